@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, TypeVar
 from shm import __version__
 from shm.errors import NothingThere, UsageError
 from shm.identify import Identification
-from shm.report.contents import DiagnosisSheet, HangerReport, ModalTestReport, TrendRow, trend_row
+from shm.report.contents import (
+    DiagnosisSheet,
+    HangerReport,
+    ModalTestReport,
+    TrendRow,
+    summary_of,
+    trend_row,
+)
 from shm.report.figures.gap_causes import FIGURE as CAUSES
 from shm.report.figures.gap_check import FIGURE as CHECK
 from shm.report.figures.gap_map import FIGURE as GAP_MAP
@@ -27,7 +34,6 @@ from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.modal_test_modes import SHAPES, STABILISATION
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.modal_test_response import Shown
-from shm.report.figures.parameter_pairs import FIGURE as PAIRS
 from shm.report.figures.specification import Member
 from shm.values import Diagnosis, GapCheck, Hanger, ModalTest, Posterior
 
@@ -40,7 +46,6 @@ __all__ = [
     "frequency_response",
     "gap",
     "gap_check",
-    "pairs",
     "shapes",
     "stabilisation",
     "stiffness",
@@ -107,15 +112,6 @@ def frequencies(posterior: Posterior, test: ModalTest | Identification, hanger: 
     """
     modal = test.test if isinstance(test, Identification) else test
     return _drawn(FREQUENCIES, _report(posterior, hanger, tests=(modal,)))
-
-
-def pairs(posterior: Posterior, hanger: Hanger) -> Figure:
-    """Each parameter alone and each against each other, with their correlations.
-
-    Example:
-        >>> figure = shm.plot.pairs(posterior, hanger)
-    """
-    return _drawn(PAIRS, _report(posterior, hanger))
 
 
 def frequency_response(test: Identification, hanger: Hanger | None = None) -> Figure:
@@ -216,7 +212,7 @@ def _report(
     """Return the data that the figures of a hanger are drawn from."""
     return HangerReport(
         bridge="",
-        hanger=hanger,
+        now=summary_of(hanger, tests[-1] if tests else ModalTest("", ()), posterior, baseline),
         tests=tests,
         posterior=posterior,
         generated_at=datetime.now(UTC),

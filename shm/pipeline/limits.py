@@ -82,7 +82,7 @@ def _alert(
         return None
     from shm.report.hanger_status import off_limits  # it computes: not before it is needed
 
-    lead = off_limits(hanger, point.averaged)
+    lead = off_limits(hanger, point.averaged, f" by test {point.test}")
     key = f"hanger-{hanger.id}:{_KIND}:{limit.side}-{limit.tension_n:.12g}:{point.test_id}"
     key += f":again-{same[-1].id}" if same else ""
     sure = "above 0.99" if probability > 0.99 else f"{probability:.2f}"

@@ -1,7 +1,4 @@
-"""A paper as plain text for a terminal.
-
-Figures are left out, and the figures on top, which the summary tells; tables as far as they say.
-"""
+"""A paper as plain text for a terminal: all of it without figures, or what fits a screen."""
 
 from __future__ import annotations
 
@@ -22,8 +19,18 @@ _LONGEST_NUMBER = 12
 _LEAST = 9
 
 
+def as_brief_text(paper: Paper, width: int = WIDTH) -> str:
+    """Return what fits a screen: state, action, reason, and the figures on top."""
+    first = paper.parts[0]
+    blocks = [*_underlined(paper.headline, "=", width), *_part(replace(first, tables=()), width)]
+    if first.facts:
+        blocks.append(laid_out(Table("", ("", "", ""), tuple(first.facts)), width).lstrip())
+    blocks += [laid_out(in_terminal(table), width) for table in first.brief]
+    return "\n".join([*blocks, *([_folded(paper.more, width)] if paper.more else []), ""])
+
+
 def as_text(paper: Paper, width: int = WIDTH) -> str:
-    """The document in lines of at most `width` columns, unless a single word is longer."""
+    """Return all of it in lines of at most `width` columns, unless a single word is longer."""
     first, *others = paper.parts
     blocks = [*_underlined(paper.headline, "=", width), *_part(first, width)]
     for part in others:
@@ -88,7 +95,8 @@ def laid_out(table: Table, width: int = WIDTH) -> str:
 
 
 def _columns(table: Table, widths: list[int]) -> list[str]:
-    lines = [*_lines(table.headings, widths), _GAP.join("-" * width for width in widths)]
+    head = [*_lines(table.headings, widths), _GAP.join("-" * width for width in widths)]
+    lines = head if any(table.headings) else []
     for row in table.rows:
         lines += _lines(row, widths)
     return lines

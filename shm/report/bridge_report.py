@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from shm.documents import averaged_document, drift_document
+from shm.documents import drift_document
 from shm.report import formatting
 from shm.report.bar_table import bar_document, bars_table
-from shm.report.contents import BridgeReport, Course, HangerLine, hangers_unit
+from shm.report.contents import BridgeReport, hangers_unit
 from shm.report.figures.every_figure import bridge_figures
 from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
+from shm.report.hanger_summary import Course, HangerSummary
 from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, filled
 from shm.report.shared_tables import lineage, settings
 from shm.report.shifts import _day, pattern_tables, shift_cells
@@ -37,7 +38,8 @@ def bridge_paper(data: BridgeReport) -> Paper:
                 lead=data.message.words,
                 summary=details(data),
                 facts=facts(data),
-                tables=(bars_table([line.bar for line in data.hangers]),),
+                tables=filled(bars_table([line.bar for line in data.hangers])),
+                brief=[_glance(data)],
             ),
             Part("Along the bridge", figures=lambda: bridge_figures(data)),
             Part("Numbers", tables=tables(data)),
@@ -45,7 +47,36 @@ def bridge_paper(data: BridgeReport) -> Paper:
         generated_at=data.generated_at,
         version=data.version,
         closing=f"{CREDIBLE}; times are UTC.",
+        more="All of it: `shm report --bridge --full`, or `--out bridge.pdf`.",
     )
+
+
+def _glance(data: BridgeReport) -> Table:
+    """Return each hanger's state, tension and change in few columns."""
+    unit = hangers_unit(data.hangers)
+    return Table(
+        "",
+        ("hanger", "state", f"tension, {unit.name}", "since the baseline", "open alerts"),
+        tuple(
+            (
+                str(line.hanger.id),
+                line.status.value if line.status else "no test",
+                _short_tension(line, unit),
+                rounded_percent(change.mean, change.width / 2, "+") if change else "",
+                str(line.open_alerts or ""),
+            )
+            for line in data.hangers
+            for change in (line.change,)
+        ),
+    )
+
+
+def _short_tension(line: HangerSummary, unit: ForceUnit) -> str:
+    if line.tension_n is None:
+        return ""
+    if not line.is_determined:
+        return "not determined"
+    return formatting.with_half(line.tension_n, unit).removesuffix(f" {unit.name}")
 
 
 def facts(data: BridgeReport) -> tuple[Fact, ...]:
@@ -53,8 +84,8 @@ def facts(data: BridgeReport) -> tuple[Fact, ...]:
     tested = [line for line in data.hangers if line.latest is not None]
     alert, watch = (of_status(data.hangers, each) for each in (Status.ALERT, Status.WATCH))
     opened = sum(line.open_alerts for line in data.hangers)
-    latest = max((line.latest for line in tested if line.latest), default=None)
-    oldest = min((line.latest for line in tested if line.latest), default=None)
+    times = [line.latest.time for line in tested if line.latest]
+    latest, oldest = max(times, default=None), min(times, default=None)
     return (
         ("Hangers", str(len(data.hangers)), f"{len(tested)} of them tested"),
         ("In alert", str(len(alert)), named(alert) if alert else "no hanger"),
@@ -85,7 +116,7 @@ def advice(data: BridgeReport) -> tuple[str, ...]:
     found = [data.message.lead.action]
     if opened := [line for line in data.hangers if line.open_alerts]:
         found.append(f"Acknowledge the open alerts of {named(opened)} (`shm alerts ack`).")
-    if wide := [line for line in data.hangers if line.is_hardly_known]:
+    if wide := [e for e in data.hangers if e.latest and not e.is_determined]:
         found.append(
             f"Identify more modes of {named(wide)}: the interval of the tension is wider than half "
             "the tension itself."
@@ -95,11 +126,11 @@ def advice(data: BridgeReport) -> tuple[str, ...]:
     return tuple(found)
 
 
-def of_status(lines: Sequence[HangerLine], status: Status | None) -> list[HangerLine]:
+def of_status(lines: Sequence[HangerSummary], status: Status | None) -> list[HangerSummary]:
     return [line for line in lines if line.status is status]
 
 
-def named(lines: Sequence[HangerLine]) -> str:
+def named(lines: Sequence[HangerSummary]) -> str:
     """`hanger 3`, `hangers 3, 4 and 7`."""
     numbers = formatting.listed([str(line.hanger.id) for line in lines])
     return f"hanger {numbers}" if len(lines) == 1 else f"hangers {numbers}"
@@ -187,15 +218,15 @@ def _hangers(data: BridgeReport) -> Table:
     )  # fmt: skip
 
 
-def _said(line: HangerLine, name: str, unit: ForceUnit) -> str:
+def _said(line: HangerSummary, name: str, unit: ForceUnit) -> str:
     """One of `_BESIDE` of a hanger; empty where it is not known."""
-    return str(getattr(stated(line.averaged, unit), name)) if line.averaged else ""
+    return str(getattr(stated(line.tension, unit), name)) if line.tension else ""
 
 
-def _hanger(line: HangerLine, beside: tuple[str, ...], unit: ForceUnit) -> tuple[str, ...]:
+def _hanger(line: HangerSummary, beside: tuple[str, ...], unit: ForceUnit) -> tuple[str, ...]:
     name = f"{line.hanger.id} {line.hanger.name}".strip()
     opened = str(line.open_alerts or "none")
-    if line.tension_n is None or line.status is None:
+    if line.latest is None or line.tension_n is None or line.status is None:
         unknown = ["not known"] * (2 + len(beside))
         return (name, "no test", *unknown, opened, "none")
     share = line.of_nominal
@@ -206,7 +237,7 @@ def _hanger(line: HangerLine, beside: tuple[str, ...], unit: ForceUnit) -> tuple
         *(text or "not known" for text in beside),
         formatting.with_span(share) if share else "no nominal",
         opened,
-        _day(line.latest),
+        _day(line.latest.time),
     )
 
 
@@ -221,7 +252,7 @@ def _since_baseline(data: BridgeReport) -> Table:
             "called",
         ),
         tuple(
-            (str(line.hanger.id), *_shifted(line.drift), line.called or "nothing")
+            (str(line.hanger.id), *_shifted(line.drift), line.detected or "nothing")
             for line in data.hangers
             if line.drift
         ),
@@ -252,7 +283,7 @@ def _courses(data: BridgeReport) -> Table:
     )
 
 
-def _course(line: HangerLine, course: Course) -> tuple[str, ...]:
+def _course(line: HangerSummary, course: Course) -> tuple[str, ...]:
     change = course.change
     return (
         str(line.hanger.id),
@@ -269,12 +300,12 @@ def _tests(data: BridgeReport) -> Table:
         tuple(
             (
                 str(line.hanger.id),
-                line.test,
-                formatting.moment(line.latest),
-                formatting.model_class(line.model),
+                line.latest.name,
+                formatting.moment(line.latest.time),
+                formatting.model_class(line.latest.model),
             )
             for line in data.hangers
-            if line.test
+            if line.latest
         ),
         note="Their files and checksums: shm report --hanger N.",
     )
@@ -311,15 +342,14 @@ def bridge_json(data: BridgeReport) -> dict[str, Any]:
                 "hanger": line.hanger.id,
                 "name": line.hanger.name,
                 "bar": bar_document(line.bar),
-                **line.message.document,
+                **line.document,
                 "warnings": list(line.warnings),
-                "latest": line.latest,
+                "latest": line.latest and line.latest.time,
                 "tension_n": asdict(line.tension_n) if line.tension_n else None,
-                "averaged": averaged_document(line.averaged) if line.averaged else None,
                 "drift": drift_document(line.drift) if line.drift else None,
-                "test": line.test or None,
-                "model": line.model or None,
-                "called": line.called,
+                "test": line.latest and line.latest.name,
+                "model": line.latest and (line.latest.model or None),
+                "called": line.detected,
                 "open_alerts": line.open_alerts,
                 "in_period": asdict(line.course) if line.course else None,
             }

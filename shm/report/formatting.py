@@ -231,16 +231,16 @@ def plain(value: float, digits: int = 3, absent: str = "not known") -> str:
 
 
 def probability(value: float) -> str:
-    """Three decimals, with no certainty pretended."""
+    """Return two decimals, as alerts do, with no certainty pretended."""
     if not math.isfinite(value):
         return "not known"
-    if value > 0.999:
-        return "> 0.999"
-    return "< 0.001" if value < 0.001 else f"{value:.3f}"
+    if value > 0.995:
+        return "> 0.99"
+    return "< 0.01" if value < 0.005 else f"{value:.2f}"
 
 
 def told_probability(value: float) -> str:
-    """The same in a sentence: `above 0.999`, `0.966`."""
+    """Return the same in a sentence: `above 0.99`, `0.97`."""
     return probability(value).replace("> ", "above ").replace("< ", "below ")
 
 
@@ -262,8 +262,8 @@ def quantity(name: str) -> str:
     return name.replace("_", " ")
 
 
-def meaning(posterior: Posterior, name: str) -> str:
-    """Return what a parameter is, with its unit.
+def meaning(posterior: Posterior, name: str, *, with_unit: bool = True) -> str:
+    """Return what a parameter is, with its unit unless that stands with its value.
 
     A parameter of an adopted effect has the name that the catalogue gives it.
     """
@@ -276,6 +276,8 @@ def meaning(posterior: Posterior, name: str) -> str:
     elif unit == "N/m" and called in _FACE_SPRINGS:
         called, unit = f"spring {called} ({_FACE_SPRINGS[called]})", "N/m per node"
     effect = name.rpartition(".")[0].replace("_", " ")
+    if not with_unit:
+        return f"{effect and effect + ': '}{called}"
     logarithm = "log10 of " if is_logarithm(name) else ""
     return f"{effect and effect + ': '}{logarithm}{called}{unit and ' in ' + unit}"
 

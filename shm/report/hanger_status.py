@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from shm.report import formatting
 from shm.report.formatting import Interval
@@ -20,6 +20,9 @@ from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
 from shm.watch.alert_text import lead_of
 from shm.watch.change_words import look_again, quantity_words, size_words
+
+if TYPE_CHECKING:
+    from shm.report.hanger_summary import HangerSummary
 
 WATCH_PROBABILITY = 0.5  # likelier than not
 # Judgement: dead load and erection leave the hangers of sound bridges some 10 % off nominal. With
@@ -30,6 +33,9 @@ OFF_NOMINAL = 0.15
 _DOUBTS = frozenset({"check the modes", "check the baseline", "limit", "silent"})
 _BEYOND = "beyond threshold"
 _CHANGES = frozenset({_BEYOND, "sudden change", "slow drift"})
+
+
+UNDETERMINED = "These modes do not determine the tension"
 
 
 class Status(Enum):
@@ -45,29 +51,6 @@ class Status(Enum):
 
 QUIET = (Status.STEADY, Status.FIRST)
 """States in which nothing was found."""
-
-
-@dataclass(frozen=True)
-class Known:
-    """All that the message of a hanger rests on.
-
-    `latest` is when it was tested last, None before the first test; `drifts` are those of that
-    test from the baseline in force, `called` the changes detected since, `standing` the alerts
-    whose condition has not ended, the oldest first. `notes` say what people did about these.
-    `unwatched` says that nothing has looked at the hanger for too long.
-    """
-
-    hanger: Hanger
-    tension: Averaged | None = None
-    latest: datetime | None = None
-    test: str = ""
-    is_first: bool = False
-    drifts: Sequence[Drift] = ()
-    called: Sequence[Change] = ()
-    standing: Sequence[Alert] = ()
-    warnings: Sequence[str] = ()
-    notes: tuple[str, ...] = ()
-    unwatched: Lead | None = None
 
 
 @dataclass(frozen=True)
@@ -185,7 +168,7 @@ def _how_soon(needing: Mapping[int, HangerMessage], others: Iterable[int]) -> st
     return f"Other hangers that need action {said[0]}.{''.join(rest)}" if said else ""
 
 
-def hanger_message(known: Known) -> HangerMessage:
+def hanger_message(known: HangerSummary) -> HangerMessage:
     """Decide state, action, urgency and reasons of a hanger, for every place that shows them."""
     status, lead = _decide(known)
     said = HangerMessage(status, lead, known.notes if status else ())
@@ -193,7 +176,7 @@ def hanger_message(known: Known) -> HangerMessage:
     return replace(said, reasons=(*said.beyond_lead(known.warnings), *caveats))
 
 
-def _decide(known: Known) -> tuple[Status | None, Lead]:
+def _decide(known: HangerSummary) -> tuple[Status | None, Lead]:
     name = f"Hanger {known.hanger.id}"
     if known.latest is None and not known.standing:
         return None, Lead(f"{name}: no test yet.", f"Test it {NEXT_TEST}.")
@@ -227,14 +210,14 @@ def _decide(known: Known) -> tuple[Status | None, Lead]:
     return _quiet(known, status)
 
 
-def _in_doubt(known: Known) -> Lead:
+def _in_doubt(known: HangerSummary) -> Lead:
     """Return what to do about a tension whose caveats say that something is wrong."""
     name, check = f"Hanger {known.hanger.id}", "Check its description and the numbers of its modes"
     if known.tension is None or known.tension.is_usable:
         return Lead(f"{name}: its tension is in doubt.", f"{check} {NEXT_TEST}.")
     if not known.tension.has_converged:
         check = "Raise `samples` in bridge.toml and run"
-        check += f" `shm ingest --again {known.test} --from updated`"
+        check += f" `shm ingest --again {known.latest.name if known.latest else ''} --from updated`"
     return Lead(f"{name}: do not use its tension.", f"{check} {WEEK}.")
 
 
@@ -286,7 +269,7 @@ def status_of(
 # ---------------------------------------------------------------- what was found
 
 
-def _of_change(known: Known) -> Lead:
+def _of_change(known: HangerSummary) -> Lead:
     """What was found to have changed; else what an alert of another kind asks for."""
     hanger, drifts = known.hanger, known.drifts
     beyond, change = _beyond(known), _change(known)
@@ -305,7 +288,7 @@ def _of_change(known: Known) -> Lead:
     return Lead(state, f"{look_again(hanger)} {WEEK}.")
 
 
-def _beyond(known: Known) -> list[Drift]:
+def _beyond(known: HangerSummary) -> list[Drift]:
     """The shifts beyond their threshold, as the latest test has them.
 
     What an alert said stays as sure as it was while it stands; where two tests that agree said it,
@@ -318,7 +301,7 @@ def _beyond(known: Known) -> list[Drift]:
         for told in alert.drifts if _BEYOND in alert.kinds else ():
             key = _way(told)
             newest = now.get(key, told)
-            is_of_latest = alert.test == known.test
+            is_of_latest = known.latest is not None and alert.test == known.latest.name
             seen = newest if not is_of_latest and newest.may_be_beyond(told.shift_mean) else told
             found[key] = replace(seen, probability=max(seen.probability, told.probability))
     return list(found.values())
@@ -328,7 +311,7 @@ def _way(drift: Drift) -> tuple[str, bool]:
     return drift.quantity, drift.shift_mean < 0
 
 
-def _change(known: Known) -> Change | None:
+def _change(known: HangerSummary) -> Change | None:
     """That of the newest alert that stands; else the last that was detected."""
     told = [each.change for each in known.standing if each.change and _CHANGES & set(each.kinds)]
     return told[-1] if told else known.called[-1] if known.called else None
@@ -342,7 +325,7 @@ def _first(leads: Sequence[Lead]) -> Lead:
 # ---------------------------------------------------------------- nothing was found
 
 
-def _quiet(known: Known, status: Status) -> tuple[Status, Lead]:
+def _quiet(known: HangerSummary, status: Status) -> tuple[Status, Lead]:
     """Where nothing was found: whether it could have been, and what the tension is."""
     name = f"Hanger {known.hanger.id}"
     off = _off_limits(known)
@@ -356,6 +339,9 @@ def _quiet(known: Known, status: Status) -> tuple[Status, Lead]:
         )
         if known.hanger.has_sensors:
             more = "No action is needed: the next days will be warmer or colder."
+        if not known.is_determined:
+            more = f"Identify more modes {NEXT_TEST}, or state length and ends more exactly."
+            return status, Lead(f"{name}: {UNDETERMINED[0].lower()}{UNDETERMINED[1:]}.", more)
         return status, Lead(f"{name}: tension {_tension(known.tension)} by its first test.", more)
     drift = next((each for each in known.drifts if each.quantity == TENSION), None)
     if drift is None or not math.isfinite(drift.shift_mean + drift.shift_sd):
@@ -377,20 +363,20 @@ def _quiet(known: Known, status: Status) -> tuple[Status, Lead]:
     )
 
 
-def off_limits(hanger: Hanger, tension: Averaged) -> Lead | None:
-    """That the tension is beyond the owner's limits."""
+def off_limits(hanger: Hanger, tension: Averaged, by: str = "") -> Lead | None:
+    """Return that the tension is beyond its owner's limits, `by` which test; None where not."""
     for probability, words, soon in (
         (tension.probability_slack, "below its lower limit", TODAY),
         (tension.probability_above_limit, "above its upper limit", WEEK),
     ):
         if probability > WATCH_PROBABILITY:
             doubt = "" if probability >= hanger.thresholds.alert_probability else "probably "
-            state = f"Hanger {hanger.id}: tension {_tension(tension)} is {doubt}{words}."
+            state = f"Hanger {hanger.id}: tension {_tension(tension)}{by} is {doubt}{words}."
             return Lead(state, f"{look_again(hanger)} {soon}, and compare it with its design.")
     return None
 
 
-def _off_limits(known: Known) -> Lead | None:
+def _off_limits(known: HangerSummary) -> Lead | None:
     """That the tension is beyond the owner's limits; without limits, far off the nominal one."""
     hanger, tension = known.hanger, known.tension
     if tension is None or not tension.is_usable:

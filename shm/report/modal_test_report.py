@@ -13,7 +13,9 @@ from shm import modes_document
 from shm.report import formatting
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.contents import ModalTestReport
+from shm.report.figures.bar_sketch import FIGURE as SKETCH
 from shm.report.figures.every_figure import modal_test_figures
+from shm.report.figures.specification import drawn
 from shm.report.figures.style import VERDICT_STYLES
 from shm.report.paper import Fact, Paper, Part, Table, filled
 from shm.report.shared_tables import added_mass, headline, lineage, overall, quality_table, settings
@@ -34,7 +36,9 @@ def modal_test_paper(sheet: ModalTestReport) -> Paper:
                 "In short",
                 summary=summary(sheet),
                 facts=facts(sheet),
+                figures=lambda: drawn((SKETCH,), sheet.bar),
                 tables=(bar_table(sheet.bar),),
+                brief=filled(replace(modes(sheet), note="")),
             ),
             Part("Modes and quality", tables=results(sheet)),
             Part("Figures", figures=lambda: modal_test_figures(sheet)),

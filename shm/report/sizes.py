@@ -58,13 +58,19 @@ class Size:
 
 
 def size(estimate: EffectEstimate) -> Size:
-    """An estimate in the unit and prefix that suit it; logarithms as what they are of."""
+    """Return an estimate in the unit and prefix that suit it; a logarithm as what it is of."""
     interval = Interval(estimate.mean, estimate.q05, estimate.q95)
-    if logarithmic := is_logarithm(estimate.name):
-        interval = Interval(
-            *(10.0**value for value in (interval.mean, interval.low, interval.high))
-        )
-    scale, unit = _FACTORS.get(estimate.unit, (1.0, estimate.unit))
+    return size_of(estimate.name, estimate.unit, interval)
+
+
+def size_of(name: str, unit: str, interval: Interval) -> Size:
+    """Return the size of a parameter by its name, `unit` and 90 % interval.
+
+    Of a log10 the unit is that of the quantity; it is given as the quantity.
+    """
+    if logarithmic := is_logarithm(name):
+        interval = Interval(*(10.0**each for each in (interval.mean, interval.low, interval.high)))
+    scale, unit = _FACTORS.get(unit, (1.0, unit))
     if unit in _SCALED_UNITS:
         sizes = (pair for pair in _PREFIXES if abs(interval.mean) >= pair[0])
         divisor, prefix = next(sizes, (1.0, ""))

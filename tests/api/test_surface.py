@@ -42,7 +42,6 @@ SIGNATURES = {
     "plot.trend": "(posteriors, tests, hanger, baseline=None)",
     "plot.stiffness": "(posteriors, tests, hanger, baseline=None)",
     "plot.frequencies": "(posterior, test, hanger)",
-    "plot.pairs": "(posterior, hanger)",
     "plot.frequency_response": "(test, hanger=None)",
     "plot.stabilisation": "(test, hanger=None)",
     "plot.shapes": "(test, hanger)",

@@ -19,7 +19,6 @@ from shm.report.bridge_report import bridge_json, bridge_paper
 from shm.report.contents import (
     BridgeReport,
     Course,
-    HangerLine,
     HangerReport,
     ModalTestReport,
     TrendRow,
@@ -31,7 +30,7 @@ from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.states import CalledChange, Period, QuantityOverTime, StatesOverTime
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
 from shm.watch.state import Band
-from tests.helpers.nouns import a_change, a_message
+from tests.helpers.nouns import a_change, a_summary
 from tests.helpers.pdf_words import Pdf
 from tests.report.conftest import START
 from tests.report.diagnoses import CASES
@@ -173,14 +172,12 @@ def test_a_bridge_is_told_in_numbers_and_words(season: HangerReport, with_period
     tension = Interval(650e3, 640e3, 660e3)
     course = Course(2, 1, Interval(-0.07, -0.08, -0.06)) if with_period else None
     lines = (
-        HangerLine(season.hanger, a_message(Status.ALERT), START, tension, "", 1, season.drifts[0],
-                   "t009", "beam2", course),
-        HangerLine(replace(season.hanger, id=4), a_message(Status.FIRST), None, tension, "", 0,
-                   drift, course=Course(1) if with_period else None),
-        HangerLine(replace(season.hanger, id=5, nominal_tension_n=0.0), a_message(Status.STEADY),
-                   START, tension),
-        HangerLine(replace(season.hanger, id=6), a_message(),
-                   course=Course() if with_period else None),
+        a_summary(season.hanger, Status.ALERT, tension, open_alerts=1, drifts=season.drifts,
+                  course=course),
+        a_summary(replace(season.hanger, id=4), Status.FIRST, tension, drifts=(drift,),
+                  course=Course(1) if with_period else None),
+        a_summary(replace(season.hanger, id=5, nominal_tension_n=0.0), Status.STEADY, tension),
+        a_summary(replace(season.hanger, id=6), course=Course() if with_period else None),
     )  # fmt: skip
     period = Period(START, season.generated_at) if with_period else None
     data = BridgeReport(

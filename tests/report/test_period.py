@@ -13,7 +13,7 @@ from shm.report.as_text import as_text
 from shm.report.contents import HangerReport
 from shm.report.formatting import Interval
 from shm.report.hanger_report import hanger_json, hanger_paper
-from shm.report.hanger_summary import in_period, summary
+from shm.report.hanger_sentences import in_period, summary
 from shm.report.hanger_tables import numbers, origins
 from shm.report.hanger_tables import period as period_table
 from shm.report.states import Period, period_since

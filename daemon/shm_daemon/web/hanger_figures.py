@@ -1,5 +1,5 @@
 """The figures of the page of a hanger: its tests over time and over temperature; how the model's
-frequencies fit, which class it is, what is open, and the causes of that.
+frequencies fit, what is open, and the causes of that.
 """
 
 from __future__ import annotations
@@ -20,11 +20,9 @@ from shm.report.figures import (
     hanger_stiffness,
     hanger_trend,
 )
-from shm.report.figures.gap_causes import Bar, probability_bars
 from shm.report.figures.gap_map import kept, measured
 from shm.report.figures.hanger_frequencies import FIGURE as OF_REPORT
 from shm.report.figures.hanger_frequencies import compared_modes
-from shm.report.figures.parameter_pairs import FIGURE as OF_PAIRS
 from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
 from shm.report.figures.time_axes import bounds_of, part, places, single_tests, thinned_words
 from shm.report.formatting import Interval
@@ -96,6 +94,9 @@ def _course(view: HangerView) -> hanger_trend.Course:
             if event.kind is kind
         ],
         notes=view.notes,
+        excluded=hanger_trend.excluded([point.time for point in view.trend], states)
+        if states
+        else (),
         remark=_remark(view),
     )
 
@@ -234,26 +235,6 @@ def report_of(view: HangerView) -> HangerReport:
     return view.report
 
 
-def _rows(view: HangerView) -> list[tuple[str, float]]:
-    """Names and probabilities of the model classes, the most probable first."""
-    found = view.report.selection if view.report else None
-    if found is None:
-        return []
-    return [
-        (formatting.model_class(posterior.model), share)
-        for posterior, share in zip(found.posteriors, found.probabilities, strict=True)
-    ]
-
-
-def _chosen(view: HangerView) -> str:
-    return formatting.model_class(report_of(view).posterior.model)
-
-
-def _alt_of_models(view: HangerView) -> str:
-    told = [f"{name} {formatting.probability(share)}" for name, share in _rows(view)]
-    return f"Probabilities of the model classes: {'; '.join(told)}."
-
-
 FIGURES: tuple[HangerFigure, ...] = (
     HangerFigure(
         "trend",
@@ -299,32 +280,6 @@ FIGURES: tuple[HangerFigure, ...] = (
         lambda view: OF_REPORT.caption(report_of(view)),
         lambda view: OF_REPORT.alt(report_of(view)),
         height_px=380,  # judgement: the usual, with words below the axis
-    ),
-    HangerFigure(
-        "models",
-        "Model classes",
-        "model",
-        lambda view: len(_rows(view)) > 1,
-        lambda view: probability_bars(
-            [Bar(name, p, "blue" if name == _chosen(view) else "quiet") for name, p in _rows(view)]
-        ),
-        lambda view: (
-            "Probability of each model class given the tests on which they were compared, all "
-            f"equally probable before. Blue: the class in force, {_chosen(view)}."
-        ),
-        _alt_of_models,
-        height_px=240,  # judgement: a bar for each of a few classes
-    ),
-    HangerFigure(
-        "pairs",
-        OF_PAIRS.title,
-        "model",
-        lambda view: view.report is not None and len(view.report.posterior.names) > 1,
-        lambda view: OF_PAIRS.draw(report_of(view)),
-        lambda view: OF_PAIRS.caption(report_of(view)),
-        lambda view: OF_PAIRS.alt(report_of(view)),
-        height_px=760,  # judgement: a grid of a panel for each pair, nearly square
-        is_wide=True,
     ),
     HangerFigure(
         "gap_map",

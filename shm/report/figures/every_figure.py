@@ -6,19 +6,18 @@ from collections.abc import Container
 
 from shm.report.contents import BridgeReport, DiagnosisSheet, HangerReport, ModalTestReport
 from shm.report.figures.along_the_bridge import SHIFTS, TENSIONS
-from shm.report.figures.gap_before_and_after import BEFORE_AND_AFTER, GAP_TENSION
+from shm.report.figures.gap_before_and_after import BEFORE_AND_AFTER
 from shm.report.figures.gap_causes import FIGURE as CAUSES
 from shm.report.figures.gap_causes import SHARED
 from shm.report.figures.gap_check import FIGURE as CHECK
 from shm.report.figures.gap_map import FIGURE as GAP_MAP
 from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
-from shm.report.figures.hanger_frequencies import RESPONSE as RESPONSE_OF_LATEST
 from shm.report.figures.hanger_states import FIGURE as STATES
 from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
 from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.modal_test_hits import FIGURE as HITS
-from shm.report.figures.modal_test_modes import DAMPING, SHAPES, STABILISATION
+from shm.report.figures.modal_test_modes import SHAPES, STABILISATION
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.modal_test_response import Shown
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
@@ -26,12 +25,12 @@ from shm.report.figures.specification import Illustration, Member, drawn
 from shm.values import BridgeDiagnosis, GapCheck
 
 OF_HANGER: tuple[Member[HangerReport], ...] = (
-    TREND, STATES, TENSION, FREQUENCIES, RESPONSE_OF_LATEST, STIFFNESS
+    TREND, STATES, TENSION, FREQUENCIES, STIFFNESS
 )  # fmt: skip
 OF_MODAL_TEST: tuple[Member[Shown], ...] = (
-    TIME_HISTORY, HITS, RESPONSE, STABILISATION, SHAPES, DAMPING
+    TIME_HISTORY, HITS, RESPONSE, STABILISATION, SHAPES
 )  # fmt: skip
-OF_DIAGNOSIS: tuple[Member[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER, GAP_TENSION)
+OF_DIAGNOSIS: tuple[Member[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER)
 OF_BRIDGE_DIAGNOSIS: tuple[Member[BridgeDiagnosis], ...] = (SHARED,)
 OF_GAP_CHECK: tuple[Member[GapCheck], ...] = (CHECK,)
 OF_HANGER_NAMES = frozenset(each.name for each in OF_HANGER)

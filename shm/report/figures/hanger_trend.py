@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 
@@ -15,7 +15,7 @@ from shm.report.contents import HangerReport
 from shm.report.figures import specification as spec
 from shm.report.figures import time_axes
 from shm.report.formatting import Interval
-from shm.report.states import CalledChange, QuantityOverTime
+from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
 from shm.values import FloatArray
 from shm.values.notes import Note, NoteKind
 from shm.values.rounding import ForceUnit, force_unit
@@ -49,7 +49,8 @@ class Course:
     """The tension of a hanger over time: n tests in N, and what is known beside them.
 
     `alerts` say by the place of a test why it raised one. `state` is at `state_times`; `changes`
-    are those that were detected, None where that is not known. `remark` ends the caption.
+    are those that were detected, None where that is not known. `excluded` are the places of tests
+    taken for blunders: no axis reaches to them for their sake. `remark` ends the caption.
     """
 
     times: Sequence[datetime]
@@ -65,6 +66,7 @@ class Course:
     changes: Sequence[CalledChange] | None = None
     deeds: Sequence[Deed] = ()
     notes: Sequence[Note] = ()
+    excluded: Collection[int] = ()
     remark: str = ""
     bounds_n: Bounds = field(init=False)
 
@@ -205,11 +207,16 @@ def _noted(notes: Sequence[Note]) -> list[Deed]:
 def _range(course: Course, scale: float) -> tuple[float, float]:
     """Tests, state, baseline, thresholds and a nominal tension near them; lone intervals may lie
     beyond."""
-    seen: list[FloatArray] = [course.bounds_n.middle]
+    counted = np.ones(len(course.times), bool)
+    counted[list(course.excluded)] = len(course.excluded) == len(course.times)
+    seen: list[FloatArray] = [course.bounds_n.middle[counted]]
     if course.baseline_n is not None:
         seen.append(course.baseline_n * np.array([1 - course.reach, 1 + course.reach]))
-    bounds = course.bounds_n if course.state is None else course.state.filtered
-    seen += [time_axes.inner(bounds.low), time_axes.inner(bounds.high)]
+    if course.state is None:
+        lows, highs = course.bounds_n.low[counted], course.bounds_n.high[counted]
+    else:
+        lows, highs = course.state.filtered.low, course.state.filtered.high
+    seen += [time_axes.inner(lows), time_axes.inner(highs)]
     low, high = spec.limits(*seen)
     if 2 * low - high < course.nominal_n < 2 * high - low:
         low, high = spec.limits(*seen, [course.nominal_n])
@@ -261,6 +268,7 @@ def _marks(course: Course) -> str:
         "upright spans: when a detected change began, with 90 % probability"
         if course.changes
         else "",
+        "tests taken for blunders may lie beyond the view" if course.excluded else "",
         "at the foot: what was set, adopted, seen or repaired"
         if course.deeds or course.notes
         else "",
@@ -300,8 +308,17 @@ def _course(data: HangerReport) -> Course:
         reach=data.hanger.thresholds.tension_shift_fraction,
         alerts={i: alerted[r.row.test] for i, r in enumerate(rows) if r.row.test in alerted},
         notes=data.inspections,
+        excluded=excluded([row.time for row in rows], data.states),
         remark=left,
     )
+
+
+def excluded(times: Sequence[datetime], states: StatesOverTime) -> tuple[int, ...]:
+    """Return the places of the tests that the watch takes for blunders."""
+    outliers = {
+        time for time, is_outlier in zip(states.times, states.outlier, strict=True) if is_outlier
+    }
+    return tuple(place for place, time in enumerate(times) if time in outliers)
 
 
 FIGURE = spec.Member[HangerReport](
