@@ -7,17 +7,28 @@ notebook is enough for its figures; elsewhere `%load_ext shm.notebook`.
 from __future__ import annotations
 
 import io
+import math
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from shm.report.formatting import Interval
-    from shm.values import Diagnosis, GapCheck, Hanger, ModalTest, Posterior, Selection
+    from shm.values import (
+        Diagnosis,
+        FloatArray,
+        GapCheck,
+        Hanger,
+        ModalTest,
+        Posterior,
+        Recording,
+        Selection,
+    )
 
 _CAUSES_SHOWN = 5  # technical: rows of a cell's table
 _WIDTH = 88  # technical: characters of a line in a notebook's cell
@@ -74,7 +85,7 @@ class Sheet:
 
 
 def sheet(value: Any) -> Sheet:
-    """That of a hanger, modal test, posterior, selection, diagnosis or check."""
+    """Return that of a recording, hanger, modal test, posterior, selection, diagnosis or check."""
     return _SHEETS[type(value).__name__](value)
 
 
@@ -104,6 +115,42 @@ def _modal_test(test: ModalTest) -> Sheet:
     when = f"{formatting.moment(test.time)}, {formatting.temperature(test.temperature_c)}"
     title = f"Modal test {test.id}{whose}, {when}"
     return Sheet(title, MODE_HEADINGS, [mode_row(mode) for mode in test.modes])
+
+
+def _recording(recording: Recording) -> Sheet:
+    """Show how long, when and how warm, and each channel with its largest value."""
+    import numpy as np
+
+    from shm.report import formatting
+
+    whose = "" if recording.hanger is None else f" of hanger {recording.hanger}"
+    title = (
+        f"Recording {Path(recording.source).name}{whose}, {recording.duration_s:.4g} s at "
+        f"{recording.sampling_rate_hz:g} Hz, {formatting.moment(recording.time)}, "
+        f"{formatting.temperature(recording.temperature_c)}"
+    )
+    units = {"force": "N", "acceleration": "m/s²"}
+    rows = [
+        (
+            channel.name,
+            channel.quantity,
+            channel.plane or "not stated",
+            f"{channel.x_m:.2f} m" if math.isfinite(channel.x_m) else "not stated",
+            f"{formatting.plain(_largest(channel.values))} {units[channel.quantity]}",
+            formatting.counted(int(np.isnan(channel.values).sum()), "gap"),
+        )
+        for channel in recording.channels
+    ]
+    head = ("channel", "quantity", "plane", "place", "largest value", "missing samples")
+    return Sheet(title, head, rows)
+
+
+def _largest(values: FloatArray) -> float:
+    """Return the largest absolute value; NaN where no sample is known."""
+    import numpy as np
+
+    known = np.abs(values[np.isfinite(values)])
+    return float(known.max()) if len(known) else math.nan
 
 
 def _posterior(posterior: Posterior) -> Sheet:
@@ -170,7 +217,7 @@ def _selection(selection: Selection) -> Sheet:
             )
         )
     head = ("class", "probability", "log evidence", *formatting.tension_headings(unit))
-    averaged = selection.averaged()
+    averaged = selection.averaged
     lead = (*averaged.caveats, " ".join(stated(averaged, unit).sentences))
     return Sheet(f"{_whose(selection.selected)}, model classes", head, rows, lead=lead)
 
@@ -238,5 +285,6 @@ _SHEETS: dict[str, Callable[[Any], Sheet]] = {
     "Hanger": _hanger,
     "ModalTest": _modal_test,
     "Posterior": _posterior,
+    "Recording": _recording,
     "Selection": _selection,
 }

@@ -130,7 +130,7 @@ class Store:
         if found is None:
             raise NothingThere(
                 f"no model class is selected for hanger {hanger_id} yet.",
-                remedy="Ingest tests of it.",
+                remedy="Take tests of it into the workspace, or call shm.select(tests, hanger).",
             )
         return found.selection
 
@@ -141,7 +141,7 @@ class Store:
         if found is None:
             raise NothingThere(
                 f"the gap of hanger {hanger_id} has not been diagnosed yet.",
-                remedy=f"Run `shm gap diagnose --hanger {hanger_id}`.",
+                remedy=f"Call shm.diagnose(store.tests({hanger_id}), store.hanger({hanger_id})).",
             )
         return found.diagnosis
 

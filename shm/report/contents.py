@@ -169,7 +169,7 @@ class HangerReport:
     @cached_property
     def by_latest_test(self) -> Averaged:
         """Return the tension that the latest test gives by itself, over all model classes."""
-        return self.compared.averaged(self.hanger.limits)
+        return self.compared.averaged_with(self.hanger.limits)
 
     @property
     def averaged(self) -> Averaged:

@@ -31,6 +31,7 @@ UNITS = {
     "stiffness": "log10 of stiffness in N m/rad",
     "gap": "order of the mode",
     "causes": "probability",
+    "recording": "time (s)",
     "gap_check": "size, from the weakest to the strongest of its prior range",
 }
 
@@ -41,6 +42,7 @@ def drawn(
     posterior: shm.Posterior,
     test_of_711_kn: shm.ModalTest,
     identified: shm.Identification,
+    recording: shm.Recording,
 ) -> dict[str, Figure]:
     dated = replace(test_of_711_kn, time=datetime(2026, 5, 1, tzinfo=UTC))
     sprung = quick_update.update([dated], build("beam2", hanger), UpdateOptions())
@@ -54,6 +56,7 @@ def drawn(
         "stiffness": shm.plot.stiffness([sprung], [dated], hanger),
         "gap": shm.plot.gap(a_diagnosis(), hanger),
         "causes": shm.plot.causes(a_diagnosis(), hanger),
+        "recording": recording.plot(),
         "gap_check": shm.plot.gap_check(a_check()),
     }
 

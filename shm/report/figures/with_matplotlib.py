@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -48,6 +48,14 @@ def draw(figure: spec.Specification) -> Figure:
     shared = [axes for axes, panel in places if not panel.has_own_legend]
     style.legend_of_figure(made, shared, figure.legend_columns, where)
     return made
+
+
+def draw_on(figure: spec.Specification, axes: Sequence[Axes]) -> None:
+    """Draw the panels in reading order on axes that somebody else made."""
+    for each, panel in zip(axes, figure.panels, strict=True):
+        _panel(each, panel, figure)
+        if each.get_legend_handles_labels()[1]:
+            style.legend_above(each)
 
 
 def _placed(made: Figure, figure: spec.Specification) -> Iterable[tuple[Axes, spec.Panel]]:
