@@ -19,7 +19,6 @@ from shm.pipeline import rebaselining, utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.rebaselining import Order, rebaseline
 from shm.pipeline.reporting import hanger_report
-from shm.report.contents import status
 from shm.report.hanger_sentences import summary
 from shm.report.hanger_status import Status
 from shm.store import Workspace
@@ -101,7 +100,7 @@ def test_a_mistaken_mode_enters_neither_the_posterior_nor_the_watch_and_the_orig
     )
     assert mode.expected_hz < 0.8 * mode.measured_hz
     assert report.warnings == line.warnings == ()
-    assert status(report) is line.status is Status.STEADY
+    assert report.status is line.status is Status.STEADY
 
 
 def test_a_test_by_a_wrong_clock_is_left_out_and_the_hanger_is_not_quiet(
@@ -119,7 +118,7 @@ def test_a_test_by_a_wrong_clock_is_left_out_and_the_hanger_is_not_quiet(
     assert summary(report).startswith("Hanger 3: its baseline is made without test t1.")
     assert "test t1: all its frequencies" in report.lineage["left_out_of_the_baseline"]
     assert line.warnings == report.warnings
-    assert status(report) is line.status is Status.CHECK
+    assert report.status is line.status is Status.CHECK
 
 
 def test_a_new_baseline_is_checked_as_the_first_one_was(

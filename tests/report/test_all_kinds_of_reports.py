@@ -18,7 +18,6 @@ from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
 from shm.report.contents import (
     BridgeReport,
-    Course,
     HangerReport,
     ModalTestReport,
     TrendRow,
@@ -26,6 +25,7 @@ from shm.report.contents import (
 from shm.report.formatting import Interval
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_status import Status
+from shm.report.hanger_summary import Course
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.states import CalledChange, Period, QuantityOverTime, StatesOverTime
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
