@@ -188,7 +188,7 @@ def drop_measured_test(workspace: Workspace, start: datetime) -> None:
 
 
 def season_start(now: datetime) -> datetime:
-    """Return when a season begins whose last tests, two hours after its end, are just made."""
+    """Return when a season begins whose last tests were made within the last three hours."""
     return now.replace(minute=0, second=0, microsecond=0) - timedelta(weeks=SEASON_WEEKS, hours=2)
 
 
