@@ -65,7 +65,7 @@ class Sheet:
             for row in table
         ]
         lead, notes = (
-            [textwrap.fill(each, _WIDTH) for each in told] for told in (self.lead, self.notes)
+            [textwrap.fill(each, _WIDTH) for each in wording] for wording in (self.lead, self.notes)
         )
         return "\n".join([self.title, *lead, *lines, *notes])
 
@@ -79,7 +79,8 @@ class Sheet:
         )
         table = f"<caption>{escape(self.title)}</caption>{shown}<tbody>{body}</tbody>"
         lead, notes = (
-            "".join(f"<p>{escape(each)}</p>" for each in told) for told in (self.lead, self.notes)
+            "".join(f"<p>{escape(each)}</p>" for each in wording)
+            for wording in (self.lead, self.notes)
         )
         return f"{lead}<table>{table}</table>{notes}"
 
@@ -107,7 +108,7 @@ def _hanger(hanger: Hanger) -> Sheet:
 
 
 def _modal_test(test: ModalTest) -> Sheet:
-    """When and how warm, and the modes."""
+    """Show when and how warm the test was, and its modes."""
     from shm.report import formatting
     from shm.report.modal_test_report import MODE_HEADINGS, mode_row
 
@@ -181,8 +182,8 @@ def _posterior(posterior: Posterior) -> Sheet:
         f"R-hat {formatting.number(posterior.r_hat, '.3f')}."
     )
     title = f"{_whose(posterior)}, {formatting.model_class(posterior.model)}"
-    said = " ".join(stated(averaged_now(posterior), unit).sentences)
-    return Sheet(title, head, rows, (said, *posterior.caveats, sampled))
+    statement = " ".join(stated(averaged_now(posterior), unit).sentences)
+    return Sheet(title, head, rows, (statement, *posterior.caveats, sampled))
 
 
 def _frequencies(posterior: Posterior) -> Sheet:
@@ -242,8 +243,8 @@ def _diagnosis(diagnosis: Diagnosis) -> Sheet:
     ]
     whose = "" if diagnosis.hanger is None else f" of hanger {diagnosis.hanger}"
     title = f"Gap{whose} to {formatting.model_class(diagnosis.baseline)}"
-    told = (write_summary(diagnosis), write_details(diagnosis))
-    paragraphs = [paragraph for paragraph in told if paragraph]
+    wording = (write_summary(diagnosis), write_details(diagnosis))
+    paragraphs = [paragraph for paragraph in wording if paragraph]
     return Sheet(title, ("cause", "probability"), rows, (*paragraphs, *diagnosis.remarks))
 
 

@@ -159,7 +159,7 @@ def shapes(test: Identification, hanger: Hanger, *, ax: Ax = None) -> Figure:
 
 
 def gap(diagnosis: Diagnosis, hanger: Hanger, *, ax: Ax = None) -> Figure:
-    """Where the gap between model and measurement lies: by mode, condition and place.
+    """Draw the gap between model and measurement by mode, condition and place.
 
     Example:
         >>> figure = shm.plot.gap(shm.diagnose(tests, hanger), hanger)

@@ -340,7 +340,7 @@ def diagnose(
     seed: int = _OF_GAP.seed,
     progress: Progress = silent,
 ) -> Diagnosis:
-    """Where the baseline and the tests of a hanger differ, which effect causes it, what it changes.
+    """Diagnose where baseline and tests differ, which effect causes it, and what it changes.
 
     `baseline` is the model class whose gap is diagnosed, empty for the beam that these data prefer;
     `Diagnosis.baseline` names it. `without` are effects taken out of the catalogue; `hold_out` what

@@ -1,4 +1,4 @@
-"""What a workspace keeps, for one who only looks."""
+"""A workspace for one who only reads it."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ class Store:
             return read_test(path)
 
     def frequency_response(self, hanger_id: int, test_id: str) -> FrequencyResponse:
-        """What the modes of a test were identified from; raises NothingThere where none is kept."""
+        """Return the response behind a test's modes; raises NothingThere without one."""
         found = self._store.tests.frequency_response(self._stored(hanger_id, test_id))
         if found is None:
             raise NothingThere(

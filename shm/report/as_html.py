@@ -40,7 +40,7 @@ def _as_markup(drawing: str) -> Markup:
 
 
 def environment(loader: BaseLoader) -> Environment:
-    """How all pages, those of the dashboard too, are made from their templates."""
+    """Return the environment that makes all pages from their templates."""
     made = Environment(
         loader=loader,
         autoescape=True,

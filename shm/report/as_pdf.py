@@ -233,8 +233,8 @@ def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> l
         found += [Paragraph(_words(paragraph), _BODY), Spacer(1, 6)]
     if part.full_summary:
         lead = f"<b>{_words(part.lead)}</b> " if part.lead else ""
-        told = Paragraph(f"{lead}{_words(part.summary)}", _BODY)
-        found += [_panel(told, colour), Spacer(1, 6)]
+        wording = Paragraph(f"{lead}{_words(part.summary)}", _BODY)
+        found += [_panel(wording, colour), Spacer(1, 6)]
     if part.details:
         found += [Paragraph(_words(part.details), _BODY), Spacer(1, 6)]
     if part.facts:
@@ -289,9 +289,9 @@ def _facts(facts: Sequence[Fact]) -> Flowable:
         [
             Paragraph(escape(what), _LABEL),
             Paragraph(_words(value), _FACT),
-            Paragraph(_words(beside), _LABEL),
+            Paragraph(_words(besides), _LABEL),
         ]
-        for what, value, beside in facts
+        for what, value, besides in facts
     ]
     rules = [
         ("BACKGROUND", (0, 0), (-1, -1), _PANEL),
@@ -405,6 +405,6 @@ def _bold_width(cell: str, size: float) -> float:
 
 
 def _width(text: str, font: str, size: float) -> float:
-    """How wide `text` is set, in points."""
+    """Return the width of a text as it is set, in points."""
     _register_fonts()
     return float(pdfmetrics.stringWidth(text, font, size))

@@ -34,8 +34,8 @@ def as_text(paper: Paper, width: int = WIDTH) -> str:
     first, *others = paper.parts
     blocks = [*_underlined(paper.headline, "=", width), *_part(first, width)]
     for part in others:
-        if told := list(_part(part, width)):
-            blocks += [*_underlined(part.headline, "-", width), *told]
+        if wording := list(_part(part, width)):
+            blocks += [*_underlined(part.headline, "-", width), *wording]
     return "\n".join([*blocks, _folded(paper.foot, width), ""])
 
 
@@ -122,7 +122,7 @@ def _widths(table: Table, width: int) -> list[int]:
     for longest in (_LONGEST_NAME, _LEAST):
         least = [max(_longest_word(cell, longest) for cell in column) for column in columns]
         while sum(widths) > room and any(map(gt, widths, least)):
-            loose = [column for column, own in enumerate(widths) if own > least[column]]
+            loose = [column for column, this in enumerate(widths) if this > least[column]]
             widths[max(loose, key=widths.__getitem__)] -= 1
     return widths if sum(widths) <= room else []
 

@@ -80,7 +80,7 @@ def _short_tension(line: HangerSummary, unit: ForceUnit) -> str:
 
 
 def facts(data: BridgeReport) -> tuple[Fact, ...]:
-    """What, value, what stands beside it."""
+    """Return what, value, and what belongs to it."""
     tested = [line for line in data.hangers if line.latest is not None]
     alert, watch = (of_status(data.hangers, each) for each in (Status.ALERT, Status.WATCH))
     opened = sum(line.open_alerts for line in data.hangers)
@@ -100,19 +100,19 @@ def facts(data: BridgeReport) -> tuple[Fact, ...]:
 
 
 def summary(data: BridgeReport) -> str:
-    """What is said first of the bridge, then the details."""
+    """Return state and action of the bridge, then the details."""
     return f"{data.message.words} {details(data)}".rstrip()
 
 
 def details(data: BridgeReport) -> str:
-    """Why, and how sure."""
+    """Return the reasons, and how sure they are."""
     pattern = data.pattern.sentence if data.pattern else data.why_no_pattern
     sentences = (_extremes(data), _in_period(data), pattern, *advice(data)[1:])
     return " ".join(sentence for sentence in sentences if sentence)
 
 
 def advice(data: BridgeReport) -> tuple[str, ...]:
-    """What to do next, most urgent first; never empty."""
+    """Return what to do next, most urgent first; never empty."""
     found = [data.message.lead.action]
     if opened := [line for line in data.hangers if line.open_alerts]:
         found.append(f"Acknowledge the open alerts of {named(opened)} (`shm alerts ack`).")
@@ -137,7 +137,7 @@ def named(lines: Sequence[HangerSummary]) -> str:
 
 
 def _extremes(data: BridgeReport) -> str:
-    """Who carries most and least of the nominal tension."""
+    """Return who carries most and least of the nominal tension."""
     shares = [(line, share) for line in data.hangers if (share := line.of_nominal) is not None]
     if len(shares) < 2:
         return ""
@@ -160,11 +160,11 @@ def _in_period(data: BridgeReport) -> str:
     tested = [line for line, course in courses if course.tests]
     alerts = sum(course.alerts for _, course in courses)
     tests = formatting.counted(sum(course.tests for _, course in courses), "test")
-    told = (
+    wording = (
         f"In the period {data.period}: {tests} of {formatting.counted(len(tested), 'hanger')}, "
         f"{formatting.counted(alerts, 'alert')}"
     )
-    return f"{told}{_most_moved(data)}."
+    return f"{wording}{_most_moved(data)}."
 
 
 def _most_moved(data: BridgeReport) -> str:
@@ -183,7 +183,7 @@ def _most_moved(data: BridgeReport) -> str:
     )
 
 
-_BESIDE = {"repeatability": "repeatability", "above": "above limit", "slack": "slack"}
+_NEXT_TO = {"repeatability": "repeatability", "above": "above limit", "slack": "slack"}
 """What stands beside a tension where it is known, with its heading."""
 
 
@@ -202,13 +202,13 @@ def tables(data: BridgeReport) -> tuple[Table, ...]:
 
 def _hangers(data: BridgeReport) -> Table:
     unit = hangers_unit(data.hangers)
-    beside = {name: [_said(line, name, unit) for line in data.hangers] for name in _BESIDE}
-    shown = {name: cells for name, cells in beside.items() if any(cells)}
+    besides = {name: [_stated(line, name, unit) for line in data.hangers] for name in _NEXT_TO}
+    shown = {name: cells for name, cells in besides.items() if any(cells)}
     cells = list(zip(*shown.values(), strict=True)) or [()] * len(data.hangers)
     return Table(
         "Hangers",
         (
-            "hanger", "state", f"tension, {unit.name} (90 %)", *(_BESIDE[name] for name in shown),
+            "hanger", "state", f"tension, {unit.name} (90 %)", *(_NEXT_TO[name] for name in shown),
             "% of nominal (90 %)", "open alerts", "latest test",
         ),
         tuple(_hanger(*each, unit) for each in zip(data.hangers, cells, strict=True)),
@@ -218,23 +218,23 @@ def _hangers(data: BridgeReport) -> Table:
     )  # fmt: skip
 
 
-def _said(line: HangerSummary, name: str, unit: ForceUnit) -> str:
+def _stated(line: HangerSummary, name: str, unit: ForceUnit) -> str:
     """One of `_BESIDE` of a hanger; empty where it is not known."""
     return str(getattr(stated(line.tension, unit), name)) if line.tension else ""
 
 
-def _hanger(line: HangerSummary, beside: tuple[str, ...], unit: ForceUnit) -> tuple[str, ...]:
+def _hanger(line: HangerSummary, besides: tuple[str, ...], unit: ForceUnit) -> tuple[str, ...]:
     name = f"{line.hanger.id} {line.hanger.name}".strip()
     opened = str(line.open_alerts or "none")
     if line.latest is None or line.tension_n is None or line.status is None:
-        unknown = ["not known"] * (2 + len(beside))
+        unknown = ["not known"] * (2 + len(besides))
         return (name, "no test", *unknown, opened, "none")
     share = line.of_nominal
     return (
         name,
         line.status.value,
         formatting.with_span(line.tension_n.in_unit(unit)),
-        *(text or "not known" for text in beside),
+        *(text or "not known" for text in besides),
         formatting.with_span(share) if share else "no nominal",
         opened,
         _day(line.latest.time),
@@ -268,7 +268,7 @@ def _shifted(drift: Drift) -> Fact:
 
 
 def _courses(data: BridgeReport) -> Table:
-    """What lay in the period; empty where the report has none."""
+    """Return tests and alerts of the period; empty where the report has none."""
     return Table(
         f"In the period {data.period}",
         ("hanger", "tests", "alerts", "change of the tension, % (90 %)"),
@@ -324,7 +324,7 @@ PATTERN_SCHEMA = "shm.bridge_pattern/1"
 
 
 def pattern_json(pattern: BridgePattern) -> dict[str, Any]:
-    """What `shm drift bridge --json` prints."""
+    """Return the document that `shm drift bridge --json` prints."""
     return {"schema": PATTERN_SCHEMA, **asdict(pattern)}
 
 

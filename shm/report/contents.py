@@ -1,4 +1,4 @@
-"""What each kind of report is made from: one frozen value, complete at birth."""
+"""The data of each kind of report: one frozen value, complete at birth."""
 
 from __future__ import annotations
 
@@ -318,7 +318,7 @@ class ModalTestReport:
 
     @property
     def channel_faults(self) -> dict[str, str]:
-        """Why a channel was left out, by its name."""
+        """Return why a channel was left out, by its name."""
         prefix = "channel "
         return {
             each.what.removeprefix(prefix): each.reason

@@ -70,8 +70,8 @@ class Interval:
 
     def scaled(self, factor: float) -> Interval:
         """The same quantity in a unit 1/`factor` as large."""
-        own = self.repeatability_sd
-        repeats = None if own is None else own * factor
+        this = self.repeatability_sd
+        repeats = None if this is None else this * factor
         return Interval(self.mean * factor, self.low * factor, self.high * factor, repeats)
 
     def in_unit(self, unit: ForceUnit) -> Interval:
@@ -84,7 +84,7 @@ class Interval:
 
     @property
     def is_wide(self) -> bool:
-        """Whether it is wider than half its mean, so that a shift could hardly be seen in it."""
+        """Return True if it is wider than half its mean: then it determines nothing."""
         return self.width > _WIDE * abs(self.mean)
 
     def since(self, then: Interval) -> Interval:
@@ -166,11 +166,11 @@ _LOPSIDED = 2.5  # judgement: a half width then says neither end
 def with_half(interval: Interval, unit: ForceUnit) -> str:
     """`655 ± 16 kN` of a tension in N: the half width of its 90 % interval; where that is much
     farther on one side, `13 to 490 kN`."""
-    own = interval.in_unit(unit)
-    above, below = own.high - own.mean, own.mean - own.low
+    this = interval.in_unit(unit)
+    above, below = this.high - this.mean, this.mean - this.low
     if max(above, below) > _LOPSIDED * min(above, below):
-        return f"{span(own)} {unit.name}"
-    return f"{rounded(own.mean, own.width / 2)} {unit.name}"
+        return f"{span(this)} {unit.name}"
+    return f"{rounded(this.mean, this.width / 2)} {unit.name}"
 
 
 def rounded_tension(tension_n: float, unit: ForceUnit) -> str:
@@ -239,7 +239,7 @@ def probability(value: float) -> str:
     return "< 0.01" if value < 0.005 else f"{value:.2f}"
 
 
-def told_probability(value: float) -> str:
+def spoken_probability(value: float) -> str:
     """Return the same in a sentence: `above 0.99`, `0.97`."""
     return probability(value).replace("> ", "above ").replace("< ", "below ")
 

@@ -142,7 +142,7 @@ def diagnosed(data: HangerReport) -> DiagnosisSheet | None:
 
 
 def how_to_diagnose(data: HangerReport) -> str:
-    """What to do where no diagnosis was made."""
+    """Return what to do where no diagnosis was made."""
     return (
         "The gap between model and measurement has not been diagnosed. To learn where it lies, "
         "what causes it and what that does to the tension: "
@@ -183,12 +183,12 @@ def _by_latest_test(data: HangerReport) -> tuple[Fact, ...]:
     return (("By the latest test alone", value, f"test {data.latest.id}; 90 % interval"),)
 
 
-def _limits(data: HangerReport, said: StatedTension) -> tuple[Fact, ...]:
+def _limits(data: HangerReport, statement: StatedTension) -> tuple[Fact, ...]:
     """The probabilities that the owner's limits ask for."""
     limits, unit = data.hanger.limits, data.tension_unit
     asked = (
-        ("Above its limit", said.above, limits.tension_max_n),
-        ("Slack", said.slack, limits.tension_min_n),
+        ("Above its limit", statement.above, limits.tension_max_n),
+        ("Slack", statement.slack, limits.tension_min_n),
     )
     return tuple(
         (what, probability, f"probability; limit {formatting.rounded_tension(limit_n, unit)}")
@@ -273,7 +273,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
 
 
 def _response(response: FrequencyResponse | None) -> dict[str, Any] | None:
-    """What was measured, without the lines: those stand in the archived recording."""
+    """Return what was measured, without the lines: those are in the archived recording."""
     if response is None:
         return None
     return {
@@ -301,7 +301,7 @@ class StructureReport:
     latest: datetime | None
     baseline_since: datetime | None
     baseline_hz: dict[str, float]
-    said: str
+    statement: str
     drifts: tuple[Drift, ...]
     alerts: tuple[Alert, ...]
     open_alerts: int
@@ -311,7 +311,7 @@ class StructureReport:
 
 
 def structure_paper(data: StructureReport) -> Paper:
-    """What the watch says, each frequency, the alerts."""
+    """Return the paper: the message of the watch, each frequency, the alerts."""
     latest = f"{data.latest:%Y-%m-%d %H:%M}" if data.latest else "none"
     since = f"{data.baseline_since:%Y-%m-%d}" if data.baseline_since else "none yet"
     facts = (
@@ -319,16 +319,16 @@ def structure_paper(data: StructureReport) -> Paper:
         ("Baseline since", since, "its own first tests; no model, no tension"),
         ("Open alerts", str(data.open_alerts), f"of {len(data.alerts)}"),
     )
-    told = tuple((f"{each.time:%Y-%m-%d}", each.message) for each in data.alerts)
-    alerts = Table("Alerts", ("test of", "message"), told)
-    said = f"{data.said or _NOT_WATCHED} {dated_by_receipt(data.undated)}".strip()
+    wording = tuple((f"{each.time:%Y-%m-%d}", each.message) for each in data.alerts)
+    alerts = Table("Alerts", ("test of", "message"), wording)
+    statement = f"{data.said or _NOT_WATCHED} {dated_by_receipt(data.undated)}".strip()
     return Paper(
         title=structure_words(data.structure),
         bridge=data.bridge,
         status="Alert" if data.open_alerts else "",
         style="alert" if data.open_alerts else "first",
         parts=(
-            Part("In short", summary=said, facts=facts),
+            Part("In short", summary=statement, facts=facts),
             Part("Numbers", tables=filled(_structure_frequencies(data), alerts)),
         ),
         generated_at=data.generated_at,

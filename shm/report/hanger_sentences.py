@@ -159,15 +159,15 @@ def _against_baseline(data: HangerReport) -> str:
     if change is None:
         return "The change since the baseline is not known: its latest test does not show it."
     size = rounded_percent(change.mean, change.width / 2, "+")
-    said = f"Since the baseline of {counted_tests(data.baseline.tests)} it changed by {size}"
+    statement = f"Since the baseline of {counted_tests(data.baseline.tests)} it changed by {size}"
     if not data.now.is_found:
-        said = f"No significant change since the baseline ({size})"
+        statement = f"No significant change since the baseline ({size})"
     later = [
         each.time for each in data.now.standing if data.latest.time and each.time > data.latest.time
     ]
     if not later:
-        return f"{said}."
-    return f"{said}, by a test made before the alert of {max(later):%Y-%m-%d}."
+        return f"{statement}."
+    return f"{statement}, by a test made before the alert of {max(later):%Y-%m-%d}."
 
 
 def counted_tests(tests: tuple[str, ...]) -> str:
@@ -176,7 +176,7 @@ def counted_tests(tests: tuple[str, ...]) -> str:
 
 
 def _unseen(data: HangerReport) -> str:
-    """What keeps a shift of the tension from being seen, or from being trusted in percent."""
+    """Return what keeps a shift of the tension from being seen."""
     change, threshold = data.now.change, data.hanger.thresholds.tension_shift_fraction
     if not data.drifts:
         return ""
@@ -186,7 +186,7 @@ def _unseen(data: HangerReport) -> str:
 
 
 def in_period(data: HangerReport) -> str:
-    """What lay in the period of the report, and what changed in it against its start."""
+    """Return what the period of the report holds, and what changed in it against its start."""
     if data.period is None:
         return ""
     tests = formatting.counted(len(data.trend), "test")
@@ -227,17 +227,17 @@ def _rms_percent(data: HangerReport) -> float:
 
 
 def _misses(data: HangerReport) -> bool:
-    """Whether the class by itself is so far off that its posterior doubts the description: what it
+    """Return True if the class is so far off that its posterior doubts the description: what it
     predicts with the model's error learnt from the same modes fits them all the same."""
     return not data.posterior.fits
 
 
 def _gap(data: HangerReport) -> str:
-    """What the model does not explain, and why as far as that was diagnosed."""
+    """Return what the model does not explain, and why as far as that was diagnosed."""
     if data.diagnosis is None:
         return _outside(data)
-    told = [_diagnosed_on(data.diagnosis), write_summary(data.diagnosis)]
-    return " ".join(part for part in (*told, data.gap_watch) if part)
+    wording = [_diagnosed_on(data.diagnosis), write_summary(data.diagnosis)]
+    return " ".join(part for part in (*wording, data.gap_watch) if part)
 
 
 def _outside(data: HangerReport) -> str:
@@ -259,8 +259,8 @@ def _outside(data: HangerReport) -> str:
 
 def _outliers(modes: Sequence[PredictedFrequency]) -> str:
     """`Transverse 2 and longitudinal 4 lie outside the 90 % interval`, `5 modes lie ...`."""
-    told = formatting.listed([f"{each.plane} {each.order}" for each in modes])
-    named = f"{told[0].upper()}{told[1:]}"
+    wording = formatting.listed([f"{each.plane} {each.order}" for each in modes])
+    named = f"{wording[0].upper()}{wording[1:]}"
     who = named if len(modes) <= _MOST_NAMED else formatting.counted(len(modes), "mode")
     return f"{who} {'lies' if len(modes) == 1 else 'lie'} outside the 90 % interval"
 

@@ -83,7 +83,7 @@ class HangerMessage:
         return " ".join((self.lead.words, *self.notes))
 
     def beyond_lead(self, warnings: Sequence[str]) -> tuple[str, ...]:
-        """What `warnings` say that the lead has not said."""
+        """Return what `warnings` say that the lead does not."""
         rest = (each.removeprefix(self.lead.words).strip() for each in warnings)
         return tuple(each for each in rest if each)
 
@@ -95,7 +95,7 @@ class HangerMessage:
 
 @dataclass(frozen=True)
 class BridgeMessage:
-    """What is said first of a bridge: of its most urgent hanger, then which others need action."""
+    """State and action of a bridge: of its most urgent hanger, then which others need action."""
 
     status: Status | None
     lead: Lead
@@ -163,17 +163,17 @@ def _how_soon(needing: Mapping[int, HangerMessage], others: Iterable[int]) -> st
     for id_ in others:
         of.setdefault(needing[id_].urgency, []).append(id_)
     order = [urgency for urgency in reversed(URGENCIES) if urgency in of]
-    said = [f"{_SOON[each]}: {listed(list(map(str, sorted(of[each]))))}" for each in order]
-    rest = (f" {each[0].upper()}{each[1:]}." for each in said[1:])
-    return f"Other hangers that need action {said[0]}.{''.join(rest)}" if said else ""
+    statement = [f"{_SOON[each]}: {listed(list(map(str, sorted(of[each]))))}" for each in order]
+    rest = (f" {each[0].upper()}{each[1:]}." for each in statement[1:])
+    return f"Other hangers that need action {statement[0]}.{''.join(rest)}" if statement else ""
 
 
 def hanger_message(known: HangerSummary) -> HangerMessage:
     """Decide state, action, urgency and reasons of a hanger, for every place that shows them."""
     status, lead = _decide(known)
-    said = HangerMessage(status, lead, known.notes if status else ())
+    statement = HangerMessage(status, lead, known.notes if status else ())
     caveats = known.tension.caveats if known.tension else ()
-    return replace(said, reasons=(*said.beyond_lead(known.warnings), *caveats))
+    return replace(statement, reasons=(*statement.beyond_lead(known.warnings), *caveats))
 
 
 def _decide(known: HangerSummary) -> tuple[Status | None, Lead]:
@@ -270,7 +270,7 @@ def status_of(
 
 
 def _of_change(known: HangerSummary) -> Lead:
-    """What was found to have changed; else what an alert of another kind asks for."""
+    """Return what was detected to have changed; else what an alert of another kind asks for."""
     hanger, drifts = known.hanger, known.drifts
     beyond, change = _beyond(known), _change(known)
     others = [each for each in known.standing if not _CHANGES & set(each.kinds)]
@@ -282,8 +282,8 @@ def _of_change(known: HangerSummary) -> Lead:
         others = list(known.standing)  # what its row said of the change is lost
     if others:
         return _first([Lead.of(each.message) for each in reversed(others)])
-    likeliest = max(drifts, key=lambda each: each.probability)
-    words = f"{quantity_words(likeliest.quantity)} {size_words(likeliest)}"
+    most_probable = max(drifts, key=lambda each: each.probability)
+    words = f"{quantity_words(most_probable.quantity)} {size_words(most_probable)}"
     state = f"Hanger {hanger.id}: {words}, more likely than not beyond its threshold."
     return Lead(state, f"{look_again(hanger)} {WEEK}.")
 
@@ -298,12 +298,14 @@ def _beyond(known: HangerSummary) -> list[Drift]:
     found = {_way(each): each for each in known.drifts if each.probability >= level}
     now = {_way(each): each for each in known.drifts}
     for alert in known.standing:
-        for told in alert.drifts if _BEYOND in alert.kinds else ():
-            key = _way(told)
-            newest = now.get(key, told)
+        for wording in alert.drifts if _BEYOND in alert.kinds else ():
+            key = _way(wording)
+            newest = now.get(key, wording)
             is_of_latest = known.latest is not None and alert.test == known.latest.name
-            seen = newest if not is_of_latest and newest.may_be_beyond(told.shift_mean) else told
-            found[key] = replace(seen, probability=max(seen.probability, told.probability))
+            seen = (
+                newest if not is_of_latest and newest.may_be_beyond(wording.shift_mean) else wording
+            )
+            found[key] = replace(seen, probability=max(seen.probability, wording.probability))
     return list(found.values())
 
 
@@ -313,8 +315,8 @@ def _way(drift: Drift) -> tuple[str, bool]:
 
 def _change(known: HangerSummary) -> Change | None:
     """That of the newest alert that stands; else the last that was detected."""
-    told = [each.change for each in known.standing if each.change and _CHANGES & set(each.kinds)]
-    return told[-1] if told else known.called[-1] if known.called else None
+    wording = [each.change for each in known.standing if each.change and _CHANGES & set(each.kinds)]
+    return wording[-1] if wording else known.called[-1] if known.called else None
 
 
 def _first(leads: Sequence[Lead]) -> Lead:
@@ -326,7 +328,7 @@ def _first(leads: Sequence[Lead]) -> Lead:
 
 
 def _quiet(known: HangerSummary, status: Status) -> tuple[Status, Lead]:
-    """Where nothing was found: whether it could have been, and what the tension is."""
+    """Return the lead where nothing was detected: could it have been, and what the tension is."""
     name = f"Hanger {known.hanger.id}"
     off = _off_limits(known)
     if known.unwatched is not None and (off is None or off.urgency == "next_test"):
@@ -384,14 +386,14 @@ def _off_limits(known: HangerSummary) -> Lead | None:
     if beyond := off_limits(hanger, tension):
         return beyond
     limits = hanger.limits
-    nominal_n, kept = hanger.nominal_tension_n, tension.tension_n
+    nominal_n, retained = hanger.nominal_tension_n, tension.tension_n
     if not nominal_n > 0:
         return None
-    low, high = kept.q05 / nominal_n - 1, kept.q95 / nominal_n - 1
+    low, high = retained.q05 / nominal_n - 1, retained.q95 / nominal_n - 1
     limit_n = limits.tension_max_n if low > 0 else limits.tension_min_n
     if (low <= OFF_NOMINAL and high >= -OFF_NOMINAL) or math.isfinite(limit_n):
         return None
-    off = kept.mean / nominal_n - 1
+    off = retained.mean / nominal_n - 1
     size = rounded_percent(abs(off), (high - low) / 2)
     return Lead(
         f"Hanger {hanger.id}: tension is {size} {'above' if off > 0 else 'below'} nominal.",

@@ -67,7 +67,7 @@ def temperatures(data: HangerReport) -> Table:
     return temperature_table(data.states)
 
 
-_BESIDE = 2  # hangers on either side, which take up most of a lost load
+_NEXT_TO = 2  # hangers on either side, which take up most of a lost load
 _ROWS_SHOWN = 12  # layout: what a page holds
 _ALERTS_SHOWN = 5  # layout: a third of a page
 _EARLIER = "... and {} earlier ones (in HTML and JSON)"
@@ -84,10 +84,10 @@ def neighbours(data: HangerReport) -> Table:
     place = next((row.place for row in rows if row.hanger == data.hanger.id), None)
     if pattern is None or place is None:
         return Table(title, (), ())
-    near = tuple(row for row in rows if abs(row.place - place) <= _BESIDE)
+    near = tuple(row for row in rows if abs(row.place - place) <= _NEXT_TO)
     made = shift_table(replace(pattern, rows=near, not_compared=()))
-    told = " ".join((pattern.sentence, *pattern.remarks))
-    note = f"{told} The whole bridge: shm report --bridge."
+    wording = " ".join((pattern.sentence, *pattern.remarks))
+    note = f"{wording} The whole bridge: shm report --bridge."
     return replace(made, title=title, note=note, terminal_column=())
 
 
@@ -218,18 +218,18 @@ def practice(data: HangerReport) -> Table:
 
     def add(name: str, found: Sequence[float], *rest: str) -> None:
         if np.isfinite(found).any():
-            told = [
+            wording = [
                 "unknown" if math.isnan(n) else "below 0" if n < 0 else f"{unit.of(n):.0f}"
                 for n in found
             ]
-            rows.append((name, *told, *rest))
+            rows.append((name, *wording, *rest))
 
     for each in FORMULAS:
         found = [each.tension_n(measured.get((p, each.order), np.nan), *bar) for p in PLANES]
         holds = f"from xi = {each.valid_from_xi:g}, within {100 * each.worst_error:g} %"
         add(f"{each.name}, mode {each.order}", found, each.ends, holds, each.leaves_out)
-    by_order = [{n: hz for (own, n), hz in measured.items() if own == plane} for plane in PLANES]
-    fitted = [equal_springs.tension_n(own, *bar) for own in by_order]
+    by_order = [{n: hz for (this, n), hz in measured.items() if this == plane} for plane in PLANES]
+    fitted = [equal_springs.tension_n(this, *bar) for this in by_order]
     add(
         f"{equal_springs.NAME}, all modes", fitted, equal_springs.ENDS, "", equal_springs.LEAVES_OUT
     )

@@ -138,7 +138,7 @@ def _what_was_found(sheet: ModalTestReport) -> str:
 
 
 def _without_order(sheet: ModalTestReport) -> str:
-    """How many modes are known, and their orders are not."""
+    """Return how many modes are known whose orders are not."""
     found_hz = [m.frequency_hz for m in sheet.identification.set_aside if m.kind == "unnumbered"]
     if not found_hz:
         return ""
@@ -175,7 +175,7 @@ def _what_is_no_mode(sheet: ModalTestReport) -> str:
 
 
 def trust(sheet: ModalTestReport) -> str:
-    """Whether the modes can be used."""
+    """Return a sentence on how far the modes can be used."""
     checks = sheet.identification.quality
     made = [check for check in checks if check.verdict != "unknown"]
     match overall(checks):
@@ -200,7 +200,7 @@ def _names(checks: Sequence[QualityCheck], verdict: Verdict) -> str:
 
 
 def advice(sheet: ModalTestReport) -> str:
-    """What to do next, gravest first."""
+    """Return what to do next, gravest first."""
     checks = sheet.identification.quality
     graves = sorted(
         (c for c in checks if c.verdict in ("refused", "warning") and c.remedy),
@@ -214,7 +214,7 @@ def advice(sheet: ModalTestReport) -> str:
 
 
 def results(sheet: ModalTestReport) -> tuple[Table, ...]:
-    """What came of the test, as far as there is any of it."""
+    """Return the tables of the results, as far as there are any."""
     return filled(modes(sheet), _doubts_in_terminal(quality(sheet)), set_aside(sheet))
 
 
@@ -227,9 +227,9 @@ def _doubts_in_terminal(checks: Table) -> Table:
 
 
 def details(sheet: ModalTestReport) -> tuple[Table, ...]:
-    """How it came about, as far as there is any of it."""
-    told = (hits(sheet), conditions(sheet), settings(sheet.settings))
-    hit, *others = (table.not_in_terminal() for table in told)
+    """Return the tables of how the results came about, as far as there are any."""
+    wording = (hits(sheet), conditions(sheet), settings(sheet.settings))
+    hit, *others = (table.not_in_terminal() for table in wording)
     return filled(notes(sheet), hit, dropped(sheet), *others)
 
 
@@ -285,7 +285,7 @@ def set_aside(sheet: ModalTestReport) -> Table:
 
 
 def dropped(sheet: ModalTestReport) -> Table:
-    """What the identification left out of the records, and why."""
+    """Return what the identification left out of the records, and why."""
     return Table(
         "Left out",
         ("what", "how many", "why"),
@@ -319,7 +319,7 @@ def notes(sheet: ModalTestReport) -> Table:
 
 
 def conditions(sheet: ModalTestReport) -> Table:
-    """Which test it is, and what was noted with it."""
+    """Return which test it is, and what was noted with it."""
     test = sheet.identification.test
     facts = {
         "test": test.id,

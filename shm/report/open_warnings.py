@@ -1,4 +1,4 @@
-"""What is wrong with what a hanger is compared with: said first wherever its state is said.
+"""Warnings about the baseline of a hanger: they come first wherever its state is given.
 
 A watch that compares with a wrong baseline is quiet for years. So a baseline that does not fit, or
 that stands out among its neighbours, and a mode that tests keep having wrong are never "No change".
@@ -149,7 +149,7 @@ def redescription_words(hanger: Hanger, changes: Sequence[str]) -> str:
     named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
     return (
         f"The description of hanger {hanger.id} has changed since its baseline: {named}. "
-        f"{_anew(hanger.id)} "
+        f"{_rebaseline(hanger.id)} "
         "Until then shifts and alerts compare two descriptions, not two states of the hanger."
     )
 
@@ -160,7 +160,7 @@ def discarded(hanger: Hanger, tests: Sequence[str]) -> str:
         return ""
     return (
         f"The baseline of hanger {hanger.id} was made from {', '.join(tests)}, discarded since: "
-        f"the comparison with it is no longer valid. {_anew(hanger.id)}"
+        f"the comparison with it is no longer valid. {_rebaseline(hanger.id)}"
     )
 
 
@@ -177,6 +177,6 @@ def dated_by_receipt(names: Sequence[str]) -> str:
     )
 
 
-def _anew(number: int) -> str:
+def _rebaseline(number: int) -> str:
     command = f"shm drift rebaseline --hanger {number} --since DAY --why TEXT"
     return f"Set a new baseline {WEEK}: `{command}`."

@@ -62,7 +62,7 @@ def read_logo(path: Path | None) -> Logo:
 
 
 Fact = tuple[str, str, str]
-"""What, value, what stands beside it."""
+"""Return what, value, and what belongs to it."""
 CREDIBLE = "Intervals are central 90 % credible intervals"
 
 
@@ -121,18 +121,18 @@ def fold_improbable(
     `probabilities` belong to the rows, and stand in a `column`; `what` names a row.
     """
     pairs = list(zip(rows, probabilities, strict=True))
-    kept = [row for row, probability in pairs if not probability < LEAST_PROBABILITY]
-    left = len(pairs) - len(kept)
+    retained = [row for row, probability in pairs if not probability < LEAST_PROBABILITY]
+    left = len(pairs) - len(retained)
     if left < 2:
         return tuple(rows)
     cells = [""] * len(rows[0])
     cells[0] = f"{left} further {what}"
     cells[column] = f"< {LEAST_PROBABILITY} each"
-    return (*kept, tuple(cells))
+    return (*retained, tuple(cells))
 
 
 def filled(*tables: Table) -> tuple[Table, ...]:
-    """Those that have rows."""
+    """Return the tables that have rows."""
     return tuple(table for table in tables if table.rows)
 
 
@@ -221,7 +221,7 @@ class Paper:
 
     @property
     def signatures(self) -> tuple[tuple[str, str], ...]:
-        """Who answers for it: the words, and the name as far as it is given."""
+        """Return who answers for it: the words, and the name as far as it is given."""
         by = self.letterhead
         return (("Prepared by", by.prepared_by), ("Checked by", by.checked_by), ("Date", ""))
 
@@ -244,5 +244,5 @@ class Paper:
     @property
     def foot(self) -> str:
         """The last line: when it was made, by which version, what holds throughout."""
-        said = (self.made, self.logo.fault, self.closing)
-        return ". ".join(each for each in said if each)
+        statement = (self.made, self.logo.fault, self.closing)
+        return ". ".join(each for each in statement if each)

@@ -40,7 +40,7 @@ _HEADLINES: dict[Verdict, str] = {
 
 
 def headline(checks: Sequence[QualityCheck]) -> str:
-    """What the whole deserves, and which lowest mode or orders it lacks: `Use with care: ...`."""
+    """Return the overall verdict and the lowest modes that are missing: `Use with care: ...`."""
     grave = (FIRST_ORDERS, "warning"), (NUMBERING, "refused")
     lost = [c.found for c in checks if (c.name, c.verdict) in grave]
     return ": ".join([_HEADLINES[overall(checks)], *lost])
@@ -88,9 +88,9 @@ _LINEAGE = {
 }
 
 
-def lineage(told: Mapping[str, str]) -> dict[str, str]:
-    """What a result was made from, its keys in words."""
-    return {_LINEAGE.get(key, formatting.quantity(key)): value for key, value in told.items()}
+def lineage(wording: Mapping[str, str]) -> dict[str, str]:
+    """Return what a result was made from, its keys in words."""
+    return {_LINEAGE.get(key, formatting.quantity(key)): value for key, value in wording.items()}
 
 
 def added_mass(test: ModalTest) -> str:
@@ -102,14 +102,14 @@ def added_mass(test: ModalTest) -> str:
     return f"{mass.mass_kg:g} kg at {mass.x_m:g} m from the deck end{size}"
 
 
-def settings(told: Mapping[str, str]) -> Table:
+def settings(wording: Mapping[str, str]) -> Table:
     """The settings that decide the numbers, each with its unit; empty where nobody says."""
     helps = {row.name: row.help for row in TABLE}
     return Table(
         "Settings in force",
         ("setting", "value", "what it is"),
         tuple(
-            (name, value.replace(",", ", "), helps.get(name, "")) for name, value in told.items()
+            (name, value.replace(",", ", "), helps.get(name, "")) for name, value in wording.items()
         ),
         note="Of identification, updating and watch, as they stand now: given, without interval.",
     )

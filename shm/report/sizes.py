@@ -50,7 +50,7 @@ class Size:
         up, bar, down = directions.partition("|")
         return self.directed(up, down) if bar else str(self)
 
-    def told(self, interval: Interval, sign: str = "") -> str:
+    def wording(self, interval: Interval, sign: str = "") -> str:
         """An interval in this size's unit and digits."""
         mean, low, high = _texts(interval, sign, self.logarithmic)
         unit = f" {self.unit}" if self.unit else ""

@@ -54,7 +54,7 @@ def test_a_probability_pretends_no_certainty(value: float, expected: str) -> Non
 
 
 def test_a_probability_is_spelled_out_in_a_sentence() -> None:
-    told = [formatting.told_probability(value) for value in (0.99999, 0.5, 1e-9)]
+    told = [formatting.spoken_probability(value) for value in (0.99999, 0.5, 1e-9)]
     assert told == ["above 0.99", "0.50", "below 0.01"]
 
 

@@ -20,7 +20,7 @@ from shm.report.figures import (
     hanger_stiffness,
     hanger_trend,
 )
-from shm.report.figures.gap_map import kept, measured
+from shm.report.figures.gap_map import measured, retained
 from shm.report.figures.hanger_frequencies import FIGURE as OF_REPORT
 from shm.report.figures.hanger_frequencies import compared_modes
 from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
@@ -226,7 +226,7 @@ def _sheet(view: HangerView) -> DiagnosisSheet:
 def _shrinks(view: HangerView) -> bool:
     if view.sheet is None or view.sheet.diagnosis.verdict.claim is None:
         return False
-    return any(math.isfinite(residual.after_percent) for residual in kept(view.sheet))
+    return any(math.isfinite(residual.after_percent) for residual in retained(view.sheet))
 
 
 def report_of(view: HangerView) -> HangerReport:

@@ -229,8 +229,8 @@ def _caption_of_tensions(data: BridgeReport) -> str:
 
 
 def _alt_of_tensions(data: BridgeReport) -> str:
-    told = [f"{line.hanger.id} {share.mean:.0f} %" for _, line, share in _shares(data)]
-    return f"Tension over nominal of {formatting.counted(len(told), 'hanger')}: {', '.join(told)}."
+    each = [f"{line.hanger.id} {share.mean:.0f} %" for _, line, share in _shares(data)]
+    return f"Tension over nominal of {formatting.counted(len(each), 'hanger')}: {', '.join(each)}."
 
 
 TENSIONS = Member(

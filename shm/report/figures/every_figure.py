@@ -39,12 +39,12 @@ OF_HANGER_NAMES = frozenset(each.name for each in OF_HANGER)
 def hanger_figures(
     data: HangerReport, names: Container[str] = OF_HANGER_NAMES
 ) -> tuple[Illustration, ...]:
-    """Those of these `names` that the report of a hanger has the data for, in reading order."""
+    """Draw those of these `names` that a hanger's report has the data for, in reading order."""
     return drawn([each for each in OF_HANGER if each.name in names], data)
 
 
 def bridge_figures(data: BridgeReport) -> tuple[Illustration, ...]:
-    """Those of a bridge: what moved, where it was compared, and what each hanger carries."""
+    """Draw those of a bridge: what moved, where it was compared, and what each hanger carries."""
     shifts = drawn((SHIFTS,), data.pattern) if data.pattern else ()
     return (*shifts, *drawn((TENSIONS,), data))
 
@@ -55,12 +55,12 @@ def modal_test_figures(sheet: ModalTestReport) -> tuple[Illustration, ...]:
 
 
 def diagnosis_figures(sheet: DiagnosisSheet) -> tuple[Illustration, ...]:
-    """Those of a gap diagnosis."""
+    """Draw those of a gap diagnosis."""
     return drawn(OF_DIAGNOSIS, sheet)
 
 
 def bridge_diagnosis_figures(diagnosis: BridgeDiagnosis) -> tuple[Illustration, ...]:
-    """Those of a joint diagnosis."""
+    """Draw those of a joint diagnosis."""
     return drawn(OF_BRIDGE_DIAGNOSIS, diagnosis)
 
 

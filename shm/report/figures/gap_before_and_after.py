@@ -15,7 +15,7 @@ from shm.report.diagnosis_wording import (
     label,
 )
 from shm.report.figures import specification as spec
-from shm.report.figures.gap_map import by_plane, kept, orders, planes
+from shm.report.figures.gap_map import by_plane, orders, planes, retained
 from shm.values import Plane, Residual
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ _SERIES = (
 
 
 def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specification | None:
-    residuals = [r for r in kept(sheet) if math.isfinite(r.after_percent)]
+    residuals = [r for r in retained(sheet) if math.isfinite(r.after_percent)]
     if not residuals or sheet.diagnosis.verdict.claim is None:
         return None
     made = {
@@ -102,13 +102,13 @@ def _caption_of_before_and_after(sheet: DiagnosisSheet) -> str:
 
 
 def _alt_of_before_and_after(sheet: DiagnosisSheet) -> str:
-    found = kept(sheet)
-    told = [
+    found = retained(sheet)
+    wording = [
         f"{plane} from {_rms(found, plane, 'residual_percent')} to "
         f"{_rms(found, plane, 'after_percent')}"
         for plane in planes(found)
     ]
-    return f"Root mean square of the gap by mode before and after: {'; '.join(told)}."
+    return f"Root mean square of the gap by mode before and after: {'; '.join(wording)}."
 
 
 def _rms(residuals: Sequence[Residual], plane: Plane, field: str) -> str:

@@ -19,7 +19,7 @@ from shm.values import (
     PredictedFrequency,
 )
 
-_BESIDE = {"transverse": -0.12, "longitudinal": 0.12}  # layout: beside a mode, apart by a mark
+_NEXT_TO = {"transverse": -0.12, "longitudinal": 0.12}  # layout: beside a mode, apart by a mark
 
 
 def specify(data: HangerReport) -> spec.Specification | None:
@@ -53,7 +53,7 @@ def specify(data: HangerReport) -> spec.Specification | None:
 
 
 def compared_modes(data: HangerReport) -> list[PredictedFrequency]:
-    """Those that were predicted and measured."""
+    """Return the modes that were predicted and measured."""
     return [mode for mode in data.predicted if math.isfinite(mode.measured_hz)]
 
 
@@ -65,7 +65,7 @@ def _points(plane: Plane, compared: Sequence[PredictedFrequency]) -> spec.Points
     ratio = np.array([mode.mean_hz for mode in modes]) / measured
     half = NORMAL_90 * np.array([mode.sd_hz for mode in modes]) / measured
     return spec.Points(
-        x=[mode.order + _BESIDE[plane] for mode in modes], y=ratio, low=ratio - half,
+        x=[mode.order + _NEXT_TO[plane] for mode in modes], y=ratio, low=ratio - half,
         high=ratio + half, symbol=spec.PLANE_SYMBOLS[plane], colour=spec.PLANE_HUES[plane], size=5,
         name=plane,
         texts=[
@@ -80,7 +80,7 @@ def _measurement(known: Sequence[Mode]) -> spec.Bars:
     """The measurement's own 90 % interval around 1, where its standard deviation is known."""
     half = np.array([NORMAL_90 * mode.frequency_sd_hz / mode.frequency_hz for mode in known])
     return spec.Bars(
-        x=[mode.order + _BESIDE[mode.plane] for mode in known], y=2 * half, base=1 - half,
+        x=[mode.order + _NEXT_TO[mode.plane] for mode in known], y=2 * half, base=1 - half,
         width=0.2, opacity=0.25, name="measurement, 90 %",
     )  # fmt: skip
 

@@ -83,7 +83,7 @@ def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> spec.Panel:
 
 
 def _scale(quantity: QuantityOverTime) -> tuple[float, str]:
-    """What turns its values into those of its axis, and their unit: that of a tension fits it."""
+    """Return the factor from its values to those of its axis, and their unit."""
     if not quantity.is_tension:
         return 1.0, quantity.unit
     unit = force_unit(quantity.baseline, *quantity.filtered.middle.tolist())

@@ -112,8 +112,8 @@ def caption(courses: Sequence[Course], reach_decades: float, remark: str = "") -
 
 
 def alt(courses: Sequence[Course]) -> str:
-    told = "; ".join(_last(course) for course in courses)
-    return f"End stiffness over time, log10; at last: {told}."
+    wording = "; ".join(_last(course) for course in courses)
+    return f"End stiffness over time, log10; at last: {wording}."
 
 
 def _last(course: Course) -> str:

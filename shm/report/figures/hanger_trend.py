@@ -34,7 +34,7 @@ _SYMBOLS: dict[NoteKind, tuple[spec.Symbol, bool]] = {
 
 @dataclass(frozen=True)
 class Deed:
-    """What somebody did, and why: it stands at the foot of the figure."""
+    """An action of a person, and why: it is drawn at the foot of the figure."""
 
     kind: str
     symbol: spec.Symbol
@@ -177,7 +177,7 @@ def _alerts(course: Course, scale: float) -> list[spec.Mark]:
 
 
 def _deeds(course: Course) -> list[spec.Mark]:
-    """What people did and noted, by kind."""
+    """Return the marks of what people did and noted, by kind."""
     deeds = [*course.deeds, *_noted(course.notes)]
     kinds = {deed.kind: deed for deed in deeds}
     return [
@@ -263,7 +263,7 @@ def _lines(course: Course) -> str:
 
 
 def _marks(course: Course) -> str:
-    told = [
+    wording = [
         "triangles: alerts" if course.alerts else "",
         "upright spans: when a detected change began, with 90 % probability"
         if course.changes
@@ -273,7 +273,7 @@ def _marks(course: Course) -> str:
         if course.deeds or course.notes
         else "",
     ]
-    found = "; ".join(filter(None, told))
+    found = "; ".join(filter(None, wording))
     fewer = time_axes.thinned_words(len(course.times))
     return ((found[:1].upper() + found[1:] + "." if found else "") + fewer).strip()
 

@@ -119,7 +119,7 @@ class Guide:
 
 
 def shown_modes(sheet: ModalTestReport) -> list[Mode]:
-    """Those with a shape, as many as there is room for."""
+    """Return modes with a shape, as many as there is room for."""
     return modes_with_shape(sheet)[:_MOST]
 
 
@@ -148,7 +148,7 @@ def panel_title(mode: Mode) -> str:
 
 
 def guide_name(sheet: ModalTestReport) -> str:
-    """What the guides of a test are, for a legend."""
+    """Return the name of the guides of a test for a legend."""
     return "places joined" if sheet.hanger is None else "guide: taut string"
 
 
@@ -197,7 +197,7 @@ def rows_of(sheet: ModalTestReport, is_on_screen: bool) -> list[list[Mode]]:
     most = _MOST_ON_SCREEN if is_on_screen else _MOST_COLUMNS
     columns = math.ceil(longest / math.ceil(longest / most))
     columns = columns if is_on_screen else max(_LEAST_COLUMNS, columns)
-    return [own[i : i + columns] for own in planes for i in range(0, len(own), columns)]
+    return [this[i : i + columns] for this in planes for i in range(0, len(this), columns)]
 
 
 def _shape_panel(sheet: ModalTestReport, mode: Mode) -> spec.Panel:

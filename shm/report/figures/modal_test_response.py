@@ -84,12 +84,12 @@ class Shown:
 def _density(records: Sequence[Recording]) -> Spectrum | None:
     """Welch's estimate (1967), averaged over the records that have the sensors of the first."""
     first = records[0]
-    alike = [r for r in records if len(r.accelerations) == len(first.accelerations)]
-    length = min(record.samples for record in alike)
+    similar = [r for r in records if len(r.accelerations) == len(first.accelerations)]
+    length = min(record.samples for record in similar)
     wanted = max(length // _SEGMENTS, int(_LEAST_SEGMENT_S * first.sampling_rate_hz))
     if not first.accelerations or length < 2:
         return None
-    estimates = [_welch(record, min(length, wanted)) for record in alike]
+    estimates = [_welch(record, min(length, wanted)) for record in similar]
     points = tuple(ResponsePoint(c.name, c.plane, c.x_m) for c in first.accelerations)
     values = np.mean([values for _, values in estimates], axis=0)
     return Spectrum(points, estimates[0][0], values, "spectral density ((m/s²)²/Hz)")
@@ -152,7 +152,7 @@ def shown_points(sheet: ModalTestReport, found: Spectrum, most: int) -> list[int
 
 
 _MARK_ROWS = {"transverse": 0.94, "longitudinal": 0.83}
-_SET_ASIDE_ROW = 0.72
+_EXCLUDED_ROW = 0.72
 _LABEL_ROOM = 0.026
 """Least distance of two numbers, as a share of the axis."""
 _HEADROOM = 0.36
@@ -178,7 +178,7 @@ def mode_marks(sheet: ModalTestReport, low_hz: float, high_hz: float) -> list[sp
     at = [each.frequency_hz for each in apart]
     texts = [f"{each.kind}, {each.frequency_hz:.4g} Hz: {each.reason}" for each in apart]
     name = "set aside"
-    return found + _marked_row(at, _SET_ASIDE_ROW, "red", "cross", name, texts, [], "dot")
+    return found + _marked_row(at, _EXCLUDED_ROW, "red", "cross", name, texts, [], "dot")
 
 
 def _marked_row(

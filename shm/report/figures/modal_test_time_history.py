@@ -144,13 +144,13 @@ def _hit_marks(sheet: ModalTestReport) -> list[spec.Mark]:
                 name=f"{counted} dropped: {reason}" if reason else f"{counted} used",
                 labels=[str(number) for number, _ in hits] if len(located) <= _MOST_NUMBERS else (),
                 label_side="top",
-                texts=[_told(number, hit, hit_time_s(sheet, hit)) for number, hit in hits],
+                texts=[_wording(number, hit, hit_time_s(sheet, hit)) for number, hit in hits],
             )
         )  # fmt: skip
     return found
 
 
-def _told(number: int, hit: Hit, at_s: float) -> str:
+def _wording(number: int, hit: Hit, at_s: float) -> str:
     """`at_s` is as the axis has it, also where records follow each other."""
     what = "used" if hit.used else f"dropped: {hit.reason}"
     return f"hit {number}, {at_s:.3f} s, {formatting.plain(hit.peak_force_n, 4)} N, {what}"

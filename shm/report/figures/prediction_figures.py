@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 # In a fixed order; dashed where a higher mode begins the list anew.
 _HUES = ("blue", "orange", "green", "purple", "red", "quiet")
-_ASIDE_INCHES = 3.2  # layout
+_ADJACENT_INCHES = 3.2  # layout
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ def specify(parts: Sequence[Curves], x_label: str, y_label: str) -> Specificatio
         )
         for place, each in enumerate(parts)
     ]
-    return Specification(rows=[panels], height_inches=_ASIDE_INCHES, legend_columns=7)
+    return Specification(rows=[panels], height_inches=_ADJACENT_INCHES, legend_columns=7)
 
 
 def write_curves_png(figure: Specification, path: Path, words: str = "") -> None:

@@ -1,4 +1,4 @@
-"""What a figure shows, told once: paper draws it by `with_matplotlib`, a screen by plotly.
+"""Figures as data: paper draws them by `with_matplotlib`, a screen by plotly.
 
 Colours are names of `style.PALETTE`, sizes are points. Places may be numbers or times. A
 `hover` is a template as plotly takes it; paper leaves it out.
@@ -43,7 +43,7 @@ PLANE_SYMBOLS: dict[Plane, Symbol] = {"transverse": "circle", "longitudinal": "s
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mark:
-    """What all marks share.
+    """The fields that all marks share.
 
     `name` stands in the legend, once a figure. `texts` are what a hover tells of each place, or
     what its template calls `%{text}`. `in_shares`: y is a share of the panel's height.
@@ -90,7 +90,7 @@ class Points(Mark):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Band(Mark):
-    """What lies between two curves."""
+    """The area between two curves."""
 
     x: Values
     low: Values
@@ -169,7 +169,7 @@ class Panel:
 
     Without `x` it shares the horizontal axis of the next panel below that has one; `shares_y`: it
     has the vertical axis of the first panel of its row, or of the row above where it is the first.
-    `has_own_legend`: on paper, apart from the others'. `words` stand in the place of axes.
+    `has_separate_legend`: on paper, apart from the others'. `words` stand in the place of axes.
     """
 
     y: Axis
@@ -181,7 +181,7 @@ class Panel:
     height: float = 1.0
     width: float = 1.0
     shares_y: bool = False
-    has_own_legend: bool = False
+    has_separate_legend: bool = False
     words: str = ""
 
 
@@ -349,10 +349,10 @@ def svg(figure: Figure, name: str, title: str, alt: str) -> str:
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
     body = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
-    return _named(_themed(_own_ids(body, name)), name, title, alt)
+    return _named(_themed(_unique_ids(body, name)), name, title, alt)
 
 
-def _own_ids(body: str, name: str) -> str:
+def _unique_ids(body: str, name: str) -> str:
     numbers: dict[str, str] = {}
     for found in _ID.findall(body):
         numbers.setdefault(found, f"{name}-{len(numbers)}")

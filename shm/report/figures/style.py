@@ -1,4 +1,4 @@
-"""What all figures share: size, letters, quiet axes, and colours that the colour-blind tell apart;
+"""The style of all figures: size, letters, quiet axes, colours that the colour-blind distinguish;
 a word stands beside each.
 """
 

@@ -45,7 +45,7 @@ def draw(figure: spec.Specification) -> Figure:
             y=0.06 / figure.height_inches,
         )
     where = "upper left" if figure.is_grid else "outside upper left"
-    shared = [axes for axes, panel in places if not panel.has_own_legend]
+    shared = [axes for axes, panel in places if not panel.has_separate_legend]
     style.legend_of_figure(made, shared, figure.legend_columns, where)
     return made
 
@@ -80,7 +80,7 @@ def _placed(made: Figure, figure: spec.Specification) -> Iterable[tuple[Axes, sp
         cells = (
             [grid[number, column] for column in range(len(row))]
             if is_whole
-            else _beside(grid, number, row)
+            else _adjacent(grid, number, row)
         )
         for column, (cell, panel) in enumerate(zip(cells, row, strict=True)):
             axes = made.add_subplot(cell, sharex=above, sharey=first if panel.shares_y else None)
@@ -94,7 +94,7 @@ def _placed(made: Figure, figure: spec.Specification) -> Iterable[tuple[Axes, sp
             yield axes, panel
 
 
-def _beside(grid: GridSpec, number: int, row: Any) -> list[Any]:
+def _adjacent(grid: GridSpec, number: int, row: Any) -> list[Any]:
     widths = [panel.width for panel in row]
     parts = grid[number, 0].subgridspec(1, len(row), width_ratios=widths)
     return [parts[0, column] for column in range(len(row))]
@@ -122,7 +122,7 @@ def _panel(axes: Axes, panel: spec.Panel, figure: spec.Specification) -> None:
     _scale(axes, "y", panel.y)
     if panel.x is not None:
         _scale(axes, "x", panel.x)
-    if panel.has_own_legend:
+    if panel.has_separate_legend:
         style.legend_above(axes, columns=2)
 
 
