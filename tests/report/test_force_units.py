@@ -18,17 +18,14 @@ from shm.report.contents import BridgeReport, DiagnosisSheet, HangerReport
 from shm.report.diagnosis_report import diagnosis_paper
 from shm.report.figures.along_the_bridge import bridge_illustration
 from shm.report.figures.every_figure import hanger_figures
-from shm.report.figures.hanger_states import STATES
 from shm.report.formatting import Interval
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_status import Status
 from shm.report.hanger_tables import history, models, results
 from shm.report.shifts import shift_unit
-from shm.report.states import QuantityOverTime, StatesOverTime
 from shm.values import Hanger, Posterior, Selection, TensionEstimate
 from shm.values.rounding import force_unit
 from shm.watch.neighbours import HangerShift, bridge_pattern
-from shm.watch.state import Band
 from tests.helpers.nouns import a_summary
 from tests.helpers.slow import few_of
 from tests.report.diagnoses import HANGER, sheet
@@ -128,22 +125,6 @@ def test_figures_are_labelled_in_that_unit(
     for said in (drawn["trend"].alt, drawn["tension"].alt, drawn["tension"].caption):
         assert f" {unit} (90 % interval" in said
         assert not NOTHING.search(said)
-
-
-@pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
-def test_states_over_time_are_drawn_in_that_unit(tension_n: float, unit: str) -> None:
-    middle = np.full(3, tension_n)
-    band = Band(0.98 * middle, middle, 1.02 * middle)
-    quantity = QuantityOverTime(
-        "tension", "tension", band, band, band, tension_n, 0.9 * tension_n, 1.1 * tension_n
-    )
-    times = (NOW, NOW.replace(day=2), NOW.replace(day=3))
-    data = StatesOverTime(times, np.full(3, nan), nan, np.zeros(3, bool), (quantity,))
-    figure = STATES.figure(data)
-    assert figure is not None
-    assert figure.axes[0].get_ylabel() == f"tension ({unit})"
-    assert f" {unit}), baseline " in STATES.alt(data)
-    assert not NOTHING.search(STATES.alt(data))
 
 
 @pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)

@@ -26,7 +26,7 @@ from shm.report.figures.hanger_frequencies import compared_modes
 from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
 from shm.report.figures.time_axes import bounds_of, part, places, single_tests, thinned_words
 from shm.report.formatting import Interval
-from shm.report.states import CalledChange, QuantityOverTime, called_words
+from shm.report.states import CalledChange, called_words
 from shm.store import EventKind, TrendPoint
 from shm.values.rounding import ForceUnit, force_unit
 from shm_daemon.web import with_plotly
@@ -72,7 +72,8 @@ _HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {
 def _course(view: HangerView) -> hanger_trend.Course:
     """All that the figure shows; without the state over time where that is still worked out."""
     states, at = view.states, {point.time: place for place, point in enumerate(view.trend)}
-    baseline, state = view.baseline, _averaged_state(view)
+    baseline = view.baseline
+    baseline_n = baseline.averaged.tension_n.mean if baseline else None
     raised = [e for e in view.events if e.kind is EventKind.ALERT and e.at in at]
     changes = [call.watched.change for call in view.calls]
     return hanger_trend.Course(
@@ -80,10 +81,10 @@ def _course(view: HangerView) -> hanger_trend.Course:
         names=[point.test for point in view.trend],
         tensions_n=[Interval.of_averaged(point.averaged) for point in view.trend],
         nominal_n=view.hanger.nominal_tension_n,
-        baseline_n=baseline.averaged.tension_n.mean if baseline else None,
+        baseline_n=baseline_n,
         reach=view.hanger.thresholds.tension_shift_fraction,
         alerts={at[event.at]: event.why for event in raised},
-        state=state,
+        state=hanger_trend.averaged_state(states, baseline_n) if states and baseline_n else None,
         state_times=states.times if states else (),
         reference_temperature_c=states.reference_temperature_c if states else math.nan,
         changes=[CalledChange(c.began_after, c.began_by, called_words(c)) for c in changes],
@@ -99,20 +100,6 @@ def _course(view: HangerView) -> hanger_trend.Course:
         else (),
         remark=_remark(view),
     )
-
-
-def _averaged_state(view: HangerView) -> QuantityOverTime | None:
-    """The state of the tension, of one model class, at the level of the average over classes.
-
-    Of a change all classes say the same share; the band compares tests, so it moves along.
-    """
-    states, baseline = view.states, view.baseline
-    found = [] if states is None else [q for q in states.quantities if q.is_tension]
-    if not found or baseline is None:
-        return None
-    ratio = baseline.averaged.tension_n.mean / baseline.tension_n.mean
-    whole = np.arange(len(found[0].filtered.middle))
-    return replace(found[0], filtered=part(found[0].filtered, whole, ratio))
 
 
 def _remark(view: HangerView) -> str:

@@ -12,7 +12,6 @@ from shm.report.figures.gap_causes import SHARED
 from shm.report.figures.gap_check import FIGURE as CHECK
 from shm.report.figures.gap_map import FIGURE as GAP_MAP
 from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
-from shm.report.figures.hanger_states import FIGURE as STATES
 from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
 from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
@@ -25,7 +24,7 @@ from shm.report.figures.specification import Illustration, Member, drawn
 from shm.values import BridgeDiagnosis, GapCheck
 
 OF_HANGER: tuple[Member[HangerReport], ...] = (
-    TREND, STATES, TENSION, FREQUENCIES, STIFFNESS
+    TREND, TENSION, FREQUENCIES, STIFFNESS
 )  # fmt: skip
 OF_MODAL_TEST: tuple[Member[Shown], ...] = (
     TIME_HISTORY, HITS, RESPONSE, STABILISATION, SHAPES

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 import numpy as np
@@ -19,7 +19,6 @@ from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
 from shm.values import FloatArray
 from shm.values.notes import Note, NoteKind
 from shm.values.rounding import ForceUnit, force_unit
-from shm.values.stated_tension import averaged_now
 from shm.watch.state import Band as Bounds
 
 _LONGEST_WORDS = 200  # layout: characters of a note in a hover; the page has all
@@ -97,6 +96,7 @@ def specify(course: Course) -> spec.Specification | None:
         ),
         *_levels(course, scale),
         *_alerts(course, scale),
+        *_excluded(course, scale),
         *_deeds(course),
         *_repeats(course, chosen.tolist(), scale),
         *time_axes.changes(course.changes or (), _shown(course)),
@@ -174,6 +174,28 @@ def _alerts(course: Course, scale: float) -> list[spec.Mark]:
             texts=list(course.alerts.values()),
         )
     ]  # fmt: skip
+
+
+def _excluded(course: Course, scale: float) -> list[spec.Mark]:
+    """Mark tests taken for blunders; where they lie beyond the view, at its edge."""
+    low, high = _range(course, scale)
+    found: list[spec.Mark] = []
+    for name, is_inside in (("excluded test", True), ("excluded test out of view", False)):
+        at = [
+            place
+            for place in course.excluded
+            if bool(low <= scale * course.bounds_n.middle[place] <= high) is is_inside
+        ]
+        if at:
+            y = np.clip(scale * course.bounds_n.middle[at], low, high)
+            symbol: spec.Symbol = "thin cross" if is_inside else "triangle"
+            found.append(
+                spec.Points(
+                    x=_picked(course.times, at), y=y, symbol=symbol, size=7, colour="ink",
+                    clipped=False, name=name, texts=[course.names[place] for place in at],
+                )
+            )  # fmt: skip
+    return found
 
 
 def _deeds(course: Course) -> list[spec.Mark]:
@@ -268,7 +290,7 @@ def _marks(course: Course) -> str:
         "upright spans: when a detected change began, with 90 % probability"
         if course.changes
         else "",
-        "tests taken for blunders may lie beyond the view" if course.excluded else "",
+        "crosses, or triangles at the edge: tests taken for blunders" if course.excluded else "",
         "at the foot: what was set, adopted, seen or repaired"
         if course.deeds or course.notes
         else "",
@@ -297,20 +319,39 @@ def _course(data: HangerReport) -> Course:
     rows = time_axes.dated(data)
     alerted = {alert.test: alert.message for alert in data.alerts}
     undated = len(data.trend) - len(rows)
-    baseline = data.baseline and averaged_now(data.baseline, data.selection)
+    baseline_n = data.now.baseline_n
+    states = data.states.within(data.period)
     left = f"{formatting.counted(undated, 'test')} without a time left out." if undated else ""
     return Course(
         times=[row.time for row in rows],
         names=[row.row.test for row in rows],
         tensions_n=[row.row.tension_n for row in rows],
         nominal_n=data.hanger.nominal_tension_n,
-        baseline_n=baseline.tension_n.mean if baseline else None,
+        baseline_n=baseline_n.mean if baseline_n else None,
         reach=data.hanger.thresholds.tension_shift_fraction,
         alerts={i: alerted[r.row.test] for i, r in enumerate(rows) if r.row.test in alerted},
         notes=data.inspections,
-        excluded=excluded([row.time for row in rows], data.states),
+        excluded=excluded([row.time for row in rows], states),
+        state=averaged_state(states, baseline_n.mean) if baseline_n else None,
+        state_times=states.times,
+        reference_temperature_c=states.reference_temperature_c,
+        changes=states.changes if states.times else None,
         remark=left,
     )
+
+
+def averaged_state(states: StatesOverTime, baseline_n: float) -> QuantityOverTime | None:
+    """Return the state of the tension at the level of the average over classes.
+
+    It is of one model class: of a change all classes say the same fraction, so the band, which
+    compares tests, moves along with the tension of the baseline `baseline_n`.
+    """
+    found = next((each for each in states.quantities if each.is_tension), None)
+    if found is None or not np.isfinite(found.filtered.middle).any():
+        return None
+    whole = np.arange(len(found.filtered.middle))
+    ratio = baseline_n / found.baseline
+    return replace(found, filtered=time_axes.part(found.filtered, whole, ratio))
 
 
 def excluded(times: Sequence[datetime], states: StatesOverTime) -> tuple[int, ...]:
