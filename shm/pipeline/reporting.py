@@ -98,7 +98,7 @@ def structure_report(
         baseline_hz=dict(zip(levels.names, levels.samples[0].tolist(), strict=True))
         if levels
         else {},
-        said=frequency_words(watched, structure),
+        statement=frequency_words(watched, structure),
         drifts=watched[-1].drifts if watched else (),
         alerts=tuple(stored.alert for stored in alerts),
         open_alerts=store.alerts.open_counts().get(number, 0),

@@ -158,12 +158,15 @@ def facts(data: HangerReport) -> tuple[Fact, ...]:
         _since_baseline(data),
         _of_nominal(data),
         *_by_latest_test(data),
-        (
-            "Latest test",
-            formatting.moment(data.latest.time),
-            formatting.temperature(data.latest.temperature_c),
-        ),
+        _latest_test(data),
     )
+
+
+def _latest_test(data: HangerReport) -> Fact:
+    time, temperature = data.latest.time, formatting.temperature(data.latest.temperature_c)
+    if time is None:
+        return ("Latest test", "time not recorded", temperature)
+    return ("Latest test", f"{time:%Y-%m-%d}", f"{formatting.moment(time)[11:]}; {temperature}")
 
 
 def _tension(data: HangerReport) -> Fact:
@@ -180,7 +183,7 @@ def _by_latest_test(data: HangerReport) -> tuple[Fact, ...]:
         return ()
     alone = Interval.of_averaged(data.by_latest_test)
     value = formatting.with_half(alone, data.tension_unit)
-    return (("By the latest test alone", value, f"test {data.latest.id}; 90 % interval"),)
+    return (("Latest test alone", value, f"test {data.latest.id}; 90 % interval"),)
 
 
 def _limits(data: HangerReport, statement: StatedTension) -> tuple[Fact, ...]:
@@ -291,7 +294,7 @@ _NOT_WATCHED = "No test was watched yet: its first tests make the baseline."
 class StructureReport:
     """The data that the report of a structure is made of.
 
-    `baseline_hz` are its first frequencies by name, `said` is the message of the watch after its
+    `baseline_hz` are its first frequencies by name, `statement` is the message of the watch after its
     latest test, empty before one was watched; `undated` names the tests dated by their receipt.
     """
 
@@ -321,7 +324,7 @@ def structure_paper(data: StructureReport) -> Paper:
     )
     wording = tuple((f"{each.time:%Y-%m-%d}", each.message) for each in data.alerts)
     alerts = Table("Alerts", ("test of", "message"), wording)
-    statement = f"{data.said or _NOT_WATCHED} {dated_by_receipt(data.undated)}".strip()
+    statement = f"{data.statement or _NOT_WATCHED} {dated_by_receipt(data.undated)}".strip()
     return Paper(
         title=structure_words(data.structure),
         bridge=data.bridge,
@@ -368,7 +371,7 @@ def structure_json(data: StructureReport) -> dict[str, Any]:
         "latest_test": data.latest,
         "baseline_since": data.baseline_since,
         "baseline_hz": data.baseline_hz,
-        "said": data.said,
+        "said": data.statement,
         "drifts": [drift_document(each) for each in data.drifts],
         "alerts": [alert_document(each) for each in data.alerts],
         "open_alerts": data.open_alerts,

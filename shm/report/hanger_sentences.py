@@ -68,12 +68,13 @@ def further(data: HangerReport) -> str:
 
 
 def _sentences(data: HangerReport) -> tuple[str, ...]:
+    known = data.now.is_determined
     found = (
         *_doubts(data),
         _tension(data),
         _latest_test(data),
         # How well a test repeats it, and the probabilities that the owner's limits ask for.
-        *stated(data.averaged, data.tension_unit).sentences[1:],
+        *(stated(data.averaged, data.tension_unit).sentences[1:] if known else ()),
         _against_nominal(data),
         _against_baseline(data),
         _unseen(data),
@@ -144,6 +145,8 @@ def _against_nominal(data: HangerReport) -> str:
     nominal = data.hanger.nominal_tension_n
     if not nominal > 0:
         return "It has no nominal tension to compare with."
+    if not data.now.is_determined:
+        return ""
     share = data.tension_n.scaled(1 / nominal)
     half, off = share.width / 2, share.mean - 1
     if abs(off) <= half:

@@ -37,7 +37,8 @@ def results(data: HangerReport) -> Table:
     rows: list[tuple[str, ...]] = []
     for what, averaged, basis in known:
         words = stated(averaged, unit)
-        rows.append((f"tension, {what}", words.tension, words.interval, basis, ""))
+        value = "not determined" if Interval.of_averaged(averaged).is_wide else words.tension
+        rows.append((f"tension, {what}", value, words.interval, basis, ""))
     if (before := data.baseline_tension_n) is not None:
         each = before.in_unit(unit)
         mean, span = f"{formatting.mean(each)} {unit.name}", f"{formatting.span(each)} {unit.name}"

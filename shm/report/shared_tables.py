@@ -88,9 +88,9 @@ _LINEAGE = {
 }
 
 
-def lineage(wording: Mapping[str, str]) -> dict[str, str]:
+def lineage(known: Mapping[str, str]) -> dict[str, str]:
     """Return what a result was made from, its keys in words."""
-    return {_LINEAGE.get(key, formatting.quantity(key)): value for key, value in wording.items()}
+    return {_LINEAGE.get(key, formatting.quantity(key)): value for key, value in known.items()}
 
 
 def added_mass(test: ModalTest) -> str:
@@ -102,14 +102,14 @@ def added_mass(test: ModalTest) -> str:
     return f"{mass.mass_kg:g} kg at {mass.x_m:g} m from the deck end{size}"
 
 
-def settings(wording: Mapping[str, str]) -> Table:
+def settings(known: Mapping[str, str]) -> Table:
     """The settings that decide the numbers, each with its unit; empty where nobody says."""
     helps = {row.name: row.help for row in TABLE}
     return Table(
         "Settings in force",
         ("setting", "value", "what it is"),
         tuple(
-            (name, value.replace(",", ", "), helps.get(name, "")) for name, value in wording.items()
+            (name, value.replace(",", ", "), helps.get(name, "")) for name, value in known.items()
         ),
         note="Of identification, updating and watch, as they stand now: given, without interval.",
     )

@@ -27,7 +27,7 @@ class Size:
     logarithmic: bool = False
 
     def __str__(self) -> str:
-        return self.told(self.interval)
+        return self.in_words(self.interval)
 
     @property
     def sure_sign(self) -> int:
@@ -42,15 +42,15 @@ class Size:
             return f"{self} {up}"
         if self.sure_sign < 0:
             turned = Interval(-self.interval.mean, -self.interval.high, -self.interval.low)
-            return f"{self.told(turned)} {down}"
-        return f"{self.told(self.interval, '+')} {up}"
+            return f"{self.in_words(turned)} {down}"
+        return f"{self.in_words(self.interval, '+')} {up}"
 
     def __format__(self, directions: str) -> str:
         """As text; with `up|down` as `directed` says it."""
         up, bar, down = directions.partition("|")
         return self.directed(up, down) if bar else str(self)
 
-    def wording(self, interval: Interval, sign: str = "") -> str:
+    def in_words(self, interval: Interval, sign: str = "") -> str:
         """An interval in this size's unit and digits."""
         mean, low, high = _texts(interval, sign, self.logarithmic)
         unit = f" {self.unit}" if self.unit else ""

@@ -46,7 +46,7 @@ def specify(sheet: DiagnosisSheet) -> spec.Specification | None:
         return None
     brackets, outermost = _brackets(bars)
     right = max(1.3, outermost + _BRACKET_TEXT)
-    besides = [(-0.85, "log Bayes factor"), *enumerate(bar.beside for bar in bars)]
+    besides = [(-0.85, "log Bayes factor"), *enumerate(bar.besides for bar in bars)]
     column = _notes(
         [right] * len(besides), [row for row, _ in besides], [wording for _, wording in besides]
     )
