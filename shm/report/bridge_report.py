@@ -14,7 +14,7 @@ from shm.report.figures.every_figure import bridge_figures
 from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
 from shm.report.hanger_summary import Course, HangerSummary
-from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, filled
+from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, appendices, filled
 from shm.report.shared_tables import lineage, settings
 from shm.report.shifts import _day, pattern_tables, shift_cells
 from shm.report.states import period_json
@@ -43,6 +43,7 @@ def bridge_paper(data: BridgeReport) -> Paper:
             ),
             Part("Along the bridge", figures=lambda: bridge_figures(data)),
             Part("Numbers", tables=tables(data)),
+            *appendices(Part("Settings", tables=filled(settings(data.settings)))),
         ),
         generated_at=data.generated_at,
         version=data.version,
@@ -138,7 +139,8 @@ def named(lines: Sequence[HangerSummary]) -> str:
 
 def _extremes(data: BridgeReport) -> str:
     """Return who carries most and least of the nominal tension."""
-    shares = [(line, share) for line in data.hangers if (share := line.of_nominal) is not None]
+    known = [line for line in data.hangers if line.is_determined]
+    shares = [(line, share) for line in known if (share := line.of_nominal) is not None]
     if len(shares) < 2:
         return ""
     by_share = sorted(shares, key=lambda each: each[1].mean)
@@ -196,7 +198,6 @@ def tables(data: BridgeReport) -> tuple[Table, ...]:
         *(pattern_tables(data.pattern) if data.pattern else ()),
         _tests(data),
         _origin(data),
-        settings(data.settings),
     )
 
 

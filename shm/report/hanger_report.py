@@ -45,8 +45,12 @@ def hanger_paper(data: HangerReport) -> Paper:
                 lead=data.now.message.words,
                 summary=why(data),
                 facts=facts(data),
+                tables=[bar_table(data.bar)],
+            ),
+            Part(
+                "Sensors and formulas of practice",
                 figures=lambda: drawn((SKETCH,), data.bar),
-                tables=filled(bar_table(data.bar), tables.practice(data)),
+                tables=filled(tables.practice(data)),
             ),
             Part(
                 "Tension over time",
@@ -294,8 +298,8 @@ _NOT_WATCHED = "No test was watched yet: its first tests make the baseline."
 class StructureReport:
     """The data that the report of a structure is made of.
 
-    `baseline_hz` are its first frequencies by name, `statement` is the message of the watch after its
-    latest test, empty before one was watched; `undated` names the tests dated by their receipt.
+    `baseline_hz` are its first frequencies by name, `statement` is the message of the watch after
+    its latest test, empty before one was watched; `undated` names the tests dated by their receipt.
     """
 
     bridge: str

@@ -6,7 +6,7 @@ import math
 
 from shm.report import formatting
 from shm.report.formatting import Interval
-from shm.report.paper import Table
+from shm.report.paper import Table, fold_improbable
 from shm.values import NAN, Drift, is_ratio, kind_of
 from shm.values.rounding import ForceUnit, force_unit
 from shm.watch.change_words import factor
@@ -71,8 +71,10 @@ def pattern_tables(pattern: BridgePattern) -> tuple[Table, Table]:
     return shift_table(pattern), Table(
         "What explains them",
         ("explanation", "probability"),
-        tuple(
-            (each.name, formatting.probability(each.probability)) for each in pattern.explanations
+        fold_improbable(
+            [(e.name, formatting.probability(e.probability)) for e in pattern.explanations],
+            [each.probability for each in pattern.explanations],
+            "explanations",
         ),
     )
 

@@ -14,7 +14,7 @@ from shm import notebook
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_paper
-from shm.report.contents import BridgeReport, DiagnosisSheet, HangerReport
+from shm.report.contents import BridgeReport, DiagnosisSheet, HangerReport, summary_of
 from shm.report.diagnosis_report import diagnosis_paper
 from shm.report.figures.along_the_bridge import bridge_illustration
 from shm.report.figures.every_figure import hanger_figures
@@ -80,12 +80,15 @@ def of_size(season: HangerReport, tension_n: float) -> HangerReport:
     assert season.selection is not None
     hanger = replace(season.hanger, nominal_tension_n=factor * season.hanger.nominal_tension_n)
     selection = season.selection
+    compared = Selection(tuple(map(scaled, selection.posteriors)), selection.probabilities)
+    posterior, baseline = scaled(season.posterior), scaled(season.baseline)
+    now = summary_of(hanger, season.latest, posterior, baseline, compared)
     return replace(
         season,
-        hanger=hanger,
-        posterior=scaled(season.posterior),
-        baseline=scaled(season.baseline),
-        selection=Selection(tuple(map(scaled, selection.posteriors)), selection.probabilities),
+        now=replace(now, drifts=season.drifts),
+        posterior=posterior,
+        baseline=baseline,
+        selection=compared,
         trend=tuple(replace(row, tension_n=row.tension_n.scaled(factor)) for row in season.trend),
     )
 

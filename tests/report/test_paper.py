@@ -81,7 +81,8 @@ def texts(paper: Paper, renderer: str) -> Iterator[str]:
     if renderer != "as_pdf":
         yield paper.title
     for number, part in enumerate(paper.parts):
-        yield from _texts_of_part(part, renderer, is_first=number == 0)
+        if not (part.is_appendix and renderer == "as_pdf"):
+            yield from _texts_of_part(part, renderer, is_first=number == 0)
     yield paper.foot
 
 
