@@ -264,7 +264,7 @@ def with_tension(alert: Alert, now: HangerSummary) -> Alert:
     """Return an alert with the tension of its hanger, as every face states it."""
     alert = replace(alert, tension=now.tension)
     then_n, now_n = now.baseline_n, now.tension_n
-    if then_n is None or now_n is None or now.basis != BASELINE_AND_CHANGE:
+    if then_n is None or now_n is None or not now.is_found or now.basis != BASELINE_AND_CHANGE:
         return alert
     unit = force_unit(then_n.mean, now_n.mean)
     said, mark, details = alert.message.partition(" Details: ")
