@@ -252,7 +252,9 @@ def _report(
     """Return the data that the figures of a hanger are drawn from."""
     return HangerReport(
         bridge="",
-        now=summary_of(hanger, tests[-1] if tests else ModalTest("latest", ()), posterior, baseline),
+        now=summary_of(
+            hanger, tests[-1] if tests else ModalTest("latest", ()), posterior, baseline
+        ),
         tests=tests,
         posterior=posterior,
         generated_at=datetime.now(UTC),

@@ -186,6 +186,7 @@ class Queue:
                 averaged_now(baseline.posterior, compared, hanger.limits),
                 drifts=watched.told,
                 called=(*called, *([watched.change] if watched.change.called else ())),
+                standing=(alert,),
             )
             alert = with_tension(alert, now)
         if alert is not None and silences:

@@ -272,7 +272,7 @@ def status_of(
 def _of_change(known: HangerSummary) -> Lead:
     """Return what was detected to have changed; else what an alert of another kind asks for."""
     hanger, drifts = known.hanger, known.drifts
-    beyond, change = _beyond(known), _change(known)
+    beyond, change = shifts_beyond(known), _change(known)
     others = [each for each in known.standing if not _CHANGES & set(each.kinds)]
     if beyond or change:
         before = change and [each for each in known.called if each.began_by < change.began_by]
@@ -288,8 +288,8 @@ def _of_change(known: HangerSummary) -> Lead:
     return Lead(state, f"{look_again(hanger)} {WEEK}.")
 
 
-def _beyond(known: HangerSummary) -> list[Drift]:
-    """The shifts beyond their threshold, as the latest test has them.
+def shifts_beyond(known: HangerSummary) -> list[Drift]:
+    """Return the shifts beyond their threshold, as the latest test has them.
 
     What an alert said stays as sure as it was while it stands; where two tests that agree said it,
     the watch may not have seen it, and the alert's own number stays.

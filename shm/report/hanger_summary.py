@@ -11,7 +11,7 @@ from typing import Any
 
 from shm.documents import averaged_document
 from shm.report.formatting import NORMAL_90, Interval
-from shm.report.hanger_status import HangerMessage, Status, hanger_message
+from shm.report.hanger_status import HangerMessage, Status, hanger_message, shifts_beyond
 from shm.values import (
     NAN,
     TENSION,
@@ -100,16 +100,22 @@ class HangerSummary:
         """Return the bar as its owner describes it, with these sensors."""
         return describe_bar(self.hanger, self.sensors)
 
-    @property
+    @cached_property
     def drift(self) -> Drift | None:
-        """Return the drift of the tension; None where nothing was compared."""
-        return next((each for each in self.drifts if each.quantity == TENSION), None)
+        """Return the drift of the tension; None where nothing was compared.
+
+        What a standing alert says to be beyond its threshold stays what its message says.
+        """
+        stated = [each for each in shifts_beyond(self) if each.quantity == TENSION]
+        of_test = [each for each in self.drifts if each.quantity == TENSION]
+        return max(stated, key=lambda each: abs(each.shift_mean), default=None) or next(
+            iter(of_test), None
+        )
 
     @property
     def is_found(self) -> bool:
         """Return True if a shift was detected, not one that is given in case there is one."""
-        level = self.hanger.thresholds.alert_probability
-        return bool(self.called) or any(each.probability >= level for each in self.drifts)
+        return bool(self.called) or bool(shifts_beyond(self))
 
     @property
     def change(self) -> Interval | None:
