@@ -35,7 +35,7 @@ def heed_limits(
         own = [each for each in alerts if _KIND in each.alert.kinds]
         ended = dict(_ended(own, hanger, point))
         for limit in _limits(hanger):
-            alert = _alert(store, hanger, limit, point, own)
+            alert = _alert(workspace, store, hanger, limit, point, own)
             if alert or ended:
                 store.alerts.settle(alert, hooks, ended, at)
                 ended = {}
@@ -70,9 +70,17 @@ def _ended(
 
 
 def _alert(
-    store: Store, hanger: Hanger, limit: CrossedLimit, point: TrendPoint, own: Sequence[StoredAlert]
+    workspace: Workspace,
+    store: Store,
+    hanger: Hanger,
+    limit: CrossedLimit,
+    point: TrendPoint,
+    own: Sequence[StoredAlert],
 ) -> Alert | None:
-    """Make the alert that a limit is crossed; None where it is not, or was told."""
+    """Return the alert that a limit is crossed; None where it is not, or was reported.
+
+    It names its test where the best estimate since the last change is another tension.
+    """
     probability, level = (
         _probability(point.averaged, limit.side),
         hanger.thresholds.alert_probability,
@@ -80,9 +88,13 @@ def _alert(
     same = [each for each in own if _is_of(each.alert, limit)]
     if not probability >= level or (same and not _is_another_crossing(store, hanger, same[-1])):
         return None
-    from shm.report.hanger_status import off_limits  # it computes: not before it is needed
+    # They compute: not before they are needed.
+    from shm.pipeline.bridge_reporting import hanger_summaries
+    from shm.report.hanger_status import off_limits
 
-    lead = off_limits(hanger, point.averaged, f" by test {point.test}")
+    (now,) = hanger_summaries(workspace, store, point.time, [hanger])
+    is_headline = now.tension is not None and now.tension.tension_n == point.averaged.tension_n
+    lead = off_limits(hanger, point.averaged, "" if is_headline else f" by test {point.test}")
     key = f"hanger-{hanger.id}:{_KIND}:{limit.side}-{limit.tension_n:.12g}:{point.test_id}"
     key += f":again-{same[-1].id}" if same else ""
     sure = "above 0.99" if probability > 0.99 else f"{probability:.2f}"

@@ -13,6 +13,7 @@ from shm.report.diagnosis_wording import (
     is_of_the_measurement,
     label,
     phrase,
+    short_tension_words,
     tension_unit,
     tension_words,
 )
@@ -160,7 +161,7 @@ def write_tension(diagnosis: Diagnosis) -> str:
             care = ", not to be relied on while the gap is open"
         elif verdict.is_description_off:
             care = ", not to be relied on while the description may be off"
-        wording = tension_words(after_n, tension_unit(diagnosis))
+        wording = short_tension_words(after_n, tension_unit(diagnosis))
         sentences.append(f"{AFTER.capitalize()}, the tension is {wording}{care}.")
     if verdict.claim is not None:
         sentences.append(_HELD_OUT[verdict.holds_out])

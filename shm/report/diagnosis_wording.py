@@ -114,3 +114,10 @@ def tension_words(estimate: TensionEstimate, unit: ForceUnit) -> str:
     if not tension_n.low <= tension_n.mean <= tension_n.high:  # most draws at a bound, few far off
         return f"{formatting.span(tension_n.in_unit(unit))} {unit.name} (90 % interval)"
     return formatting.tension(tension_n, unit)
+
+
+def short_tension_words(estimate: TensionEstimate, unit: ForceUnit) -> str:
+    """Return `702 ± 12 kN`, with half of the 90 % interval, where it is about symmetrical."""
+    tension_n = tension_of(estimate)
+    is_usual = tension_n.low <= tension_n.mean <= tension_n.high  # and no NaN
+    return formatting.with_half(tension_n, unit) if is_usual else tension_words(estimate, unit)

@@ -51,7 +51,7 @@ def said(diagnosis: Diagnosis) -> str:
         (LED, "The gap is explained by point mass, probability 0.93; what is left is within the "
               "stated errors."),
         (LED, "The cause: a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7)."),
-        (LED, "Weighed over all that may be, the tension is 702 kN (90 % interval 690 to 715 kN)."),
+        (LED, "Weighed over all that may be, the tension is 702 ± 12 kN."),
         (LED, "To tell point mass from section loss, measure next: known mass of 25 kg at 3.6 m."),
         (ALIKE, "Measure section, length and weight with calliper and tape first: several causes "
                 "fit alike"),
@@ -73,7 +73,7 @@ def said(diagnosis: Diagnosis) -> str:
         (replace(UNEXPLAINED, left_out=(), unexplained_probability=0.95),
          "Not explained: none of the effects in the catalogue explains it"),
         (UNEXPLAINED, "The most probable: a point mass of 12 kg (9 to 15)"),
-        (UNEXPLAINED, "715 kN), not to be relied on while the gap is open."),
+        (UNEXPLAINED, "702 ± 12 kN, not to be relied on while the gap is open."),
         (UNDECIDED, "Several causes fit alike, and these data cannot tell them apart: point mass "
                     "and sag, together probability 0.75."),
         (replace(LED, fit_p_value=0.002),
