@@ -335,7 +335,12 @@ def structure_paper(data: StructureReport) -> Paper:
         status="Alert" if data.open_alerts else "",
         style="alert" if data.open_alerts else "first",
         parts=(
-            Part("In short", summary=statement, facts=facts),
+            Part(
+                "In short",
+                summary=statement,
+                facts=facts,
+                brief=filled(_structure_frequencies(data)),
+            ),
             Part("Numbers", tables=filled(_structure_frequencies(data), alerts)),
         ),
         generated_at=data.generated_at,

@@ -48,7 +48,13 @@ def why(data: HangerReport) -> str:
 
 
 def _why(data: HangerReport) -> tuple[str, ...]:
-    return (*_doubts(data), _tension(data), _against_baseline(data))
+    undated = open_warnings.dated_by_receipt(data.now.undated)
+    return (
+        *_doubts(data),
+        _tension(data),
+        _against_baseline(data),
+        *([undated] if undated else ()),
+    )
 
 
 def _doubts(data: HangerReport) -> tuple[str, ...]:

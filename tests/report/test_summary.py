@@ -209,7 +209,8 @@ def test_the_paragraph_reads_so_from_beginning_to_end(
         "beam2, the most probable (beside beam1). It predicts 12 measured frequencies to 0.4 % "
         "(root mean square). What the plain class beam1 would leave unexplained was diagnosed on 5 "
         "tests. The gap is explained by point mass, probability 0.93; what is left is within "
-        "the stated errors. Weighed over all that may be, the tension is 702 ± 12 kN. (What became of it.) To tell point mass from section loss, "
+        "the stated errors. Weighed over all that may be, the tension is 702 ± 12 kN. (What became "
+        "of it.) To tell point mass from section loss, "
         "measure next: known mass of 25 kg at 3.6 m."
     )
     assert summary(bare) == (
