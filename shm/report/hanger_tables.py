@@ -227,24 +227,30 @@ def practice(data: HangerReport) -> Table:
 
     for each in FORMULAS:
         found = [each.tension_n(measured.get((p, each.order), np.nan), *bar) for p in PLANES]
-        holds = f"from xi = {each.valid_from_xi:g}, within {100 * each.worst_error:g} %"
-        add(f"{each.name}, mode {each.order}", found, each.ends, holds, each.leaves_out)
+        holds = f"{each.valid_from_xi:g}", f"{100 * each.worst_error:g} %"
+        add(f"{each.name}, mode {each.order}", found, each.ends, *holds, each.leaves_out)
     by_order = [{n: hz for (this, n), hz in measured.items() if this == plane} for plane in PLANES]
     fitted = [equal_springs.tension_n(this, *bar) for this in by_order]
     add(
-        f"{equal_springs.NAME}, all modes", fitted, equal_springs.ENDS, "", equal_springs.LEAVES_OUT
+        f"{equal_springs.NAME}, all modes",
+        fitted,
+        equal_springs.ENDS,
+        "",
+        "",
+        equal_springs.LEAVES_OUT,
     )
     if not rows:
         return Table(title, (), ())
     ours = stated(data.by_latest_test, unit)
     both = (ours.tension, ours.tension)
-    rows.append(("ours, by all modes of the same test", *both, "as inferred", "", ""))
+    rows.append(("ours, by all modes of the same test", *both, "as inferred", "", "", ""))
     planes = (f"{plane} ({unit.name})" for plane in PLANES)
-    heads = ("formula", *planes, "ends", "holds on such ends", "leaves out")
+    heads = ("formula", *planes, "ends", "from xi", "error", "leaves out")
     xi = hanger.length_m * math.sqrt(data.averaged.tension_n.mean / hanger.bending_stiffness_n_m2)
     note = (
         "Each from the modes that it names, of one plane. "
-        f"xi = L sqrt(T/EI) is some {xi:.2g} here: below its range a formula says nothing. "
+        f"xi = L sqrt(T/EI) is some {xi:.2g} here: below its range a formula says nothing; error: "
+        "the worst within it, on such ends. "
         f"The 90 % interval of ours is {ours.interval}."
     )
     return Table(title, heads, tuple(rows), note)

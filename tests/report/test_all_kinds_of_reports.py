@@ -30,7 +30,7 @@ from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.states import CalledChange, Period, QuantityOverTime, StatesOverTime
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
 from shm.watch.state import Band
-from tests.helpers.nouns import a_change, a_summary
+from tests.helpers.nouns import a_change, a_summary, with_now
 from tests.helpers.pdf_words import Pdf
 from tests.report.conftest import START
 from tests.report.diagnoses import CASES
@@ -66,7 +66,8 @@ def without_sds(data: HangerReport) -> HangerReport:
     check = QualityCheck("noise", "unknown", NAN, NAN, "dB", "not measured", "")
     drift = Drift(3, "t009", START, "tension", NAN, NAN, NAN, NAN, 0.05, NAN)
     tests = (replace(data.latest, modes=modes, amplitude=NAN, time=None),)
-    return replace(data, tests=tests, posterior=posterior, quality=(check,), drifts=(drift,))
+    known = with_now(data, drifts=(drift,))
+    return replace(known, tests=tests, posterior=posterior, quality=(check,))
 
 
 def of_period(data: HangerReport) -> HangerReport:
@@ -85,9 +86,15 @@ def unrecorded(row: TrendRow) -> TrendRow:
 
 KINDS: dict[str, Change] = {
     "whole": lambda data: data,
-    "no baseline": lambda data: replace(data, baseline=None, drifts=(), alerts=()),
+    "no baseline": lambda data: replace(
+        with_now(data, baseline=None, is_first=True, drifts=()), baseline=None, alerts=()
+    ),
     "one test": lambda data: replace(
-        data, trend=data.trend[-1:], baseline=data.posterior, drifts=(), alerts=(), selection=None
+        with_now(data, is_first=True, drifts=()),
+        trend=data.trend[-1:],
+        baseline=data.posterior,
+        alerts=(),
+        selection=None,
     ),
     "no temperature": lambda data: replace(
         data,
@@ -95,7 +102,9 @@ KINDS: dict[str, Change] = {
         trend=tuple(unrecorded(row) for row in data.trend),
     ),
     "called drift": lambda data: replace(
-        data, states=watched(data), called=(a_change(),), drift_watch="Tension fell by 7 %."
+        with_now(data, called=(a_change(),)),
+        states=watched(data),
+        drift_watch="Tension fell by 7 %.",
     ),
     "adopted class": lambda data: replace(
         data,

@@ -13,7 +13,7 @@ from shm.values.bar_description import BarDescription
 # Layout: heights within the panel, in its own units from -1 to 1, and of the figure in inches.
 _HEIGHTS = {"transverse": 0.45, "longitudinal": -0.45, None: 0.45}
 _HIT_HEIGHT = 0.85
-_INCHES = 1.35
+_INCHES = 1.25
 _BAR, _FITTING = 4.0, 9.0
 
 
