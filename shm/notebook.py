@@ -258,7 +258,7 @@ def _gap_check(check: GapCheck) -> Sheet:
 
 
 def figure_png(figure: Figure) -> bytes:
-    """A picture of a figure, also of one that pyplot does not know."""
+    """Return a picture of a figure, also of one that pyplot does not know."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=110)
     return buffer.getvalue()

@@ -86,7 +86,7 @@ def read(
 
 
 def load_modes(path: str | Path) -> tuple[ModalTest, ...]:
-    """The modal tests of a `*.modes.json` document, as `shm identify --out` writes it.
+    """Return the modal tests of a `*.modes.json` document, as `shm identify --out` writes it.
 
     One test each, modes in Hz by plane and order. A sidecar NAME.modes.toml may say hanger, time
     and temperature. Raises BadInput naming test, mode and remedy.
@@ -105,13 +105,13 @@ Tests: TypeAlias = Test | Sequence[Test]
 
 
 def modal_tests(tests: Tests) -> tuple[ModalTest, ...]:
-    """The modal tests, one or many."""
+    """Return the modal tests, one or many."""
     given = (tests,) if isinstance(tests, ModalTest | Identification) else tests
     return tuple(each.test if isinstance(each, Identification) else each for each in given)
 
 
 def load_hanger(path: str | Path, hanger_id: int | None = None) -> Hanger:
-    """A hanger described in a TOML file: a `bridge.toml`, or a file with one `[[hanger]]` table.
+    """Return a hanger from a TOML file: a `bridge.toml`, or a file with one `[[hanger]]` table.
 
     `hanger_id` says which, and may be left out where the file has one only. Raises BadInput naming
     the table and key at fault, or the hangers that there are.
@@ -134,7 +134,7 @@ def round_bar(
     nominal_tension_n: float,
     name: str = "",
 ) -> Hanger:
-    """A solid round bar, clamped at both ends: section and mass follow from diameter and density.
+    """Return a round bar, clamped at both ends: section and mass follow from diameter and density.
 
     The same checks are made as of a `[[hanger]]` table, which can say more (end plates,
     turnbuckles, strands, supports). A nominal tension of 0 is a bar without any. Raises BadInput
@@ -178,7 +178,7 @@ def identify(
     mains_hz: float = _DEFAULT.mains_hz,
     window_time_constant_s: float = math.inf,
 ) -> Identification:
-    """The modes of one test, each with its standard deviations, and how they were found.
+    """Return the modes of one test, each with its standard deviations, and how they were found.
 
     `records` are those of one test: hits, set-ups, or frequency responses. The description of the
     `hanger`, where known, helps to number the modes. `test_id` names the test; left out, the name
@@ -219,7 +219,7 @@ def identify(
 
 
 def _of(found: Identification, hanger: Hanger, source: str) -> Identification:
-    """The test as one of `hanger`, where its records do not say that it is of another."""
+    """Return the test as one of `hanger`, where its records do not say that it is of another."""
     named = found.test.hanger
     if named not in (None, hanger.id):
         raise BadInput(
@@ -242,7 +242,7 @@ def update(
     sampler: str = IMPORTANCE,
     calibrated_by: Tests = (),
 ) -> Posterior:
-    """The posterior of tension and end stiffness of one model class, given all modes of `tests`.
+    """Return the posterior of tension and ends of one model class, given all modes of `tests`.
 
     `model` is a name of `shm.models.MODELS` (`beam1`, `beam2`, `beam3`, `s1`, `s2`, `solid0`,
     `solid1`, `solid2`), or a baseline with an adopted effect (`beam1+point_mass@everywhere`).
@@ -416,7 +416,7 @@ def simulate(
     time: datetime | None = None,
     seed: int = 1,
 ) -> Recording:
-    """The recording of a hammer test of a hanger whose truth you choose.
+    """Return the recording of a hammer test of a hanger whose truth you choose.
 
     The modes are those of the general model of a hanger, `shm.models.hanger`. Left out, `tension_n`
     is the nominal one, the end springs (k1, k3 transverse at deck and arch end; k2, k4

@@ -124,7 +124,7 @@ class Store:
         return tuple(posterior for _, posterior in self._store.posteriors.history(hanger_id))
 
     def selection(self, hanger_id: int) -> Selection:
-        """The model classes compared on the hanger's first tests; raises NothingThere."""
+        """Return the model classes compared on the hanger's first tests; raises NothingThere."""
         self.hanger(hanger_id)
         found = self._store.posteriors.selection(hanger_id)
         if found is None:
@@ -135,7 +135,7 @@ class Store:
         return found.selection
 
     def diagnosis(self, hanger_id: int) -> Diagnosis:
-        """The latest gap diagnosis of a hanger; raises NothingThere."""
+        """Return the latest gap diagnosis of a hanger; raises NothingThere."""
         self.hanger(hanger_id)
         found = self._store.posteriors.latest_diagnosis(hanger_id)
         if found is None:
@@ -146,7 +146,7 @@ class Store:
         return found.diagnosis
 
     def records(self, hanger_id: int, test_id: str) -> tuple[Recording | FrequencyResponse, ...]:
-        """The raw records of a test, from the archive; raises NothingThere for an unknown test.
+        """Return the raw records of a test from the archive; raises NothingThere for another one.
 
         Raises BadInput where a file gave the modes and holds no record.
         """

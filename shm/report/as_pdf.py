@@ -60,7 +60,7 @@ _PANEL = colors.HexColor("#f4f6f9")
 
 @cache
 def _register_fonts() -> None:
-    """Makes the fonts known to reportlab, which embeds the signs that a document uses."""
+    """Make the fonts known to reportlab, which embeds the signs that a document uses."""
     folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
     for name in (_PLAIN, _BOLD):
         pdfmetrics.registerFont(TTFont(name, folder / f"{name}.ttf"))
@@ -89,7 +89,7 @@ _LABEL = _letters("label", 7.6, textColor=_QUIET)
 
 
 def as_pdf(paper: Paper) -> bytes:
-    """The document with its fonts, figures, outline and properties inside."""
+    """Return the document with its fonts, figures, outline and properties inside."""
     _register_fonts()
     buffer = io.BytesIO()
     made_by = f"shm {paper.version}".rstrip()
@@ -262,7 +262,7 @@ def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> l
 
 
 def _mark(title: str) -> Flowable:
-    """An entry of the document's outline, kept with the heading that follows."""
+    """Return an entry of the document's outline, kept with the heading that follows."""
 
     def entry(macro: CallerMacro) -> None:
         macro.canv.bookmarkPage(title)
@@ -339,7 +339,7 @@ def _widths(table: Table) -> list[float]:
 
 
 def _marked(table: Table) -> int:
-    """The column that stands for its row's mark: the second, where there is one."""
+    """Return the column that stands for its row's mark: the second, where there is one."""
     return min(1, len(table.headings) - 1)
 
 

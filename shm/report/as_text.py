@@ -64,7 +64,7 @@ def _folded(text: str, width: int, start: str = "") -> str:
 
 
 def in_terminal(table: Table) -> Table:
-    """The rows that a terminal shows, with the column that stands for a figure there."""
+    """Return the rows that a terminal shows, with the column that stands for a figure there."""
     rows, headings, note = table.rows, table.headings, table.note
     if table.terminal_column:
         heading, *strokes = table.terminal_column

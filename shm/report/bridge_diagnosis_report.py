@@ -29,7 +29,7 @@ _MOST_SIMILAR = 3  # what a sentence bears
 
 
 def bridge_diagnosis_paper(sheet: BridgeDiagnosisSheet) -> Paper:
-    """The answer, its figure, the answer in numbers, each hanger for itself."""
+    """Return the answer, its figure, the answer in numbers, each hanger for itself."""
     diagnosis = sheet.diagnosis
     status, style = _STATES[diagnosis.leads]
     seconds = f" in {diagnosis.seconds:.0f} s" if math.isfinite(diagnosis.seconds) else ""
@@ -60,7 +60,7 @@ def bridge_diagnosis_paper(sheet: BridgeDiagnosisSheet) -> Paper:
 
 
 def bridge_diagnosis_json(sheet: BridgeDiagnosisSheet) -> dict[str, Any]:
-    """A document for `shm.documents.dump`; unknown numbers become null there."""
+    """Return a document for `shm.documents.dump`; unknown numbers become null there."""
     summary = f"{shared_verdict(sheet.diagnosis)} {_consequences(sheet.diagnosis)}".rstrip()
     return {
         **bridge_diagnosis_document(sheet.diagnosis),

@@ -170,7 +170,7 @@ def _in_period(data: BridgeReport) -> str:
 
 
 def _most_moved(data: BridgeReport) -> str:
-    """The hanger whose tension moved most from the period's first test of it to the last."""
+    """Return the hanger whose tension moved most from the period's first test of it to the last."""
     moved = [
         (line, line.course.change)
         for line in data.hangers
@@ -330,7 +330,7 @@ def pattern_json(pattern: BridgePattern) -> dict[str, Any]:
 
 
 def bridge_json(data: BridgeReport) -> dict[str, Any]:
-    """A document for `shm.documents.dump`."""
+    """Return a document for `shm.documents.dump`."""
     return {
         "schema": REPORT_SCHEMA,
         "bridge": data.bridge,

@@ -239,7 +239,7 @@ class BridgeDiagnosisSheet:
 
 
 def hangers_unit(lines: Iterable[HangerSummary]) -> ForceUnit:
-    """The one unit of all their tensions, so that they compare at a glance."""
+    """Return the one unit of all their tensions, so that they compare at a glance."""
     return force_unit(*(line.tension_n.mean for line in lines if line.tension_n))
 
 

@@ -82,7 +82,7 @@ def _place_part(part: str) -> str:
 
 
 def separate_estimates(cause: Cause, number: int) -> tuple[EffectEstimate, ...]:
-    """The estimates of effect `number` of the cause.
+    """Return the estimates of effect `number` of the cause.
 
     In a pair a name that both have carries its effect before a dot.
     """

@@ -65,17 +65,17 @@ class Interval:
         return cls.of_summary(averaged.tension_n).repeating(averaged.repeatability_sd_n)
 
     def repeating(self, sd: float) -> Interval:
-        """The same with the standard deviation of a repetition; NaN is not known."""
+        """Return the same with the standard deviation of a repetition; NaN is not known."""
         return replace(self, repeatability_sd=sd if math.isfinite(sd) else None)
 
     def scaled(self, factor: float) -> Interval:
-        """The same quantity in a unit 1/`factor` as large."""
+        """Return the same quantity in a unit 1/`factor` as large."""
         this = self.repeatability_sd
         repeats = None if this is None else this * factor
         return Interval(self.mean * factor, self.low * factor, self.high * factor, repeats)
 
     def in_unit(self, unit: ForceUnit) -> Interval:
-        """A force in N in another unit."""
+        """Return a force in N in another unit."""
         return self.scaled(1 / unit.newtons)
 
     @property
@@ -88,7 +88,7 @@ class Interval:
         return self.width > _WIDE * abs(self.mean)
 
     def since(self, then: Interval) -> Interval:
-        """The relative change from `then`: repeatabilities in squares.
+        """Return the relative change from `then`: repeatabilities in squares.
 
         Where one is not known, of two independent estimates: widths in squares.
         """
@@ -100,7 +100,7 @@ class Interval:
         return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
 
     def less(self, then: Interval) -> Interval:
-        """The difference from `then`, of two independent estimates: widths in squares."""
+        """Return the difference from `then`, of two independent estimates: widths in squares."""
         half = math.hypot(self.width, then.width) / 2
         shift = self.mean - then.mean
         return Interval(shift, shift - half, shift + half)
@@ -190,7 +190,7 @@ def span(interval: Interval, signed: bool = False) -> str:
 
 
 def mean(interval: Interval, signed: bool = False) -> str:
-    """The mean to two significant digits of its interval's half width."""
+    """Return the mean to two significant digits of its interval's half width."""
     return to_two_digits(interval.mean, interval.width / 2, "+" if signed else "")
 
 

@@ -139,7 +139,7 @@ FURTHER = OF_HANGER_NAMES - TREND - FIT
 
 
 def diagnosed(data: HangerReport) -> DiagnosisSheet | None:
-    """The latest diagnosis of the report's hanger."""
+    """Return the latest diagnosis of the report's hanger."""
     if data.diagnosis is None:
         return None
     return DiagnosisSheet(data.diagnosis, data.hanger, data.bridge, data.bar.sensors)
@@ -191,7 +191,7 @@ def _by_latest_test(data: HangerReport) -> tuple[Fact, ...]:
 
 
 def _limits(data: HangerReport, statement: StatedTension) -> tuple[Fact, ...]:
-    """The probabilities that the owner's limits ask for."""
+    """Return the probabilities that the owner's limits ask for."""
     limits, unit = data.hanger.limits, data.tension_unit
     asked = (
         ("Above its limit", statement.above, limits.tension_max_n),
@@ -233,7 +233,7 @@ REPORT_SCHEMA = "shm.report/1"
 
 
 def hanger_json(data: HangerReport) -> dict[str, Any]:
-    """A document for `shm.documents.dump`; unknown numbers become null there."""
+    """Return a document for `shm.documents.dump`; unknown numbers become null there."""
     document = {
         "schema": REPORT_SCHEMA,
         "bridge": data.bridge,
@@ -371,7 +371,7 @@ def _frequency_shift(drift: Drift | None) -> tuple[str, str]:
 
 
 def structure_json(data: StructureReport) -> dict[str, Any]:
-    """The same as one document."""
+    """Return the same as one document."""
     return {
         "bridge": data.bridge,
         "structure": data.structure.id,

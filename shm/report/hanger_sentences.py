@@ -325,7 +325,7 @@ def _width(data: HangerReport) -> str:
 
 
 def _diagnose(data: HangerReport) -> str:
-    """The next step against the gap between model and measurement."""
+    """Return the next step against the gap between model and measurement."""
     if data.diagnosis is not None:
         return next_step(data.diagnosis)
     if not (_misses(data) or _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT):

@@ -127,7 +127,7 @@ def _document(message: HangerMessage | BridgeMessage) -> dict[str, object]:
 
 
 def bridge_message(messages: Mapping[int, HangerMessage]) -> BridgeMessage:
-    """That of a bridge from those of its hangers, by their numbers."""
+    """Return that of a bridge from those of its hangers, by their numbers."""
     order = list(Status)
     known = {id_: each for id_, each in messages.items() if each.is_known}
     found = {each.status for each in known.values()}
@@ -158,7 +158,7 @@ _SOON = {"none": "when convenient", "next_test": NEXT_TEST, "week": WEEK, "today
 
 
 def _how_soon(needing: Mapping[int, HangerMessage], others: Iterable[int]) -> str:
-    """The others by urgency, the most urgent first; empty where there are none."""
+    """Return the others by urgency, the most urgent first; empty where there are none."""
     of: dict[Urgency, list[int]] = {}
     for id_ in others:
         of.setdefault(needing[id_].urgency, []).append(id_)
@@ -224,7 +224,7 @@ def _in_doubt(known: HangerSummary) -> Lead:
 def still_detected(
     detected: Iterable[Change], latest: WatchedTest | None, hanger: Hanger
 ) -> tuple[Change, ...]:
-    """The changes that were detected, unless the latest test shows that they are gone.
+    """Return the changes that were detected, unless the latest test shows that they are gone.
 
     As the watch does: below half the level at which its owner is alerted.
     """
@@ -246,7 +246,7 @@ def status_of(
     warnings: Sequence[str] = (),
     standing: Sequence[Alert] = (),
 ) -> Status:
-    """The state that the drifts of the latest test give, and whether a change was detected.
+    """Return the state that the drifts of the latest test give, and whether a change was detected.
 
     With open `warnings` no hanger is quiet: what it is compared with may be wrong. Nor is one of
     which an alert is `standing`: two tests that agree show a shift before the watch is sure.
@@ -314,13 +314,13 @@ def _way(drift: Drift) -> tuple[str, bool]:
 
 
 def _change(known: HangerSummary) -> Change | None:
-    """That of the newest alert that stands; else the last that was detected."""
+    """Return that of the newest alert that stands; else the last that was detected."""
     wording = [each.change for each in known.standing if each.change and _CHANGES & set(each.kinds)]
     return wording[-1] if wording else known.called[-1] if known.called else None
 
 
 def _first(leads: Sequence[Lead]) -> Lead:
-    """The first of the most urgent."""
+    """Return the first of the most urgent."""
     return max(leads, key=lambda each: URGENCIES.index(each.urgency))
 
 
@@ -379,7 +379,7 @@ def off_limits(hanger: Hanger, tension: Averaged, by: str = "") -> Lead | None:
 
 
 def _off_limits(known: HangerSummary) -> Lead | None:
-    """That the tension is beyond the owner's limits; without limits, far off the nominal one."""
+    """Return that the tension is beyond its limits; without these, far off the nominal one."""
     hanger, tension = known.hanger, known.tension
     if tension is None or not tension.is_usable:
         return None

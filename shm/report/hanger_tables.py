@@ -79,7 +79,7 @@ _IRREGULAR = (
 
 
 def neighbours(data: HangerReport) -> Table:
-    """The hanger and two to either side; empty where nothing is called."""
+    """Return the hanger and two to either side; empty where nothing is called."""
     title, pattern = "The hangers beside it", data.neighbours
     rows = pattern.rows if pattern else ()
     place = next((row.place for row in rows if row.hanger == data.hanger.id), None)

@@ -53,7 +53,7 @@ def modal_test_paper(sheet: ModalTestReport) -> Paper:
 
 
 def facts(sheet: ModalTestReport) -> tuple[Fact, ...]:
-    """The figures on top: what, value, what stands beside it."""
+    """Return the figures on top: what, value, what stands beside it."""
     test, hits = sheet.identification.test, sheet.hits
     planes = {mode.plane for mode in sheet.modes}
     return (
@@ -373,7 +373,7 @@ def _record(record: Recording | FrequencyResponse) -> str:
 
 
 def _file(record: Recording | FrequencyResponse) -> str:
-    """The file's name: where it lay is nothing for a report."""
+    """Return the file's name: where it lay is nothing for a report."""
     return Path(record.source).name
 
 
@@ -381,7 +381,7 @@ SHEET_SCHEMA = "shm.test-sheet/1"
 
 
 def modal_test_json(sheet: ModalTestReport) -> dict[str, Any]:
-    """A document for `shm.documents.dump`; signals and curves stay in the records."""
+    """Return a document for `shm.documents.dump`; signals and curves stay in the records."""
     found = sheet.identification
     return {
         "schema": SHEET_SCHEMA,

@@ -71,7 +71,7 @@ def open_warnings(
 
 
 def passed_over(hanger: Hanger, window: str) -> str:
-    """That the newest test was compared with nothing: it lies within a maintenance `window`."""
+    """Return that the newest test was compared with nothing: it is in a maintenance `window`."""
     return (
         f"Hanger {hanger.id}: its latest test was made in a maintenance window and is compared "
         f"with nothing. Test it again {WEEK} of the end of the works. Until then nobody knows "
@@ -80,7 +80,7 @@ def passed_over(hanger: Hanger, window: str) -> str:
 
 
 def nearly_slack(hanger: Hanger, baseline: Summary, now: Summary, *, is_told: bool) -> str:
-    """That the latest test alone reads most of the tension lost; "" where it does not.
+    """Return that the latest test alone reads most of the tension lost; "" where it does not.
 
     A bar that carries next to nothing is as stiff as before, and the watch may put its frequencies
     down to something else, or be unsure for want of tests. Where it `is_told` of the tension that
@@ -98,7 +98,7 @@ def nearly_slack(hanger: Hanger, baseline: Summary, now: Summary, *, is_told: bo
 
 
 def standing_out(hanger: Hanger, hangers: Sequence[Hanger], tensions: Mapping[int, Summary]) -> str:
-    """That a baseline's tension is far off its nominal one, and its neighbours' are not; or "".
+    """Return that a baseline is far off its nominal tension unlike its neighbours; else "".
 
     `hangers` stand in the order of the bridge; `tensions` are those of their baselines.
     """

@@ -43,7 +43,7 @@ class Logo:
 
 
 def read_logo(path: Path | None) -> Logo:
-    """The logo in a file; with a `fault` that names it where there is none to be read."""
+    """Return the logo in a file; with a `fault` that names it where there is none to be read."""
     if path is None:
         return Logo()
     # Loaded here: a report on a terminal shows no image.
@@ -174,7 +174,7 @@ class Part:
 
 
 def appendices(*parts: Part) -> tuple[Part, ...]:
-    """The parts as `Appendix A: ...`, `Appendix B: ...`."""
+    """Return the parts as `Appendix A: ...`, `Appendix B: ...`."""
     lettered = zip(ascii_uppercase, parts, strict=False)
     return tuple(
         replace(part, title=f"Appendix {letter}: {part.title}", is_appendix=True)

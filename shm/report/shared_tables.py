@@ -24,7 +24,7 @@ def verdict_label(verdict: Verdict) -> str:
 
 
 def overall(checks: Sequence[QualityCheck]) -> Verdict:
-    """The gravest of the verdicts; one good check outweighs any number that say nothing."""
+    """Return the gravest of the verdicts; one good check outweighs any number that say nothing."""
     given = {check.verdict for check in checks}
     if given <= {"unknown"}:
         return "unknown"
@@ -47,7 +47,7 @@ def headline(checks: Sequence[QualityCheck]) -> str:
 
 
 def with_unit(value: float, unit: str) -> str:
-    """A figure with its unit as one reads it, `not known` where it is NaN."""
+    """Return a figure with its unit as one reads it, `not known` where it is NaN."""
     known = math.isfinite(value)
     return f"{formatting.plain(value)} {unit}".rstrip() if known else formatting.plain(value)
 
@@ -103,7 +103,7 @@ def added_mass(test: ModalTest) -> str:
 
 
 def settings(known: Mapping[str, str]) -> Table:
-    """The settings that decide the numbers, each with its unit; empty where nobody says."""
+    """Return the settings that decide the numbers, each with its unit; empty where nobody says."""
     helps = {row.name: row.help for row in TABLE}
     return Table(
         "Settings in force",

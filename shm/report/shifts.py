@@ -34,7 +34,7 @@ def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
 
 
 def shift_unit(pattern: BridgePattern) -> tuple[ForceUnit, int]:
-    """The one unit of all shifts of tension, and the decimals that they deserve.
+    """Return the one unit of all shifts of tension, and the decimals that they deserve.
 
     By the tensions that shift, not by the shifts: of hangers at rest they are all but 0.
     """
@@ -121,7 +121,7 @@ def _shift(row: HangerRow, unit: ForceUnit, places: int) -> tuple[str, ...]:
 
 
 def bar(share: float) -> str:
-    """A share of the largest shift, -1 to 1, as `...<==|......`."""
+    """Return a share of the largest shift, -1 to 1, as `...<==|......`."""
     length = round(abs(share) * _BAR)
     stroke = "=" * (length - 1)
     left = f"<{stroke}" if share < 0 and length else ""

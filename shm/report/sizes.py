@@ -51,7 +51,7 @@ class Size:
         return self.directed(up, down) if bar else str(self)
 
     def in_words(self, interval: Interval, sign: str = "") -> str:
-        """An interval in this size's unit and digits."""
+        """Return an interval in this size's unit and digits."""
         mean, low, high = _texts(interval, sign, self.logarithmic)
         unit = f" {self.unit}" if self.unit else ""
         return f"{mean}{unit} ({low} to {high})" if low and high else f"{mean}{unit}"
@@ -126,7 +126,7 @@ class Sizes(dict[str, "Size | str"]):
         super().__init__({base_name(e.name): size(e) for e in estimates})
 
     def __missing__(self, stem: str) -> str:
-        """The end springs `stem` 1 to 4, with their planes where there are several."""
+        """Return the end springs `stem` 1 to 4, with their planes where there are several."""
         found = {
             plane: self[name]
             for number, plane in _SPRING_PLANES.items()

@@ -68,7 +68,7 @@ def period_since(wording: str, now: datetime) -> Period:
 
 
 def period_json(period: Period | None) -> dict[str, datetime] | None:
-    """The period in a JSON document."""
+    """Return the period in a JSON document."""
     return {"since": period.since, "until": period.until} if period else None
 
 
@@ -111,7 +111,7 @@ class QuantityOverTime:
         return self.name == TENSION
 
     def at(self, chosen: BoolArray) -> QuantityOverTime:
-        """The same at the `chosen` tests, shape (n,)."""
+        """Return the same at the `chosen` tests, shape (n,)."""
         bands = (self.read, self.filtered, self.smoothed)
         read, filtered, smoothed = (
             Band(band.low[chosen], band.middle[chosen], band.high[chosen]) for band in bands
@@ -299,7 +299,7 @@ def _is_known(each: TemperatureCoefficient, states: StatesOverTime) -> bool:
 
 
 def _known_c(states: StatesOverTime) -> FloatArray:
-    """The temperatures (n,) of the tests that count."""
+    """Return the temperatures (n,) of the tests that count."""
     return states.temperatures_c[np.isfinite(states.temperatures_c) & ~states.outlier]
 
 

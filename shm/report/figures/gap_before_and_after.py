@@ -61,7 +61,7 @@ def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specifica
 
 
 def _points(residuals: Sequence[Residual], plane: Plane, series: _Series) -> spec.Points | None:
-    """The mean over the tests with a line from the least to the largest."""
+    """Return the mean over the tests with a line from the least to the largest."""
     there = [
         (order, values)
         for order in orders(residuals, plane)

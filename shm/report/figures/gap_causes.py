@@ -129,7 +129,7 @@ def _shown(diagnosis: Diagnosis) -> list[tuple[Claim, Cause]]:
 
 
 def _brackets(bars: Sequence[Bar]) -> tuple[list[spec.Mark], float]:
-    """A bracket around causes that the data cannot tell apart, with what they have together.
+    """Return a bracket around causes that the data cannot tell apart, with what they have together.
 
     And the place of the outermost bracket.
     """

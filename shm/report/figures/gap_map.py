@@ -16,7 +16,7 @@ from shm.values import PLANES, GapPlace, Plane, Residual, Trend, is_excluded
 
 
 def measured(sheet: DiagnosisSheet) -> list[Residual]:
-    """The residuals that are known."""
+    """Return the residuals that are known."""
     return [r for r in sheet.diagnosis.where if math.isfinite(r.residual_percent)]
 
 
@@ -44,7 +44,7 @@ def by_plane(
     y: spec.Axis,
     is_on_screen: bool,
 ) -> list[list[spec.Panel]]:
-    """A panel of marks for each plane over its orders, with one vertical axis.
+    """Return a panel of marks for each plane over its orders, with one vertical axis.
 
     They stand side by side on paper, one below the other on a screen, which may be narrow."""
     panels: list[spec.Panel] = []
@@ -89,7 +89,7 @@ _BELOW_INCHES = 2.2
 
 
 def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specification | None:
-    """The map; on paper with what stands below it."""
+    """Return the map; on paper with what stands below it."""
     residuals = measured(sheet)
     if not residuals:
         return None
@@ -120,7 +120,7 @@ def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specifica
 
 
 def _marks(residuals: Sequence[Residual], plane: Plane, tests: Sequence[str]) -> list[spec.Mark]:
-    """A mark for each test beside the others of its mode, filled where the gap is clear."""
+    """Return a mark for each test beside the others of its mode, filled where the gap is clear."""
     this = spec.PLANE_SYMBOLS[plane]
     kinds: tuple[tuple[list[Residual], spec.Symbol, bool, str], ...] = (
         ([r for r in residuals if abs(r.z) >= _CLEAR_SD], this, True, "beyond 2 sd"),
@@ -174,7 +174,7 @@ def _offset(test: str, tests: Sequence[str]) -> float:
 
 
 def _sd_percent(residual: Residual) -> float:
-    """The standard deviation that the z-score was counted in."""
+    """Return the standard deviation that the z-score was counted in."""
     return abs(residual.residual_percent / residual.z) if residual.z else math.nan
 
 
@@ -185,7 +185,7 @@ def local(sheet: DiagnosisSheet) -> list[GapPlace]:
 
 
 def profiles(sheet: DiagnosisSheet) -> spec.Panel:
-    """The density of the place along the hanger of each kind of local cause, largest 1."""
+    """Return the density of the place along the hanger of each kind of local cause, largest 1."""
     looks = zip(local(sheet), _LOOKS, strict=False)
     return spec.Panel(
         y=spec.Axis(label="density, largest 1", range=(0, 1.08), ticks=(0, 0.5, 1)),

@@ -108,7 +108,7 @@ def specify(course: Course) -> spec.Specification | None:
 
 
 def _shown(course: Course) -> list[datetime]:
-    """The times of the tests, and of what was noted after the last of them."""
+    """Return the times of the tests, and of what was noted after the last of them."""
     last = max(course.times)
     return [*course.times, *(each.at for each in course.notes if each.at > last)]
 
@@ -131,7 +131,7 @@ def _has_repeats(course: Course) -> bool:
 
 
 def _repeats(course: Course, chosen: list[int], scale: float) -> list[spec.Mark]:
-    """The interval in which the same test would repeat, within the absolute one."""
+    """Return the interval in which the same test would repeat, within the absolute one."""
     if not _has_repeats(course):
         return []
     inner = [
@@ -163,7 +163,7 @@ def _levels(course: Course, scale: float) -> list[spec.Mark]:
 
 
 def _alerts(course: Course, scale: float) -> list[spec.Mark]:
-    """A triangle at each test that raised an alert."""
+    """Return a triangle at each test that raised an alert."""
     if not course.alerts:
         return []
     raised = list(course.alerts)

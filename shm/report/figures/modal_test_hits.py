@@ -70,7 +70,7 @@ def offsets_s(records: Sequence[Recording]) -> list[float]:
 
 
 def borders_s(records: Sequence[Recording]) -> list[float]:
-    """The middle of the gap between each two records on the common axis, in s."""
+    """Return the middle of the gap between each two records on the common axis, in s."""
     starts = offsets_s(records)
     ends = [start + record.duration_s for start, record in zip(starts, records, strict=True)]
     return [(end + start) / 2 for end, start in zip(ends[:-1], starts[1:], strict=True)]
@@ -82,13 +82,13 @@ def hit_time_s(sheet: ModalTestReport, hit: Hit) -> float:
 
 
 def located_hits(sheet: ModalTestReport) -> list[tuple[int, Hit]]:
-    """The hits whose records are at hand, each with its number from 1."""
+    """Return the hits whose records are at hand, each with its number from 1."""
     numbered = enumerate(sheet.hits, 1)
     return [(number, hit) for number, hit in numbered if hit.record < len(sheet.recordings)]
 
 
 def channel_of(record: Recording, row: int | None) -> Channel | None:
-    """The force (`row` None) or the acceleration of that row; None where it has none."""
+    """Return the force (`row` None) or the acceleration of that row; None where it has none."""
     if row is None:
         return record.force
     return record.accelerations[row] if row < len(record.accelerations) else None
@@ -223,7 +223,7 @@ def _stop(sheet: ModalTestReport, hit: Hit) -> int:
 
 
 def _pulse(force: FloatArray, hit: Hit, rate: float) -> tuple[FloatArray, FloatArray]:
-    """The pulse free of its offset, long enough for a second strike to be in it."""
+    """Return the pulse free of its offset, long enough for a second strike to be in it."""
     before = int(_BEFORE_S * rate) + _FILTER_SAMPLES
     first = max(0, hit.start - before)
     part = force[first : hit.start + int(_SECOND_STRIKE_S * rate)]

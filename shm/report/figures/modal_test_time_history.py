@@ -97,7 +97,7 @@ def _history(sheet: ModalTestReport, row: int | None, is_top: bool) -> spec.Pane
 
 
 def _range(values: FloatArray, row: int | None, room: float) -> tuple[float, float]:
-    """The values with a little room, and more above for marks."""
+    """Return the values with a little room, and more above for marks."""
     largest = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
     low = float(np.nanmin(values)) if np.isfinite(values).any() else -1.0
     low, high = min(low, 0.0) - 0.05 * largest, 1.05 * largest
@@ -157,7 +157,7 @@ def _wording(number: int, hit: Hit, at_s: float) -> str:
 
 
 def _typical(sheet: ModalTestReport) -> HitRecord | None:
-    """The used hit of median force, else any."""
+    """Return the used hit of median force, else any."""
     found = hit_records(sheet)
     hits = [hit_record for hit_record in found if hit_record.hit.used] or found
     hits = sorted(hits, key=lambda hit_record: hit_record.hit.peak_force_n)

@@ -50,7 +50,7 @@ def specify(parts: Sequence[Curves], x_label: str, y_label: str) -> Specificatio
 
 
 def write_curves_png(figure: Specification, path: Path, words: str = "") -> None:
-    """The figure on white, with `words` below."""
+    """Return the figure on white, with `words` below."""
     # What draws is loaded where something is drawn.
     from shm.report.figures.with_matplotlib import draw
 
@@ -114,5 +114,5 @@ def draw(corners: FloatArray, moved: FloatArray) -> Figure:
 
 
 def write_deformed_png(corners: FloatArray, moved: FloatArray, path: Path, words: str = "") -> None:
-    """The figure of these on white, with `words` below."""
+    """Return the figure of these on white, with `words` below."""
     path.write_bytes(specification.png(draw(corners, moved), words=words))

@@ -222,7 +222,7 @@ def limits(*values: Values, room: float = 0.08) -> tuple[float, float]:
 
 
 def log_axis(label: str, low: float, high: float) -> Axis:
-    """A logarithmic axis of few decades, numbered in full at 1, 2 and 5 of each."""
+    """Return a logarithmic axis of few decades, numbered in full at 1, 2 and 5 of each."""
     decades = range(math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 1)
     ticks = [step * 10.0**decade for decade in decades for step in (1, 2, 5)]
     shown = [tick for tick in ticks if low <= tick <= high]
@@ -231,12 +231,12 @@ def log_axis(label: str, low: float, high: float) -> Axis:
 
 
 def plane_colour(plane: Plane | None) -> str:
-    """The name of a plane's colour; purple where the plane is not known."""
+    """Return the name of a plane's colour; purple where the plane is not known."""
     return PLANE_HUES[plane] if plane else "purple"
 
 
 def envelope_places(values: FloatArray, bins: int) -> IntArray:
-    """Indices of the smallest and the largest of `values` (n,) in each of `bins`, ascending.
+    """Return indices of the smallest and the largest of `values` (n,) in each of `bins`, ascending.
 
     No peak is lost, and every value that is drawn was measured. NaN are passed over; a bin of
     nothing else keeps one, so that the line breaks there. All of a short signal stays.
@@ -256,7 +256,7 @@ def envelope_places(values: FloatArray, bins: int) -> IntArray:
 
 
 def peak_places(values: FloatArray, bins: int) -> IntArray:
-    """Indices of the largest finite of `values` (n,) in each of `bins`, ascending."""
+    """Return indices of the largest finite of `values` (n,) in each of `bins`, ascending."""
     edges = np.unique(np.linspace(0, len(values), bins + 1).astype(np.int64))
     finite = np.where(np.isnan(values), -np.inf, values)
     pairs = pairwise(edges.tolist())
@@ -281,7 +281,7 @@ class Member(Generic[Data]):
     alt: Callable[[Data], str]
 
     def figure(self, data: Data) -> Figure | None:
-        """The figure on paper."""
+        """Return the figure on paper."""
         found = self.draw(data)
         if not isinstance(found, Specification):
             return found
@@ -302,11 +302,11 @@ class Illustration:
     figure: Figure
 
     def svg(self) -> str:
-        """An `<svg>` element whose ids are its own and whose colours follow the page."""
+        """Return an `<svg>` element whose ids are its own and whose colours follow the page."""
         return svg(self.figure, self.name, self.title, self.alt)
 
     def png(self, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
-        """The picture on white."""
+        """Return the picture on white."""
         return png(self.figure, dots_per_inch)
 
 
@@ -317,7 +317,7 @@ def drawn(members: Sequence[Member[Data]], data: Data) -> tuple[Illustration, ..
 
 
 def illustration(member: Member[Data], data: Data) -> Illustration | None:
-    """The figure with its words; None where `data` lacks what it shows."""
+    """Return the figure with its words; None where `data` lacks what it shows."""
     figure = member.figure(data)
     if figure is None:
         return None

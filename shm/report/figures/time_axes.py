@@ -37,13 +37,13 @@ class Dated:
 
 
 def dated(data: HangerReport) -> list[Dated]:
-    """The rows with a time, oldest first."""
+    """Return the rows with a time, oldest first."""
     rows = [Dated(row.time, row) for row in data.trend if row.time is not None]
     return sorted(rows, key=lambda row: row.time)
 
 
 def places(*curves: FloatArray, always: Collection[int] = ()) -> IntArray:
-    """Indices (m,) of what to draw of curves (n,): of each bin the extremes of every curve.
+    """Return indices (m,) of what to draw of curves (n,): of each bin the extremes of every curve.
 
     The first, the last and those of `always` stay whatever they are.
     """
@@ -75,7 +75,7 @@ def part(bounds: Bounds, chosen: IntArray, scale: float = 1.0) -> Bounds:
 
 
 def band(times: Sequence[datetime], bounds: Bounds, colour: str, name: str = "") -> list[spec.Mark]:
-    """A band and, under a name, its middle line."""
+    """Return a band and, under a name, its middle line."""
     marks: list[spec.Mark] = [
         spec.Band(x=times, low=bounds.low, high=bounds.high, colour=colour, opacity=0.2)
     ]

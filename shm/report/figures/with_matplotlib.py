@@ -32,7 +32,7 @@ _SYMBOLS = {
 
 
 def draw(figure: spec.Specification) -> Figure:
-    """The figure in the width of a page."""
+    """Return the figure in the width of a page."""
     made = style.new_figure(figure.height_inches)
     places = list(_placed(made, figure))
     for axes, panel in places:
@@ -59,7 +59,7 @@ def draw_on(figure: spec.Specification, axes: Sequence[Axes]) -> None:
 
 
 def _placed(made: Figure, figure: spec.Specification) -> Iterable[tuple[Axes, spec.Panel]]:
-    """The axes of each panel; those over one horizontal axis share it."""
+    """Return the axes of each panel; those over one horizontal axis share it."""
     height, rows = figure.height_inches, figure.rows
     if figure.is_grid:
         # Twenty-four panels by constrained layout take seconds; these are all of one size.
