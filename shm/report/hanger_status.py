@@ -38,6 +38,79 @@ _CHANGES = frozenset({_BEYOND, "sudden change", "slow drift"})
 UNDETERMINED = "These modes do not determine the tension"
 
 
+_LEADS: dict[str, tuple[str, str]] = {
+    "no hanger tested": ("No hanger has been tested yet.", f"Test all {NEXT_TEST}."),
+    "all steady": (
+        "No change detected on {many}.",
+        "No action is needed before the next planned test.",
+    ),
+    "untested": ("{name}: no test yet.", f"Test it {NEXT_TEST}."),
+    "in doubt": (
+        "{name}: its tension is in doubt.",
+        f"Check its description and the numbers of its modes {NEXT_TEST}.",
+    ),
+    "unusable": (
+        "{name}: do not use its tension.",
+        f"Check its description and the numbers of its modes {WEEK}.",
+    ),
+    "not converged": (
+        "{name}: do not use its tension.",
+        "Raise `samples` in bridge.toml and run "
+        f"`shm ingest --again {{test}} --from updated` {WEEK}.",
+    ),
+    "likely beyond": (
+        "{name}: {what}, more likely than not beyond its threshold.",
+        f"{{again}} {WEEK}.",
+    ),
+    "first": (
+        "{name}: tension {tension} by its first test.",
+        f"Choose a warmer or colder day {NEXT_TEST}, so that the baseline covers temperature.",
+    ),
+    "first of sensors": (
+        "{name}: tension {tension} by its first test.",
+        "No action is needed: the next days will be warmer or colder.",
+    ),
+    "undetermined": (
+        "{name}: these modes do not determine the tension.",
+        f"Identify more modes {NEXT_TEST}, or state length and ends more exactly.",
+    ),
+    "not comparable": (
+        "{name}: its latest test cannot be compared with the baseline.",
+        f"{{again}} {WEEK}: it lacks modes of the baseline.",
+    ),
+    "rough": (
+        "{name}: no change detected, but its tests are too few or too rough to show one "
+        "(tension {shift}).",
+        f"Identify more modes {NEXT_TEST}, or test more often.",
+    ),
+    "steady": (
+        "{name}: no change detected since the baseline (tension {shift}).",
+        "No action is needed before the next planned test.",
+    ),
+    "slack": (
+        "{name}: tension {tension}{by} is {doubt}below its lower limit.",
+        f"{{again}} {TODAY}, and compare it with its design.",
+    ),
+    "overloaded": (
+        "{name}: tension {tension}{by} is {doubt}above its upper limit.",
+        f"{{again}} {WEEK}, and compare it with its design.",
+    ),
+    "off nominal": (
+        "{name}: tension is {size} {side} nominal.",
+        f"Compare it with the design {NEXT_TEST}, or give limits in bridge.toml.",
+    ),
+}
+"""State and action by what is known of a hanger; what was found to change is in `lead_of`."""
+
+
+def _lead(key: str, hanger: Hanger | None = None, **values: str) -> Lead:
+    """Return state and action with the hanger and `values` filled in."""
+    if hanger is not None:
+        values |= {"name": f"Hanger {hanger.id}", "again": look_again(hanger)}
+    state, action = _LEADS[key]
+    return Lead(state.format(**values), action.format(**values))
+
+
 class Status(Enum):
     """The state of a hanger in a word."""
 
@@ -144,12 +217,12 @@ def bridge_message(messages: Mapping[int, HangerMessage]) -> BridgeMessage:
         more = _how_soon(needing, others)
         return BridgeMessage(worst, needing[first].lead, more, needing[first].notes)
     if not known:
-        return BridgeMessage(None, Lead("No hanger has been tested yet.", f"Test all {NEXT_TEST}."))
+        return BridgeMessage(None, _lead("no hanger tested"))
     untested = [str(id_) for id_ in messages if id_ not in known]
     many = formatting.counted(len(known), "hanger")
     return BridgeMessage(
         worst,
-        Lead(f"No change detected on {many}.", "No action is needed before the next planned test."),
+        _lead("all steady", many=many),
         f"Not tested yet: {listed(untested)}." if untested else "",
     )
 
@@ -177,9 +250,8 @@ def hanger_message(known: HangerSummary) -> HangerMessage:
 
 
 def _decide(known: HangerSummary) -> tuple[Status | None, Lead]:
-    name = f"Hanger {known.hanger.id}"
     if known.latest is None and not known.standing:
-        return None, Lead(f"{name}: no test yet.", f"Test it {NEXT_TEST}.")
+        return None, _lead("untested", known.hanger)
     faults = known.tension.faults if known.tension else ()
     status = status_of(
         known.drifts,
@@ -212,13 +284,11 @@ def _decide(known: HangerSummary) -> tuple[Status | None, Lead]:
 
 def _in_doubt(known: HangerSummary) -> Lead:
     """Return what to do about a tension whose caveats say that something is wrong."""
-    name, check = f"Hanger {known.hanger.id}", "Check its description and the numbers of its modes"
     if known.tension is None or known.tension.is_usable:
-        return Lead(f"{name}: its tension is in doubt.", f"{check} {NEXT_TEST}.")
-    if not known.tension.has_converged:
-        check = "Raise `samples` in bridge.toml and run"
-        check += f" `shm ingest --again {known.latest.name if known.latest else ''} --from updated`"
-    return Lead(f"{name}: do not use its tension.", f"{check} {WEEK}.")
+        return _lead("in doubt", known.hanger)
+    if known.tension.has_converged:
+        return _lead("unusable", known.hanger)
+    return _lead("not converged", known.hanger, test=known.latest.name if known.latest else "")
 
 
 def still_detected(
@@ -282,10 +352,9 @@ def _of_change(known: HangerSummary) -> Lead:
         others = list(known.standing)  # what its row said of the change is lost
     if others:
         return _first([Lead.of(each.message) for each in reversed(others)])
-    most_probable = max(drifts, key=lambda each: each.probability)
-    words = f"{quantity_words(most_probable.quantity)} {size_words(most_probable)}"
-    state = f"Hanger {hanger.id}: {words}, more likely than not beyond its threshold."
-    return Lead(state, f"{look_again(hanger)} {WEEK}.")
+    first = max(drifts, key=lambda each: each.probability)
+    what = f"{quantity_words(first.quantity)} {size_words(first)}"
+    return _lead("likely beyond", hanger, what=what)
 
 
 def shifts_beyond(known: HangerSummary) -> list[Drift]:
@@ -329,52 +398,35 @@ def _first(leads: Sequence[Lead]) -> Lead:
 
 def _quiet(known: HangerSummary, status: Status) -> tuple[Status, Lead]:
     """Return the lead where nothing was detected: could it have been, and what the tension is."""
-    name = f"Hanger {known.hanger.id}"
-    off = _off_limits(known)
+    hanger, off = known.hanger, _off_limits(known)
     if known.unwatched is not None and (off is None or off.urgency == "next_test"):
         return Status.UNCLEAR, known.unwatched
     if off:
         return Status.CHECK, off
     if status is Status.FIRST:
-        more = (
-            f"Choose a warmer or colder day {NEXT_TEST}, so that the baseline covers temperature."
-        )
-        if known.hanger.has_sensors:
-            more = "No action is needed: the next days will be warmer or colder."
         if not known.is_determined:
-            more = f"Identify more modes {NEXT_TEST}, or state length and ends more exactly."
-            return status, Lead(f"{name}: {UNDETERMINED[0].lower()}{UNDETERMINED[1:]}.", more)
-        return status, Lead(f"{name}: tension {_tension(known.tension)} by its first test.", more)
+            return status, _lead("undetermined", hanger)
+        key = "first of sensors" if hanger.has_sensors else "first"
+        return status, _lead(key, hanger, tension=_tension(known.tension))
     drift = next((each for each in known.drifts if each.quantity == TENSION), None)
     if drift is None or not math.isfinite(drift.shift_mean + drift.shift_sd):
-        return Status.UNCLEAR, Lead(
-            f"{name}: its latest test cannot be compared with the baseline.",
-            f"{look_again(known.hanger)} {WEEK}: it lacks modes of the baseline.",
-        )
+        return Status.UNCLEAR, _lead("not comparable", hanger)
     half = NINETY_PERCENT * drift.shift_sd
     shift = rounded_percent(drift.shift_mean, half, "+")
     if half > drift.threshold:
-        return Status.UNCLEAR, Lead(
-            f"{name}: no change detected, but its tests are too few or too rough to show one "
-            f"(tension {shift}).",
-            f"Identify more modes {NEXT_TEST}, or test more often.",
-        )
-    return status, Lead(
-        f"{name}: no change detected since the baseline (tension {shift}).",
-        "No action is needed before the next planned test.",
-    )
+        return Status.UNCLEAR, _lead("rough", hanger, shift=shift)
+    return status, _lead("steady", hanger, shift=shift)
 
 
 def off_limits(hanger: Hanger, tension: Averaged, by: str = "") -> Lead | None:
     """Return that the tension is beyond its owner's limits, `by` which test; None where not."""
-    for probability, words, soon in (
-        (tension.probability_slack, "below its lower limit", TODAY),
-        (tension.probability_above_limit, "above its upper limit", WEEK),
+    for probability, key in (
+        (tension.probability_slack, "slack"),
+        (tension.probability_above_limit, "overloaded"),
     ):
         if probability > WATCH_PROBABILITY:
             doubt = "" if probability >= hanger.thresholds.alert_probability else "probably "
-            state = f"Hanger {hanger.id}: tension {_tension(tension)}{by} is {doubt}{words}."
-            return Lead(state, f"{look_again(hanger)} {soon}, and compare it with its design.")
+            return _lead(key, hanger, tension=_tension(tension), by=by, doubt=doubt)
     return None
 
 
@@ -395,10 +447,7 @@ def _off_limits(known: HangerSummary) -> Lead | None:
         return None
     off = retained.mean / nominal_n - 1
     size = rounded_percent(abs(off), (high - low) / 2)
-    return Lead(
-        f"Hanger {hanger.id}: tension is {size} {'above' if off > 0 else 'below'} nominal.",
-        f"Compare it with the design {NEXT_TEST}, or give limits in bridge.toml.",
-    )
+    return _lead("off nominal", hanger, size=size, side="above" if off > 0 else "below")
 
 
 def _tension(tension: Averaged | None) -> str:
