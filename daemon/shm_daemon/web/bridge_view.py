@@ -47,9 +47,11 @@ class HangerGlance:
     def cells(self, unit: ForceUnit) -> tuple[str, str, str]:
         """As tables have it: tension, percent of nominal, shift in percent; empty where unknown."""
         summary, shift, tension = self.summary, self.summary.change, "no test yet"
+        is_known = summary.is_determined
         if summary.tension_n:
-            tension = formatting.with_half(summary.tension_n, unit).removesuffix(f" {unit.name}")
-        nominal = formatting.mean(summary.of_nominal) if summary.of_nominal else ""
+            known = formatting.with_half(summary.tension_n, unit).removesuffix(f" {unit.name}")
+            tension = known if is_known else "not determined"
+        nominal = formatting.mean(summary.of_nominal) if summary.of_nominal and is_known else ""
         percent = rounded_percent(shift.mean, shift.width / 2, "+") if shift else ""
         return tension, nominal, percent.removesuffix(" %")
 
