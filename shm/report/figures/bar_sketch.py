@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from shm.report import formatting
 from shm.report.figures import specification as spec
-from shm.values import PLANES, ResponsePoint
+from shm.values import PLANES, Plane, ResponsePoint
 from shm.values.bar_description import BarDescription
 
 # Layout: heights within the panel, in its own units from -1 to 1, and of the figure in inches.
@@ -60,7 +60,7 @@ def _fittings(bar: BarDescription) -> list[spec.Mark]:
     return found
 
 
-def _sensors(sensors: Sequence[ResponsePoint], plane: spec.Plane | None) -> list[spec.Mark]:
+def _sensors(sensors: Sequence[ResponsePoint], plane: Plane | None) -> list[spec.Mark]:
     placed = [each for each in _placed(sensors) if each.plane == plane]
     if not placed:
         return []
