@@ -85,7 +85,7 @@ def _texts(interval: Interval, sign: str, logarithmic: bool) -> tuple[str, str, 
         mean, low, high = (_significant(v, sign) for v in _three(interval))
         return (mean, low, high) if half > 0 else (mean, "", "")
     places = min(math.ceil(-math.log10(half / 2.95)), _most_places(interval.mean))
-    mean, low, high = (f"{round(v, places):{sign}.{max(0, places)}f}" for v in _three(interval))
+    mean, low, high = (f"{round(v, places):{sign}z.{max(0, places)}f}" for v in _three(interval))
     return mean, low, high
 
 
@@ -111,7 +111,7 @@ def _significant(value: float, sign: str) -> str:
     if value == 0:
         return "0"
     places = 1 - math.floor(math.log10(abs(value)))
-    return f"{round(value, places):{sign}.{max(0, places)}f}"
+    return f"{round(value, places):{sign}z.{max(0, places)}f}"
 
 
 def quantity(estimate: EffectEstimate) -> str:
