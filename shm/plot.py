@@ -103,7 +103,7 @@ def stiffness(
     *,
     ax: Ax = None,
 ) -> Figure:
-    """log10 of the end stiffness in N m/rad over time, a panel for each plane, with its 90 % band.
+    """Draw the end stiffness in MN m/rad over time, a panel for each plane, with its 90 % band.
 
     `posteriors` and `tests` go together, one posterior a test. The model class must have springs
     at the ends (`beam2`, `solid1`, `solid2`).

@@ -28,7 +28,7 @@ UNITS = {
     "frequency_response": "accelerance (m/s²/N)",
     "stabilisation": "frequency (Hz)",
     "shapes": "position from the deck end (m)",
-    "stiffness": "log10 of stiffness in N m/rad",
+    "stiffness": "stiffness (MN m/rad)",
     "gap": "order of the mode",
     "causes": "probability",
     "recording": "time (s)",

@@ -51,7 +51,7 @@ def test_every_axis_has_a_label_and_quantities_a_unit(drawn: dict[str, Illustrat
     assert {"time of the test (UTC)", "tension (kN)"} <= labels["trend"]
     assert {"tension (kN)", "probability density (1/kN)"} <= labels["tension"]
     assert "predicted / measured frequency" in labels["frequencies"]
-    assert "log10 of stiffness in N m/rad" in labels["stiffness"]
+    assert "stiffness (MN m/rad)" in labels["stiffness"]
 
 
 def test_captions_and_alternative_texts_are_whole_sentences_without_nan(
