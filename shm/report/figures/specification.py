@@ -169,7 +169,7 @@ class Panel:
 
     Without `x` it shares the horizontal axis of the next panel below that has one; `shares_y`: it
     has the vertical axis of the first panel of its row, or of the row above where it is the first.
-    `has_separate_legend`: on paper, apart from the others'. `words` stand in the place of axes.
+    `has_separate_legend`: on paper, apart from the others'.
     """
 
     y: Axis
@@ -182,7 +182,6 @@ class Panel:
     width: float = 1.0
     shares_y: bool = False
     has_separate_legend: bool = False
-    words: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -101,13 +101,6 @@ def _adjacent(grid: GridSpec, number: int, row: Any) -> list[Any]:
 
 
 def _panel(axes: Axes, panel: spec.Panel, figure: spec.Specification) -> None:
-    if panel.words:
-        axes.set_axis_off()
-        axes.text(
-            0.5, 0.5, panel.words, transform=axes.transAxes, ha="center", va="center",
-            color=style.INK, fontsize=style.TINY + 1.5,
-        )  # fmt: skip
-        return
     style.dress(axes, panel.x.label if panel.x else "", panel.y.label)
     for mark in panel.marks:
         _DRAWN[type(mark)](axes, mark)
