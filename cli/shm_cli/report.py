@@ -1,4 +1,4 @@
-"""`shm report`: what an engineer files about a hanger or the bridge."""
+"""`shm report`: the state of a hanger or the bridge on a screen, or the report that is filed."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def command(
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """Print the state of a hanger or of the bridge, or write the report that is filed.
+    """Print the state of a hanger or the bridge, or write its report.
 
     One screen: state, action, tension with its interval, change since the baseline. With --full
     everything: trend, fit, formulas of practice, quality, gap, alerts. HTML and PDF hold the
