@@ -158,7 +158,7 @@ def __dir__() -> list[str]:
 
 
 def _show_in_notebook() -> None:
-    """Where a notebook is what imports us, its shell learns to show our values."""
+    """Register how values are shown with the shell of a notebook that imports us."""
     running = getattr(sys.modules.get("IPython"), "get_ipython", None)
     shell = running() if running else None
     if shell is not None:

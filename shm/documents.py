@@ -279,7 +279,7 @@ def selection_document(selection: Selection, limits: Limits | None = None) -> di
     return {
         "models": [posterior_document(posterior, probability) for posterior, probability in pairs],
         "selected": selection.selected.model,
-        "averaged": averaged_document(selection.averaged(limits)),
+        "averaged": averaged_document(selection.averaged_with(limits)),
     }
 
 

@@ -7,17 +7,28 @@ notebook is enough for its figures; elsewhere `%load_ext shm.notebook`.
 from __future__ import annotations
 
 import io
+import math
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from shm.report.formatting import Interval
-    from shm.values import Diagnosis, GapCheck, Hanger, ModalTest, Posterior, Selection
+    from shm.values import (
+        Diagnosis,
+        FloatArray,
+        GapCheck,
+        Hanger,
+        ModalTest,
+        Posterior,
+        Recording,
+        Selection,
+    )
 
 _CAUSES_SHOWN = 5  # technical: rows of a cell's table
 _WIDTH = 88  # technical: characters of a line in a notebook's cell
@@ -54,7 +65,7 @@ class Sheet:
             for row in table
         ]
         lead, notes = (
-            [textwrap.fill(each, _WIDTH) for each in told] for told in (self.lead, self.notes)
+            [textwrap.fill(each, _WIDTH) for each in wording] for wording in (self.lead, self.notes)
         )
         return "\n".join([self.title, *lead, *lines, *notes])
 
@@ -68,13 +79,14 @@ class Sheet:
         )
         table = f"<caption>{escape(self.title)}</caption>{shown}<tbody>{body}</tbody>"
         lead, notes = (
-            "".join(f"<p>{escape(each)}</p>" for each in told) for told in (self.lead, self.notes)
+            "".join(f"<p>{escape(each)}</p>" for each in wording)
+            for wording in (self.lead, self.notes)
         )
         return f"{lead}<table>{table}</table>{notes}"
 
 
 def sheet(value: Any) -> Sheet:
-    """That of a hanger, modal test, posterior, selection, diagnosis or check."""
+    """Return that of a recording, hanger, modal test, posterior, selection, diagnosis or check."""
     return _SHEETS[type(value).__name__](value)
 
 
@@ -96,7 +108,7 @@ def _hanger(hanger: Hanger) -> Sheet:
 
 
 def _modal_test(test: ModalTest) -> Sheet:
-    """When and how warm, and the modes."""
+    """Show when and how warm the test was, and its modes."""
     from shm.report import formatting
     from shm.report.modal_test_report import MODE_HEADINGS, mode_row
 
@@ -104,6 +116,42 @@ def _modal_test(test: ModalTest) -> Sheet:
     when = f"{formatting.moment(test.time)}, {formatting.temperature(test.temperature_c)}"
     title = f"Modal test {test.id}{whose}, {when}"
     return Sheet(title, MODE_HEADINGS, [mode_row(mode) for mode in test.modes])
+
+
+def _recording(recording: Recording) -> Sheet:
+    """Show how long, when and how warm, and each channel with its largest value."""
+    import numpy as np
+
+    from shm.report import formatting
+
+    whose = "" if recording.hanger is None else f" of hanger {recording.hanger}"
+    title = (
+        f"Recording {Path(recording.source).name}{whose}, {recording.duration_s:.4g} s at "
+        f"{recording.sampling_rate_hz:g} Hz, {formatting.moment(recording.time)}, "
+        f"{formatting.temperature(recording.temperature_c)}"
+    )
+    units = {"force": "N", "acceleration": "m/s²"}
+    rows = [
+        (
+            channel.name,
+            channel.quantity,
+            channel.plane or "not stated",
+            f"{channel.x_m:.2f} m" if math.isfinite(channel.x_m) else "not stated",
+            f"{formatting.plain(_largest(channel.values))} {units[channel.quantity]}",
+            formatting.counted(int(np.isnan(channel.values).sum()), "gap"),
+        )
+        for channel in recording.channels
+    ]
+    head = ("channel", "quantity", "plane", "place", "largest value", "missing samples")
+    return Sheet(title, head, rows)
+
+
+def _largest(values: FloatArray) -> float:
+    """Return the largest absolute value; NaN where no sample is known."""
+    import numpy as np
+
+    known = np.abs(values[np.isfinite(values)])
+    return float(known.max()) if len(known) else math.nan
 
 
 def _posterior(posterior: Posterior) -> Sheet:
@@ -134,8 +182,8 @@ def _posterior(posterior: Posterior) -> Sheet:
         f"R-hat {formatting.number(posterior.r_hat, '.3f')}."
     )
     title = f"{_whose(posterior)}, {formatting.model_class(posterior.model)}"
-    said = " ".join(stated(averaged_now(posterior), unit).sentences)
-    return Sheet(title, head, rows, (said, *posterior.caveats, sampled))
+    statement = " ".join(stated(averaged_now(posterior), unit).sentences)
+    return Sheet(title, head, rows, (statement, *posterior.caveats, sampled))
 
 
 def _frequencies(posterior: Posterior) -> Sheet:
@@ -170,7 +218,7 @@ def _selection(selection: Selection) -> Sheet:
             )
         )
     head = ("class", "probability", "log evidence", *formatting.tension_headings(unit))
-    averaged = selection.averaged()
+    averaged = selection.averaged
     lead = (*averaged.caveats, " ".join(stated(averaged, unit).sentences))
     return Sheet(f"{_whose(selection.selected)}, model classes", head, rows, lead=lead)
 
@@ -195,8 +243,8 @@ def _diagnosis(diagnosis: Diagnosis) -> Sheet:
     ]
     whose = "" if diagnosis.hanger is None else f" of hanger {diagnosis.hanger}"
     title = f"Gap{whose} to {formatting.model_class(diagnosis.baseline)}"
-    told = (write_summary(diagnosis), write_details(diagnosis))
-    paragraphs = [paragraph for paragraph in told if paragraph]
+    wording = (write_summary(diagnosis), write_details(diagnosis))
+    paragraphs = [paragraph for paragraph in wording if paragraph]
     return Sheet(title, ("cause", "probability"), rows, (*paragraphs, *diagnosis.remarks))
 
 
@@ -210,7 +258,7 @@ def _gap_check(check: GapCheck) -> Sheet:
 
 
 def figure_png(figure: Figure) -> bytes:
-    """A picture of a figure, also of one that pyplot does not know."""
+    """Return a picture of a figure, also of one that pyplot does not know."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=110)
     return buffer.getvalue()
@@ -238,5 +286,6 @@ _SHEETS: dict[str, Callable[[Any], Sheet]] = {
     "Hanger": _hanger,
     "ModalTest": _modal_test,
     "Posterior": _posterior,
+    "Recording": _recording,
     "Selection": _selection,
 }

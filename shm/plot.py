@@ -3,20 +3,28 @@
 The figures are those of `shm report`, `shm identify --html` and `shm gap diagnose --html`: labels
 and units on every axis, colours that the colour-blind tell apart, on white. A notebook shows what a
 cell returns; elsewhere `figure.savefig("tension.png", dpi=150)`. Axes may be changed as any of
-matplotlib's: `figure.axes[0].set_title("Hanger 3")`. Where the data lack what a figure shows,
+matplotlib's: `figure.axes[0].set_title("Hanger 3")`. With `ax` a figure is drawn on axes of yours,
+as many as it has panels. Where the data lack what a figure shows,
 NothingThere says so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from shm import __version__
 from shm.errors import NothingThere, UsageError
 from shm.identify import Identification
-from shm.report.contents import DiagnosisSheet, HangerReport, ModalTestReport, TrendRow, trend_row
+from shm.report.contents import (
+    DiagnosisSheet,
+    HangerReport,
+    ModalTestReport,
+    TrendRow,
+    summary_of,
+    trend_row,
+)
 from shm.report.figures.gap_causes import FIGURE as CAUSES
 from shm.report.figures.gap_check import FIGURE as CHECK
 from shm.report.figures.gap_map import FIGURE as GAP_MAP
@@ -27,11 +35,12 @@ from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.modal_test_modes import SHAPES, STABILISATION
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.modal_test_response import Shown
-from shm.report.figures.parameter_pairs import FIGURE as PAIRS
-from shm.report.figures.specification import Member
-from shm.values import Diagnosis, GapCheck, Hanger, ModalTest, Posterior
+from shm.report.figures.recording_channels import FIGURE as CHANNELS
+from shm.report.figures.specification import Member, Specification
+from shm.values import Diagnosis, GapCheck, Hanger, ModalTest, Posterior, Recording
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = [
@@ -40,7 +49,7 @@ __all__ = [
     "frequency_response",
     "gap",
     "gap_check",
-    "pairs",
+    "recording",
     "shapes",
     "stabilisation",
     "stiffness",
@@ -49,9 +58,13 @@ __all__ = [
 ]
 
 Data = TypeVar("Data")
+Ax: TypeAlias = "Axes | Iterable[Axes] | None"
+"""Where to draw: axes for each panel in reading order; None makes a figure."""
 
 
-def tension(posterior: Posterior, hanger: Hanger, baseline: Posterior | None = None) -> Figure:
+def tension(
+    posterior: Posterior, hanger: Hanger, baseline: Posterior | None = None, *, ax: Ax = None
+) -> Figure:
     """Draw the posterior of the tension: histogram, 90 % interval, nominal and baseline tension.
 
     Example:
@@ -59,7 +72,7 @@ def tension(posterior: Posterior, hanger: Hanger, baseline: Posterior | None = N
         >>> figure.axes[0].get_xlabel()
         'tension (kN)'
     """
-    return _drawn(TENSION, _report(posterior, hanger, baseline=baseline))
+    return _drawn(TENSION, _report(posterior, hanger, baseline=baseline), ax)
 
 
 def trend(
@@ -67,6 +80,8 @@ def trend(
     tests: Sequence[ModalTest],
     hanger: Hanger,
     baseline: Posterior | None = None,
+    *,
+    ax: Ax = None,
 ) -> Figure:
     """Draw the tension over time: mean and 90 % band by test, nominal, baseline, thresholds.
 
@@ -77,7 +92,7 @@ def trend(
         ...     posteriors = store.posteriors(3)
         ...     figure = shm.plot.trend(posteriors, store.tests(3), store.hanger(3))
     """
-    return _drawn(TREND, _history(posteriors, tests, hanger, baseline))
+    return _drawn(TREND, _history(posteriors, tests, hanger, baseline), ax)
 
 
 def stiffness(
@@ -85,8 +100,10 @@ def stiffness(
     tests: Sequence[ModalTest],
     hanger: Hanger,
     baseline: Posterior | None = None,
+    *,
+    ax: Ax = None,
 ) -> Figure:
-    """log10 of the end stiffness in N m/rad over time, a panel for each plane, with its 90 % band.
+    """Draw the end stiffness in MN m/rad over time, a panel for each plane, with its 90 % band.
 
     `posteriors` and `tests` go together, one posterior a test. The model class must have springs
     at the ends (`beam2`, `solid1`, `solid2`).
@@ -94,10 +111,12 @@ def stiffness(
     Example:
         >>> figure = shm.plot.stiffness(posteriors, tests, hanger)
     """
-    return _drawn(STIFFNESS, _history(posteriors, tests, hanger, baseline))
+    return _drawn(STIFFNESS, _history(posteriors, tests, hanger, baseline), ax)
 
 
-def frequencies(posterior: Posterior, test: ModalTest | Identification, hanger: Hanger) -> Figure:
+def frequencies(
+    posterior: Posterior, test: ModalTest | Identification, hanger: Hanger, *, ax: Ax = None
+) -> Figure:
     """Predicted over measured frequency of every mode of `test`, with what each leaves open.
 
     The light band is the model error sigma: a mode outside is one that the model does not explain.
@@ -106,82 +125,99 @@ def frequencies(posterior: Posterior, test: ModalTest | Identification, hanger: 
         >>> figure = shm.plot.frequencies(posterior, test, hanger)
     """
     modal = test.test if isinstance(test, Identification) else test
-    return _drawn(FREQUENCIES, _report(posterior, hanger, tests=(modal,)))
+    return _drawn(FREQUENCIES, _report(posterior, hanger, tests=(modal,)), ax)
 
 
-def pairs(posterior: Posterior, hanger: Hanger) -> Figure:
-    """Each parameter alone and each against each other, with their correlations.
-
-    Example:
-        >>> figure = shm.plot.pairs(posterior, hanger)
-    """
-    return _drawn(PAIRS, _report(posterior, hanger))
-
-
-def frequency_response(test: Identification, hanger: Hanger | None = None) -> Figure:
+def frequency_response(
+    test: Identification, hanger: Hanger | None = None, *, ax: Ax = None
+) -> Figure:
     """Draw a test's frequency response in m/s^2/N over Hz, with fitted modes and coherence.
 
     Example:
         >>> test = shm.identify(shm.read("hanger3.csv"), hanger=hanger)
         >>> figure = shm.plot.frequency_response(test)
     """
-    return _drawn(RESPONSE, Shown.of(ModalTestReport(test, hanger=hanger)))
+    return _drawn(RESPONSE, Shown.of(ModalTestReport(test, hanger=hanger)), ax)
 
 
-def stabilisation(test: Identification, hanger: Hanger | None = None) -> Figure:
+def stabilisation(test: Identification, hanger: Hanger | None = None, *, ax: Ax = None) -> Figure:
     """Draw the poles of all model orders over Hz, and which of them became modes.
 
     Example:
         >>> figure = shm.plot.stabilisation(test)
     """
-    return _drawn(STABILISATION, Shown.of(ModalTestReport(test, hanger=hanger)))
+    return _drawn(STABILISATION, Shown.of(ModalTestReport(test, hanger=hanger)), ax)
 
 
-def shapes(test: Identification, hanger: Hanger) -> Figure:
+def shapes(test: Identification, hanger: Hanger, *, ax: Ax = None) -> Figure:
     """Draw the identified mode shapes along the hanger in m from the deck end, by plane and order.
 
     Example:
         >>> figure = shm.plot.shapes(test, hanger)
     """
-    return _drawn(SHAPES, Shown.of(ModalTestReport(test, hanger=hanger)))
+    return _drawn(SHAPES, Shown.of(ModalTestReport(test, hanger=hanger)), ax)
 
 
-def gap(diagnosis: Diagnosis, hanger: Hanger) -> Figure:
-    """Where the gap between model and measurement lies: by mode, condition and place.
+def gap(diagnosis: Diagnosis, hanger: Hanger, *, ax: Ax = None) -> Figure:
+    """Draw the gap between model and measurement by mode, condition and place.
 
     Example:
         >>> figure = shm.plot.gap(shm.diagnose(tests, hanger), hanger)
     """
-    return _drawn(GAP_MAP, DiagnosisSheet(diagnosis, hanger))
+    return _drawn(GAP_MAP, DiagnosisSheet(diagnosis, hanger), ax)
 
 
-def causes(diagnosis: Diagnosis, hanger: Hanger) -> Figure:
+def causes(diagnosis: Diagnosis, hanger: Hanger, *, ax: Ax = None) -> Figure:
     """Draw the probability of each cause of a gap, of no gap, of something unknown.
 
     Example:
         >>> figure = shm.plot.causes(shm.diagnose(tests, hanger), hanger)
     """
-    return _drawn(CAUSES, DiagnosisSheet(diagnosis, hanger))
+    return _drawn(CAUSES, DiagnosisSheet(diagnosis, hanger), ax)
 
 
-def gap_check(check: GapCheck) -> Figure:
+def gap_check(check: GapCheck, *, ax: Ax = None) -> Figure:
     """Draw from which size on a diagnosis would find each effect.
 
     Example:
         >>> figure = shm.plot.gap_check(shm.check_gap(tests, hanger, effects=["point_mass"]))
     """
-    return _drawn(CHECK, check)
+    return _drawn(CHECK, check, ax)
 
 
-def _drawn(member: Member[Data], data: Data) -> Figure:
-    figure = member.figure(data)
-    if figure is None:
+def recording(recording: Recording, *, ax: Ax = None) -> Figure:
+    """Draw every channel of a recording over time, in N and m/s^2.
+
+    Example:
+        >>> figure = shm.plot.recording(shm.read("hanger3.csv"))
+    """
+    return _drawn(CHANNELS, recording, ax)
+
+
+def _drawn(member: Member[Data], data: Data, ax: Ax) -> Figure:
+    """Draw a figure, on `ax` where that is given; raises NothingThere, UsageError."""
+    specification = member.draw(data)
+    if not isinstance(specification, Specification):
         raise NothingThere(
             f"these data do not hold what the figure {member.title!r} shows.",
             remedy="See the docstring for what it needs.",
         )
-    figure.set_facecolor("white")
-    return figure
+    from shm.report.figures.with_matplotlib import draw, draw_on
+
+    if ax is None:
+        figure = draw(specification)
+        figure.set_facecolor("white")
+        return figure
+    axes = list(ax) if isinstance(ax, Iterable) else [ax]
+    count = len(specification.panels)
+    if len(axes) != count:
+        raise UsageError(
+            f"the figure {member.title!r} has {count} panels, and ax has {len(axes)}.",
+            remedy=f"Give as many: figure, ax = plt.subplots({count}); "
+            f"shm.plot.{member.name}(..., ax=ax).",
+        )
+    draw_on(specification, axes)
+    return axes[0].get_figure(root=True)  # type: ignore[return-value]
 
 
 def _history(
@@ -216,7 +252,9 @@ def _report(
     """Return the data that the figures of a hanger are drawn from."""
     return HangerReport(
         bridge="",
-        hanger=hanger,
+        now=summary_of(
+            hanger, tests[-1] if tests else ModalTest("latest", ()), posterior, baseline
+        ),
         tests=tests,
         posterior=posterior,
         generated_at=datetime.now(UTC),

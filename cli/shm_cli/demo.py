@@ -15,7 +15,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -124,14 +124,14 @@ def conclude_live(workspace: Workspace, store: Store, alerts: tuple[StoredAlert,
 
 # A story: a sound hanger, one that loses as much as nobody overlooks, and the thesis's, of which
 # nothing is simulated: its printed frequencies are one test, and no bar of ours repeats them. It is
-# the one of twenty that is as long, 12 m. Tests take place on a Monday morning, short enough that
-# the demo takes a minute or two.
+# the one of twenty that is as long, 12 m. The season's last tests were made today, short enough
+# that the demo takes a minute or two.
 HANGERS = 20
 SOUND = 3
 LOSING = 7
 MEASURED = 18
 LOSS = 0.08
-_START = datetime(2026, 3, 2, 9, tzinfo=UTC)
+SEASON_WEEKS = 12
 _PLAN = HammerPlan(seconds_per_hit=8.0, acceleration_noise_m_s2=0.05)
 _TENSION_SCATTER = 0.003  # judgement: traffic and warmth between two tests of one hanger
 
@@ -176,20 +176,28 @@ def _length_m(number: int) -> float:
     return 12.0 * heights[0] / heights[1]
 
 
-def drop_measured_test(workspace: Workspace) -> None:
-    """Drop the frequencies that the thesis measured, as the one test of their hanger."""
+def drop_measured_test(workspace: Workspace, start: datetime) -> None:
+    """Drop the frequencies that the thesis measured, as the one test of their hanger.
+
+    It is dated a week before the `start` of the season.
+    """
     (test,) = load_modes(example.MODES_FILE)
-    test = replace(test, id="thesis_table_1_1", time=_START - timedelta(weeks=1))
+    test = replace(test, id="thesis_table_1_1", time=start - timedelta(weeks=1))
     document = modes_document([replace(test, hanger=MEASURED)])
     replace_text(workspace.spool / f"hanger{MEASURED}_measured.modes.json", dump(document))
 
 
-def planned(hangers: Iterable[Hanger]) -> Sequence[PlannedTest]:
-    """Return the season to simulate, by time; none of the measured hanger.
+def season_start(now: datetime) -> datetime:
+    """Return when a season begins whose last tests were made within the last three hours."""
+    return now.replace(minute=0, second=0, microsecond=0) - timedelta(weeks=SEASON_WEEKS, hours=2)
+
+
+def planned(hangers: Iterable[Hanger], start: datetime) -> Sequence[PlannedTest]:
+    """Return the season from `start` to simulate, by time; none of the measured hanger.
 
     Hangers 3 and 7 are hit every three weeks, the others at its start, every third again.
     """
-    tests = [_planned(hanger, week) for hanger in hangers for week in _weeks(hanger.id)]
+    tests = [_planned(hanger, week, start) for hanger in hangers for week in _weeks(hanger.id)]
     return sorted(tests, key=lambda test: test.time)
 
 
@@ -197,17 +205,17 @@ def _weeks(hanger_id: int) -> Sequence[int]:
     if hanger_id == MEASURED:
         return ()
     if hanger_id in (SOUND, LOSING):
-        return range(0, 13, 3)
+        return range(0, SEASON_WEEKS + 1, 3)
     return (0, 10) if hanger_id % 3 == 2 else (0,)
 
 
-def _planned(hanger: Hanger, week: int) -> PlannedTest:
+def _planned(hanger: Hanger, week: int, start: datetime) -> PlannedTest:
     state = _random_state(hanger, np.random.default_rng((_SEED, hanger.id)))
     scatter = np.random.default_rng((_SEED, hanger.id, week)).normal(1, _TENSION_SCATTER)
     lost = LOSS if hanger.id == LOSING and week >= 6 else 0.0
     return PlannedTest(
         hanger=hanger,
-        time=_START + timedelta(weeks=week, hours=hanger.id / 4),
+        time=start + timedelta(weeks=week, hours=hanger.id / 4),
         state=replace(state, tension_n=state.tension_n * float(scatter) * (1 - lost)),
         temperature_c=8.0 + 1.2 * week,
         seed=(_SEED, hanger.id, week + 1),
@@ -264,8 +272,9 @@ def command(folder: Path, live: bool) -> None:
     workspace = _fresh_workspace(folder, bridge_description())
     click.echo(f"Workspace {workspace.folder}: 20 hangers, their daemon is starting.", err=True)
     with workspace.store() as store, _daemon(workspace) as daemon, counting_bar() as bar:
-        drop_measured_test(workspace)
-        tests = planned(workspace.bridge.hangers)
+        start = season_start(utc_now())
+        drop_measured_test(workspace, start)
+        tests = planned(workspace.bridge.hangers, start)
         for _ in bar.track(dropped(tests, workspace), len(tests), description=_DROPPING):
             pass
         _await(1 + len(tests), store, daemon, bar, "tests through all stages")

@@ -66,7 +66,9 @@ VERBS: dict[str, Verb] = {
     "update": Verb("shm_cli.update", "Posterior of tension and end stiffness."),
     "select": Verb("shm_cli.update", "Compare model classes by their evidence.", "select_command"),
     "gap": Verb("shm_cli.gap", "Why model and measurement differ, and what that does to tension."),
-    "report": Verb("shm_cli.report", "What an engineer files about a hanger, or the bridge."),
+    "report": Verb(
+        "shm_cli.report", "Print the state of a hanger or the bridge, or write its report."
+    ),
     "drift": Verb("shm_cli.drift", "How far tension and stiffness have moved."),
     "alerts": Verb("shm_cli.alerts", "Alerts that were raised, and their deliveries."),
     "simulate": Verb("shm_cli.simulate", "Hammer tests of a hanger whose truth you choose."),

@@ -1,4 +1,4 @@
-"""`shm report`: what an engineer files about a hanger or the bridge."""
+"""`shm report`: the state of a hanger or the bridge on a screen, or the report that is filed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.reporting import hanger_report, modal_test_report, structure_report
-from shm.report.as_text import as_text
+from shm.report.as_text import as_brief_text, as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
 from shm.report.hanger_report import hanger_json, hanger_paper, structure_json, structure_paper
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
@@ -37,20 +37,21 @@ class _Report:
     document: Callable[[Any], dict[str, Any]]
 
 
-def _written(report: _Report, form: str) -> str | bytes:
+def _written(report: _Report, form: str, revision: str, *, is_full: bool) -> str | bytes:
     if form == "json":
         return dump(report.document(report.content))
     if form == "text":
-        return as_text(report.paper(report.content), readable_width())
+        paper = report.paper(report.content)
+        return (as_text if is_full else as_brief_text)(paper, readable_width())
     # What draws and sets is loaded where a page is asked for.
     with drawing():
         if form == "html":
             from shm.report.as_html import as_html
 
-            return as_html(report.paper(report.content))
+            return as_html(replace(report.paper(report.content), revision=revision))
         from shm.report.as_pdf import as_pdf
 
-        return as_pdf(report.paper(report.content))
+        return as_pdf(replace(report.paper(report.content), revision=revision))
 
 
 @click.command()
@@ -68,6 +69,8 @@ def _written(report: _Report, form: str) -> str | bytes:
     metavar="WHEN",
     help="Only the period since a date (2026-03-01) or over a span (90d, 12w, 6m, 1y).",
 )
+@click.option("--full", "is_full", is_flag=True, help="Print all of it, not one screen.")
+@click.option("--revision", metavar="TEXT", default="", help="The revision that a page names.")
 @click.option("--json", "as_json", is_flag=True, help="The same as --format json.")
 @click.option("--out", type=flags.NewFile(), metavar="FILE", help="Write here instead of stdout.")
 @click.pass_context
@@ -78,17 +81,18 @@ def command(
     form: str | None,
     test_id: str | None,
     since: str | None,
+    is_full: bool,
+    revision: str,
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """What an engineer files about a hanger, or the bridge.
+    """Print the state of a hanger or the bridge, or write its report.
 
-    Tension with its interval, against nominal and baseline; what changed, how it goes with the
-    temperature, what the hangers beside it did; predicted and measured frequencies; what the model
-    does not explain; what to do next. HTML and PDF hold the figures. With --since, the tests,
-    alerts and trend of a period, and what changed in it against its start. With --test, how one
-    test was identified: hits, quality, stabilisation, shapes. With --bridge, all hangers: their
-    state, who lost and who gained tension, and what explains it.
+    One screen: state, action, tension with its interval, change since the baseline. With --full
+    everything: trend, fit, formulas of practice, quality, gap, alerts. HTML and PDF hold the
+    figures. With --since, the tests, alerts and trend of a period, and what changed in it. With
+    --test, how one test was identified. With --bridge, all hangers, and what explains their
+    changes.
 
     \b
     Example: shm report --hanger 3 --since 90d --out hanger3.pdf
@@ -99,7 +103,8 @@ def command(
     _refuse_pdf_on_a_terminal(form, out)
     now = utc_now()
     period = period_since(since, now) if since else None
-    _write(_written(_gathered(ctx, hanger_id, test_id, now, period), form), out)
+    report = _gathered(ctx, hanger_id, test_id, now, period)
+    _write(_written(report, form, revision, is_full=is_full or out is not None), out)
 
 
 def _gathered(

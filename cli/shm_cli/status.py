@@ -18,12 +18,12 @@ import rich_click as click
 from shm.documents import creep_document
 from shm.models import applicable
 from shm.pipeline import utc_now
-from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.telling import quiet_until
 from shm.pipeline.unheard import stream_leads
-from shm.report.contents import HangerLine
-from shm.report.formatting import model_class
+from shm.report.formatting import Interval, model_class, with_half
 from shm.report.hanger_status import Status, bridge_message
+from shm.report.hanger_summary import HangerSummary
 from shm.report.open_warnings import dated_by_receipt
 from shm.store import (
     ENDED,
@@ -33,6 +33,8 @@ from shm.store import (
     Workspace,
 )
 from shm.store.stored_alerts import said_of
+from shm.values import Summary
+from shm.values.rounding import ForceUnit, force_unit, rounded_percent
 from shm.watch.change_words import frequency_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
@@ -129,25 +131,39 @@ def _show(document: dict[str, Any]) -> None:
 
 
 def _show_hangers(document: dict[str, Any]) -> None:
+    known = [row["averaged"]["tension_n"]["mean"] for row in document["hangers"] if row["averaged"]]
+    unit = force_unit(*known)
     headings = (
-        "hanger", "state", "tests", "held", "latest", "model class", "baseline since",
-        "open alerts",
+        "hanger", "state", f"tension, {unit.name}", "since baseline", "tests", "held", "latest",
+        "baseline since", "open alerts",
     )  # fmt: skip
-    show_rows("hangers", headings, map(_cells, document["hangers"]))
+    show_rows("hangers", headings, [_cells(row, unit) for row in document["hangers"]])
 
 
-def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
-    latest, since = row["latest_test"], row["baseline_since"]
+def _cells(row: Mapping[str, Any], unit: ForceUnit) -> tuple[str, ...]:
+    latest, since, change = row["latest_test"], row["baseline_since"], row["change"]
     return (
         str(row["hanger"]),
         Status[row["status"].upper()].value if row["status"] else "no test yet",
+        _tension(row, unit),
+        rounded_percent(change["mean"], (change["high"] - change["low"]) / 2, "+")
+        if change
+        else "",
         str(row["tests"]),
         str(row["held"] or ""),
-        f"{latest:%Y-%m-%d %H:%M}" if latest else "none",
-        model_class(row["model"]) if row["model"] else "none yet",
-        f"{since:%Y-%m-%d %H:%M}" if since else "none yet",
+        f"{latest:%Y-%m-%d}" if latest else "none",
+        f"{since:%Y-%m-%d}" if since else "none yet",
         str(row["open_alerts"] or ""),
     )
+
+
+def _tension(row: Mapping[str, Any], unit: ForceUnit) -> str:
+    if row["averaged"] is None:
+        return ""
+    tension_n = Interval.of_summary(Summary(**row["averaged"]["tension_n"]))
+    if tension_n.is_wide:
+        return "not determined"
+    return with_half(tension_n, unit).removesuffix(f" {unit.name}")
 
 
 def _told_of_structure(row: Mapping[str, Any]) -> str:
@@ -221,7 +237,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
     counts = store.recordings.stage_counts()
     ended = sum(counts[stage] for stage in ENDED)
     held, now = store.recordings.list_holds(), utc_now()
-    lines = {each.hanger.id: each for each in hanger_lines(workspace, store, now)}
+    lines = {each.hanger.id: each for each in hanger_summaries(workspace, store, now)}
     of_hangers = Counter(hold.hanger for hold in held)
     message = bridge_message({id_: each.message for id_, each in lines.items()})
     return {
@@ -295,7 +311,7 @@ def _structures(
 def _hangers(
     workspace: Workspace,
     store: Store,
-    lines: Mapping[int, HangerLine],
+    lines: Mapping[int, HangerSummary],
     open_alerts: Mapping[int, int],
     held: Mapping[int, int],
 ) -> list[dict[str, Any]]:
@@ -311,7 +327,7 @@ def _hangers(
         rows.append(
             {
                 "hanger": hanger.id,
-                **lines[hanger.id].message.document,
+                **lines[hanger.id].document,
                 "tests": found.tests if found else 0,
                 "latest_test": found.time if found else None,
                 "model": models.get(hanger.id),

@@ -270,7 +270,7 @@ def _stated_priors(text: str) -> dict[str, float]:
 
 def show_selection(selection: Selection, limits: Limits | None = None) -> None:
     """The tension over all classes in words, and the classes as a table, most probable first."""
-    show_stated(selection.averaged(limits))
+    show_stated(selection.averaged_with(limits))
     unit = force_unit(*(float(each.tension_n.mean()) for each in selection.posteriors))
     headings = (
         "class", "probability", "log evidence", f"tension ({unit.name})",

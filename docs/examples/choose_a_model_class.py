@@ -41,7 +41,7 @@ for name, choice in (("clamped", clamped), ("turning", soft)):
 
 assert soft.selected.model == "beam2"
 assert soft.probabilities[0] > 0.99
-soft_n = soft.averaged().tension_n
+soft_n = soft.averaged.tension_n
 assert abs(soft_n.mean - 600e3) < 3 * soft_n.sd
-clamped_n = clamped.averaged().tension_n
+clamped_n = clamped.averaged.tension_n
 assert abs(clamped_n.mean - 600e3) < 3 * clamped_n.sd

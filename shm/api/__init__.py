@@ -17,6 +17,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from shm import bridge
+from shm.api.in_python import in_python
+from shm.api.placing import Places, Planes, with_places
 from shm.api.stored import Store
 from shm.bridge.hanger import hanger_of
 from shm.errors import BadInput, UsageError
@@ -64,20 +66,25 @@ __all__ = [
 ]  # fmt: skip
 
 
-def read(path: str | Path) -> Recording | FrequencyResponse:
-    """The content of one file, in SI units, gaps as NaN.
+def read(
+    path: str | Path, *, planes: Planes = None, places_m: Places = None
+) -> Recording | FrequencyResponse:
+    """Return the content of one file, in SI units, gaps as NaN.
 
     CSV, UFF58, HDF5, MATLAB, TDMS, miniSEED or npz; a sidecar NAME.toml beside NAME.csv says what
-    the file does not. Time histories are a Recording, frequency responses a FrequencyResponse.
-    Raises BadInput naming file, line, channel and remedy. A .zip holds several files of one test:
-    `shm.read.read_test` gives them all.
+    the file does not. So do `planes` (`transverse`, `longitudinal`) and `places_m`, in m from the
+    deck end: by the names of channels, or one for all accelerations; they override the file.
+    Time histories are a Recording, frequency responses a FrequencyResponse. Raises BadInput naming
+    file, line, channel and remedy, and UsageError for a channel that the file does not have. A
+    .zip holds several files of one test: `shm.read.read_test` gives them all.
 
     Example:
-        >>> recording = shm.read("hanger3.csv")
+        >>> recording = shm.read("hanger3.csv", places_m={"acc_1": 2.5, "acc_2": 4.4})
         >>> [channel.name for channel in recording.channels]
         ['force', 'acc_1', 'acc_2']
     """
-    return read_file(Path(path))
+    with in_python():
+        return with_places(read_file(Path(path)), planes, places_m)
 
 
 def from_sep005(
@@ -97,7 +104,7 @@ def from_sep005(
 
 
 def load_modes(path: str | Path) -> tuple[ModalTest, ...]:
-    """The modal tests of a `*.modes.json` document, as `shm identify --out` writes it.
+    """Return the modal tests of a `*.modes.json` document, as `shm identify --out` writes it.
 
     One test each, modes in Hz by plane and order. A sidecar NAME.modes.toml may say hanger, time
     and temperature. Raises BadInput naming test, mode and remedy.
@@ -116,13 +123,13 @@ Tests: TypeAlias = Test | Sequence[Test]
 
 
 def modal_tests(tests: Tests) -> tuple[ModalTest, ...]:
-    """The modal tests, one or many."""
+    """Return the modal tests, one or many."""
     given = (tests,) if isinstance(tests, ModalTest | Identification) else tests
     return tuple(each.test if isinstance(each, Identification) else each for each in given)
 
 
 def load_hanger(path: str | Path, hanger_id: int | None = None) -> Hanger:
-    """A hanger described in a TOML file: a `bridge.toml`, or a file with one `[[hanger]]` table.
+    """Return a hanger from a TOML file: a `bridge.toml`, or a file with one `[[hanger]]` table.
 
     `hanger_id` says which, and may be left out where the file has one only. Raises BadInput naming
     the table and key at fault, or the hangers that there are.
@@ -145,7 +152,7 @@ def round_bar(
     nominal_tension_n: float,
     name: str = "",
 ) -> Hanger:
-    """A solid round bar, clamped at both ends: section and mass follow from diameter and density.
+    """Return a round bar, clamped at both ends: section and mass follow from diameter and density.
 
     The same checks are made as of a `[[hanger]]` table, which can say more (end plates,
     turnbuckles, strands, supports). A nominal tension of 0 is a bar without any. Raises BadInput
@@ -189,7 +196,7 @@ def identify(
     mains_hz: float = _DEFAULT.mains_hz,
     window_time_constant_s: float = math.inf,
 ) -> Identification:
-    """The modes of one test, each with its standard deviations, and how they were found.
+    """Return the modes of one test, each with its standard deviations, and how they were found.
 
     `records` are those of one test: hits, set-ups, or frequency responses. The description of the
     `hanger`, where known, helps to number the modes. `test_id` names the test; left out, the name
@@ -209,27 +216,28 @@ def identify(
         >>> [(mode.plane, mode.order, mode.frequency_hz) for mode in test.test.modes[:2]]
         [('transverse', 1, 5.83), ('transverse', 2, 14.17)]
     """
-    given = [records] if isinstance(records, Recording | FrequencyResponse) else list(records)
-    if not given:
-        raise UsageError("no record to identify modes in.", remedy="Give at least one.")
-    options = IdentifyOptions(
-        band_low_hz=band_hz[0],
-        band_high_hz=band_hz[1],
-        identifier=identifier,
-        cross_check=cross_check,
-        estimator=estimator,
-        reference_force_n=reference_force_n,
-        frequency_allowance=frequency_allowance,
-        mains_hz=mains_hz,
-        window_time_constant_s=window_time_constant_s,
-    )
-    name = test_id or Path(given[0].source).stem
-    found = identified(given, options, test_id=name, hanger=hanger)
-    return found if hanger is None else _of(found, hanger, given[0].source)
+    with in_python():
+        given = [records] if isinstance(records, Recording | FrequencyResponse) else list(records)
+        if not given:
+            raise UsageError("no record to identify modes in.", remedy="Give at least one.")
+        options = IdentifyOptions(
+            band_low_hz=band_hz[0],
+            band_high_hz=band_hz[1],
+            identifier=identifier,
+            cross_check=cross_check,
+            estimator=estimator,
+            reference_force_n=reference_force_n,
+            frequency_allowance=frequency_allowance,
+            mains_hz=mains_hz,
+            window_time_constant_s=window_time_constant_s,
+        )
+        name = test_id or Path(given[0].source).stem
+        found = identified(given, options, test_id=name, hanger=hanger)
+        return found if hanger is None else _of(found, hanger, given[0].source)
 
 
 def _of(found: Identification, hanger: Hanger, source: str) -> Identification:
-    """The test as one of `hanger`, where its records do not say that it is of another."""
+    """Return the test as one of `hanger`, where its records do not say that it is of another."""
     named = found.test.hanger
     if named not in (None, hanger.id):
         raise BadInput(
@@ -252,7 +260,7 @@ def update(
     sampler: str = IMPORTANCE,
     calibrated_by: Tests = (),
 ) -> Posterior:
-    """The posterior of tension and end stiffness of one model class, given all modes of `tests`.
+    """Return the posterior of tension and ends of one model class, given all modes of `tests`.
 
     `model` is a name of `shm.models.MODELS` (`beam1`, `beam2`, `beam3`, `s1`, `s2`, `solid0`,
     `solid1`, `solid2`), or a baseline with an adopted effect (`beam1+point_mass@everywhere`).
@@ -275,9 +283,10 @@ def update(
         >>> posterior.tension_n.mean(), posterior.tension_n.std()
         (711000.0, 4000.0)
     """
-    chosen = build(model, hanger, priors)
-    options = _options(samples, seed, sampler, calibrated_by, [chosen], progress)
-    return updating.update(modal_tests(tests), chosen, options, progress)
+    with in_python():
+        chosen = build(model, hanger, priors)
+        options = _options(samples, seed, sampler, calibrated_by, [chosen], progress)
+        return updating.update(modal_tests(tests), chosen, options, progress)
 
 
 def _options(
@@ -316,8 +325,9 @@ def select(
     beside one with springs unless the `priors` are the thesis's; `class_priors` say otherwise, such
     as `{"beam1": 0.25, "beam2": 0.75}`. Without `models` they are
     those of the setting `models` that apply to this hanger (`shm.models.applicable` says why
-    another does not). `Selection.averaged(hanger.limits)` is the tension over all of them. The
-    other options are those of `update`. Raises UsageError where one of `models` does not apply,
+    another does not). `Selection.averaged` is the tension over all of them; with the probabilities
+    of one beyond limits it is `Selection.averaged_with(hanger.limits)`. The other options are those
+    of `update`. Raises UsageError where one of `models` does not apply,
     BadInput as `update` does.
 
     Example:
@@ -325,12 +335,13 @@ def select(
         >>> choice.selected.model, choice.probabilities
         ('beam2', (0.98, 0.02))
     """
-    usual = () if models else competing_names(hanger, load_settings().model_names)
-    classes = [build(name, hanger, priors) for name in models or usual]
-    if class_priors is not None:
-        check_class_priors(class_priors, [each.name for each in classes])
-    options = _options(samples, seed, sampler, calibrated_by, classes, progress)
-    return updating.select(modal_tests(tests), classes, options, progress, class_priors)
+    with in_python():
+        usual = () if models else competing_names(hanger, load_settings().model_names)
+        classes = [build(name, hanger, priors) for name in models or usual]
+        if class_priors is not None:
+            check_class_priors(class_priors, [each.name for each in classes])
+        options = _options(samples, seed, sampler, calibrated_by, classes, progress)
+        return updating.select(modal_tests(tests), classes, options, progress, class_priors)
 
 
 _OF_GAP = GapOptions()
@@ -347,7 +358,7 @@ def diagnose(
     seed: int = _OF_GAP.seed,
     progress: Progress = silent,
 ) -> Diagnosis:
-    """Where the baseline and the tests of a hanger differ, which effect causes it, what it changes.
+    """Diagnose where baseline and tests differ, which effect causes it, and what it changes.
 
     `baseline` is the model class whose gap is diagnosed, empty for the beam that these data prefer;
     `Diagnosis.baseline` names it. `without` are effects taken out of the catalogue; `hold_out` what
@@ -364,8 +375,9 @@ def diagnose(
         >>> diagnosis.leading.effect
         'point_mass'
     """
-    options = GapOptions(baseline, tuple(without), tuple(hold_out), draws, seed)
-    return diagnosed(modal_tests(tests), hanger, options, progress)
+    with in_python():
+        options = GapOptions(baseline, tuple(without), tuple(hold_out), draws, seed)
+        return diagnosed(modal_tests(tests), hanger, options, progress)
 
 
 def check_gap(
@@ -394,8 +406,9 @@ def check_gap(
         >>> check.effects[0].size, check.effects[0].unit
         (3.5, 'kg')
     """
-    options = CheckOptions(tuple(effects), baseline, seeds, sound, seed=seed)
-    return checked(modal_tests(tests), hanger, options, progress)
+    with in_python():
+        options = CheckOptions(tuple(effects), baseline, seeds, sound, seed=seed)
+        return checked(modal_tests(tests), hanger, options, progress)
 
 
 def simulate(
@@ -421,7 +434,7 @@ def simulate(
     time: datetime | None = None,
     seed: int = 1,
 ) -> Recording:
-    """The recording of a hammer test of a hanger whose truth you choose.
+    """Return the recording of a hammer test of a hanger whose truth you choose.
 
     The modes are those of the general model of a hanger, `shm.models.hanger`. Left out, `tension_n`
     is the nominal one, the end springs (k1, k3 transverse at deck and arch end; k2, k4

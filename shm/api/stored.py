@@ -1,4 +1,4 @@
-"""What a workspace keeps, for one who only looks."""
+"""A workspace for one who only reads it."""
 
 from __future__ import annotations
 
@@ -124,29 +124,29 @@ class Store:
         return tuple(posterior for _, posterior in self._store.posteriors.history(hanger_id))
 
     def selection(self, hanger_id: int) -> Selection:
-        """The model classes compared on the hanger's first tests; raises NothingThere."""
+        """Return the model classes compared on the hanger's first tests; raises NothingThere."""
         self.hanger(hanger_id)
         found = self._store.posteriors.selection(hanger_id)
         if found is None:
             raise NothingThere(
                 f"no model class is selected for hanger {hanger_id} yet.",
-                remedy="Ingest tests of it.",
+                remedy="Take tests of it into the workspace, or call shm.select(tests, hanger).",
             )
         return found.selection
 
     def diagnosis(self, hanger_id: int) -> Diagnosis:
-        """The latest gap diagnosis of a hanger; raises NothingThere."""
+        """Return the latest gap diagnosis of a hanger; raises NothingThere."""
         self.hanger(hanger_id)
         found = self._store.posteriors.latest_diagnosis(hanger_id)
         if found is None:
             raise NothingThere(
                 f"the gap of hanger {hanger_id} has not been diagnosed yet.",
-                remedy=f"Run `shm gap diagnose --hanger {hanger_id}`.",
+                remedy=f"Call shm.diagnose(store.tests({hanger_id}), store.hanger({hanger_id})).",
             )
         return found.diagnosis
 
     def records(self, hanger_id: int, test_id: str) -> tuple[Recording | FrequencyResponse, ...]:
-        """The raw records of a test, from the archive; raises NothingThere for an unknown test.
+        """Return the raw records of a test from the archive; raises NothingThere for another one.
 
         Raises BadInput where a file gave the modes and holds no record.
         """
@@ -156,7 +156,7 @@ class Store:
             return read_test(path)
 
     def frequency_response(self, hanger_id: int, test_id: str) -> FrequencyResponse:
-        """What the modes of a test were identified from; raises NothingThere where none is kept."""
+        """Return the response behind a test's modes; raises NothingThere without one."""
         found = self._store.tests.frequency_response(self._stored(hanger_id, test_id))
         if found is None:
             raise NothingThere(

@@ -96,8 +96,8 @@ def inference_data(
         warnings.simplefilter("ignore", FutureWarning)  # ArviZ announces its next version at import
         import arviz
     tree = datatree(posterior, tests, hanger)
-    own = getattr(arviz, "InferenceData", None)
-    return tree if own is None else own.from_datatree(tree)
+    this = getattr(arviz, "InferenceData", None)
+    return tree if this is None else this.from_datatree(tree)
 
 
 def write_netcdf(tree: DataTree, path: Path) -> None:
@@ -170,17 +170,17 @@ def _dataset(group: Group, named: dict[str, Any]) -> Dataset:
         for name, (dimensions, values, unit) in group.items()
     }
     used = {each for dimensions, _, _ in group.values() for each in dimensions}
-    kept = {
+    retained = {
         name: value
         for name, value in named.items()
         if (value[0] if isinstance(value, tuple) else name) in used
     }
-    return Dataset(variables, kept)
+    return Dataset(variables, retained)
 
 
 def _lineage(posterior: Posterior) -> dict[str, Any]:
-    """Where the draws come from; numbers that are not known are left out."""
-    told = {
+    """Return the origin of the draws; numbers that are not known are left out."""
+    wording = {
         "model": posterior.model,
         "hanger": posterior.hanger,
         "tests": list(posterior.tests),
@@ -194,7 +194,7 @@ def _lineage(posterior: Posterior) -> dict[str, Any]:
         "inference_library": "shm",
         "inference_library_version": __version__,
     }
-    return {name: value for name, value in told.items() if value is not None and value == value}
+    return {name: value for name, value in wording.items() if value is not None and value == value}
 
 
 def _unit(posterior: Posterior, name: str) -> str:
@@ -255,17 +255,17 @@ def _of_the_field(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hang
     likelihood, sigma = problem.measured, posterior.samples[:, -1]
     likelihood.settle(problem.model, posterior.most_probable[:-1])
     predicted = problem.run(parameter_sets(posterior, model))
-    kept = posterior.log_likelihood
-    if not np.allclose(likelihood.joint(predicted, sigma), kept, rtol=1e-4, atol=_NATS):
+    retained = posterior.log_likelihood
+    if not np.allclose(likelihood.joint(predicted, sigma), retained, rtol=1e-4, atol=_NATS):
         raise _another(posterior)
     by_mode = likelihood.by_mode(predicted)
     stated = [mode.frequency_sd_hz / mode.frequency_hz for mode in likelihood.modes]
     sd = np.hypot(sigma[:, None], np.nan_to_num(np.array(stated)))
     measured = np.array([mode.frequency_hz for mode in likelihood.modes])
     standardised = np.log(measured / by_mode) / sd
-    own = -0.5 * standardised**2 - np.log(sd * measured) - 0.5 * np.log(2 * np.pi)
+    this = -0.5 * standardised**2 - np.log(sd * measured) - 0.5 * np.log(2 * np.pi)
     rng = np.random.default_rng(posterior.seed)
-    return Predictive(by_mode * np.exp(sd * rng.standard_normal(sd.shape)), np.asarray(own))
+    return Predictive(by_mode * np.exp(sd * rng.standard_normal(sd.shape)), np.asarray(this))
 
 
 def _refuse_another(posterior: Posterior, joint: FloatArray) -> None:

@@ -21,9 +21,10 @@ from shm.pipeline.lineage import (
     software,
 )
 from shm.pipeline.unheard import blind_hangers, heard
-from shm.report.contents import BridgeReport, Course, HangerLine
+from shm.report.contents import BridgeReport
 from shm.report.formatting import Interval
-from shm.report.hanger_status import Known, findings, hanger_message, still_detected
+from shm.report.hanger_status import findings, still_detected
+from shm.report.hanger_summary import Course, HangerSummary, LatestTest
 from shm.report.open_warnings import (
     discarded,
     nearly_slack,
@@ -43,7 +44,7 @@ from shm.store import (
     Workspace,
 )
 from shm.store.stored_alerts import said_of, silenced_until
-from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint, WatchedTest
+from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
 from shm.watch.change_words import look_again
@@ -112,7 +113,7 @@ def bridge_report(
     Raises NothingThere before any test is through, and where none lies in the period.
     """
     hangers = workspace.bridge.hangers
-    lines = hanger_lines(workspace, store, generated_at)
+    lines = hanger_summaries(workspace, store, generated_at)
     if all(line.tension_n is None for line in lines):
         raise NothingThere(
             "no test of any hanger has been through updating yet.",
@@ -148,22 +149,22 @@ def bridge_report(
     )
 
 
-def _sensors(workspace: Workspace, store: Store, line: HangerLine) -> tuple[ResponsePoint, ...]:
+def _sensors(workspace: Workspace, store: Store, line: HangerSummary) -> tuple[ResponsePoint, ...]:
     """Return the sensors of a hanger's latest test; before the first those that stay on it."""
-    if line.test:
-        stored = store.tests.named(line.hanger.id, line.test)
+    if line.latest:
+        stored = store.tests.named(line.hanger.id, line.latest.name)
         return list_sensors(stored.test, store.tests.frequency_response(stored))
     streams = [each for each in workspace.bridge.streams if each.hanger == line.hanger.id]
     return tuple(ResponsePoint(c.name, c.plane, c.x_m) for each in streams for c in each.channels)
 
 
-def hanger_lines(
+def hanger_summaries(
     workspace: Workspace, store: Store, now: datetime, hangers: Sequence[Hanger] = ()
-) -> tuple[HangerLine, ...]:
-    """Each of `hangers` in a line, or all in their order along the bridge, without samples."""
+) -> tuple[HangerSummary, ...]:
+    """Return the state of each of `hangers`, or of all along the bridge; it reads no samples."""
     hangers = hangers or workspace.bridge.hangers
     kept = HangersNow.of(workspace, store, hangers, now)
-    return tuple(kept.line(hanger) for hanger in hangers)
+    return tuple(kept.summary(hanger) for hanger in hangers)
 
 
 def unwatched(
@@ -240,53 +241,28 @@ class HangersNow:
             store.tests.names_without_time(),
         )
 
-    def line(self, hanger: Hanger) -> HangerLine:
-        opened, point = self.open_alerts.get(hanger.id, 0), self.latest.get(hanger.id)
-        message = hanger_message(self.known(hanger))
-        baseline, watched = self.baselines.get(hanger.id), self._watched(hanger)
-        called = self.called.get(hanger.id, ())
-        if point is None:
-            return HangerLine(hanger, message, open_alerts=opened)
-        return HangerLine(
-            hanger,
-            message,
-            point.time,
-            Interval.of_averaged(point.averaged),
-            "; ".join(called_words(change) for change in called),
-            opened,
-            next((d for d in (watched.told if watched else ()) if d.quantity == TENSION), None),
-            point.test,
-            point.model,
-            baseline_tension_n=Interval.of_averaged(baseline.averaged) if baseline else None,
-            averaged=point.averaged,
-            warnings=self.warnings.get(hanger.id, ()),
-            undated=self.undated.get(hanger.id, ()),
-        )
-
-    def _watched(self, hanger: Hanger) -> WatchedTest | None:
+    def summary(self, hanger: Hanger) -> HangerSummary:
+        """Return the state of a hanger, as every face shows it."""
+        point, baseline = self.latest.get(hanger.id), self.baselines.get(hanger.id)
         found = self.watches.get(hanger.id)
-        return found.watched if found else None
-
-    def known(self, hanger: Hanger) -> Known:
-        """Return what the state of a hanger is decided from."""
-        point = self.latest.get(hanger.id)
-        watched = self._watched(hanger)
-        standing = self.standing.get(hanger.id, ())
-        baseline = self.baselines.get(hanger.id)
-        return Known(
+        watched, called = found.watched if found else None, self.called.get(hanger.id, ())
+        standing, blind = self.standing.get(hanger.id, ()), self.blind.get(hanger.id)
+        return HangerSummary(
             hanger,
-            point.averaged if point else None,
-            point.time if point else None,
-            point.test if point else "",
-            point is not None and (baseline is None or point.test in baseline.tests),
-            watched.told if watched else (),
-            still_detected(self.called.get(hanger.id, ()), watched, hanger),
-            findings(each.alert for each in standing),
-            self.warnings.get(hanger.id, ()),
-            notes_of(standing, self.silences, hanger.id, self.now),
-            unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
+            LatestTest(point.test, point.time, point.averaged, point.model) if point else None,
+            baseline.averaged if baseline else None,
+            is_first=point is not None and (baseline is None or point.test in baseline.tests),
+            drifts=watched.told if watched else (),
+            called=still_detected(called, watched, hanger),
+            detected="; ".join(called_words(change) for change in called),
+            standing=findings(each.alert for each in standing),
+            open_alerts=self.open_alerts.get(hanger.id, 0),
+            warnings=self.warnings.get(hanger.id, ()),
+            notes=notes_of(standing, self.silences, hanger.id, self.now),
+            unwatched=unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
             if point
-            else self.blind.get(hanger.id),
+            else blind,
+            undated=self.undated.get(hanger.id, ()),
         )
 
 

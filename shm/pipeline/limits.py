@@ -29,12 +29,16 @@ def heed_limits(
         if not is_open and not any(_limits(hanger)):
             continue
         if (point := store.posteriors.latest_trends([hanger]).get(hanger.id)) is not None:
-            conditions = list(_conditions(store, hanger, point, known))
+            conditions = list(_conditions(workspace, store, hanger, point, known))
             store.alerts.settle(reconcile(is_open, conditions), hooks, at)
 
 
 def _conditions(
-    store: Store, hanger: Hanger, point: TrendPoint, known: Sequence[StoredAlert]
+    workspace: Workspace,
+    store: Store,
+    hanger: Hanger,
+    point: TrendPoint,
+    known: Sequence[StoredAlert],
 ) -> Iterator[Condition]:
     limits, thresholds = tuple(_limits(hanger)), hanger.thresholds
     for each in known:
@@ -48,7 +52,7 @@ def _conditions(
                 yield Condition(each.alert, "over", f"test {point.test} has it within the limit")
         is_told = same and not _is_another_crossing(store, hanger, same[-1])
         if probability >= thresholds.alert_probability and not is_told:
-            yield Condition(_alert(hanger, limit, point, same), "holds")
+            yield Condition(_alert(workspace, store, hanger, limit, point, same), "holds")
 
 
 def _limits(hanger: Hanger) -> Iterator[CrossedLimit]:
@@ -65,12 +69,25 @@ def _probability(averaged: Averaged, side: str) -> float:
 
 
 def _alert(
-    hanger: Hanger, limit: CrossedLimit, point: TrendPoint, same: Sequence[StoredAlert]
+    workspace: Workspace,
+    store: Store,
+    hanger: Hanger,
+    limit: CrossedLimit,
+    point: TrendPoint,
+    same: Sequence[StoredAlert],
 ) -> Alert:
-    from shm.report.hanger_status import off_limits  # it computes: not before it is needed
+    """Return the alert that a limit is crossed.
+
+    It names its test where the best estimate since the last change is another tension.
+    """
+    # They compute: not before they are needed.
+    from shm.pipeline.bridge_reporting import hanger_summaries
+    from shm.report.hanger_status import off_limits
 
     probability = _probability(point.averaged, limit.side)
-    lead = off_limits(hanger, point.averaged)
+    (now,) = hanger_summaries(workspace, store, point.time, [hanger])
+    is_headline = now.tension is not None and now.tension.tension_n == point.averaged.tension_n
+    lead = off_limits(hanger, point.averaged, "" if is_headline else f" by test {point.test}")
     key = f"hanger-{hanger.id}:{_KIND}:{limit.side}-{limit.tension_n:.12g}:{point.test_id}"
     key += f":again-{same[-1].id}" if same else ""
     sure = "above 0.99" if probability > 0.99 else f"{probability:.2f}"

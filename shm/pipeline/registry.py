@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from shm.store import Baseline, IdentifiedTest, StoredRecording
     from shm.values import (
         Alert,
-        Averaged,
         Beside,
         Hanger,
         ModalTest,
@@ -104,7 +103,6 @@ class Steps:
             Hanger,
             float,
             bytes | None,
-            Averaged | None,
             Beside | None,
         ],
         WatchResult | None,

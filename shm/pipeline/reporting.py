@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 
 import shm
-from shm.errors import NothingThere
+from shm.errors import NothingThere, ShmError
 from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
-from shm.pipeline.bridge_reporting import HangersNow, stored_pattern
+from shm.pipeline.bridge_reporting import hanger_summaries, stored_pattern
 from shm.pipeline.lineage import (
     IDENTIFY_SETTINGS,
     discarded_of_baselines,
@@ -22,17 +23,19 @@ from shm.pipeline.lineage import (
 )
 from shm.pipeline.steps import identify_options
 from shm.pipeline.watching import dated_tests
-from shm.read.sandbox import read_test
+from shm.read.sandbox import peek_test, read_test
 from shm.report.contents import HangerReport, ModalTestReport, TrendRow
 from shm.report.formatting import Interval
 from shm.report.hanger_report import StructureReport
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
-from shm.store import Baseline, Store, StoredAlert, TrendPoint, Workspace
-from shm.values import Hanger, WatchedTest
+from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
+from shm.values import Hanger, ResponsePoint, WatchedTest
 from shm.watch import WatchOptions, watch_hanger
 from shm.watch.alert_text import watch_words
 from shm.watch.change_words import frequency_words
 from shm.watch.neighbours import BridgePattern
+
+log = logging.getLogger(__name__)
 
 
 def hanger_report(
@@ -48,19 +51,33 @@ def hanger_report(
     hanger, NothingThere before its first test is through and where none lies in the period.
     """
     hanger = workspace.bridge.hanger(hanger_id)
-    now = hanger_now(workspace, store, hanger, _trend(store, hanger, period), generated_at)
-    latest = store.tests.named(hanger_id, now.latest.id)
+    report = hanger_now(workspace, store, hanger, _trend(store, hanger, period), generated_at)
+    latest = store.tests.named(hanger_id, report.latest.id)
     return replace(
-        now,
-        alerts=tuple(each for each in now.alerts if period is None or period.holds(each.time)),
-        inspections=tuple(e for e in now.inspections if period is None or period.holds(e.at)),
+        report,
+        alerts=tuple(each for each in report.alerts if period is None or period.holds(each.time)),
+        inspections=tuple(e for e in report.inspections if period is None or period.holds(e.at)),
         frequency_response=store.tests.frequency_response(latest),
+        hits=_hit_places(workspace, store, latest),
         states=hanger_states(
-            workspace, store, hanger, store.watch.baseline(hanger_id, now.posterior.model)
+            workspace, store, hanger, store.watch.baseline(hanger_id, report.posterior.model)
         ),
-        neighbours=_neighbours(workspace, store) if now.is_called else None,
+        neighbours=_neighbours(workspace, store) if report.now.called else None,
         period=period,
     )
+
+
+def _hit_places(workspace: Workspace, store: Store, test: StoredTest) -> tuple[ResponsePoint, ...]:
+    """Return where the hammer hit, as the header of the test's file says; none without that."""
+    recording = store.recordings.get(test.recording_id)
+    try:
+        with workspace.archive.opened(recording.file) as path:
+            looks = peek_test(path, read_limits(workspace.settings))
+    except ShmError as reason:  # dropped by retention, or frequencies were given
+        log.info("places of hits of test %s: %s", test.test.id, reason.message)
+        return ()
+    force = (c for look in looks for c in look.channels if c.quantity == "force")
+    return tuple(dict.fromkeys(ResponsePoint("hit", c.plane, c.x_m) for c in force))
 
 
 def structure_report(
@@ -81,7 +98,7 @@ def structure_report(
         baseline_hz=dict(zip(levels.names, levels.samples[0].tolist(), strict=True))
         if levels
         else {},
-        said=frequency_words(watched, structure),
+        statement=frequency_words(watched, structure),
         drifts=watched[-1].drifts if watched else (),
         alerts=tuple(stored.alert for stored in alerts),
         open_alerts=store.alerts.open_counts().get(number, 0),
@@ -111,11 +128,11 @@ def hanger_now(
     in_force = store.watch.baseline(hanger.id)
     diagnosis, watch = store.posteriors.latest_diagnosis(hanger.id), gap_watch(store, hanger.id)
     watched, alerts = _watched_against(store, baseline), store.alerts.list_all(hanger.id)
-    known = HangersNow.of(workspace, store, [hanger], generated_at).known(hanger)
+    (now,) = hanger_summaries(workspace, store, generated_at, [hanger])
     return HangerReport(
         bridge=workspace.bridge.name,
         letterhead=workspace.bridge.letterhead,
-        hanger=hanger,
+        now=now,
         tests=(latest.test,),
         posterior=posterior,
         generated_at=generated_at,
@@ -123,7 +140,6 @@ def hanger_now(
         trend=tuple(_trend_row(point) for point in trend),
         baseline=baseline.posterior if baseline else None,
         selection=selection.selection if selection else None,
-        drifts=tuple(known.drifts),
         alerts=tuple(stored.alert for stored in alerts),
         acknowledged=_acknowledged(alerts),
         quality=latest.quality,
@@ -131,18 +147,11 @@ def hanger_now(
         gap_watch=str(watch) if watch else "",
         drift_watch=watch_words(watched),
         creep=watched[-1].creep_per_year if watched else None,
-        called=tuple(known.called),
         lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
         settings={**settings_words(workspace.settings), **_changed(store, hanger)},
         redescribed=redescribed(hanger, in_force),
         discarded=discarded_of_baselines(store).get(hanger.id, ()),
-        warnings=tuple(known.warnings),
-        standing=tuple(known.standing),
-        notes=known.notes,
         inspections=store.notes.list_all(hanger.id),
-        unwatched=known.unwatched,
-        known=known,
-        undated=store.tests.names_without_time().get(hanger.id, ()),
     )
 
 

@@ -24,7 +24,6 @@ from shm.settings import Settings
 from shm.store import Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
 from shm.values import (
-    Averaged,
     BaselineCheck,
     Beside,
     Hanger,
@@ -176,12 +175,9 @@ def watch_test(
     hanger: Hanger,
     limit_years: float,
     kept: bytes | None = None,
-    tension: Averaged | None = None,
     beside: Beside | None = None,
 ) -> WatchResult | None:
     """What the watch says after a test, the alert that it calls for, and what to keep of it.
-
-    The alert leads with the `tension` by the test.
 
     `tests` are those of the baseline and those since, the last of which is the one in question; or
     that one alone, with what was `kept` before it: None where nothing can go on from that. The
@@ -207,5 +203,5 @@ def watch_test(
         gap = watch_gap(baseline.posterior, current, hanger, test=test.id, time=time)
         alert = joined(alert, gap)
     # A new baseline makes a standing condition a new one.
-    alert = alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}", tension=tension)
+    alert = alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}")
     return found.test, alert, found.kept

@@ -14,9 +14,12 @@ from functools import cached_property
 
 from shm.bridge import Hook
 from shm.bridge.hooks import escalations_s
+from shm.report import formatting
+from shm.report.hanger_summary import BASELINE_AND_CHANGE, HangerSummary
 from shm.store import Delivery, News, Silence
 from shm.store.stored_alerts import silenced_until
 from shm.values import Alert, Drift, is_ratio, kind_of
+from shm.values.rounding import force_unit
 
 _MOST_WINDOWS = 5
 """Judgement: while alike alerts keep coming a message waits for 5 windows, by default the 5 minutes
@@ -255,6 +258,19 @@ def _amount(lead: Drift) -> str:
     if is_ratio(lead.quantity):
         return f"{100 * abs(lead.shift_mean):.1f} %"
     return f"{10 ** abs(lead.shift_mean):.1f} times"
+
+
+def with_tension(alert: Alert, now: HangerSummary) -> Alert:
+    """Return an alert with the tension of its hanger, as every face states it."""
+    alert = replace(alert, tension=now.tension)
+    then_n, now_n = now.baseline_n, now.tension_n
+    if then_n is None or now_n is None or not now.is_found or now.basis != BASELINE_AND_CHANGE:
+        return alert
+    unit = force_unit(then_n.mean, now_n.mean)
+    said, mark, details = alert.message.partition(" Details: ")
+    said += f" The tension is now {formatting.with_half(now_n, unit)}."
+    said += f" At the baseline it was {formatting.with_half(then_n, unit)}."
+    return replace(alert, message=f"{said}{mark}{details}")
 
 
 # ---------------------------------------------------------------- after planned works

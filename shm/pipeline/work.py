@@ -20,8 +20,9 @@ from shm.pipeline.judging import judge
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import Opens, RemoteFile, WatchResult, registered, run_step
-from shm.pipeline.telling import after_works, works_before
+from shm.pipeline.telling import after_works, with_tension, works_before
 from shm.pipeline.watching import reconciled, tests_beside, to_watch
+from shm.report.hanger_summary import HangerSummary, LatestTest
 from shm.store import KeptWatch, Stage, Store, StoredAlert, StoredRecording, TestRow, Workspace
 from shm.store.archive import nothing
 from shm.values import WITHOUT_MODEL, Hanger
@@ -171,12 +172,23 @@ class Queue:
         tension = averaged_now(current, compared, hanger.limits) if hanger.is_modelled else None
         beside = tests_beside(store, baseline, test)
         years = settings.false_call_years
-        of_test = (baseline, tests, current, hanger, years, needed.kept, tension, beside)
+        of_test = (baseline, tests, current, hanger, years, needed.kept, beside)
         found: WatchResult | None = yield partial(run_step, registered().watch, *of_test)
         if found is None:  # the test still waits, to be watched from the baseline on
             store.watch.forget_state(baseline)
             return None
         watched, alert, kept = found
+        if alert is not None and tension is not None:
+            called = store.watch.detected_changes([hanger]).get(hanger.id, ())
+            now = HangerSummary(
+                hanger,
+                LatestTest(test.test.id, test.time, tension, current.model),
+                averaged_now(baseline.posterior, compared, hanger.limits),
+                drifts=watched.told,
+                called=(*called, *([watched.change] if watched.change.called else ())),
+                standing=(alert,),
+            )
+            alert = with_tension(alert, now)
         if alert is not None and silences:
             earlier = [each.alert for each in store.alerts.list_all(hanger.id)]
             works = works_before(alert, silences, earlier)

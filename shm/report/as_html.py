@@ -17,12 +17,12 @@ _CODE = Markup("<code>{}</code>")
 
 
 def as_html(paper: Paper) -> str:
-    """The document; its figures are SVG elements whose colours follow the page's."""
+    """Return the document; its figures are SVG elements whose colours follow the page's."""
     return ENVIRONMENT.get_template("paper.html.j2").render(paper=paper)
 
 
 def with_code(text: str) -> Markup:
-    """The text for a page; what stands between backticks, as commands do, is code."""
+    """Return the text for a page; what stands between backticks, as commands do, is code."""
     return Markup().join(
         _CODE.format(part) if index % 2 else escape(part)
         for index, part in enumerate(_COMMAND.split(text))
@@ -40,7 +40,7 @@ def _as_markup(drawing: str) -> Markup:
 
 
 def environment(loader: BaseLoader) -> Environment:
-    """How all pages, those of the dashboard too, are made from their templates."""
+    """Return the environment that makes all pages from their templates."""
     made = Environment(
         loader=loader,
         autoescape=True,

@@ -31,7 +31,6 @@ from reportlab.platypus import (
     Frame,
     Image,
     KeepTogether,
-    PageBreak,
     PageTemplate,
     Paragraph,
     Spacer,
@@ -61,7 +60,7 @@ _PANEL = colors.HexColor("#f4f6f9")
 
 @cache
 def _register_fonts() -> None:
-    """Makes the fonts known to reportlab, which embeds the signs that a document uses."""
+    """Make the fonts known to reportlab, which embeds the signs that a document uses."""
     folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
     for name in (_PLAIN, _BOLD):
         pdfmetrics.registerFont(TTFont(name, folder / f"{name}.ttf"))
@@ -90,7 +89,7 @@ _LABEL = _letters("label", 7.6, textColor=_QUIET)
 
 
 def as_pdf(paper: Paper) -> bytes:
-    """The document with its fonts, figures, outline and properties inside."""
+    """Return the document with its fonts, figures, outline and properties inside."""
     _register_fonts()
     buffer = io.BytesIO()
     made_by = f"shm {paper.version}".rstrip()
@@ -167,20 +166,22 @@ def _cut(text: str) -> str:
     return f"{text}…"
 
 
+def _words(text: str) -> str:
+    """Return a text for a paragraph, without the backticks around commands."""
+    return escape(text.replace("`", ""))
+
+
 def _flowables(paper: Paper) -> list[Flowable]:
-    """The title and all parts that have something, in order; figures and tables are numbered."""
+    """Return title, parts and signature in order; figures and tables are numbered."""
     figures, tables = count(1), count(1)
     colour = STATUS_COLOURS[paper.style]
     state = f' <font color="{colour}" size="12">● {escape(paper.status)}</font>'
-    body, appendix = (
-        [
-            each
-            for part in paper.parts
-            if part.is_appendix is is_appendix
-            for each in _part(part, STATUS_COLOURS[part.style or paper.style], figures, tables)
-        ]
-        for is_appendix in (False, True)
-    )
+    body = [
+        each
+        for part in paper.parts
+        if not part.is_appendix
+        for each in _part(part, STATUS_COLOURS[part.style or paper.style], figures, tables)
+    ]
     signature = [_signature(paper)] if paper.is_signed else []
     return [
         *_logo(paper),
@@ -188,7 +189,6 @@ def _flowables(paper: Paper) -> list[Flowable]:
         Paragraph(escape(paper.title) + (state if paper.status else ""), _TITLE),
         *body,
         *signature,
-        *([PageBreak(), *appendix] if appendix else []),
         Paragraph(escape(paper.foot), _NOTE),
     ]
 
@@ -230,18 +230,18 @@ def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> l
     heading: list[Flowable] = [_mark(part.headline), Paragraph(escape(part.headline), _HEADING)]
     found: list[Flowable] = []
     for paragraph in part.paragraphs:
-        found += [Paragraph(escape(paragraph), _BODY), Spacer(1, 6)]
+        found += [Paragraph(_words(paragraph), _BODY), Spacer(1, 6)]
     if part.full_summary:
-        lead = f"<b>{escape(part.lead)}</b> " if part.lead else ""
-        told = Paragraph(f"{lead}{escape(part.summary)}", _BODY)
-        found += [_panel(told, colour), Spacer(1, 6)]
+        lead = f"<b>{_words(part.lead)}</b> " if part.lead else ""
+        wording = Paragraph(f"{lead}{_words(part.summary)}", _BODY)
+        found += [_panel(wording, colour), Spacer(1, 6)]
     if part.details:
-        found += [Paragraph(escape(part.details), _BODY), Spacer(1, 6)]
+        found += [Paragraph(_words(part.details), _BODY), Spacer(1, 6)]
     if part.facts:
         found += [_facts(part.facts), Spacer(1, 8)]
     if part.remarks:
         found.append(Paragraph(escape(part.remarks_title), _SUBHEADING))
-        found += [Paragraph(escape(each), _REMARK, bulletText="•") for each in part.remarks]
+        found += [Paragraph(_words(each), _REMARK, bulletText="•") for each in part.remarks]
         found.append(Spacer(1, 8))
     groups = [_figure(each, next(figures)) for each in part.figures()]
     groups += [_table(each, next(tables)) for each in part.tables]
@@ -262,7 +262,7 @@ def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> l
 
 
 def _mark(title: str) -> Flowable:
-    """An entry of the document's outline, kept with the heading that follows."""
+    """Return an entry of the document's outline, kept with the heading that follows."""
 
     def entry(macro: CallerMacro) -> None:
         macro.canv.bookmarkPage(title)
@@ -288,10 +288,10 @@ def _facts(facts: Sequence[Fact]) -> Flowable:
     cells = [
         [
             Paragraph(escape(what), _LABEL),
-            Paragraph(escape(value), _FACT),
-            Paragraph(escape(beside), _LABEL),
+            Paragraph(_words(value), _FACT),
+            Paragraph(_words(besides), _LABEL),
         ]
-        for what, value, beside in facts
+        for what, value, besides in facts
     ]
     rules = [
         ("BACKGROUND", (0, 0), (-1, -1), _PANEL),
@@ -315,9 +315,9 @@ def _table(table: Table, number: int) -> list[Flowable]:
     table = table.folded() if table.is_folded else table
     # What is kept with a table keeps the table in one piece, too.
     style = _LOOSE_SUBHEADING if table.may_break else _SUBHEADING
-    title = Paragraph(f"Table {number}. {escape(table.title)}", style)
-    rows = [[Paragraph(escape(cell), _HEAD) for cell in table.headings]]
-    rows += [[Paragraph(escape(cell), _CELL) for cell in row] for row in table.rows]
+    title = Paragraph(f"Table {number}. {_words(table.title)}", style)
+    rows = [[Paragraph(_words(cell), _HEAD) for cell in table.headings]]
+    rows += [[Paragraph(_words(cell), _CELL) for cell in row] for row in table.rows]
     set_table = SetTable(
         rows,
         _widths(table),
@@ -326,7 +326,7 @@ def _table(table: Table, number: int) -> list[Flowable]:
         hAlign="LEFT",
         style=_rules(table),
     )
-    note = Paragraph(escape(table.note), _NOTE) if table.note else Spacer(1, 9)
+    note = Paragraph(_words(table.note), _NOTE) if table.note else Spacer(1, 9)
     return [title, set_table, note]
 
 
@@ -339,7 +339,7 @@ def _widths(table: Table) -> list[float]:
 
 
 def _marked(table: Table) -> int:
-    """The column that stands for its row's mark: the second, where there is one."""
+    """Return the column that stands for its row's mark: the second, where there is one."""
     return min(1, len(table.headings) - 1)
 
 
@@ -405,6 +405,6 @@ def _bold_width(cell: str, size: float) -> float:
 
 
 def _width(text: str, font: str, size: float) -> float:
-    """How wide `text` is set, in points."""
+    """Return the width of a text as it is set, in points."""
     _register_fonts()
     return float(pdfmetrics.stringWidth(text, font, size))

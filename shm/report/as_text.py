@@ -1,7 +1,4 @@
-"""A paper as plain text for a terminal.
-
-Figures are left out, and the figures on top, which the summary tells; tables as far as they say.
-"""
+"""A paper as plain text for a terminal: all of it without figures, or what fits a screen."""
 
 from __future__ import annotations
 
@@ -22,13 +19,23 @@ _LONGEST_NUMBER = 12
 _LEAST = 9
 
 
+def as_brief_text(paper: Paper, width: int = WIDTH) -> str:
+    """Return what fits a screen: state, action, reason, and the figures on top."""
+    first = paper.parts[0]
+    blocks = [*_underlined(paper.headline, "=", width), *_part(replace(first, tables=()), width)]
+    if first.facts:
+        blocks.append(laid_out(Table("", ("", "", ""), tuple(first.facts)), width).lstrip())
+    blocks += [laid_out(in_terminal(table), width) for table in first.brief]
+    return "\n".join([*blocks, *([_folded(paper.more, width)] if paper.more else []), ""])
+
+
 def as_text(paper: Paper, width: int = WIDTH) -> str:
-    """The document in lines of at most `width` columns, unless a single word is longer."""
+    """Return all of it in lines of at most `width` columns, unless a single word is longer."""
     first, *others = paper.parts
     blocks = [*_underlined(paper.headline, "=", width), *_part(first, width)]
     for part in others:
-        if told := list(_part(part, width)):
-            blocks += [*_underlined(part.headline, "-", width), *told]
+        if wording := list(_part(part, width)):
+            blocks += [*_underlined(part.headline, "-", width), *wording]
     return "\n".join([*blocks, _folded(paper.foot, width), ""])
 
 
@@ -57,7 +64,7 @@ def _folded(text: str, width: int, start: str = "") -> str:
 
 
 def in_terminal(table: Table) -> Table:
-    """The rows that a terminal shows, with the column that stands for a figure there."""
+    """Return the rows that a terminal shows, with the column that stands for a figure there."""
     rows, headings, note = table.rows, table.headings, table.note
     if table.terminal_column:
         heading, *strokes = table.terminal_column
@@ -88,7 +95,8 @@ def laid_out(table: Table, width: int = WIDTH) -> str:
 
 
 def _columns(table: Table, widths: list[int]) -> list[str]:
-    lines = [*_lines(table.headings, widths), _GAP.join("-" * width for width in widths)]
+    head = [*_lines(table.headings, widths), _GAP.join("-" * width for width in widths)]
+    lines = head if any(table.headings) else []
     for row in table.rows:
         lines += _lines(row, widths)
     return lines
@@ -114,7 +122,7 @@ def _widths(table: Table, width: int) -> list[int]:
     for longest in (_LONGEST_NAME, _LEAST):
         least = [max(_longest_word(cell, longest) for cell in column) for column in columns]
         while sum(widths) > room and any(map(gt, widths, least)):
-            loose = [column for column, own in enumerate(widths) if own > least[column]]
+            loose = [column for column, this in enumerate(widths) if this > least[column]]
             widths[max(loose, key=widths.__getitem__)] -= 1
     return widths if sum(widths) <= room else []
 

@@ -50,7 +50,7 @@ def bars_table(bars: Sequence[BarDescription]) -> Table:
     labels = list(rows[0])
     common = {k: rows[0][k] for k in labels if len(rows) > 1 and len({r[k] for r in rows}) == 1}
     shown = [label for label in labels if label not in common]
-    told = "; ".join(f"{label.lower()} {value}" for label, value in common.items())
+    wording = "; ".join(f"{label.lower()} {value}" for label, value in common.items())
     return Table(
         "The bars as described",
         ("hanger", *(label.lower() for label in shown)),
@@ -58,7 +58,7 @@ def bars_table(bars: Sequence[BarDescription]) -> Table:
             (f"{bar.hanger} {bar.name}".strip(), *(row[label] for label in shown))
             for bar, row in zip(bars, rows, strict=True)
         ),
-        note=f"All bars: {told}." if told else "",
+        note=f"All bars: {wording}." if wording else "",
         may_break=True,
     )
 
@@ -129,8 +129,8 @@ def _sensors(sensors: Sequence[ResponsePoint]) -> str:
     first, second, unknown = places.values()
     if first == second and not unknown:
         return f"both planes at {first}"
-    told = [f"{plane or 'plane not stated,'} at {at}" for plane, at in places.items() if at]
-    return "; ".join(told)
+    wording = [f"{plane or 'plane not stated,'} at {at}" for plane, at in places.items() if at]
+    return "; ".join(wording)
 
 
 def _places(x_m: Iterable[float]) -> str:

@@ -25,11 +25,11 @@ _STATES = {
     "shared unknown": ("Shared, not explained", "alert"),
 }
 _WORTH_A_ROW = 0.001  # of a probability: what the three decimals show
-_MOST_ALIKE = 3  # what a sentence bears
+_MOST_SIMILAR = 3  # what a sentence bears
 
 
 def bridge_diagnosis_paper(sheet: BridgeDiagnosisSheet) -> Paper:
-    """The answer, its figure, the answer in numbers, each hanger for itself."""
+    """Return the answer, its figure, the answer in numbers, each hanger for itself."""
     diagnosis = sheet.diagnosis
     status, style = _STATES[diagnosis.leads]
     seconds = f" in {diagnosis.seconds:.0f} s" if math.isfinite(diagnosis.seconds) else ""
@@ -60,7 +60,7 @@ def bridge_diagnosis_paper(sheet: BridgeDiagnosisSheet) -> Paper:
 
 
 def bridge_diagnosis_json(sheet: BridgeDiagnosisSheet) -> dict[str, Any]:
-    """A document for `shm.documents.dump`; unknown numbers become null there."""
+    """Return a document for `shm.documents.dump`; unknown numbers become null there."""
     summary = f"{shared_verdict(sheet.diagnosis)} {_consequences(sheet.diagnosis)}".rstrip()
     return {
         **bridge_diagnosis_document(sheet.diagnosis),
@@ -74,10 +74,10 @@ def shared_verdict(diagnosis: BridgeDiagnosis) -> str:
     """`Rotational end flexibility (deck end) is shared by hangers 3, 5 and 7 (0.97).`"""
     apart, leading = diagnosis.each_for_itself_probability, diagnosis.leading
     if leading is not None:
-        claim = formatting.told_probability(diagnosis.claim(leading))
+        claim = formatting.spoken_probability(diagnosis.claim(leading))
         what = effect_label(leading.effect, leading.at)
-        alike = _alike(diagnosis, leading)
-        start = f"{what[0].upper()}{what[1:]}{alike}"
+        similar = _similar(diagnosis, leading)
+        start = f"{what[0].upper()}{what[1:]}{similar}"
         everyone = len(leading.named) == len(diagnosis.hangers)
         who = (
             f"all {len(leading.named)} hangers"
@@ -86,19 +86,19 @@ def shared_verdict(diagnosis: BridgeDiagnosis) -> str:
         )
         return f"{start} is shared by {who} ({claim})."
     if diagnosis.leads == "shared unknown":
-        chance = formatting.told_probability(diagnosis.unknown_probability)
+        chance = formatting.spoken_probability(diagnosis.unknown_probability)
         return f"Hangers share something that is not in the catalogue ({chance})."
     return (
         "No cause is shown that hangers share: each has its own or none "
-        f"({formatting.told_probability(apart)})."
+        f"({formatting.spoken_probability(apart)})."
     )
 
 
-def _alike(diagnosis: BridgeDiagnosis, leading: SharedCause) -> str:
-    """What these data cannot tell from it."""
+def _similar(diagnosis: BridgeDiagnosis, leading: SharedCause) -> str:
+    """Return what these data cannot distinguish from it."""
     if leading.group is None:
         return ""
-    names = [n for n in diagnosis.groups[leading.group] if n != leading.effect][:_MOST_ALIKE]
+    names = [n for n in diagnosis.groups[leading.group] if n != leading.effect][:_MOST_SIMILAR]
     return f", or {formatting.listed([formatting.quantity(each) for each in names])},"
 
 
@@ -117,22 +117,24 @@ def _consequences(diagnosis: BridgeDiagnosis) -> str:
     if leading is None:
         return "Each hanger's own diagnosis stands."
     others = [each for each in diagnosis.hangers if each not in leading.named]
-    told = f"It is {effect_phrase(leading.effect, leading.at, [leading.size])}"
-    told += f", from hanger to hanger within some {100 * leading.scatter:.0f} %."
+    wording = f"It is {effect_phrase(leading.effect, leading.at, [leading.size])}"
+    wording += f", from hanger to hanger within some {100 * leading.scatter:.0f} %."
     if leading.also_at:
-        told += f" About as likely: {formatting.listed(list(leading.also_at[:_MOST_ALIKE]))}."
+        wording += f" About as likely: {formatting.listed(list(leading.also_at[:_MOST_SIMILAR]))}."
     if leading.effect == "point_mass" and leading.size.q05 < _heaviest_sensor_kg():
-        told += " So small a mass may be that of the sensors: it is then no cause in the hangers."
+        wording += (
+            " So small a mass may be that of the sensors: it is then no cause in the hangers."
+        )
     if others:
-        told += f" Without it: {_hangers(others)}."
+        wording += f" Without it: {_hangers(others)}."
     moved = [
         100 * (each.jointly_n.mean / each.before_n.mean - 1)
         for each in diagnosis.tensions
         if each.hanger in leading.named and math.isfinite(each.jointly_n.mean)
     ]
     if moved:
-        told += f" It changes their tensions by {min(moved):+.1f} to {max(moved):+.1f} %."
-    return told
+        wording += f" It changes their tensions by {min(moved):+.1f} to {max(moved):+.1f} %."
+    return wording
 
 
 def _causes(diagnosis: BridgeDiagnosis) -> Table:
@@ -197,8 +199,8 @@ def _tensions(diagnosis: BridgeDiagnosis) -> Table:
 
 
 def _tension(estimate: TensionEstimate, unit: ForceUnit) -> str:
-    told, places = tension_of(estimate).in_unit(unit), unit.decimals(estimate.mean)
-    return f"{told.mean:.{places}f} ({told.low:.{places}f} to {told.high:.{places}f})"
+    wording, places = tension_of(estimate).in_unit(unit), unit.decimals(estimate.mean)
+    return f"{wording.mean:.{places}f} ({wording.low:.{places}f} to {wording.high:.{places}f})"
 
 
 def _alone(diagnosis: BridgeDiagnosis) -> Table:

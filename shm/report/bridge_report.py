@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from shm.documents import averaged_document, drift_document
+from shm.documents import drift_document
 from shm.report import formatting
 from shm.report.bar_table import bar_document, bars_table
-from shm.report.contents import BridgeReport, Course, HangerLine, hangers_unit
+from shm.report.contents import BridgeReport, hangers_unit
 from shm.report.figures.every_figure import bridge_figures
 from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
-from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, filled
+from shm.report.hanger_summary import Course, HangerSummary
+from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, appendices, filled
 from shm.report.shared_tables import lineage, settings
 from shm.report.shifts import _day, pattern_tables, shift_cells
 from shm.report.states import period_json
@@ -37,24 +38,55 @@ def bridge_paper(data: BridgeReport) -> Paper:
                 lead=data.message.words,
                 summary=details(data),
                 facts=facts(data),
-                tables=(bars_table([line.bar for line in data.hangers]),),
+                tables=filled(bars_table([line.bar for line in data.hangers])),
+                brief=[_glance(data)],
             ),
             Part("Along the bridge", figures=lambda: bridge_figures(data)),
             Part("Numbers", tables=tables(data)),
+            *appendices(Part("Settings", tables=filled(settings(data.settings)))),
         ),
         generated_at=data.generated_at,
         version=data.version,
         closing=f"{CREDIBLE}; times are UTC.",
+        more="All of it: `shm report --bridge --full`, or `--out bridge.pdf`.",
     )
 
 
+def _glance(data: BridgeReport) -> Table:
+    """Return each hanger's state, tension and change in few columns."""
+    unit = hangers_unit(data.hangers)
+    return Table(
+        "",
+        ("hanger", "state", f"tension, {unit.name}", "since the baseline", "open alerts"),
+        tuple(
+            (
+                str(line.hanger.id),
+                line.status.value if line.status else "no test",
+                _short_tension(line, unit),
+                rounded_percent(change.mean, change.width / 2, "+") if change else "",
+                str(line.open_alerts or ""),
+            )
+            for line in data.hangers
+            for change in (line.change,)
+        ),
+    )
+
+
+def _short_tension(line: HangerSummary, unit: ForceUnit) -> str:
+    if line.tension_n is None:
+        return ""
+    if not line.is_determined:
+        return "not determined"
+    return formatting.with_half(line.tension_n, unit).removesuffix(f" {unit.name}")
+
+
 def facts(data: BridgeReport) -> tuple[Fact, ...]:
-    """What, value, what stands beside it."""
+    """Return what, value, and what belongs to it."""
     tested = [line for line in data.hangers if line.latest is not None]
     alert, watch = (of_status(data.hangers, each) for each in (Status.ALERT, Status.WATCH))
     opened = sum(line.open_alerts for line in data.hangers)
-    latest = max((line.latest for line in tested if line.latest), default=None)
-    oldest = min((line.latest for line in tested if line.latest), default=None)
+    times = [line.latest.time for line in tested if line.latest]
+    latest, oldest = max(times, default=None), min(times, default=None)
     return (
         ("Hangers", str(len(data.hangers)), f"{len(tested)} of them tested"),
         ("In alert", str(len(alert)), named(alert) if alert else "no hanger"),
@@ -69,23 +101,23 @@ def facts(data: BridgeReport) -> tuple[Fact, ...]:
 
 
 def summary(data: BridgeReport) -> str:
-    """What is said first of the bridge, then the details."""
+    """Return state and action of the bridge, then the details."""
     return f"{data.message.words} {details(data)}".rstrip()
 
 
 def details(data: BridgeReport) -> str:
-    """Why, and how sure."""
+    """Return the reasons, and how sure they are."""
     pattern = data.pattern.sentence if data.pattern else data.why_no_pattern
     sentences = (_extremes(data), _in_period(data), pattern, *advice(data)[1:])
     return " ".join(sentence for sentence in sentences if sentence)
 
 
 def advice(data: BridgeReport) -> tuple[str, ...]:
-    """What to do next, most urgent first; never empty."""
+    """Return what to do next, most urgent first; never empty."""
     found = [data.message.lead.action]
     if opened := [line for line in data.hangers if line.open_alerts]:
         found.append(f"Acknowledge the open alerts of {named(opened)} (`shm alerts ack`).")
-    if wide := [line for line in data.hangers if line.is_hardly_known]:
+    if wide := [e for e in data.hangers if e.latest and not e.is_determined]:
         found.append(
             f"Identify more modes of {named(wide)}: the interval of the tension is wider than half "
             "the tension itself."
@@ -95,19 +127,20 @@ def advice(data: BridgeReport) -> tuple[str, ...]:
     return tuple(found)
 
 
-def of_status(lines: Sequence[HangerLine], status: Status | None) -> list[HangerLine]:
+def of_status(lines: Sequence[HangerSummary], status: Status | None) -> list[HangerSummary]:
     return [line for line in lines if line.status is status]
 
 
-def named(lines: Sequence[HangerLine]) -> str:
+def named(lines: Sequence[HangerSummary]) -> str:
     """`hanger 3`, `hangers 3, 4 and 7`."""
     numbers = formatting.listed([str(line.hanger.id) for line in lines])
     return f"hanger {numbers}" if len(lines) == 1 else f"hangers {numbers}"
 
 
 def _extremes(data: BridgeReport) -> str:
-    """Who carries most and least of the nominal tension."""
-    shares = [(line, share) for line in data.hangers if (share := line.of_nominal) is not None]
+    """Return who carries most and least of the nominal tension."""
+    known = [line for line in data.hangers if line.is_determined]
+    shares = [(line, share) for line in known if (share := line.of_nominal) is not None]
     if len(shares) < 2:
         return ""
     by_share = sorted(shares, key=lambda each: each[1].mean)
@@ -129,15 +162,15 @@ def _in_period(data: BridgeReport) -> str:
     tested = [line for line, course in courses if course.tests]
     alerts = sum(course.alerts for _, course in courses)
     tests = formatting.counted(sum(course.tests for _, course in courses), "test")
-    told = (
+    wording = (
         f"In the period {data.period}: {tests} of {formatting.counted(len(tested), 'hanger')}, "
         f"{formatting.counted(alerts, 'alert')}"
     )
-    return f"{told}{_most_moved(data)}."
+    return f"{wording}{_most_moved(data)}."
 
 
 def _most_moved(data: BridgeReport) -> str:
-    """The hanger whose tension moved most from the period's first test of it to the last."""
+    """Return the hanger whose tension moved most from the period's first test of it to the last."""
     moved = [
         (line, line.course.change)
         for line in data.hangers
@@ -152,7 +185,7 @@ def _most_moved(data: BridgeReport) -> str:
     )
 
 
-_BESIDE = {"repeatability": "repeatability", "above": "above limit", "slack": "slack"}
+_NEXT_TO = {"repeatability": "repeatability", "above": "above limit", "slack": "slack"}
 """What stands beside a tension where it is known, with its heading."""
 
 
@@ -165,19 +198,18 @@ def tables(data: BridgeReport) -> tuple[Table, ...]:
         *(pattern_tables(data.pattern) if data.pattern else ()),
         _tests(data),
         _origin(data),
-        settings(data.settings),
     )
 
 
 def _hangers(data: BridgeReport) -> Table:
     unit = hangers_unit(data.hangers)
-    beside = {name: [_said(line, name, unit) for line in data.hangers] for name in _BESIDE}
-    shown = {name: cells for name, cells in beside.items() if any(cells)}
+    besides = {name: [_stated(line, name, unit) for line in data.hangers] for name in _NEXT_TO}
+    shown = {name: cells for name, cells in besides.items() if any(cells)}
     cells = list(zip(*shown.values(), strict=True)) or [()] * len(data.hangers)
     return Table(
         "Hangers",
         (
-            "hanger", "state", f"tension, {unit.name} (90 %)", *(_BESIDE[name] for name in shown),
+            "hanger", "state", f"tension, {unit.name} (90 %)", *(_NEXT_TO[name] for name in shown),
             "% of nominal (90 %)", "open alerts", "latest test",
         ),
         tuple(_hanger(*each, unit) for each in zip(data.hangers, cells, strict=True)),
@@ -187,26 +219,26 @@ def _hangers(data: BridgeReport) -> Table:
     )  # fmt: skip
 
 
-def _said(line: HangerLine, name: str, unit: ForceUnit) -> str:
+def _stated(line: HangerSummary, name: str, unit: ForceUnit) -> str:
     """One of `_BESIDE` of a hanger; empty where it is not known."""
-    return str(getattr(stated(line.averaged, unit), name)) if line.averaged else ""
+    return str(getattr(stated(line.tension, unit), name)) if line.tension else ""
 
 
-def _hanger(line: HangerLine, beside: tuple[str, ...], unit: ForceUnit) -> tuple[str, ...]:
+def _hanger(line: HangerSummary, besides: tuple[str, ...], unit: ForceUnit) -> tuple[str, ...]:
     name = f"{line.hanger.id} {line.hanger.name}".strip()
     opened = str(line.open_alerts or "none")
-    if line.tension_n is None or line.status is None:
-        unknown = ["not known"] * (2 + len(beside))
+    if line.latest is None or line.tension_n is None or line.status is None:
+        unknown = ["not known"] * (2 + len(besides))
         return (name, "no test", *unknown, opened, "none")
     share = line.of_nominal
     return (
         name,
         line.status.value,
         formatting.with_span(line.tension_n.in_unit(unit)),
-        *(text or "not known" for text in beside),
+        *(text or "not known" for text in besides),
         formatting.with_span(share) if share else "no nominal",
         opened,
-        _day(line.latest),
+        _day(line.latest.time),
     )
 
 
@@ -221,7 +253,7 @@ def _since_baseline(data: BridgeReport) -> Table:
             "called",
         ),
         tuple(
-            (str(line.hanger.id), *_shifted(line.drift), line.called or "nothing")
+            (str(line.hanger.id), *_shifted(line.drift), line.detected or "nothing")
             for line in data.hangers
             if line.drift
         ),
@@ -237,7 +269,7 @@ def _shifted(drift: Drift) -> Fact:
 
 
 def _courses(data: BridgeReport) -> Table:
-    """What lay in the period; empty where the report has none."""
+    """Return tests and alerts of the period; empty where the report has none."""
     return Table(
         f"In the period {data.period}",
         ("hanger", "tests", "alerts", "change of the tension, % (90 %)"),
@@ -252,7 +284,7 @@ def _courses(data: BridgeReport) -> Table:
     )
 
 
-def _course(line: HangerLine, course: Course) -> tuple[str, ...]:
+def _course(line: HangerSummary, course: Course) -> tuple[str, ...]:
     change = course.change
     return (
         str(line.hanger.id),
@@ -269,12 +301,12 @@ def _tests(data: BridgeReport) -> Table:
         tuple(
             (
                 str(line.hanger.id),
-                line.test,
-                formatting.moment(line.latest),
-                formatting.model_class(line.model),
+                line.latest.name,
+                formatting.moment(line.latest.time),
+                formatting.model_class(line.latest.model),
             )
             for line in data.hangers
-            if line.test
+            if line.latest
         ),
         note="Their files and checksums: shm report --hanger N.",
     )
@@ -293,12 +325,12 @@ PATTERN_SCHEMA = "shm.bridge_pattern/1"
 
 
 def pattern_json(pattern: BridgePattern) -> dict[str, Any]:
-    """What `shm drift bridge --json` prints."""
+    """Return the document that `shm drift bridge --json` prints."""
     return {"schema": PATTERN_SCHEMA, **asdict(pattern)}
 
 
 def bridge_json(data: BridgeReport) -> dict[str, Any]:
-    """A document for `shm.documents.dump`."""
+    """Return a document for `shm.documents.dump`."""
     return {
         "schema": REPORT_SCHEMA,
         "bridge": data.bridge,
@@ -311,15 +343,14 @@ def bridge_json(data: BridgeReport) -> dict[str, Any]:
                 "hanger": line.hanger.id,
                 "name": line.hanger.name,
                 "bar": bar_document(line.bar),
-                **line.message.document,
+                **line.document,
                 "warnings": list(line.warnings),
-                "latest": line.latest,
+                "latest": line.latest and line.latest.time,
                 "tension_n": asdict(line.tension_n) if line.tension_n else None,
-                "averaged": averaged_document(line.averaged) if line.averaged else None,
                 "drift": drift_document(line.drift) if line.drift else None,
-                "test": line.test or None,
-                "model": line.model or None,
-                "called": line.called,
+                "test": line.latest and line.latest.name,
+                "model": line.latest and (line.latest.model or None),
+                "called": line.detected,
                 "open_alerts": line.open_alerts,
                 "in_period": asdict(line.course) if line.course else None,
             }

@@ -1,32 +1,25 @@
-"""What each kind of report is made from: one frozen value, complete at birth."""
+"""The data of each kind of report: one frozen value, complete at birth."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 from shm.bridge.description import NO_LETTERHEAD, Letterhead
 from shm.models import end_stiffness
 from shm.report.formatting import Interval
-from shm.report.hanger_status import (
-    BridgeMessage,
-    HangerMessage,
-    Known,
-    Status,
-    bridge_message,
-    hanger_message,
-)
+from shm.report.hanger_status import BridgeMessage, Status, bridge_message
+from shm.report.hanger_summary import HangerSummary, LatestTest
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime
 from shm.values import (
     NAN,
     Alert,
     Averaged,
     BridgeDiagnosis,
-    Change,
     CreepRate,
     Diagnosis,
     Drift,
@@ -41,8 +34,7 @@ from shm.values import (
     ResponsePoint,
     Selection,
 )
-from shm.values.bar_description import BarDescription, describe_bar, list_sensors
-from shm.values.messages import Lead
+from shm.values.bar_description import BarDescription, describe_bar, list_hits, list_sensors
 from shm.values.notes import Note
 from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import averaged_now, selection_now
@@ -90,27 +82,24 @@ def trend_row(
 class HangerReport:
     """All that a report of one hanger says.
 
-    `posterior` and `frequency_response` are those of the latest test, the last of `tests`, which
-    stand oldest first like `trend`. `drifts` are those of the latest test from the baseline in
-    force, `alerts` all of the hanger; `acknowledged` says by an alert's key who took note of it.
+    `now` is the state of the hanger as every face shows it. `posterior` and `frequency_response`
+    and `hits`, the places where it was hit, are those of the latest test, the last of
+    `tests`, which stand oldest first like `trend`.
+    `alerts` are all of the hanger; `acknowledged` says by an alert's key who took note of it.
     `lineage` names where the numbers come from: checksums, settings, files. `quality` is that of
     the latest test, empty where it was not checked; `diagnosis` the latest of its gap. `gap_watch`
     says in a sentence how the gap has gone since an effect was adopted, `drift_watch` what the
-    sequential test has detected since the baseline, `called` these changes, `creep`
-    how fast the tension creeps. `states` are empty
-    where the hanger has no baseline. `neighbours` is what moved over the whole bridge, None where
-    nothing is called. Of a `period`, `tests`, `trend` and `alerts` are those that lie in it.
-    `settings` are those that decide the numbers, each with its unit. `redescribed` says what of the
-    hanger's description has changed since the baseline, where that moves results; `discarded` names
-    the tests of the baseline that count no more. `warnings` are the open ones, `standing` the
-    alerts whose condition has not ended, `notes` what people did about these; `inspections`
-    what they wrote, the latest first; `unwatched` says that nothing has looked at it for long;
-    `undated` names the tests that are dated by their receipt. `known` is what home page and
-    `shm status` decide the state from; None: it follows from these.
+    sequential test has detected since the baseline, `creep` how fast the tension creeps. `states`
+    are empty where the hanger has no baseline. `neighbours` is what moved over the whole bridge,
+    None where nothing is detected. Of a `period`, `tests`, `trend` and `alerts` are those that lie
+    in it. `settings` are those that decide the numbers, each with its unit. `redescribed` says what
+    of the hanger's description has changed since the baseline, where that moves results;
+    `discarded` names the tests of the baseline that count no more. `inspections` are what people
+    wrote, the latest first.
     """
 
     bridge: str
-    hanger: Hanger
+    now: HangerSummary
     tests: tuple[ModalTest, ...]
     posterior: Posterior
     generated_at: datetime
@@ -118,10 +107,10 @@ class HangerReport:
     trend: tuple[TrendRow, ...] = ()
     baseline: Posterior | None = None
     selection: Selection | None = None
-    drifts: tuple[Drift, ...] = ()
     alerts: tuple[Alert, ...] = ()
     acknowledged: Mapping[str, str] = field(default_factory=dict)
     frequency_response: FrequencyResponse | None = None
+    hits: tuple[ResponsePoint, ...] = ()
     lineage: Mapping[str, str] = field(default_factory=dict)
     quality: tuple[QualityCheck, ...] = ()
     diagnosis: Diagnosis | None = None
@@ -129,25 +118,27 @@ class HangerReport:
     drift_watch: str = ""
     creep: CreepRate | None = None
     states: StatesOverTime = NOTHING_WATCHED
-    called: tuple[Change, ...] = ()
     neighbours: BridgePattern | None = None
     period: Period | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
     redescribed: tuple[str, ...] = ()
     discarded: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
-    standing: tuple[Alert, ...] = ()
-    notes: tuple[str, ...] = ()
     inspections: tuple[Note, ...] = ()
-    unwatched: Lead | None = None
-    undated: tuple[str, ...] = ()
     letterhead: Letterhead = NO_LETTERHEAD
-    known: Known | None = None
 
     @property
-    def is_called(self) -> bool:
-        """Whether a change was detected since the baseline."""
-        return bool(self.called)
+    def hanger(self) -> Hanger:
+        return self.now.hanger
+
+    @property
+    def status(self) -> Status:
+        """Return the state in a word; of a hanger with a test it is known."""
+        return self.now.status or Status.UNCLEAR
+
+    @property
+    def drifts(self) -> Sequence[Drift]:
+        """Return those of the latest test from the baseline in force."""
+        return self.now.drifts
 
     @property
     def latest(self) -> ModalTest:
@@ -155,12 +146,13 @@ class HangerReport:
 
     @property
     def bar(self) -> BarDescription:
-        """The bar, with the sensors of the latest test."""
-        return describe_bar(self.hanger, list_sensors(self.latest, self.frequency_response))
+        """Return the bar, with the sensors of the latest test."""
+        sensors = list_sensors(self.latest, self.frequency_response)
+        return describe_bar(self.hanger, sensors, self.hits)
 
     @property
     def predicted(self) -> tuple[PredictedFrequency, ...]:
-        """The predictions for the latest test, where the posterior is of several."""
+        """Return the predictions for the latest test, where the posterior is of several."""
         measured = {(mode.plane, mode.order): mode.frequency_hz for mode in self.latest.modes}
         return tuple(
             row
@@ -171,62 +163,55 @@ class HangerReport:
 
     @cached_property
     def compared(self) -> Selection:
-        """The model classes as they are by the latest test."""
+        """Return the model classes as they are by the latest test."""
         return selection_now(self.posterior, self.selection)
 
     @cached_property
+    def by_latest_test(self) -> Averaged:
+        """Return the tension that the latest test gives by itself, over all model classes."""
+        return self.compared.averaged_with(self.hanger.limits)
+
+    @property
     def averaged(self) -> Averaged:
-        """The tension over all model classes by the latest test: the headline."""
-        return self.compared.averaged(self.hanger.limits)
+        """Return the headline: the best estimate since the last change, over all classes."""
+        return self.now.tension or self.by_latest_test
 
     @property
     def tension_n(self) -> Interval:
-        """The same, absolute."""
+        """Return the same, absolute."""
         return Interval.of_averaged(self.averaged)
 
     @property
     def baseline_tension_n(self) -> Interval | None:
-        """The baseline's tension; None where no earlier test forms one."""
-        if self.baseline is None or self.baseline.tests == self.posterior.tests:
-            return None
-        return Interval.of_averaged(averaged_now(self.baseline, self.selection))
+        """Return the baseline's tension; None where no earlier test forms one."""
+        return None if self.now.is_baseline else self.now.baseline_n
 
     @property
     def tension_unit(self) -> ForceUnit:
-        """The one unit of this tension and the baseline's, so that they compare at a glance."""
-        both = (self.tension_n, self.baseline_tension_n)
-        return force_unit(*(each.mean for each in both if each))
+        """Return the one unit of all tensions, so that they compare at a glance."""
+        known = (self.tension_n, self.baseline_tension_n, Interval.of_averaged(self.by_latest_test))
+        return force_unit(*(each.mean for each in known if each))
 
 
-def message(data: HangerReport) -> HangerMessage:
-    """What is said first of the hanger."""
-    return hanger_message(
-        data.known
-        or Known(
-            data.hanger,
-            data.averaged,
-            data.latest.time or data.generated_at,
-            data.latest.id,
-            data.baseline_tension_n is None,
-            data.drifts,
-            data.called,
-            data.standing,
-            data.warnings,
-            data.notes,
-            data.unwatched,
-        )
+def summary_of(
+    hanger: Hanger,
+    test: ModalTest,
+    posterior: Posterior,
+    baseline: Posterior | None = None,
+    selection: Selection | None = None,
+) -> HangerSummary:
+    """Return the state of a hanger of which a test, its posterior and a baseline are all.
+
+    Of a test without a time the age is not known; it is taken to be new.
+    """
+    is_first = baseline is None or baseline.tests == posterior.tests
+    tension = averaged_now(posterior, selection, hanger.limits)
+    return HangerSummary(
+        hanger,
+        LatestTest(test.id, test.time or datetime.now(UTC), tension, posterior.model),
+        averaged_now(baseline, selection, hanger.limits) if baseline else None,
+        is_first,
     )
-
-
-def status(data: HangerReport) -> Status:
-    """The state in a word; of a hanger with a test it is known."""
-    return message(data).status or Status.UNCLEAR
-
-
-def of_nominal(tension_n: Interval, hanger: Hanger) -> Interval | None:
-    """The tension in percent of the nominal one; None where the hanger has none."""
-    nominal_n = hanger.nominal_tension_n
-    return tension_n.scaled(100 / nominal_n) if nominal_n > 0 else None
 
 
 @dataclass(frozen=True)
@@ -253,68 +238,8 @@ class BridgeDiagnosisSheet:
     bars: tuple[BarDescription, ...] = ()
 
 
-@dataclass(frozen=True)
-class Course:
-    """What became of a hanger in the period of the report.
-
-    `change` is that of the tension from the first test of the period to the last, as a fraction;
-    None where it has fewer than two.
-    """
-
-    tests: int = 0
-    alerts: int = 0
-    change: Interval | None = None
-
-
-@dataclass(frozen=True)
-class HangerLine:
-    """A hanger as the report of its bridge shows it.
-
-    `tension_n` is that of its latest test, None before the first, `averaged` all that is said of
-    it; `drift` that of its tension since its baseline, None where nothing was compared; `called`
-    says in a few words what was called since; `open_alerts` is `store.alerts.open_counts`.
-    `course` is None without a period; `warnings` are the open ones; `undated` names the tests that
-    are dated by their receipt. `sensors` are those of the latest test, or those that stay.
-    """
-
-    hanger: Hanger
-    message: HangerMessage
-    latest: datetime | None = None
-    tension_n: Interval | None = None
-    called: str = ""
-    open_alerts: int = 0
-    drift: Drift | None = None
-    test: str = ""
-    model: str = ""
-    course: Course | None = None
-    baseline_tension_n: Interval | None = None
-    averaged: Averaged | None = None
-    warnings: tuple[str, ...] = ()
-    undated: tuple[str, ...] = ()
-    sensors: tuple[ResponsePoint, ...] = ()
-
-    @property
-    def bar(self) -> BarDescription:
-        """The bar, with these sensors."""
-        return describe_bar(self.hanger, self.sensors)
-
-    @property
-    def status(self) -> Status | None:
-        return self.message.status
-
-    @property
-    def of_nominal(self) -> Interval | None:
-        """The tension in percent of the nominal one."""
-        return of_nominal(self.tension_n, self.hanger) if self.tension_n else None
-
-    @property
-    def is_hardly_known(self) -> bool:
-        """Whether the interval of the tension is so wide that a shift could hardly be seen."""
-        return self.tension_n is not None and self.tension_n.is_wide
-
-
-def hangers_unit(lines: Iterable[HangerLine]) -> ForceUnit:
-    """The one unit of all their tensions, so that they compare at a glance."""
+def hangers_unit(lines: Iterable[HangerSummary]) -> ForceUnit:
+    """Return the one unit of all their tensions, so that they compare at a glance."""
     return force_unit(*(line.tension_n.mean for line in lines if line.tension_n))
 
 
@@ -323,7 +248,7 @@ class BridgeReport:
     """All that a report of a bridge says; `why_no_pattern` stands where there is no pattern."""
 
     bridge: str
-    hangers: tuple[HangerLine, ...]
+    hangers: tuple[HangerSummary, ...]
     pattern: BridgePattern | None
     why_no_pattern: str
     generated_at: datetime
@@ -372,7 +297,7 @@ class ModalTestReport:
         """The bar, with the sensors of the test."""
         found = self.identification
         sensors = list_sensors(found.test, found.frequency_response, self.records)
-        return describe_bar(self.hanger, sensors)
+        return describe_bar(self.hanger, sensors, list_hits(self.records))
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -393,7 +318,7 @@ class ModalTestReport:
 
     @property
     def channel_faults(self) -> dict[str, str]:
-        """Why a channel was left out, by its name."""
+        """Return why a channel was left out, by its name."""
         prefix = "channel "
         return {
             each.what.removeprefix(prefix): each.reason

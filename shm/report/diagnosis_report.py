@@ -30,7 +30,15 @@ from shm.report.diagnosis_wording import (
 )
 from shm.report.figures.every_figure import diagnosis_figures
 from shm.report.formatting import Interval
-from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
+from shm.report.paper import (
+    CREDIBLE,
+    LEAST_PROBABILITY,
+    Paper,
+    Part,
+    Table,
+    filled,
+    fold_improbable,
+)
 from shm.report.sizes import quantity, size
 from shm.values import (
     NO_GAP,
@@ -136,7 +144,11 @@ def causes(sheet: DiagnosisSheet) -> Table:
             Outcome.UNEXPLAINED,
         ),
     )
-    marks = [each in claimed for each in found] + [each is verdict.outcome for *_, each in rest]
+    shown = [each for each in found if not each.probability < LEAST_PROBABILITY]
+    shown = found if len(found) - len(shown) < 2 else shown
+    folded = [False] * (len(found) > len(shown))
+    marks = [each in claimed for each in shown] + folded
+    marks += [each is verdict.outcome for *_, each in rest]
     left_out = ", ".join(formatting.quantity(effect) for effect in diagnosis.left_out)
     return Table(
         "Causes, most probable first",
@@ -150,7 +162,11 @@ def causes(sheet: DiagnosisSheet) -> Table:
             "how",
         ),
         (
-            *(_cause_row(cause) for cause in found),
+            *fold_improbable(
+                [_cause_row(cause) for cause in found],
+                [cause.probability for cause in found],
+                "effects",
+            ),
             *((what, formatting.probability(share), *("",) * 5) for what, share, _ in rest),
         ),
         note=(

@@ -13,6 +13,7 @@ from shm.report.diagnosis_wording import (
     is_of_the_measurement,
     label,
     phrase,
+    short_tension_words,
     tension_unit,
     tension_words,
 )
@@ -90,8 +91,8 @@ def write_lead(diagnosis: Diagnosis) -> str:
         start += _CALLIPER
     elif verdict.claim is not None and is_of_the_measurement(verdict.claim):
         start += _MEASUREMENT
-    told = start + _OUTCOMES[verdict.outcome].format_map(_list_words(diagnosis, verdict))
-    return f"{told[0].upper()}{told[1:]}."
+    wording = start + _OUTCOMES[verdict.outcome].format_map(_list_words(diagnosis, verdict))
+    return f"{wording[0].upper()}{wording[1:]}."
 
 
 def _list_words(diagnosis: Diagnosis, verdict: GapVerdict) -> dict[str, str]:
@@ -99,20 +100,20 @@ def _list_words(diagnosis: Diagnosis, verdict: GapVerdict) -> dict[str, str]:
     alone, unknown = verdict.alone, diagnosis.unexplained_probability
     left_out = ", ".join(formatting.quantity(effect) for effect in diagnosis.left_out)
     words = {
-        "chance": formatting.told_probability(verdict.probability),
+        "chance": formatting.spoken_probability(verdict.probability),
         "due": "is explained by" if verdict.probability >= _SURE else "is most likely due to",
         "causes": _list_causes(verdict),
         "baseline": diagnosis.baseline,
         "modes": _count_modes(diagnosis) if verdict.is_few else "",
         "possible": _explain_misfit(diagnosis) if verdict.reason == "misses by percents" else "",
-        "p_value": formatting.told_probability(verdict.fit_p_value),
+        "p_value": formatting.spoken_probability(verdict.fit_p_value),
         "rms_z": formatting.plain(verdict.rms_z, 2),
         "misfit": formatting.plain(diagnosis.shrinkage.rms_after_percent, 2),
         "alone": f"{alone.plane} {alone.order} of test {alone.test}" if alone else "",
-        "acts_alone": formatting.told_probability(alone.acts_alone) if alone else "",
+        "acts_alone": formatting.spoken_probability(alone.acts_alone) if alone else "",
         "start": "none" if unknown >= _SURE else "most likely none",
         "tried": f"that were tried ({left_out} left out)" if left_out else "in the catalogue",
-        "unknown": formatting.told_probability(unknown),
+        "unknown": formatting.spoken_probability(unknown),
         "nearest": label(verdict.runner_up.leading) if verdict.runner_up else "the best of them",
     }
     return words | {"reason": _REASONS[verdict.reason].format_map(words)}
@@ -160,8 +161,8 @@ def write_tension(diagnosis: Diagnosis) -> str:
             care = ", not to be relied on while the gap is open"
         elif verdict.is_description_off:
             care = ", not to be relied on while the description may be off"
-        told = tension_words(after_n, tension_unit(diagnosis))
-        sentences.append(f"{AFTER.capitalize()}, the tension is {told}{care}.")
+        wording = short_tension_words(after_n, tension_unit(diagnosis))
+        sentences.append(f"{AFTER.capitalize()}, the tension is {wording}{care}.")
     if verdict.claim is not None:
         sentences.append(_HELD_OUT[verdict.holds_out])
     return " ".join(sentence for sentence in sentences if sentence)
@@ -193,17 +194,17 @@ def _state_size(verdict: GapVerdict) -> str:
         return f"{most}: {phrase(verdict.claim.leading)}."
     if verdict.runner_up is None:
         return ""
-    chance = formatting.told_probability(verdict.runner_up.probability)
+    chance = formatting.spoken_probability(verdict.runner_up.probability)
     return f"The most probable: {phrase(verdict.runner_up.leading)}, probability {chance}."
 
 
 def _state_reach(diagnosis: Diagnosis) -> str:
     """Return what no hit reached."""
-    swing = "of these hits"
+    variation = "of these hits"
     if math.isfinite(diagnosis.widest_swing_m):
-        swing = f"of {formatting.plain(1e3 * diagnosis.widest_swing_m, 2)} mm at the sensors"
+        variation = f"of {formatting.plain(1e3 * diagnosis.widest_swing_m, 2)} mm at the sensors"
     return (
-        f"What acts only beyond swings {swing}, such as a guide with more play or a crack that "
+        f"What acts only beyond swings {variation}, such as a guide with more play or a crack that "
         "traffic opens, is not visible; what touches only right after a hit hardly is."
     )
 
@@ -230,8 +231,8 @@ def next_step(diagnosis: Diagnosis) -> str:
 
 def _rival(diagnosis: Diagnosis, measurement: NextMeasurement) -> float:
     """Return the probability of the best cause that a measurement tells from another answer."""
-    told = (e.probability for e in diagnosis.causes if e.effect in measurement.separates)
-    return max(told, default=0.0)
+    wording = (e.probability for e in diagnosis.causes if e.effect in measurement.separates)
+    return max(wording, default=0.0)
 
 
 def promise(measurement: NextMeasurement) -> str:
@@ -269,8 +270,8 @@ def _give_tension(diagnosis: Diagnosis) -> Fact | None:
     alone = f"baseline alone {tension_words(before_n, unit)}"
     if math.isnan(after_n.mean):
         return ("Tension", formatting.rounded_tension(before_n.mean, unit), alone)
-    told = f"{tension_words(after_n, unit)}; {alone}"
-    return ("Tension", formatting.rounded_tension(after_n.mean, unit), told)
+    wording = f"{tension_words(after_n, unit)}; {alone}"
+    return ("Tension", formatting.rounded_tension(after_n.mean, unit), wording)
 
 
 def _give_fit(verdict: GapVerdict) -> Fact | None:

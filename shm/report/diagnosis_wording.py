@@ -44,14 +44,14 @@ def label(cause: Cause) -> str:
 def phrase(cause: Cause) -> str:
     """`a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7)`; a pair joined by `and`."""
     clauses = [
-        effect_phrase(effect, at, own_estimates(cause, number))
+        effect_phrase(effect, at, separate_estimates(cause, number))
         for number, (effect, at) in enumerate(zip(cause.effects, cause.places, strict=True))
     ]
     return " together with ".join(clauses) + _also(cause)
 
 
 def _also(cause: Cause) -> str:
-    """Where else it may act as well."""
+    """Return where else it may act as well."""
     if not cause.also_at:
         return ""
     places = [
@@ -62,13 +62,13 @@ def _also(cause: Cause) -> str:
 
 
 def effect_phrase(effect: str, at: str, estimates: Sequence[EffectEstimate]) -> str:
-    """What the effect is, how large, where; the bare name where its size is not known."""
+    """Return what the effect is, how large, where; its name where the size is not known."""
     where = _place(at)
     try:
-        told = EFFECTS[effect].phrase.format_map(Sizes(estimates))
+        wording = EFFECTS[effect].phrase.format_map(Sizes(estimates))
     except KeyError:
-        told = formatting.quantity(effect)
-    return f"{told} {where}".rstrip()
+        wording = formatting.quantity(effect)
+    return f"{wording} {where}".rstrip()
 
 
 def _place(at: str) -> str:
@@ -81,14 +81,14 @@ def _place_part(part: str) -> str:
     return _PLACES.get(part, f"{start} {part}" if start else part)
 
 
-def own_estimates(cause: Cause, number: int) -> tuple[EffectEstimate, ...]:
-    """The estimates of effect `number` of the cause.
+def separate_estimates(cause: Cause, number: int) -> tuple[EffectEstimate, ...]:
+    """Return the estimates of effect `number` of the cause.
 
     In a pair a name that both have carries its effect before a dot.
     """
     prefixed = {e.name: e.name.partition(".")[0] for e in cause.parameters if "." in e.name}
-    own = cause.effects[number]
-    return tuple(e for e in cause.parameters if prefixed.get(e.name, own) == own)
+    this = cause.effects[number]
+    return tuple(e for e in cause.parameters if prefixed.get(e.name, this) == this)
 
 
 AFTER = "weighed over all that may be"
@@ -114,3 +114,10 @@ def tension_words(estimate: TensionEstimate, unit: ForceUnit) -> str:
     if not tension_n.low <= tension_n.mean <= tension_n.high:  # most draws at a bound, few far off
         return f"{formatting.span(tension_n.in_unit(unit))} {unit.name} (90 % interval)"
     return formatting.tension(tension_n, unit)
+
+
+def short_tension_words(estimate: TensionEstimate, unit: ForceUnit) -> str:
+    """Return `702 ± 12 kN`, with half of the 90 % interval, where it is about symmetrical."""
+    tension_n = tension_of(estimate)
+    is_usual = tension_n.low <= tension_n.mean <= tension_n.high  # and no NaN
+    return formatting.with_half(tension_n, unit) if is_usual else tension_words(estimate, unit)

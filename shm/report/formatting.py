@@ -65,17 +65,17 @@ class Interval:
         return cls.of_summary(averaged.tension_n).repeating(averaged.repeatability_sd_n)
 
     def repeating(self, sd: float) -> Interval:
-        """The same with the standard deviation of a repetition; NaN is not known."""
+        """Return the same with the standard deviation of a repetition; NaN is not known."""
         return replace(self, repeatability_sd=sd if math.isfinite(sd) else None)
 
     def scaled(self, factor: float) -> Interval:
-        """The same quantity in a unit 1/`factor` as large."""
-        own = self.repeatability_sd
-        repeats = None if own is None else own * factor
+        """Return the same quantity in a unit 1/`factor` as large."""
+        this = self.repeatability_sd
+        repeats = None if this is None else this * factor
         return Interval(self.mean * factor, self.low * factor, self.high * factor, repeats)
 
     def in_unit(self, unit: ForceUnit) -> Interval:
-        """A force in N in another unit."""
+        """Return a force in N in another unit."""
         return self.scaled(1 / unit.newtons)
 
     @property
@@ -84,11 +84,11 @@ class Interval:
 
     @property
     def is_wide(self) -> bool:
-        """Whether it is wider than half its mean, so that a shift could hardly be seen in it."""
+        """Return True if it is wider than half its mean: then it determines nothing."""
         return self.width > _WIDE * abs(self.mean)
 
     def since(self, then: Interval) -> Interval:
-        """The relative change from `then`: repeatabilities in squares.
+        """Return the relative change from `then`: repeatabilities in squares.
 
         Where one is not known, of two independent estimates: widths in squares.
         """
@@ -100,7 +100,7 @@ class Interval:
         return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
 
     def less(self, then: Interval) -> Interval:
-        """The difference from `then`, of two independent estimates: widths in squares."""
+        """Return the difference from `then`, of two independent estimates: widths in squares."""
         half = math.hypot(self.width, then.width) / 2
         shift = self.mean - then.mean
         return Interval(shift, shift - half, shift + half)
@@ -166,11 +166,11 @@ _LOPSIDED = 2.5  # judgement: a half width then says neither end
 def with_half(interval: Interval, unit: ForceUnit) -> str:
     """`655 ± 16 kN` of a tension in N: the half width of its 90 % interval; where that is much
     farther on one side, `13 to 490 kN`."""
-    own = interval.in_unit(unit)
-    above, below = own.high - own.mean, own.mean - own.low
+    this = interval.in_unit(unit)
+    above, below = this.high - this.mean, this.mean - this.low
     if max(above, below) > _LOPSIDED * min(above, below):
-        return f"{span(own)} {unit.name}"
-    return f"{rounded(own.mean, own.width / 2)} {unit.name}"
+        return f"{span(this)} {unit.name}"
+    return f"{rounded(this.mean, this.width / 2)} {unit.name}"
 
 
 def rounded_tension(tension_n: float, unit: ForceUnit) -> str:
@@ -190,7 +190,7 @@ def span(interval: Interval, signed: bool = False) -> str:
 
 
 def mean(interval: Interval, signed: bool = False) -> str:
-    """The mean to two significant digits of its interval's half width."""
+    """Return the mean to two significant digits of its interval's half width."""
     return to_two_digits(interval.mean, interval.width / 2, "+" if signed else "")
 
 
@@ -231,16 +231,16 @@ def plain(value: float, digits: int = 3, absent: str = "not known") -> str:
 
 
 def probability(value: float) -> str:
-    """Three decimals, with no certainty pretended."""
+    """Return two decimals, as alerts do, with no certainty pretended."""
     if not math.isfinite(value):
         return "not known"
-    if value > 0.999:
-        return "> 0.999"
-    return "< 0.001" if value < 0.001 else f"{value:.3f}"
+    if value > 0.995:
+        return "> 0.99"
+    return "< 0.01" if value < 0.005 else f"{value:.2f}"
 
 
-def told_probability(value: float) -> str:
-    """The same in a sentence: `above 0.999`, `0.966`."""
+def spoken_probability(value: float) -> str:
+    """Return the same in a sentence: `above 0.99`, `0.97`."""
     return probability(value).replace("> ", "above ").replace("< ", "below ")
 
 
@@ -262,8 +262,8 @@ def quantity(name: str) -> str:
     return name.replace("_", " ")
 
 
-def meaning(posterior: Posterior, name: str) -> str:
-    """Return what a parameter is, with its unit.
+def meaning(posterior: Posterior, name: str, *, with_unit: bool = True) -> str:
+    """Return what a parameter is, with its unit unless that stands with its value.
 
     A parameter of an adopted effect has the name that the catalogue gives it.
     """
@@ -276,6 +276,8 @@ def meaning(posterior: Posterior, name: str) -> str:
     elif unit == "N/m" and called in _FACE_SPRINGS:
         called, unit = f"spring {called} ({_FACE_SPRINGS[called]})", "N/m per node"
     effect = name.rpartition(".")[0].replace("_", " ")
+    if not with_unit:
+        return f"{effect and effect + ': '}{called}"
     logarithm = "log10 of " if is_logarithm(name) else ""
     return f"{effect and effect + ': '}{logarithm}{called}{unit and ' in ' + unit}"
 

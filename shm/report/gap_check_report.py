@@ -58,8 +58,8 @@ def missed(effect: EffectCheck) -> str:
     """Return the largest size that was not found, and what the diagnosis says of it."""
     if not effect.missed:
         return "none"
-    said = dict.fromkeys(_missed(trial) for trial in effect.missed)
-    return f"{size_words(effect, effect.missed[0].step)}: {' or '.join(said)}"
+    statement = dict.fromkeys(_missed(trial) for trial in effect.missed)
+    return f"{size_words(effect, effect.missed[0].step)}: {' or '.join(statement)}"
 
 
 def _missed(trial: GapTrial) -> str:

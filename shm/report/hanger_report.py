@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import Any
 
 from shm import documents, modes_document
 from shm.documents import alert_document, drift_document
 from shm.report import formatting
-from shm.report.assumed import assumptions_line, with_assumptions
+from shm.report import hanger_tables as tables
+from shm.report.assumed import assumptions_line, assumptions_table, with_assumptions
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.bridge_report import pattern_json
-from shm.report.contents import DiagnosisSheet, HangerReport, message, of_nominal, status
-from shm.report.diagnosis_report import diagnosis_json, diagnosis_part
+from shm.report.contents import DiagnosisSheet, HangerReport
+from shm.report.diagnosis_report import causes, diagnosis_json, diagnosis_part
+from shm.report.figures.bar_sketch import FIGURE as SKETCH
 from shm.report.figures.every_figure import OF_HANGER_NAMES, hanger_figures
-from shm.report.hanger_summary import advice, further, is_found, summary, tension_change, why
-from shm.report.hanger_tables import numbers, origins, results
+from shm.report.figures.specification import drawn
+from shm.report.formatting import Interval
+from shm.report.hanger_sentences import advice, further, summary, why
+from shm.report.hanger_summary import BASELINE_ALONE, BASELINE_AND_CHANGE
 from shm.report.open_warnings import dated_by_receipt
 from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, appendices, filled
+from shm.report.shared_tables import settings
 from shm.report.states import period_json, temperature_documents
 from shm.values import Alert, Drift, FrequencyResponse, Hanger
 from shm.values.rounding import NINETY_PERCENT, rounded_percent
@@ -27,30 +32,74 @@ from shm.watch.change_words import structure_words
 
 
 def hanger_paper(data: HangerReport) -> Paper:
-    """Two pages: state, action, trend, fit, results; all else is an appendix."""
-    state = status(data)
+    """Return page 1 with all that is acted on; then why; appendices are for a screen."""
     return Paper(
         title=formatting.hanger_name(data.hanger.id, data.hanger.name),
         bridge=data.bridge,
         period=str(data.period) if data.period else "",
-        status=state.value,
-        style=state.name.lower(),
+        status=data.status.value,
+        style=data.status.name.lower(),
         parts=(
             Part(
                 "In short",
-                lead=message(data).words,
+                lead=data.now.message.words,
                 summary=why(data),
                 facts=facts(data),
-                tables=(bar_table(data.bar),),
+                tables=[bar_table(data.bar)],
             ),
-            Part("Results", figures=lambda: hanger_figures(data, TREND), tables=(results(data),)),
-            Part("Fit of the model", figures=lambda: hanger_figures(data, FIT)),
-            Part("Details", paragraphs=[further(data)]),
+            Part(
+                "Sensors and formulas of practice",
+                figures=lambda: drawn((SKETCH,), data.bar),
+                tables=filled(tables.practice(data)),
+            ),
+            Part(
+                "Tension over time",
+                figures=lambda: hanger_figures(data, TREND),
+                tables=filled(
+                    tables.results(data),
+                    tables.period(data),
+                    tables.temperatures(data),
+                    tables.neighbours(data),
+                ),
+            ),
+            Part(
+                "Fit of the model",
+                paragraphs=[further(data)],
+                figures=lambda: hanger_figures(data, FIT),
+                tables=[tables.frequencies(data)],
+            ),
+            short_gap_part(data),
+            Part(
+                "Test, alerts and notes",
+                paragraphs=[assumptions_line(data.hanger)],
+                tables=filled(
+                    tables.doubts(data),
+                    tables.latest_alerts(data),
+                    tables.inspections(data),
+                    tables.conditions(data),
+                ),
+            ),
             *appendices(
-                Part("Figures", figures=lambda: hanger_figures(data, FURTHER)),
-                Part("Numbers", tables=numbers(data)),
-                gap_part(data),
-                Part("Origin", paragraphs=[assumptions_line(data.hanger)], tables=origins(data)),
+                Part("Figures", figures=lambda: hanger_figures(data, _further_figures(data))),
+                Part(
+                    "Numbers",
+                    tables=filled(
+                        tables.parameters(data),
+                        tables.models(data),
+                        tables.quality(data),
+                        tables.history(data),
+                        tables.alerts(data),
+                    ),
+                ),
+                *([gap_part(data)] if data.diagnosis else []),
+                Part(
+                    "Settings",
+                    tables=filled(
+                        tables.sampling(data),
+                        settings(data.settings),
+                        assumptions_table(data.hanger),
+                    ),
+                ),
             ),
         ),
         is_signed=True,
@@ -58,15 +107,30 @@ def hanger_paper(data: HangerReport) -> Paper:
         generated_at=data.generated_at,
         version=data.version,
         closing=f"{CREDIBLE}; times are UTC.",
+        more=f"All of it: `shm report --hanger {data.hanger.id} --full`, or "
+        f"`--out hanger{data.hanger.id}.pdf`.",
     )
 
 
 def gap_part(data: HangerReport) -> Part:
-    """How the gap has gone since an effect was adopted, then its latest diagnosis, if any."""
+    """Return how the gap has gone since an effect was adopted, then its latest diagnosis."""
     watched = [data.gap_watch] if data.gap_watch else []
     if sheet := diagnosed(data):
         return diagnosis_part(sheet, "Gap diagnosis", watched)
     return Part("Gap diagnosis", paragraphs=[*watched, how_to_diagnose(data)])
+
+
+def short_gap_part(data: HangerReport) -> Part:
+    """Return the same as a page of a report bears it: verdict, figures on top, causes."""
+    part = gap_part(data)
+    if (sheet := diagnosed(data)) is None:
+        return part
+    return replace(part, details="", remarks=(), figures=tuple, tables=(causes(sheet),))
+
+
+def _further_figures(data: HangerReport) -> frozenset[str]:
+    """Return those without a histogram of a tension that the modes do not determine."""
+    return FURTHER if data.now.is_determined else FURTHER - {"tension"}
 
 
 TREND, FIT = frozenset({"trend"}), frozenset({"frequencies"})
@@ -75,14 +139,14 @@ FURTHER = OF_HANGER_NAMES - TREND - FIT
 
 
 def diagnosed(data: HangerReport) -> DiagnosisSheet | None:
-    """The latest diagnosis of the report's hanger."""
+    """Return the latest diagnosis of the report's hanger."""
     if data.diagnosis is None:
         return None
     return DiagnosisSheet(data.diagnosis, data.hanger, data.bridge, data.bar.sensors)
 
 
 def how_to_diagnose(data: HangerReport) -> str:
-    """What to do where no diagnosis was made."""
+    """Return what to do where no diagnosis was made."""
     return (
         "The gap between model and measurement has not been diagnosed. To learn where it lies, "
         "what causes it and what that does to the tension: "
@@ -91,39 +155,47 @@ def how_to_diagnose(data: HangerReport) -> str:
 
 
 def facts(data: HangerReport) -> tuple[Fact, ...]:
-    """What, value, what stands beside it."""
-    unit = data.tension_unit
-    said = stated(data.averaged, unit)
-    repeats = f"; repeatability {said.repeatability}" if said.repeatability else ""
+    """Return what, value, and what belongs to it."""
     return (
-        (
-            "Tension",
-            said.tension,
-            f"{'' if data.averaged.is_usable else 'do not use it; '}"
-            f"90 % interval {said.interval}{repeats}",
-        ),
-        *_limits(data, said),
-        _of_nominal(data),
+        _tension(data),
+        *_limits(data, stated(data.averaged, data.tension_unit)),
         _since_baseline(data),
-        (
-            "Latest test",
-            formatting.moment(data.latest.time),
-            formatting.temperature(data.latest.temperature_c),
-        ),
-        (
-            "Model class",
-            formatting.model_class(data.posterior.model),
-            f"{formatting.counted(len(data.latest.modes), 'mode')} identified",
-        ),
+        _of_nominal(data),
+        *_by_latest_test(data),
+        _latest_test(data),
     )
 
 
-def _limits(data: HangerReport, said: StatedTension) -> tuple[Fact, ...]:
-    """The probabilities that the owner's limits ask for."""
+def _latest_test(data: HangerReport) -> Fact:
+    time, temperature = data.latest.time, formatting.temperature(data.latest.temperature_c)
+    if time is None:
+        return ("Latest test", "time not recorded", temperature)
+    return ("Latest test", f"{time:%Y-%m-%d}", f"{formatting.moment(time)[11:]}; {temperature}")
+
+
+def _tension(data: HangerReport) -> Fact:
+    words = stated(data.averaged, data.tension_unit)
+    doubt = "" if data.averaged.is_usable else "do not use it; "
+    if not data.now.is_determined:
+        return ("Tension", "not determined", f"{doubt}90 % interval {words.interval}")
+    value = formatting.with_half(data.tension_n, data.tension_unit)
+    return ("Tension", value, f"{doubt}90 % interval; from {data.now.basis}")
+
+
+def _by_latest_test(data: HangerReport) -> tuple[Fact, ...]:
+    if data.now.basis not in (BASELINE_AND_CHANGE, BASELINE_ALONE):
+        return ()
+    alone = Interval.of_averaged(data.by_latest_test)
+    value = formatting.with_half(alone, data.tension_unit)
+    return (("Latest test alone", value, f"test {data.latest.id}; 90 % interval"),)
+
+
+def _limits(data: HangerReport, statement: StatedTension) -> tuple[Fact, ...]:
+    """Return the probabilities that the owner's limits ask for."""
     limits, unit = data.hanger.limits, data.tension_unit
     asked = (
-        ("Above its limit", said.above, limits.tension_max_n),
-        ("Slack", said.slack, limits.tension_min_n),
+        ("Above its limit", statement.above, limits.tension_max_n),
+        ("Slack", statement.slack, limits.tension_min_n),
     )
     return tuple(
         (what, probability, f"probability; limit {formatting.rounded_tension(limit_n, unit)}")
@@ -133,44 +205,42 @@ def _limits(data: HangerReport, said: StatedTension) -> tuple[Fact, ...]:
 
 
 def _of_nominal(data: HangerReport) -> Fact:
-    share = of_nominal(data.tension_n, data.hanger)
+    share = data.now.of_nominal
     if share is None:
         return ("Of nominal", "not known", "the hanger has no nominal tension")
+    if not data.now.is_determined:
+        return ("Of nominal", "not determined", f"90 % interval {formatting.span(share)} %")
     nominal = formatting.rounded_tension(data.hanger.nominal_tension_n, data.tension_unit)
     return (
         "Of nominal",
-        f"{formatting.mean(share)} %",
-        f"90 % interval {formatting.span(share)} %; nominal {nominal}",
+        rounded_percent(share.mean / 100, share.width / 200),
+        f"90 % interval; nominal {nominal}",
     )
 
 
 def _since_baseline(data: HangerReport) -> Fact:
-    change = tension_change(data)
+    change = data.now.change
     if change is None and data.baseline_tension_n is not None:
         return ("Since the baseline", "not known", "the latest test does not show it")
     if change is None:
         return ("Since the baseline", "first test", "nothing earlier to compare with")
-    percent = change.scaled(100)
-    return (
-        "Since the baseline",
-        f"{formatting.mean(percent, signed=True)} %",
-        f"90 % interval {formatting.span(percent, signed=True)} %"
-        f"{'' if is_found(data) else ', if it has moved at all'}",
-    )
+    size = rounded_percent(change.mean, change.width / 2, "+")
+    doubt = "" if data.now.is_found else "; no significant change"
+    return ("Since the baseline", size, f"90 % interval{doubt}")
 
 
 REPORT_SCHEMA = "shm.report/1"
 
 
 def hanger_json(data: HangerReport) -> dict[str, Any]:
-    """A document for `shm.documents.dump`; unknown numbers become null there."""
+    """Return a document for `shm.documents.dump`; unknown numbers become null there."""
     document = {
         "schema": REPORT_SCHEMA,
         "bridge": data.bridge,
         "hanger": asdict(data.hanger),
         "bar": bar_document(data.bar),
-        "status": status(data).name.lower(),
-        "message": message(data).document,
+        "status": data.status.name.lower(),
+        "message": data.now.message.document,
         "summary": summary(data),
         "advice": list(advice(data)),
         "test": modes_document.test_document(data.latest),
@@ -181,7 +251,8 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
             if data.selection
             else None
         ),
-        "averaged": documents.averaged_document(data.averaged),
+        **{name: data.now.document[name] for name in ("averaged", "basis", "change")},
+        "by_latest_test": documents.averaged_document(data.by_latest_test),
         "trend": [asdict(row) for row in data.trend],
         "drifts": [documents.drift_document(drift) for drift in data.drifts],
         "alerts": [documents.alert_document(alert) for alert in data.alerts],
@@ -193,10 +264,10 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         "drift_watch": data.drift_watch,
         "creep_per_year": documents.creep_document(data.creep),
         "inspections": [asdict(note) for note in data.inspections],
-        "warnings": list(data.warnings),
+        "warnings": list(data.now.warnings),
         "redescribed": list(data.redescribed),
         "discarded_of_baseline": list(data.discarded),
-        "dated_by_receipt": list(data.undated),
+        "dated_by_receipt": list(data.now.undated),
         "temperature_coefficients": temperature_documents(data.states),
         "neighbours": pattern_json(data.neighbours) if data.neighbours else None,
         "period": period_json(data.period),
@@ -209,7 +280,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
 
 
 def _response(response: FrequencyResponse | None) -> dict[str, Any] | None:
-    """What was measured, without the lines: those stand in the archived recording."""
+    """Return what was measured, without the lines: those are in the archived recording."""
     if response is None:
         return None
     return {
@@ -227,8 +298,8 @@ _NOT_WATCHED = "No test was watched yet: its first tests make the baseline."
 class StructureReport:
     """The data that the report of a structure is made of.
 
-    `baseline_hz` are its first frequencies by name, `said` is the message of the watch after its
-    latest test, empty before one was watched; `undated` names the tests dated by their receipt.
+    `baseline_hz` are its first frequencies by name, `statement` is the message of the watch after
+    its latest test, empty before one was watched; `undated` names the tests dated by their receipt.
     """
 
     bridge: str
@@ -237,7 +308,7 @@ class StructureReport:
     latest: datetime | None
     baseline_since: datetime | None
     baseline_hz: dict[str, float]
-    said: str
+    statement: str
     drifts: tuple[Drift, ...]
     alerts: tuple[Alert, ...]
     open_alerts: int
@@ -247,7 +318,7 @@ class StructureReport:
 
 
 def structure_paper(data: StructureReport) -> Paper:
-    """What the watch says, each frequency, the alerts."""
+    """Return the paper: the message of the watch, each frequency, the alerts."""
     latest = f"{data.latest:%Y-%m-%d %H:%M}" if data.latest else "none"
     since = f"{data.baseline_since:%Y-%m-%d}" if data.baseline_since else "none yet"
     facts = (
@@ -255,16 +326,21 @@ def structure_paper(data: StructureReport) -> Paper:
         ("Baseline since", since, "its own first tests; no model, no tension"),
         ("Open alerts", str(data.open_alerts), f"of {len(data.alerts)}"),
     )
-    told = tuple((f"{each.time:%Y-%m-%d}", each.message) for each in data.alerts)
-    alerts = Table("Alerts", ("test of", "message"), told)
-    said = f"{data.said or _NOT_WATCHED} {dated_by_receipt(data.undated)}".strip()
+    wording = tuple((f"{each.time:%Y-%m-%d}", each.message) for each in data.alerts)
+    alerts = Table("Alerts", ("test of", "message"), wording)
+    statement = f"{data.statement or _NOT_WATCHED} {dated_by_receipt(data.undated)}".strip()
     return Paper(
         title=structure_words(data.structure),
         bridge=data.bridge,
         status="Alert" if data.open_alerts else "",
         style="alert" if data.open_alerts else "first",
         parts=(
-            Part("In short", summary=said, facts=facts),
+            Part(
+                "In short",
+                summary=statement,
+                facts=facts,
+                brief=filled(_structure_frequencies(data)),
+            ),
             Part("Numbers", tables=filled(_structure_frequencies(data), alerts)),
         ),
         generated_at=data.generated_at,
@@ -295,7 +371,7 @@ def _frequency_shift(drift: Drift | None) -> tuple[str, str]:
 
 
 def structure_json(data: StructureReport) -> dict[str, Any]:
-    """The same as one document."""
+    """Return the same as one document."""
     return {
         "bridge": data.bridge,
         "structure": data.structure.id,
@@ -304,7 +380,7 @@ def structure_json(data: StructureReport) -> dict[str, Any]:
         "latest_test": data.latest,
         "baseline_since": data.baseline_since,
         "baseline_hz": data.baseline_hz,
-        "said": data.said,
+        "said": data.statement,
         "drifts": [drift_document(each) for each in data.drifts],
         "alerts": [alert_document(each) for each in data.alerts],
         "open_alerts": data.open_alerts,

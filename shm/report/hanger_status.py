@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from shm.report import formatting
 from shm.report.formatting import Interval
@@ -20,6 +20,9 @@ from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
 from shm.watch.alert_text import lead_of
 from shm.watch.change_words import look_again, quantity_words, size_words
+
+if TYPE_CHECKING:
+    from shm.report.hanger_summary import HangerSummary
 
 WATCH_PROBABILITY = 0.5  # likelier than not
 # Judgement: dead load and erection leave the hangers of sound bridges some 10 % off nominal. With
@@ -30,6 +33,82 @@ OFF_NOMINAL = 0.15
 _DOUBTS = frozenset({"check the modes", "check the baseline", "limit", "silent"})
 _BEYOND = "beyond threshold"
 _CHANGES = frozenset({_BEYOND, "sudden change", "slow drift"})
+
+
+UNDETERMINED = "These modes do not determine the tension"
+
+
+_LEADS: dict[str, tuple[str, str]] = {
+    "no hanger tested": ("No hanger has been tested yet.", f"Test all {NEXT_TEST}."),
+    "all steady": (
+        "No change detected on {many}.",
+        "No action is needed before the next planned test.",
+    ),
+    "untested": ("{name}: no test yet.", f"Test it {NEXT_TEST}."),
+    "in doubt": (
+        "{name}: its tension is in doubt.",
+        f"Check its description and the numbers of its modes {NEXT_TEST}.",
+    ),
+    "unusable": (
+        "{name}: do not use its tension.",
+        f"Check its description and the numbers of its modes {WEEK}.",
+    ),
+    "not converged": (
+        "{name}: do not use its tension.",
+        "Raise `samples` in bridge.toml and run "
+        f"`shm ingest --again {{test}} --from updated` {WEEK}.",
+    ),
+    "likely beyond": (
+        "{name}: {what}, more likely than not beyond its threshold.",
+        f"{{again}} {WEEK}.",
+    ),
+    "first": (
+        "{name}: tension {tension} by its first test.",
+        f"Choose a warmer or colder day {NEXT_TEST}, so that the baseline covers temperature.",
+    ),
+    "first of sensors": (
+        "{name}: tension {tension} by its first test.",
+        "No action is needed: the next days will be warmer or colder.",
+    ),
+    "undetermined": (
+        "{name}: these modes do not determine the tension.",
+        f"Identify more modes {NEXT_TEST}, or state length and ends more exactly.",
+    ),
+    "not comparable": (
+        "{name}: its latest test cannot be compared with the baseline.",
+        f"{{again}} {WEEK}: it lacks modes of the baseline.",
+    ),
+    "rough": (
+        "{name}: no change detected, but its tests are too few or too rough to show one "
+        "(tension {shift}).",
+        f"Identify more modes {NEXT_TEST}, or test more often.",
+    ),
+    "steady": (
+        "{name}: no change detected since the baseline (tension {shift}).",
+        "No action is needed before the next planned test.",
+    ),
+    "slack": (
+        "{name}: tension {tension}{by} is {doubt}below its lower limit.",
+        f"{{again}} {TODAY}, and compare it with its design.",
+    ),
+    "overloaded": (
+        "{name}: tension {tension}{by} is {doubt}above its upper limit.",
+        f"{{again}} {WEEK}, and compare it with its design.",
+    ),
+    "off nominal": (
+        "{name}: tension is {size} {side} nominal.",
+        f"Compare it with the design {NEXT_TEST}, or give limits in bridge.toml.",
+    ),
+}
+"""State and action by what is known of a hanger; what was found to change is in `lead_of`."""
+
+
+def _lead(key: str, hanger: Hanger | None = None, **values: str) -> Lead:
+    """Return state and action with the hanger and `values` filled in."""
+    if hanger is not None:
+        values |= {"name": f"Hanger {hanger.id}", "again": look_again(hanger)}
+    state, action = _LEADS[key]
+    return Lead(state.format(**values), action.format(**values))
 
 
 class Status(Enum):
@@ -45,29 +124,6 @@ class Status(Enum):
 
 QUIET = (Status.STEADY, Status.FIRST)
 """States in which nothing was found."""
-
-
-@dataclass(frozen=True)
-class Known:
-    """All that the message of a hanger rests on.
-
-    `latest` is when it was tested last, None before the first test; `drifts` are those of that
-    test from the baseline in force, `called` the changes detected since, `standing` the alerts
-    whose condition has not ended, the oldest first. `notes` say what people did about these.
-    `unwatched` says that nothing has looked at the hanger for too long.
-    """
-
-    hanger: Hanger
-    tension: Averaged | None = None
-    latest: datetime | None = None
-    test: str = ""
-    is_first: bool = False
-    drifts: Sequence[Drift] = ()
-    called: Sequence[Change] = ()
-    standing: Sequence[Alert] = ()
-    warnings: Sequence[str] = ()
-    notes: tuple[str, ...] = ()
-    unwatched: Lead | None = None
 
 
 @dataclass(frozen=True)
@@ -100,7 +156,7 @@ class HangerMessage:
         return " ".join((self.lead.words, *self.notes))
 
     def beyond_lead(self, warnings: Sequence[str]) -> tuple[str, ...]:
-        """What `warnings` say that the lead has not said."""
+        """Return what `warnings` say that the lead does not."""
         rest = (each.removeprefix(self.lead.words).strip() for each in warnings)
         return tuple(each for each in rest if each)
 
@@ -112,7 +168,7 @@ class HangerMessage:
 
 @dataclass(frozen=True)
 class BridgeMessage:
-    """What is said first of a bridge: of its most urgent hanger, then which others need action."""
+    """State and action of a bridge: of its most urgent hanger, then which others need action."""
 
     status: Status | None
     lead: Lead
@@ -144,7 +200,7 @@ def _document(message: HangerMessage | BridgeMessage) -> dict[str, object]:
 
 
 def bridge_message(messages: Mapping[int, HangerMessage]) -> BridgeMessage:
-    """That of a bridge from those of its hangers, by their numbers."""
+    """Return that of a bridge from those of its hangers, by their numbers."""
     order = list(Status)
     known = {id_: each for id_, each in messages.items() if each.is_known}
     found = {each.status for each in known.values()}
@@ -161,12 +217,12 @@ def bridge_message(messages: Mapping[int, HangerMessage]) -> BridgeMessage:
         more = _how_soon(needing, others)
         return BridgeMessage(worst, needing[first].lead, more, needing[first].notes)
     if not known:
-        return BridgeMessage(None, Lead("No hanger has been tested yet.", f"Test all {NEXT_TEST}."))
+        return BridgeMessage(None, _lead("no hanger tested"))
     untested = [str(id_) for id_ in messages if id_ not in known]
     many = formatting.counted(len(known), "hanger")
     return BridgeMessage(
         worst,
-        Lead(f"No change detected on {many}.", "No action is needed before the next planned test."),
+        _lead("all steady", many=many),
         f"Not tested yet: {listed(untested)}." if untested else "",
     )
 
@@ -175,28 +231,27 @@ _SOON = {"none": "when convenient", "next_test": NEXT_TEST, "week": WEEK, "today
 
 
 def _how_soon(needing: Mapping[int, HangerMessage], others: Iterable[int]) -> str:
-    """The others by urgency, the most urgent first; empty where there are none."""
+    """Return the others by urgency, the most urgent first; empty where there are none."""
     of: dict[Urgency, list[int]] = {}
     for id_ in others:
         of.setdefault(needing[id_].urgency, []).append(id_)
     order = [urgency for urgency in reversed(URGENCIES) if urgency in of]
-    said = [f"{_SOON[each]}: {listed(list(map(str, sorted(of[each]))))}" for each in order]
-    rest = (f" {each[0].upper()}{each[1:]}." for each in said[1:])
-    return f"Other hangers that need action {said[0]}.{''.join(rest)}" if said else ""
+    statement = [f"{_SOON[each]}: {listed(list(map(str, sorted(of[each]))))}" for each in order]
+    rest = (f" {each[0].upper()}{each[1:]}." for each in statement[1:])
+    return f"Other hangers that need action {statement[0]}.{''.join(rest)}" if statement else ""
 
 
-def hanger_message(known: Known) -> HangerMessage:
+def hanger_message(known: HangerSummary) -> HangerMessage:
     """Decide state, action, urgency and reasons of a hanger, for every place that shows them."""
     status, lead = _decide(known)
-    said = HangerMessage(status, lead, known.notes if status else ())
+    statement = HangerMessage(status, lead, known.notes if status else ())
     caveats = known.tension.caveats if known.tension else ()
-    return replace(said, reasons=(*said.beyond_lead(known.warnings), *caveats))
+    return replace(statement, reasons=(*statement.beyond_lead(known.warnings), *caveats))
 
 
-def _decide(known: Known) -> tuple[Status | None, Lead]:
-    name = f"Hanger {known.hanger.id}"
+def _decide(known: HangerSummary) -> tuple[Status | None, Lead]:
     if known.latest is None and not known.standing:
-        return None, Lead(f"{name}: no test yet.", f"Test it {NEXT_TEST}.")
+        return None, _lead("untested", known.hanger)
     faults = known.tension.faults if known.tension else ()
     status = status_of(
         known.drifts,
@@ -227,21 +282,19 @@ def _decide(known: Known) -> tuple[Status | None, Lead]:
     return _quiet(known, status)
 
 
-def _in_doubt(known: Known) -> Lead:
+def _in_doubt(known: HangerSummary) -> Lead:
     """Return what to do about a tension whose caveats say that something is wrong."""
-    name, check = f"Hanger {known.hanger.id}", "Check its description and the numbers of its modes"
     if known.tension is None or known.tension.is_usable:
-        return Lead(f"{name}: its tension is in doubt.", f"{check} {NEXT_TEST}.")
-    if not known.tension.has_converged:
-        check = "Raise `samples` in bridge.toml and run"
-        check += f" `shm ingest --again {known.test} --from updated`"
-    return Lead(f"{name}: do not use its tension.", f"{check} {WEEK}.")
+        return _lead("in doubt", known.hanger)
+    if known.tension.has_converged:
+        return _lead("unusable", known.hanger)
+    return _lead("not converged", known.hanger, test=known.latest.name if known.latest else "")
 
 
 def still_detected(
     detected: Iterable[Change], latest: WatchedTest | None, hanger: Hanger
 ) -> tuple[Change, ...]:
-    """The changes that were detected, unless the latest test shows that they are gone.
+    """Return the changes that were detected, unless the latest test shows that they are gone.
 
     As the watch does: below half the level at which its owner is alerted.
     """
@@ -263,7 +316,7 @@ def status_of(
     warnings: Sequence[str] = (),
     standing: Sequence[Alert] = (),
 ) -> Status:
-    """The state that the drifts of the latest test give, and whether a change was detected.
+    """Return the state that the drifts of the latest test give, and whether a change was detected.
 
     With open `warnings` no hanger is quiet: what it is compared with may be wrong. Nor is one of
     which an alert is `standing`: two tests that agree show a shift before the watch is sure.
@@ -286,10 +339,10 @@ def status_of(
 # ---------------------------------------------------------------- what was found
 
 
-def _of_change(known: Known) -> Lead:
-    """What was found to have changed; else what an alert of another kind asks for."""
+def _of_change(known: HangerSummary) -> Lead:
+    """Return what was detected to have changed; else what an alert of another kind asks for."""
     hanger, drifts = known.hanger, known.drifts
-    beyond, change = _beyond(known), _change(known)
+    beyond, change = shifts_beyond(known), _change(known)
     others = [each for each in known.standing if not _CHANGES & set(each.kinds)]
     if beyond or change:
         before = change and [each for each in known.called if each.began_by < change.began_by]
@@ -299,14 +352,13 @@ def _of_change(known: Known) -> Lead:
         others = list(known.standing)  # what its row said of the change is lost
     if others:
         return _first([Lead.of(each.message) for each in reversed(others)])
-    likeliest = max(drifts, key=lambda each: each.probability)
-    words = f"{quantity_words(likeliest.quantity)} {size_words(likeliest)}"
-    state = f"Hanger {hanger.id}: {words}, more likely than not beyond its threshold."
-    return Lead(state, f"{look_again(hanger)} {WEEK}.")
+    first = max(drifts, key=lambda each: each.probability)
+    what = f"{quantity_words(first.quantity)} {size_words(first)}"
+    return _lead("likely beyond", hanger, what=what)
 
 
-def _beyond(known: Known) -> list[Drift]:
-    """The shifts beyond their threshold, as the latest test has them.
+def shifts_beyond(known: HangerSummary) -> list[Drift]:
+    """Return the shifts beyond their threshold, as the latest test has them.
 
     What an alert said stays as sure as it was while it stands; where two tests that agree said it,
     the watch may not have seen it, and the alert's own number stays.
@@ -315,12 +367,14 @@ def _beyond(known: Known) -> list[Drift]:
     found = {_way(each): each for each in known.drifts if each.probability >= level}
     now = {_way(each): each for each in known.drifts}
     for alert in known.standing:
-        for told in alert.drifts if _BEYOND in alert.kinds else ():
-            key = _way(told)
-            newest = now.get(key, told)
-            is_of_latest = alert.test == known.test
-            seen = newest if not is_of_latest and newest.may_be_beyond(told.shift_mean) else told
-            found[key] = replace(seen, probability=max(seen.probability, told.probability))
+        for wording in alert.drifts if _BEYOND in alert.kinds else ():
+            key = _way(wording)
+            newest = now.get(key, wording)
+            is_of_latest = known.latest is not None and alert.test == known.latest.name
+            seen = (
+                newest if not is_of_latest and newest.may_be_beyond(wording.shift_mean) else wording
+            )
+            found[key] = replace(seen, probability=max(seen.probability, wording.probability))
     return list(found.values())
 
 
@@ -328,89 +382,72 @@ def _way(drift: Drift) -> tuple[str, bool]:
     return drift.quantity, drift.shift_mean < 0
 
 
-def _change(known: Known) -> Change | None:
-    """That of the newest alert that stands; else the last that was detected."""
-    told = [each.change for each in known.standing if each.change and _CHANGES & set(each.kinds)]
-    return told[-1] if told else known.called[-1] if known.called else None
+def _change(known: HangerSummary) -> Change | None:
+    """Return that of the newest alert that stands; else the last that was detected."""
+    wording = [each.change for each in known.standing if each.change and _CHANGES & set(each.kinds)]
+    return wording[-1] if wording else known.called[-1] if known.called else None
 
 
 def _first(leads: Sequence[Lead]) -> Lead:
-    """The first of the most urgent."""
+    """Return the first of the most urgent."""
     return max(leads, key=lambda each: URGENCIES.index(each.urgency))
 
 
 # ---------------------------------------------------------------- nothing was found
 
 
-def _quiet(known: Known, status: Status) -> tuple[Status, Lead]:
-    """Where nothing was found: whether it could have been, and what the tension is."""
-    name = f"Hanger {known.hanger.id}"
-    off = _off_limits(known)
+def _quiet(known: HangerSummary, status: Status) -> tuple[Status, Lead]:
+    """Return the lead where nothing was detected: could it have been, and what the tension is."""
+    hanger, off = known.hanger, _off_limits(known)
     if known.unwatched is not None and (off is None or off.urgency == "next_test"):
         return Status.UNCLEAR, known.unwatched
     if off:
         return Status.CHECK, off
     if status is Status.FIRST:
-        more = (
-            f"Choose a warmer or colder day {NEXT_TEST}, so that the baseline covers temperature."
-        )
-        if known.hanger.has_sensors:
-            more = "No action is needed: the next days will be warmer or colder."
-        return status, Lead(f"{name}: tension {_tension(known.tension)} by its first test.", more)
+        if not known.is_determined:
+            return status, _lead("undetermined", hanger)
+        key = "first of sensors" if hanger.has_sensors else "first"
+        return status, _lead(key, hanger, tension=_tension(known.tension))
     drift = next((each for each in known.drifts if each.quantity == TENSION), None)
     if drift is None or not math.isfinite(drift.shift_mean + drift.shift_sd):
-        return Status.UNCLEAR, Lead(
-            f"{name}: its latest test cannot be compared with the baseline.",
-            f"{look_again(known.hanger)} {WEEK}: it lacks modes of the baseline.",
-        )
+        return Status.UNCLEAR, _lead("not comparable", hanger)
     half = NINETY_PERCENT * drift.shift_sd
     shift = rounded_percent(drift.shift_mean, half, "+")
     if half > drift.threshold:
-        return Status.UNCLEAR, Lead(
-            f"{name}: no change detected, but its tests are too few or too rough to show one "
-            f"(tension {shift}).",
-            f"Identify more modes {NEXT_TEST}, or test more often.",
-        )
-    return status, Lead(
-        f"{name}: no change detected since the baseline (tension {shift}).",
-        "No action is needed before the next planned test.",
-    )
+        return Status.UNCLEAR, _lead("rough", hanger, shift=shift)
+    return status, _lead("steady", hanger, shift=shift)
 
 
-def off_limits(hanger: Hanger, tension: Averaged) -> Lead | None:
-    """That the tension is beyond the owner's limits."""
-    for probability, words, soon in (
-        (tension.probability_slack, "below its lower limit", TODAY),
-        (tension.probability_above_limit, "above its upper limit", WEEK),
+def off_limits(hanger: Hanger, tension: Averaged, by: str = "") -> Lead | None:
+    """Return that the tension is beyond its owner's limits, `by` which test; None where not."""
+    for probability, key in (
+        (tension.probability_slack, "slack"),
+        (tension.probability_above_limit, "overloaded"),
     ):
         if probability > WATCH_PROBABILITY:
             doubt = "" if probability >= hanger.thresholds.alert_probability else "probably "
-            state = f"Hanger {hanger.id}: tension {_tension(tension)} is {doubt}{words}."
-            return Lead(state, f"{look_again(hanger)} {soon}, and compare it with its design.")
+            return _lead(key, hanger, tension=_tension(tension), by=by, doubt=doubt)
     return None
 
 
-def _off_limits(known: Known) -> Lead | None:
-    """That the tension is beyond the owner's limits; without limits, far off the nominal one."""
+def _off_limits(known: HangerSummary) -> Lead | None:
+    """Return that the tension is beyond its limits; without these, far off the nominal one."""
     hanger, tension = known.hanger, known.tension
     if tension is None or not tension.is_usable:
         return None
     if beyond := off_limits(hanger, tension):
         return beyond
     limits = hanger.limits
-    nominal_n, kept = hanger.nominal_tension_n, tension.tension_n
+    nominal_n, retained = hanger.nominal_tension_n, tension.tension_n
     if not nominal_n > 0:
         return None
-    low, high = kept.q05 / nominal_n - 1, kept.q95 / nominal_n - 1
+    low, high = retained.q05 / nominal_n - 1, retained.q95 / nominal_n - 1
     limit_n = limits.tension_max_n if low > 0 else limits.tension_min_n
     if (low <= OFF_NOMINAL and high >= -OFF_NOMINAL) or math.isfinite(limit_n):
         return None
-    off = kept.mean / nominal_n - 1
+    off = retained.mean / nominal_n - 1
     size = rounded_percent(abs(off), (high - low) / 2)
-    return Lead(
-        f"Hanger {hanger.id}: tension is {size} {'above' if off > 0 else 'below'} nominal.",
-        f"Compare it with the design {NEXT_TEST}, or give limits in bridge.toml.",
-    )
+    return _lead("off nominal", hanger, size=size, side="above" if off > 0 else "below")
 
 
 def _tension(tension: Averaged | None) -> str:

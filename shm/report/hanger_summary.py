@@ -1,326 +1,241 @@
-"""The paragraph that an engineer reads first: tension, what changed, which model, what next."""
+"""The state of one hanger in one value, which report, page, status, alert and hook show."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import datetime
+from functools import cached_property
+from typing import Any
 
-import numpy as np
+from shm.documents import averaged_document
+from shm.report.formatting import NORMAL_90, Interval
+from shm.report.hanger_status import HangerMessage, Status, hanger_message, shifts_beyond
+from shm.values import (
+    NAN,
+    TENSION,
+    Alert,
+    Averaged,
+    Change,
+    Drift,
+    Hanger,
+    Limits,
+    ResponsePoint,
+    Summary,
+)
+from shm.values.bar_description import BarDescription, describe_bar
+from shm.values.messages import Lead
 
-from shm.report import formatting, open_warnings
-from shm.report.contents import HangerReport, message
-from shm.report.diagnosis_summary import next_step, write_summary
-from shm.report.formatting import Interval
-from shm.values import TENSION, Diagnosis, PredictedFrequency
-from shm.values.posterior import MOST_R_HAT
-from shm.values.rounding import rounded_percent
-from shm.values.stated_tension import stated
-
-# Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
-# three names are what a sentence bears.
-_WORTH_DIAGNOSING_PERCENT = 0.5
-_MOST_NAMED = 3
-
-
-def summary(data: HangerReport) -> str:
-    """What is said first of the hanger, wherever it is said, then the details."""
-    return f"{message(data).words} {details(data)}"
-
-
-def why(data: HangerReport) -> str:
-    """What stands beside state and action: every doubt, the tension, and its change."""
-    return " ".join(_why(data))
-
-
-def _why(data: HangerReport) -> tuple[str, ...]:
-    return (*_doubts(data), _tension(data), _against_baseline(data))
+LATEST_TEST = "the latest test"
+BASELINE_TESTS = "the tests of the baseline"
+BASELINE_AND_CHANGE = "the baseline and the change since"
+BASELINE_ALONE = "the baseline; the tests since do not show whether it changed"
 
 
-def _doubts(data: HangerReport) -> tuple[str, ...]:
-    """Return what must not wait until the details: warnings, an outdated baseline, caveats."""
-    return message(data).reasons
+@dataclass(frozen=True)
+class LatestTest:
+    """The latest test of a hanger, and the tension that it gives by itself."""
+
+    name: str
+    time: datetime
+    tension: Averaged
+    model: str = ""
 
 
-def details(data: HangerReport) -> str:
-    """Why, and how sure: all that is said after state and action."""
-    return " ".join(_sentences(data))
+@dataclass(frozen=True)
+class Course:
+    """Tests and alerts of a hanger within the period of a report.
 
-
-def further(data: HangerReport) -> str:
-    """The details without what `why` says."""
-    said = _why(data)
-    return " ".join(each for each in _sentences(data) if each not in said)
-
-
-def _sentences(data: HangerReport) -> tuple[str, ...]:
-    found = (
-        *_doubts(data),
-        _tension(data),
-        # How well a test repeats it, and the probabilities that the owner's limits ask for.
-        *stated(data.averaged, data.tension_unit).sentences[1:],
-        _against_nominal(data),
-        _against_baseline(data),
-        _unseen(data),
-        "Once the change is explained, set a new baseline (`shm drift rebaseline`)."
-        if data.is_called
-        else "",
-        data.creep.words if data.creep else "",
-        in_period(data),
-        data.neighbours.sentence if data.neighbours else "",
-        _model(data),
-        _gap(data),
-        *_further_advice(data),
-        open_warnings.dated_by_receipt(data.undated),
-    )
-    return tuple(each for each in found if each)
-
-
-def advice(data: HangerReport) -> tuple[str, ...]:
-    """What to do next, most urgent first; never empty."""
-    first, further = message(data).lead, _further_advice(data)
-    return further if further and first.urgency == "none" else (first.action, *further)
-
-
-def _further_advice(data: HangerReport) -> tuple[str, ...]:
-    made = (_quality, _sampling, _width, _diagnose, _thermometer)
-    return tuple(each for make in made if (each := make(data)))
-
-
-def tension_change(data: HangerReport) -> Interval | None:
-    """Return the relative change of the tension since the baseline; None if it is not known.
-
-    As the watch found it; if it has not compared the test, of two independent estimates, standard
-    deviations in squares.
+    `change` is that of the tension from the first test of the period to the last, as a fraction;
+    None where it has fewer than two.
     """
-    then, now = data.baseline_tension_n, data.tension_n
-    if then is None:
-        return None
-    drift = next((each for each in data.drifts if each.quantity == TENSION), None)
-    if drift is None:
-        return now.since(then)
-    is_known = math.isfinite(drift.shift_mean + drift.shift_sd)
-    return Interval.normal(drift.shift_mean, drift.shift_sd) if is_known else None
+
+    tests: int = 0
+    alerts: int = 0
+    change: Interval | None = None
 
 
-def misfits_percent(data: HangerReport) -> list[tuple[PredictedFrequency, Interval]]:
-    """Predicted over measured frequency less one of each measured mode, in percent.
+@dataclass(frozen=True)
+class HangerSummary:
+    """Everything that is shown of a hanger, whatever shows it.
 
-    The interval is that of prediction and measurement together; of the prediction alone where the
-    measurement came without a standard deviation.
+    `latest` is None before the first test, `baseline` where no baseline is in force; `is_first`:
+    the latest test is one of the baseline's. `drifts` are those of the latest test from the
+    baseline, `called` the changes detected since that still hold, `detected` says in words what
+    was ever detected since. `standing` are the alerts whose condition has not ended, the oldest
+    first, `open_alerts` how many nobody took note of; `notes` say what people did about them.
+    `unwatched` says that nothing has looked at the hanger for too long; `undated` names the tests
+    dated by their receipt; `sensors` are those of the latest test, or those that stay. `course`
+    is None without a period.
     """
-    sds_hz = {(mode.plane, mode.order): mode.frequency_sd_hz for mode in data.latest.modes}
-    return [
-        (each, _misfit(each, sds_hz.get((each.plane, each.order), math.nan)))
-        for each in data.predicted
-        if math.isfinite(each.measured_hz)
-    ]
+
+    hanger: Hanger
+    latest: LatestTest | None = None
+    baseline: Averaged | None = None
+    is_first: bool = False
+    drifts: Sequence[Drift] = ()
+    called: Sequence[Change] = ()
+    detected: str = ""
+    standing: Sequence[Alert] = ()
+    open_alerts: int = 0
+    warnings: Sequence[str] = ()
+    notes: tuple[str, ...] = ()
+    unwatched: Lead | None = None
+    undated: Sequence[str] = ()
+    sensors: tuple[ResponsePoint, ...] = ()
+    course: Course | None = None
+
+    @cached_property
+    def message(self) -> HangerMessage:
+        """Return the state in a word and in two sentences, and all doubts."""
+        return hanger_message(self)
+
+    @property
+    def status(self) -> Status | None:
+        return self.message.status
+
+    @property
+    def bar(self) -> BarDescription:
+        """Return the bar as its owner describes it, with these sensors."""
+        return describe_bar(self.hanger, self.sensors)
+
+    @cached_property
+    def drift(self) -> Drift | None:
+        """Return the drift of the tension; None where nothing was compared.
+
+        What a standing alert says to be beyond its threshold stays what its message says.
+        """
+        stated = [each for each in shifts_beyond(self) if each.quantity == TENSION]
+        of_test = [each for each in self.drifts if each.quantity == TENSION]
+        return max(stated, key=lambda each: abs(each.shift_mean), default=None) or next(
+            iter(of_test), None
+        )
+
+    @property
+    def is_found(self) -> bool:
+        """Return True if a shift was detected, not one that is given in case there is one."""
+        return bool(self.called) or bool(shifts_beyond(self))
+
+    @property
+    def change(self) -> Interval | None:
+        """Return the relative change of the tension since the baseline; None: not known.
+
+        As the watch estimates it, at equal temperature; of a test that it has not compared, from
+        two independent estimates.
+        """
+        if self.latest is None or self.baseline is None or self.is_baseline:
+            return None
+        if (drift := self.drift) is None:
+            of_test = Interval.of_averaged(self.latest.tension)
+            return of_test.since(Interval.of_averaged(self.baseline))
+        is_known = math.isfinite(drift.shift_mean + drift.shift_sd)
+        return Interval.normal(drift.shift_mean, drift.shift_sd) if is_known else None
+
+    @property
+    def is_baseline(self) -> bool:
+        """Return True if the latest test is of the baseline itself."""
+        return self.is_first and self.drift is None
+
+    @property
+    def _follows_change(self) -> bool:
+        """Return True if the tests since the baseline show where the tension is now."""
+        change = self.change
+        if change is None:
+            return False
+        limit = self.hanger.thresholds.tension_shift_fraction
+        return self.is_found or self.drift is None or change.width / 2 <= limit
+
+    @cached_property
+    def tension(self) -> Averaged | None:
+        """Return the best estimate since the last change, absolute, over all model classes.
+
+        It is the baseline's tension, moved by the change since: both intervals go into its own.
+        Where the tests since do not show a change, it is the baseline's. Before there is a
+        baseline, and where the watch has not compared the latest test, it is that test's.
+        """
+        if self.latest is None or self.baseline is None:
+            return self.latest.tension if self.latest else None
+        of_test, drift = self.latest.tension, self.drift
+        if drift is None and not self.is_baseline:
+            return of_test
+        caveats = of_test.caveats if of_test.faults else (*of_test.caveats, *self.baseline.faults)
+        known = replace(self.baseline, caveats=tuple(dict.fromkeys(caveats)))
+        if drift is None or not self._follows_change:
+            return known
+        moved = _moved(known.tension_n, drift.shift_mean, drift.shift_sd)
+        above, slack = _beyond_limits(moved, self.hanger.limits)
+        return replace(
+            known, tension_n=moved, probability_above_limit=above, probability_slack=slack
+        )
+
+    @property
+    def tension_n(self) -> Interval | None:
+        return Interval.of_averaged(self.tension) if self.tension else None
+
+    @property
+    def baseline_n(self) -> Interval | None:
+        return Interval.of_averaged(self.baseline) if self.baseline else None
+
+    @property
+    def basis(self) -> str:
+        """Return what the tension rests on, in words; empty before the first test."""
+        if self.latest is None:
+            return ""
+        if self.baseline is None or (self.drift is None and not self.is_baseline):
+            return LATEST_TEST
+        if self.is_baseline:
+            return BASELINE_TESTS
+        return BASELINE_AND_CHANGE if self._follows_change else BASELINE_ALONE
+
+    @property
+    def is_determined(self) -> bool:
+        """Return False if the interval of the tension is wider than half the tension."""
+        return self.tension_n is not None and not self.tension_n.is_wide
+
+    @property
+    def of_nominal(self) -> Interval | None:
+        """Return the tension in percent of the nominal one; None where the hanger has none."""
+        nominal_n = self.hanger.nominal_tension_n
+        return self.tension_n.scaled(100 / nominal_n) if self.tension_n and nominal_n > 0 else None
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """Return what every JSON document gives of a hanger.
+
+        `averaged` is the headline, `change` a fraction with its 90 % interval, `by_latest_test`
+        the tension that the latest test gives by itself.
+        """
+        change, latest = self.change, self.latest
+        return {
+            **self.message.document,
+            "averaged": averaged_document(self.tension) if self.tension else None,
+            "basis": self.basis,
+            "change": {k: v for k, v in asdict(change).items() if v is not None}
+            if change
+            else None,
+            "by_latest_test": averaged_document(latest.tension) if latest else None,
+        }
 
 
-def _misfit(each: PredictedFrequency, measured_sd_hz: float) -> Interval:
-    sd_hz = math.hypot(each.sd_hz, measured_sd_hz if math.isfinite(measured_sd_hz) else 0.0)
-    off = Interval.normal(each.mean_hz - each.measured_hz, sd_hz)
-    return off.scaled(100 / each.measured_hz)
+def _moved(base: Summary, shift: float, sd: float) -> Summary:
+    """Return a tension after a shift with a standard deviation `sd`, both of the tension."""
+    ratio, of_shift = 1 + shift, NORMAL_90 * sd * base.mean
+    mean, middle = base.mean * ratio, base.q50 * ratio
+    below, above = (math.hypot((end - base.mean) * ratio, of_shift) for end in (base.q05, base.q95))
+    spread = math.hypot(base.sd * ratio, sd * base.mean)
+    return Summary(mean, spread, mean - below, middle, mean + above)
 
 
-def _tension(data: HangerReport) -> str:
-    tension = formatting.with_half(data.tension_n, data.tension_unit)
-    day = f" of {data.latest.time:%Y-%m-%d}" if data.latest.time else ""
-    return f"Its tension is {tension} by test {data.latest.id}{day}."
-
-
-def _against_nominal(data: HangerReport) -> str:
-    nominal = data.hanger.nominal_tension_n
-    if not nominal > 0:
-        return "It has no nominal tension to compare with."
-    share = data.tension_n.scaled(1 / nominal)
-    half, off = share.width / 2, share.mean - 1
-    if abs(off) <= half:
-        return f"The tension agrees with the nominal one ({rounded_percent(off, half, '+')})."
-    size, side = rounded_percent(abs(off), half), "above" if off > 0 else "below"
-    return f"The tension is {size} {side} nominal."
-
-
-def _against_baseline(data: HangerReport) -> str:
-    change = tension_change(data)
-    if data.baseline is None or data.baseline_tension_n is None:
-        return "There is no earlier test to compare with: this one is the baseline."
-    if change is None:
-        return "The change since the baseline is not known: its latest test does not show it."
-    size = rounded_percent(change.mean, change.width / 2, "+")
-    doubt = "" if is_found(data) else ", if it has changed at all"
-    said = f"Against the baseline of {counted_tests(data.baseline.tests)} it is {size}{doubt}"
-    later = [
-        each.time for each in data.standing if data.latest.time and each.time > data.latest.time
-    ]
-    if not later:
-        return f"{said}."
-    return f"{said}: by that test, which was before what the alert of {max(later):%Y-%m-%d} tells."
-
-
-def is_found(data: HangerReport) -> bool:
-    """Whether a shift is found, not one that is told in case there is one."""
-    level = data.hanger.thresholds.alert_probability
-    return data.is_called or not data.drifts or any(e.probability >= level for e in data.drifts)
-
-
-def counted_tests(tests: tuple[str, ...]) -> str:
-    """`test t001`, `5 tests`."""
-    return f"test {tests[0]}" if len(tests) == 1 else f"{len(tests)} tests"
-
-
-def _unseen(data: HangerReport) -> str:
-    """What keeps a shift of the tension from being seen, or from being trusted in percent."""
-    change, threshold = tension_change(data), data.hanger.thresholds.tension_shift_fraction
-    if not data.drifts:
-        return ""
-    if change is not None and change.width / 2 > threshold:
-        return f"These tests could hardly show a change of tension of {100 * threshold:.3g} %."
-    if data.tension_n.is_wide:
-        return "The tension itself is hardly known, and so is what percentage of it a change is."
-    return ""
-
-
-def in_period(data: HangerReport) -> str:
-    """What lay in the period of the report, and what changed in it against its start."""
-    if data.period is None:
-        return ""
-    tests = formatting.counted(len(data.trend), "test")
-    raised = formatting.counted(len(data.alerts), "alert")
-    called = formatting.listed(
-        [each.words for each in data.states.within(data.period).changes]
-        or ["no change was detected"]
-    )
-    return f"In the period {data.period}: {tests}, {raised}; {called}; {_course(data)}."
-
-
-def _course(data: HangerReport) -> str:
-    if len(data.trend) < 2:
-        return "with one test in it nothing in it can be compared"
-    first, last = data.trend[0], data.trend[-1]
-    change = formatting.signed_percent(last.tension_n.since(first.tension_n))
-    return f"from its first test ({first.test}) to its last the tension moved by {change}"
-
-
-def _model(data: HangerReport) -> str:
-    misfits = misfits_percent(data)
-    if not misfits:
-        return f"{_chosen(data)}."
-    count = (
-        "one measured frequency" if len(misfits) == 1 else f"{len(misfits)} measured frequencies"
-    )
-    if _misses(data):
-        off = f"{data.posterior.misfit_percent:.1f} % (root mean square)"
-        return f"{_chosen(data)}. It misses {count} by {off}."
-    rms = formatting.plain(_rms_percent(data), 2)
-    return f"{_chosen(data)}. It predicts {count} to {rms} % (root mean square)."
-
-
-def _rms_percent(data: HangerReport) -> float:
-    """Root mean square of the misfits; NaN where no mode was measured."""
-    residuals = [off.mean for _, off in misfits_percent(data)]
-    return float(np.sqrt(np.mean(np.square(residuals)))) if residuals else math.nan
-
-
-def _misses(data: HangerReport) -> bool:
-    """Whether the class by itself is so far off that its posterior doubts the description: what it
-    predicts with the model's error learnt from the same modes fits them all the same."""
-    return not data.posterior.fits
-
-
-def _gap(data: HangerReport) -> str:
-    """What the model does not explain, and why as far as that was diagnosed."""
-    if data.diagnosis is None:
-        return _outside(data)
-    told = [_diagnosed_on(data.diagnosis), write_summary(data.diagnosis)]
-    return " ".join(part for part in (*told, data.gap_watch) if part)
-
-
-def _outside(data: HangerReport) -> str:
-    """The modes that the model class misses by more than the uncertainty of both explains."""
-    misfits = [] if _misses(data) else misfits_percent(data)
-    outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
-    if not misfits:
-        return ""
-    # So many may well lie outside by chance: two standard deviations.
-    by_chance = 0.1 * len(misfits) + 2 * math.sqrt(0.09 * len(misfits))
-    if len(outside) > by_chance:
-        return f"{_outliers(outside)}: the model does not explain these, and no diagnosis was made."
-    chance = f"{_outliers(outside)}, no more than by chance" if outside else ""
-    start = chance or "Each lies within its 90 % interval"
-    if _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT:
-        return f"{start}, but the intervals are so wide that they may hide a misfit."
-    return f"{start}: the model explains what was measured."
-
-
-def _outliers(modes: Sequence[PredictedFrequency]) -> str:
-    """`Transverse 2 and longitudinal 4 lie outside the 90 % interval`, `5 modes lie ...`."""
-    told = formatting.listed([f"{each.plane} {each.order}" for each in modes])
-    named = f"{told[0].upper()}{told[1:]}"
-    who = named if len(modes) <= _MOST_NAMED else formatting.counted(len(modes), "mode")
-    return f"{who} {'lies' if len(modes) == 1 else 'lie'} outside the 90 % interval"
-
-
-def _diagnosed_on(diagnosis: Diagnosis) -> str:
+def _beyond_limits(tension: Summary, limits: Limits) -> tuple[float, float]:
+    """Return the probabilities of a tension above and below its limits; NaN without a limit."""
+    above, slack = limits.tension_max_n, limits.tension_min_n
     return (
-        f"What the plain class {diagnosis.baseline} would leave unexplained was diagnosed on "
-        f"{counted_tests(diagnosis.tests)}."
+        _normal((tension.mean - above) / tension.sd) if math.isfinite(above) else NAN,
+        _normal((slack - tension.mean) / tension.sd) if math.isfinite(slack) else NAN,
     )
 
 
-def _chosen(data: HangerReport) -> str:
-    model = formatting.model_class(data.posterior.model)
-    if data.selection is None or len(data.selection.posteriors) < 2:
-        return f"The model class is {model}"
-    names = [formatting.model_class(posterior.model) for posterior in data.selection.posteriors]
-    if model not in names:
-        return f"The model class is {model}"
-    rivals = formatting.listed([each for each in names if each != model])
-    if names[0] != model:
-        return f"The model class is {model}, less probable than {names[0]}"
-    return f"The model class is {model}, the most probable (beside {rivals})"
-
-
-def _quality(data: HangerReport) -> str:
-    doubted = [check.name for check in data.quality if check.verdict in ("warning", "refused")]
-    if not doubted:
-        return ""
-    return f"Mend what the quality of the latest test warns of: {formatting.listed(doubted)}."
-
-
-def _sampling(data: HangerReport) -> str:
-    if not data.posterior.r_hat > MOST_R_HAT:
-        return ""
-    return (
-        f"The sampling has not settled (R-hat {data.posterior.r_hat:.2f}): raise the number of "
-        f"samples before relying on the interval."
-    )
-
-
-def _width(data: HangerReport) -> str:
-    half = data.tension_n.width / 2 / data.tension_n.mean
-    threshold_fraction = data.hanger.thresholds.tension_shift_fraction
-    if half <= threshold_fraction:
-        return ""
-    return (
-        f"The tension is known to ± {100 * half:.1f} %, no better than the threshold of "
-        f"{100 * threshold_fraction:.3g} %: identify more modes, or repeat the test, "
-        f"to see smaller shifts."
-    )
-
-
-def _diagnose(data: HangerReport) -> str:
-    """The next step against the gap between model and measurement."""
-    if data.diagnosis is not None:
-        return next_step(data.diagnosis)
-    if not (_misses(data) or _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT):
-        return ""
-    return (
-        "Learn what the model does not explain, and what that does to the tension "
-        f"(shm gap diagnose --hanger {data.hanger.id})."
-    )
-
-
-def _thermometer(data: HangerReport) -> str:
-    if math.isfinite(data.latest.temperature_c):
-        return ""
-    return "Record the temperature with the next test: it moves the tension."
+def _normal(deviations: float) -> float:
+    """Return the probability of a standard normal value below so many standard deviations."""
+    return math.erfc(-deviations / math.sqrt(2)) / 2

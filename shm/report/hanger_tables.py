@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,60 +11,66 @@ import numpy as np
 from shm.models import equal_springs
 from shm.models.practice_formulas import FORMULAS
 from shm.report import formatting
-from shm.report.assumed import assumptions_table
+from shm.report.bar_table import NOT_STATED
 from shm.report.contents import HangerReport, TrendRow
 from shm.report.formatting import Interval
-from shm.report.hanger_summary import counted_tests, misfits_percent
-from shm.report.paper import Table, filled
-from shm.report.shared_tables import added_mass, lineage, quality_table, settings
+from shm.report.hanger_sentences import counted_tests, misfits_percent
+from shm.report.hanger_summary import BASELINE_ALONE, BASELINE_AND_CHANGE
+from shm.report.paper import Table, fold_improbable
+from shm.report.shared_tables import added_mass, lineage, quality_table
 from shm.report.shifts import shift_cells, shift_table
+from shm.report.sizes import size_of
 from shm.report.states import temperature_table
 from shm.values import PLANES, WITHOUT_MODEL, Alert, Mode, Posterior, PredictedFrequency
+from shm.values.messages import Lead
 from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import stated
 from shm.watch.change_words import factor
 
 
-def numbers(data: HangerReport) -> tuple[Table, ...]:
-    """What was found, as far as there is any of it."""
-    return filled(*(make(data) for make in _NUMBERS))
-
-
-def origins(data: HangerReport) -> tuple[Table, ...]:
-    """What it was found from."""
-    return filled(origin(data), settings(data.settings), assumptions_table(data.hanger))
-
-
 def results(data: HangerReport) -> Table:
-    """What a reader takes away: tension, repeatability, baseline, shifts."""
-    unit, said = data.tension_unit, stated(data.averaged, data.tension_unit)
-    rows: list[tuple[str, ...]] = [("tension, absolute", said.tension, said.interval, "", "")]
-    if said.repeatability:
-        rows.append(("its repeatability (sd)", said.repeatability, "", "", ""))
+    """Return the tensions with what each rests on, then the shifts since the baseline."""
+    unit = data.tension_unit
+    known = [("best estimate since the last change", data.averaged, data.now.basis)]
+    if data.now.basis in (BASELINE_AND_CHANGE, BASELINE_ALONE):
+        known.append(("by the latest test alone", data.by_latest_test, f"test {data.latest.id}"))
+    rows: list[tuple[str, ...]] = []
+    for what, averaged, basis in known:
+        words = stated(averaged, unit)
+        value = "not determined" if Interval.of_averaged(averaged).is_wide else words.tension
+        rows.append((f"tension, {what}", value, words.interval, basis, ""))
     if (before := data.baseline_tension_n) is not None:
         each = before.in_unit(unit)
         mean, span = f"{formatting.mean(each)} {unit.name}", f"{formatting.span(each)} {unit.name}"
-        rows.append(("tension of the baseline, absolute", mean, span, "", ""))
+        rows.append(("tension of the baseline", mean, span, _baseline_tests(data), ""))
+    if repeats := stated(data.by_latest_test, unit).repeatability:
+        rows.append(("repeatability of one test (sd)", repeats, "", "", ""))
     if (nominal_n := data.hanger.nominal_tension_n) > 0:
         nominal = f"{unit.of(nominal_n):.{unit.decimals(nominal_n)}f} {unit.name}"
-        rows.append(("nominal (as designed)", nominal, "given, no interval", "", ""))
-    shifts = [shift_cells(row) for row in data.drifts]
-    rows += [(f"shift of {what}", *rest) for what, *rest in shifts]
+        rows.append(("nominal tension (as designed)", nominal, "", "given", ""))
+    for drift in data.drifts:
+        what, size, span, threshold, probability = shift_cells(drift)
+        rows.append((f"change of {what}", size, span, f"threshold {threshold}", probability))
     return Table(
-        "Results of the latest test",
-        ("quantity", "value", "90 % credible interval", "threshold", "probability beyond it"),
+        "Tension and changes",
+        ("quantity", "value", "90 % interval", "rests on", "probability beyond the threshold"),
         tuple(rows),
-        note="Temperature-compensated shifts from the baseline, if there is any: tension in "
-        f"percent, stiffness as how many times what it was. {data.drift_watch}".strip(),
+        note="Tensions are absolute. Changes since the baseline are at equal temperature, if "
+        f"anything changed at all. {data.drift_watch}".strip(),
     )
+
+
+def _baseline_tests(data: HangerReport) -> str:
+    return counted_tests(data.baseline.tests) if data.baseline else ""
 
 
 def temperatures(data: HangerReport) -> Table:
     return temperature_table(data.states)
 
 
-_BESIDE = 2  # hangers on either side, which take up most of a lost load
+_NEXT_TO = 2  # hangers on either side, which take up most of a lost load
 _ROWS_SHOWN = 12  # layout: what a page holds
+_ALERTS_SHOWN = 5  # layout: a third of a page
 _EARLIER = "... and {} earlier ones (in HTML and JSON)"
 _IRREGULAR = (
     " Not followed: the mode is well off the bar that the others follow, as if the hanger sagged "
@@ -73,16 +79,16 @@ _IRREGULAR = (
 
 
 def neighbours(data: HangerReport) -> Table:
-    """The hanger and two to either side; empty where nothing is called."""
+    """Return the hanger and two to either side; empty where nothing is called."""
     title, pattern = "The hangers beside it", data.neighbours
     rows = pattern.rows if pattern else ()
     place = next((row.place for row in rows if row.hanger == data.hanger.id), None)
     if pattern is None or place is None:
         return Table(title, (), ())
-    near = tuple(row for row in rows if abs(row.place - place) <= _BESIDE)
+    near = tuple(row for row in rows if abs(row.place - place) <= _NEXT_TO)
     made = shift_table(replace(pattern, rows=near, not_compared=()))
-    told = " ".join((pattern.sentence, *pattern.remarks))
-    note = f"{told} The whole bridge: shm report --bridge."
+    wording = " ".join((pattern.sentence, *pattern.remarks))
+    note = f"{wording} The whole bridge: shm report --bridge."
     return replace(made, title=title, note=note, terminal_column=())
 
 
@@ -111,6 +117,7 @@ def frequencies(data: HangerReport) -> Table:
         "sd: standard deviation of the measurement. Off: predicted over measured, less one, with "
         "the interval of both; where the sd is not known, with that of the prediction."
         + (_IRREGULAR if _irregular(data) else ""),
+        may_break=True,
     )  # fmt: skip
 
 
@@ -145,37 +152,41 @@ def quality(data: HangerReport) -> Table:
     return quality_table(data.quality, "Quality of the latest test")
 
 
+def doubts(data: HangerReport) -> Table:
+    """Return the checks that are not good, and how many are."""
+    found = [check for check in data.quality if check.verdict in ("warning", "refused")]
+    rest = len(data.quality) - len(found)
+    made = quality_table(found, "Quality of the latest test: what to improve")
+    return replace(made, note=f"{formatting.counted(rest, 'further check')} without a warning.")
+
+
 def parameters(data: HangerReport) -> Table:
     posterior = data.posterior
     return Table(
         f"Parameters of the model class {formatting.model_class(posterior.model)}",
-        ("name", "meaning", "mean", "90 % credible interval", "most probable"),
+        ("parameter", "most probable to be, with 90 % interval", "symbol"),
         tuple(_parameter_row(posterior, name) for name in posterior.names),
-        note="Ratios and fractions have no unit; of the most probable set the interval is that of "
-        "its row.",
+        note="Ratios and fractions have no unit. Of end stiffnesses the value is the median.",
     )
 
 
 def _parameter_row(posterior: Posterior, name: str) -> tuple[str, ...]:
     interval = Interval.of_samples(posterior.parameter(name))
-    best = posterior.most_probable[posterior.names.index(name)]
-    return (
-        name,
-        formatting.meaning(posterior, name),
-        formatting.mean(interval),
-        formatting.span(interval),
-        f"{best:.{formatting.decimals(interval.width)}f}",
-    )
+    unit = posterior.unit(name)
+    value = size_of(name, "" if unit == "1" else unit, interval)
+    symbol = name.rpartition(".")[2].removeprefix("log10_")
+    return (formatting.meaning(posterior, name, with_unit=False), str(value), symbol)
 
 
 def models(data: HangerReport) -> Table:
     chosen = data.selection
     pairs = list(zip(chosen.posteriors, chosen.probabilities, strict=True)) if chosen else []
     unit = force_unit(*(float(posterior.tension_n.mean()) for posterior, _ in pairs))
+    rows = [_model_row(posterior, share, unit) for posterior, share in pairs]
     return Table(
         "Model classes",
         ("model", "probability", "log evidence", "its sd", *formatting.tension_headings(unit)),
-        tuple(_model_row(posterior, share, unit) for posterior, share in pairs),
+        fold_improbable(rows, [share for _, share in pairs], "classes"),
         note=f"Compared on {counted_tests(pairs[0][0].tests)}. Before them all classes were "
         "equally probable, clamped ones less so but with the thesis's priors. Evidence in natural "
         "logarithms, with the standard deviation of its sampling."
@@ -197,7 +208,7 @@ def _model_row(posterior: Posterior, share: float, unit: ForceUnit) -> tuple[str
 
 
 def practice(data: HangerReport) -> Table:
-    """Formulas of practice from the latest measured frequencies, beside ours."""
+    """Return formulas of practice from the latest measured frequencies, and our value."""
     title = "Formulas of practice"
     hanger, unit = data.hanger, data.tension_unit
     bar = (hanger.length_m, hanger.mass_per_length_kg_m, hanger.bending_stiffness_n_m2)
@@ -208,32 +219,39 @@ def practice(data: HangerReport) -> Table:
 
     def add(name: str, found: Sequence[float], *rest: str) -> None:
         if np.isfinite(found).any():
-            told = [
+            wording = [
                 "unknown" if math.isnan(n) else "below 0" if n < 0 else f"{unit.of(n):.0f}"
                 for n in found
             ]
-            rows.append((name, *told, *rest))
+            rows.append((name, *wording, *rest))
 
     for each in FORMULAS:
         found = [each.tension_n(measured.get((p, each.order), np.nan), *bar) for p in PLANES]
-        holds = f"from xi = {each.valid_from_xi:g}, within {100 * each.worst_error:g}%"
-        add(f"{each.name}, mode {each.order}", found, each.ends, holds, each.leaves_out)
-    by_order = [{n: hz for (own, n), hz in measured.items() if own == plane} for plane in PLANES]
-    fitted = [equal_springs.tension_n(own, *bar) for own in by_order]
+        holds = f"{each.valid_from_xi:g}", f"{100 * each.worst_error:g} %"
+        add(f"{each.name}, mode {each.order}", found, each.ends, *holds, each.leaves_out)
+    by_order = [{n: hz for (this, n), hz in measured.items() if this == plane} for plane in PLANES]
+    fitted = [equal_springs.tension_n(this, *bar) for this in by_order]
     add(
-        f"{equal_springs.NAME}, all modes", fitted, equal_springs.ENDS, "", equal_springs.LEAVES_OUT
+        f"{equal_springs.NAME}, all modes",
+        fitted,
+        equal_springs.ENDS,
+        "",
+        "",
+        equal_springs.LEAVES_OUT,
     )
     if not rows:
         return Table(title, (), ())
-    said = stated(data.averaged, unit)
-    rows.append(("ours, all modes of both planes", said.tension, said.tension, "as found", "", ""))
+    ours = stated(data.by_latest_test, unit)
+    both = (ours.tension, ours.tension)
+    rows.append(("ours, by all modes of the same test", *both, "as inferred", "", "", ""))
     planes = (f"{plane} ({unit.name})" for plane in PLANES)
-    heads = ("formula", *planes, "ends", "holds on such ends", "leaves out")
+    heads = ("formula", *planes, "ends", "from xi", "error", "leaves out")
     xi = hanger.length_m * math.sqrt(data.averaged.tension_n.mean / hanger.bending_stiffness_n_m2)
     note = (
         "Each from the modes that it names, of one plane. "
-        f"xi = L sqrt(T/EI) is some {xi:.2g} here: below its range a formula says nothing. "
-        f"The 90 % interval of ours is {said.interval}."
+        f"xi = L sqrt(T/EI) is some {xi:.2g} here: below its range a formula says nothing; error: "
+        "the worst within it, on such ends. "
+        f"The 90 % interval of ours is {ours.interval}."
     )
     return Table(title, heads, tuple(rows), note)
 
@@ -332,6 +350,18 @@ def alerts(data: HangerReport) -> Table:
     ).shortened(_ROWS_SHOWN)
 
 
+def latest_alerts(data: HangerReport) -> Table:
+    """Return the latest alerts, each with what it says first."""
+    made = alerts(data)
+    rows = tuple(
+        (time, test, Lead.of(message).words, state)
+        for time, test, message, state in made.rows[:_ALERTS_SHOWN]
+    )
+    more = len(made.rows) - len(rows)
+    note = f"{formatting.counted(more, 'earlier one')} in the HTML report." if more else ""
+    return Table(made.title, made.headings, rows, note)
+
+
 def _alert_row(row: Alert, acknowledged: Mapping[str, str]) -> tuple[str, ...]:
     return (formatting.moment(row.time), row.test, row.message, acknowledged.get(row.key, "open"))
 
@@ -348,41 +378,43 @@ def inspections(data: HangerReport) -> Table:
     ).shortened(_ROWS_SHOWN)
 
 
-_NUMBERS: tuple[Callable[[HangerReport], Table], ...] = (
-    period,
-    alerts,
-    inspections,
-    neighbours,
-    temperatures,
-    frequencies,
-    quality,
-    models,
-    practice,
-    parameters,
-    history,
-)
-
-
-def origin(data: HangerReport) -> Table:
-    posterior, test = data.posterior, data.latest
+def conditions(data: HangerReport) -> Table:
+    """Return how the latest test was made, and by what its files are known."""
+    test = data.latest
     facts = {
         "test": f"{test.id}, {formatting.moment(test.time)}",
         "temperature": formatting.temperature(test.temperature_c),
         "hit level over reference level": formatting.plain(test.amplitude, absent="not recorded"),
         "added mass": added_mass(test),
         "modes identified": f"{len(test.modes)}",
+        "bar measured by": data.bar.measured_by or NOT_STATED,
+        **lineage({key: value for key, value in data.lineage.items() if key not in _COMPUTING}),
+        "report made": f"{formatting.moment(data.generated_at)} by shm version {data.version}",
+    }
+    return Table(
+        "Where these numbers come from", ("what", "value"), tuple(facts.items()), may_break=True
+    )
+
+
+_COMPUTING = frozenset({"input_sha256", "settings_sha256", "software"})
+"""What of the lineage only a repetition needs."""
+
+
+def sampling(data: HangerReport) -> Table:
+    """Return how the posterior was computed."""
+    posterior = data.posterior
+    facts = {
         "model class": formatting.model_class(posterior.model),
         "tests in this posterior": ", ".join(posterior.tests),
         "posterior samples": f"{len(posterior.samples)} (effective "
         f"{formatting.number(posterior.effective_sample_size, '.0f')})",
-        "R-hat (1 is settled)": formatting.number(posterior.r_hat, ".3f"),
+        "R-hat (1 is converged)": formatting.number(posterior.r_hat, ".3f"),
         "model evaluations": f"{posterior.evaluations}",
         "random seed": f"{posterior.seed}",
         "computing time": _seconds(posterior.seconds),
-        **lineage(data.lineage),
-        "report made": f"{formatting.moment(data.generated_at)} by shm version {data.version}",
+        **lineage({key: value for key, value in data.lineage.items() if key in _COMPUTING}),
     }
-    return Table("Where these numbers come from", ("what", "value"), tuple(facts.items()))
+    return Table("How the posterior was computed", ("what", "value"), tuple(facts.items()))
 
 
 def _seconds(seconds: float) -> str:

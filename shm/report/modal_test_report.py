@@ -13,7 +13,9 @@ from shm import modes_document
 from shm.report import formatting
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.contents import ModalTestReport
+from shm.report.figures.bar_sketch import FIGURE as SKETCH
 from shm.report.figures.every_figure import modal_test_figures
+from shm.report.figures.specification import drawn
 from shm.report.figures.style import VERDICT_STYLES
 from shm.report.paper import Fact, Paper, Part, Table, filled
 from shm.report.shared_tables import added_mass, headline, lineage, overall, quality_table, settings
@@ -35,9 +37,13 @@ def modal_test_paper(sheet: ModalTestReport) -> Paper:
                 summary=summary(sheet),
                 facts=facts(sheet),
                 tables=(bar_table(sheet.bar),),
+                brief=filled(replace(modes(sheet), note="")),
             ),
             Part("Modes and quality", tables=results(sheet)),
-            Part("Figures", figures=lambda: modal_test_figures(sheet)),
+            Part(
+                "Figures",
+                figures=lambda: (*drawn((SKETCH,), sheet.bar), *modal_test_figures(sheet)),
+            ),
             Part("How it came about", tables=details(sheet)),
         ),
         generated_at=sheet.generated_at,
@@ -47,7 +53,7 @@ def modal_test_paper(sheet: ModalTestReport) -> Paper:
 
 
 def facts(sheet: ModalTestReport) -> tuple[Fact, ...]:
-    """The figures on top: what, value, what stands beside it."""
+    """Return the figures on top: what, value, what stands beside it."""
     test, hits = sheet.identification.test, sheet.hits
     planes = {mode.plane for mode in sheet.modes}
     return (
@@ -134,7 +140,7 @@ def _what_was_found(sheet: ModalTestReport) -> str:
 
 
 def _without_order(sheet: ModalTestReport) -> str:
-    """How many modes are known, and their orders are not."""
+    """Return how many modes are known whose orders are not."""
     found_hz = [m.frequency_hz for m in sheet.identification.set_aside if m.kind == "unnumbered"]
     if not found_hz:
         return ""
@@ -171,7 +177,7 @@ def _what_is_no_mode(sheet: ModalTestReport) -> str:
 
 
 def trust(sheet: ModalTestReport) -> str:
-    """Whether the modes can be used."""
+    """Return a sentence on how far the modes can be used."""
     checks = sheet.identification.quality
     made = [check for check in checks if check.verdict != "unknown"]
     match overall(checks):
@@ -196,7 +202,7 @@ def _names(checks: Sequence[QualityCheck], verdict: Verdict) -> str:
 
 
 def advice(sheet: ModalTestReport) -> str:
-    """What to do next, gravest first."""
+    """Return what to do next, gravest first."""
     checks = sheet.identification.quality
     graves = sorted(
         (c for c in checks if c.verdict in ("refused", "warning") and c.remedy),
@@ -210,7 +216,7 @@ def advice(sheet: ModalTestReport) -> str:
 
 
 def results(sheet: ModalTestReport) -> tuple[Table, ...]:
-    """What came of the test, as far as there is any of it."""
+    """Return the tables of the results, as far as there are any."""
     return filled(modes(sheet), _doubts_in_terminal(quality(sheet)), set_aside(sheet))
 
 
@@ -223,9 +229,9 @@ def _doubts_in_terminal(checks: Table) -> Table:
 
 
 def details(sheet: ModalTestReport) -> tuple[Table, ...]:
-    """How it came about, as far as there is any of it."""
-    told = (hits(sheet), conditions(sheet), settings(sheet.settings))
-    hit, *others = (table.not_in_terminal() for table in told)
+    """Return the tables of how the results came about, as far as there are any."""
+    wording = (hits(sheet), conditions(sheet), settings(sheet.settings))
+    hit, *others = (table.not_in_terminal() for table in wording)
     return filled(notes(sheet), hit, dropped(sheet), *others)
 
 
@@ -281,7 +287,7 @@ def set_aside(sheet: ModalTestReport) -> Table:
 
 
 def dropped(sheet: ModalTestReport) -> Table:
-    """What the identification left out of the records, and why."""
+    """Return what the identification left out of the records, and why."""
     return Table(
         "Left out",
         ("what", "how many", "why"),
@@ -315,7 +321,7 @@ def notes(sheet: ModalTestReport) -> Table:
 
 
 def conditions(sheet: ModalTestReport) -> Table:
-    """Which test it is, and what was noted with it."""
+    """Return which test it is, and what was noted with it."""
     test = sheet.identification.test
     facts = {
         "test": test.id,
@@ -367,7 +373,7 @@ def _record(record: Recording | FrequencyResponse) -> str:
 
 
 def _file(record: Recording | FrequencyResponse) -> str:
-    """The file's name: where it lay is nothing for a report."""
+    """Return the file's name: where it lay is nothing for a report."""
     return Path(record.source).name
 
 
@@ -375,7 +381,7 @@ SHEET_SCHEMA = "shm.test-sheet/1"
 
 
 def modal_test_json(sheet: ModalTestReport) -> dict[str, Any]:
-    """A document for `shm.documents.dump`; signals and curves stay in the records."""
+    """Return a document for `shm.documents.dump`; signals and curves stay in the records."""
     found = sheet.identification
     return {
         "schema": SHEET_SCHEMA,

@@ -1,4 +1,4 @@
-"""What is wrong with what a hanger is compared with: said first wherever its state is said.
+"""Warnings about the baseline of a hanger: they come first wherever its state is given.
 
 A watch that compares with a wrong baseline is quiet for years. So a baseline that does not fit, or
 that stands out among its neighbours, and a mode that tests keep having wrong are never "No change".
@@ -71,7 +71,7 @@ def open_warnings(
 
 
 def passed_over(hanger: Hanger, window: str) -> str:
-    """That the newest test was compared with nothing: it lies within a maintenance `window`."""
+    """Return that the newest test was compared with nothing: it is in a maintenance `window`."""
     return (
         f"Hanger {hanger.id}: its latest test was made in a maintenance window and is compared "
         f"with nothing. Test it again {WEEK} of the end of the works. Until then nobody knows "
@@ -80,7 +80,7 @@ def passed_over(hanger: Hanger, window: str) -> str:
 
 
 def nearly_slack(hanger: Hanger, baseline: Summary, now: Summary, *, is_told: bool) -> str:
-    """That the latest test alone reads most of the tension lost; "" where it does not.
+    """Return that the latest test alone reads most of the tension lost; "" where it does not.
 
     A bar that carries next to nothing is as stiff as before, and the watch may put its frequencies
     down to something else, or be unsure for want of tests. Where it `is_told` of the tension that
@@ -98,7 +98,7 @@ def nearly_slack(hanger: Hanger, baseline: Summary, now: Summary, *, is_told: bo
 
 
 def standing_out(hanger: Hanger, hangers: Sequence[Hanger], tensions: Mapping[int, Summary]) -> str:
-    """That a baseline's tension is far off its nominal one, and its neighbours' are not; or "".
+    """Return that a baseline is far off its nominal tension unlike its neighbours; else "".
 
     `hangers` stand in the order of the bridge; `tensions` are those of their baselines.
     """
@@ -149,7 +149,7 @@ def redescription_words(hanger: Hanger, changes: Sequence[str]) -> str:
     named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
     return (
         f"The description of hanger {hanger.id} has changed since its baseline: {named}. "
-        f"{_anew(hanger.id)} "
+        f"{_rebaseline(hanger.id)} "
         "Until then shifts and alerts compare two descriptions, not two states of the hanger."
     )
 
@@ -160,7 +160,7 @@ def discarded(hanger: Hanger, tests: Sequence[str]) -> str:
         return ""
     return (
         f"The baseline of hanger {hanger.id} was made from {', '.join(tests)}, discarded since: "
-        f"the comparison with it is no longer valid. {_anew(hanger.id)}"
+        f"the comparison with it is no longer valid. {_rebaseline(hanger.id)}"
     )
 
 
@@ -177,6 +177,6 @@ def dated_by_receipt(names: Sequence[str]) -> str:
     )
 
 
-def _anew(number: int) -> str:
+def _rebaseline(number: int) -> str:
     command = f"shm drift rebaseline --hanger {number} --since DAY --why TEXT"
     return f"Set a new baseline {WEEK}: `{command}`."

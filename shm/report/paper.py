@@ -43,7 +43,7 @@ class Logo:
 
 
 def read_logo(path: Path | None) -> Logo:
-    """The logo in a file; with a `fault` that names it where there is none to be read."""
+    """Return the logo in a file; with a `fault` that names it where there is none to be read."""
     if path is None:
         return Logo()
     # Loaded here: a report on a terminal shows no image.
@@ -62,7 +62,7 @@ def read_logo(path: Path | None) -> Logo:
 
 
 Fact = tuple[str, str, str]
-"""What, value, what stands beside it."""
+"""Return what, value, and what belongs to it."""
 CREDIBLE = "Intervals are central 90 % credible intervals"
 
 
@@ -109,8 +109,30 @@ class Table:
         return replace(self, terminal_rows=(), hidden_note="")
 
 
+LEAST_PROBABILITY = 0.01
+"""Rows of less are folded into one: a reader does nothing with them."""
+
+
+def fold_improbable(
+    rows: Sequence[tuple[str, ...]], probabilities: Sequence[float], what: str, column: int = 1
+) -> tuple[tuple[str, ...], ...]:
+    """Return the rows, those of a probability below 0.01 as one with their number.
+
+    `probabilities` belong to the rows, and stand in a `column`; `what` names a row.
+    """
+    pairs = list(zip(rows, probabilities, strict=True))
+    retained = [row for row, probability in pairs if not probability < LEAST_PROBABILITY]
+    left = len(pairs) - len(retained)
+    if left < 2:
+        return tuple(rows)
+    cells = [""] * len(rows[0])
+    cells[0] = f"{left} further {what}"
+    cells[column] = f"< {LEAST_PROBABILITY} each"
+    return (*retained, tuple(cells))
+
+
 def filled(*tables: Table) -> tuple[Table, ...]:
-    """Those that have rows."""
+    """Return the tables that have rows."""
     return tuple(table for table in tables if table.rows)
 
 
@@ -121,7 +143,8 @@ class Part:
     `lead` begins the summary and is stressed; `details` is the paragraph after it. `figures` are
     drawn where a renderer asks for them: a terminal does not, and loads nothing that draws.
     `status` and `style` are those of an answer of its own, as the paper's are of the whole; without
-    a `style` it has the paper's. The first appendix begins a page.
+    a `style` it has the paper's. An appendix is on a screen and in a complete text, not in a PDF.
+    `brief` are tables that stand alone in a brief text.
     """
 
     title: str
@@ -137,6 +160,7 @@ class Part:
     style: str = ""
     remarks_title: str = "What to mind about these data"
     is_appendix: bool = False
+    brief: Sequence[Table] = ()
 
     @property
     def headline(self) -> str:
@@ -150,7 +174,7 @@ class Part:
 
 
 def appendices(*parts: Part) -> tuple[Part, ...]:
-    """The parts as `Appendix A: ...`, `Appendix B: ...`."""
+    """Return the parts as `Appendix A: ...`, `Appendix B: ...`."""
     lettered = zip(ascii_uppercase, parts, strict=False)
     return tuple(
         replace(part, title=f"Appendix {letter}: {part.title}", is_appendix=True)
@@ -164,7 +188,8 @@ class Paper:
 
     The first part says all in short. `bridge` and `period` are empty where the title says them or
     there is none; an engineer puts a name to one that `is_signed`. `generated_at` is None and
-    `version` empty where nobody says. `closing` ends it: what holds throughout.
+    `version` empty where nobody says. `closing` ends it: what holds throughout. `revision` is that
+    of the report as a file, and `more` says in a brief text how to see everything.
     """
 
     title: str
@@ -178,13 +203,16 @@ class Paper:
     version: str = ""
     is_signed: bool = False
     letterhead: Letterhead = NO_LETTERHEAD
+    revision: str = ""
+    more: str = ""
 
     @property
     def above(self) -> str:
         """`Arch bridge, period 2026-03-01 to 2026-05-25`: what stands above the title."""
         period = f"period {self.period}" if self.period else ""
-        said = (self.letterhead.organisation, self.bridge, period)
-        return ", ".join(word for word in said if word)
+        revision = f"revision {self.revision}" if self.revision else ""
+        words = (self.letterhead.organisation, self.bridge, period, revision)
+        return ", ".join(word for word in words if word)
 
     @cached_property
     def logo(self) -> Logo:
@@ -193,7 +221,7 @@ class Paper:
 
     @property
     def signatures(self) -> tuple[tuple[str, str], ...]:
-        """Who answers for it: the words, and the name as far as it is given."""
+        """Return who answers for it: the words, and the name as far as it is given."""
         by = self.letterhead
         return (("Prepared by", by.prepared_by), ("Checked by", by.checked_by), ("Date", ""))
 
@@ -216,5 +244,5 @@ class Paper:
     @property
     def foot(self) -> str:
         """The last line: when it was made, by which version, what holds throughout."""
-        said = (self.made, self.logo.fault, self.closing)
-        return ". ".join(each for each in said if each)
+        statement = (self.made, self.logo.fault, self.closing)
+        return ". ".join(each for each in statement if each)

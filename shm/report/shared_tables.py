@@ -24,7 +24,7 @@ def verdict_label(verdict: Verdict) -> str:
 
 
 def overall(checks: Sequence[QualityCheck]) -> Verdict:
-    """The gravest of the verdicts; one good check outweighs any number that say nothing."""
+    """Return the gravest of the verdicts; one good check outweighs any number that say nothing."""
     given = {check.verdict for check in checks}
     if given <= {"unknown"}:
         return "unknown"
@@ -40,14 +40,14 @@ _HEADLINES: dict[Verdict, str] = {
 
 
 def headline(checks: Sequence[QualityCheck]) -> str:
-    """What the whole deserves, and which lowest mode or orders it lacks: `Use with care: ...`."""
+    """Return the overall verdict and the lowest modes that are missing: `Use with care: ...`."""
     grave = (FIRST_ORDERS, "warning"), (NUMBERING, "refused")
     lost = [c.found for c in checks if (c.name, c.verdict) in grave]
     return ": ".join([_HEADLINES[overall(checks)], *lost])
 
 
 def with_unit(value: float, unit: str) -> str:
-    """A figure with its unit as one reads it, `not known` where it is NaN."""
+    """Return a figure with its unit as one reads it, `not known` where it is NaN."""
     known = math.isfinite(value)
     return f"{formatting.plain(value)} {unit}".rstrip() if known else formatting.plain(value)
 
@@ -88,9 +88,9 @@ _LINEAGE = {
 }
 
 
-def lineage(told: Mapping[str, str]) -> dict[str, str]:
-    """What a result was made from, its keys in words."""
-    return {_LINEAGE.get(key, formatting.quantity(key)): value for key, value in told.items()}
+def lineage(known: Mapping[str, str]) -> dict[str, str]:
+    """Return what a result was made from, its keys in words."""
+    return {_LINEAGE.get(key, formatting.quantity(key)): value for key, value in known.items()}
 
 
 def added_mass(test: ModalTest) -> str:
@@ -102,14 +102,14 @@ def added_mass(test: ModalTest) -> str:
     return f"{mass.mass_kg:g} kg at {mass.x_m:g} m from the deck end{size}"
 
 
-def settings(told: Mapping[str, str]) -> Table:
-    """The settings that decide the numbers, each with its unit; empty where nobody says."""
+def settings(known: Mapping[str, str]) -> Table:
+    """Return the settings that decide the numbers, each with its unit; empty where nobody says."""
     helps = {row.name: row.help for row in TABLE}
     return Table(
         "Settings in force",
         ("setting", "value", "what it is"),
         tuple(
-            (name, value.replace(",", ", "), helps.get(name, "")) for name, value in told.items()
+            (name, value.replace(",", ", "), helps.get(name, "")) for name, value in known.items()
         ),
         note="Of identification, updating and watch, as they stand now: given, without interval.",
     )

@@ -6,7 +6,7 @@ import math
 
 from shm.report import formatting
 from shm.report.formatting import Interval
-from shm.report.paper import Table
+from shm.report.paper import Table, fold_improbable
 from shm.values import NAN, Drift, is_ratio, kind_of
 from shm.values.rounding import ForceUnit, force_unit
 from shm.watch.change_words import factor
@@ -34,7 +34,7 @@ def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
 
 
 def shift_unit(pattern: BridgePattern) -> tuple[ForceUnit, int]:
-    """The one unit of all shifts of tension, and the decimals that they deserve.
+    """Return the one unit of all shifts of tension, and the decimals that they deserve.
 
     By the tensions that shift, not by the shifts: of hangers at rest they are all but 0.
     """
@@ -71,8 +71,10 @@ def pattern_tables(pattern: BridgePattern) -> tuple[Table, Table]:
     return shift_table(pattern), Table(
         "What explains them",
         ("explanation", "probability"),
-        tuple(
-            (each.name, formatting.probability(each.probability)) for each in pattern.explanations
+        fold_improbable(
+            [(e.name, formatting.probability(e.probability)) for e in pattern.explanations],
+            [each.probability for each in pattern.explanations],
+            "explanations",
         ),
     )
 
@@ -119,7 +121,7 @@ def _shift(row: HangerRow, unit: ForceUnit, places: int) -> tuple[str, ...]:
 
 
 def bar(share: float) -> str:
-    """A share of the largest shift, -1 to 1, as `...<==|......`."""
+    """Return a share of the largest shift, -1 to 1, as `...<==|......`."""
     length = round(abs(share) * _BAR)
     stroke = "=" * (length - 1)
     left = f"<{stroke}" if share < 0 and length else ""

@@ -27,7 +27,7 @@ class Size:
     logarithmic: bool = False
 
     def __str__(self) -> str:
-        return self.told(self.interval)
+        return self.in_words(self.interval)
 
     @property
     def sure_sign(self) -> int:
@@ -42,29 +42,35 @@ class Size:
             return f"{self} {up}"
         if self.sure_sign < 0:
             turned = Interval(-self.interval.mean, -self.interval.high, -self.interval.low)
-            return f"{self.told(turned)} {down}"
-        return f"{self.told(self.interval, '+')} {up}"
+            return f"{self.in_words(turned)} {down}"
+        return f"{self.in_words(self.interval, '+')} {up}"
 
     def __format__(self, directions: str) -> str:
         """As text; with `up|down` as `directed` says it."""
         up, bar, down = directions.partition("|")
         return self.directed(up, down) if bar else str(self)
 
-    def told(self, interval: Interval, sign: str = "") -> str:
-        """An interval in this size's unit and digits."""
+    def in_words(self, interval: Interval, sign: str = "") -> str:
+        """Return an interval in this size's unit and digits."""
         mean, low, high = _texts(interval, sign, self.logarithmic)
         unit = f" {self.unit}" if self.unit else ""
         return f"{mean}{unit} ({low} to {high})" if low and high else f"{mean}{unit}"
 
 
 def size(estimate: EffectEstimate) -> Size:
-    """An estimate in the unit and prefix that suit it; logarithms as what they are of."""
+    """Return an estimate in the unit and prefix that suit it; a logarithm as what it is of."""
     interval = Interval(estimate.mean, estimate.q05, estimate.q95)
-    if logarithmic := is_logarithm(estimate.name):
-        interval = Interval(
-            *(10.0**value for value in (interval.mean, interval.low, interval.high))
-        )
-    scale, unit = _FACTORS.get(estimate.unit, (1.0, estimate.unit))
+    return size_of(estimate.name, estimate.unit, interval)
+
+
+def size_of(name: str, unit: str, interval: Interval) -> Size:
+    """Return the size of a parameter by its name, `unit` and 90 % interval.
+
+    Of a log10 the unit is that of the quantity; it is given as the quantity.
+    """
+    if logarithmic := is_logarithm(name):
+        interval = Interval(*(10.0**each for each in (interval.mean, interval.low, interval.high)))
+    scale, unit = _FACTORS.get(unit, (1.0, unit))
     if unit in _SCALED_UNITS:
         sizes = (pair for pair in _PREFIXES if abs(interval.mean) >= pair[0])
         divisor, prefix = next(sizes, (1.0, ""))
@@ -79,7 +85,7 @@ def _texts(interval: Interval, sign: str, logarithmic: bool) -> tuple[str, str, 
         mean, low, high = (_significant(v, sign) for v in _three(interval))
         return (mean, low, high) if half > 0 else (mean, "", "")
     places = min(math.ceil(-math.log10(half / 2.95)), _most_places(interval.mean))
-    mean, low, high = (f"{round(v, places):{sign}.{max(0, places)}f}" for v in _three(interval))
+    mean, low, high = (f"{round(v, places):{sign}z.{max(0, places)}f}" for v in _three(interval))
     return mean, low, high
 
 
@@ -105,7 +111,7 @@ def _significant(value: float, sign: str) -> str:
     if value == 0:
         return "0"
     places = 1 - math.floor(math.log10(abs(value)))
-    return f"{round(value, places):{sign}.{max(0, places)}f}"
+    return f"{round(value, places):{sign}z.{max(0, places)}f}"
 
 
 def quantity(estimate: EffectEstimate) -> str:
@@ -120,7 +126,7 @@ class Sizes(dict[str, "Size | str"]):
         super().__init__({base_name(e.name): size(e) for e in estimates})
 
     def __missing__(self, stem: str) -> str:
-        """The end springs `stem` 1 to 4, with their planes where there are several."""
+        """Return the end springs `stem` 1 to 4, with their planes where there are several."""
         found = {
             plane: self[name]
             for number, plane in _SPRING_PLANES.items()

@@ -47,7 +47,7 @@ class Period:
     until: datetime
 
     def holds(self, time: datetime | None) -> bool:
-        """Whether `time` lies in it, or ahead of it by another clock; an unknown one does not."""
+        """Return True if `time` is in it or ahead of it; an unknown one is not."""
         return time is not None and time >= self.since
 
     def __str__(self) -> str:
@@ -55,31 +55,31 @@ class Period:
         return f"{_day(self.since)} to {_day(self.until)}"
 
 
-def period_since(told: str, now: datetime) -> Period:
+def period_since(wording: str, now: datetime) -> Period:
     """The period that a person writes: `2026-03-01`, `2026-03-01T10:00`, `90d`, `12w`, `6m`, `1y`.
 
     A date is taken in UTC, a month as the twelfth of a year. Raises UsageError where it is neither,
     or lies ahead of `now`.
     """
-    since = _since(told.strip(), now)
+    since = _since(wording.strip(), now)
     if since >= now:
         raise UsageError(f"a period since {_day(since)} has not begun yet.", remedy=_REMEDY)
     return Period(since, now)
 
 
 def period_json(period: Period | None) -> dict[str, datetime] | None:
-    """The period in a JSON document."""
+    """Return the period in a JSON document."""
     return {"since": period.since, "until": period.until} if period else None
 
 
-def _since(told: str, now: datetime) -> datetime:
+def _since(wording: str, now: datetime) -> datetime:
     try:
-        if found := _SPAN.fullmatch(told):
+        if found := _SPAN.fullmatch(wording):
             return now - timedelta(days=int(found[1]) * _DAYS[found[2].lower()])
-        since = datetime.fromisoformat(told)
+        since = datetime.fromisoformat(wording)
     except (ValueError, OverflowError):
         raise UsageError(
-            f"{told!r} is neither a date nor a span of time.", remedy=_REMEDY
+            f"{wording!r} is neither a date nor a span of time.", remedy=_REMEDY
         ) from None
     return since.replace(tzinfo=UTC) if since.tzinfo is None else since
 
@@ -111,7 +111,7 @@ class QuantityOverTime:
         return self.name == TENSION
 
     def at(self, chosen: BoolArray) -> QuantityOverTime:
-        """The same at the `chosen` tests, shape (n,)."""
+        """Return the same at the `chosen` tests, shape (n,)."""
         bands = (self.read, self.filtered, self.smoothed)
         read, filtered, smoothed = (
             Band(band.low[chosen], band.middle[chosen], band.high[chosen]) for band in bands
@@ -156,7 +156,7 @@ class StatesOverTime:
     temperature_coefficients: tuple[TemperatureCoefficient, ...] = ()
 
     def within(self, period: Period | None) -> StatesOverTime:
-        """Those at the tests of a period, and the changes that may have begun in it."""
+        """Return the states at the tests of a period, and the changes that may have begun in it."""
         if period is None:
             return self
         inside = np.array([period.holds(time) for time in self.times], bool)
@@ -294,12 +294,12 @@ def _coefficient_row(
 
 
 def _is_known(each: TemperatureCoefficient, states: StatesOverTime) -> bool:
-    """Whether the tests tell it, and are enough to tell it from a change."""
+    """Return True if the tests show it, and are enough to distinguish it from a change."""
     return each.is_known and len(_known_c(states)) >= _FEWEST
 
 
 def _known_c(states: StatesOverTime) -> FloatArray:
-    """The temperatures (n,) of the tests that count."""
+    """Return the temperatures (n,) of the tests that count."""
     return states.temperatures_c[np.isfinite(states.temperatures_c) & ~states.outlier]
 
 

@@ -17,7 +17,8 @@ class BarDescription:
 
     `density_kg_m3` is mass over area. `length_by` and `length_measured` say how the length was
     taped, `measured_by` who measured the bar. `sensors` are those of the test that the report is
-    about; with a roving hammer they are the places that it hit. `ends` is how the ends are held,
+    about; with a roving hammer they are the places that it hit. `hits` are where the hammer hit,
+    as far as the file says. `ends` is how the ends are held,
     `end_kind` how they are made; `inclination_deg` is counted from the horizontal.
     """
 
@@ -38,16 +39,21 @@ class BarDescription:
     end_kind: str = ""
     inclination_deg: float = NAN
     sensors: tuple[ResponsePoint, ...] = ()
+    hits: tuple[ResponsePoint, ...] = ()
     measured_by: str = ""
 
 
-def describe_bar(hanger: Hanger | None, sensors: Sequence[ResponsePoint] = ()) -> BarDescription:
+def describe_bar(
+    hanger: Hanger | None,
+    sensors: Sequence[ResponsePoint] = (),
+    hits: Sequence[ResponsePoint] = (),
+) -> BarDescription:
     """Return the description of a hanger's bar; of None only the sensors are known.
 
     Fittings and ends at their defaults count as stated only where the owner wrote them.
     """
     if hanger is None:
-        return BarDescription(sensors=tuple(sensors))
+        return BarDescription(sensors=tuple(sensors), hits=tuple(hits))
     survey = hanger.survey
     has_fittings = any(hanger.fittings_m) or "fittings_m" in survey.stated_keys
     has_ends = hanger.supports != Supports() or "supports" in survey.stated_keys
@@ -69,6 +75,7 @@ def describe_bar(hanger: Hanger | None, sensors: Sequence[ResponsePoint] = ()) -
         end_kind=hanger.ends,
         inclination_deg=hanger.inclination_deg,
         sensors=tuple(sensors),
+        hits=tuple(hits),
         measured_by=survey.measured_by,
     )
 
@@ -90,4 +97,16 @@ def list_sensors(
     if not found:
         places = {(mode.plane, point.x_m) for mode in test.modes for point in mode.shape}
         found = [ResponsePoint("", plane, x_m) for plane, x_m in sorted(places)]
+    return tuple(dict.fromkeys(found))
+
+
+def list_hits(records: Sequence[Recording | FrequencyResponse]) -> tuple[ResponsePoint, ...]:
+    """Return where the hammer hit, by the places of the force channels, each place once."""
+    found = (
+        ResponsePoint("hit", channel.plane, channel.x_m)
+        for record in records
+        if isinstance(record, Recording)
+        for channel in record.channels
+        if channel.quantity == "force"
+    )
     return tuple(dict.fromkeys(found))

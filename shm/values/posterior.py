@@ -380,7 +380,7 @@ class Posterior(Shown):
             n_modes = len(self.names)
             modes = "1 measured frequency" if n_modes == 1 else f"{n_modes} measured frequencies"
             return line("Posterior", self.hanger, f"{modes}, no model")
-        tension = Selection((self,), (1.0,)).averaged().tension_n
+        tension = Selection((self,), (1.0,)).averaged.tension_n
         said = f"{self.model}, {tension_words(tension.mean, tension.q05, tension.q95)}"
         return line("Posterior", self.hanger, said)
 
@@ -455,8 +455,13 @@ class Selection(Shown):
         ]
         return np.concatenate(parts)
 
-    def averaged(self, limits: Limits | None = None) -> Averaged:
-        """Return the tension over all classes together."""
+    @property
+    def averaged(self) -> Averaged:
+        """Return the tension over all classes together; see `averaged_with` for limits."""
+        return self.averaged_with(Limits())
+
+    def averaged_with(self, limits: Limits | None) -> Averaged:
+        """Return the same with the probabilities of a tension beyond a hanger's `limits`."""
         draws, limits = self.tension_n, limits or Limits()
         above, slack = limits.tension_max_n, limits.tension_min_n
         likely = [p for p, w in zip(self.posteriors, self.probabilities, strict=True) if w > 0.05]

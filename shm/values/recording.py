@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shm.values.kinds import NAN, ComplexArray, FloatArray, IntArray, Plane, Quantity
+from shm.values.showing import Shown, front
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(Shown):
     """Accelerations over time, as received, with the hammer's force unless nobody hit.
 
     One file, one or many hits. The force channel's `x_m` and `plane` say where and in which
@@ -99,6 +105,15 @@ class Recording:
             }
             for channel in self.channels
         ]
+
+    def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Figure:
+        """Draw all channels over time: the figure of `shm.plot.recording`.
+
+        Example:
+            >>> shm.read("hanger3.csv").plot()
+        """
+        figure: Figure = front().plot.recording(self, ax=ax)
+        return figure
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ def averaged_now(
     posterior: Posterior, selection: Selection | None = None, limits: Limits | None = None
 ) -> Averaged:
     """Return the tension by a `posterior`, averaged over the classes of a `selection`."""
-    return selection_now(posterior, selection).averaged(limits)
+    return selection_now(posterior, selection).averaged_with(limits)
 
 
 def selection_now(posterior: Posterior, selection: Selection | None = None) -> Selection:

@@ -13,7 +13,7 @@ from datetime import datetime
 
 from shm.values import TENSION, Alert, AlertKind, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.messages import WEEK, Lead
-from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
+from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
 from shm.watch.change_words import (
     CAUSES,
     action_words,
@@ -97,12 +97,9 @@ def _new(beyond: Sequence[Drift]) -> str:
 def _of_hanger(
     test: WatchedTest, change: Change | None, beyond: Sequence[Drift], sizes: str, *, is_call: bool
 ) -> list[str]:
-    tension = next((each for each in test.drifts if each.quantity == TENSION), None)
-    spoken = {each.quantity for each in (*beyond, *(suspects(change) if change else ()))}
     is_odd = test.change.outlier_probability > 0.5
     return [
         "This test itself is probably an outlier." if is_odd else "",
-        _tension_now(tension) if tension and TENSION in spoken else "",
         _details(
             sizes, _probabilities(test, change, beyond), _false_alarms(change) if is_call else ""
         ),
@@ -139,7 +136,6 @@ def message_of_agreeing(
         action_words(hanger, None, [drift]),
         f"Tests {first} and {tests[1]} both read beyond its threshold of {threshold_words(drift)}.",
         "Check the logger's clock: if it is wrong, the date of the change is not known.",
-        _tension_now(drift) if drift.quantity == TENSION else "",
         _details(_sizes(None, [drift]) or _HALF_WIDTH, _merged(said)),
     ]
     return " ".join(part for part in parts if part)
@@ -293,14 +289,6 @@ def _when(change: Change | None) -> str:
 def _between(after: datetime, by: datetime) -> str:
     first, last = f"{after:%Y-%m-%d}", f"{by:%Y-%m-%d}"
     return f"on {first}" if first == last else f"between {first} and {last}"
-
-
-def _tension_now(drift: Drift) -> str:
-    """Return the tension to three digits, of which its absolute interval hardly leaves more."""
-    unit = force_unit(drift.value, drift.baseline)
-    places = max(0, 2 - math.floor(math.log10(unit.of(drift.baseline))))
-    now, then = (f"{unit.of(n):.{places}f} {unit.name}" for n in (drift.value, drift.baseline))
-    return f"At equal temperature the tension is {now} now, {then} at the baseline."
 
 
 def _details(*parts: str) -> str:

@@ -9,7 +9,6 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -26,13 +25,13 @@ UNITS = {
     "tension": "tension (kN)",
     "trend": "tension (kN)",
     "frequencies": "predicted / measured frequency",
-    "pairs": "tension (kN)",
     "frequency_response": "accelerance (m/s²/N)",
     "stabilisation": "frequency (Hz)",
     "shapes": "position from the deck end (m)",
-    "stiffness": "log10 of stiffness in N m/rad",
+    "stiffness": "stiffness (MN m/rad)",
     "gap": "order of the mode",
     "causes": "probability",
+    "recording": "time (s)",
     "gap_check": "size, from the weakest to the strongest of its prior range",
 }
 
@@ -43,6 +42,7 @@ def drawn(
     posterior: shm.Posterior,
     test_of_711_kn: shm.ModalTest,
     identified: shm.Identification,
+    recording: shm.Recording,
 ) -> dict[str, Figure]:
     dated = replace(test_of_711_kn, time=datetime(2026, 5, 1, tzinfo=UTC))
     sprung = quick_update.update([dated], build("beam2", hanger), UpdateOptions())
@@ -50,13 +50,13 @@ def drawn(
         "tension": shm.plot.tension(posterior, hanger),
         "trend": shm.plot.trend([posterior], [dated], hanger),
         "frequencies": shm.plot.frequencies(posterior, test_of_711_kn, hanger),
-        "pairs": shm.plot.pairs(posterior, hanger),
         "frequency_response": shm.plot.frequency_response(identified, hanger),
         "stabilisation": shm.plot.stabilisation(identified),
         "shapes": shm.plot.shapes(identified, hanger),
         "stiffness": shm.plot.stiffness([sprung], [dated], hanger),
         "gap": shm.plot.gap(a_diagnosis(), hanger),
         "causes": shm.plot.causes(a_diagnosis(), hanger),
+        "recording": recording.plot(),
         "gap_check": shm.plot.gap_check(a_check()),
     }
 
@@ -81,25 +81,6 @@ def test_a_figure_is_one_of_matplotlib_with_labels_on_white(
     labels += [text.get_text() for text in (figure._supxlabel, figure._supylabel) if text]
     assert UNITS[name] in labels
     assert figure.get_facecolor() == (1.0, 1.0, 1.0, 1.0)
-
-
-def test_pairs_show_each_parameter_and_each_two(
-    drawn: dict[str, Figure], posterior: shm.Posterior
-) -> None:
-    panels = drawn["pairs"].axes
-    assert len(panels) == min(len(posterior.names), 7) ** 2  # the first seven at most
-    said = [text.get_text() for axes in panels for text in axes.texts]
-    force, length, *_ = posterior.samples.T
-    assert said[0] == f"{np.corrcoef(force, length)[0, 1]:+.2f}"
-
-
-def test_a_parameter_that_does_not_vary_has_no_correlation(
-    hanger: shm.Hanger, posterior: shm.Posterior
-) -> None:
-    samples = posterior.samples.copy()
-    samples[:, 1] = 1.0
-    figure = shm.plot.pairs(replace(posterior, samples=samples), hanger)
-    assert "constant" in [text.get_text() for axes in figure.axes for text in axes.texts]
 
 
 def test_a_figure_without_its_data_says_so(

@@ -65,7 +65,7 @@ def test_tension_averages_classes(tmp_path: Path) -> None:
     with shm.Store(workspace.folder) as store:
         selection = store.selection(3)
         headline, one = store.tension(3).tension_n, store.posterior(3, model="beam2").tension_n
-        assert headline == selection.averaged(store.hanger(3).limits).tension_n
+        assert headline == selection.averaged_with(store.hanger(3).limits).tension_n
         assert headline.q95 - headline.q05 > 1.2 * np.ptp(np.quantile(one, [0.05, 0.95]))
         other = store.posterior(3, model="beam1")
         assert (other.model, other.tests) == ("beam1", ("t1",))

@@ -17,8 +17,8 @@ import shm
 ROOT = Path(__file__).resolve().parents[2]
 
 SIGNATURES = {
-    "read": "(path)",
     "from_sep005": "(channels, *, hanger=None)",
+    "read": "(path, *, planes=None, places_m=None)",
     "load_modes": "(path)",
     "load_hanger": "(path, hanger_id=None)",
     "round_bar": "(id, *, diameter_m, length_m, elastic_modulus_pa, density_kg_m3, "
@@ -39,17 +39,17 @@ SIGNATURES = {
     "sensors=2, hammer_x_m=nan, acceleration_noise_m_s2=0.02, effects=(), "
     "amplitude=1.0, temperature_c=nan, reference_c=10.0, added_mass=None, time=None, seed=1)",
     "Store": "(workspace)",
-    "plot.tension": "(posterior, hanger, baseline=None)",
-    "plot.trend": "(posteriors, tests, hanger, baseline=None)",
-    "plot.stiffness": "(posteriors, tests, hanger, baseline=None)",
-    "plot.frequencies": "(posterior, test, hanger)",
-    "plot.pairs": "(posterior, hanger)",
-    "plot.frequency_response": "(test, hanger=None)",
-    "plot.stabilisation": "(test, hanger=None)",
-    "plot.shapes": "(test, hanger)",
-    "plot.gap": "(diagnosis, hanger)",
-    "plot.causes": "(diagnosis, hanger)",
-    "plot.gap_check": "(check)",
+    "plot.tension": "(posterior, hanger, baseline=None, *, ax=None)",
+    "plot.trend": "(posteriors, tests, hanger, baseline=None, *, ax=None)",
+    "plot.stiffness": "(posteriors, tests, hanger, baseline=None, *, ax=None)",
+    "plot.frequencies": "(posterior, test, hanger, *, ax=None)",
+    "plot.frequency_response": "(test, hanger=None, *, ax=None)",
+    "plot.stabilisation": "(test, hanger=None, *, ax=None)",
+    "plot.shapes": "(test, hanger, *, ax=None)",
+    "plot.gap": "(diagnosis, hanger, *, ax=None)",
+    "plot.causes": "(diagnosis, hanger, *, ax=None)",
+    "plot.recording": "(recording, *, ax=None)",
+    "plot.gap_check": "(check, *, ax=None)",
     "export.causes": "(diagnosis)",
     "export.inference_data": "(posterior, tests=(), hanger=None)",
     "export.samples": "(posterior)",

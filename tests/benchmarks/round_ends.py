@@ -79,7 +79,7 @@ def told(case: Case) -> tuple[float, float, float, tuple[str, ...]]:
     )
     test = ModalTest("exact", modes, hanger=1)
     found = select([test], [build(name, hanger) for name in CLASSES], UpdateOptions())
-    averaged = found.averaged()
+    averaged = found.averaged
     stated = averaged.tension_n
     return (
         stated.mean / tension_n,

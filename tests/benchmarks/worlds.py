@@ -73,7 +73,7 @@ def selected(task: tuple[str, int, int, int, bool]) -> dict[str, Any]:
     started = time.process_time()
     names, _ = applicable(hanger, BEAMS)
     found = select(tests, [build(name, hanger) for name in names], UpdateOptions())
-    seconds, tension_n = time.process_time() - started, found.averaged().tension_n
+    seconds, tension_n = time.process_time() - started, found.averaged.tension_n
     truth = float(case.truth["tension_n"])
     return {
         "world": world,
@@ -85,8 +85,8 @@ def selected(task: tuple[str, int, int, int, bool]) -> dict[str, Any]:
         "seconds": seconds,
         "fewest_effective": min(p.effective_sample_size for p in found.posteriors),
         "largest_occam": max(p.log_occam for p in found.posteriors),
-        "caveats": list(found.averaged().caveats),
-        "faults": list(found.averaged().faults),
+        "caveats": list(found.averaged.caveats),
+        "faults": list(found.averaged.faults),
     }
 
 
@@ -96,7 +96,7 @@ def against_reference(task: tuple[str, int, int, int, bool]) -> float:
     case = importlib.import_module(f"tests.worlds.{world}").sound_hangers(seed, count)[index]
     hanger, tests = hanger_and_tests(case, new_keys)
     names, _ = applicable(hanger, BEAMS)
-    averaged = select(tests, [build(n, hanger) for n in names], UpdateOptions()).averaged()
+    averaged = select(tests, [build(n, hanger) for n in names], UpdateOptions()).averaged
     truly = update(tests, build("beam3", hanger), UpdateOptions(samples=8000, seed=2))
     low, high = np.quantile(truly.tension_n, [0.05, 0.95])
     return float((averaged.tension_n.q95 - averaged.tension_n.q05) / (high - low))

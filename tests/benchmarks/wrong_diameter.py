@@ -59,7 +59,7 @@ def case(seed: int, factor: float) -> tuple[float, float, float, bool]:
         for order, hz in enumerate(exact * (1 + ERROR * rng.standard_normal(orders)), start=1):
             modes.append(Mode(plane, order, float(hz), frequency_sd_hz=ERROR * float(hz)))
     test = ModalTest("t", tuple(modes), hanger=1)
-    found = select([test], [build("beam2", hanger)], UpdateOptions(samples=600)).averaged()
+    found = select([test], [build("beam2", hanger)], UpdateOptions(samples=600)).averaged
     stated = found.tension_n
     says = any(each.startswith("The description does not fit") for each in found.caveats)
     return stated.mean / tension_n, stated.q05 / tension_n, stated.q95 / tension_n, says

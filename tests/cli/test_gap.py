@@ -86,7 +86,7 @@ def test_a_diagnosis_of_a_workspace_is_kept_for_the_report(shm: Shm, tmp_path: P
     assert len(ended.document["tests"]) == 2
     kept = shm(*at, "report", "--hanger", 3, "--json").document["diagnosis"]
     assert kept == ended.document
-    assert "Gap diagnosis: " in shm(*at, "report", "--hanger", 3).out
+    assert "Gap diagnosis: " in shm(*at, "report", "--hanger", 3, "--full").out
 
 
 def test_the_bar_has_the_sensors_of_all_tests(

@@ -101,7 +101,7 @@ def test_a_stored_test_shows_how_it_was_identified(
     page = tmp_path / "sheet.html"
     assert shm(*ask, "--out", page).code == 0
     assert "set_up_0" in page.read_text(encoding="utf-8")
-    assert "QUALITY" in shm(*ask).out
+    assert "QUALITY" in shm(*ask, "--full").out
 
 
 def test_a_test_that_is_not_there_names_the_latest(

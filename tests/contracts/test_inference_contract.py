@@ -574,7 +574,7 @@ def test_a_choice_of_the_function_holds_its_posteriors_and_an_average() -> None:
     tests, hanger = shm.load_modes(calls.FEW), shm.load_hanger(calls.LIMITED)
     choice = shm.select(tests, hanger, models=["beam1"], seed=1, samples=SAMPLES)
     assert (choice.selected.model, choice.probabilities) == ("beam1", (1.0,))
-    averaged = choice.averaged(hanger.limits)
+    averaged = choice.averaged_with(hanger.limits)
     command = updated("select_limits")["averaged"]
     assert averaged.tension_n.q50 == pytest.approx(command["tension_n"]["q50"])
     assert averaged.probability_above_limit == command["probability_above_limit"]

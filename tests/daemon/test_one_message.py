@@ -26,8 +26,8 @@ from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
 from shm.report.bridge_report import summary as bridge_summary
 from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.hanger_sentences import summary
 from shm.report.hanger_status import Status
-from shm.report.hanger_summary import summary
 from shm.store import IdentifiedTest, Lineage, Store, StoredTest, Workspace
 from shm.values import Alert, Change, Drift, RepeatedMistake, Selection, WatchedTest
 from shm.values.messages import Lead, Urgency

@@ -13,7 +13,6 @@ from pathlib import Path
 import httpx
 import pytest
 
-from shm.report.contents import HangerLine
 from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
 from shm.store import Workspace
@@ -22,7 +21,7 @@ from shm_daemon.web import bridge_view
 from shm_daemon.web.address import Address
 from shm_daemon.web.bridge_view import CLASSES, HangerGlance, elevation, kind_of, shift_words
 from shm_daemon.web.site import Description, Site
-from tests.helpers.nouns import a_message
+from tests.helpers.nouns import a_summary, averaged
 from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import START, make_workspace, write_test
@@ -32,12 +31,14 @@ def glance(hanger: Hanger, shift: float = 0.0, sd: float = 0.003) -> HangerGlanc
     """A hanger whose tension moved by so much since its baseline."""
     moved = Drift(hanger.id, "t9", START, TENSION, 711e3, 711e3, shift, sd, 0.05, 0.1)
     tension = Interval.normal(711e3, 5e3)
-    line = HangerLine(hanger, a_message(Status.STEADY), START, tension, drift=moved)
-    return HangerGlance(line, tests=9)
+    return HangerGlance(
+        a_summary(hanger, Status.STEADY, tension, drifts=(moved,), baseline=averaged(tension)),
+        tests=9,
+    )
 
 
 def never_tested(hanger: Hanger) -> HangerGlance:
-    return HangerGlance(HangerLine(hanger, a_message()))
+    return HangerGlance(a_summary(hanger))
 
 
 @pytest.fixture(scope="module")
@@ -145,8 +146,8 @@ def test_a_shift_has_a_class_that_the_legend_names(hanger: Hanger, shift: float,
 
 def test_where_there_is_no_change_to_tell_none_is_told(hanger: Hanger) -> None:
     tension = Interval.normal(711e3, 5e3)
-    first = HangerLine(hanger, a_message(Status.FIRST), START, tension, baseline_tension_n=tension)
-    unready = HangerLine(hanger, a_message(Status.FIRST), START, tension)
+    first = a_summary(hanger, Status.FIRST, tension, baseline=averaged(tension))
+    unready = a_summary(hanger, Status.FIRST, tension)
     told = {
         "is the baseline": HangerGlance(first),
         "no baseline yet": HangerGlance(unready),
@@ -158,8 +159,8 @@ def test_where_there_is_no_change_to_tell_none_is_told(hanger: Hanger) -> None:
 
 def test_a_test_that_the_watch_passed_over_is_compared_by_itself(hanger: Hanger) -> None:
     then, now = Interval.normal(700e3, 5e3), Interval.normal(630e3, 5e3)
-    line = HangerLine(hanger, a_message(Status.STEADY), START, now, baseline_tension_n=then)
-    assert kind_of(HangerGlance(line)) == "lost3"
+    summary = a_summary(hanger, Status.STEADY, now, drifts=(), baseline=averaged(then))
+    assert kind_of(HangerGlance(summary)) == "lost3"
 
 
 def test_a_shift_that_may_be_none_is_marked_hollow(hanger: Hanger) -> None:
@@ -175,19 +176,9 @@ def test_a_hanger_is_drawn_as_long_as_it_is(hanger: Hanger) -> None:
     assert heights[1] == pytest.approx(2 * heights[0], abs=0.2)
 
 
-def test_the_arch_is_nowhere_higher_than_the_hangers(hanger: Hanger) -> None:
-    lengths = (12.0, 12.0, 5.0, 5.0, 12.0)
-    drawing = elevation(
-        [glance(replace(hanger, id=id, length_m=m)) for id, m in enumerate(lengths, start=1)]
-    )
-    numbers = [float(each) for each in re.findall(r"[\d.]+", drawing.arch)]
-    assert min(numbers[1::2]) == min(mark.top for mark in drawing.hangers)
-    assert max(numbers[1::2]) == drawing.deck
-
-
 def test_two_hundred_hangers_have_room_and_alarms_keep_their_numbers(hanger: Hanger) -> None:
     many = [glance(replace(hanger, id=number)) for number in range(1, 201)]
-    many[96] = replace(many[96], line=replace(many[96].line, open_alerts=1))
+    many[96] = replace(many[96], summary=replace(many[96].summary, open_alerts=1))
     drawing = elevation(many)
     places = [mark.x for mark in drawing.hangers]
     steps = [after - before for before, after in pairwise(places)]

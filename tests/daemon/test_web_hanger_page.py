@@ -14,9 +14,8 @@ import plotly.graph_objects as plotly
 import pytest
 
 from shm.pipeline.reporting import hanger_report
-from shm.report.contents import message, status
+from shm.report.hanger_sentences import details
 from shm.report.hanger_status import Status
-from shm.report.hanger_summary import details
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.store import Lineage, Workspace
 from shm_daemon.web.background_work import BackgroundWorker, Order
@@ -115,9 +114,9 @@ def test_the_page_says_what_the_report_says(
     monkeypatch.setattr("shm.pipeline.reporting.hanger_states", without_states)
     with bridge.store() as store:
         report = hanger_report(bridge, store, 3, START)
-    assert status(report) is Status.ALERT
+    assert report.status is Status.ALERT
     said = _plain(words_of(page))
-    assert _plain(message(report).words) in said
+    assert _plain(report.now.message.words) in said
     assert _plain(details(report)) in said
     assert f'<span class="status alert">{Status.ALERT.value}</span>' in page
 

@@ -197,7 +197,7 @@ def test_each_plane_has_its_panel_of_stiffness() -> None:
     titles = [each["text"] for each in document["layout"]["annotations"]]
     assert titles == ["transverse end stiffness", "longitudinal end stiffness"]
     assert {each["yaxis"] for each in document["data"]} == {"y", "y2"}
-    assert "log10 of N m/rad" in document["caption"]
+    assert "MN m/rad" in document["caption"]
 
 
 def test_ends_that_frequencies_tell_apart_have_a_panel_each() -> None:

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from typing import Any
 
 import numpy as np
 
+from shm.report.contents import HangerReport
+from shm.report.formatting import Interval
 from shm.report.hanger_status import HangerMessage, Status
+from shm.report.hanger_summary import HangerSummary, LatestTest
 from shm.store import ReceivedFile
 from shm.values import (
     Alert,
+    Averaged,
     Change,
     Drift,
     ForeignMode,
     FrequencyResponse,
+    Hanger,
     ModalTest,
     Mode,
     Moved,
@@ -22,6 +29,7 @@ from shm.values import (
     QualityCheck,
     ResponsePoint,
     ShapePoint,
+    Summary,
     WatchedTest,
 )
 from shm.values.messages import Lead
@@ -136,6 +144,33 @@ def a_watched_test(test: str = "t2", **changes: object) -> WatchedTest:
 
 def an_alert(key: str = "hanger-3:tension-down", test: str = "t2") -> Alert:
     return Alert(key, 3, test, NOW, "Hanger 3: tension moved.", (a_drift(test),))
+
+
+def averaged(tension_n: Interval) -> Averaged:
+    """Return a tension over all classes with this interval, its repeatability unknown."""
+    low, mean, high = tension_n.low, tension_n.mean, tension_n.high
+    return Averaged(Summary(mean, (high - low) / 3.29, low, mean, high), float("nan"))
+
+
+def a_summary(
+    hanger: Hanger, status: Status | None = None, tension_n: Interval | None = None, **more: Any
+) -> HangerSummary:
+    """Return a tested hanger in a state, without a baseline; of no status it was never tested."""
+    if status is None or tension_n is None:
+        return HangerSummary(hanger, **more)
+    shift, probability = (-0.1, 0.99) if status is Status.ALERT else (0.0, 0.01)
+    drift = Drift(hanger.id, "t2", NOW, "tension", 1.0, 1.0, shift, 0.004, 0.05, probability)
+    given = {
+        "latest": LatestTest("t2", NOW, averaged(tension_n), "beam1"),
+        "is_first": status is Status.FIRST,
+        "drifts": () if status is Status.FIRST else (drift,),
+    }
+    return HangerSummary(hanger, **{**given, **more})
+
+
+def with_now(report: HangerReport, **changes: Any) -> HangerReport:
+    """Return a report of a hanger whose state now is another."""
+    return replace(report, now=replace(report.now, **changes))
 
 
 def a_message(status: Status | None = None) -> HangerMessage:

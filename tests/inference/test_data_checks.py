@@ -99,7 +99,7 @@ def test_a_posterior_says_first_what_it_left_out() -> None:
     posterior = update(NINE, build("beam1", STRING), FEW)
     assert "w9" not in posterior.tests
     assert posterior.caveats[0].startswith("Left out: test w9")
-    assert Selection((posterior,), (1.0,)).averaged().caveats[0].startswith("Left out: test w9")
+    assert Selection((posterior,), (1.0,)).averaged.caveats[0].startswith("Left out: test w9")
     assert not any("w9" in each for each in posterior.faults)
 
 

@@ -42,7 +42,7 @@ def wide(**fields: object) -> Posterior:
 
 def asked(posterior: Posterior) -> list[str]:
     """Return the caveats that are of this page, of which none is a fault."""
-    averaged = Selection((posterior,), (1.0,)).averaged()
+    averaged = Selection((posterior,), (1.0,)).averaged
     found = [each for each in averaged.caveats if each.startswith((ENDS, INCLINATION, "Sampled"))]
     assert not set(found) & {*averaged.faults, *posterior.faults}
     return found

@@ -16,12 +16,11 @@ from shm.inference import UpdateOptions
 from shm.models import Model
 from shm.modes_document import modes_document
 from shm.pipeline import rebaselining, utc_now
-from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.rebaselining import Order, rebaseline
 from shm.pipeline.reporting import hanger_report
-from shm.report.contents import status
+from shm.report.hanger_sentences import summary
 from shm.report.hanger_status import Status
-from shm.report.hanger_summary import summary
 from shm.store import Workspace
 from shm.values import ModalTest, Posterior
 from tests.helpers import quick_update
@@ -92,7 +91,7 @@ def test_a_mistaken_mode_enters_neither_the_posterior_nor_the_watch_and_the_orig
             ("t2", "transverse", 2)
         ]
         report = hanger_report(workspace, store, 3, Clock().now)
-        (line,) = hanger_lines(workspace, store, utc_now())
+        (line,) = hanger_summaries(workspace, store, utc_now())
     said = report.lineage["left_out_of_the_baseline"]
     (mode,) = check.modes
     assert said == (
@@ -101,7 +100,7 @@ def test_a_mistaken_mode_enters_neither_the_posterior_nor_the_watch_and_the_orig
     )
     assert mode.expected_hz < 0.8 * mode.measured_hz
     assert report.warnings == line.warnings == ()
-    assert status(report) is line.status is Status.STEADY
+    assert report.status is line.status is Status.STEADY
 
 
 def test_a_test_by_a_wrong_clock_is_left_out_and_the_hanger_is_not_quiet(
@@ -115,11 +114,11 @@ def test_a_test_by_a_wrong_clock_is_left_out_and_the_hanger_is_not_quiet(
     assert [test.id for test in updated_from[0]] == ["t0", "t2", "t3"]
     with workspace.store() as store:
         report = hanger_report(workspace, store, 3, Clock().now)
-        (line,) = hanger_lines(workspace, store, utc_now())
+        (line,) = hanger_summaries(workspace, store, utc_now())
     assert summary(report).startswith("Hanger 3: its baseline is made without test t1.")
     assert "test t1: all its frequencies" in report.lineage["left_out_of_the_baseline"]
     assert line.warnings == report.warnings
-    assert status(report) is line.status is Status.CHECK
+    assert report.status is line.status is Status.CHECK
 
 
 def test_a_new_baseline_is_checked_as_the_first_one_was(
@@ -162,7 +161,7 @@ def test_a_mode_that_three_tests_have_wrong_is_one_notice_and_an_open_warning(
     with workspace.store() as store:
         alerts = [each.alert for each in store.alerts.list_all(3)]
         report = hanger_report(workspace, store, 3, Clock().now)
-        (line,) = hanger_lines(workspace, store, utc_now())
+        (line,) = hanger_summaries(workspace, store, utc_now())
     (alert,) = [each for each in alerts if "check the modes" in each.kinds]
     assert alert.test == "t6"
     assert alert.message.startswith(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report.hanger_status import Status
 from shm.store import Reconciled, StoredAlert, Workspace
 from shm.values import CrossedLimit
@@ -50,7 +50,7 @@ def test_a_crossed_limit_is_told_once_and_ends_when_the_tension_is_back(
     _, two = after(workspace, 0.7)
     assert two.resolution is None
     with workspace.store() as store:
-        (line,) = hanger_lines(workspace.reopened(), store, Clock()())
+        (line,) = hanger_summaries(workspace.reopened(), store, Clock()())
     assert "below its lower limit" in two.alert.message
     assert line.message.status is not Status.STEADY
 
@@ -62,7 +62,7 @@ def test_a_limit_that_is_changed_judges_at_once_and_what_a_person_resolved_stays
     (one,) = after(workspace, upper=650e3)
     assert "above its upper limit" in one.alert.message
     with workspace.reopened().store() as store:
-        (line,) = hanger_lines(workspace.reopened(), store, Clock()())
+        (line,) = hanger_summaries(workspace.reopened(), store, Clock()())
         assert line.message.status is Status.CHECK
         assert one.alert.message.startswith(line.message.lead.words)
         store.alerts.resolve(one.id, "Meier", "load test", Clock()())

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline import utc_now
-from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report.hanger_status import HangerMessage, Status
 from shm.store import Workspace
 from tests.helpers import quick_update
@@ -19,7 +19,7 @@ from tests.helpers.workspaces import START, make_workspace, write_test
 
 def message(workspace: Workspace) -> HangerMessage:
     with workspace.store() as store:
-        (line,) = hanger_lines(workspace, store, utc_now(), [workspace.bridge.hanger(3)])
+        (line,) = hanger_summaries(workspace, store, utc_now(), [workspace.bridge.hanger(3)])
     return line.message
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline import utc_now
-from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.conditions import Evidence, why_over
 from shm.pipeline.reconcile import SHM, Condition, reconcile, tells
 from shm.report.hanger_status import Status
@@ -298,12 +298,12 @@ def test_that_a_test_is_to_be_repeated_ends_with_one_that_does_not_show_the_same
         (notice,) = store.alerts.list_all()
         assert notice.alert.kinds == ("repeat the test",)
         assert notice.resolution is None, "the repeated test shows what the first has shown"
-        assert hanger_lines(bridge, store, utc_now())[0].status is Status.WATCH
+        assert hanger_summaries(bridge, store, utc_now())[0].status is Status.WATCH
     for day in (65, 90):
         take(bridge, postman, day, 1.0)
     with bridge.store() as store:
         assert store.alerts.list_all()[0].resolution is not None
-        assert hanger_lines(bridge, store, utc_now())[0].status is Status.STEADY
+        assert hanger_summaries(bridge, store, utc_now())[0].status is Status.STEADY
 
 
 def test_a_loss_that_a_test_done_again_calls_by_another_rule_is_told_already() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from shm.pipeline.bridge_reporting import hanger_lines, unwatched
+from shm.pipeline.bridge_reporting import hanger_summaries, unwatched
 from shm.pipeline.unheard import (
     Heard,
     State,
@@ -111,7 +111,7 @@ def test_a_silence_of_a_day_is_one_alert_which_ends_with_it(tmp_path: Path) -> N
             "Hanger 3: its stream hanger03 (last sample 2026-05-01 12:10 UTC) is silent for longer "
             "than a day. Look at its logger, power and connection within a week."
         )
-        lines = hanger_lines(workspace, store, last + 5 * day)
+        lines = hanger_summaries(workspace, store, last + 5 * day)
         assert {each.message.status for each in lines if each.hanger.id == 3} == {Status.UNCLEAR}
         send(workspace, hours=1 / 6, first=NOW + 5 * day)
         heed_silences(workspace, store, NOW + 5 * day + HOUR / 2)
@@ -159,7 +159,9 @@ def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(
         assert "is without any motion of it for longer than a day. See within a week whether" in (
             raised.alert.message
         )
-        (line,) = (e for e in hanger_lines(workspace, store, NOW + 27.2 * HOUR) if e.hanger.id == 3)
+        (line,) = (
+            e for e in hanger_summaries(workspace, store, NOW + 27.2 * HOUR) if e.hanger.id == 3
+        )
         assert line.message.status is Status.UNCLEAR
         heed_silences(workspace, store, NOW + 60 * HOUR)  # silent, too: it does not see again
         assert len(store.alerts.list_all(standing=True)) == 2

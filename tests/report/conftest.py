@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shm.models import class_units
-from shm.report.contents import HangerReport, trend_row
+from shm.report.contents import HangerReport, summary_of, trend_row
 from shm.report.figures import specification
 from shm.report.figures.specification import Illustration, Member, illustration
 from shm.values import (
@@ -105,14 +105,16 @@ def season(hanger: Hanger) -> HangerReport:
     )
     rival = make_posterior("t009", "beam1", 690e3, 99)
     compared = Selection((posteriors[-1], rival), (0.982, 0.018))
+    now = replace(
+        summary_of(hanger, tests[-1], posteriors[-1], posteriors[0], compared), drifts=drifts
+    )
     return HangerReport(
-        bridge="Arch bridge", hanger=hanger, tests=tests, posterior=posteriors[-1],
+        bridge="Arch bridge", now=now, tests=tests, posterior=posteriors[-1],
         generated_at=START + timedelta(days=130), version="0.1.0",
         trend=tuple(
             trend_row(p, t, hanger, compared) for p, t in zip(posteriors, tests, strict=True)
         ),
         baseline=posteriors[0], selection=compared,
-        drifts=drifts,
         alerts=(Alert("3-t009", 3, "t009", time, "tension fell by 7.2 %", drifts[:1]),),
         frequency_response=make_response(),
         lineage={"recording": "t009.csv, SHA-256 ab12cd34"},
@@ -133,7 +135,7 @@ def bare(hanger: Hanger) -> HangerReport:
     )  # fmt: skip
     return HangerReport(
         "Arch bridge",
-        hanger,
+        summary_of(hanger, test, posterior),
         (test,),
         posterior,
         START,

@@ -18,8 +18,6 @@ from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
 from shm.report.contents import (
     BridgeReport,
-    Course,
-    HangerLine,
     HangerReport,
     ModalTestReport,
     TrendRow,
@@ -27,11 +25,12 @@ from shm.report.contents import (
 from shm.report.formatting import Interval
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_status import Status
+from shm.report.hanger_summary import Course
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.states import CalledChange, Period, QuantityOverTime, StatesOverTime
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
 from shm.watch.state import Band
-from tests.helpers.nouns import a_change, a_message
+from tests.helpers.nouns import a_change, a_summary, with_now
 from tests.helpers.pdf_words import Pdf
 from tests.report.conftest import START
 from tests.report.diagnoses import CASES
@@ -67,7 +66,8 @@ def without_sds(data: HangerReport) -> HangerReport:
     check = QualityCheck("noise", "unknown", NAN, NAN, "dB", "not measured", "")
     drift = Drift(3, "t009", START, "tension", NAN, NAN, NAN, NAN, 0.05, NAN)
     tests = (replace(data.latest, modes=modes, amplitude=NAN, time=None),)
-    return replace(data, tests=tests, posterior=posterior, quality=(check,), drifts=(drift,))
+    known = with_now(data, drifts=(drift,))
+    return replace(known, tests=tests, posterior=posterior, quality=(check,))
 
 
 def of_period(data: HangerReport) -> HangerReport:
@@ -86,9 +86,15 @@ def unrecorded(row: TrendRow) -> TrendRow:
 
 KINDS: dict[str, Change] = {
     "whole": lambda data: data,
-    "no baseline": lambda data: replace(data, baseline=None, drifts=(), alerts=()),
+    "no baseline": lambda data: replace(
+        with_now(data, baseline=None, is_first=True, drifts=()), baseline=None, alerts=()
+    ),
     "one test": lambda data: replace(
-        data, trend=data.trend[-1:], baseline=data.posterior, drifts=(), alerts=(), selection=None
+        with_now(data, is_first=True, drifts=()),
+        trend=data.trend[-1:],
+        baseline=data.posterior,
+        alerts=(),
+        selection=None,
     ),
     "no temperature": lambda data: replace(
         data,
@@ -96,7 +102,9 @@ KINDS: dict[str, Change] = {
         trend=tuple(unrecorded(row) for row in data.trend),
     ),
     "called drift": lambda data: replace(
-        data, states=watched(data), called=(a_change(),), drift_watch="Tension fell by 7 %."
+        with_now(data, called=(a_change(),)),
+        states=watched(data),
+        drift_watch="Tension fell by 7 %.",
     ),
     "adopted class": lambda data: replace(
         data,
@@ -173,14 +181,12 @@ def test_a_bridge_is_told_in_numbers_and_words(season: HangerReport, with_period
     tension = Interval(650e3, 640e3, 660e3)
     course = Course(2, 1, Interval(-0.07, -0.08, -0.06)) if with_period else None
     lines = (
-        HangerLine(season.hanger, a_message(Status.ALERT), START, tension, "", 1, season.drifts[0],
-                   "t009", "beam2", course),
-        HangerLine(replace(season.hanger, id=4), a_message(Status.FIRST), None, tension, "", 0,
-                   drift, course=Course(1) if with_period else None),
-        HangerLine(replace(season.hanger, id=5, nominal_tension_n=0.0), a_message(Status.STEADY),
-                   START, tension),
-        HangerLine(replace(season.hanger, id=6), a_message(),
-                   course=Course() if with_period else None),
+        a_summary(season.hanger, Status.ALERT, tension, open_alerts=1, drifts=season.drifts,
+                  course=course),
+        a_summary(replace(season.hanger, id=4), Status.FIRST, tension, drifts=(drift,),
+                  course=Course(1) if with_period else None),
+        a_summary(replace(season.hanger, id=5, nominal_tension_n=0.0), Status.STEADY, tension),
+        a_summary(replace(season.hanger, id=6), course=Course() if with_period else None),
     )  # fmt: skip
     period = Period(START, season.generated_at) if with_period else None
     data = BridgeReport(

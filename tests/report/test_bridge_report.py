@@ -11,15 +11,15 @@ import pytest
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
-from shm.report.contents import BridgeReport, HangerLine, HangerReport
+from shm.report.contents import BridgeReport, HangerReport
 from shm.report.formatting import Interval
+from shm.report.hanger_sentences import summary
 from shm.report.hanger_status import Status
-from shm.report.hanger_summary import summary
 from shm.report.hanger_tables import neighbours
 from shm.report.shifts import bar
 from shm.values import Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
-from tests.helpers.nouns import a_change, a_message
+from tests.helpers.nouns import a_change, a_summary, with_now
 from tests.report.outline import Outline
 
 NOW = datetime(2026, 5, 1, tzinfo=UTC)
@@ -36,17 +36,16 @@ def pattern() -> BridgePattern:
 def report(hanger: Hanger, pattern: BridgePattern) -> BridgeReport:
     tension = Interval(666e3, 660e3, 672e3)
     lines = [
-        HangerLine(
+        a_summary(
             replace(hanger, id=number),
-            a_message(Status.ALERT if number == 3 else Status.STEADY),
-            NOW,
+            Status.ALERT if number == 3 else Status.STEADY,
             tension,
-            "sudden: tension -4.9 %" if number == 3 else "",
+            detected="sudden: tension -4.9 %" if number == 3 else "",
             open_alerts=int(number == 3),
         )
         for number in range(1, 9)
     ]
-    untested = HangerLine(replace(hanger, id=9), a_message())
+    untested = a_summary(replace(hanger, id=9))
     return BridgeReport("Arch", (*lines, untested), pattern, "", NOW, "0.1.0")
 
 
@@ -54,7 +53,9 @@ def test_the_text_tells_states_shifts_and_the_explanation(report: BridgeReport) 
     told = as_text(bridge_paper(report))
     assert told.startswith("Arch: Alert\n")
     flat = " ".join(told.split())
-    assert flat.startswith("Arch: Alert =========== Hanger 3: Alert. Repeat the test")
+    assert flat.startswith(
+        "Arch: Alert =========== Hanger 3: tension fell by 10.00 ± 0.66 %, beyond"
+    )
     assert "Load has moved from hanger 3 to its neighbours. Hanger 3 lost 34" in flat
     assert "<=====|......" in told
     assert "-34.0 (-36.5 to -31.5)" in told
@@ -92,7 +93,7 @@ def test_a_bar_shows_a_share_of_the_largest_shift(share: float, drawn: str) -> N
 def test_a_hanger_whose_change_is_called_tells_of_those_beside_it(
     season: HangerReport, pattern: BridgePattern
 ) -> None:
-    called = replace(season, called=(a_change(),), neighbours=pattern)
+    called = replace(with_now(season, called=(a_change(),)), neighbours=pattern)
     table = neighbours(called)
     assert [row[0] for row in table.rows] == ["1", "2", "3", "4", "5"]
     assert "shm report --bridge" in table.note
@@ -104,7 +105,7 @@ def test_a_hanger_whose_tension_is_hardly_known_is_to_be_tested_for_more_modes(
     report: BridgeReport,
 ) -> None:
     first, *rest = report.hangers
-    wide = replace(first, tension_n=Interval(700e3, 400e3, 1900e3))
+    wide = a_summary(first.hanger, Status.STEADY, Interval(700e3, 400e3, 1900e3))
     told = " ".join(as_text(bridge_paper(replace(report, hangers=(wide, *rest)))).split())
     assert "Identify more modes of hanger 1: the interval of the tension is wider than half" in told
     assert "Identify more modes" not in as_text(bridge_paper(report))

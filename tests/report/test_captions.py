@@ -54,7 +54,7 @@ def test_the_words_beside_every_figure_are_those_that_were_agreed(
 
 def _plain(fixture: Any) -> Any:
     """What a fixture calls."""
-    return getattr(fixture, "__wrapped__", None) or fixture.__pytest_wrapped__.obj
+    return getattr(fixture, "__wrapped__", None) or fixture._fixture_function
 
 
 if __name__ == "__main__":

@@ -13,10 +13,9 @@ from shm.report.contents import DiagnosisSheet
 from shm.report.figures.every_figure import diagnosis_figures
 from shm.report.figures.specification import Illustration
 from shm.report.figures.style import PALETTE
-from shm.values import TensionEstimate
-from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, STRING, STRING_HANGER, sheet
+from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, sheet
 
-ALL = ["causes", "gap_map", "before_and_after", "gap_tension"]
+ALL = ["causes", "gap_map", "before_and_after"]
 
 
 @pytest.fixture(scope="module")
@@ -29,10 +28,10 @@ def drawn() -> dict[str, dict[str, Illustration]]:
     [
         ("led", ALL),
         ("alike", ALL),
-        ("no gap", ["causes", "gap_map", "gap_tension"]),
-        ("unexplained", ["causes", "gap_map", "gap_tension"]),
+        ("no gap", ["causes", "gap_map"]),
+        ("unexplained", ["causes", "gap_map"]),
         ("blunder", ALL),
-        ("one mode", ["causes", "gap_map", "gap_tension"]),
+        ("one mode", ["causes", "gap_map"]),
         ("nothing known", []),
     ],
 )
@@ -64,7 +63,7 @@ def test_causes_alike_are_bracketed_with_their_sum(
     drawn: dict[str, dict[str, Illustration]],
 ) -> None:
     (axes,) = drawn["alike"]["causes"].figure.axes
-    assert "not told apart:\n0.900 together" in [text.get_text() for text in axes.texts]
+    assert "not told apart:\n0.90 together" in [text.get_text() for text in axes.texts]
     (bracket,) = [line for line in axes.lines if len(line.get_xdata()) == 4]
     assert min(np.asarray(bracket.get_ydata())) == pytest.approx(-0.3)
     assert max(np.asarray(bracket.get_ydata())) == pytest.approx(2.3)
@@ -118,38 +117,6 @@ def test_before_and_after_shows_held_out_modes_apart(
     item = diagnosis_figures(DiagnosisSheet(replace(LED, where=unheld), HANGER))[2]
     assert "Nothing was held out" in item.caption
     assert len(item.figure.axes[0].containers) == 2
-
-
-def test_tensions_are_drawn_in_kilonewtons(drawn: dict[str, dict[str, Illustration]]) -> None:
-    (axes,) = drawn["led"]["gap_tension"].figure.axes
-    points = [line for line in axes.lines if line.get_marker() == "o"]
-    assert [float(np.asarray(p.get_xdata())[0]) for p in points] == pytest.approx([731.4, 702.3])
-
-
-def test_tensions_below_one_kilonewton_are_drawn_in_newtons() -> None:
-    item = diagnosis_figures(DiagnosisSheet(STRING, STRING_HANGER))[-1]
-    (axes,) = item.figure.axes
-    points = [line for line in axes.lines if line.get_marker() == "o"]
-    assert [float(np.asarray(p.get_xdata())[0]) for p in points] == pytest.approx([38.34, 41.04])
-    assert axes.get_xlabel() == "tension (N)"
-    assert [text.get_text() for text in axes.texts] == [
-        "38.3 N (90 % interval 37.1 to 40.0 N)",
-        "41.0 N (90 % interval 35.9 to 45.7 N)",
-    ]
-    (nominal,) = [line for line in axes.lines if line.get_label() == "nominal"]
-    assert list(np.asarray(nominal.get_xdata())) == [37.5, 37.5]
-    assert "41.0 N (90 % interval 35.9 to 45.7 N)" in item.alt
-
-
-def test_a_nominal_tension_far_away_does_not_squeeze_the_intervals() -> None:
-    sharp = replace(
-        LED,
-        tension_before_n=TensionEstimate(731.4e3, 20.0, 731.36e3, 731.44e3),
-        tension_after_n=TensionEstimate(731.5e3, 20.0, 731.46e3, 731.54e3),
-    )
-    item = diagnosis_figures(DiagnosisSheet(sharp, HANGER))[-1]
-    low, high = item.figure.axes[0].get_xlim()
-    assert high - low < 1.0
 
 
 def test_the_svg_is_well_formed_named_and_follows_the_page(

@@ -48,16 +48,16 @@ def said(diagnosis: Diagnosis) -> str:
 @pytest.mark.parametrize(
     ("diagnosis", "words"),
     [
-        (LED, "The gap is explained by point mass, probability 0.930; what is left is within the "
+        (LED, "The gap is explained by point mass, probability 0.93; what is left is within the "
               "stated errors."),
         (LED, "The cause: a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7)."),
-        (LED, "Weighed over all that may be, the tension is 702 kN (90 % interval 690 to 715 kN)."),
+        (LED, "Weighed over all that may be, the tension is 702 ± 12 kN."),
         (LED, "To tell point mass from section loss, measure next: known mass of 25 kg at 3.6 m."),
         (ALIKE, "Measure section, length and weight with calliper and tape first: several causes "
                 "fit alike"),
-        (ALIKE, "effective length (both ends) and bending stiffness, together probability 0.900."),
+        (ALIKE, "effective length (both ends) and bending stiffness, together probability 0.90."),
         (NO_GAP, "No gap is visible: the baseline beam1 explains the measurements (no gap, "
-                 "probability 0.920)."),
+                 "probability 0.92)."),
         (NO_GAP, "What acts only beyond swings of these hits, such as a guide with more play"),
         (replace(NO_GAP, widest_swing_m=8.3e-5),
          "What acts only beyond swings of 0.083 mm at the sensors"),
@@ -69,16 +69,16 @@ def said(diagnosis: Diagnosis) -> str:
          "No cause is claimed, for it may be that there is no gap"),
         (UNEXPLAINED, "Not explained: most likely none of the effects that were tried (rotational "
                       "end flexibility left out) explains it, and the probability of something "
-                      "else is 0.870."),
+                      "else is 0.87."),
         (replace(UNEXPLAINED, left_out=(), unexplained_probability=0.95),
          "Not explained: none of the effects in the catalogue explains it"),
         (UNEXPLAINED, "The most probable: a point mass of 12 kg (9 to 15)"),
-        (UNEXPLAINED, "715 kN), not to be relied on while the gap is open."),
+        (UNEXPLAINED, "702 ± 12 kN, not to be relied on while the gap is open."),
         (UNDECIDED, "Several causes fit alike, and these data cannot tell them apart: point mass "
-                    "and sag, together probability 0.750."),
+                    "and sag, together probability 0.75."),
         (replace(LED, fit_p_value=0.002),
          "Point mass explains a part of the gap, but more is left than the errors allow: "
-         "measurements as far off would come by chance with probability 0.002 only."),
+         "measurements as far off would come by chance with probability below 0.01 only."),
         (replace(ALIKE, fit_p_value=0.002), "first: one of rotational end flexibility (both ends)"),
     ],
 )  # fmt: skip

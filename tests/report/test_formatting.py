@@ -47,15 +47,15 @@ def test_a_relative_change_carries_its_sign_and_its_interval() -> None:
 
 @pytest.mark.parametrize(
     ("value", "expected"),
-    [(0.5, "0.500"), (0.99999, "> 0.999"), (1e-9, "< 0.001"), (float("nan"), "not known")],
+    [(0.5, "0.50"), (0.99999, "> 0.99"), (1e-9, "< 0.01"), (float("nan"), "not known")],
 )
 def test_a_probability_pretends_no_certainty(value: float, expected: str) -> None:
     assert formatting.probability(value) == expected
 
 
 def test_a_probability_is_spelled_out_in_a_sentence() -> None:
-    told = [formatting.told_probability(value) for value in (0.99999, 0.5, 1e-9)]
-    assert told == ["above 0.999", "0.500", "below 0.001"]
+    told = [formatting.spoken_probability(value) for value in (0.99999, 0.5, 1e-9)]
+    assert told == ["above 0.99", "0.50", "below 0.01"]
 
 
 def test_what_is_unknown_is_said_in_words() -> None:

@@ -11,14 +11,13 @@ import pytest
 from shm.report.hanger_status import (
     BridgeMessage,
     HangerMessage,
-    Known,
     Status,
     bridge_message,
     findings,
-    hanger_message,
     status_of,
     still_detected,
 )
+from shm.report.hanger_summary import HangerSummary, LatestTest
 from shm.values import Averaged, Drift, Summary
 from shm.values.hanger import Limits
 from shm.values.messages import Lead
@@ -75,7 +74,15 @@ def test_the_state_in_a_word(said: dict[str, Any], status: Status) -> None:
 
 
 UNWATCHED = Lead("Hanger 3: not tested for 400 days.", "Repeat the hammer test within a week.")
-QUIET = Known(HANGER, tension(702e3), NOW, "t2", drifts=[drift()])
+QUIET = HangerSummary(HANGER, LatestTest("t2", NOW, tension(702e3)), drifts=[drift()])
+
+
+def with_tension(tension: Averaged | None = None, **changes: Any) -> HangerSummary:
+    """Return the quiet hanger with changes, its tension among them."""
+    assert QUIET.latest is not None
+    if tension is not None:
+        changes["latest"] = replace(QUIET.latest, tension=tension)
+    return replace(QUIET, **changes)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +96,6 @@ QUIET = Known(HANGER, tension(702e3), NOW, "t2", drifts=[drift()])
             "Choose a warmer or colder day at the next planned test, so that the baseline covers "
             "temperature.",
         ),
-        ({"is_first": True, "tension": None}, "FIRST", "tension not known by its first", None),
         ({"latest": None}, None, "no test yet.", "Test it at the next planned test."),
         (
             {"unwatched": UNWATCHED},
@@ -171,7 +177,7 @@ QUIET = Known(HANGER, tension(702e3), NOW, "t2", drifts=[drift()])
 def test_of_a_quiet_hanger_what_its_tests_can_say(
     changes: dict[str, Any], status: str | None, state: str, action: str | None
 ) -> None:
-    message = hanger_message(replace(QUIET, notes=("Ada looked.",), **changes))
+    message = with_tension(**changes, notes=("Ada looked.",)).message
     assert (message.status and message.status.name) == status
     assert message.lead.state.startswith(f"Hanger 3: {state}")
     if action is not None:
@@ -208,7 +214,7 @@ def test_of_a_quiet_hanger_what_its_tests_can_say(
 def test_of_a_hanger_that_moved_the_most_urgent_is_said(
     changes: dict[str, Any], status: str, state: str
 ) -> None:
-    message = hanger_message(replace(QUIET, notes=("Ada looked.",), **changes))
+    message = with_tension(**changes, notes=("Ada looked.",)).message
     assert message.status is Status[status]
     assert state in message.lead.state
     assert message.notes == ("Ada looked.",)
@@ -218,13 +224,13 @@ def test_an_alert_stays_as_sure_as_it_was_while_it_stands() -> None:
     """Of the latest test, or where the latest no longer reaches the threshold, its own number."""
     told = alert("beyond threshold", drifts=(drift(0.99, -0.08, 0.01),), test="t1")
     newest = drift(0.6, -0.06, 0.01)
-    said = hanger_message(replace(QUIET, drifts=[newest], standing=[told])).lead.state
+    said = with_tension(drifts=[newest], standing=[told]).message.lead.state
     assert "6.0 ± 1.6 %" in said
     small = replace(newest, shift_mean=-0.01)
-    said = hanger_message(replace(QUIET, drifts=[small], standing=[told])).lead.state
+    said = with_tension(drifts=[small], standing=[told]).message.lead.state
     assert "8.0 ± 1.6 %" in said
     own = replace(told, test="t2")
-    said = hanger_message(replace(QUIET, drifts=[newest], standing=[own])).lead.state
+    said = with_tension(drifts=[newest], standing=[own]).message.lead.state
     assert "8.0 ± 1.6 %" in said
 
 
@@ -323,7 +329,7 @@ def test_a_message_says_what_its_warnings_add_to_the_lead() -> None:
 def test_hanger_message_tension_unusable(caveat: str, state: str, action: str) -> None:
     """No hanger is called unchanged, or beyond a limit, by a tension that must not be used."""
     doubtful = replace(tension(840e3), caveats=(caveat,))
-    said = hanger_message(replace(QUIET, tension=doubtful))
+    said = with_tension(doubtful).message
     assert said.status is Status.CHECK
     assert state in said.lead.state
     assert action in said.lead.action

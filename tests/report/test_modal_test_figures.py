@@ -50,16 +50,16 @@ CASES: dict[str, Callable[[], ModalTestReport]] = {
 TIMED = ["time_history", "hits"]
 SPECTRAL = ["response", "stabilisation"]
 DRAWN = {
-    "two sensors": [*TIMED, *SPECTRAL, "shapes", "damping"],
-    "eight sensors": [*TIMED, *SPECTRAL, "shapes", "damping"],
-    "dropped hits": [*TIMED, *SPECTRAL, "shapes", "damping"],
-    "single hit": [*TIMED, *SPECTRAL, "shapes", "damping"],
-    "given responses": [*SPECTRAL, "shapes", "damping"],
-    "one sensor": [*TIMED, *SPECTRAL, "damping"],
-    "ambient": ["time_history", *SPECTRAL, "shapes", "damping"],
-    "warned": [*TIMED, *SPECTRAL, "shapes", "damping"],
-    "refused": [*TIMED, *SPECTRAL, "shapes", "damping"],
-    "no records": [*SPECTRAL, "shapes", "damping"],
+    "two sensors": [*TIMED, *SPECTRAL, "shapes"],
+    "eight sensors": [*TIMED, *SPECTRAL, "shapes"],
+    "dropped hits": [*TIMED, *SPECTRAL, "shapes"],
+    "single hit": [*TIMED, *SPECTRAL, "shapes"],
+    "given responses": [*SPECTRAL, "shapes"],
+    "one sensor": [*TIMED, *SPECTRAL],
+    "ambient": ["time_history", *SPECTRAL, "shapes"],
+    "warned": [*TIMED, *SPECTRAL, "shapes"],
+    "refused": [*TIMED, *SPECTRAL, "shapes"],
+    "no records": [*SPECTRAL, "shapes"],
 }
 Drawn = dict[str, dict[str, Illustration]]
 
@@ -138,8 +138,7 @@ def test_axes_have_units(name: str, drawn: Drawn) -> None:
     if "hits" in labels:
         expected = {"force (N)", "force, relative (dB)", "time from the start of the hit (ms)"}
         assert expected <= labels["hits"]
-    assert "frequency (Hz)" in labels["response"] & labels["stabilisation"] & labels["damping"]
-    assert "damping ratio (%)" in labels["damping"]
+    assert "frequency (Hz)" in labels["response"] & labels["stabilisation"]
 
 
 def test_every_hit_is_marked_as_used_or_dropped_with_its_reason(drawn: Drawn) -> None:
@@ -332,15 +331,6 @@ def test_without_a_hanger_the_places_are_only_joined(drawn: Drawn) -> None:
     item = drawn["given responses"]["shapes"]
     assert set(legend_of(item.figure)) >= {"places joined", "transverse"}
     assert "Thin lines only join" in item.caption
-
-
-def test_damping_is_shown_with_its_interval(drawn: Drawn) -> None:
-    axes = drawn["two sensors"]["damping"].figure.axes[0]
-    (bars,) = [c for c in axes.containers if c.get_label() == "transverse"]
-    low, high = bars[2][0].get_segments()[0][:, 1]
-    assert (low + high) / 2 == pytest.approx(0.4)
-    assert (high - low) / 2 == pytest.approx(1.645 * 0.02, rel=1e-3)
-    assert "its uncertainty is not known" in drawn["given responses"]["damping"].caption
 
 
 def test_planes_differ_by_colour_and_by_marker(drawn: Drawn) -> None:

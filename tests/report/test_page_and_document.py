@@ -15,6 +15,7 @@ from shm.report.as_text import as_text
 from shm.report.contents import HangerReport
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.values import QualityCheck
+from tests.helpers.nouns import with_now
 from tests.report.outline import Outline
 
 
@@ -54,7 +55,7 @@ def test_ids_are_unique_on_the_page(outline: Outline) -> None:
 
 def test_every_table_has_a_caption_and_scoped_headings(outline: Outline) -> None:
     names = [tag for tag, _ in outline.tags]
-    assert names.count("table") == names.count("caption") == 9
+    assert names.count("table") == names.count("caption") == 11
     scopes = {attributes.get("scope") for tag, attributes in outline.tags if tag == "th"}
     assert scopes == {"col", "row"}
 
@@ -72,7 +73,7 @@ def test_dark_light_and_print_styles_are_there(page: str) -> None:
 
 def test_the_page_leads_with_the_summary_and_the_state(outline: Outline) -> None:
     told = " ".join(" ".join(outline.words).split())
-    assert told.index("tension fell by 7.2 ± 2.0 %") < told.index("Numbers")
+    assert told.index("tension fell by 7.2 ± 2.0 %") < told.index("Tension over time")
     assert "Alert" in told
 
 
@@ -85,7 +86,9 @@ def test_the_page_says_nan_nowhere(name: str, request: pytest.FixtureRequest) ->
 
 def test_names_from_outside_cannot_inject_markup(bare: HangerReport) -> None:
     sly = "<script>alert(1)</script>"
-    page = as_html(hanger_paper(replace(bare, bridge=sly, hanger=replace(bare.hanger, name=sly))))
+    page = as_html(
+        hanger_paper(replace(with_now(bare, hanger=replace(bare.hanger, name=sly)), bridge=sly))
+    )
     assert "<script" not in page
     assert "&lt;script&gt;" in page
 
@@ -124,7 +127,7 @@ def test_the_quality_of_the_latest_test_stands_in_page_text_document_and_advice(
     told = " ".join(" ".join(parsed.words).split())
     for page in (told, " ".join(as_text(hanger_paper(judged)).split())):
         assert "clipping ! warning 0.99 0.95 acc_1 clips Lower the gain." in page
-        assert "Mend what the quality of the latest test warns of: clipping." in page
+        assert "Test quality, to improve at the next test: clipping." in page
     assert ("tr", {"class": "warning"}) in parsed.tags
     document = standard_json.loads(documents.dump(hanger_json(judged)))
     assert document["quality"][0]["name"] == "clipping"

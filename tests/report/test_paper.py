@@ -14,14 +14,14 @@ from shm.report.as_html import as_html
 from shm.report.as_pdf import as_pdf
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_paper
-from shm.report.contents import BridgeReport, HangerLine, HangerReport
+from shm.report.contents import BridgeReport, HangerReport
 from shm.report.diagnosis_report import diagnosis_paper
 from shm.report.hanger_report import hanger_paper
 from shm.report.hanger_status import Status
 from shm.report.modal_test_report import modal_test_paper
 from shm.report.paper import Paper, Part, Table
 from shm.watch.neighbours import HangerShift, bridge_pattern
-from tests.helpers.nouns import a_message
+from tests.helpers.nouns import a_summary
 from tests.helpers.pdf_words import Pdf
 from tests.report.conftest import START
 from tests.report.diagnoses import CASES, sheet
@@ -45,8 +45,8 @@ def of_bridge(season: HangerReport) -> Paper:
         HangerShift(number, number - 1, START, 700e3, -34e3 if number == 3 else 0.0, 1.5e3)
         for number in range(1, 6)
     ]
-    line = HangerLine(
-        season.hanger, a_message(Status.ALERT), START, season.tension_n, "", 1, season.drifts[0]
+    line = a_summary(
+        season.hanger, Status.ALERT, season.tension_n, open_alerts=1, drifts=season.drifts
     )
     report = BridgeReport("Arch", (line,), bridge_pattern(shifts, range(1, 7)), "", START, "0.1.0")
     return bridge_paper(replace(report, settings={"seed": "1"}))
@@ -81,7 +81,8 @@ def texts(paper: Paper, renderer: str) -> Iterator[str]:
     if renderer != "as_pdf":
         yield paper.title
     for number, part in enumerate(paper.parts):
-        yield from _texts_of_part(part, renderer, is_first=number == 0)
+        if not (part.is_appendix and renderer == "as_pdf"):
+            yield from _texts_of_part(part, renderer, is_first=number == 0)
     yield paper.foot
 
 

@@ -13,8 +13,7 @@ from shm.report.as_text import as_text
 from shm.report.contents import HangerReport
 from shm.report.formatting import Interval
 from shm.report.hanger_report import hanger_json, hanger_paper
-from shm.report.hanger_summary import in_period, summary
-from shm.report.hanger_tables import numbers, origins
+from shm.report.hanger_sentences import in_period, summary
 from shm.report.hanger_tables import period as period_table
 from shm.report.states import Period, period_since
 from tests.report.conftest import START
@@ -89,6 +88,6 @@ def test_every_form_names_the_period(recent: HangerReport) -> None:
     assert as_text(hanger_paper(recent)).splitlines()[0] == f"Hanger 3, Arch bridge, {named}: Alert"
     assert f"period {named}" in as_html(hanger_paper(recent))
     assert hanger_json(recent)["period"] == {"since": START + timedelta(days=30), "until": NOW}
-    titles = [table.title for table in (*numbers(recent), *origins(recent))]
+    titles = [table.title for part in hanger_paper(recent).parts for table in part.tables]
     assert f"Tests in the period {named}, latest first" in titles
     assert f"Alerts in the period {named}, latest first" in titles

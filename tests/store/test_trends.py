@@ -220,7 +220,7 @@ def test_the_tension_over_all_classes_follows_the_selected_one(file_store: Store
     (first,) = file_store.posteriors.trend(HANGER_3)
     found = file_store.posteriors.selection(3)
     assert found is not None
-    assert first.averaged == found.selection.averaged(HANGER_3.limits)
+    assert first.averaged == found.selection.averaged_with(HANGER_3.limits)
     updated(file_store, 2, 0.9)
     latest = file_store.posteriors.trend(HANGER_3)[-1]
     ratio = latest.tension_n.mean / first.tension_n.mean

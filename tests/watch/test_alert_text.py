@@ -234,27 +234,11 @@ def test_a_sudden_loss_says_the_state_then_what_to_do_then_why() -> None:
     assert message == (
         "Hanger 3: tension fell by 8.2 ± 1.1 %. Repeat the hammer test within a week; if the loss "
         "stays, inspect its anchorages and the rod, and compare the hangers beside it (`shm drift "
-        "bridge`). It came suddenly, between 2026-04-30 and 2026-05-03. At equal temperature the "
-        "tension is 654 kN now, 711 kN at the baseline. Details: ± is half the 90 % interval; "
-        "probability 0.97 that tension changed, 0.90 that anything changed, 0.98 that it came "
-        "suddenly, 0.30 that "
+        "bridge`). It came suddenly, between 2026-04-30 and 2026-05-03. Details: ± is half "
+        "the 90 % interval; probability 0.97 that tension changed, 0.90 that anything changed, "
+        "0.98 that it came suddenly, 0.30 that "
         "tension is beyond its threshold of 5 %; mean time between false alarms at least 200 years."
     )
-
-
-@pytest.mark.parametrize(
-    ("baseline_n", "said"),
-    [
-        (5.4, "At equal temperature the tension is 4.97 N now, 5.40 N at the baseline."),
-        (20e3, "At equal temperature the tension is 18.4 kN now, 20.0 kN at the baseline."),
-        (12e6, "At equal temperature the tension is 11.0 MN now, 12.0 MN at the baseline."),
-        (10.5e6, "At equal temperature the tension is 9.7 MN now, 10.5 MN at the baseline."),
-    ],
-)
-def test_the_tension_is_told_in_the_unit_that_fits_it(baseline_n: float, said: str) -> None:
-    test = day(2, change(called=True, began=2), 0.3)
-    shift = replace(test.drifts[0], baseline=baseline_n, value=0.92 * baseline_n)
-    assert said in only(replace(test, drifts=(shift,))).message
 
 
 def test_a_loss_beyond_the_threshold_comes_first_and_asks_for_a_decision() -> None:
@@ -283,7 +267,6 @@ def test_ends_that_the_tests_do_not_tell_apart_are_both_in_the_details() -> None
     )
     assert "end stiffness k1 (deck end, transverse) 0.40 to 0.63 times what it was" in alert.message
     assert "0.40 that end stiffness k3 (arch end, transverse) changed" in alert.message
-    assert "At equal temperature" not in alert.message
 
 
 def test_beyond_the_threshold_names_what_the_data_cannot_tell_from_it() -> None:
@@ -429,9 +412,6 @@ def test_a_further_change_is_said_to_be_one() -> None:
     first, second = alerts_of(calls, HANGER_3)
     assert "again" not in first.message
     assert second.message.startswith("Hanger 3 changed again: tension rose by 0.90 ± 0.25 %.")
-    assert (
-        "At equal temperature the tension is 654 kN now, 711 kN at the baseline." in second.message
-    )
 
 
 def test_beyond_the_threshold_speaks_of_the_called_change_that_went_the_same_way() -> None:

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 import shm
 from shm.errors import ShmError
-from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report.formatting import counted, listed
 from shm.report.hanger_status import QUIET, Status, bridge_message
 from shm.values.messages import URGENCIES, Lead, Urgency
@@ -52,7 +52,7 @@ class Summary:
 def summary_of(site: Site, now: datetime) -> Summary:
     """What the site's own home page says first. Raises StoreError where the store is out."""
     workspace, store = site.workspace, site.store
-    lines = hanger_lines(workspace, store, now)
+    lines = hanger_summaries(workspace, store, now)
     message = bridge_message({each.hanger.id: each.message for each in lines})
     return Summary(
         bridge=workspace.bridge.name,
@@ -62,7 +62,7 @@ def summary_of(site: Site, now: datetime) -> Summary:
         notices=tuple(notices(site)),
         troubles=tuple(troubles(site)),
         hangers=len(lines),
-        latest_test_at=max((each.latest for each in lines if each.latest), default=None),
+        latest_test_at=max((each.latest.time for each in lines if each.latest), default=None),
         open_alerts=store.alerts.counts()[0],
         held=len(store.recordings.list_holds()),
     )

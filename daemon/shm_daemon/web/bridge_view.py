@@ -1,5 +1,5 @@
 """The whole bridge at a glance: what is shown of each hanger, what moved over all of them, and its
-elevation: where deck, arch and hangers are drawn, and what marks them.
+elevation: where deck and hangers are drawn, and what marks them.
 
 All hangers in a handful of queries, and no samples: a page of 200 hangers must not wait.
 
@@ -14,16 +14,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from functools import cached_property
-from itertools import pairwise
 
 from fastapi import Request
 
 from shm.errors import NothingThere
-from shm.pipeline.bridge_reporting import hanger_lines, hanger_shifts
+from shm.pipeline.bridge_reporting import hanger_shifts, hanger_summaries
 from shm.report import formatting
-from shm.report.contents import HangerLine
-from shm.report.formatting import Interval
-from shm.report.hanger_status import BridgeMessage, Status, bridge_message
+from shm.report.hanger_status import BridgeMessage, bridge_message
+from shm.report.hanger_summary import HangerSummary
 from shm.values import NAN, Hanger
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
@@ -38,41 +36,22 @@ QUICKLY_COMPARED = 24
 class HangerGlance:
     """One hanger as its bridge's report has it; `is_quiet`: it was not tested for long."""
 
-    line: HangerLine
+    summary: HangerSummary
     tests: int = 0
     is_quiet: bool = False
 
     @property
     def hanger(self) -> Hanger:
-        return self.line.hanger
-
-    @property
-    def is_baseline(self) -> bool:
-        """Whether the latest test is of the baseline itself."""
-        line = self.line
-        is_first = line.drift is None and line.status is Status.FIRST
-        return is_first and line.baseline_tension_n is not None
-
-    @property
-    def shift(self) -> Interval | None:
-        """Of the tension since the baseline, a fraction; None where there is none to tell.
-
-        As the watch found it, the swing with the temperature taken out; else of two estimates.
-        """
-        line = self.line
-        if (drift := line.drift) is not None:
-            is_known = math.isfinite(drift.shift_mean + drift.shift_sd)
-            return Interval.normal(drift.shift_mean, drift.shift_sd) if is_known else None
-        if line.tension_n is None or line.baseline_tension_n is None or self.is_baseline:
-            return None
-        return line.tension_n.since(line.baseline_tension_n)
+        return self.summary.hanger
 
     def cells(self, unit: ForceUnit) -> tuple[str, str, str]:
         """As tables have it: tension, percent of nominal, shift in percent; empty where unknown."""
-        line, shift, tension = self.line, self.shift, "no test yet"
-        if line.tension_n:
-            tension = formatting.with_half(line.tension_n, unit).removesuffix(f" {unit.name}")
-        nominal = formatting.mean(line.of_nominal) if line.of_nominal else ""
+        summary, shift, tension = self.summary, self.summary.change, "no test yet"
+        is_known = summary.is_determined
+        if summary.tension_n:
+            known = formatting.with_half(summary.tension_n, unit).removesuffix(f" {unit.name}")
+            tension = known if is_known else "not determined"
+        nominal = formatting.mean(summary.of_nominal) if summary.of_nominal and is_known else ""
         percent = rounded_percent(shift.mean, shift.width / 2, "+") if shift else ""
         return tension, nominal, percent.removesuffix(" %")
 
@@ -87,13 +66,13 @@ class BridgeGlance:
     @cached_property
     def message(self) -> BridgeMessage:
         """What the page says first."""
-        return bridge_message({each.hanger.id: each.line.message for each in self.hangers})
+        return bridge_message({each.hanger.id: each.summary.message for each in self.hangers})
 
     @property
-    def latest(self) -> HangerLine | None:
-        """The hanger that was tested last."""
-        tested = [(each.line.latest, each.line) for each in self.hangers if each.line.latest]
-        return max(tested, key=lambda pair: pair[0])[1] if tested else None
+    def latest(self) -> HangerSummary | None:
+        """Return the hanger that was tested last."""
+        times = [(e.summary.latest.time, e.summary) for e in self.hangers if e.summary.latest]
+        return max(times, key=lambda pair: pair[0])[1] if times else None
 
 
 @dataclass(frozen=True)
@@ -130,11 +109,11 @@ def glance(site: Site, now: datetime) -> BridgeGlance:
     tests, quiet_before = store.tests.latest(), now - timedelta(days=workspace.settings.quiet_days)
     hangers = tuple(
         HangerGlance(
-            line,
-            tests[line.hanger.id].tests if line.hanger.id in tests else 0,
-            line.latest is not None and line.latest < quiet_before,
+            summary,
+            tests[summary.hanger.id].tests if summary.hanger.id in tests else 0,
+            summary.latest is not None and summary.latest.time < quiet_before,
         )
-        for line in hanger_lines(workspace, store, now)
+        for summary in hanger_summaries(workspace, store, now)
     )
     return BridgeGlance(workspace.bridge.name, hangers)
 
@@ -209,12 +188,14 @@ class Elevation:
     deck: float
     step: float
     bar: float
-    arch: str
     hangers: tuple[HangerMark, ...]
 
 
 def elevation(hangers: Sequence[HangerGlance]) -> Elevation:
-    """The hangers evenly spaced in their order, as long as they are, the arch over them."""
+    """Return the hangers evenly spaced in their order, as long as they are.
+
+    Where they are along the bridge is not described, so no arch is drawn.
+    """
     step = min(_MOST_STEP, max(_LEAST_STEP, (_WIDEST - 2 * _BESIDE) / (len(hangers) + 1)))
     longest = max(each.hanger.length_m for each in hangers)
     deck = _TOP + _TALLEST
@@ -226,13 +207,12 @@ def elevation(hangers: Sequence[HangerGlance]) -> Elevation:
         for index, (each, x, top) in enumerate(zip(hangers, places, tops, strict=True))
     )
     width = 2 * _BESIDE + step * (len(hangers) + 1)
-    ends = [(_BESIDE, deck), *zip(places, tops, strict=True), (width - _BESIDE, deck)]
-    return Elevation(width, deck + _BELOW, deck, step, round(step / 4, 1), _curve(ends), marks)
+    return Elevation(width, deck + _BELOW, deck, step, round(step / 4, 1), marks)
 
 
 def kind_of(glance: HangerGlance) -> str:
     """The class of a hanger's shift; a test that is of the baseline itself says nothing of one."""
-    shift = glance.shift
+    shift = glance.summary.change
     if shift is None:
         return "unknown"
     size = sum(abs(shift.mean) >= limit for limit in _LIMITS)
@@ -243,11 +223,11 @@ def kind_of(glance: HangerGlance) -> str:
 
 def shift_words(glance: HangerGlance) -> str:
     """The shift from the baseline as people say it."""
-    if glance.is_baseline:
+    summary = glance.summary
+    if summary.is_baseline and summary.baseline:
         return "is the baseline"
-    if glance.shift is None:
-        return "no baseline yet" if glance.line.tension_n else "no test yet"
-    shift = glance.shift
+    if (shift := summary.change) is None:
+        return "no baseline yet" if summary.latest else "no test yet"
     return f"{rounded_percent(shift.mean, shift.width / 2, '+')} since the baseline"
 
 
@@ -266,13 +246,14 @@ def triangles(kind: str, x: float, base: float, hollow: bool = False) -> tuple[T
 
 
 def _mark(glance: HangerGlance, x: float, top: float, number: bool) -> HangerMark:
-    kind, shift, line = kind_of(glance), glance.shift, glance.line
+    kind, summary = kind_of(glance), glance.summary
+    shift = summary.change
     hollow = shift is not None and shift.low < 0 < shift.high
     words = [formatting.hanger_name(glance.hanger.id, glance.hanger.name), shift_words(glance)]
-    if line.latest:
-        words.append(f"last test {line.latest:%Y-%m-%d}")
-    if line.open_alerts:
-        words.append(formatting.counted(line.open_alerts, "open alert"))
+    if summary.latest:
+        words.append(f"last test {summary.latest.time:%Y-%m-%d}")
+    if summary.open_alerts:
+        words.append(formatting.counted(summary.open_alerts, "open alert"))
     return HangerMark(
         id=glance.hanger.id,
         x=round(x, 1),
@@ -281,7 +262,7 @@ def _mark(glance: HangerGlance, x: float, top: float, number: bool) -> HangerMar
         words=", ".join(words),
         triangles=triangles(kind, x, top - 8, hollow),
         number=number,
-        open_alerts=line.open_alerts,
+        open_alerts=summary.open_alerts,
         is_quiet=glance.is_quiet,
     )
 
@@ -291,33 +272,12 @@ def _numbered(hangers: Sequence[HangerGlance], places: Sequence[float]) -> set[i
 
     def urgency(index: int) -> tuple[bool, float]:
         glance = hangers[index]
-        moved = abs(glance.shift.mean) if glance.shift and kind_of(glance)[-1] in "23" else 0.0
-        return glance.line.open_alerts == 0, -moved
+        change = glance.summary.change
+        moved = abs(change.mean) if change and kind_of(glance)[-1] in "23" else 0.0
+        return glance.summary.open_alerts == 0, -moved
 
     chosen: set[int] = set()
     for index in sorted(range(len(hangers)), key=urgency):
         if all(abs(places[index] - places[each]) >= _BETWEEN_NUMBERS for each in chosen):
             chosen.add(index)
     return chosen
-
-
-def _curve(points: Sequence[tuple[float, float]]) -> str:
-    """A path through all points, evenly spaced, round where they bend and with no hump that they
-    have not: a monotone cubic, as Bezier pieces.
-    """
-    slopes = _slopes([y for _, y in points])
-    path = f"M{points[0][0]:.1f} {points[0][1]:.1f}"
-    for (begin, end), (first, last) in zip(pairwise(points), pairwise(slopes), strict=True):
-        third = (end[0] - begin[0]) / 3
-        path += f"C{begin[0] + third:.1f} {begin[1] + first / 3:.1f}"
-        path += f" {end[0] - third:.1f} {end[1] - last / 3:.1f} {end[0]:.1f} {end[1]:.1f}"
-    return path
-
-
-def _slopes(heights: Sequence[float]) -> list[float]:
-    """The rise from point to point at each of three or more (Fritsch and Butland, 1984): flat at a
-    summit, and nowhere so steep as to overshoot.
-    """
-    rises = [after - before for before, after in pairwise(heights)]
-    inner = [2 * a * b / (a + b) if a * b > 0 else 0.0 for a, b in pairwise(rises)]
-    return [(3 * rises[0] - inner[0]) / 2, *inner, (3 * rises[-1] - inner[-1]) / 2]

@@ -1,5 +1,5 @@
 """The figures of the page of a hanger: its tests over time and over temperature; how the model's
-frequencies fit, which class it is, what is open, and the causes of that.
+frequencies fit, what is open, and the causes of that.
 """
 
 from __future__ import annotations
@@ -20,15 +20,13 @@ from shm.report.figures import (
     hanger_stiffness,
     hanger_trend,
 )
-from shm.report.figures.gap_causes import Bar, probability_bars
-from shm.report.figures.gap_map import kept, measured
+from shm.report.figures.gap_map import measured, retained
 from shm.report.figures.hanger_frequencies import FIGURE as OF_REPORT
 from shm.report.figures.hanger_frequencies import compared_modes
-from shm.report.figures.parameter_pairs import FIGURE as OF_PAIRS
 from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
 from shm.report.figures.time_axes import bounds_of, part, places, single_tests, thinned_words
 from shm.report.formatting import Interval
-from shm.report.states import CalledChange, QuantityOverTime, called_words
+from shm.report.states import CalledChange, called_words
 from shm.store import EventKind, TrendPoint
 from shm.values.rounding import ForceUnit, force_unit
 from shm_daemon.web import with_plotly
@@ -74,7 +72,8 @@ _HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {
 def _course(view: HangerView) -> hanger_trend.Course:
     """All that the figure shows; without the state over time where that is still worked out."""
     states, at = view.states, {point.time: place for place, point in enumerate(view.trend)}
-    baseline, state = view.baseline, _averaged_state(view)
+    baseline = view.baseline
+    baseline_n = baseline.averaged.tension_n.mean if baseline else None
     raised = [e for e in view.events if e.kind is EventKind.ALERT and e.at in at]
     changes = [call.watched.change for call in view.calls]
     return hanger_trend.Course(
@@ -82,10 +81,10 @@ def _course(view: HangerView) -> hanger_trend.Course:
         names=[point.test for point in view.trend],
         tensions_n=[Interval.of_averaged(point.averaged) for point in view.trend],
         nominal_n=view.hanger.nominal_tension_n,
-        baseline_n=baseline.averaged.tension_n.mean if baseline else None,
+        baseline_n=baseline_n,
         reach=view.hanger.thresholds.tension_shift_fraction,
         alerts={at[event.at]: event.why for event in raised},
-        state=state,
+        state=hanger_trend.averaged_state(states, baseline_n) if states and baseline_n else None,
         state_times=states.times if states else (),
         reference_temperature_c=states.reference_temperature_c if states else math.nan,
         changes=[CalledChange(c.began_after, c.began_by, called_words(c)) for c in changes],
@@ -96,22 +95,11 @@ def _course(view: HangerView) -> hanger_trend.Course:
             if event.kind is kind
         ],
         notes=view.notes,
+        excluded=hanger_trend.excluded([point.time for point in view.trend], states)
+        if states
+        else (),
         remark=_remark(view),
     )
-
-
-def _averaged_state(view: HangerView) -> QuantityOverTime | None:
-    """The state of the tension, of one model class, at the level of the average over classes.
-
-    Of a change all classes say the same share; the band compares tests, so it moves along.
-    """
-    states, baseline = view.states, view.baseline
-    found = [] if states is None else [q for q in states.quantities if q.is_tension]
-    if not found or baseline is None:
-        return None
-    ratio = baseline.averaged.tension_n.mean / baseline.tension_n.mean
-    whole = np.arange(len(found[0].filtered.middle))
-    return replace(found[0], filtered=part(found[0].filtered, whole, ratio))
 
 
 def _remark(view: HangerView) -> str:
@@ -225,33 +213,13 @@ def _sheet(view: HangerView) -> DiagnosisSheet:
 def _shrinks(view: HangerView) -> bool:
     if view.sheet is None or view.sheet.diagnosis.verdict.claim is None:
         return False
-    return any(math.isfinite(residual.after_percent) for residual in kept(view.sheet))
+    return any(math.isfinite(residual.after_percent) for residual in retained(view.sheet))
 
 
 def report_of(view: HangerView) -> HangerReport:
     """The report of a view that has one."""
     assert view.report is not None
     return view.report
-
-
-def _rows(view: HangerView) -> list[tuple[str, float]]:
-    """Names and probabilities of the model classes, the most probable first."""
-    found = view.report.selection if view.report else None
-    if found is None:
-        return []
-    return [
-        (formatting.model_class(posterior.model), share)
-        for posterior, share in zip(found.posteriors, found.probabilities, strict=True)
-    ]
-
-
-def _chosen(view: HangerView) -> str:
-    return formatting.model_class(report_of(view).posterior.model)
-
-
-def _alt_of_models(view: HangerView) -> str:
-    told = [f"{name} {formatting.probability(share)}" for name, share in _rows(view)]
-    return f"Probabilities of the model classes: {'; '.join(told)}."
 
 
 FIGURES: tuple[HangerFigure, ...] = (
@@ -299,32 +267,6 @@ FIGURES: tuple[HangerFigure, ...] = (
         lambda view: OF_REPORT.caption(report_of(view)),
         lambda view: OF_REPORT.alt(report_of(view)),
         height_px=380,  # judgement: the usual, with words below the axis
-    ),
-    HangerFigure(
-        "models",
-        "Model classes",
-        "model",
-        lambda view: len(_rows(view)) > 1,
-        lambda view: probability_bars(
-            [Bar(name, p, "blue" if name == _chosen(view) else "quiet") for name, p in _rows(view)]
-        ),
-        lambda view: (
-            "Probability of each model class given the tests on which they were compared, all "
-            f"equally probable before. Blue: the class in force, {_chosen(view)}."
-        ),
-        _alt_of_models,
-        height_px=240,  # judgement: a bar for each of a few classes
-    ),
-    HangerFigure(
-        "pairs",
-        OF_PAIRS.title,
-        "model",
-        lambda view: view.report is not None and len(view.report.posterior.names) > 1,
-        lambda view: OF_PAIRS.draw(report_of(view)),
-        lambda view: OF_PAIRS.caption(report_of(view)),
-        lambda view: OF_PAIRS.alt(report_of(view)),
-        height_px=760,  # judgement: a grid of a panel for each pair, nearly square
-        is_wide=True,
     ),
     HangerFigure(
         "gap_map",

@@ -233,7 +233,7 @@ def _now(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
     return [
         {
             "hanger": hanger.id,
-            **known.line(hanger).message.document,
+            **plain(known.summary(hanger).document),
             "tests": tests[hanger.id].tests if hanger.id in tests else 0,
             "latest_test_at": tests[hanger.id].time if hanger.id in tests else None,
             "nominal_tension_n": hanger.nominal_tension_n,
@@ -248,10 +248,9 @@ def _now(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
 
 def _tension(latest: StoredPoint | None) -> dict[str, Any]:
     if latest is None:
-        return {"model": None, "tension_n": None, "averaged": None}
+        return {"model": None, "tension_n": None}
     summary = {**asdict(latest.tension_n), "map": latest.most_probable_tension_n}
-    averaged = plain(averaged_document(latest.averaged))
-    return {"model": latest.model, "tension_n": summary, "averaged": averaged}
+    return {"model": latest.model, "tension_n": summary}
 
 
 def _watched(latest: StoredWatch | None) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from shm.pipeline.lineage import identify_lineage
 from shm.pipeline.reporting import modal_test_report
 from shm.report.contents import ModalTestReport
 from shm.report.figures.modal_test_hits import FIGURE as HITS
-from shm.report.figures.modal_test_modes import DAMPING, SHAPES, STABILISATION, rows_of
+from shm.report.figures.modal_test_modes import SHAPES, STABILISATION, rows_of
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.modal_test_response import Shown, Spectrum
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
@@ -83,7 +83,6 @@ MEMBERS: tuple[TestFigure, ...] = (
         lambda sheet: _REST_PX + _ROW_PX * len(rows_of(sheet, is_on_screen=True)),
         is_wide=True,
     ),
-    TestFigure(DAMPING, "store", lambda sheet: 440),
 )
 FIGURES = {figure.name: figure for figure in MEMBERS}
 FROM_RECORDS = tuple(figure for figure in MEMBERS if figure.source == "file")

@@ -155,8 +155,11 @@ class HangerState(Message):
     latest_test_at: datetime | None
     model: str | None
     nominal_tension_n: float
-    tension_n: Quantity | None = Field(description="By the class in force alone.")
-    averaged: AveragedTension | None = Field(description="The headline.")
+    tension_n: Quantity | None = Field(description="By the latest test and class in force alone.")
+    averaged: AveragedTension | None = Field(description="Best estimate since the last change.")
+    basis: str = Field(description="What that estimate rests on.")
+    change: Bounded | None = Field(description="Of the tension since the baseline, a fraction.")
+    by_latest_test: AveragedTension | None = Field(description="By the latest test alone.")
     baseline_set_at: datetime | None
     shifts: list[Shift]
     creep_per_year: Creep | None = Field(description="Null where the tests do not show it.")

@@ -71,7 +71,7 @@ class _Drawing:
             for column, (panel, width) in enumerate(zip(row, self._widths(row), strict=True)):
                 number += 1
                 x, y = ("x" if across == 1 else f"x{across}", "y" if number == 1 else f"y{number}")
-                self._place(panel, (x, y), (width, domain), column)
+                self._place(panel, (x, y), domain, column)
                 if panel.x is not None:
                     self.layout[_key(x)] = {**_axis_of(panel.x), "anchor": y, "domain": width}
                     across += 1
@@ -79,9 +79,7 @@ class _Drawing:
                     rows = self.figure.rows
                     is_last = line == len(rows) - 1 or column >= len(rows[line + 1])
                     self._quieten(x, y, column == 0, is_last)
-                    if panel.words:
-                        self.layout[_key(x)]["visible"] = False
-                    elif self.columns.setdefault(column, x) != x:
+                    if self.columns.setdefault(column, x) != x:
                         self.layout[_key(x)]["matches"] = self.columns[column]
                 for mark in panel.marks:
                     self._draw(mark, panel, x, y)
@@ -107,11 +105,11 @@ class _Drawing:
         self,
         panel: spec.Panel,
         axes: tuple[str, str],
-        domains: tuple[list[float], ...],
+        domain: list[float],
         column: int,
     ) -> None:
-        """The vertical axis of a panel, its title and its words."""
-        (x, y), (width, domain) = axes, domains
+        """Place the vertical axis of a panel and its title."""
+        x, y = axes
         upright = {**_axis_of(panel.y), "domain": domain, "anchor": x}
         if panel.shares_y:
             upright["matches"] = self.first
@@ -120,12 +118,6 @@ class _Drawing:
         if len(self.figure.rows) > 1 and panel.y.ticks is None and panel.y.scale == "linear":
             upright["nticks"] = 5
         self.layout[_key(y)] = upright
-        if panel.words:
-            upright["visible"] = False
-            self.layout["annotations"].append({
-                "text": panel.words, "xref": "paper", "yref": "paper", "x": sum(width) / 2,
-                "y": sum(domain) / 2, "xanchor": "center", "yanchor": "middle", "showarrow": False,
-            })  # fmt: skip
         if panel.title:
             at_right = panel.title_side == "right"
             size = 11 if at_right or self.figure.is_grid else 13

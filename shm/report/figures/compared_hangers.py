@@ -67,7 +67,7 @@ def _words(shift: Interval) -> str:
 
 
 def caption(courses: Sequence[Course]) -> str:
-    """What is seen."""
+    """Explain what is seen."""
     return (
         "Tension of each test since the hanger's own baseline, with 90 % of what a repetition of "
         "the test would scatter. The temperature is not compensated here, as it is in the table: "

@@ -6,19 +6,17 @@ from collections.abc import Container
 
 from shm.report.contents import BridgeReport, DiagnosisSheet, HangerReport, ModalTestReport
 from shm.report.figures.along_the_bridge import SHIFTS, TENSIONS
-from shm.report.figures.gap_before_and_after import BEFORE_AND_AFTER, GAP_TENSION
+from shm.report.figures.gap_before_and_after import BEFORE_AND_AFTER
 from shm.report.figures.gap_causes import FIGURE as CAUSES
 from shm.report.figures.gap_causes import SHARED
 from shm.report.figures.gap_check import FIGURE as CHECK
 from shm.report.figures.gap_map import FIGURE as GAP_MAP
 from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
-from shm.report.figures.hanger_frequencies import RESPONSE as RESPONSE_OF_LATEST
-from shm.report.figures.hanger_states import FIGURE as STATES
 from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
 from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.modal_test_hits import FIGURE as HITS
-from shm.report.figures.modal_test_modes import DAMPING, SHAPES, STABILISATION
+from shm.report.figures.modal_test_modes import SHAPES, STABILISATION
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.modal_test_response import Shown
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
@@ -26,12 +24,12 @@ from shm.report.figures.specification import Illustration, Member, drawn
 from shm.values import BridgeDiagnosis, GapCheck
 
 OF_HANGER: tuple[Member[HangerReport], ...] = (
-    TREND, STATES, TENSION, FREQUENCIES, RESPONSE_OF_LATEST, STIFFNESS
+    TREND, TENSION, FREQUENCIES, STIFFNESS
 )  # fmt: skip
 OF_MODAL_TEST: tuple[Member[Shown], ...] = (
-    TIME_HISTORY, HITS, RESPONSE, STABILISATION, SHAPES, DAMPING
+    TIME_HISTORY, HITS, RESPONSE, STABILISATION, SHAPES
 )  # fmt: skip
-OF_DIAGNOSIS: tuple[Member[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER, GAP_TENSION)
+OF_DIAGNOSIS: tuple[Member[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER)
 OF_BRIDGE_DIAGNOSIS: tuple[Member[BridgeDiagnosis], ...] = (SHARED,)
 OF_GAP_CHECK: tuple[Member[GapCheck], ...] = (CHECK,)
 OF_HANGER_NAMES = frozenset(each.name for each in OF_HANGER)
@@ -40,12 +38,12 @@ OF_HANGER_NAMES = frozenset(each.name for each in OF_HANGER)
 def hanger_figures(
     data: HangerReport, names: Container[str] = OF_HANGER_NAMES
 ) -> tuple[Illustration, ...]:
-    """Those of these `names` that the report of a hanger has the data for, in reading order."""
+    """Draw those of these `names` that a hanger's report has the data for, in reading order."""
     return drawn([each for each in OF_HANGER if each.name in names], data)
 
 
 def bridge_figures(data: BridgeReport) -> tuple[Illustration, ...]:
-    """Those of a bridge: what moved, where it was compared, and what each hanger carries."""
+    """Draw those of a bridge: what moved, where it was compared, and what each hanger carries."""
     shifts = drawn((SHIFTS,), data.pattern) if data.pattern else ()
     return (*shifts, *drawn((TENSIONS,), data))
 
@@ -56,12 +54,12 @@ def modal_test_figures(sheet: ModalTestReport) -> tuple[Illustration, ...]:
 
 
 def diagnosis_figures(sheet: DiagnosisSheet) -> tuple[Illustration, ...]:
-    """Those of a gap diagnosis."""
+    """Draw those of a gap diagnosis."""
     return drawn(OF_DIAGNOSIS, sheet)
 
 
 def bridge_diagnosis_figures(diagnosis: BridgeDiagnosis) -> tuple[Illustration, ...]:
-    """Those of a joint diagnosis."""
+    """Draw those of a joint diagnosis."""
     return drawn(OF_BRIDGE_DIAGNOSIS, diagnosis)
 
 

@@ -1,4 +1,4 @@
-"""What the gap diagnosis changes: the frequencies and the tension, before and after."""
+"""The frequencies before and after a gap diagnosis."""
 
 from __future__ import annotations
 
@@ -12,21 +12,14 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_wording import (
-    AFTER,
     label,
-    tension_of,
-    tension_unit,
-    tension_words,
 )
 from shm.report.figures import specification as spec
-from shm.report.figures import style
-from shm.report.figures.gap_map import by_plane, kept, orders, planes
-from shm.values import Plane, Residual, TensionEstimate
-from shm.values.rounding import ForceUnit
+from shm.report.figures.gap_map import by_plane, orders, planes, retained
+from shm.values import Plane, Residual
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    pass
 
 
 @dataclass(frozen=True)
@@ -50,7 +43,7 @@ _SERIES = (
 
 
 def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specification | None:
-    residuals = [r for r in kept(sheet) if math.isfinite(r.after_percent)]
+    residuals = [r for r in retained(sheet) if math.isfinite(r.after_percent)]
     if not residuals or sheet.diagnosis.verdict.claim is None:
         return None
     made = {
@@ -68,7 +61,7 @@ def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specifica
 
 
 def _points(residuals: Sequence[Residual], plane: Plane, series: _Series) -> spec.Points | None:
-    """The mean over the tests with a line from the least to the largest."""
+    """Return the mean over the tests with a line from the least to the largest."""
     there = [
         (order, values)
         for order in orders(residuals, plane)
@@ -109,13 +102,13 @@ def _caption_of_before_and_after(sheet: DiagnosisSheet) -> str:
 
 
 def _alt_of_before_and_after(sheet: DiagnosisSheet) -> str:
-    found = kept(sheet)
-    told = [
+    found = retained(sheet)
+    wording = [
         f"{plane} from {_rms(found, plane, 'residual_percent')} to "
         f"{_rms(found, plane, 'after_percent')}"
         for plane in planes(found)
     ]
-    return f"Root mean square of the gap by mode before and after: {'; '.join(told)}."
+    return f"Root mean square of the gap by mode before and after: {'; '.join(wording)}."
 
 
 def _rms(residuals: Sequence[Residual], plane: Plane, field: str) -> str:
@@ -132,91 +125,4 @@ BEFORE_AND_AFTER = spec.Member(
     specify,
     _caption_of_before_and_after,
     _alt_of_before_and_after,
-)
-
-
-_NEAR = 1.0
-"""How far the nominal tension may lie to be in view, in widths of what is drawn."""
-
-
-def _draw_gap_tension(sheet: DiagnosisSheet) -> Figure | None:
-    rows = _rows(sheet)
-    if not rows:
-        return None
-    unit = tension_unit(sheet.diagnosis)
-    figure, axes = style.one_panel(f"tension ({unit.name})", "", 0.42 * len(rows) + 0.95)
-    for row, (_, estimate, colour) in enumerate(rows):
-        _interval(axes, row, estimate, unit, colour)
-    axes.set_yticks(range(len(rows)), [told for told, _, _ in rows])
-    axes.tick_params(axis="y", length=0)
-    axes.grid(False, axis="y")
-    axes.set_ylim(len(rows) - 0.5, -0.75)
-    axes.margins(x=0.12)
-    axes.ticklabel_format(axis="x", useOffset=False)
-    _nominal(axes, unit.of(sheet.hanger.nominal_tension_n))
-    return figure
-
-
-def _rows(sheet: DiagnosisSheet) -> list[tuple[str, TensionEstimate, str]]:
-    diagnosis = sheet.diagnosis
-    rows = [
-        (f"baseline {diagnosis.baseline}", diagnosis.tension_before_n, style.QUIET),
-        (AFTER, diagnosis.tension_after_n, style.BLUE),
-    ]
-    return [row for row in rows if math.isfinite(row[1].mean)]
-
-
-def _interval(
-    axes: Axes, row: int, estimate: TensionEstimate, unit: ForceUnit, colour: str
-) -> None:
-    interval = tension_of(estimate).in_unit(unit)
-    if math.isfinite(interval.width):
-        axes.plot(
-            [interval.low, interval.high], [row, row], color=colour, linewidth=7, alpha=0.35,
-            solid_capstyle="butt",
-        )  # fmt: skip
-    axes.plot([interval.mean], [row], marker="o", markersize=6, color=colour)
-    axes.annotate(
-        tension_words(estimate, unit),
-        (interval.mean, row),
-        xytext=(0, 9),
-        textcoords="offset points",
-        ha="center",
-        fontsize=style.TINY + 0.5,
-        color=style.INK,
-    )
-
-
-def _nominal(axes: Axes, nominal: float) -> None:
-    """The nominal tension as a line, where it lies near."""
-    low, high = axes.get_xlim()
-    reach = _NEAR * (high - low)
-    if not low - reach <= nominal <= high + reach:
-        return
-    axes.axvline(nominal, color=style.INK, linestyle=":", linewidth=1.2, label="nominal")
-    margin = 0.08 * (high - low)
-    axes.set_xlim(min(low, nominal - margin), max(high, nominal + margin))
-    style.legend_above(axes)
-
-
-def _caption_of_gap_tension(sheet: DiagnosisSheet) -> str:
-    return (
-        f"Tension by the baseline alone and {AFTER}: mean and 90 % interval. Where the two bars do "
-        "not overlap, the gap moves the tension by more than the baseline admits. The interval "
-        "holds what the scatter of manufacture leaves open."
-    )
-
-
-def _alt_of_gap_tension(sheet: DiagnosisSheet) -> str:
-    unit = tension_unit(sheet.diagnosis)
-    told = [f"{what} {tension_words(estimate, unit)}" for what, estimate, _ in _rows(sheet)]
-    return f"Tension before and after, mean and 90 % interval: {'; '.join(told)}."
-
-
-GAP_TENSION = spec.Member(
-    "gap_tension",
-    "Tension before and after",
-    _draw_gap_tension,
-    _caption_of_gap_tension,
-    _alt_of_gap_tension,
 )

@@ -1,4 +1,4 @@
-"""How probable each cause is, beside no gap and something that is not in the catalogue.
+"""Probabilities of the causes of a gap, of no gap and of something that is not in the catalogue.
 
 Which hangers have a shared cause, and how large it is in each.
 """
@@ -35,7 +35,7 @@ class Bar:
     label: str
     probability: float
     colour: str
-    beside: str = ""
+    besides: str = ""
     claim: Claim | None = None
 
 
@@ -46,13 +46,15 @@ def specify(sheet: DiagnosisSheet) -> spec.Specification | None:
         return None
     brackets, outermost = _brackets(bars)
     right = max(1.3, outermost + _BRACKET_TEXT)
-    beside = [(-0.85, "log Bayes factor"), *enumerate(bar.beside for bar in bars)]
-    column = _notes([right] * len(beside), [row for row, _ in beside], [told for _, told in beside])
+    besides = [(-0.85, "log Bayes factor"), *enumerate(bar.besides for bar in bars)]
+    column = _notes(
+        [right] * len(besides), [row for row, _ in besides], [wording for _, wording in besides]
+    )
     return probability_bars(bars, _LABEL, (-1.2, right), [*brackets, column])
 
 
 def specify_on_screen(sheet: DiagnosisSheet) -> spec.Specification:
-    """Where those alike share a letter, and fewer are shown."""
+    """Return fewer bars, those that cannot be told apart with one letter."""
     pairs = [
         (claim, cause) for claim in group_causes(sheet.diagnosis.causes) for cause in claim.causes
     ]
@@ -127,7 +129,7 @@ def _shown(diagnosis: Diagnosis) -> list[tuple[Claim, Cause]]:
 
 
 def _brackets(bars: Sequence[Bar]) -> tuple[list[spec.Mark], float]:
-    """A bracket around causes that the data cannot tell apart, with what they have together.
+    """Return a bracket around causes that the data cannot tell apart, with what they have together.
 
     And the place of the outermost bracket.
     """
@@ -141,21 +143,21 @@ def _brackets(bars: Sequence[Bar]) -> tuple[list[spec.Mark], float]:
         x = max(bars[row].probability for row in rows) + 0.13
         top, bottom = rows[0] - 0.3, rows[-1] + 0.3
         sides, heights = [x - 0.012, x, x, x - 0.012], [top, top, bottom, bottom]
-        told = f"not told apart:\n{formatting.probability(claim.probability)} together"
+        wording = f"not told apart:\n{formatting.probability(claim.probability)} together"
         marks += [
             spec.Line(x=sides, y=heights, colour="purple", width=1.4),
-            _notes([x + 0.01], [(top + bottom) / 2], [told], "purple", "right"),
+            _notes([x + 0.01], [(top + bottom) / 2], [wording], "purple", "right"),
         ]
         outermost = max(outermost, x)
     return marks, outermost
 
 
 def _notes(
-    x: Sequence[float], y: Sequence[float], told: Sequence[str], colour: str = "quiet",
+    x: Sequence[float], y: Sequence[float], wording: Sequence[str], colour: str = "quiet",
     side: spec.Side = "left",
 ) -> spec.Points:  # fmt: skip
     """Words alone."""
-    return spec.Points(x=x, y=y, size=0, labels=told, label_side=side, colour=colour)
+    return spec.Points(x=x, y=y, size=0, labels=wording, label_side=side, colour=colour)
 
 
 def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
@@ -164,12 +166,12 @@ def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
     left = len(diagnosis.causes) - shown
     verb = "is" if left == 1 else "are"
     more = f" {formatting.counted(left, 'less probable cause')} {verb} not drawn."
-    alike = (
+    similar = (
         "Causes with the same letter cannot be told apart with these data"
         if is_on_screen
         else "A bracket holds causes that these data cannot tell apart"
     )
-    groups = f" {alike}; what counts is their sum." if diagnosis.groups else ""
+    groups = f" {similar}; what counts is their sum." if diagnosis.groups else ""
     return (
         "Probability of each cause, of something that the catalogue does not hold, and of no gap; "
         f"all add to 1.{groups}{more if left > 0 else ''}"
@@ -252,12 +254,12 @@ def shared_caption(diagnosis: BridgeDiagnosis) -> str:
 
 def _shared_alt(diagnosis: BridgeDiagnosis) -> str:
     assert diagnosis.leading is not None
-    told = [
+    wording = [
         f"hanger {each.hanger} {formatting.probability(each.probability)}"
         for each in diagnosis.leading.members
     ]
     what = effect_label(diagnosis.leading.effect, diagnosis.leading.at)
-    return f"Probability of {what}: {', '.join(told)}."
+    return f"Probability of {what}: {', '.join(wording)}."
 
 
 SHARED = spec.Member(

@@ -60,13 +60,13 @@ def specify(check: GapCheck) -> spec.Specification | None:
                     size=6, name=look.name, texts=texts, clipped=False,
                 )
             )  # fmt: skip
-    told = [found_from(each) for each in check.effects]
+    wording = [found_from(each) for each in check.effects]
     marks.append(
         spec.Points(
             x=[1.0 for _ in places],
             y=list(places),
             size=0,
-            labels=told,
+            labels=wording,
             colour="ink",
             clipped=False,
         )
@@ -103,8 +103,8 @@ def caption(check: GapCheck) -> str:
 
 
 def _alt(check: GapCheck) -> str:
-    told = ["; ".join(each for each in row if each) for row in rows(check)]
-    return f"{'; '.join(HEADINGS)}: {'. '.join(told)}."
+    wording = ["; ".join(each for each in row if each) for row in rows(check)]
+    return f"{'; '.join(HEADINGS)}: {'. '.join(wording)}."
 
 
 FIGURE = spec.Member("gap_check", "What a diagnosis would find", specify, caption, _alt)

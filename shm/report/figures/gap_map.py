@@ -1,4 +1,4 @@
-"""Where the gap lies: residuals by plane and order, place along the hanger, what it goes with."""
+"""The gap by plane and order, by place along the hanger, and by the conditions of the test."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from shm.values import PLANES, GapPlace, Plane, Residual, Trend, is_excluded
 
 
 def measured(sheet: DiagnosisSheet) -> list[Residual]:
-    """The residuals that are known."""
+    """Return the residuals that are known."""
     return [r for r in sheet.diagnosis.where if math.isfinite(r.residual_percent)]
 
 
-def kept(sheet: DiagnosisSheet) -> list[Residual]:
-    """Those of them that were not set aside as gross errors."""
+def retained(sheet: DiagnosisSheet) -> list[Residual]:
+    """Return those that were not excluded as gross errors."""
     return [r for r in measured(sheet) if not is_excluded(sheet.diagnosis, r)]
 
 
-def aside(sheet: DiagnosisSheet) -> list[Residual]:
-    """Those of them that were."""
+def excluded(sheet: DiagnosisSheet) -> list[Residual]:
+    """Return those that were excluded as gross errors."""
     return [r for r in measured(sheet) if is_excluded(sheet.diagnosis, r)]
 
 
@@ -44,7 +44,7 @@ def by_plane(
     y: spec.Axis,
     is_on_screen: bool,
 ) -> list[list[spec.Panel]]:
-    """A panel of marks for each plane over its orders, with one vertical axis.
+    """Return a panel of marks for each plane over its orders, with one vertical axis.
 
     They stand side by side on paper, one below the other on a screen, which may be narrow."""
     panels: list[spec.Panel] = []
@@ -89,11 +89,11 @@ _BELOW_INCHES = 2.2
 
 
 def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specification | None:
-    """The map; on paper with what stands below it."""
+    """Return the map; on paper with what stands below it."""
     residuals = measured(sheet)
     if not residuals:
         return None
-    ordinary, gross = kept(sheet), aside(sheet)
+    ordinary, gross = retained(sheet), excluded(sheet)
     halves = np.nan_to_num([NORMAL_90 * _sd_percent(r) for r in ordinary])
     inside = np.array([r.residual_percent for r in ordinary or gross])
     low, high = (
@@ -102,7 +102,7 @@ def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specifica
     made = {
         plane: [
             *_marks([r for r in ordinary if r.plane == plane], plane, sheet.diagnosis.tests),
-            *_set_aside([r for r in gross if r.plane == plane], sheet, low, high),
+            *_excluded([r for r in gross if r.plane == plane], sheet, low, high),
         ]
         for plane in planes(residuals)
     }
@@ -120,11 +120,11 @@ def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specifica
 
 
 def _marks(residuals: Sequence[Residual], plane: Plane, tests: Sequence[str]) -> list[spec.Mark]:
-    """A mark for each test beside the others of its mode, filled where the gap is clear."""
-    own = spec.PLANE_SYMBOLS[plane]
+    """Return a mark for each test beside the others of its mode, filled where the gap is clear."""
+    this = spec.PLANE_SYMBOLS[plane]
     kinds: tuple[tuple[list[Residual], spec.Symbol, bool, str], ...] = (
-        ([r for r in residuals if abs(r.z) >= _CLEAR_SD], own, True, "beyond 2 sd"),
-        ([r for r in residuals if abs(r.z) < _CLEAR_SD], own, False, "within 2 sd"),
+        ([r for r in residuals if abs(r.z) >= _CLEAR_SD], this, True, "beyond 2 sd"),
+        ([r for r in residuals if abs(r.z) < _CLEAR_SD], this, False, "within 2 sd"),
         ([r for r in residuals if math.isnan(r.z)], "thin cross", True, "sd not known"),
     )
     found: list[spec.Mark] = []
@@ -137,13 +137,13 @@ def _marks(residuals: Sequence[Residual], plane: Plane, tests: Sequence[str]) ->
                     x=[r.order + _offset(r.test, tests) for r in chosen], y=y, low=y - half,
                     high=y + half, caps=False, symbol=symbol, filled=filled, name=name,
                     size=4.6 if len(tests) <= 6 else 3.2, colour=spec.PLANE_HUES[plane],
-                    texts=_told(chosen),
+                    texts=_wording(chosen),
                 )
             )  # fmt: skip
     return found
 
 
-def _set_aside(
+def _excluded(
     residuals: Sequence[Residual], sheet: DiagnosisSheet, low: float, high: float
 ) -> list[spec.Mark]:
     """Gross errors as crosses with their size, at the edge where they lie beyond the others."""
@@ -153,13 +153,13 @@ def _set_aside(
             x=[r.order + _offset(r.test, sheet.diagnosis.tests)],
             y=[min(max(r.residual_percent, low), high)], symbol="cross", size=7, colour="red",
             name="set aside", labels=[f"{r.residual_percent:+z.2f} %"],
-            label_side="left" if r.order > (1 + last) / 2 else "right", texts=_told([r]),
+            label_side="left" if r.order > (1 + last) / 2 else "right", texts=_wording([r]),
         )
         for r in residuals
     ]  # fmt: skip
 
 
-def _told(residuals: Sequence[Residual]) -> list[str]:
+def _wording(residuals: Sequence[Residual]) -> list[str]:
     return [
         f"{r.plane} {r.order}, {r.test}: {r.residual_percent:+.2f} %, measured "
         f"{formatting.number(r.measured_hz, '.3f')} Hz"
@@ -174,7 +174,7 @@ def _offset(test: str, tests: Sequence[str]) -> float:
 
 
 def _sd_percent(residual: Residual) -> float:
-    """The standard deviation that the z-score was counted in."""
+    """Return the standard deviation that the z-score was counted in."""
     return abs(residual.residual_percent / residual.z) if residual.z else math.nan
 
 
@@ -185,13 +185,13 @@ def local(sheet: DiagnosisSheet) -> list[GapPlace]:
 
 
 def profiles(sheet: DiagnosisSheet) -> spec.Panel:
-    """The density of the place along the hanger of each kind of local cause, largest 1."""
+    """Return the density of the place along the hanger of each kind of local cause, largest 1."""
     looks = zip(local(sheet), _LOOKS, strict=False)
     return spec.Panel(
         y=spec.Axis(label="density, largest 1", range=(0, 1.08), ticks=(0, 0.5, 1)),
         marks=[mark for place, look in looks for mark in _profile(place, *look)],
         x=spec.Axis(label="position from the deck end (m)", range=(0, sheet.hanger.length_m)),
-        width=1.6, has_own_legend=True,
+        width=1.6, has_separate_legend=True,
     )  # fmt: skip
 
 
@@ -223,7 +223,7 @@ def known(sheet: DiagnosisSheet) -> list[Trend]:
 
 
 def goes_with(sheet: DiagnosisSheet) -> spec.Panel:
-    """How the mean residual changes over the range of each condition."""
+    """Return the change of the mean residual over the range of each condition."""
     found = known(sheet)
     rows = np.arange(len(found))
     slope = np.array([trend.slope_percent for trend in found])
@@ -263,7 +263,7 @@ def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
     )
     crosses = (
         " Crosses: gross errors, set aside; at the edge where they lie beyond it."
-        if aside(sheet)
+        if excluded(sheet)
         else ""
     )
     return (
@@ -286,12 +286,14 @@ def places_in_words(sheet: DiagnosisSheet) -> str:
 def _alt(sheet: DiagnosisSheet) -> str:
     residuals = measured(sheet)
     worst = sorted(residuals, key=lambda r: -abs(r.residual_percent))[:3]
-    told = ", ".join(f"{r.plane} {r.order} in {r.test} {r.residual_percent:+z.2f} %" for r in worst)
+    wording = ", ".join(
+        f"{r.plane} {r.order} in {r.test} {r.residual_percent:+z.2f} %" for r in worst
+    )
     there = f" {places_in_words(sheet)}" if local(sheet) else ""
     count = formatting.counted(len(residuals), "residual")
-    gross = ", ".join(f"{r.plane} {r.order} in {r.test}" for r in aside(sheet))
+    gross = ", ".join(f"{r.plane} {r.order} in {r.test}" for r in excluded(sheet))
     set_aside = f" Set aside as a gross error: {gross}." if gross else ""
-    return f"{count} of frequencies; the largest: {told}.{set_aside}{there}"
+    return f"{count} of frequencies; the largest: {wording}.{set_aside}{there}"
 
 
 FIGURE = spec.Member("gap_map", "Where the gap lies", specify, caption, _alt)

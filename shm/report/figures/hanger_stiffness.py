@@ -14,6 +14,8 @@ from shm.report import formatting
 from shm.report.contents import HangerReport
 from shm.report.figures import specification as spec
 from shm.report.figures import time_axes
+from shm.report.formatting import Interval
+from shm.report.sizes import size_of
 from shm.values import FloatArray
 from shm.watch.state import Band as Bounds
 
@@ -47,22 +49,36 @@ def specify(
     if is_on_screen:
         return spec.stacked([*(replace(each, x=None) for each in panels[:-1]), panels[-1]], 3.0)
     units = " or ".join(sorted({course.unit for course in courses if course.unit}))
-    label = spec.Axis(label=f"log10 of stiffness{units and ' in ' + units}")
-    ends = [end for panel in panels for end in panel.y.range or ()]
-    shared = [
-        replace(each, y=spec.Axis(range=(min(ends), max(ends))), shares_y=place > 0)
-        for place, each in enumerate(panels)
-    ]
-    shared[0] = replace(shared[0], y=replace(shared[0].y, label=label.label))
+    ends = [float(end) for panel in panels for end in panel.y.range or ()]  # type: ignore[arg-type]
+    axis = _axis("", min(ends), max(ends))
+    shared = [replace(each, y=axis, shares_y=place > 0) for place, each in enumerate(panels)]
+    label = f"stiffness (M{units})" if units else "stiffness (millions)"
+    shared[0] = replace(shared[0], y=replace(axis, label=label))
     return spec.Specification(rows=[shared], height_inches=3.0)
+
+
+def _axis(label: str, low: float, high: float) -> spec.Axis:
+    """Return a logarithmic axis; of more than two decades with a number at each of them."""
+    if high < 200 * low:
+        return spec.log_axis(label, low, high)
+    ticks = [10.0**n for n in range(math.ceil(math.log10(low)), math.floor(math.log10(high)) + 1)]
+    return replace(
+        spec.log_axis(label, low, high), ticks=ticks, tick_labels=[f"{each:g}" for each in ticks]
+    )
+
+
+def _in_millions(decades: Bounds) -> Bounds:
+    """Return stiffnesses in millions of their unit from their log10."""
+    return Bounds(*(10.0 ** (each - 6) for each in (decades.low, decades.middle, decades.high)))
 
 
 def _panel(course: Course, reach: float, is_on_screen: bool) -> spec.Panel:
     alone = course.alone
     chosen = time_axes.places(alone.middle, alone.low, alone.high)
     when = [course.times[place] for place in chosen.tolist()]
-    shown, names = time_axes.part(alone, chosen), [course.tests[i] for i in chosen.tolist()]
-    state = None if course.state is None else time_axes.part(course.state, chosen)
+    shown = _in_millions(time_axes.part(alone, chosen))
+    names = [course.tests[i] for i in chosen.tolist()]
+    state = None if course.state is None else _in_millions(time_axes.part(course.state, chosen))
     marks: list[spec.Mark] = [
         *(
             time_axes.band(when, shown, "purple")
@@ -75,7 +91,10 @@ def _panel(course: Course, reach: float, is_on_screen: bool) -> spec.Panel:
     if not math.isnan(course.baseline):
         marks += [
             time_axes.level(
-                course.baseline + shift, name, hue, "dash" if shift == 0 else "dashdot"
+                10.0 ** (course.baseline + shift - 6),
+                name,
+                hue,
+                "dash" if shift == 0 else "dashdot",
             )
             for shift, name, hue in levels
         ]  # fmt: skip
@@ -83,24 +102,26 @@ def _panel(course: Course, reach: float, is_on_screen: bool) -> spec.Panel:
     bounds = course.alone if course.state is None else course.state
     seen: list[FloatArray] = [time_axes.inner(each) for each in (bounds.low, bounds.high)]
     seen += [time_axes.inner(alone.middle), course.baseline + np.array([-reach, reach])]
+    low, high = (10.0 ** (end - 6) for end in spec.limits(*seen))
     return spec.Panel(
-        y=spec.Axis(label="log10 of stiffness", range=spec.limits(*seen)), marks=marks,
+        y=_axis(f"M{course.unit}" if course.unit else "millions", low, high), marks=marks,
         x=time_axes.time_axis(course.times), title=course.title, title_side="left",
     )  # fmt: skip
 
 
 def caption(courses: Sequence[Course], reach_decades: float, remark: str = "") -> str:
     what = (
-        "Stiffness of the ends, log10 of N m/rad (of N/m per node for a solid class), by each test "
+        "Stiffness of the ends in MN m/rad (MN/m per node for a solid class), by each test "
         "and as a state from all tests up to each, with 90 % intervals; the ends stand apart where "
         "the frequencies tell them apart."
         if any(course.state for course in courses)
-        else "Rotational stiffness of the ends by each test, log10 of N m/rad, "
+        else "Rotational stiffness of the ends by each test in MN m/rad, "
         "2/(1/k_deck + 1/k_arch) in each plane, because frequencies alone cannot tell the ends "
         "apart: mean and 90 % credible band."
     )
     levels = (
-        f" Dashed: baseline; dash-dotted: thresholds, {reach_decades:.3g} decades either side."
+        f" Dashed: baseline; dash-dotted: thresholds, {10**reach_decades:.2g} times as much or as "
+        "little."
         if any(math.isfinite(course.baseline) for course in courses)
         else ""
     )
@@ -112,8 +133,8 @@ def caption(courses: Sequence[Course], reach_decades: float, remark: str = "") -
 
 
 def alt(courses: Sequence[Course]) -> str:
-    told = "; ".join(_last(course) for course in courses)
-    return f"End stiffness over time, log10; at last: {told}."
+    wording = "; ".join(_last(course) for course in courses)
+    return f"End stiffness over time; at last: {wording}."
 
 
 def _last(course: Course) -> str:
@@ -121,7 +142,7 @@ def _last(course: Course) -> str:
     low, middle, high = (float(each[-1]) for each in (bounds.low, bounds.middle, bounds.high))
     if math.isnan(middle):
         return f"{course.title} not known"
-    return f"{course.title} {middle:.2f} ({low:.2f} to {high:.2f})"
+    return f"{course.title} {size_of('log10_k', course.unit, Interval(middle, low, high))}"
 
 
 def _courses(data: HangerReport) -> list[Course]:

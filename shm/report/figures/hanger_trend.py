@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 import numpy as np
@@ -15,11 +15,10 @@ from shm.report.contents import HangerReport
 from shm.report.figures import specification as spec
 from shm.report.figures import time_axes
 from shm.report.formatting import Interval
-from shm.report.states import CalledChange, QuantityOverTime
+from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
 from shm.values import FloatArray
 from shm.values.notes import Note, NoteKind
 from shm.values.rounding import ForceUnit, force_unit
-from shm.values.stated_tension import averaged_now
 from shm.watch.state import Band as Bounds
 
 _LONGEST_WORDS = 200  # layout: characters of a note in a hover; the page has all
@@ -34,7 +33,7 @@ _SYMBOLS: dict[NoteKind, tuple[spec.Symbol, bool]] = {
 
 @dataclass(frozen=True)
 class Deed:
-    """What somebody did, and why: it stands at the foot of the figure."""
+    """An action of a person, and why: it is drawn at the foot of the figure."""
 
     kind: str
     symbol: spec.Symbol
@@ -49,7 +48,8 @@ class Course:
     """The tension of a hanger over time: n tests in N, and what is known beside them.
 
     `alerts` say by the place of a test why it raised one. `state` is at `state_times`; `changes`
-    are those that were detected, None where that is not known. `remark` ends the caption.
+    are those that were detected, None where that is not known. `excluded` are the places of tests
+    taken for blunders: no axis reaches to them for their sake. `remark` ends the caption.
     """
 
     times: Sequence[datetime]
@@ -65,6 +65,7 @@ class Course:
     changes: Sequence[CalledChange] | None = None
     deeds: Sequence[Deed] = ()
     notes: Sequence[Note] = ()
+    excluded: Collection[int] = ()
     remark: str = ""
     bounds_n: Bounds = field(init=False)
 
@@ -95,6 +96,7 @@ def specify(course: Course) -> spec.Specification | None:
         ),
         *_levels(course, scale),
         *_alerts(course, scale),
+        *_excluded(course, scale),
         *_deeds(course),
         *_repeats(course, chosen.tolist(), scale),
         *time_axes.changes(course.changes or (), _shown(course)),
@@ -106,7 +108,7 @@ def specify(course: Course) -> spec.Specification | None:
 
 
 def _shown(course: Course) -> list[datetime]:
-    """The times of the tests, and of what was noted after the last of them."""
+    """Return the times of the tests, and of what was noted after the last of them."""
     last = max(course.times)
     return [*course.times, *(each.at for each in course.notes if each.at > last)]
 
@@ -129,7 +131,7 @@ def _has_repeats(course: Course) -> bool:
 
 
 def _repeats(course: Course, chosen: list[int], scale: float) -> list[spec.Mark]:
-    """The interval in which the same test would repeat, within the absolute one."""
+    """Return the interval in which the same test would repeat, within the absolute one."""
     if not _has_repeats(course):
         return []
     inner = [
@@ -161,7 +163,7 @@ def _levels(course: Course, scale: float) -> list[spec.Mark]:
 
 
 def _alerts(course: Course, scale: float) -> list[spec.Mark]:
-    """A triangle at each test that raised an alert."""
+    """Return a triangle at each test that raised an alert."""
     if not course.alerts:
         return []
     raised = list(course.alerts)
@@ -174,8 +176,30 @@ def _alerts(course: Course, scale: float) -> list[spec.Mark]:
     ]  # fmt: skip
 
 
+def _excluded(course: Course, scale: float) -> list[spec.Mark]:
+    """Mark tests taken for blunders; where they lie beyond the view, at its edge."""
+    low, high = _range(course, scale)
+    found: list[spec.Mark] = []
+    for name, is_inside in (("excluded test", True), ("excluded test out of view", False)):
+        at = [
+            place
+            for place in course.excluded
+            if bool(low <= scale * course.bounds_n.middle[place] <= high) is is_inside
+        ]
+        if at:
+            y = np.clip(scale * course.bounds_n.middle[at], low, high)
+            symbol: spec.Symbol = "thin cross" if is_inside else "triangle"
+            found.append(
+                spec.Points(
+                    x=_picked(course.times, at), y=y, symbol=symbol, size=7, colour="ink",
+                    clipped=False, name=name, texts=[course.names[place] for place in at],
+                )
+            )  # fmt: skip
+    return found
+
+
 def _deeds(course: Course) -> list[spec.Mark]:
-    """What people did and noted, by kind."""
+    """Return the marks of what people did and noted, by kind."""
     deeds = [*course.deeds, *_noted(course.notes)]
     kinds = {deed.kind: deed for deed in deeds}
     return [
@@ -205,11 +229,16 @@ def _noted(notes: Sequence[Note]) -> list[Deed]:
 def _range(course: Course, scale: float) -> tuple[float, float]:
     """Tests, state, baseline, thresholds and a nominal tension near them; lone intervals may lie
     beyond."""
-    seen: list[FloatArray] = [course.bounds_n.middle]
+    counted = np.ones(len(course.times), bool)
+    counted[list(course.excluded)] = len(course.excluded) == len(course.times)
+    seen: list[FloatArray] = [course.bounds_n.middle[counted]]
     if course.baseline_n is not None:
         seen.append(course.baseline_n * np.array([1 - course.reach, 1 + course.reach]))
-    bounds = course.bounds_n if course.state is None else course.state.filtered
-    seen += [time_axes.inner(bounds.low), time_axes.inner(bounds.high)]
+    if course.state is None:
+        lows, highs = course.bounds_n.low[counted], course.bounds_n.high[counted]
+    else:
+        lows, highs = course.state.filtered.low, course.state.filtered.high
+    seen += [time_axes.inner(lows), time_axes.inner(highs)]
     low, high = spec.limits(*seen)
     if 2 * low - high < course.nominal_n < 2 * high - low:
         low, high = spec.limits(*seen, [course.nominal_n])
@@ -256,16 +285,17 @@ def _lines(course: Course) -> str:
 
 
 def _marks(course: Course) -> str:
-    told = [
+    wording = [
         "triangles: alerts" if course.alerts else "",
         "upright spans: when a detected change began, with 90 % probability"
         if course.changes
         else "",
+        "crosses, or triangles at the edge: tests taken for blunders" if course.excluded else "",
         "at the foot: what was set, adopted, seen or repaired"
         if course.deeds or course.notes
         else "",
     ]
-    found = "; ".join(filter(None, told))
+    found = "; ".join(filter(None, wording))
     fewer = time_axes.thinned_words(len(course.times))
     return ((found[:1].upper() + found[1:] + "." if found else "") + fewer).strip()
 
@@ -289,19 +319,47 @@ def _course(data: HangerReport) -> Course:
     rows = time_axes.dated(data)
     alerted = {alert.test: alert.message for alert in data.alerts}
     undated = len(data.trend) - len(rows)
-    baseline = data.baseline and averaged_now(data.baseline, data.selection)
+    baseline_n = data.now.baseline_n
+    states = data.states.within(data.period)
     left = f"{formatting.counted(undated, 'test')} without a time left out." if undated else ""
     return Course(
         times=[row.time for row in rows],
         names=[row.row.test for row in rows],
         tensions_n=[row.row.tension_n for row in rows],
         nominal_n=data.hanger.nominal_tension_n,
-        baseline_n=baseline.tension_n.mean if baseline else None,
+        baseline_n=baseline_n.mean if baseline_n else None,
         reach=data.hanger.thresholds.tension_shift_fraction,
         alerts={i: alerted[r.row.test] for i, r in enumerate(rows) if r.row.test in alerted},
         notes=data.inspections,
+        excluded=excluded([row.time for row in rows], states),
+        state=averaged_state(states, baseline_n.mean) if baseline_n else None,
+        state_times=states.times,
+        reference_temperature_c=states.reference_temperature_c,
+        changes=states.changes if states.times else None,
         remark=left,
     )
+
+
+def averaged_state(states: StatesOverTime, baseline_n: float) -> QuantityOverTime | None:
+    """Return the state of the tension at the level of the average over classes.
+
+    It is of one model class: of a change all classes say the same fraction, so the band, which
+    compares tests, moves along with the tension of the baseline `baseline_n`.
+    """
+    found = next((each for each in states.quantities if each.is_tension), None)
+    if found is None or not np.isfinite(found.filtered.middle).any():
+        return None
+    whole = np.arange(len(found.filtered.middle))
+    ratio = baseline_n / found.baseline
+    return replace(found, filtered=time_axes.part(found.filtered, whole, ratio))
+
+
+def excluded(times: Sequence[datetime], states: StatesOverTime) -> tuple[int, ...]:
+    """Return the places of the tests that the watch takes for blunders."""
+    outliers = {
+        time for time, is_outlier in zip(states.times, states.outlier, strict=True) if is_outlier
+    }
+    return tuple(place for place, time in enumerate(times) if time in outliers)
 
 
 FIGURE = spec.Member[HangerReport](

@@ -62,7 +62,7 @@ _GAP_SHARE = 0.015
 
 
 def offsets_s(records: Sequence[Recording]) -> list[float]:
-    """Where each record begins on the common axis, in s."""
+    """Return where each record begins on the common axis, in s."""
     whole = sum(record.duration_s for record in records)
     gap = _GAP_SHARE * whole if len(records) > 1 else 0.0
     ends = np.cumsum([record.duration_s + gap for record in records])
@@ -70,25 +70,25 @@ def offsets_s(records: Sequence[Recording]) -> list[float]:
 
 
 def borders_s(records: Sequence[Recording]) -> list[float]:
-    """The middle of the gap between each two records on the common axis, in s."""
+    """Return the middle of the gap between each two records on the common axis, in s."""
     starts = offsets_s(records)
     ends = [start + record.duration_s for start, record in zip(starts, records, strict=True)]
     return [(end + start) / 2 for end, start in zip(ends[:-1], starts[1:], strict=True)]
 
 
 def hit_time_s(sheet: ModalTestReport, hit: Hit) -> float:
-    """When a hit fell on the common axis, in s."""
+    """Return the time of a hit on the common axis, in s."""
     return offsets_s(sheet.recordings)[hit.record] + hit.start_s
 
 
 def located_hits(sheet: ModalTestReport) -> list[tuple[int, Hit]]:
-    """The hits whose records are at hand, each with its number from 1."""
+    """Return the hits whose records are at hand, each with its number from 1."""
     numbered = enumerate(sheet.hits, 1)
     return [(number, hit) for number, hit in numbered if hit.record < len(sheet.recordings)]
 
 
 def channel_of(record: Recording, row: int | None) -> Channel | None:
-    """The force (`row` None) or the acceleration of that row; None where it has none."""
+    """Return the force (`row` None) or the acceleration of that row; None where it has none."""
     if row is None:
         return record.force
     return record.accelerations[row] if row < len(record.accelerations) else None
@@ -160,16 +160,16 @@ class HitRecord:
     @property
     def near_s(self) -> tuple[float, float]:
         """From a little before the pulse to a little after the last strike."""
-        struck = self.force_n > _STRIKES * np.nanmax(self.force_n)
+        hit_at = self.force_n > _STRIKES * np.nanmax(self.force_n)
         peak = int(np.nanargmax(self.force_n))
-        width = _run(struck[peak:]) + _run(struck[peak::-1])
+        width = _run(hit_at[peak:]) + _run(hit_at[peak::-1])
         step_s = float(self.time_s[1] - self.time_s[0])
-        last_s = float(self.time_s[np.flatnonzero(struck)[-1]])
+        last_s = float(self.time_s[np.flatnonzero(hit_at)[-1]])
         return -_LEAD * width * step_s, max(_TAIL * width * step_s, 1.1 * last_s)
 
     @property
     def reach_hz(self) -> float:
-        """Where the force first falls to a tenth of its largest; NaN where it never does."""
+        """Return where the force first falls to a tenth of its largest; NaN where it never does."""
         top = int(np.argmax(self.spectrum_db))
         below = np.flatnonzero(self.spectrum_db[top:] < REACH_DB)
         return float(self.spectrum_hz[top + below[0]]) if len(below) else NAN
@@ -208,9 +208,9 @@ def _hit_record(sheet: ModalTestReport, number: int, hit: Hit, row: int) -> HitR
     )
 
 
-def _run(struck: BoolArray) -> int:
-    """How many of the first samples are true."""
-    return len(struck) if np.all(struck) else int(np.argmin(struck))
+def _run(hit_at: BoolArray) -> int:
+    """Count how many of the first samples are true."""
+    return len(hit_at) if np.all(hit_at) else int(np.argmin(hit_at))
 
 
 def _stop(sheet: ModalTestReport, hit: Hit) -> int:
@@ -223,7 +223,7 @@ def _stop(sheet: ModalTestReport, hit: Hit) -> int:
 
 
 def _pulse(force: FloatArray, hit: Hit, rate: float) -> tuple[FloatArray, FloatArray]:
-    """The pulse free of its offset, long enough for a second strike to be in it."""
+    """Return the pulse free of its offset, long enough for a second strike to be in it."""
     before = int(_BEFORE_S * rate) + _FILTER_SAMPLES
     first = max(0, hit.start - before)
     part = force[first : hit.start + int(_SECOND_STRIKE_S * rate)]
@@ -231,8 +231,8 @@ def _pulse(force: FloatArray, hit: Hit, rate: float) -> tuple[FloatArray, FloatA
     if part[np.nanargmax(np.abs(part))] < 0:
         part = -part
     least = hit.start - first + int(_AFTER_S * rate) + _FILTER_SAMPLES
-    struck = np.flatnonzero(part > _STRIKES * np.nanmax(part))
-    last = max(least, int(1.1 * struck[-1])) if len(struck) else least
+    hit_at = np.flatnonzero(part > _STRIKES * np.nanmax(part))
+    last = max(least, int(1.1 * hit_at[-1])) if len(hit_at) else least
     places = np.arange(min(last, len(part)))
     return (first + places - hit.start) / rate, np.asarray(part[places])
 
@@ -282,10 +282,10 @@ def _look(hit_record: HitRecord, place: int) -> dict[str, Any]:
 def _pulses(hits: Sequence[HitRecord]) -> spec.Panel:
     lines = []
     for place, hit_record in enumerate(hits):
-        kept = spec.envelope_places(hit_record.force_n, CURVE_BINS)
+        retained = spec.envelope_places(hit_record.force_n, CURVE_BINS)
         lines.append(
             spec.Line(
-                x=1e3 * hit_record.time_s[kept], y=hit_record.force_n[kept],
+                x=1e3 * hit_record.time_s[retained], y=hit_record.force_n[retained],
                 hover="%{x:.1f} ms: %{y:.4g} N",
                 **_look(hit_record, place),
             )
@@ -308,8 +308,8 @@ def _force_spectra(shown: Shown, hits: Sequence[HitRecord]) -> spec.Panel:
     lines = []
     for place, hit_record in enumerate(hits):
         # Far below the panel nothing is drawn, as lines to there would cross others outside it.
-        kept = (hit_record.spectrum_hz <= end) & (hit_record.spectrum_db > LOWEST_DB - 20)
-        found = np.where(kept, hit_record.spectrum_db, np.nan)
+        retained = (hit_record.spectrum_hz <= end) & (hit_record.spectrum_db > LOWEST_DB - 20)
+        found = np.where(retained, hit_record.spectrum_db, np.nan)
         places = spec.envelope_places(found, CURVE_BINS)
         lines.append(
             spec.Line(

@@ -5,7 +5,6 @@ sure they are, their shapes along the hanger.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,81 +102,6 @@ STABILISATION = spec.Member(
     "stabilisation", "Stabilisation diagram", _draw_poles, _poles_caption, _poles_alt
 )
 
-
-_LEAST_DAMPING_SPAN = 30.0
-"""Of the axis of intervals: equal ones shall look equal."""
-
-
-def _draw_damping(shown: Shown) -> spec.Specification | None:
-    damped = [m for m in shown.sheet.modes if math.isfinite(m.damping_ratio)]
-    sure = [m for m in shown.sheet.modes if m.frequency_sd_hz > 0]
-    across = spec.Axis(label="frequency (Hz)", range=shown_range(shown.sheet))
-    panels = []
-    if damped:
-        panels.append(_damping(damped, None if sure else across))
-    if sure:
-        panels.append(_uncertainty(sure, across))
-    return spec.stacked(panels, 4.6 if sure else 2.9) if panels else None
-
-
-def _damping(modes: Sequence[Mode], across: spec.Axis | None) -> spec.Panel:
-    value = np.array([100 * mode.damping_ratio for mode in modes])
-    half = np.nan_to_num([100 * NORMAL_90 * mode.damping_sd for mode in modes])
-    axis = spec.Axis(label="damping ratio (%)", range=(0, 1.1 * float(max(value + half))))
-    return spec.Panel(y=axis, marks=_marks(modes, value, half), x=across)
-
-
-def _uncertainty(modes: Sequence[Mode], across: spec.Axis) -> spec.Panel:
-    """Half the 90 % interval of each frequency, in percent of it."""
-    value = np.array([100 * NORMAL_90 * m.frequency_sd_hz / m.frequency_hz for m in modes])
-    low, high = float(min(value)), float(max(value))
-    room = max(1.3, math.sqrt(_LEAST_DAMPING_SPAN * low / high))
-    axis = spec.log_axis("90 % interval of\nthe frequency (± %)", low / room, high * room)
-    return spec.Panel(y=axis, marks=_marks(modes, value), x=across)
-
-
-def _marks(
-    modes: Sequence[Mode], value: FloatArray, half: FloatArray | None = None
-) -> list[spec.Mark]:
-    found: list[spec.Mark] = []
-    for plane in PLANES:
-        own = [place for place, mode in enumerate(modes) if mode.plane == plane]
-        if own:
-            found.append(
-                spec.Points(
-                    x=[modes[place].frequency_hz for place in own], y=value[own],
-                    low=None if half is None else (value - half)[own],
-                    high=None if half is None else (value + half)[own],
-                    symbol=spec.PLANE_SYMBOLS[plane], colour=spec.PLANE_HUES[plane], name=plane,
-                    texts=[f"{plane} {modes[place].order}" for place in own],
-                    hover="%{text}: %{x:.4g} Hz, %{y:.3g} %",
-                )
-            )  # fmt: skip
-    return found
-
-
-def _damping_caption(shown: Shown) -> str:
-    known = any(math.isfinite(mode.damping_sd) for mode in shown.sheet.modes)
-    bars = "bars are 90 % intervals" if known else "its uncertainty is not known"
-    return (
-        f"Damping of each mode, {bars}. A mode damped quite unlike its neighbours, or one whose "
-        "frequency is far less sure than theirs, deserves a second look."
-    )
-
-
-def _damping_alt(shown: Shown) -> str:
-    percent = [100 * mode.damping_ratio for mode in shown.sheet.modes]
-    return (
-        f"Damping ratios of {len(percent)} modes between {min(percent):.2g} and "
-        f"{max(percent):.2g} %, by frequency and plane."
-    )
-
-
-DAMPING = spec.Member(
-    "damping", "Damping and uncertainty", _draw_damping, _damping_caption, _damping_alt
-)
-
-
 ROOM = 1.35
 """To either side of a shape, whose largest value is 1."""
 _MOST = 36
@@ -195,7 +119,7 @@ class Guide:
 
 
 def shown_modes(sheet: ModalTestReport) -> list[Mode]:
-    """Those with a shape, as many as there is room for."""
+    """Return modes with a shape, as many as there is room for."""
     return modes_with_shape(sheet)[:_MOST]
 
 
@@ -224,7 +148,7 @@ def panel_title(mode: Mode) -> str:
 
 
 def guide_name(sheet: ModalTestReport) -> str:
-    """What the guides of a test are, for a legend."""
+    """Return the name of the guides of a test for a legend."""
     return "places joined" if sheet.hanger is None else "guide: taut string"
 
 
@@ -273,7 +197,7 @@ def rows_of(sheet: ModalTestReport, is_on_screen: bool) -> list[list[Mode]]:
     most = _MOST_ON_SCREEN if is_on_screen else _MOST_COLUMNS
     columns = math.ceil(longest / math.ceil(longest / most))
     columns = columns if is_on_screen else max(_LEAST_COLUMNS, columns)
-    return [own[i : i + columns] for own in planes for i in range(0, len(own), columns)]
+    return [this[i : i + columns] for this in planes for i in range(0, len(this), columns)]
 
 
 def _shape_panel(sheet: ModalTestReport, mode: Mode) -> spec.Panel:

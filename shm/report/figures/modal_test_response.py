@@ -50,7 +50,7 @@ class Spectrum:
 
 
 def spectrum(sheet: ModalTestReport) -> Spectrum | None:
-    """The accelerance where somebody hit, else the power spectral density of the records."""
+    """Return the accelerance where somebody hit, else the power spectral density of the records."""
     response = sheet.identification.frequency_response
     if response is not None and response.points:
         values = np.abs(response.accelerance)
@@ -84,12 +84,12 @@ class Shown:
 def _density(records: Sequence[Recording]) -> Spectrum | None:
     """Welch's estimate (1967), averaged over the records that have the sensors of the first."""
     first = records[0]
-    alike = [r for r in records if len(r.accelerations) == len(first.accelerations)]
-    length = min(record.samples for record in alike)
+    similar = [r for r in records if len(r.accelerations) == len(first.accelerations)]
+    length = min(record.samples for record in similar)
     wanted = max(length // _SEGMENTS, int(_LEAST_SEGMENT_S * first.sampling_rate_hz))
     if not first.accelerations or length < 2:
         return None
-    estimates = [_welch(record, min(length, wanted)) for record in alike]
+    estimates = [_welch(record, min(length, wanted)) for record in similar]
     points = tuple(ResponsePoint(c.name, c.plane, c.x_m) for c in first.accelerations)
     values = np.mean([values for _, values in estimates], axis=0)
     return Spectrum(points, estimates[0][0], values, "spectral density ((m/s²)²/Hz)")
@@ -144,7 +144,7 @@ def telling_points(
 
 
 def shown_points(sheet: ModalTestReport, found: Spectrum, most: int) -> list[int]:
-    """Indices of the points of `found` that are drawn."""
+    """Return indices of the points of `found` that are drawn."""
     lines = np.searchsorted(found.frequency_hz, [mode.frequency_hz for mode in sheet.modes])
     lines = np.minimum(lines, len(found.frequency_hz) - 1)
     values = np.nan_to_num(found.values[:, lines])
@@ -152,7 +152,7 @@ def shown_points(sheet: ModalTestReport, found: Spectrum, most: int) -> list[int
 
 
 _MARK_ROWS = {"transverse": 0.94, "longitudinal": 0.83}
-_SET_ASIDE_ROW = 0.72
+_EXCLUDED_ROW = 0.72
 _LABEL_ROOM = 0.026
 """Least distance of two numbers, as a share of the axis."""
 _HEADROOM = 0.36
@@ -178,7 +178,7 @@ def mode_marks(sheet: ModalTestReport, low_hz: float, high_hz: float) -> list[sp
     at = [each.frequency_hz for each in apart]
     texts = [f"{each.kind}, {each.frequency_hz:.4g} Hz: {each.reason}" for each in apart]
     name = "set aside"
-    return found + _marked_row(at, _SET_ASIDE_ROW, "red", "cross", name, texts, [], "dot")
+    return found + _marked_row(at, _EXCLUDED_ROW, "red", "cross", name, texts, [], "dot")
 
 
 def _marked_row(
@@ -199,12 +199,12 @@ def _marked_row(
 
 
 def with_headroom(low: float, high: float) -> tuple[float, float]:
-    """A range of which the upper part is left to the marks."""
+    """Return a range of which the upper part is left to the marks."""
     return low, high + (high - low) * _HEADROOM / (1 - _HEADROOM)
 
 
 def with_headroom_log(low: float, high: float) -> tuple[float, float]:
-    """The same of a logarithmic axis."""
+    """Return the same of a logarithmic axis."""
     lowest, highest = with_headroom(math.log10(low), math.log10(high))
     return 10**lowest, 10**highest
 
@@ -234,7 +234,7 @@ def _draw(shown: Shown) -> spec.Specification | None:
 
 
 def _points(shown: Shown) -> list[int]:
-    """Indices of the points that are drawn."""
+    """Return indices of the points that are drawn."""
     if shown.spectrum is None:
         return []
     if shown.point is None:
@@ -243,7 +243,7 @@ def _points(shown: Shown) -> list[int]:
 
 
 def _lines(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> slice:
-    """The lines within the axis; that at 0 Hz says nothing of a response."""
+    """Return the lines within the axis; that at 0 Hz says nothing of a response."""
     start, stop = np.searchsorted(frequency_hz, band_hz, side="right")
     return slice(max(1, int(start) - 1), int(stop) + 1)
 

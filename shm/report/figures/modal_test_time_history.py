@@ -97,7 +97,7 @@ def _history(sheet: ModalTestReport, row: int | None, is_top: bool) -> spec.Pane
 
 
 def _range(values: FloatArray, row: int | None, room: float) -> tuple[float, float]:
-    """The values with a little room, and more above for marks."""
+    """Return the values with a little room, and more above for marks."""
     largest = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
     low = float(np.nanmin(values)) if np.isfinite(values).any() else -1.0
     low, high = min(low, 0.0) - 0.05 * largest, 1.05 * largest
@@ -144,20 +144,20 @@ def _hit_marks(sheet: ModalTestReport) -> list[spec.Mark]:
                 name=f"{counted} dropped: {reason}" if reason else f"{counted} used",
                 labels=[str(number) for number, _ in hits] if len(located) <= _MOST_NUMBERS else (),
                 label_side="top",
-                texts=[_told(number, hit, hit_time_s(sheet, hit)) for number, hit in hits],
+                texts=[_wording(number, hit, hit_time_s(sheet, hit)) for number, hit in hits],
             )
         )  # fmt: skip
     return found
 
 
-def _told(number: int, hit: Hit, at_s: float) -> str:
+def _wording(number: int, hit: Hit, at_s: float) -> str:
     """`at_s` is as the axis has it, also where records follow each other."""
     what = "used" if hit.used else f"dropped: {hit.reason}"
     return f"hit {number}, {at_s:.3f} s, {formatting.plain(hit.peak_force_n, 4)} N, {what}"
 
 
 def _typical(sheet: ModalTestReport) -> HitRecord | None:
-    """The used hit of median force, else any."""
+    """Return the used hit of median force, else any."""
     found = hit_records(sheet)
     hits = [hit_record for hit_record in found if hit_record.hit.used] or found
     hits = sorted(hits, key=lambda hit_record: hit_record.hit.peak_force_n)

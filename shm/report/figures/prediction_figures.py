@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 # In a fixed order; dashed where a higher mode begins the list anew.
 _HUES = ("blue", "orange", "green", "purple", "red", "quiet")
-_ASIDE_INCHES = 3.2  # layout
+_ADJACENT_INCHES = 3.2  # layout
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +46,11 @@ def specify(parts: Sequence[Curves], x_label: str, y_label: str) -> Specificatio
         )
         for place, each in enumerate(parts)
     ]
-    return Specification(rows=[panels], height_inches=_ASIDE_INCHES, legend_columns=7)
+    return Specification(rows=[panels], height_inches=_ADJACENT_INCHES, legend_columns=7)
 
 
 def write_curves_png(figure: Specification, path: Path, words: str = "") -> None:
-    """The figure on white, with `words` below."""
+    """Return the figure on white, with `words` below."""
     # What draws is loaded where something is drawn.
     from shm.report.figures.with_matplotlib import draw
 
@@ -114,5 +114,5 @@ def draw(corners: FloatArray, moved: FloatArray) -> Figure:
 
 
 def write_deformed_png(corners: FloatArray, moved: FloatArray, path: Path, words: str = "") -> None:
-    """The figure of these on white, with `words` below."""
+    """Return the figure of these on white, with `words` below."""
     path.write_bytes(specification.png(draw(corners, moved), words=words))

@@ -1,4 +1,4 @@
-"""What a figure shows, told once: paper draws it by `with_matplotlib`, a screen by plotly.
+"""Figures as data: paper draws them by `with_matplotlib`, a screen by plotly.
 
 Colours are names of `style.PALETTE`, sizes are points. Places may be numbers or times. A
 `hover` is a template as plotly takes it; paper leaves it out.
@@ -43,7 +43,7 @@ PLANE_SYMBOLS: dict[Plane, Symbol] = {"transverse": "circle", "longitudinal": "s
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mark:
-    """What all marks share.
+    """The fields that all marks share.
 
     `name` stands in the legend, once a figure. `texts` are what a hover tells of each place, or
     what its template calls `%{text}`. `in_shares`: y is a share of the panel's height.
@@ -90,7 +90,7 @@ class Points(Mark):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Band(Mark):
-    """What lies between two curves."""
+    """The area between two curves."""
 
     x: Values
     low: Values
@@ -169,7 +169,7 @@ class Panel:
 
     Without `x` it shares the horizontal axis of the next panel below that has one; `shares_y`: it
     has the vertical axis of the first panel of its row, or of the row above where it is the first.
-    `has_own_legend`: on paper, apart from the others'. `words` stand in the place of axes.
+    `has_separate_legend`: on paper, apart from the others'.
     """
 
     y: Axis
@@ -181,8 +181,7 @@ class Panel:
     height: float = 1.0
     width: float = 1.0
     shares_y: bool = False
-    has_own_legend: bool = False
-    words: str = ""
+    has_separate_legend: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -222,7 +221,7 @@ def limits(*values: Values, room: float = 0.08) -> tuple[float, float]:
 
 
 def log_axis(label: str, low: float, high: float) -> Axis:
-    """A logarithmic axis of few decades, numbered in full at 1, 2 and 5 of each."""
+    """Return a logarithmic axis of few decades, numbered in full at 1, 2 and 5 of each."""
     decades = range(math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 1)
     ticks = [step * 10.0**decade for decade in decades for step in (1, 2, 5)]
     shown = [tick for tick in ticks if low <= tick <= high]
@@ -231,12 +230,12 @@ def log_axis(label: str, low: float, high: float) -> Axis:
 
 
 def plane_colour(plane: Plane | None) -> str:
-    """The name of a plane's colour; purple where the plane is not known."""
+    """Return the name of a plane's colour; purple where the plane is not known."""
     return PLANE_HUES[plane] if plane else "purple"
 
 
 def envelope_places(values: FloatArray, bins: int) -> IntArray:
-    """Indices of the smallest and the largest of `values` (n,) in each of `bins`, ascending.
+    """Return indices of the smallest and the largest of `values` (n,) in each of `bins`, ascending.
 
     No peak is lost, and every value that is drawn was measured. NaN are passed over; a bin of
     nothing else keeps one, so that the line breaks there. All of a short signal stays.
@@ -256,7 +255,7 @@ def envelope_places(values: FloatArray, bins: int) -> IntArray:
 
 
 def peak_places(values: FloatArray, bins: int) -> IntArray:
-    """Indices of the largest finite of `values` (n,) in each of `bins`, ascending."""
+    """Return indices of the largest finite of `values` (n,) in each of `bins`, ascending."""
     edges = np.unique(np.linspace(0, len(values), bins + 1).astype(np.int64))
     finite = np.where(np.isnan(values), -np.inf, values)
     pairs = pairwise(edges.tolist())
@@ -281,7 +280,7 @@ class Member(Generic[Data]):
     alt: Callable[[Data], str]
 
     def figure(self, data: Data) -> Figure | None:
-        """The figure on paper."""
+        """Return the figure on paper."""
         found = self.draw(data)
         if not isinstance(found, Specification):
             return found
@@ -302,11 +301,11 @@ class Illustration:
     figure: Figure
 
     def svg(self) -> str:
-        """An `<svg>` element whose ids are its own and whose colours follow the page."""
+        """Return an `<svg>` element whose ids are its own and whose colours follow the page."""
         return svg(self.figure, self.name, self.title, self.alt)
 
     def png(self, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
-        """The picture on white."""
+        """Return the picture on white."""
         return png(self.figure, dots_per_inch)
 
 
@@ -317,7 +316,7 @@ def drawn(members: Sequence[Member[Data]], data: Data) -> tuple[Illustration, ..
 
 
 def illustration(member: Member[Data], data: Data) -> Illustration | None:
-    """The figure with its words; None where `data` lacks what it shows."""
+    """Return the figure with its words; None where `data` lacks what it shows."""
     figure = member.figure(data)
     if figure is None:
         return None
@@ -349,10 +348,10 @@ def svg(figure: Figure, name: str, title: str, alt: str) -> str:
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
     body = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
-    return _named(_themed(_own_ids(body, name)), name, title, alt)
+    return _named(_themed(_unique_ids(body, name)), name, title, alt)
 
 
-def _own_ids(body: str, name: str) -> str:
+def _unique_ids(body: str, name: str) -> str:
     numbers: dict[str, str] = {}
     for found in _ID.findall(body):
         numbers.setdefault(found, f"{name}-{len(numbers)}")

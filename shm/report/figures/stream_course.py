@@ -1,4 +1,4 @@
-"""What a stream of permanent sensors has shown: spectrum, tracked frequencies, tension, health."""
+"""A stream of permanent sensors over time: spectrum, tracked frequencies, tension, health."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Course:
 
     @property
     def has_tension(self) -> bool:
-        """Whether the watch has learnt enough to say a tension of any hour."""
+        """Return True if the watch has learnt enough to state a tension of any hour."""
         return bool(np.isfinite(self.tension.middle).any())
 
     @property
@@ -111,13 +111,13 @@ def _tension(course: Course) -> spec.Panel:
 
 
 def _health(events: Sequence[StreamEvent]) -> list[spec.Span]:
-    told = [each for each in events if each.kind in _OF_HEALTH]
+    wording = [each for each in events if each.kind in _OF_HEALTH]
     return [
         spec.Span(
             low=each.start, high=max(each.end, each.start + timedelta(minutes=10)), opacity=0.15,
             colour="red", name="sensor or clock at fault",
         )
-        for each in told
+        for each in wording
     ]  # fmt: skip
 
 
@@ -133,7 +133,7 @@ def _broken(course: Course, *values: FloatArray) -> tuple[list[datetime], FloatA
 
 
 def caption(course: Course) -> str:
-    """What is seen, panel by panel."""
+    """Explain what is seen, panel by panel."""
     below = (
         "Below: the change of tension that they mean, and when a sensor or the clock was at fault."
         if course.has_tension
@@ -146,7 +146,7 @@ def caption(course: Course) -> str:
 
 
 def alt(course: Course) -> str:
-    """What a blind reader needs: how many modes are followed, and the tension at last."""
+    """Return how many modes are followed and the last tension, for a blind reader."""
     known = np.flatnonzero(np.isfinite(course.tension.middle))
     modes = formatting.counted(len(course.followed), "mode")
     if not len(known):

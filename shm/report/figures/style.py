@@ -1,4 +1,4 @@
-"""What all figures share: size, letters, quiet axes, and colours that the colour-blind tell apart;
+"""The style of all figures: size, letters, quiet axes, colours that the colour-blind distinguish;
 a word stands beside each.
 """
 
@@ -65,14 +65,14 @@ TINY = 7.5
 
 
 def new_figure(height_inches: float = 3.4) -> Figure:
-    """An empty figure of the page's width, with no pyplot behind it."""
+    """Return an empty figure of the page's width, with no pyplot behind it."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(WIDTH_INCHES, height_inches), layout="constrained", facecolor="none")
 
 
 def one_panel(x_label: str, y_label: str, height_inches: float = 3.4) -> tuple[Figure, Axes]:
-    """A figure of one panel, dressed."""
+    """Return a figure of one panel, dressed."""
     figure = new_figure(height_inches)
     axes = figure.subplots()
     dress(axes, x_label, y_label)
@@ -104,7 +104,7 @@ _QUIET_LEGEND: dict[str, Any] = {
 
 
 def legend_above(axes: Axes, columns: int = 4) -> Legend:
-    """A legend over the plot, where it hides no data."""
+    """Return a legend over the plot, where it hides no data."""
     return axes.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, fontsize=_SMALL,
         handlelength=1.6, **_QUIET_LEGEND,

@@ -1,4 +1,4 @@
-"""What is drawn over time: bands, single tests with their intervals, levels, fewer points."""
+"""Marks over time: bands, single tests with their intervals, levels, fewer points."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ class Dated:
 
 
 def dated(data: HangerReport) -> list[Dated]:
-    """The rows with a time, oldest first."""
+    """Return the rows with a time, oldest first."""
     rows = [Dated(row.time, row) for row in data.trend if row.time is not None]
     return sorted(rows, key=lambda row: row.time)
 
 
 def places(*curves: FloatArray, always: Collection[int] = ()) -> IntArray:
-    """Indices (m,) of what to draw of curves (n,): of each bin the extremes of every curve.
+    """Return indices (m,) of what to draw of curves (n,): of each bin the extremes of every curve.
 
     The first, the last and those of `always` stay whatever they are.
     """
@@ -51,12 +51,12 @@ def places(*curves: FloatArray, always: Collection[int] = ()) -> IntArray:
     if count <= MOST_POINTS:
         return np.arange(count)
     chosen = [spec.envelope_places(curve, _BINS) for curve in curves]
-    kept = np.array(sorted({0, count - 1, *always}), dtype=np.int64)
-    return np.unique(np.concatenate([*chosen, kept]))
+    retained = np.array(sorted({0, count - 1, *always}), dtype=np.int64)
+    return np.unique(np.concatenate([*chosen, retained]))
 
 
 def thinned_words(count: int) -> str:
-    """What a caption says, after a space, of a figure of so many tests that shows only some."""
+    """Return, after a space, that a figure of so many tests shows only some; else nothing."""
     if count <= MOST_POINTS:
         return ""
     return f" Of {count} tests those are drawn that keep every extreme; enlarging brings no more."
@@ -69,13 +69,13 @@ def bounds_of(intervals: Sequence[Interval | None]) -> Bounds:
 
 
 def part(bounds: Bounds, chosen: IntArray, scale: float = 1.0) -> Bounds:
-    """Those of some tests, times `scale`."""
+    """Return the bounds of some tests, times `scale`."""
     low, middle, high = bounds.low[chosen], bounds.middle[chosen], bounds.high[chosen]
     return Bounds(scale * low, scale * middle, scale * high)
 
 
 def band(times: Sequence[datetime], bounds: Bounds, colour: str, name: str = "") -> list[spec.Mark]:
-    """A band and, under a name, its middle line."""
+    """Return a band and, under a name, its middle line."""
     marks: list[spec.Mark] = [
         spec.Band(x=times, low=bounds.low, high=bounds.high, colour=colour, opacity=0.2)
     ]
@@ -100,10 +100,10 @@ def single_tests(
     name: str = "test by itself", size: float = 3.6,
 ) -> spec.Points:  # fmt: skip
     """Single tests as marks with their 90 % intervals."""
-    told = zip(names, spans(bounds), strict=True)
+    wording = zip(names, spans(bounds), strict=True)
     return spec.Points(
         x=x, y=bounds.middle, low=bounds.low, high=bounds.high, caps=False, colour=colour,
-        size=size, name=name, texts=[f"{test}: {span}" for test, span in told],
+        size=size, name=name, texts=[f"{test}: {span}" for test, span in wording],
     )  # fmt: skip
 
 
@@ -114,7 +114,7 @@ def level(value: float, name: str, colour: str, dash: spec.Dash) -> spec.Rule:
 def changes(
     called: Sequence[CalledChange], times: Sequence[datetime], with_words: bool = True
 ) -> list[spec.Span]:
-    """When each called change began, the words of later ones a line lower."""
+    """Return spans of when each detected change began, the words of later ones a line lower."""
     first, last = min(times), max(times)
     thin, middle = _THINNEST * (last - first), first + (last - first) / 2
     return [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -32,7 +32,7 @@ _SYMBOLS = {
 
 
 def draw(figure: spec.Specification) -> Figure:
-    """The figure in the width of a page."""
+    """Return the figure in the width of a page."""
     made = style.new_figure(figure.height_inches)
     places = list(_placed(made, figure))
     for axes, panel in places:
@@ -45,13 +45,21 @@ def draw(figure: spec.Specification) -> Figure:
             y=0.06 / figure.height_inches,
         )
     where = "upper left" if figure.is_grid else "outside upper left"
-    shared = [axes for axes, panel in places if not panel.has_own_legend]
+    shared = [axes for axes, panel in places if not panel.has_separate_legend]
     style.legend_of_figure(made, shared, figure.legend_columns, where)
     return made
 
 
+def draw_on(figure: spec.Specification, axes: Sequence[Axes]) -> None:
+    """Draw the panels in reading order on axes that somebody else made."""
+    for each, panel in zip(axes, figure.panels, strict=True):
+        _panel(each, panel, figure)
+        if each.get_legend_handles_labels()[1]:
+            style.legend_above(each)
+
+
 def _placed(made: Figure, figure: spec.Specification) -> Iterable[tuple[Axes, spec.Panel]]:
-    """The axes of each panel; those over one horizontal axis share it."""
+    """Return the axes of each panel; those over one horizontal axis share it."""
     height, rows = figure.height_inches, figure.rows
     if figure.is_grid:
         # Twenty-four panels by constrained layout take seconds; these are all of one size.
@@ -72,7 +80,7 @@ def _placed(made: Figure, figure: spec.Specification) -> Iterable[tuple[Axes, sp
         cells = (
             [grid[number, column] for column in range(len(row))]
             if is_whole
-            else _beside(grid, number, row)
+            else _adjacent(grid, number, row)
         )
         for column, (cell, panel) in enumerate(zip(cells, row, strict=True)):
             axes = made.add_subplot(cell, sharex=above, sharey=first if panel.shares_y else None)
@@ -86,20 +94,13 @@ def _placed(made: Figure, figure: spec.Specification) -> Iterable[tuple[Axes, sp
             yield axes, panel
 
 
-def _beside(grid: GridSpec, number: int, row: Any) -> list[Any]:
+def _adjacent(grid: GridSpec, number: int, row: Any) -> list[Any]:
     widths = [panel.width for panel in row]
     parts = grid[number, 0].subgridspec(1, len(row), width_ratios=widths)
     return [parts[0, column] for column in range(len(row))]
 
 
 def _panel(axes: Axes, panel: spec.Panel, figure: spec.Specification) -> None:
-    if panel.words:
-        axes.set_axis_off()
-        axes.text(
-            0.5, 0.5, panel.words, transform=axes.transAxes, ha="center", va="center",
-            color=style.INK, fontsize=style.TINY + 1.5,
-        )  # fmt: skip
-        return
     style.dress(axes, panel.x.label if panel.x else "", panel.y.label)
     for mark in panel.marks:
         _DRAWN[type(mark)](axes, mark)
@@ -114,7 +115,7 @@ def _panel(axes: Axes, panel: spec.Panel, figure: spec.Specification) -> None:
     _scale(axes, "y", panel.y)
     if panel.x is not None:
         _scale(axes, "x", panel.x)
-    if panel.has_own_legend:
+    if panel.has_separate_legend:
         style.legend_above(axes, columns=2)
 
 

@@ -101,7 +101,7 @@ def _row(
 
     found = update([test], build("beam2", hanger), options, tell)
     # As reports state it: where ends of another kind fit as well, the interval reaches to theirs.
-    ours = Selection((found,), (1.0,)).averaged().tension_n
+    ours = Selection((found,), (1.0,)).averaged.tension_n
     return FormulaRow(
         hanger=name,
         xi=length * math.sqrt(tension / stiffness),

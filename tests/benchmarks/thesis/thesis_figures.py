@@ -28,8 +28,8 @@ from shm.inference import UpdateOptions, update
 from shm.models import THESIS, build
 from shm.models.solid.classes import SolidModel
 from shm.models.tensioned_beam import wave_numbers
-from shm.report.contents import HangerReport
-from shm.report.figures import hanger_frequencies, parameter_pairs
+from shm.report.contents import HangerReport, summary_of
+from shm.report.figures import hanger_frequencies
 from shm.report.figures.prediction_figures import (
     Curves,
     specify,
@@ -38,7 +38,7 @@ from shm.report.figures.prediction_figures import (
 )
 from shm.report.figures.specification import Specification
 from shm.values import PLANES, FloatArray, Hanger, Plane, Posterior, Summary
-from tests.benchmarks.thesis import frequencies, thesis_data
+from tests.benchmarks.thesis import frequencies, parameter_pairs, thesis_data
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +181,8 @@ def _posterior(hanger: Hanger, model: str, tell: Tell) -> Posterior:
 
 def _frequencies(hanger: Hanger, posterior: Posterior, number: str) -> Figure:
     tests = tuple(thesis_data.measured_tests(_PRINTING))
-    report = HangerReport("", hanger, tests, posterior, datetime.now(UTC), __version__)
+    now = summary_of(hanger, tests[-1], posterior)
+    report = HangerReport("", now, tests, posterior, datetime.now(UTC), __version__)
     rows = posterior.predicted
     cells = [
         (

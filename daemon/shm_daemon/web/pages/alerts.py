@@ -18,7 +18,7 @@ from fastapi.responses import RedirectResponse
 from shm.bridge import Hook
 from shm.errors import BadInput
 from shm.pipeline import utc_now
-from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report import formatting
 from shm.report.hanger_status import HangerMessage
 from shm.store import Delivery, DeliveryState, News, Silence, StoredAlert
@@ -115,7 +115,7 @@ def _messages(shown: Sequence[StoredAlert], site: Site) -> dict[int, HangerMessa
     hangers = [each for each in site.workspace.bridge.hangers if each.id in numbers]
     if not hangers:
         return {}
-    lines = hanger_lines(site.workspace, site.store, utc_now(), hangers)
+    lines = hanger_summaries(site.workspace, site.store, utc_now(), hangers)
     return {each.hanger.id: each.message for each in lines}
 
 

@@ -61,7 +61,7 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
     now = utc_now()
     bridge = glance(site, now)
     found = compared(request, site) if len(bridge.hangers) <= QUICKLY_COMPARED else None
-    unit = hangers_unit(each.line for each in bridge.hangers)
+    unit = hangers_unit(each.summary for each in bridge.hangers)
     return page(
         request,
         "bridge.html.j2",
@@ -75,7 +75,7 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
         warnings=[
             said
             for each in bridge.hangers
-            for said in each.line.message.beyond_lead(each.line.warnings)
+            for said in each.summary.message.beyond_lead(each.summary.warnings)
         ],
         notes=site.store.notes.list_all(of_bridge=True),
         rows=[SimpleNamespace(**_row(each, unit, now)) for each in bridge.hangers],
@@ -123,12 +123,12 @@ def moved(request: Request, site: AtSite, _: Reader) -> Any:
 def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
     """The tiles over the drawing."""
     latest = bridge.latest
-    alerts = sum(each.line.open_alerts for each in bridge.hangers)
+    alerts = sum(each.summary.open_alerts for each in bridge.hangers)
     quiet = sum(each.is_quiet for each in bridge.hangers)
-    never = sum(each.line.latest is None for each in bridge.hangers)
+    never = sum(each.summary.latest is None for each in bridge.hangers)
     missing = [formatting.counted(quiet, "hanger") + " long not tested"] if quiet else []
     missing += [f"{never} without a result"] if never else []
-    newest = latest.latest if latest else None
+    newest = latest.latest.time if latest and latest.latest else None
     return [
         (
             "Last test",
@@ -143,7 +143,7 @@ def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
 
 def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
     """A hanger's row of the table."""
-    line, hanger = each.line, each.hanger
+    line, hanger = each.summary, each.hanger
     latest, (tension, nominal, shift) = line.latest, each.cells(unit)
     return {
         "id": hanger.id,
@@ -155,31 +155,31 @@ def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
         "message": line.message,
         "when": _WHEN[line.message.urgency],
         "open_alerts": line.open_alerts,
-        "day": f"{latest:%Y-%m-%d}" if latest else "",
-        "age": f"{told(now - latest)} ago" if latest else "",
-        "test_page": test_page(hanger.id, line.test) if latest else "",
+        "day": f"{latest.time:%Y-%m-%d}" if latest else "",
+        "age": f"{told(now - latest.time)} ago" if latest else "",
+        "test_page": test_page(hanger.id, latest.name) if latest else "",
         "is_quiet": each.is_quiet,
         "tests": each.tests,
     }
 
 
 def _glance_document(each: HangerGlance) -> dict[str, Any]:
-    line, hanger = each.line, each.hanger
+    summary, hanger, latest = each.summary, each.hanger, each.summary.latest
     return {
         "hanger": hanger.id,
         "name": hanger.name,
         "length_m": hanger.length_m,
         "nominal_tension_n": hanger.nominal_tension_n,
-        **line.message.document,
+        **summary.message.document,
         "tests": each.tests,
-        "latest_test": line.test or None,
-        "latest_test_at": line.latest,
-        "model": line.model or None,
-        "tension_n": line.tension_n and asdict(line.tension_n),
-        "shift": each.shift and asdict(each.shift),
-        "called": line.called,
-        "open_alerts": line.open_alerts,
-        "warnings": list(line.warnings),
+        "latest_test": latest and latest.name,
+        "latest_test_at": latest and latest.time,
+        "model": latest and (latest.model or None),
+        "tension_n": summary.tension_n and asdict(summary.tension_n),
+        "shift": summary.change and asdict(summary.change),
+        "called": summary.detected,
+        "open_alerts": summary.open_alerts,
+        "warnings": list(summary.warnings),
     }
 
 

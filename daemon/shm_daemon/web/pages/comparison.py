@@ -12,11 +12,12 @@ from fastapi.responses import HTMLResponse, JSONResponse
 
 from shm.errors import BadInput, NothingThere
 from shm.pipeline import utc_now
-from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report import formatting
-from shm.report.contents import HangerLine, hangers_unit
+from shm.report.contents import hangers_unit
 from shm.report.figures.compared_hangers import MOST, Course, alt, caption, specify
 from shm.report.formatting import Interval
+from shm.report.hanger_summary import HangerSummary
 from shm.report.paper import Table
 from shm.values import Hanger
 from shm_daemon.web import with_plotly
@@ -47,7 +48,7 @@ def compare_page(
     """Hangers to choose from, and those that were chosen, beside each other."""
     every, day = site.workspace.bridge.hangers, _day(since)
     chosen = _chosen(site, hanger) if hanger else []
-    rows = hanger_lines(site.workspace, site.store, utc_now(), chosen)
+    rows = hanger_summaries(site.workspace, site.store, utc_now(), chosen)
     if not chosen:  # the hanger that is worst off, between its neighbours
         first = next((i for i, each in enumerate(rows) if each.message.urgency == "today"), 0)
         start = max(0, min(first - 1, len(rows) - 3))
@@ -98,11 +99,10 @@ def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:
     return [each for each in site.workspace.bridge.hangers if each.id in wanted]
 
 
-def _is_there(rows: Sequence[HangerLine], since: date | None) -> bool:
+def _is_there(rows: Sequence[HangerSummary], since: date | None) -> bool:
     """Whether `_courses` has anything of these hangers."""
     return any(
-        row.baseline_tension_n is not None and row.latest and row.latest >= _begin(since)
-        for row in rows
+        row.baseline is not None and row.latest and row.latest.time >= _begin(since) for row in rows
     )
 
 
@@ -140,10 +140,10 @@ def _courses(site: Site, chosen: Sequence[Hanger], since: date | None) -> list[C
     return found
 
 
-def _table(lines: Sequence[HangerLine]) -> Table:
+def _table(lines: Sequence[HangerSummary]) -> Table:
     unit = hangers_unit(lines)
     return Table(
-        "The latest test of each",
+        "Each hanger now",
         ("hanger", "state", f"tension, {unit.name}", "of nominal, %", "since the baseline, %",
          "length", "last test"),
         tuple(
@@ -152,7 +152,7 @@ def _table(lines: Sequence[HangerLine]) -> Table:
                 line.status.value if line.status else "",
                 *HangerGlance(line).cells(unit),
                 f"{line.hanger.length_m:g} m",
-                f"{line.latest:%Y-%m-%d}" if line.latest else "",
+                f"{line.latest.time:%Y-%m-%d}" if line.latest else "",
             )
             for line in lines
         ),

@@ -18,14 +18,14 @@ from fastapi.responses import HTMLResponse
 
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
-from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.reporting import hanger_report
 from shm.report import formatting, hanger_tables
 from shm.report.bar_table import bar_table
-from shm.report.contents import HangerReport, message
+from shm.report.contents import HangerReport
 from shm.report.diagnosis_report import answers, evidence
 from shm.report.hanger_report import facts, gap_part, hanger_paper
-from shm.report.hanger_summary import details
+from shm.report.hanger_sentences import details
 from shm.report.paper import Table
 from shm.report.states import called_words, temperature_table
 from shm.store import EventKind, Store, TrendPoint, Workspace
@@ -99,7 +99,7 @@ def hanger(request: Request, site: AtSite, _: Reader, view: View) -> HTMLRespons
         "bar": bar_table(describe_bar(one) if view.report is None else view.report.bar),
     }
     if view.report is None:
-        (line,) = hanger_lines(site.workspace, site.store, utc_now(), [one])
+        (line,) = hanger_summaries(site.workspace, site.store, utc_now(), [one])
         return page(request, "hanger_untested.html.j2", message=line.message, **common)
     return page(request, "hanger.html.j2", **common, **_content(view, view.report))
 
@@ -122,7 +122,7 @@ def all_tests(request: Request, _: Reader, view: View, before: Before = None) ->
 
 
 def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
-    said = message(report)
+    said = report.now.message
     assert said.status is not None  # a hanger with a test has one
     tables = [make(report) for make in _TABLES]
     if view.states is not None:
@@ -133,7 +133,7 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
         "lead": said.words,
         "details": details(report),
         "facts": facts(report),
-        "is_called": report.is_called,
+        "is_called": bool(report.now.called),
         "charts": {
             part: [_chart(view, e) for e in FIGURES if e.part == part and e.is_there(view)]
             for part in ("trends", "model", "gap")
@@ -144,7 +144,7 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
         "gap": gap_part(report),
         "answers": answers(view.sheet) if view.sheet else (),
         "evidence": evidence(view.sheet) if view.sheet else (),
-        "origin": hanger_tables.origins(report)[-1],
+        "origin": hanger_tables.conditions(report),
     }
 
 

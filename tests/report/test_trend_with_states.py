@@ -1,4 +1,4 @@
-"""The figure of the states over time, drawn from plain values."""
+"""The trend of a report with the state over time, drawn from plain values."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shm.report.figures.hanger_states import STATES
+from shm.report.contents import HangerReport, TrendRow
+from shm.report.figures.hanger_trend import FIGURE
+from shm.report.formatting import Interval
 from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime, _over_time
 from shm.values import TENSION, FloatArray, WatchedQuantity
 from shm.watch.state import Band, StateHistory
@@ -64,69 +65,55 @@ def data() -> StatesOverTime:
     )
 
 
-def drawn(data: StatesOverTime) -> Figure:
-    figure = STATES.figure(data)
+@pytest.fixture
+def report(season: HangerReport, data: StatesOverTime) -> HangerReport:
+    """Sixty tests of the hanger of the season, with its baseline of 700 kN."""
+    tension = data.quantities[0].read
+    rows = tuple(
+        TrendRow(f"t{n}", "beam2", Interval(middle, middle - 9e3, middle + 9e3), time=time)
+        for n, (time, middle) in enumerate(zip(data.times, tension.middle.tolist(), strict=True))
+    )
+    return replace(season, states=data, trend=rows, alerts=())
+
+
+def drawn(report: HangerReport) -> Figure:
+    figure = FIGURE.figure(report)
     assert figure is not None
     figure.draw_without_rendering()
     return figure
 
 
-def named(axes: Axes) -> set[str]:
-    return set(axes.get_legend_handles_labels()[1])
-
-
-def test_each_quantity_has_a_panel_and_the_temperature_a_strip(data: StatesOverTime) -> None:
-    labels = [axes.get_ylabel() for axes in drawn(data).axes]
-    assert labels == ["tension (kN)", "log10 of\nN m/rad", "temp.\n(°C)"]
-
-
-@pytest.mark.parametrize(("unit", "label"), [("N/m", "log10 of\nN/m"), ("", "log10 of\nstiffness")])
-def test_specify_stiffness_unit(data: StatesOverTime, unit: str, label: str) -> None:
-    solid = replace(data.quantities[1], unit=unit)
-    axes = drawn(replace(data, quantities=(data.quantities[0], solid))).axes
-    assert axes[1].get_ylabel() == label
-
-
-def test_without_temperatures_there_is_no_strip(data: StatesOverTime) -> None:
-    figure = drawn(replace(data, temperatures_c=np.full(TESTS, np.nan)))
-    assert [axes.get_ylabel() for axes in figure.axes] == ["tension (kN)", "log10 of\nN m/rad"]
-    assert figure.axes[-1].get_xlabel() == "time of the test (UTC)"
-
-
-def test_the_legend_names_all_that_is_drawn(data: StatesOverTime) -> None:
-    figure = drawn(data)
+def test_the_legend_names_all_that_is_drawn(report: HangerReport) -> None:
+    figure = drawn(report)
     assert {text.get_text() for text in figure.legends[0].get_texts()} == {
-        "90 % band", "estimate to date", "retrospective", "test by itself", "taken as outlier",
-        "test out of view", "baseline", "threshold", "change began",
+        "state, 90 % band", "test by itself", "nominal", "baseline", "threshold", "change began",
+        "excluded test out of view",
     }  # fmt: skip
 
 
-def test_thresholds_and_states_are_in_view_in_kilonewtons(data: StatesOverTime) -> None:
-    low, high = drawn(data).axes[0].get_ylim()
-    assert 650 < low < 676
-    assert 746 < high < 770
+def test_the_state_stands_at_the_level_of_the_average_over_classes(report: HangerReport) -> None:
+    """The class of the watch has 711 kN at the baseline, all classes together 701 kN."""
+    (axes,) = drawn(report).axes
+    (state,) = [line for line in axes.lines if line.get_label() == "state, 90 % band"]
+    assert report.now.baseline_n is not None
+    level = report.now.baseline_n.mean / 1e3
+    assert np.asarray(state.get_ydata())[0] == pytest.approx(level)
 
 
-def test_a_blunder_does_not_squeeze_the_panel_but_shows_at_its_edge(data: StatesOverTime) -> None:
-    axes = drawn(data).axes[0]
-    marks = [line for line in axes.lines if line.get_label() == "test out of view"]
-    assert len(marks) == 1
-    assert np.asarray(marks[0].get_ydata())[0] == axes.get_ylim()[1]
+def test_an_excluded_test_stretches_no_axis_but_shows_at_its_edge(report: HangerReport) -> None:
+    (axes,) = drawn(report).axes
+    (mark,) = [line for line in axes.lines if line.get_label() == "excluded test out of view"]
+    assert np.asarray(mark.get_ydata()).tolist() == [axes.get_ylim()[1]]
     assert axes.get_ylim()[1] < 800
-
-
-def test_a_quantity_that_no_test_sees_has_its_state_but_no_dots(data: StatesOverTime) -> None:
-    unseen = Band(*[np.full(TESTS, np.nan)] * 3)
-    blind = replace(data.quantities[1], read=unseen)
-    axes = drawn(replace(data, quantities=(data.quantities[0], blind))).axes[1]
-    assert "estimate to date" in named(axes)
-    assert "test by itself" not in named(axes)
+    assert "tests taken for blunders" in FIGURE.caption(report)
+    sound = replace(report, states=replace(report.states, outlier=np.zeros(TESTS, bool)))
+    assert drawn(sound).axes[0].get_ylim()[1] > 800
 
 
 def test_words_over_changes_overlap_neither_each_other_nor_the_legend(
-    data: StatesOverTime,
+    report: HangerReport,
 ) -> None:
-    figure = drawn(data)
+    figure = drawn(report)
     texts = [text for text in figure.axes[0].texts if text.get_text()]
     boxes = [text.get_window_extent() for text in texts] + [figure.legends[0].get_window_extent()]
     assert len(boxes) == 3
@@ -134,45 +121,21 @@ def test_words_over_changes_overlap_neither_each_other_nor_the_legend(
         assert not any(box.overlaps(other) for other in boxes[at + 1 :])
 
 
-def test_words_and_legend_stay_on_the_figure(data: StatesOverTime) -> None:
+def test_words_and_legend_stay_on_the_figure(report: HangerReport) -> None:
     late = CalledChange(TIMES[-2], TIMES[-1], "slow: longitudinal spring at the arch end -0.6")
-    figure = drawn(replace(data, changes=(late,)))
+    figure = drawn(replace(report, states=replace(report.states, changes=(late,))))
     for artist in (*figure.axes[0].texts, figure.legends[0]):
         extent = artist.get_window_extent()
         assert extent.x0 >= 0
         assert extent.x1 <= figure.bbox.x1
 
 
-def test_one_test_is_drawn(data: StatesOverTime) -> None:
-    def first(whole: Band) -> Band:
-        return Band(whole.low[:1], whole.middle[:1], whole.high[:1])
-
-    alone = tuple(
-        replace(q, read=first(q.read), filtered=first(q.filtered), smoothed=first(q.smoothed))
-        for q in data.quantities
-    )
-    figure = drawn(
-        StatesOverTime(
-            TIMES[:1], data.temperatures_c[:1], 12.0, data.outlier[:1], alone, changes=()
-        )
-    )
-    left, right = figure.axes[0].get_xlim()
-    assert right - left == pytest.approx(2.0)
-
-
-def test_nothing_is_drawn_of_nothing(data: StatesOverTime) -> None:
-    assert STATES.draw(replace(data, quantities=())) is None
-
-
-def test_caption_and_alternative_text_say_what_is_seen(data: StatesOverTime) -> None:
-    caption, alt = STATES.caption(data), STATES.alt(data)
+def test_caption_and_alternative_text_say_what_is_seen(report: HangerReport) -> None:
+    caption, alt = FIGURE.caption(report), FIGURE.alt(report)
     assert "at 12.0 °C" in caption
     assert caption.endswith(".")
-    assert "tension 683 kN (90 % interval 681.2 to 684.8 kN), baseline 711 kN" in alt
-    assert "sudden: tension -3.9 %, begun by 2025-07-14" in alt
-    unknown = replace(data, reference_temperature_c=float("nan"), changes=())
-    assert "nan" not in STATES.caption(unknown) + STATES.alt(unknown)
-    assert STATES.alt(unknown).endswith("Changes detected: none.")
+    assert "sudden: tension -3.9 %" in alt
+    assert "nan" not in caption + alt
 
 
 @pytest.mark.parametrize(

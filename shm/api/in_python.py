@@ -1,0 +1,37 @@
+"""Remedies of errors for one who works in Python: calls in place of commands and files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from shm.errors import ShmError
+
+_CALLS: tuple[tuple[str, str], ...] = (
+    (r"`?shm import FILE`?", "shm.read(path, planes=..., places_m=...)"),
+    (r"`shm gap diagnose[^`]*`", "shm.diagnose(tests, hanger)"),
+    (r"`shm gap check[^`]*`", "shm.check_gap(tests, hanger)"),
+    (r"`shm select[^`]*`", "shm.select(tests, hanger)"),
+    (r"`shm update[^`]*`", "shm.update(tests, hanger)"),
+    (r"`shm identify[^`]*`", "shm.identify(records, hanger=hanger)"),
+    (r"`?shm ingest --together`?", "shm.identify([first, second], hanger=hanger)"),
+)
+"""Commands in remedies, and what does the same in Python."""
+_IN_A_FILE = re.compile(r"(?=.*\b(planes?|x_m)\b)(?=.*\b(sidecar|header)\b)", re.DOTALL)
+_BY_READ = "In Python: shm.read(path, planes={...}, places_m={...})."
+
+
+@contextmanager
+def in_python() -> Iterator[None]:
+    """Let errors through with remedies that work where Python is written."""
+    try:
+        yield
+    except ShmError as error:
+        remedy = error.remedy
+        for command, call in _CALLS:
+            remedy = re.sub(command, lambda _, call=call: call, remedy)  # type: ignore[misc]
+        if _IN_A_FILE.search(remedy):
+            remedy = f"{remedy} {_BY_READ}"
+        error.remedy = remedy
+        raise

@@ -1,0 +1,54 @@
+"""The channels of a recording over time, one panel each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shm.report import formatting
+from shm.report.figures import specification as spec
+from shm.values import Channel, Recording
+
+_BINS = 1500  # technical: columns of pixels of a figure; no peak is lost
+_PANEL_INCHES, _REST_INCHES = 1.1, 0.8
+_UNITS = {"force": "N", "acceleration": "m/s²"}
+
+
+def specify(recording: Recording) -> spec.Specification | None:
+    """Return a panel for each channel; None without any."""
+    if not recording.channels:
+        return None
+    panels = [_panel(recording, channel) for channel in recording.channels]
+    across = spec.Axis(label="time (s)", range=(0.0, recording.duration_s))
+    panels[-1] = replace(panels[-1], x=across)
+    return spec.stacked(panels, _PANEL_INCHES * len(panels) + _REST_INCHES)
+
+
+def _panel(recording: Recording, channel: Channel) -> spec.Panel:
+    places = spec.envelope_places(np.asarray(channel.values, np.float64), _BINS)
+    colour = "ink" if channel.quantity == "force" else spec.plane_colour(channel.plane)
+    line = spec.Line(
+        x=places / recording.sampling_rate_hz,
+        y=channel.values[places],
+        width=0.6,
+        colour=colour,
+    )
+    return spec.Panel(
+        y=spec.Axis(label=f"{channel.quantity}\n({_UNITS[channel.quantity]})", most_ticks=3),
+        marks=[line],
+        title=formatting.place(channel.name, channel.plane, channel.x_m),
+        title_side="left",
+    )
+
+
+def _caption(recording: Recording) -> str:
+    return f"Each channel over {recording.duration_s:.4g} s, as recorded; every peak is drawn."
+
+
+def _alt(recording: Recording) -> str:
+    names = formatting.listed([channel.name for channel in recording.channels])
+    return f"Time histories of {names} over {recording.duration_s:.4g} s."
+
+
+FIGURE = spec.Member[Recording]("recording", "Channels over time", specify, _caption, _alt)

@@ -1,0 +1,342 @@
+"""The paragraph that an engineer reads first: tension, what changed, which model, what next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.report import formatting, open_warnings
+from shm.report.contents import HangerReport
+from shm.report.diagnosis_summary import next_step, write_summary
+from shm.report.formatting import Interval
+from shm.report.hanger_status import UNDETERMINED
+from shm.report.hanger_summary import (
+    BASELINE_ALONE,
+    BASELINE_AND_CHANGE,
+    BASELINE_TESTS,
+    LATEST_TEST,
+)
+from shm.values import Diagnosis, PredictedFrequency
+from shm.values.posterior import MOST_R_HAT
+from shm.values.rounding import rounded_percent
+from shm.values.stated_tension import stated
+
+# Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
+# three names are what a sentence bears.
+_WORTH_DIAGNOSING_PERCENT = 0.5
+_MOST_NAMED = 3
+_BASIS = {
+    LATEST_TEST: "Its tension is {tension} by test {test}{day}.",
+    BASELINE_TESTS: "Its tension is {tension} by its baseline, test {test}{day}.",
+    BASELINE_AND_CHANGE: "Its tension is now {tension}.",
+    BASELINE_ALONE: "Its tension was {tension} at the baseline; the tests since do not show "
+    "whether it changed.",
+}
+"""The sentence on the tension, by what it rests on."""
+
+
+def summary(data: HangerReport) -> str:
+    """Return state and action, then the details."""
+    return f"{data.now.message.words} {details(data)}"
+
+
+def why(data: HangerReport) -> str:
+    """Return every doubt, the tension and its change."""
+    return " ".join(_why(data))
+
+
+def _why(data: HangerReport) -> tuple[str, ...]:
+    undated = open_warnings.dated_by_receipt(data.now.undated)
+    return (
+        *_doubts(data),
+        _tension(data),
+        _against_baseline(data),
+        *([undated] if undated else ()),
+    )
+
+
+def _doubts(data: HangerReport) -> tuple[str, ...]:
+    """Return what must not wait until the details: warnings, an outdated baseline, caveats."""
+    return data.now.message.reasons
+
+
+def details(data: HangerReport) -> str:
+    """Return why, and how sure: everything after state and action."""
+    return " ".join(_sentences(data))
+
+
+def further(data: HangerReport) -> str:
+    """Return the details without those of `why`."""
+    before = _why(data)
+    return " ".join(each for each in _sentences(data) if each not in before)
+
+
+def _sentences(data: HangerReport) -> tuple[str, ...]:
+    known = data.now.is_determined
+    found = (
+        *_doubts(data),
+        _tension(data),
+        _latest_test(data),
+        # How well a test repeats it, and the probabilities that the owner's limits ask for.
+        *(stated(data.averaged, data.tension_unit).sentences[1:] if known else ()),
+        _against_nominal(data),
+        _against_baseline(data),
+        _unseen(data),
+        "Once the change is explained, set a new baseline (`shm drift rebaseline`)."
+        if data.now.called
+        else "",
+        data.creep.words if data.creep else "",
+        in_period(data),
+        data.neighbours.sentence if data.neighbours else "",
+        _model(data),
+        _gap(data),
+        *_further_advice(data),
+        open_warnings.dated_by_receipt(data.now.undated),
+    )
+    return tuple(each for each in found if each)
+
+
+def advice(data: HangerReport) -> tuple[str, ...]:
+    """Return what to do next, most urgent first; never empty."""
+    first, further = data.now.message.lead, _further_advice(data)
+    return further if further and first.urgency == "none" else (first.action, *further)
+
+
+def _further_advice(data: HangerReport) -> tuple[str, ...]:
+    made = (_quality, _sampling, _width, _diagnose, _thermometer)
+    return tuple(each for make in made if (each := make(data)))
+
+
+def misfits_percent(data: HangerReport) -> list[tuple[PredictedFrequency, Interval]]:
+    """Predicted over measured frequency less one of each measured mode, in percent.
+
+    The interval is that of prediction and measurement together; of the prediction alone where the
+    measurement came without a standard deviation.
+    """
+    sds_hz = {(mode.plane, mode.order): mode.frequency_sd_hz for mode in data.latest.modes}
+    return [
+        (each, _misfit(each, sds_hz.get((each.plane, each.order), math.nan)))
+        for each in data.predicted
+        if math.isfinite(each.measured_hz)
+    ]
+
+
+def _misfit(each: PredictedFrequency, measured_sd_hz: float) -> Interval:
+    sd_hz = math.hypot(each.sd_hz, measured_sd_hz if math.isfinite(measured_sd_hz) else 0.0)
+    off = Interval.normal(each.mean_hz - each.measured_hz, sd_hz)
+    return off.scaled(100 / each.measured_hz)
+
+
+def _tension(data: HangerReport) -> str:
+    now = data.now
+    if not now.is_determined:
+        span = formatting.span(data.tension_n.in_unit(data.tension_unit))
+        return f"{UNDETERMINED} (90 % interval {span} {data.tension_unit.name})."
+    tension = formatting.with_half(data.tension_n, data.tension_unit)
+    day = f" of {data.latest.time:%Y-%m-%d}" if data.latest.time else ""
+    return _BASIS[now.basis].format(tension=tension, test=data.latest.id, day=day)
+
+
+def _latest_test(data: HangerReport) -> str:
+    """Return the tension by the latest test alone, where the headline is another estimate."""
+    if data.now.basis not in (BASELINE_AND_CHANGE, BASELINE_ALONE):
+        return ""
+    alone = formatting.with_half(Interval.of_averaged(data.by_latest_test), data.tension_unit)
+    return f"Test {data.latest.id} alone gives {alone}."
+
+
+def _against_nominal(data: HangerReport) -> str:
+    nominal = data.hanger.nominal_tension_n
+    if not nominal > 0:
+        return "It has no nominal tension to compare with."
+    if not data.now.is_determined:
+        return ""
+    share = data.tension_n.scaled(1 / nominal)
+    half, off = share.width / 2, share.mean - 1
+    if abs(off) <= half:
+        return f"The tension agrees with the nominal one ({rounded_percent(off, half, '+')})."
+    size, side = rounded_percent(abs(off), half), "above" if off > 0 else "below"
+    return f"The tension is {size} {side} nominal."
+
+
+def _against_baseline(data: HangerReport) -> str:
+    change = data.now.change
+    if data.baseline is None or data.baseline_tension_n is None:
+        return "There is no earlier test to compare with: this one is the baseline."
+    if change is None:
+        return "The change since the baseline is not known: its latest test does not show it."
+    size = rounded_percent(change.mean, change.width / 2, "+")
+    statement = f"Since the baseline of {counted_tests(data.baseline.tests)} it changed by {size}"
+    if not data.now.is_found:
+        statement = f"No significant change since the baseline ({size})"
+    later = [
+        each.time for each in data.now.standing if data.latest.time and each.time > data.latest.time
+    ]
+    if not later:
+        return f"{statement}."
+    return f"{statement}, by a test made before the alert of {max(later):%Y-%m-%d}."
+
+
+def counted_tests(tests: tuple[str, ...]) -> str:
+    """`test t001`, `5 tests`."""
+    return f"test {tests[0]}" if len(tests) == 1 else f"{len(tests)} tests"
+
+
+def _unseen(data: HangerReport) -> str:
+    """Return what keeps a shift of the tension from being seen."""
+    change, threshold = data.now.change, data.hanger.thresholds.tension_shift_fraction
+    if not data.drifts:
+        return ""
+    if change is not None and change.width / 2 > threshold:
+        return f"These tests could hardly show a change of tension of {100 * threshold:.3g} %."
+    return ""
+
+
+def in_period(data: HangerReport) -> str:
+    """Return what the period of the report holds, and what changed in it against its start."""
+    if data.period is None:
+        return ""
+    tests = formatting.counted(len(data.trend), "test")
+    raised = formatting.counted(len(data.alerts), "alert")
+    called = formatting.listed(
+        [each.words for each in data.states.within(data.period).changes]
+        or ["no change was detected"]
+    )
+    return f"In the period {data.period}: {tests}, {raised}; {called}; {_course(data)}."
+
+
+def _course(data: HangerReport) -> str:
+    if len(data.trend) < 2:
+        return "with one test in it nothing in it can be compared"
+    first, last = data.trend[0], data.trend[-1]
+    change = formatting.signed_percent(last.tension_n.since(first.tension_n))
+    return f"from its first test ({first.test}) to its last the tension moved by {change}"
+
+
+def _model(data: HangerReport) -> str:
+    misfits = misfits_percent(data)
+    if not misfits:
+        return f"{_chosen(data)}."
+    count = (
+        "one measured frequency" if len(misfits) == 1 else f"{len(misfits)} measured frequencies"
+    )
+    if _misses(data):
+        off = f"{data.posterior.misfit_percent:.1f} % (root mean square)"
+        return f"{_chosen(data)}. It misses {count} by {off}."
+    rms = formatting.plain(_rms_percent(data), 2)
+    return f"{_chosen(data)}. It predicts {count} to {rms} % (root mean square)."
+
+
+def _rms_percent(data: HangerReport) -> float:
+    """Root mean square of the misfits; NaN where no mode was measured."""
+    residuals = [off.mean for _, off in misfits_percent(data)]
+    return float(np.sqrt(np.mean(np.square(residuals)))) if residuals else math.nan
+
+
+def _misses(data: HangerReport) -> bool:
+    """Return True if the class is so far off that its posterior doubts the description: what it
+    predicts with the model's error learnt from the same modes fits them all the same."""
+    return not data.posterior.fits
+
+
+def _gap(data: HangerReport) -> str:
+    """Return what the model does not explain, and why as far as that was diagnosed."""
+    if data.diagnosis is None:
+        return _outside(data)
+    wording = [_diagnosed_on(data.diagnosis), write_summary(data.diagnosis)]
+    return " ".join(part for part in (*wording, data.gap_watch) if part)
+
+
+def _outside(data: HangerReport) -> str:
+    """The modes that the model class misses by more than the uncertainty of both explains."""
+    misfits = [] if _misses(data) else misfits_percent(data)
+    outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
+    if not misfits:
+        return ""
+    # So many may well lie outside by chance: two standard deviations.
+    by_chance = 0.1 * len(misfits) + 2 * math.sqrt(0.09 * len(misfits))
+    if len(outside) > by_chance:
+        return f"{_outliers(outside)}: the model does not explain these, and no diagnosis was made."
+    chance = f"{_outliers(outside)}, no more than by chance" if outside else ""
+    start = chance or "Each lies within its 90 % interval"
+    if _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT:
+        return f"{start}, but the intervals are so wide that they may hide a misfit."
+    return f"{start}: the model explains what was measured."
+
+
+def _outliers(modes: Sequence[PredictedFrequency]) -> str:
+    """`Transverse 2 and longitudinal 4 lie outside the 90 % interval`, `5 modes lie ...`."""
+    wording = formatting.listed([f"{each.plane} {each.order}" for each in modes])
+    named = f"{wording[0].upper()}{wording[1:]}"
+    who = named if len(modes) <= _MOST_NAMED else formatting.counted(len(modes), "mode")
+    return f"{who} {'lies' if len(modes) == 1 else 'lie'} outside the 90 % interval"
+
+
+def _diagnosed_on(diagnosis: Diagnosis) -> str:
+    return (
+        f"What the plain class {diagnosis.baseline} would leave unexplained was diagnosed on "
+        f"{counted_tests(diagnosis.tests)}."
+    )
+
+
+def _chosen(data: HangerReport) -> str:
+    model = formatting.model_class(data.posterior.model)
+    if data.selection is None or len(data.selection.posteriors) < 2:
+        return f"The model class is {model}"
+    names = [formatting.model_class(posterior.model) for posterior in data.selection.posteriors]
+    if model not in names:
+        return f"The model class is {model}"
+    rivals = formatting.listed([each for each in names if each != model])
+    if names[0] != model:
+        return f"The model class is {model}, less probable than {names[0]}"
+    return f"The model class is {model}, the most probable (beside {rivals})"
+
+
+def _quality(data: HangerReport) -> str:
+    doubted = [check.name for check in data.quality if check.verdict in ("warning", "refused")]
+    if not doubted:
+        return ""
+    return f"Test quality, to improve at the next test: {formatting.listed(doubted)}."
+
+
+def _sampling(data: HangerReport) -> str:
+    if not data.posterior.r_hat > MOST_R_HAT:
+        return ""
+    return (
+        f"The sampling has not converged (R-hat {data.posterior.r_hat:.2f}): raise the number of "
+        f"samples before relying on the interval."
+    )
+
+
+def _width(data: HangerReport) -> str:
+    half = data.tension_n.width / 2 / data.tension_n.mean
+    threshold_fraction = data.hanger.thresholds.tension_shift_fraction
+    if half <= threshold_fraction:
+        return ""
+    if not data.now.is_determined:
+        return "Identify more modes, or state the ends and the length more exactly."
+    return (
+        f"The tension is known to ± {100 * half:.1f} %, no better than the threshold of "
+        f"{100 * threshold_fraction:.3g} %: identify more modes, or repeat the test, "
+        f"to see smaller shifts."
+    )
+
+
+def _diagnose(data: HangerReport) -> str:
+    """Return the next step against the gap between model and measurement."""
+    if data.diagnosis is not None:
+        return next_step(data.diagnosis)
+    if not (_misses(data) or _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT):
+        return ""
+    return (
+        "Learn what the model does not explain, and what that does to the tension "
+        f"(shm gap diagnose --hanger {data.hanger.id})."
+    )
+
+
+def _thermometer(data: HangerReport) -> str:
+    if math.isfinite(data.latest.temperature_c):
+        return ""
+    return "Record the temperature with the next test: it moves the tension."

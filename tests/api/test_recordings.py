@@ -1,0 +1,123 @@
+"""A recording in a researcher's hand: read with planes and places, shown, drawn on axes."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+
+import shm
+from shm.api.in_python import in_python
+from shm.errors import BadInput, NothingThere, UsageError
+from shm.read import write
+
+
+@pytest.fixture
+def path(recording: shm.Recording, tmp_path: Path) -> Path:
+    file = tmp_path / "hanger3.csv"
+    write(recording, file)
+    return file
+
+
+def test_planes_and_places_override_the_file(path: Path) -> None:
+    """By name, or one for all accelerations; what is not named stays as the file says."""
+    before = shm.read(path)
+    assert isinstance(before, shm.Recording)
+    moved = shm.read(path, planes="longitudinal", places_m={"acc_1": 3.25, "force": 1.5})
+    assert isinstance(moved, shm.Recording)
+    assert {each.plane for each in moved.accelerations} == {"longitudinal"}
+    assert moved.accelerations[0].x_m == 3.25
+    assert moved.force is not None
+    assert moved.force.x_m == 1.5
+    assert [e.x_m for e in moved.accelerations[1:]] == [e.x_m for e in before.accelerations[1:]]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"planes": {"acc_9": "transverse"}}, "'acc_9', which the file does not have"),
+        ({"places_m": {"acc_9": 1.0}}, "'acc_9', which the file does not have"),
+        ({"planes": "vertical"}, "'vertical' is no plane"),
+    ],
+)
+def test_a_channel_or_plane_that_is_not_there_is_refused(
+    path: Path, given: dict[str, object], said: str
+) -> None:
+    with pytest.raises(UsageError, match=said):
+        shm.read(path, **given)  # type: ignore[arg-type]
+
+
+def test_frequency_responses_are_placed_too(
+    identified: shm.Identification, hanger: shm.Hanger
+) -> None:
+    from shm.api.placing import with_places
+
+    response = identified.frequency_response
+    assert response is not None
+    name = response.points[0].name
+    placed = with_places(response, {name: "transverse"}, {name: 0.5})
+    assert isinstance(placed, shm.FrequencyResponse)
+    assert (placed.points[0].plane, placed.points[0].x_m) == ("transverse", 0.5)
+    assert placed.points[1:] == response.points[1:]
+
+
+def test_a_recording_shows_its_channels(recording: shm.Recording) -> None:
+    text = recording.summary()
+    assert text.startswith("Recording ")
+    assert "24 s at 512 Hz" in text
+    for channel in recording.channels:
+        assert re.search(rf"^{channel.name} +{channel.quantity}", text, re.MULTILINE)
+    assert not re.search(r"\bnan\b|None", text)
+    assert "<caption>Recording" in recording._repr_html_()
+
+
+def test_a_recording_is_drawn_channel_by_channel(recording: shm.Recording) -> None:
+    figure = recording.plot()
+    assert len(figure.axes) == len(recording.channels)
+    assert figure.axes[-1].get_xlabel() == "time (s)"
+    assert "acceleration (m/s²)" in figure.axes[1].get_ylabel().replace("\n", " ")
+
+
+def test_a_figure_is_drawn_on_axes_of_ones_own(
+    posterior: shm.Posterior, hanger: shm.Hanger
+) -> None:
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    assert shm.plot.tension(posterior, hanger, ax=left) is figure
+    assert left.get_xlabel() == "tension (kN)"
+    assert len(left.patches) > 10
+    assert not right.has_data()
+
+
+def test_too_few_axes_are_refused_with_the_call_that_makes_enough(
+    recording: shm.Recording,
+) -> None:
+    axes = Figure().subplots()
+    with pytest.raises(UsageError, match=r"has 5 panels, and ax has 1.*plt.subplots\(5\)"):
+        shm.plot.recording(recording, ax=axes)
+
+
+def test_errors_name_calls_and_not_commands() -> None:
+    with pytest.raises(BadInput) as raised, in_python():
+        raise BadInput("no plane.", remedy="Write x_m and plane into the header or a sidecar.")
+    assert "shm.read(path, planes={...}, places_m={...})" in raised.value.remedy
+    with pytest.raises(NothingThere) as missing, in_python():
+        raise NothingThere("no gap.", remedy="Run `shm gap diagnose --hanger 3`.")
+    assert missing.value.remedy == "Run shm.diagnose(tests, hanger)."
+    with pytest.raises(UsageError) as kept, in_python():
+        raise UsageError("no sampler.", remedy="Name one of a, b.")
+    assert kept.value.remedy == "Name one of a, b."
+
+
+def test_a_missing_file_is_told_with_its_name(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"none\.csv"):
+        shm.read(tmp_path / "none.csv")
+
+
+def test_an_average_over_classes_is_a_property(posterior: shm.Posterior) -> None:
+    choice = shm.Selection((posterior,), (1.0,))
+    assert choice.averaged.tension_n.mean == pytest.approx(posterior.tension_n.mean())
+    assert math.isnan(choice.averaged.probability_slack)
