@@ -20,6 +20,7 @@ _SLOPE_STEP = 0.1  # technical: of a quantity's step, over which frequencies go 
 _LEAST_SLOPE_STEP = 1e-7
 _PULL_SD_IN_STEPS = 10.0
 _MOST_STEPS = 12
+_STARTS = 24  # technical: of a tension from a fiftieth to five times the nominal one
 # In units of the reading's variance: a last step of a tenth of its standard deviation is taken
 # along with the reading, which is linear about the place before it.
 _SETTLED = 1e-2
@@ -117,12 +118,31 @@ class Likelihood:
         """Coordinates (q,) no further beyond the tables than a search may go."""
         return np.clip(x, self._lowest - _BEYOND, self._highest + _BEYOND)
 
+    def far_start(self, seen: SeenModes) -> FloatArray:
+        """Where the tension alone fits best, over all that its table holds: half of the modes may
+        be anywhere."""
+        first = np.linspace(self._lowest[0], self._highest[0], _STARTS)
+        places = np.zeros((_STARTS, len(self._quantities)))
+        places[:, 0] = first
+        off = np.abs(seen.log_frequency - self.predicted(places, seen))
+        return np.asarray(places[int(np.median(off, axis=1).argmin())])
+
     def settled(self, seen: SeenModes) -> LinearReading:
         """Return the likelihood about where it is largest, or very nearly.
 
-        Sought from the baseline on; steps that overshoot halve.
+        Sought from the baseline on; where that fits badly, from where the tension alone fits best,
+        too: on the way to a slack hanger a descent may lose itself among stiffnesses.
         """
-        best = self.linear(np.zeros(len(self._quantities)), seen)
+        near = self._descended(np.zeros(len(self._quantities)), seen)
+        misfit = float(near.residual @ near.residual)
+        if misfit <= scipy.special.chdtri(len(near.residual), _SELDOM):
+            return near
+        far = self._descended(self.far_start(seen), seen)
+        return far if far.cost < near.cost else near
+
+    def _descended(self, start: FloatArray, seen: SeenModes) -> LinearReading:
+        """Return the same from `start` (q,) on; steps that overshoot halve."""
+        best = self.linear(start, seen)
         step = best.step
         for _ in range(_MOST_STEPS):
             if best.gain(step) < _SETTLED:

@@ -178,21 +178,28 @@ class Reader:
         every = np.ones(len(seen.own), bool)
         if len(seen.own) < len(self.quantities) + 2:
             return every
-        found = self._sound_by(seen, self._loosening[:, :0])
+        still, none = np.zeros(len(self.quantities)), self._loosening[:, :0]
+        found = self._sound_by(seen, none, still)
         if found.sound.all():
             return every
+        slack = self._sound_by(seen, none, self._likelihood.far_start(seen))
+        if slack.log_evidence > found.log_evidence:
+            found = slack
         if self._loosening.size:
-            loose = self._sound_by(seen, self._loosening)
+            loose = self._sound_by(seen, self._loosening, still)
             if loose.log_evidence + math.log(_LOOSENED) > found.log_evidence:
                 found = loose
         return found.sound if (~found.sound).sum() <= MOST_MISTAKEN * len(every) else every
 
-    def _sound_by(self, seen: SeenModes, more: FloatArray) -> SoundModes:
-        """Find the sound modes where the quantities, and `more` (modes, k), may have moved."""
+    def _sound_by(self, seen: SeenModes, more: FloatArray, start: FloatArray) -> SoundModes:
+        """Find the sound modes where the quantities, and `more` (modes, k), may have moved.
+
+        The quantities are sought from `start` (q,) on.
+        """
         variance, more = seen.variance + self._scatter**2, more[seen.own]
         wide, sd = replace(seen, variance=variance), np.sqrt(variance)
         pull = np.append(self._likelihood.pull, np.full(more.shape[1], 1 / _LOOSENED_STEPS**2))
-        x = np.zeros(len(self.quantities))
+        x = start
         for _ in range(_ROUNDS):
             linear = self._likelihood.linear(x, wide)
             off = sd * (linear.residual + linear.slopes @ x)

@@ -44,6 +44,7 @@ from shm.watch import (  # noqa: E402
     watching,
 )
 from shm.watch.change_point import Evidence  # noqa: E402
+from shm.watch.linear_reading import Likelihood  # noqa: E402
 from shm.watch.reading_corrections import AmplitudeSlopes  # noqa: E402
 from shm.watch.state_sums import StateSums, WatchState  # noqa: E402
 from shm.watch.watcher import Watcher  # noqa: E402
@@ -108,6 +109,9 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
         (Evidence, "log_evidence", property(lambda self: min(self.log_statistic, self.log_most)))
     ],
     "mistaken modes": [(readings.Reader, "_sound", lambda _, seen: np.ones(len(seen.own), bool))],
+    "a start from slack": [
+        (Likelihood, "far_start", lambda self, _: np.zeros(len(self._quantities)))
+    ],
     "mistaken modes: loosened ends": [(readings, "_LOOSENED", 1e-300)],
     "mistaken modes: tests of another bar": [(mistaken_modes, "_MISFIT", 1e-300)],
     "stated errors by the misfit": [(readings, "_PRIOR_FREEDOM", 1e12)],
