@@ -12,7 +12,7 @@ from shm_cli.common import answer, opened_store, show, show_rows
 
 @click.group()
 def token() -> None:
-    """Who may read and write over the network.
+    """Manage tokens for access over the network.
 
     \b
     Example: shm token list
@@ -92,7 +92,7 @@ def revoke(ctx: click.Context, name: str) -> None:
 
 @click.group()
 def user() -> None:
-    """People who may sign in to the dashboard.
+    """Manage the people who may sign in.
 
     \b
     Example: shm user list

@@ -14,7 +14,7 @@ import rich_click as click
 
 from shm.bridge import Bridge, Hook
 from shm.documents import alert_document, format_time
-from shm.errors import NothingThere, UsageError
+from shm.errors import NothingThere, UsageError, suggest
 from shm.pipeline import utc_now
 from shm.pipeline.telling import quiet_until
 from shm.store import Delivery, DeliveryState, Silence, StoredAlert
@@ -29,7 +29,7 @@ from shm_cli.common import answer, open_workspace, opened_store, paragraph, show
 @flags.json
 @click.pass_context
 def command(ctx: click.Context, hanger_id: int | None) -> None:
-    """Alerts that were raised, and their deliveries.
+    """Show alerts and their deliveries; acknowledge them.
 
     \b
     Example: shm alerts --hanger 7 --json
@@ -287,7 +287,8 @@ def _described(bridge: Bridge, name: str) -> Hook:
     known = ", ".join(hook.name for hook in bridge.hooks) or "none"
     raise UsageError(
         f"bridge.toml describes no hook {name} (known: {known}).",
-        remedy="Correct the name, or describe it in a [[hook]] table.",
+        remedy=f"{suggest(name, (hook.name for hook in bridge.hooks))}"
+        "Correct the name, or describe it in a [[hook]] table.",
     )
 
 

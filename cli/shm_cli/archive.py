@@ -30,7 +30,7 @@ _DAYS = click.IntRange(1, 36500)  # technical: a century, which dates can bear
 
 @click.group()
 def command() -> None:
-    """Keep the archive and the quarantine from growing for ever.
+    """Limit the size of the archive and the quarantine.
 
     \b
     Example: shm archive fetch t7

@@ -32,7 +32,7 @@ _FAULT = 1
 @flags.json
 @click.pass_context
 def doctor(ctx: click.Context) -> int:
-    """Whether all is well, and what to do where it is not.
+    """Check the installation and the workspace.
 
     Looks at folders, disks, store, daemon, spool, recordings, backups, clock, hooks, hangers,
     versions and whether other bridges answer; changes nothing. Exit code 0 without a fault
@@ -67,7 +67,7 @@ def _show_findings(findings: Sequence[Finding]) -> None:
 @flags.json
 @click.pass_context
 def bridges(ctx: click.Context) -> None:
-    """How this bridge and the others of bridge.toml are, the worst first.
+    """Show the state of this bridge and of the others of bridge.toml.
 
     The dashboard of each [[other_bridge]] is asked; one that does not answer is named, with what
     to do.

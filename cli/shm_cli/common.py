@@ -7,7 +7,7 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -35,6 +35,7 @@ from shm.documents import dump
 from shm.errors import NothingThere, UsageError
 from shm.modes_document import load_modes
 from shm.values import Hanger, ModalTest
+from shm_cli import errors
 from shm_cli.flags import wants_json
 from shm_cli.terminal import Terminal, escape_controls
 
@@ -48,15 +49,22 @@ _WIDTH_OF_A_FILE, _BEYOND_ANY = 120, 100_000
 _READABLE = 100
 
 
-def show(document: object) -> None:
-    """Prints one JSON document on stdout."""
-    click.echo(dump(document))
+def show(document: Mapping[str, object], kind: str = "") -> None:
+    """Print one JSON document on stdout, with its schema first.
+
+    A document without `schema` gets `shm.KIND/1`; KIND is by default the command, as in
+    `shm.alerts_silences/1`.
+    """
+    command = click.get_current_context().command_path.split()[1:]
+    schema = document.get("schema", f"shm.{kind or '_'.join(command)}/1")
+    errors.printed_documents.append(str(schema))
+    click.echo(dump({"schema": schema, **document}))
 
 
-def answer(document: object, words: str) -> None:
-    """One JSON document on stdout where --json asks for it, else words for a person."""
+def answer(document: Mapping[str, object], words: str, kind: str = "") -> None:
+    """Print one JSON document on stdout where --json asks for it, else words for a person."""
     if wants_json():
-        show(document)
+        show(document, kind)
     else:
         click.echo(words)
 

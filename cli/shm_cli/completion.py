@@ -20,7 +20,7 @@ _VARIABLE = "_SHM_COMPLETE"
 @click.argument("shell", type=click.Choice(["bash", "zsh"]))
 @click.pass_context
 def command(ctx: click.Context, shell: str) -> None:
-    """Print the script that completes `shm` in bash or zsh.
+    """Print the completion script of bash or zsh.
 
     It completes commands, options, the workspace's hangers and hooks, model classes and effects.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm.errors import StoreError, UsageError, sentence
+from shm.errors import BadInput, StoreError, UsageError, sentence
 from shm.store import Archive, Store, Workspace
 from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import (
@@ -43,6 +43,9 @@ _copies_option = click.option(
     metavar="DIR",
     help="A folder for copies of the raw files.",
 )
+
+
+_SQLITE_HEADER = b"SQLite format 3\0"  # https://www.sqlite.org/fileformat.html
 
 
 @click.group()
@@ -212,6 +215,7 @@ def restore_command(ctx: click.Context, file: Path, replace: bool, copies: Path 
     \b
     Example: shm db restore /backup/arch-2026-05-01.db --replace
     """
+    _refuse_no_backup(file)
     workspace = open_workspace(ctx)
     keep_as = workspace.folder / f"shm-before-restore-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.db"
     with workspace.lock(), progress_bar("restore") as tell:
@@ -252,6 +256,18 @@ def copy(ctx: click.Context, target: str) -> None:
     else:
         _show_tables(tables)
         click.echo("Both stores hold the same. Name the new one in SHM_STORE.")
+
+
+def _refuse_no_backup(file: Path) -> None:
+    """Raise BadInput if a file cannot be a backup; one that is not there is reported later."""
+    if file.is_file():
+        with file.open("rb") as opened:
+            if opened.read(len(_SQLITE_HEADER)) != _SQLITE_HEADER:
+                raise BadInput(
+                    "this is not a backup: it is not an SQLite database.",
+                    file=file,
+                    remedy="Give a file that `shm db backup` has written.",
+                )
 
 
 def _fetch(workspace: Workspace, copies: Path | None) -> CopiedArchive | None:

@@ -249,7 +249,7 @@ _DAEMON_LIMIT_S = 600.0  # technical: several times what a slow machine takes
 )
 @click.option("--live", is_flag=True, help="A bridge with permanent sensors instead of a hammer.")
 def command(folder: Path, live: bool) -> None:
-    """See the whole job on a simulated bridge of 20 hangers.
+    """Run everything on a simulated bridge of 20 hangers.
 
     A season of hammer tests is dropped into the spool of a running daemon; hanger 7 loses 8 % of
     its tension; the alert fires; the reports are written. Nothing of hanger 18 is simulated: its

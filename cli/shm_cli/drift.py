@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,8 +30,6 @@ from shm.watch.repair_check import EVENT_KINDS
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, progress_bar, show, show_rows, show_texts
 
-_FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
-
 
 @click.group(invoke_without_command=True)
 @flags.hanger()
@@ -39,7 +37,7 @@ _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
 @flags.json
 @click.pass_context
 def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
-    """How far tension and stiffness have moved.
+    """Show how far tension and stiffness have moved.
 
     The shift of the latest test of each hanger from its baseline, if there is one at all: the
     tension in percent, an end stiffness as how many times what it was, with the probability that it
@@ -124,7 +122,7 @@ def bridge(ctx: click.Context, figure: Path | None) -> None:
 @flags.hanger(required=True)
 @click.option(
     "--since",
-    type=click.DateTime(_FORMATS),
+    type=flags.Time(),
     required=True,
     metavar="DAY",
     help="The first day (UTC) whose tests count, such as 2026-05-01.",
@@ -163,7 +161,7 @@ def rebaseline(
     Example: shm drift rebaseline --hanger 7 --since 2026-05-03 --kind retensioned --why "to 640 kN"
     """
     event = EVENT_KINDS[kind] if kind else None
-    order = Order(since.replace(tzinfo=UTC), why, who, event)
+    order = Order(since, why, who, event)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         with progress_bar("updating") as progress:

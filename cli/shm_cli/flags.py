@@ -15,13 +15,13 @@ from typing import Any, TypeVar
 import rich_click as click
 
 from shm.documents import parse_time
-from shm.errors import BadInput
+from shm.errors import BadInput, UsageError, suggest
 from shm.models import PRIORS
 from shm_cli import completion
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
 FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
@@ -38,7 +38,7 @@ class Words(click.ParamType[str]):
 
 
 class Time(click.ParamType[datetime]):
-    """An ISO 8601 time; one without zone is taken as UTC."""
+    """A day or a time of ISO 8601; one without zone is taken as UTC."""
 
     name = "time"
 
@@ -48,9 +48,33 @@ class Time(click.ParamType[datetime]):
         try:
             return parse_time(str(value))
         except (ValueError, OverflowError):
-            raise BadInput(
-                f"{value} is not an ISO 8601 time.", remedy="Write 2026-05-01T10:00:00Z."
+            raise UsageError(
+                f"{value!r} is not an ISO 8601 time.",
+                remedy="Write a day as 2026-05-01, or a time as 2026-05-01T10:00Z.",
             ) from None
+
+
+class ExistingFile(click.Path):
+    """A path of a file that exists; the nearest name of its folder is suggested."""
+
+    def __init__(self) -> None:
+        super().__init__(exists=True, dir_okay=False, path_type=Path)
+
+    def convert(
+        self, value: Any, parameter: click.Parameter | None, context: click.Context | None
+    ) -> Any:
+        try:
+            return super().convert(value, parameter, context)
+        except click.BadParameter as error:
+            path = Path(os.fsdecode(value))
+            if path.exists() or not path.parent.is_dir():
+                raise
+            nearest = suggest(path.name, (each.name for each in path.parent.iterdir()))
+            error.message = f"{error.message} {nearest}".strip()
+            raise
+
+
+FILE = ExistingFile()
 
 
 class NewFile(click.Path):

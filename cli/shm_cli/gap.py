@@ -65,7 +65,7 @@ _HEADS = ("measurement", "hours", "in all", "promised log odds", "then", "probab
 
 @click.group()
 def command() -> None:
-    """Why model and measurement differ, and what that does to tension.
+    """Find out why model and measurement differ.
 
     \b
     Example: shm gap diagnose hanger3.modes.json

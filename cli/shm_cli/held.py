@@ -26,7 +26,7 @@ def show_held(workspace: Workspace) -> int:
     with workspace.store() as store:
         found = store.recordings.list_holds()
     if flags.wants_json():
-        show({"held": [hold_document(hold) for hold in found]})
+        show({"held": [hold_document(hold) for hold in found]}, "held")
         return 0
     if not found:
         click.echo("Nothing is held.")

@@ -130,7 +130,7 @@ def command(
     hanger_file: Path | None,
     **chosen: Any,
 ) -> None:
-    """Modal parameters of recordings.
+    """Identify the modes of recordings.
 
     Each file is a test of its own unless --together is given; a .zip holds the files of one test.
     The hanger's description, where known, helps to number the modes; in a workspace the profile of

@@ -67,7 +67,7 @@ def import_modes(
         keep_modes_profile(found, workspace, answers)
         landed = _land_modes(found, workspace)
     if flags.wants_json():
-        show(_modes_document(found, landed))
+        show(_modes_document(found, landed), "import_modes")
     else:
         _show_modes(found, landed)
     return 0 if found.test is not None else BadInput.exit_code
@@ -167,12 +167,13 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
 @flags.json
 @click.pass_context
 def command(ctx: click.Context, /, file: Path, dry_run: bool, **said: Any) -> int:
-    """Take a logger's file in for the first time, asking only what it does not say.
+    """Take in the first file of a logger: asks what it lacks and remembers the answers.
 
-    Shows each column, what it is taken for, its range, hits and clipping. What you answer (hanger,
-    place and plane of the sensors) is kept in the workspace, in loggers/; later files of the same
-    logger need nothing and may go into the spool as they are. With --each-time the hanger is not
-    kept: each file says it, or you do.
+    Later files of that logger need no answers: use `shm ingest FILE`, or copy them into the spool.
+
+    Shows each column with its meaning, range, hits and clipping, and asks for what the file does
+    not say: hanger, positions and planes of the sensors, units. The answers are stored in
+    loggers/. With --each-time the hanger is not stored: each file must name it.
 
     Without a terminal nothing is asked: exit code 3, and the options to add.
 

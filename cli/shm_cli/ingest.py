@@ -86,13 +86,15 @@ def command(
     look: bool,
     **about: Any,
 ) -> int:
-    """Take recordings in, look into them with --peek, or do one again with --again.
+    """Take in files of known loggers; look into one with --peek; redo one with --again.
 
-    Each file is archived, identified, updated and watched as the daemon would; it may also be a
-    *.modes.json. The files stay where they are. Exit code 3 when any was refused.
+    A logger that shm has not seen before needs answers: use `shm import FILE` for its first file.
 
-    What is implausible is held and counts in nothing: --held shows it, --confirm and --discard
-    answer it. With --why they also take out what counts, and take back what was discarded.
+    Each file is archived, identified, updated and watched as the daemon would do it; it may also be
+    a *.modes.json. The files stay where they are. Exit code 3 if any was refused.
+
+    An implausible recording is held and not used: --held lists them, --confirm and --discard
+    decide. With --why they also exclude a used recording, or take back a discarded one.
 
     \b
     Example: shm ingest hanger3_*.csv
@@ -163,7 +165,7 @@ def _decide(workspace: Workspace, about: Mapping[str, Any]) -> int:
         stage = store.recordings.get(made.hold.recording_id).stage
     if flags.wants_json():
         alerts = [alert_document(stored.alert) for stored in made.alerts]
-        show({**hold_document(made.hold), "stage": stage.value, "alerts": alerts})
+        show({**hold_document(made.hold), "stage": stage.value, "alerts": alerts}, "decision")
         return 0
     click.echo(decided_words(made, stage))
     for stored in made.alerts:
@@ -278,7 +280,8 @@ def show_peeks(files: Sequence[Path], workspace: Workspace | None = None) -> int
     missing = [_missing(look, workspace) for look in looks]
     if flags.wants_json():
         found = zip(looks, missing, strict=True)
-        show({"files": [{**asdict(look), "missing": lacks} for look, lacks in found]})
+        files_found = [{**asdict(look), "missing": lacks} for look, lacks in found]
+        show({"files": files_found}, "peek")
     else:
         for look, lacks in zip(looks, missing, strict=True):
             if look.channels:

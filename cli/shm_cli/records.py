@@ -16,7 +16,7 @@ from shm_cli.common import answer, opened_store, show_rows
 
 @click.group()
 def note() -> None:
-    """Notes, inspections and repairs of a hanger or of the bridge.
+    """Record notes, inspections and repairs of a hanger.
 
     \b
     Example: shm note list --hanger 3
@@ -101,7 +101,7 @@ def list_notes(ctx: click.Context, hanger_id: int | None) -> None:
 @flags.json
 @click.pass_context
 def audit(ctx: click.Context, limit: int | None) -> None:
-    """Who changed what, when and how: the newest first.
+    """Show who changed what, and when.
 
     What shm does by itself is not listed, nor what is edited in bridge.toml.
 

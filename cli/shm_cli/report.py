@@ -81,7 +81,7 @@ def command(
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """What an engineer files about a hanger, or the bridge.
+    """Report on a hanger or the bridge, for the file.
 
     Tension with its interval, against nominal and baseline; what changed, how it goes with the
     temperature, what the hangers beside it did; predicted and measured frequencies; what the model

@@ -49,7 +49,7 @@ def daemon(
     log_file: Path | None,
     as_unit: bool,
 ) -> None:
-    """Watch the spool and do the whole job, unattended.
+    """Watch the spool and process every file.
 
     A file dropped into spool/ is archived, identified, updated and watched; alerts go to the hooks
     of bridge.toml. SIGTERM ends the daemon; what was under way goes on at the next start.
@@ -98,7 +98,7 @@ def web(
     log_file: Path | None,
     as_unit: bool,
 ) -> None:
-    """The dashboard and its API: pages for people, upload, alerts, health and metrics.
+    """Serve the dashboard and its API.
 
     Open the address that it prints in a browser. Only this machine can reach it unless --host says
     otherwise; then all but /health needs a token of `shm token create`, which a person gives once

@@ -157,7 +157,7 @@ def _springs(function: flags.F) -> flags.F:
     show_default=False,
     help="Unknown if left out.",
 )
-@click.option("--first", type=click.DateTime(), help="Time of the first test; then weekly.")
+@click.option("--first", type=flags.Time(), help="Time of the first test; then weekly.")
 @click.option("--format", "form", type=click.Choice(_SUFFIXES), default="csv")
 @click.option(
     "--out", type=flags.FOLDER, metavar="DIR", help="Where the files go; a stream needs none."
@@ -180,7 +180,7 @@ def command(
     seed: int,
     **chosen: Unpack[Chosen],
 ) -> None:
-    """Hammer tests of a hanger whose truth you choose.
+    """Simulate hammer tests of a hanger.
 
     The hanger is hit in the time domain; biaxial accelerometers record. Effects of the gap
     diagnosis can be planted.
@@ -189,16 +189,15 @@ def command(
     Example: shm simulate --hanger-file H.toml --k1 1e7 --k3 1e7 --out tests
     Example: shm simulate --stream --days 3 --loss 7:2:2.5
     """
-    start = first.replace(tzinfo=UTC) if first else None
     if as_stream:
-        live = Live(days, start, losses, speed, seed)
+        live = Live(days, first, losses, speed, seed)
         simulate_streams(open_workspace(ctx), live)
         return
     if out is None:
         raise UsageError("no folder is named for the files.", remedy="Add --out DIR.")
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     _refuse_other_supports(hanger)
-    start = start or _FIRST
+    start = first or _FIRST
     out.mkdir(parents=True, exist_ok=True)
     written = []
     with counting_bar() as bar:

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 @flags.json
 @click.pass_context
 def command(ctx: click.Context, which: str | None) -> None:
-    """What the workspace holds and what waits.
+    """Show the state of every hanger and of the workspace.
 
     \b
     Example: shm --workspace arch status

@@ -46,7 +46,7 @@ _name = click.argument("name", metavar="NAME", shell_complete=completion.streams
 @flags.json
 @click.pass_context
 def command(ctx: click.Context, events: bool, days: float) -> None:
-    """Permanent sensors: what is live, and what was lost.
+    """Show permanent sensors: what is live, what was lost.
 
     A stream is late once its last sample is 5 minutes old, silent after an hour. The share that was
     lost is of the last 24 hours, up to the last sample; what comes late takes it back. Apart are

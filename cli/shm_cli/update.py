@@ -92,7 +92,7 @@ def command(
     sampler: str,
     calibrated_by: Path | None,
 ) -> None:
-    """Posterior of tension and end stiffness.
+    """Infer tension and end stiffness with one model class.
 
     The tests come from MODES.json, or are the latest of a hanger of the workspace.
 
@@ -208,7 +208,7 @@ def select_command(
     sampler: str,
     calibrated_by: Path | None,
 ) -> None:
-    """Compare model classes by their evidence.
+    """Infer the tension with all model classes, and compare them.
 
     The classes are equally probable beforehand, but for clamped ones, which are as probable as the
     kind of ends makes them (0.1 to 0.4: shm settings --assumptions); --priors thesis has all equal,

@@ -12,7 +12,8 @@ from dataclasses import replace
 from typing import Any
 
 from shm.assumptions import DEFAULTS, FILE, Assumption, Assumptions, number_text
-from shm.bridge.table import Table, suggest
+from shm.bridge.table import Table
+from shm.errors import suggest
 
 _ALL_ROWS = "`shm settings --assumptions` lists all."
 _NUMBERS = {

@@ -24,7 +24,7 @@ from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, escalations_s, hook_of, zone_of
 from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table, is_loopback, web_address
-from shm.errors import BadInput
+from shm.errors import BadInput, NotDescribed, suggest
 from shm.values import MEASUREMENT_HOURS, Hanger, MonitoredHanger
 from shm.values.stream import Stream
 
@@ -217,7 +217,7 @@ class Bridge:
                 f"{hanger_id}` for its frequencies.",
             )
         known = ", ".join(str(hanger.id) for hanger in self.hangers) or "none"
-        raise BadInput(
+        raise NotDescribed(
             f"hanger {hanger_id} is not described in {Path(self.source).name} (known: {known}).",
             remedy="Add a [[hanger]] table with this id, or correct the number.",
         )
@@ -235,7 +235,24 @@ def load_bridge(path: Path, changed: Mapping[str, object] = MappingProxyType({})
     return replace(_described(overlaid(document, changed), path), as_in_file=plain)
 
 
+_TABLES = (
+    "bridge", "hanger", "structure", "hook", "other_bridge", "stream", "settings", "disturbance",
+    "report", "measurement_hours", "single_sign_on", "assumptions",
+)  # fmt: skip
+_OF_BRIDGE = ("name", "built", "time_zone")
+
+
+def _refuse_unknown_tables(document: Mapping[str, Any], path: Path) -> None:
+    """Raise BadInput for a table that nothing reads, and for such a key of `[bridge]`."""
+    for name in document.keys() - set(_TABLES):
+        remedy = f"{suggest(name, _TABLES)}Known: {', '.join(_TABLES)}."
+        raise BadInput(f"unknown table or key {name}.", file=path, remedy=remedy)
+    if table := _table(document, "bridge", path):
+        table.refuse_unknown(_OF_BRIDGE)
+
+
 def _described(document: dict[str, Any], path: Path) -> Bridge:
+    _refuse_unknown_tables(document, path)
     assumed = assumptions_of(_table(document, "assumptions", path), DEFAULTS)
     hangers = tuple(hanger_of(table, path, assumed) for table in _tables(document, "hanger", path))
     structures = tuple(structure_of(table, path) for table in _tables(document, "structure", path))

@@ -48,6 +48,7 @@ _SOFTEST_PA, _STIFFEST_PA = 1e6, 2e12
 # Light timber and osmium; the strongest carbon fibre.
 _LIGHTEST_KG_M3, _DENSEST_KG_M3, _STRONGEST_PA = 300.0, 23000.0, 7e9
 _FLATTEST_DEG, _VERTICAL_DEG = 10.0, 90.0  # judgement: a flatter one is no hanger
+_GRAVITY_M_S2 = 9.81
 _LONGEST_M = 1000.0  # judgement: the longest stays have 580 m; of 4000 m and more no mode is solved
 
 # Judgement: from ten false calls a year, which nobody reads, to none in the life of all bridges.
@@ -71,6 +72,9 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
     assumed = assumptions_of(table.table("assumptions"), assumed, origin)
     usual_ratio = assumed.poissons_ratio.value
     _refuse_other_units(table, mass / area, nominal_tension_n / area)
+    supports = supports_of(table.table("supports"))
+    if supports == Supports():
+        _refuse_less_than_weight(table, nominal_tension_n, mass * length_m * _GRAVITY_M_S2)
     fittings_m, plate = _fittings(table, length_m), _plate(table.table("plate"), length_m, diameter)
     open_ends = plate is None and not any(fittings_m)
     return Hanger(
@@ -93,7 +97,7 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
         models=_models(table),
         scatter=_scatter(table, length_m, area, open_ends, assumed),
         effect_priors=effect_priors_of(table.table("effects")),
-        supports=supports_of(table.table("supports")),
+        supports=supports,
         kind=_kind(table),
         family=str(values.get("family", "")),
         limits=_limits(table.table("limits")),
@@ -140,6 +144,16 @@ def _refuse_other_units(table: Table, density_kg_m3: float, stress_pa: float) ->
         raise table.refusal(
             f"nominal_tension_n makes a stress of {stress_pa / 1e6:g} MPa, which no hanger carries",
             "Give it in N, lengths in m.",
+        )
+
+
+def _refuse_less_than_weight(table: Table, nominal_tension_n: float, weight_n: float) -> None:
+    """Refuse a nominal tension in kN: a hanger in service carries more than its weight."""
+    if 0 < nominal_tension_n < weight_n:
+        raise table.refusal(
+            f"nominal_tension_n = {nominal_tension_n:g} is less than the weight of the hanger, "
+            f"{weight_n / 1e3:.3g} kN",
+            f"Give it in N: {nominal_tension_n:g} kN is {nominal_tension_n:g}e3.",
         )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from shm.bridge.table import Table
-from shm.errors import BadInput
+from shm.errors import BadInput, NotDescribed
 from shm.values import NAN, PLANES, Hanger
 from shm.values.stream import Stream, StreamChannel
 
@@ -121,7 +121,7 @@ def stream_named(streams: tuple[Stream, ...], name: str) -> Stream:
             return stream
     known = ", ".join(stream.name for stream in streams) or "none"
     meant = next((each.name for each in streams if each.name.lower() == name.lower()), None)
-    raise BadInput(
+    raise NotDescribed(
         f"stream {name[:64]!r} is not described in bridge.toml (known: {known}).",
         remedy=f"Capitals count: write {meant}."
         if meant

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import ipaddress
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -12,15 +11,9 @@ from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
 from shm.documents import Misfit, finite, reader, value_of
-from shm.errors import BadInput
+from shm.errors import BadInput, suggest
 
 _READER = reader(finite)
-
-
-def suggest(key: str, known: Iterable[str]) -> str:
-    """Return `Did you mean diameter_m? ` for a misspelt key, with the known one nearest to it."""
-    near = difflib.get_close_matches(key, known, n=1)
-    return f"Did you mean {near[0]}? " if near else ""
 
 
 @dataclass(frozen=True)
