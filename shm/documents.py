@@ -80,7 +80,7 @@ _Hook = Callable[[Any, Any], Any]
 
 
 class Misfit(ValueError):
-    """What in a document does not fit the value that it should be; `key` is the one at fault."""
+    """A part of a document that is not the expected value; `key` is the one at fault."""
 
     def __init__(self, said: str, key: str):
         super().__init__(said)
@@ -304,7 +304,7 @@ def creep_document(creep: CreepRate | None) -> dict[str, Any] | None:
 
 
 def alert_document(alert: Alert) -> dict[str, Any]:
-    """What a hook gets on its standard input; what its message leads with stands by itself, too."""
+    """Return the document that a hook gets on its standard input, with its lead as fields."""
     tension = alert.tension and averaged_document(alert.tension)
     lead = Lead.of(alert.message)
     document = {

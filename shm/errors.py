@@ -152,8 +152,9 @@ class GateNotMet(ShmError):
 
 def suggest(name: str, known: Iterable[str]) -> str:
     """Return `Did you mean diameter_m? ` for a misspelt name, or "" if no known name is near."""
-    near = difflib.get_close_matches(name, list(known), n=1)
-    return f"Did you mean {near[0]}? " if near else ""
+    by_lower = {each.lower(): each for each in known}
+    near = difflib.get_close_matches(name.lower(), list(by_lower), n=1)
+    return f"Did you mean {by_lower[near[0]]}? " if near else ""
 
 
 @contextmanager

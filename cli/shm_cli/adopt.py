@@ -72,7 +72,7 @@ def adopt(
 @flags.json
 @click.pass_context
 def adopted(ctx: click.Context, hanger_id: int | None, undone: bool) -> None:
-    """What was adopted, and what became of its gap.
+    """List adopted effects and the gap since then.
 
     \b
     Example: shm gap adopted --hanger 3

@@ -144,7 +144,7 @@ def unsilence(ctx: click.Context, silence_id: int, who: str) -> None:
 
 
 def silence_row(silence: Silence, now: datetime) -> dict[str, object]:
-    """What `--json` says of a silence."""
+    """Return the JSON document of a silence."""
     return {**vars(silence), "state": state_of(silence, now), "until": silence.until}
 
 
@@ -188,8 +188,10 @@ def acknowledge(ctx: click.Context, alert_id: int, why: str, resolved: bool, who
 
 
 def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
-    """What `shm alerts --json` says of it: `acknowledged` is null while nobody took note of it, and
-    `resolved` while its condition stands; it is open while both are.
+    """Return the JSON document of an alert.
+
+    `acknowledged` is null until somebody acknowledges it, `resolved` while its condition holds; it
+    is open while both are null.
     """
     noted, ended = stored.acknowledgement, stored.resolution
     return {"acknowledged": noted and noted.said, "resolved": ended and ended.said}

@@ -91,7 +91,7 @@ def fetch_command(ctx: click.Context, which: str) -> None:
 
 @dataclass(frozen=True)
 class _Pruned:
-    """What went, or would go, of one of the folders, and why the rest of the old ones stays."""
+    """Return a sentence on the files removed from a folder, and why other old ones stay."""
 
     files: Sequence[str]
     freed_bytes: int

@@ -1,4 +1,4 @@
-"""What verbs share: where they print, how they show progress and read their input."""
+"""Printing, progress and input that verbs share."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def show_table(table: Table) -> None:
 
 
 def _folded(table: Table, console: Console) -> bool:
-    """Whether the columns now fit the terminal with no word cut: the widest fold first."""
+    """Fit columns to the terminal without cutting a word; return False if they do not fit."""
     unbounded = console.options.update(max_width=_BEYOND_ANY)
     least, widths = [], []
     for column in table.columns:
@@ -112,7 +112,7 @@ def _folded(table: Table, console: Console) -> bool:
 
 
 def _is_one_word(column: Column) -> bool:
-    """Whether nothing in a column can be broken, as a bar that is drawn: it must not be cut."""
+    """Return True if nothing in a column can be broken, such as a drawn bar."""
     cells = [str(cell) for cell in column.cells]
     return len(str(column.header)) <= max(map(len, cells), default=0) and " " not in "".join(cells)
 
@@ -178,7 +178,7 @@ def open_workspace(ctx: click.Context, **flags: object) -> Workspace:
 
 
 def is_workspace(ctx: click.Context) -> bool:
-    """Whether the folder that the command works in is one."""
+    """Return True if the folder of the command is a workspace."""
     return (Path(ctx.obj) / "bridge.toml").is_file()
 
 
@@ -320,5 +320,5 @@ def write_pictures(drawn: Iterable[Illustration], folder: Path, start: str = "")
 
 
 def drawing() -> AbstractContextManager[None]:
-    """What is shown while figures and pages are written."""
+    """Show that figures and pages are being written."""
     return waiting("drawing the figures")

@@ -93,7 +93,7 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
 )
 @click.pass_context
 def bridge(ctx: click.Context, figure: Path | None) -> None:
-    """Which hangers gained and which lost, and whether it is the bridge at all.
+    """Show which hangers gained and lost tension, and if the complete bridge moved.
 
     Compares the latest tension shift of each hanger with its neighbours': one hanger whose
     load moved to others, one that gained load, all alike (a temperature or a clock), or each

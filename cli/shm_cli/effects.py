@@ -147,7 +147,7 @@ def _shown_by(effect: Effect) -> str:
 
 
 def _facts(effect: Effect) -> str:
-    """Where it acts, what shows and what imitates it, and who says so; a line each."""
+    """Return lines on an effect: place, evidence, imitators and source."""
     places = ", ".join(f"*{each.at}*" for each in effect.variants(_HANGER, _EVERYTHING))
     needs = effect.invisible(_HANGER, _LEAST)
     lines = [

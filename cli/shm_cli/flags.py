@@ -118,7 +118,7 @@ json = click.option(
 
 
 def wants_json() -> bool:
-    """Whether the command that runs was given --json."""
+    """Return True if the running command was given --json."""
     context = click.get_current_context(silent=True)
     return context is not None and bool(context.meta.get(_JSON))
 

@@ -197,7 +197,7 @@ def diagnose(
     html: Path | None,
     figures: Path | None,
 ) -> None:
-    """Where the gap lies, which effect causes it, how far it shrinks, what would tell.
+    """Diagnose the gap: where it is, its causes, how far they shrink it, what to measure next.
 
     Of MODES.json with --hanger-file, or of the latest tests of a hanger of the workspace, which
     keeps the diagnosis for its report and for `shm gap adopt`. The answer gives every effect of

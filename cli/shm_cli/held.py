@@ -22,7 +22,7 @@ from shm_cli.common import paragraph, show
 
 
 def show_held(workspace: Workspace) -> int:
-    """What nobody has decided on yet."""
+    """List the recordings that wait for a decision."""
     with workspace.store() as store:
         found = store.recordings.list_holds()
     if flags.wants_json():
@@ -87,7 +87,7 @@ def decide(
 
 
 def _is_held(store: Store, recording_id: int, test: str | None) -> bool:
-    """Whether the recording waits for a decision, or that test of it."""
+    """Return True if the recording, or that test of it, waits for a decision."""
     hold = store.recordings.latest_hold(recording_id)
     if hold is None or hold.decision is not None:
         return False
@@ -111,7 +111,7 @@ def _refuse_part(hold: Hold | None, test: str, decision: Decision) -> None:
 
 
 def _refuse_without_reason(store: Store, recording_id: int, decision: Decision, why: str) -> None:
-    """What counts, or was decided on, is not turned round by one word."""
+    """Require a reason to reverse a decision or to exclude a used recording."""
     recording, hold = store.recordings.get(recording_id), store.recordings.latest_hold(recording_id)
     confirms = decision is Decision.CONFIRMED
     is_out = hold is not None and hold.is_out
@@ -136,7 +136,7 @@ def _refuse_copy_without_reason(hold: Hold | None, why: str) -> None:
 
 
 def decided_words(decided: Decided, stage: Stage) -> str:
-    """What became of it."""
+    """Return a sentence on the decision and its consequence."""
     hold, exclusion = decided.hold, decided.exclusion
     what = f"Recording {hold.recording_id} ({hold.file_name})"
     if exclusion is not None and hold.decision is Decision.WITHDRAWN:
@@ -174,7 +174,7 @@ def _excluded_words(what: str, exclusion: Exclusion) -> str:
 
 
 def discarded_words(hold: Hold) -> str:
-    """What is said where a discarded file comes again: one line."""
+    """Return the line for a discarded file that arrives again."""
     words = discarded_reason(hold).replace("discarded", "discarded before,", 1)
     return f"{words} {taking_back(hold)}"
 

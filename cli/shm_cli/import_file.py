@@ -167,7 +167,7 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
 @flags.json
 @click.pass_context
 def command(ctx: click.Context, /, file: Path, dry_run: bool, **said: Any) -> int:
-    """Take in the first file of a logger: asks what it lacks and remembers the answers.
+    """Take in the first file of a logger; asks what it does not say.
 
     Later files of that logger need no answers: use `shm ingest FILE`, or copy them into the spool.
 
@@ -224,7 +224,7 @@ def _modes_in(file: Path, workspace: Workspace) -> ForeignModes | None:
 
 
 def _whole_file(said: dict[str, Any]) -> Answers:
-    """What the options say of the whole file."""
+    """Return the answers of the options for the complete file."""
     rate, temperature = said["rate"], said["temperature"]
     if rate is not None and not 0 < rate < math.inf:
         raise UsageError(
@@ -240,7 +240,7 @@ def _whole_file(said: dict[str, Any]) -> Answers:
 
 
 def _answers(said: dict[str, Any], found: Import) -> Answers:
-    """What the options say, of the channels too."""
+    """Return the answers of the options, those for channels included."""
     names = [column.name for column in found.survey.columns]
     tables: dict[str, dict[str, object]] = {}
     for name in said["leave_out"]:

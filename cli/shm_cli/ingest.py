@@ -86,7 +86,7 @@ def command(
     look: bool,
     **about: Any,
 ) -> int:
-    """Take in files of known loggers; look into one with --peek; redo one with --again.
+    """Take in files of known loggers; --peek looks, --again redoes.
 
     A logger that shm has not seen before needs answers: use `shm import FILE` for its first file.
 
@@ -397,7 +397,7 @@ def _title(look: Peek) -> str:
 
 
 def _kind(look: Peek) -> str:
-    """What the file is, where that is not a plain hammer test."""
+    """Return the kind of file, if it is not a single hammer test."""
     if look.lines:
         return f"frequency responses of {look.lines} lines every {look.frequency_step_hz:g} Hz"
     ambient = look.samples and all(channel.quantity == "acceleration" for channel in look.channels)

@@ -41,11 +41,11 @@ GROUPS: dict[str, dict[str, Verb]] = {
         "demo": Verb("shm_cli.demo", "Run everything on a simulated bridge of 20 hangers."),
         "import": Verb(
             "shm_cli.import_file",
-            "Take in the first file of a logger: asks what it lacks and remembers the answers.",
+            "Take in the first file of a logger; asks what it does not say.",
         ),
         "ingest": Verb(
             "shm_cli.ingest",
-            "Take in files of known loggers; look into one with --peek; redo one with --again.",
+            "Take in files of known loggers; --peek looks, --again redoes.",
         ),
     },
     "Look": {
@@ -123,7 +123,7 @@ class Verbs(click.RichGroup):
         """Return the verb; raises click.UsageError that names the nearest one."""
         if args[0] in VERBS or args[0].startswith("-") or ctx.resilient_parsing:
             return super().resolve_command(ctx, args)
-        nearest = suggest(args[0].lower(), VERBS)
+        nearest = suggest(args[0], VERBS)
         raise click.UsageError(f"No such command {args[0]!r}. {nearest}".rstrip(), ctx)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:

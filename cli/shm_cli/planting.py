@@ -65,7 +65,7 @@ _AT_ONCE = 6  # technical: 20 MB of memory, and folders are synchronised once fo
 
 @dataclass(frozen=True)
 class Live:
-    """What is simulated; `speed` is how many seconds pass on the bridge in one of ours, 0: any."""
+    """Simulated streams; `speed` is seconds on the bridge per second here, 0 for no limit."""
 
     days: float
     first: datetime | None
@@ -122,7 +122,7 @@ def send(
     speed: float,
     told: Callable[[datetime], None],
 ) -> int:
-    """How many were taken; with a `speed`, each once the bridge's clock has come to its end."""
+    """Send chunks and return their number; with a `speed`, each at its time."""
     begun, start, count = time.monotonic(), None, 0
     while batch := list(islice(chunks, 1 if speed > 0 else _AT_ONCE)):
         start, end = start or batch[0].start, batch[-1].end

@@ -135,7 +135,7 @@ def print_unit(name: str, workspace: Path, words: Sequence[str], *writes: Path) 
 
 
 def serving_words(host: str, port: int, files: Mapping[str, Path | None]) -> Sequence[str]:
-    """Where the web interface listens, as options with paths that hold from everywhere."""
+    """Return the address of the web interface as options with absolute paths."""
     given = [str(word) for name, file in files.items() if file for word in (name, file.resolve())]
     return ["--host", host, "--port", str(port), *given]
 

@@ -38,7 +38,7 @@ _SENSORS = 2
 
 
 class Chosen(TypedDict):
-    """What is planted, how it is measured, and what each recording is told beside its data."""
+    """Planted truth, measurement set-up and the header of each recording."""
 
     tension_n: float | None
     k1: float
@@ -266,7 +266,7 @@ def _hit(hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Gene
 
 
 def _conditions(chosen: Chosen) -> Conditions:
-    """What a recording is made under; an unknown temperature is the reference."""
+    """Return the conditions of a recording; an unknown temperature is the reference."""
     shift_k = chosen["temperature_c"] - chosen["reference_c"]
     mass = mass_of(chosen["added_mass"])
     return Conditions("", 0.0 if math.isnan(shift_k) else shift_k, chosen["amplitude"], mass)

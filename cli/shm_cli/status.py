@@ -181,7 +181,7 @@ def _shift(held: Mapping[str, Any]) -> float:
 
 
 def _gap(store: Store, hanger: int) -> dict[str, Any] | None:
-    """How the gap has gone since an effect was adopted; None where none is."""
+    """Return the gap since an effect was adopted; None if none is."""
     # It brings the whole pipeline, and of few hangers an effect is adopted.
     from shm.pipeline.adopting import gap_watch
 
@@ -198,7 +198,7 @@ def _gap(store: Store, hanger: int) -> dict[str, Any] | None:
 
 
 def _competitions(rows: list[dict[str, Any]]) -> dict[str, str]:
-    """Which classes compete and why others do not, each with the hangers that it is true of."""
+    """Return the competing classes, and the reasons against others, with their hangers."""
     found: dict[str, list[str]] = {}
     for row in rows:
         said = f"{', '.join(map(model_class, row['competing'])) or 'no model class'} may compete"
@@ -271,7 +271,7 @@ def _daemon(workspace: Workspace) -> dict[str, Any]:
 def _structures(
     workspace: Workspace, store: Store, open_alerts: Mapping[int, int]
 ) -> list[dict[str, Any]]:
-    """Those without a model, of which frequencies alone are watched."""
+    """Show structures without a model, of which only frequencies are watched."""
     latest, rows, undated = store.tests.latest(), [], store.tests.names_without_time()
     for each in workspace.bridge.structures:
         found, baseline = latest.get(each.id), store.watch.baseline(each.id)

@@ -134,7 +134,7 @@ def tell_irregular(tests: Sequence[ModalTest]) -> None:
 
 
 def show_stated(averaged: Averaged) -> None:
-    """What keeps a tension from being taken at its word, then the tension with both intervals."""
+    """Return the caveats of a tension, then the tension with both intervals."""
     for caveat in averaged.caveats:
         click.echo(paragraph(caveat))
     for sentence in stated(averaged).sentences:

@@ -1,4 +1,4 @@
-"""What `shm ingest` takes in, or does again with --again, is done at once, in a flow of its own."""
+"""Immediate processing for `shm ingest`, in a separate flow."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _refuse_without_raw_file(workspace: Workspace, store: Store, recording_id: i
 
 
 def sentences(rerun: Rerun, stage: Stage) -> list[str]:
-    """What is done anew, what that supersedes, and what it leaves as it is."""
+    """Return the document of a rerun: stages repeated, results replaced, results left."""
     names, file = ", ".join(rerun.tests) or "no test yet", rerun.recording.file.file_name
     tests = f"tests: {len(rerun.tests)}, " if stage is Stage.IDENTIFIED else ""
     said = [

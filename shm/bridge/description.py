@@ -34,7 +34,7 @@ _SUFFIXES = (".png", ".jpg", ".jpeg")
 
 @dataclass(frozen=True)
 class Letterhead:
-    """Who makes the reports of a bridge, as their head and their signatures name them.
+    """Letterhead of the reports of a bridge: company, author, signatures.
 
     Empty texts and None: nothing is given. `logo` is an image file, which need not be there.
     """
@@ -139,7 +139,7 @@ def single_sign_on_of(document: Mapping[str, Any], path: Path) -> SingleSignOn |
 
 
 def is_safe(address: str) -> bool:
-    """Whether what is sent to an address is encrypted, or stays on this computer."""
+    """Return True if a connection is encrypted or stays on this computer."""
     try:
         parts = urlsplit(address)
         host = parts.hostname or ""
@@ -161,7 +161,7 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class Bridge:
-    """What `bridge.toml` says; `built` is None where it does not say.
+    """The description of a bridge by `bridge.toml`; `built` is None if it is not stated.
 
     `structures` are those without a model, of which frequencies alone are watched: a deck, a pylon.
     Their numbers are none of a hanger. `measurement_hours` is what each kind of measurement costs.

@@ -253,7 +253,7 @@ def _inclination_deg(table: Table) -> float:
 
 
 def _positive(table: Table, kind: Any) -> dict[str, float]:
-    """Those of the numbers of a kind that stand in a table, which holds nothing else."""
+    """Return the numbers of a kind that a table states; raises BadInput for other keys."""
     table.refuse_unknown(field.name for field in fields(kind))
     return {key: table.positive(key) for key in table.values}
 

@@ -17,7 +17,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
 def is_stream_name(text: str) -> bool:
-    """Whether a stream or a channel may be called so."""
+    """Return True if a stream or a channel may have that name."""
     return _NAME.fullmatch(text) is not None
 
 

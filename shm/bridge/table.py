@@ -149,7 +149,7 @@ def web_address(table: Table, key: str, remedy: str, no_password: str) -> str:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host is this machine itself."""
+    """Return True if a host is this machine."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -201,7 +201,7 @@ def _line_of_plain_table(lines: Sequence[str], name: str, problem: str) -> int |
 
 
 def _other(line: str, kind: str) -> bool:
-    """Whether another table begins, which is no part of this one."""
+    """Return True if another table starts that is no part of this one."""
     header = line.strip()
     return header.startswith("[") and not re.match(rf"\[+{kind}\.", header)
 

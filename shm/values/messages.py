@@ -1,4 +1,4 @@
-"""What a message to a person leads with: the state of a hanger, what to do about it, how soon.
+"""The lead of a message to a person: state of a hanger, action and urgency.
 
 The urgency is read off the words of the action, so that the two cannot disagree.
 """

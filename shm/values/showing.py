@@ -1,4 +1,4 @@
-"""How a value shows itself to a researcher: one line, a summary, a notebook's table.
+"""Display of values to a researcher: one line, a summary, a table in a notebook.
 
 The line is made here. Summaries and tables are made floors above, which values may not import: as
 `shm.values` is loaded, the front of the package gives itself to `hand_over_to`, and it loads what

@@ -1,4 +1,4 @@
-"""Who may do what: people and their roles, tokens and their scopes.
+"""Access: people and their roles, tokens and their scopes.
 
 A program sends its token in a header; a browser sends the cookie that signing in gave it.
 """
@@ -41,7 +41,7 @@ _FORWARDED = ("forwarded", "x-forwarded-for", "x-forwarded-host", "x-real-ip")
 
 @dataclass(frozen=True)
 class Visitor:
-    """Who asks: the name of the person or token, empty for this machine without one."""
+    """The caller: the name of the person or token, empty for this machine without one."""
 
     name: str
     role: Role = Role.READER
@@ -58,7 +58,7 @@ class Visitor:
 
     @property
     def actor(self) -> Actor:
-        """Whose their changes are, in the audit log."""
+        """Return the author of their changes for the audit log."""
         return Actor(self.name if self.is_person else f"token {self.name}", self.via)
 
 
@@ -168,7 +168,7 @@ def refuse_foreign(request: Request) -> None:
 
 
 def visitor_in_force(request: Request, site: Site, secret: str) -> Visitor:
-    """Whose token or session this is; raises Refused where it is wrong or has ended.
+    """Return the caller of a token or session; raises Refused if it is wrong or has ended.
 
     One in force is never kept waiting, whatever came from the same address.
     """
@@ -182,7 +182,7 @@ def visitor_in_force(request: Request, site: Site, secret: str) -> Visitor:
 
 
 def is_signed_in(request: Request, site: Site) -> bool:
-    """Whether the browser's cookie is in force."""
+    """Return True if the browser's cookie is valid."""
     secret = request.cookies.get(COOKIE)
     return bool(secret) and _found(site, secret or "") is not None
 
@@ -263,7 +263,7 @@ def _visitor(request: Request, site: Site, secret: str, needed: Role) -> Visitor
 
 
 def _signed_in(request: Request, site: Site, otherwise: str, needed: Role) -> Visitor:
-    """Who has signed in with this browser; `otherwise` is said where nobody has."""
+    """Return the person signed in with this browser; raises Refused with `otherwise` if none is."""
     secret = request.cookies.get(COOKIE)
     if not secret:
         raise _nobody(otherwise, f"Sign in at /sign-in. A program: {_BY_HEADER}")

@@ -107,7 +107,7 @@ def load_pages(site: Site) -> Pages:
 
 @_described.get("/openapi.json")
 def openapi(request: Request, _: Reader) -> JSONResponse:
-    """What the interface takes and answers, as OpenAPI."""
+    """Return the description of the interface as OpenAPI."""
     return JSONResponse(request.app.openapi())
 
 

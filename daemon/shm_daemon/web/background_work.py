@@ -1,4 +1,4 @@
-"""What takes seconds to work out, beside the requests that want it: one at a time, a few waiting.
+"""Background work: requests that take seconds to compute, one at a time, a few waiting.
 
 It runs in a process of its own that ends when nothing has been wanted for a while, so that neither
 a heavy file nor a crash of what reads it touches the interface. The latest results are kept in
@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 
 
 class Order(Protocol):
-    """What is wanted: equal orders have the same result. `make` runs in the other process."""
+    """A request for work: equal ones have the same result. `make` runs in the other process."""
 
     def __hash__(self) -> int: ...
 
@@ -66,7 +66,7 @@ class BackgroundWorker(Generic[Made]):
         self._closed = False
 
     def kept(self, order: Order) -> Made | None:
-        """What was made of an order already; begins nothing."""
+        """Return the stored result of a request, None if there is none; start nothing."""
         with self._changed:
             if order not in self._kept:
                 return None
@@ -74,7 +74,7 @@ class BackgroundWorker(Generic[Made]):
             return self._kept[order][0]
 
     def wanted(self, order: Order) -> Made | None:
-        """What was made of an order; None while it is being worked on, or while many others wait.
+        """Return the result of a request; None while it is computed, or while many others wait.
 
         Raises the ShmError with which it failed a short while ago.
         """
@@ -203,5 +203,5 @@ def background_worker_of(request: Request) -> BackgroundWorker[Any]:
 
 
 def _packed(order: Order) -> bytes:
-    """What is made of an order, as it comes from the other process: its length is its size here."""
+    """Return the result of a request, packed in the other process: its length is its size here."""
     return pickle.dumps(order.make())

@@ -22,7 +22,7 @@ NOT_REACHED, STANDS_STILL = "Not reached", "Stands still"
 
 @dataclass(frozen=True)
 class Summary:
-    """What a bridge says of itself.
+    """Summary of a bridge by itself.
 
     `notices` are what every page of its dashboard says at its top, `troubles` why its work stands
     still; `others` says which other hangers need action.
@@ -50,7 +50,7 @@ class Summary:
 
 
 def summary_of(site: Site, now: datetime) -> Summary:
-    """What the site's own home page says first. Raises StoreError where the store is out."""
+    """Return the lead of the home page of this site. Raises StoreError if the store is unusable."""
     workspace, store = site.workspace, site.store
     lines = hanger_lines(workspace, store, now)
     message = bridge_message({each.hanger.id: each.message for each in lines})
@@ -89,7 +89,7 @@ class BridgeRow:
 
     @property
     def leads(self) -> tuple[Lead, ...]:
-        """What is said before its own words: that it is not reached, or what limits its work."""
+        """Return the notices before its lead: it is not reached, or its work is limited."""
         if self.trouble or self.summary is None:
             return (self.trouble,) if self.trouble else ()
         said = self.summary.notices
@@ -99,7 +99,7 @@ class BridgeRow:
 
     @property
     def states(self) -> tuple[tuple[str, str], ...]:
-        """How it is in a word or two, each with its style; empty before its first test.
+        """Return its state in a word or two, each with its style; empty before its first test.
 
         What is not watched is never quiet, whatever its last tests said.
         """
@@ -114,7 +114,7 @@ class BridgeRow:
 
     @property
     def is_watched(self) -> bool:
-        """Whether its words are of now, and work goes on: else nothing of it is quiet."""
+        """Return True if its summary is current and its work goes on; else it is never quiet."""
         return not self.trouble and self.summary is not None and not self.summary.troubles
 
     @property
@@ -174,7 +174,7 @@ _GROUPS = {
 
 
 def groups(rows: Sequence[BridgeRow]) -> dict[str, tuple[BridgeRow, ...]]:
-    """Which bridges need what, the most urgent first; one that stands still may need more."""
+    """Group bridges by the action they need, most urgent first; stopped ones may need more."""
     found: dict[str, list[BridgeRow]] = {
         said: [] for said in (_GROUPS["today"], NOT_REACHED, STANDS_STILL, *_GROUPS.values())
     }
@@ -187,6 +187,6 @@ def groups(rows: Sequence[BridgeRow]) -> dict[str, tuple[BridgeRow, ...]]:
 
 
 def headline(rows: Sequence[BridgeRow]) -> str:
-    """How many bridges there are, and which need what."""
+    """Return a sentence: how many bridges there are, and which of them need what."""
     said = (f"{key}: {listed([each.name for each in of])}." for key, of in groups(rows).items())
     return " ".join((f"{counted(len(rows), 'bridge')}.", *said))

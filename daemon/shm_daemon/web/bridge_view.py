@@ -48,7 +48,7 @@ class HangerGlance:
 
     @property
     def is_baseline(self) -> bool:
-        """Whether the latest test is of the baseline itself."""
+        """Return True if the latest test belongs to the baseline."""
         line = self.line
         is_first = line.drift is None and line.status is Status.FIRST
         return is_first and line.baseline_tension_n is not None
@@ -86,7 +86,7 @@ class BridgeGlance:
 
     @cached_property
     def message(self) -> BridgeMessage:
-        """What the page says first."""
+        """Return the lead of the page."""
         return bridge_message({each.hanger.id: each.line.message for each in self.hangers})
 
     @property
@@ -98,7 +98,7 @@ class BridgeGlance:
 
 @dataclass(frozen=True)
 class Compared:
-    """What moved over the bridge; `pattern` is None where too few hangers can be compared."""
+    """Changes over the bridge; `pattern` is None if too few hangers can be compared."""
 
     pattern: BridgePattern | None
     why_not: str = ""
@@ -140,7 +140,7 @@ def glance(site: Site, now: datetime) -> BridgeGlance:
 
 
 def compared(request: Request, site: Site) -> Compared | None:
-    """What moved over the bridge; None while it is being worked out."""
+    """Return the changes over the bridge; None while they are computed."""
     order = tuple(hanger.id for hanger in site.workspace.bridge.hangers)
     # One NaN, which equals itself, where a change of temperature is not known.
     shifts = tuple(
@@ -287,7 +287,7 @@ def _mark(glance: HangerGlance, x: float, top: float, number: bool) -> HangerMar
 
 
 def _numbered(hangers: Sequence[HangerGlance], places: Sequence[float]) -> set[int]:
-    """Which have room for their number: those with an alert, then those that moved, go before."""
+    """Return the hangers with room for their number: alerts first, then those that moved."""
 
     def urgency(index: int) -> tuple[bool, float]:
         glance = hangers[index]

@@ -1,4 +1,4 @@
-"""Who may keep a connection: callers that say what they want, soon.
+"""Limits of connections: a caller must send its request soon.
 
 Uvicorn counts connections, not requests, and sets no deadline to a caller that connects and falls
 silent, or drips in a byte at a time. Here a connection *waits* until its request has come as a
@@ -142,7 +142,7 @@ class Guarded(H11Protocol):
             self._plain.abort()
 
     def _look(self) -> None:
-        """Whether it waits, or is being answered."""
+        """Check if the connection waits, or is being answered."""
         cycle = self.cycle
         asked = cycle is not None and not cycle.response_complete
         if asked and (not cycle.more_body or is_upload(self.scope)):
@@ -173,7 +173,7 @@ class Guarded(H11Protocol):
             self.cut_off()
 
     def _unsent(self) -> int:
-        """What the caller has yet to take, with what the system keeps for them."""
+        """Return the bytes that the caller has not received, buffers of the system included."""
         if self.transport is None or self._plain is None:
             return 0
         kept = array("i", [0])

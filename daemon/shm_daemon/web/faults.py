@@ -1,4 +1,4 @@
-"""What goes wrong, as answers: a status, what is wrong and what to do.
+"""Errors as responses: a status, the problem and a remedy.
 
 A document where a document was asked for, a page where a page was.
 """
@@ -53,7 +53,7 @@ _WORDS = {
 
 
 class Fault(BaseModel):
-    """What is wrong and what to do about it."""
+    """A problem and its remedy."""
 
     message: str
     remedy: str = ""

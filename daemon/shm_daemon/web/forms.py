@@ -27,7 +27,7 @@ _BOUNDARY = re.compile(r'boundary="?([^";]+)')
 
 
 def _up_to(longest_bytes: int) -> Any:
-    """What reads a form that is no longer; raises Refused where there is more than we ask for."""
+    """Return a reader of forms up to a length; it raises Refused for longer ones."""
 
     async def fields(request: Request) -> dict[str, str]:
         body = await _body(
@@ -86,7 +86,7 @@ def done_or_again(
 
 
 def reason_in(told: Mapping[str, str], of: str) -> str:
-    """Why, for the record; raises UsageError where nothing is written."""
+    """Return the reason for the record; raises UsageError if it is empty."""
     why = told.get("why", "").replace("\r\n", "\n").strip()  # as browsers send lines
     if not why:
         raise UsageError(f"{of} needs a reason.", remedy="Write why, for the record.")

@@ -81,7 +81,7 @@ def prepare_templates() -> None:
 def problem(
     request: Request, status: int, message: str, remedy: str, headers: dict[str, str] | None
 ) -> HTMLResponse:
-    """What went wrong, for a person: a stranger is asked to sign in."""
+    """Show an error to a person; a stranger is asked to sign in."""
     template = "sign_in.html.j2" if status == 401 else "problem.html.j2"
     found = page(
         request, template, status=status, message=message, remedy=remedy, next=_address(request)
@@ -91,7 +91,7 @@ def problem(
 
 
 def for_a_person(request: Request) -> bool:
-    """Whether a page was asked for, not a document: errors are told in kind."""
+    """Return True if a page was requested, not a document: errors have the same format."""
     path, accepted = request.url.path, request.headers.get("accept", "")
     return "text/html" in accepted and not path.startswith("/api/")
 
@@ -138,7 +138,7 @@ def _open_alerts(site: Site) -> int | None:
 
 
 def _address(request: Request) -> str:
-    """Where a person wanted to go."""
+    """Return the address that a person asked for."""
     query = f"?{request.url.query}" if request.url.query else ""
     return request.url.path + query if request.method == "GET" else "/"
 

@@ -1,4 +1,4 @@
-"""What the page of one hanger and its figures show: each part is read when it is first wanted."""
+"""Data of the page of one hanger and its figures; each part is read when it is first used."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class HangerView:
 
     @cached_property
     def notes(self) -> tuple[Note, ...]:
-        """What people wrote of it and of the bridge, the latest first."""
+        """Return the notes on the hanger and on the bridge, the latest first."""
         return self.store.notes.list_all(self.hanger.id)
 
     @cached_property
@@ -94,7 +94,7 @@ class HangerView:
 
     @cached_property
     def report(self) -> HangerReport | None:
-        """What the report says of the latest test; None before the first is through."""
+        """Return the report after the latest test; None before the first is processed."""
         if not self.trend:
             return None
         return hanger_now(self.workspace, self.store, self.hanger, self.trend, utc_now())

@@ -1,6 +1,4 @@
-"""What is known of the hangers, in numbers: the state of all; of one its trend, its tests, the
-documents of its figures. The lines of the table of tests are in the words of the report.
-"""
+"""Hangers as documents: the state of all; the trend, tests and figures of one."""
 
 from __future__ import annotations
 
@@ -62,7 +60,7 @@ class TrendPoint(BaseModel):
 
 
 class TrendEvent(BaseModel):
-    """What happened to the hanger beside its tests."""
+    """An event of the hanger other than a test."""
 
     at: datetime
     kind: str = Field(description="baseline, adopted, adoption undone, alert, acknowledged")
@@ -80,7 +78,7 @@ class CalledChange(BaseModel):
 
 
 class StateOverTime(BaseModel):
-    """What all tests up to each say of one quantity: tension in N, stiffness log10 of its unit.
+    """Estimate of one quantity from all tests so far: tension in N, stiffness log10 of its unit.
 
     It holds at the reference temperature: the swing with the temperature is taken out.
     """

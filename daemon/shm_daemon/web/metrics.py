@@ -1,4 +1,4 @@
-"""What Prometheus scrapes: made anew at each scrape, so that no process needs to keep counts.
+"""Metrics for Prometheus, computed at each scrape, so that no process needs to store counts.
 
 It is made in parts. A part that fails is left out, counted in `shm_scrape_errors_total` and logged;
 the others answer, so that one odd row or folder never blinds those who watch.

@@ -94,7 +94,7 @@ class Around:
 
 
 def is_https(scope: Scope) -> bool:
-    """Whether the caller came by HTTPS, to us or to a proxy before us.
+    """Return True if the caller came by HTTPS, to us or to a proxy before us.
 
     A proxy's word is enough, whoever it is: to believe it only makes cookies and browsers stricter.
     """
@@ -115,7 +115,7 @@ _LONGEST_BODY_BYTES = 65_536
 
 
 class Kind(StrEnum):
-    """What is wanted, by what it may take."""
+    """Kinds of requests by the resources that they may take."""
 
     PAGE = "pages"
     UPLOAD = "uploads"
@@ -131,7 +131,7 @@ passwords, which wait in line for a thread of their own.
 
 @dataclass(frozen=True)
 class Pages:
-    """What is loaded behind the front, how it is ended, and what its first visitor need not do."""
+    """The pages behind the front: how they are loaded, warmed up and ended."""
 
     app: ASGIApp
     close: Callable[[], None]
@@ -242,7 +242,7 @@ class Front:
 
 
 def is_upload(scope: Mapping[str, object]) -> bool:
-    """Whether a request may have a long body: who sends it needs a token first."""
+    """Return True if a request may have a long body: its sender needs a token first."""
     path = str(scope["path"])
     is_chunk = path.startswith(f"{STREAMS}/") and path.endswith("/chunks")
     return scope["method"] == "POST" and (path in (UPLOADS, IMPORTS, NOTES) or is_chunk)

@@ -121,7 +121,7 @@ class TestView:
 
     @property
     def missing(self) -> str:
-        """Why there is no more than the store holds; empty where the raw file can be asked."""
+        """Return why only stored results are shown; empty if the raw file can be read."""
         name = self.recording.file.file_name
         if name.lower().endswith(MODES_SUFFIX):
             return (
@@ -137,7 +137,7 @@ class TestView:
 
     @cached_property
     def order(self) -> ModalTestOrder:
-        """What to work out of a test as it is stored and would be identified now."""
+        """Return the request for the results of a test, as stored and as identified now."""
         stored, workspace = self.stored, self.workspace
         terms = identify_lineage(self.recording, stored.hanger, workspace)
         return ModalTestOrder(
@@ -156,7 +156,7 @@ class TestView:
 
     @cached_property
     def as_stored(self) -> ModalTestReport:
-        """What the store knows of a test: no records, hits, poles and fit."""
+        """Return the stored results of a test: no records, hits, poles and fit."""
         stored, settings = self.stored, self.workspace.settings
         response = self.store.tests.frequency_response(stored)
         found = Identification(
@@ -191,13 +191,13 @@ class TestView:
         return self.background_worker.wanted(self.order)
 
     def shown(self, point: int = 0) -> Shown:
-        """What figures are drawn from, without any record."""
+        """Return the data of the figures, without any record."""
         if self.worked:
             return Shown(self.worked.sheet, self.worked.spectrum, point)
         return Shown.of(self.as_stored, point)
 
     def figures(self) -> tuple[TestFigure, ...]:
-        """Those that this test has, or may have once its raw file is identified once more."""
+        """Return the figures that this test has, or may have after a new identification."""
         if not self.missing:
             return MEMBERS
         shown = self.shown()

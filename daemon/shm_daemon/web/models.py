@@ -111,7 +111,7 @@ class Quantity(Posterior):
 
 
 class Shift(BaseModel):
-    """How far a quantity has moved from its baseline: tension a fraction, a spring decades."""
+    """Shift of a quantity from its baseline: a fraction of the tension, decades of a spring."""
 
     quantity: str
     shift_mean: float | None
@@ -131,14 +131,14 @@ class AveragedTension(BaseModel):
 
 
 class Creep(BaseModel):
-    """How fast the tension creeps: a fraction a year, below 0 where it relaxes."""
+    """Creep rate of the tension: a fraction a year, below 0 if it relaxes."""
 
     mean: float
     sd: float
 
 
 class Message(BaseModel):
-    """What is said first, the same on every surface; `status` is null where nothing is known."""
+    """The lead, the same on every surface; `status` is null if nothing is known."""
 
     status: Literal["alert", "watch", "check", "unclear", "steady", "first"] | None
     state: str = Field(description="What is the matter, with its interval.")
@@ -148,7 +148,7 @@ class Message(BaseModel):
 
 
 class HangerState(Message):
-    """What is known of a hanger after its latest test; null or empty before the first."""
+    """State of a hanger after its latest test; null or empty before the first."""
 
     hanger: int
     tests: int
@@ -182,7 +182,7 @@ class DeliveryState(BaseModel):
 
 
 class Acknowledged(BaseModel):
-    """Who has taken note of an alert, when, and what they say to it."""
+    """Acknowledgement of an alert: person, time and comment."""
 
     who: str
     why: str
@@ -224,7 +224,7 @@ class Alerts(BaseModel):
 
 
 class Acknowledge(BaseModel):
-    """What a person makes of an alert."""
+    """Comment of a person on an alert."""
 
     why: Written = Field(description="What came of it, for the record.")
     who: Written | None = Field(
@@ -237,7 +237,7 @@ class Acknowledge(BaseModel):
 
 
 class Status(BaseModel):
-    """What the workspace holds and what waits."""
+    """Contents of the workspace, and files that wait."""
 
     bridge: str
     recordings: dict[str, int] = Field(description="How many stand at each stage.")
@@ -249,7 +249,7 @@ class Status(BaseModel):
 
 
 class Health(BaseModel):
-    """Whether all is well; `reasons` says what is not. What is degraded works, not as described."""
+    """Health; `reasons` states the problems. Degraded parts work, but not as described."""
 
     status: Literal["ok", "degraded", "failing"]
     reasons: list[str]
@@ -278,7 +278,7 @@ class RefusedFile(BaseModel):
 
 
 class Operation(BaseModel):
-    """Whether the work flows; `troubles` is empty where it does."""
+    """Operation; `troubles` is empty if the work goes on."""
 
     troubles: list[str]
     daemon: str | None = Field(description="Which daemon is active; null where none is.")
@@ -297,7 +297,7 @@ class Operation(BaseModel):
 
 
 class Finding(BaseModel):
-    """What one check of `shm doctor` found."""
+    """Result of one check of `shm doctor`."""
 
     check: str
     level: Literal["ok", "unknown", "warning", "fault"]
@@ -363,14 +363,14 @@ class BridgeState(Message):
 
 
 class Moved(BaseModel):
-    """What moved over the bridge, in words, and what may explain it."""
+    """Changes over the bridge in words, and possible explanations."""
 
     sentence: str
     explanations: dict[str, float] = Field(description="The probability of each explanation.")
 
 
 def plain(value: Any) -> Any:
-    """What JSON can say: arrays as lists, times in ISO 8601, NaN and infinity as null."""
+    """Convert to JSON values: arrays to lists, times to ISO 8601, NaN and infinity to null."""
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if isinstance(value, np.ndarray):

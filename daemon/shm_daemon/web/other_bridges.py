@@ -48,7 +48,7 @@ class NotTold(ShmError):
 
 
 def ask(bridge: OtherBridge, folder: Path, lines: Lines, timeout_s: float = LONGEST_S) -> Summary:
-    """What a bridge says of itself; `folder` is that of our workspace. Raises NotTold."""
+    """Return the summary of another bridge; `folder` is that of our workspace. Raises NotTold."""
     headers = {"Accept": "application/json", "User-Agent": "shm", **_token(bridge, folder)}
     verify = _certificate(bridge, folder)
     with lines.session(timeout_s) as (session, line):
@@ -154,7 +154,7 @@ def _no_shm(answered: str) -> NotTold:
 
 @dataclass(frozen=True)
 class _Known:
-    """What is known of a bridge; `failing_since` is None where it answered the last time."""
+    """State of another bridge; `failing_since` is None if it answered the last time."""
 
     asked_at: datetime
     summary: Summary | None = None
@@ -164,7 +164,7 @@ class _Known:
 
 
 class OtherBridges:
-    """What other bridges said last. May be used from many threads."""
+    """Latest summaries of other bridges. May be used from many threads."""
 
     def __init__(
         self,

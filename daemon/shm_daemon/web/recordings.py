@@ -64,7 +64,7 @@ def described_by(
     calibration: List = None,
     full_scale: List = None,
 ) -> dict[str, object]:
-    """What the file cannot say: becomes its sidecar and goes before what the file says.
+    """Build the sidecar from a form: it overrides the file.
 
     The last five are lists in the order of the channels, parted by commas, as in the header of a
     CSV file. More (single channels by name) is said by a sidecar in a .zip with the file.

@@ -146,7 +146,7 @@ def make_server(
 
 
 def context_of(certificate: Path | None, key: Path | None) -> ssl.SSLContext | None:
-    """What HTTPS is served with; None where no certificate is given.
+    """Return the TLS context of HTTPS; None if no certificate is given.
 
     Raises BadInput where it cannot be used, UsageError for a key without one.
     """

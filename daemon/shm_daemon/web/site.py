@@ -1,4 +1,4 @@
-"""What every request works with: the workspace as it is described now, and its open store.
+"""The site of a request: the workspace as described now, and its open store.
 
 Who comes with wrong tokens too often has to wait, and is named in the log.
 """
@@ -38,9 +38,7 @@ class WrongAttempts:
         self._wrong: OrderedDict[tuple[str, ...], tuple[float, int]] = OrderedDict()
 
     def wait_s(self, address: str, name: str | None = None) -> float:
-        """How long until a password of this user, or a token where there is no name, is looked at
-        from there; 0 where at once.
-        """
+        """Return the seconds until a password (or, without a name, a token) is checked again."""
         with self._lock:
             counts = [(self._wrong.get(key), most) for key, most in _counted(address, name)]
             due = [found[0] + WITHIN_S for found, most in counts if found and found[1] >= most]
@@ -67,7 +65,7 @@ class WrongAttempts:
 
 
 def _counted(address: str, name: str | None) -> tuple[tuple[tuple[str, ...], int], ...]:
-    """What a wrong password or token counts for, and how many of those are let through."""
+    """Return the counters of a wrong password or token, and the limit of each."""
     network = network_of(address)
     if name is None:
         return (((network, "token"), MOST_WRONG),)
@@ -129,7 +127,7 @@ class Site:
 
     @property
     def fault(self) -> ShmError | None:
-        """What is wrong with `bridge.toml` as it is now."""
+        """Return the error of the present `bridge.toml`, None if there is none."""
         return self._description.now()[1]
 
     def forget_description(self) -> None:
@@ -148,7 +146,7 @@ class Site:
             return self._store
 
     def answers_to(self, host_header: str) -> bool:
-        """Whether a request with this `Host` is meant for us."""
+        """Return True if a request with this `Host` is meant for us."""
         names = self.workspace.settings.web_hosts.lower().split(",")
         return self.address.answers_to(host_header, tuple(name.strip() for name in names if name))
 
@@ -160,7 +158,7 @@ class Site:
 
 
 def modified_ns(workspace: Workspace) -> int:
-    """When `bridge.toml` was last written; 0 where it cannot be looked at."""
+    """Return when `bridge.toml` was last written (ns); 0 if it cannot be read."""
     try:
         return Path(workspace.bridge.source).stat().st_mtime_ns
     except OSError:
@@ -168,7 +166,7 @@ def modified_ns(workspace: Workspace) -> int:
 
 
 def held_documents(site: Site, hanger: int | None = None) -> list[dict[str, Any]]:
-    """What nobody has decided on yet, the oldest first; of one hanger where named."""
+    """Return the held recordings, the oldest first; of one hanger if given."""
     return [
         {
             "recording": hold.recording_id,
@@ -190,5 +188,5 @@ def described(workspace: Workspace, hanger_id: int) -> Hanger:
 
 
 def quarantined(workspace: Workspace) -> int:
-    """How many refused files lie in the quarantine."""
+    """Count the refused files in the quarantine."""
     return sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json"))

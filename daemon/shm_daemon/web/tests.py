@@ -1,9 +1,4 @@
-"""What is known of one test, in numbers and as figures.
-
-The documents of one test. Unknown numbers are null.
-
-Where a test's results come from: its file, checksums, steps with times, what was superseded.
-"""
+"""Documents and figures of one test. Unknown numbers are null."""
 
 from __future__ import annotations
 
@@ -82,9 +77,7 @@ def formers_of(view: TestView) -> tuple[FormerTest, ...]:
 
 
 def _replaced(view: TestView) -> list[tuple[str | None, datetime, FormerTest | FormerPosterior]]:
-    """What later runs have replaced: its model class (None of an identification), when it was made,
-    and itself.
-    """
+    """Return replaced results: model class (None for an identification), time, result."""
     found: list[tuple[str | None, datetime, FormerTest | FormerPosterior]] = []
     for test in formers_of(view):
         found.append((None, test.identified_at, test))
@@ -129,7 +122,7 @@ class Check(BaseModel):
 
 
 class RawFile(BaseModel):
-    """What the test came as."""
+    """The raw file of a test."""
 
     file_name: str
     sha256: str
@@ -139,7 +132,7 @@ class RawFile(BaseModel):
 
 
 class LineageState(BaseModel):
-    """What a result comes from."""
+    """The lineage of a result."""
 
     input_sha256: str
     settings_sha256: str
@@ -201,7 +194,7 @@ class HitState(BaseModel):
 
 
 class DroppedState(BaseModel):
-    """What else was left out, and why."""
+    """Other excluded data, with the reason."""
 
     what: str
     count: int

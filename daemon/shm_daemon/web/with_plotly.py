@@ -224,7 +224,7 @@ def _heights(figure: spec.Specification) -> list[list[float]]:
 
 
 def _begins_left(row: Sequence[spec.Panel]) -> bool:
-    """Whether a title stands where the legend begins."""
+    """Return True if a title is where the legend starts."""
     return any(panel.title and panel.title_side == "left" for panel in row)
 
 

@@ -105,7 +105,7 @@ def _some(
 
 
 def _messages(shown: Sequence[AlertRow], site: Site) -> dict[int, HangerMessage]:
-    """What is said first of the hangers of these alerts, by their numbers."""
+    """Return the leads of the hangers of these alerts, by number."""
     numbers = {each.hanger for each in shown if each.resolution is None}
     hangers = [each for each in site.workspace.bridge.hangers if each.id in numbers]
     if not hangers:
@@ -115,7 +115,7 @@ def _messages(shown: Sequence[AlertRow], site: Site) -> dict[int, HangerMessage]
 
 
 def _now(alert: AlertRow, message: HangerMessage | None) -> str:
-    """How the hanger of an alert that stands is now; empty where the alert says just that."""
+    """Return the present state of the hanger of an open alert; empty if the alert states it."""
     if message is None or alert.resolution or alert.kinds == ("test",):
         return ""
     return "" if alert.message.startswith(message.lead.words) else message.lead.words

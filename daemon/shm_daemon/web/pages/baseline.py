@@ -33,7 +33,7 @@ _AT_WORK = "Its tests are updated together; that takes some seconds …"
 
 @dataclass(frozen=True)
 class Told:
-    """What came of it, to be shown."""
+    """Outcome of a request, to be shown."""
 
     warning: str
     sentences: tuple[str, ...]
@@ -66,7 +66,7 @@ Ordered = OrderedDict[str, SetBaseline | Told | ShmError]
 def baseline_page(
     request: Request, site: AtSite, _: Engineer, hanger_id: HangerNumber, order: str = ""
 ) -> HTMLResponse:
-    """What the hanger is compared with, and the form for another; what comes of an order."""
+    """Show the baseline, the form for another, and the outcome of a request."""
     one = described(site.workspace, hanger_id)
     return page(
         request,
@@ -104,7 +104,7 @@ def order_baseline(
 
 @router.get("/outcome")
 def outcome(request: Request, _: Engineer, hanger_id: HangerNumber, order: str) -> Response:
-    """What came of an order, without the frame; 202 while it is being made."""
+    """Return the outcome of a request without the frame; 202 while it is computed."""
     ordered: Ordered = request.app.state.ordered_baselines
     found = ordered.get(order)
     if isinstance(found, SetBaseline):

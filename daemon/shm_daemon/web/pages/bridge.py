@@ -84,7 +84,7 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
 
 @router.get("/moved", include_in_schema=False)
 def moved_fragment(request: Request, site: AtSite, _: Reader) -> Response:
-    """What moved over the bridge, for a page that is shown already."""
+    """Return the changes over the bridge, for a page that is shown already."""
     found = compared(request, site)
     if found is None:
         return _underway()
@@ -208,7 +208,7 @@ class Bridges(BaseModel):
 
 @router.get("/bridges", include_in_schema=False)
 def bridges_page(request: Request, site: AtSite, _: Reader) -> Response:
-    """How all bridges are, and the way to each."""
+    """Show the state of all bridges with links to them."""
     now, rows = utc_now(), _bridges(request, site)
     return page(
         request,
@@ -229,7 +229,7 @@ def bridges(request: Request, site: AtSite, _: Reader) -> Any:
 
 @router.get(SUMMARY, response_model=Summary, summary="This bridge in a line")
 def summary(site: AtSite, _: Reader) -> Summary:
-    """What its home page says first; it does not ask other bridges."""
+    """Return the lead of its home page; other bridges are not asked."""
     return summary_of(site, utc_now())
 
 
@@ -241,7 +241,7 @@ def _bridges(request: Request, site: Site) -> tuple[BridgeRow, ...]:
 
 
 def _words_of(row: BridgeRow, now: datetime) -> str:
-    """What is told small below a bridge's words."""
+    """Return the small print below the lead of a bridge."""
     found = row.summary
     if found is None or row.told_at is None:
         return ""

@@ -99,7 +99,7 @@ def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:
 
 
 def _is_there(rows: Sequence[HangerLine], since: date | None) -> bool:
-    """Whether `_courses` has anything of these hangers."""
+    """Return True if `_courses` has data of these hangers."""
     return any(
         row.baseline_tension_n is not None and row.latest and row.latest >= _begin(since)
         for row in rows

@@ -154,7 +154,7 @@ def _chart(view: HangerView, figure: HangerFigure) -> Chart:
 
 
 def _events(view: HangerView) -> Table:
-    """What people did and what the watch detected, the latest first."""
+    """Return the actions of people and the detections of the watch, the latest first."""
     done = [(e.at, _EVENTS[e.kind], e.who, e.why) for e in view.events if e.kind in _EVENTS]
     called = [
         (call.watched.time, "change detected", "the watch", called_words(call.watched.change))
@@ -203,7 +203,7 @@ class ReportOrder:
 def report(
     request: Request, site: AtSite, _: Reader, hanger_id: HangerNumber, form: Literal["pdf", "html"]
 ) -> Response:
-    """What `shm report` writes; 503 with `Retry-After` where many others wait."""
+    """Return the document of `shm report`; 503 with `Retry-After` if many others wait."""
     _refuse_untested(site.store, described(site.workspace, hanger_id))
     minute = int(time.time() // _FRESH_S)
     order = ReportOrder(site.workspace.folder, hanger_id, form, minute)

@@ -85,7 +85,7 @@ def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
 
 
 def _details(view: TestView) -> tuple[Table, ...]:
-    """What was dropped stands by itself where it was worked out; in the store, among the notes."""
+    """Return tables of details; dropped data are separate if computed, else among the notes."""
     notes = modal_test_report.notes(view.sheet)
     if view.worked:
         return filled(notes, view.worked.dropped, view.worked.conditions)
@@ -95,7 +95,7 @@ def _details(view: TestView) -> tuple[Table, ...]:
 
 
 def _chart(view: TestView, figure: TestFigure, chosen: int) -> tuple[str, int]:
-    """Where a figure's document is, and how high it is."""
+    """Return the address of a figure's document, and its height."""
     address = f"{test_json(view.stored.hanger, view.stored.test.id)}/figures/{figure.name}"
     if figure.source == "both":
         address += f"?point={chosen}"

@@ -176,7 +176,7 @@ def _refused(workspace: Workspace) -> list[dict[str, Any]]:
 
 
 def _reason(path: Path) -> dict[str, Any]:
-    """What is written beside a refused file, as far as it can be read."""
+    """Return the stored reason of a refused file, as far as it can be read."""
     try:
         said = json.loads(path.read_text(encoding="utf-8"))
         where = f" (line {said['line']})" if said["line"] else ""

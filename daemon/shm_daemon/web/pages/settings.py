@@ -145,7 +145,7 @@ def _page(
 
 
 def _judged(site: Site, hanger: Hanger) -> str:
-    """Whether the stored tests of a hanger are judged with what is in force."""
+    """Return a sentence if stored tests of a hanger were judged with other settings."""
     waiting = [each for each in site.store.tests.list_waiting() if each.hanger == hanger.id]
     if any(each.stage is Stage.UPDATED for each in waiting):
         return f"Yet to be judged: {formatting.counted(len(waiting), 'stored test')} of it."

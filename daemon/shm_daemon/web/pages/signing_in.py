@@ -170,7 +170,7 @@ class SignOns:
                 self._begun.popitem(last=False)
 
     def take(self, state: str) -> tuple[Begun, str] | None:
-        """What was noted of a state, once and in time."""
+        """Return the stored data of a state, once and in time."""
         with self._lock:
             noted = self._begun.pop(state, None)
         return noted[1:] if noted is not None and utc_now() - noted[0] < _WITHIN else None

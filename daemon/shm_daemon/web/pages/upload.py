@@ -71,7 +71,7 @@ class ImportedColumn(BaseModel):
 
 
 class ImportQuestion(BaseModel):
-    """What only a person knows; `channel` is empty for the whole file."""
+    """A question to a person; `channel` is empty for the complete file."""
 
     about: str
     channel: str

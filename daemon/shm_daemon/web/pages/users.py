@@ -1,6 +1,4 @@
-"""Who may sign in, and as what; and what people changed: engineers let people in, change what they
-may and end them, and read the audit log.
-"""
+"""Users and audit log: engineers add people, change their roles, end their access."""
 
 from __future__ import annotations
 
@@ -26,7 +24,7 @@ _SHOWN = 100  # technical: changes on a page, which links to older ones
 
 @router.get("/users")
 def users_page(request: Request, site: AtSite, _: Engineer) -> Response:
-    """Who may sign in, and as what."""
+    """Show the users and their roles."""
     return _page(request, site)
 
 
@@ -66,7 +64,7 @@ def _page(request: Request, site: Site, message: str = "", status: int = 200) ->
 
 @router.get("/audit")
 def audit_page(request: Request, site: AtSite, _: Engineer, before: Before = None) -> Response:
-    """What people changed, by page, API or command line, the newest first."""
+    """Show the changes by people through page, API or command line, the newest first."""
     shown, older = paged(site.store.audit.list_rows(_SHOWN + 1, before), _SHOWN)
     table = Table(
         "Changes",
