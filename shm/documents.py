@@ -82,8 +82,8 @@ _Hook = Callable[[Any, Any], Any]
 class Misfit(ValueError):
     """A part of a document that is not the expected value; `key` is the one at fault."""
 
-    def __init__(self, said: str, key: str):
-        super().__init__(said)
+    def __init__(self, message: str, key: str):
+        super().__init__(message)
         self.key = key
 
 
@@ -96,12 +96,12 @@ def value_of(kind: type[T], node: object, path: str = "", by: cattrs.Converter |
     try:
         return (by or _READER).structure(node, kind)
     except (cattrs.BaseValidationError, ValueError) as error:
-        said, _, at = transform_error(error, path, _said)[0].rpartition(" @ ")
+        message, _, at = transform_error(error, path, _message)[0].rpartition(" @ ")
     label, _, key = at.rpartition(".")
-    raise Misfit(f"{label and label + ': '}{key} {said}".strip(), key.partition("[")[0])
+    raise Misfit(f"{label and label + ': '}{key} {message}".strip(), key.partition("[")[0])
 
 
-def _said(error: BaseException, _: object) -> str:
+def _message(error: BaseException, _: object) -> str:
     return "is missing" if isinstance(error, KeyError) else str(error)
 
 
@@ -203,7 +203,7 @@ def _is_of(origin: Any) -> Callable[[Any], bool]:
 _READER = reader()
 
 
-_ALIKE = 0.75  # of a key to another, from which on a slip of the hand is likelier than a key
+_SIMILAR = 0.75  # of a key to another, from which on a slip of the hand is likelier than a key
 
 
 def key_meant(key: str, known: Sequence[str]) -> str | None:
@@ -213,7 +213,7 @@ def key_meant(key: str, known: Sequence[str]) -> str | None:
     """
     if key in known:
         return None
-    return next(iter(get_close_matches(key, known, n=1, cutoff=_ALIKE)), None)
+    return next(iter(get_close_matches(key, known, n=1, cutoff=_SIMILAR)), None)
 
 
 # ---------------------------------------------------------------- posteriors

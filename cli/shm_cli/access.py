@@ -68,8 +68,8 @@ def list_tokens(ctx: click.Context) -> None:
     rows = []
     for each in tokens:
         times = (each.created_at, each.last_used_at, each.revoked_at)
-        told = (f"{time:%Y-%m-%d %H:%M}" if time else "never" for time in times)
-        rows.append((each.name, ", ".join(sorted(each.scopes)), *told))
+        shown = (f"{time:%Y-%m-%d %H:%M}" if time else "never" for time in times)
+        rows.append((each.name, ", ".join(sorted(each.scopes)), *shown))
     show_rows("tokens", ("name", "may", "made", "last used", "revoked"), rows)
 
 

@@ -56,14 +56,14 @@ def adopt(
     \b
     Example: shm gap adopt --hanger 3 --effect point_mass --why "clamp of the lamp at 3.4 m"
     """
-    wish = Wish(effects, at, baseline, why, who)
+    request = Wish(effects, at, baseline, why, who)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         with progress_bar("adopting") as progress:
-            made = adopt_in_store(workspace, store, hanger, wish, utc_now(), progress)
+            made = adopt_in_store(workspace, store, hanger, request, utc_now(), progress)
         watch = gap_watch(store, hanger_id)
-    said = f"Hanger {hanger_id} has the model class {made.adoption.model} from now on."
-    answer(_document(made), f"{said}\n{watch}")
+    sentence = f"Hanger {hanger_id} has the model class {made.adoption.model} from now on."
+    answer(_document(made), f"{sentence}\n{watch}")
 
 
 @click.command()

@@ -202,8 +202,8 @@ def acknowledgement_words(stored: StoredAlert) -> str:
     noted, ended = stored.acknowledgement, stored.resolution
     if noted is None:
         return "open" if ended is None else f"resolved {ended.at:%Y-%m-%d}: {ended.why}"
-    said = f"{noted.who}, {noted.at:%Y-%m-%d}: {noted.why}"
-    return said if ended is None else f"{said} (resolved {ended.at:%Y-%m-%d})"
+    text = f"{noted.who}, {noted.at:%Y-%m-%d}: {noted.why}"
+    return text if ended is None else f"{text} (resolved {ended.at:%Y-%m-%d})"
 
 
 @command.command()
@@ -256,14 +256,14 @@ def test(ctx: click.Context, name: str) -> None:
     timeout_s = workspace.settings.hook_timeout_seconds
     notifier, began = HookNotifier(workspace.folder, timeout_s, os.environ), time.monotonic()
     try:
-        said = notifier(hook, alert)
+        response = notifier(hook, alert)
     finally:
         notifier.close()
     seconds = time.monotonic() - began
-    told = {"hook": name, "kind": hook.kind, "key": alert.key, "answer": said}
+    document = {"hook": name, "kind": hook.kind, "key": alert.key, "answer": response}
     answer(
-        {**told, "seconds": round(seconds, 3)},
-        f"The hook {name} took the test alert in {seconds:.1f} s: {said}.",
+        {**document, "seconds": round(seconds, 3)},
+        f"The hook {name} took the test alert in {seconds:.1f} s: {response}.",
     )
 
 

@@ -66,8 +66,8 @@ def prune(
         raw = _prune_archive(workspace, store, keep_days, dry_run)
         refused = _prune_quarantine(workspace, store, quarantine_days, dry_run)
     document = {"dry_run": dry_run, "archive": raw.document, "quarantine": refused.document}
-    said = [*raw.sentences("archive", dry_run), *refused.sentences("quarantine", dry_run)]
-    answer(document, "\n".join(said))
+    sentences = [*raw.sentences("archive", dry_run), *refused.sentences("quarantine", dry_run)]
+    answer(document, "\n".join(sentences))
 
 
 @command.command("fetch")
@@ -103,9 +103,9 @@ class _Pruned:
 
     def sentences(self, what: str, dry_run: bool) -> list[str]:
         verb = "would be removed, which would free" if dry_run else "removed, which freed"
-        said = [f"{what}: {len(self.files)} files {verb} {self.freed_bytes / 1e6:.1f} MB."]
-        said += [f"  {count} old ones stay: {reason}." for reason, count in self.kept.items()]
-        return said
+        lines = [f"{what}: {len(self.files)} files {verb} {self.freed_bytes / 1e6:.1f} MB."]
+        lines += [f"  {count} old ones stay: {reason}." for reason, count in self.kept.items()]
+        return lines
 
 
 def _prune_archive(
@@ -134,5 +134,5 @@ def _prune_quarantine(
         empty_quarantine(going)
     names = [file.path.name for file in going]
     left = len(old) - len(going)
-    kept = {"their bytes lie nowhere else": left} if left else {}
-    return _Pruned(names, sum(file.size_bytes for file in going), kept)
+    remaining = {"their bytes lie nowhere else": left} if left else {}
+    return _Pruned(names, sum(file.size_bytes for file in going), remaining)

@@ -223,7 +223,7 @@ def latest_tests(store: Store, hanger: Hanger, count: int) -> Sequence[StoredTes
     return stored
 
 
-def told_doubts(
+def show_doubts(
     tests: Sequence[ModalTest], hanger: Hanger, *, apart: bool = True
 ) -> tuple[str, ...]:
     """Says, before any result, which tests are probably not of the described hanger.
@@ -240,10 +240,10 @@ def told_doubts(
     )
     doubts = {test.id: doubt_of(test, Known(hanger), []) for test in tests}
     found = tuple(f"Doubtful: test {id_}. {doubt.text}" for id_, doubt in doubts.items() if doubt)
-    said = (*others, *found)
-    for each in said:
+    messages = (*others, *found)
+    for each in messages:
         click.echo(each if apart else paragraph(each), err=apart)
-    return said
+    return messages
 
 
 @contextmanager

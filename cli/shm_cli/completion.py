@@ -89,8 +89,8 @@ def effects(
 
 def _beginning(start: str, offered: Iterable[tuple[str, str]]) -> list[CompletionItem]:
     return [
-        CompletionItem(value, help=beside or None)
-        for value, beside in offered
+        CompletionItem(value, help=help_text or None)
+        for value, help_text in offered
         if value.startswith(start)
     ]
 

@@ -115,7 +115,7 @@ def check(ctx: click.Context, with_archive: bool) -> None:
         held = next(each.rows for each in checked.tables if each.table == "recordings")
         click.echo(f"The store has the present schema and holds {held} recordings.")
         if archive is not None:
-            click.echo(_archive_said(archive))
+            click.echo(_archive_words(archive))
     if findings:
         kinds = Counter(each.kind for each in findings)
         counted = ", ".join(_counted(count, kind) for kind, count in kinds.items())
@@ -165,10 +165,10 @@ def backup(
         if target.is_dir():
             workspace.copy_description(file.parent)
         if copies is not None:
-            kept, removed = Archive(copies), store.upkeep.removed_names(workspace.archive)
+            copied_to, removed = Archive(copies), store.upkeep.removed_names(workspace.archive)
             names = [name for name in archived_names(store) if name not in removed]
-            copied = copy_archive(workspace.archive, kept, names, tell)
-            noted = store.upkeep.note_copies(kept, datetime.now(UTC))
+            copied = copy_archive(workspace.archive, copied_to, names, tell)
+            noted = store.upkeep.note_copies(copied_to, datetime.now(UTC))
         store.upkeep.note_backup(file.resolve(), datetime.now(UTC))
     if flags.wants_json():
         document = {"file": str(file), **_document(written.tables, copied), "newly_noted": noted}
@@ -222,12 +222,12 @@ def restore_command(ctx: click.Context, file: Path, replace: bool, copies: Path 
         restored = restore(workspace.location, file, keep_as, tell, replace=replace)
         copied = _fetch(workspace, copies)
     if flags.wants_json():
-        kept = str(restored.kept) if restored.kept else None
-        show({"kept": kept, **_document(restored.tables, copied)})
+        previous = str(restored.kept) if restored.kept else None
+        show({"kept": previous, **_document(restored.tables, copied)})
     else:
         _show_tables(restored.tables)
-        kept_said = f" What it held before is in {restored.kept}." if restored.kept else ""
-        click.echo(f"The store holds what {file} holds.{kept_said}")
+        previous_words = f" What it held before is in {restored.kept}." if restored.kept else ""
+        click.echo(f"The store holds what {file} holds.{previous_words}")
         with workspace.store() as store:
             _say_unknown(unknown_files(store, workspace.archive))
         _say_copied(copied)
@@ -300,7 +300,7 @@ def _say_unknown(names: Sequence[str]) -> None:
         click.echo(paragraph(f"Raw files: {what}. {remedy}"), err=True)
 
 
-def _archive_said(archive: CheckedArchive) -> str:
+def _archive_words(archive: CheckedArchive) -> str:
     return (
         f"Raw files: {archive.whole} whole, {len(archive.missing)} missing, "
         f"{len(archive.damaged)} damaged, {len(archive.unreferenced)} of no recording, "

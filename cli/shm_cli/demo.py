@@ -88,10 +88,10 @@ def send_days(workspace: Workspace) -> datetime:
     with counting_bar() as bar:
         task = bar.add_task("four days of wind and traffic", total=round(DAYS * _WINDOWS_A_DAY))
 
-        def told(at: datetime) -> None:
+        def on_sent(at: datetime) -> None:
             bar.update(task, completed=(at - first) / timedelta(minutes=10))
 
-        send(chunks, ring_of(workspace).append_all, 0.0, told)
+        send(chunks, ring_of(workspace).append_all, 0.0, on_sent)
     return now
 
 
@@ -111,7 +111,7 @@ def await_windows(workspace: Workspace, store: Store, looks: Iterator[int], ends
 
 
 def conclude_live(workspace: Workspace, store: Store, alerts: tuple[StoredAlert, ...]) -> None:
-    """Says what was told; raises ShmError without the alert of the loss."""
+    """Print the alerts; raises ShmError without the alert of the loss."""
     for stored in alerts:
         click.echo(f"ALERT {stored.alert.message}")
     for state in stream_states(workspace, ring_of(workspace), store, utc_now()):

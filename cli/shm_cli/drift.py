@@ -61,8 +61,8 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
             if all_tests
             else [drift for each in hangers for drift in latest_drifts(store, each)]
         )
-        anew = [] if all_tests else _without_a_test(store, hangers)
-    if not shown and not anew:
+        rebaselined = [] if all_tests else _without_a_test(store, hangers)
+    if not shown and not rebaselined:
         raise NothingThere(
             "no test has been compared with a baseline yet.",
             remedy="Take in more tests: the first ones of a hanger form its baseline.",
@@ -75,9 +75,12 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
         return
     if shown:
         _show(shown)
-    for each in anew:
-        said = f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has "
-        click.echo(paragraph(f"{said}come in after that baseline was set."))
+    for each in rebaselined:
+        sentence = (
+            f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has come "
+            "in after that baseline was set."
+        )
+        click.echo(paragraph(sentence))
     if states.temperature_coefficients:
         click.echo()
         show_texts(temperature_table(states))

@@ -172,11 +172,11 @@ def _parameters(effect: Effect) -> dict[str, Parameter]:
 
 def _parameter_rows(parameters: Sequence[Parameter]) -> list[tuple[str, ...]]:
     """One row a parameter; those of the other end or plane, which only repeat it, in one row."""
-    alike: dict[tuple[float, float, str], list[Parameter]] = {}
+    same_prior: dict[tuple[float, float, str], list[Parameter]] = {}
     for parameter in parameters:
         key = (parameter.lower, parameter.upper, parameter.reason)
-        alike.setdefault(key, []).append(parameter)
-    return [_row(group) for group in alike.values()]
+        same_prior.setdefault(key, []).append(parameter)
+    return [_row(group) for group in same_prior.values()]
 
 
 def _row(group: list[Parameter]) -> tuple[str, ...]:

@@ -43,9 +43,9 @@ from shm_cli.common import (
     open_workspace,
     opened_store,
     readable_width,
+    show_doubts,
     show_rows,
     tests_and_hanger,
-    told_doubts,
     write_pictures,
 )
 from shm_cli.effects import effects
@@ -279,7 +279,7 @@ def _jointly(
         return _of_bridge(ctx, count, options)
     found = [tests_and_hanger(ctx, modes, of, None) for modes, of in _pairs(files)]
     for tests, hanger in found:
-        told_doubts(tests, hanger)
+        show_doubts(tests, hanger)
     with advancing_bar() as progress:
         named = [(hanger, tests) for tests, hanger in found]
         bars = tuple(describe_bar(hanger, _sensors(tests)) for tests, hanger in found)
@@ -313,9 +313,9 @@ def _of_bridge(ctx: click.Context, count: int, options: GapOptions) -> BridgeDia
         with advancing_bar() as progress:
             named = [(hanger, [e.test for e in tests]) for hanger, tests in stored.items()]
             found = diagnose_bridge(named, options, progress)
-        for (hanger, tests), own in zip(stored.items(), found.diagnoses, strict=True):
+        for (hanger, tests), diagnosis in zip(stored.items(), found.diagnoses, strict=True):
             lineage = diagnosis_lineage(tests, hanger, asdict(options))
-            store.posteriors.save_diagnosis(hanger.id, own, lineage, utc_now())
+            store.posteriors.save_diagnosis(hanger.id, diagnosis, lineage, utc_now())
         bars = tuple(
             describe_bar(hanger, _stored_sensors(store, tests)) for hanger, tests in stored.items()
         )

@@ -31,7 +31,7 @@ def show_held(workspace: Workspace) -> int:
     if not found:
         click.echo("Nothing is held.")
     for hold in found:
-        click.echo(told(hold) + "\n")
+        click.echo(hold_line(hold) + "\n")
     return 0
 
 
@@ -145,8 +145,8 @@ def decided_words(decided: Decided, stage: Stage) -> str:
         return f"{what} is discarded and counts in nothing. {taking_back(hold)}"
     if hold.decision is Decision.DISCARDED:
         names = ", ".join(test.name for test in hold.tests)
-        said = f"{names} is discarded and counts in nothing; its other tests go on counting."
-        return f"{what}: {said} {taking_back(hold)}"
+        sentence = f"{names} is discarded and counts in nothing; its other tests go on counting."
+        return f"{what}: {sentence} {taking_back(hold)}"
     verb = "counts again" if hold.decision is Decision.REINSTATED else "is confirmed and counts"
     time = ""
     if hold.time is not None:
@@ -158,19 +158,19 @@ def decided_words(decided: Decided, stage: Stage) -> str:
 
 def _excluded_words(what: str, exclusion: Exclusion) -> str:
     names = ", ".join(test.name for test in exclusion.hold.tests)
-    said = [f"{what}: {names} is discarded and counts in nothing from now on."]
+    sentences = [f"{what}: {names} is discarded and counts in nothing from now on."]
     if exclusion.watched_again:
-        said.append(
+        sentences.append(
             f"Later tests that are watched again: {exclusion.watched_again}; alerts that others "
             "raised stay raised."
         )
     if exclusion.of_baseline and exclusion.since is not None:
-        said.append(
+        sentences.append(
             f"The baseline was made from {', '.join(exclusion.of_baseline)} and stays until you "
             f"set another: `shm drift rebaseline --hanger {exclusion.hold.hanger} --since "
             f"{exclusion.since:%Y-%m-%d} --why TEXT`."
         )
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def discarded_words(hold: Hold) -> str:
@@ -179,7 +179,7 @@ def discarded_words(hold: Hold) -> str:
     return f"{words} {taking_back(hold)}"
 
 
-def told(hold: Hold) -> str:
+def hold_line(hold: Hold) -> str:
     """A hold as text: when, what and why, with the commands that end it."""
     since = f"recording {hold.recording_id}, {hold.file_name}, held since"
     return paragraph(f"{since} {hold.held_at:%Y-%m-%d %H:%M}. {hold.message}")

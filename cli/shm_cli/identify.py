@@ -30,7 +30,7 @@ from shm_cli.common import (
     one_hanger,
     open_workspace,
     readable_width,
-    told_doubts,
+    show_doubts,
     write_pictures,
 )
 
@@ -157,8 +157,8 @@ def command(
     _refuse_several_hangers(sheets)
     with drawing():
         _write(sheets, out, html, figures)
-    said = [as_text(modal_test_paper(sheet), readable_width()).rstrip() for sheet in sheets]
-    answer(_document(sheets), "\n".join(said))
+    texts = [as_text(modal_test_paper(sheet), readable_width()).rstrip() for sheet in sheets]
+    answer(_document(sheets), "\n".join(texts))
 
 
 def _identified(
@@ -182,7 +182,7 @@ def _identified(
             remedy="Give the description of its hanger, or correct the file.",
         )
     if hanger is not None:
-        told_doubts([found.test], hanger)
+        show_doubts([found.test], hanger)
     return ModalTestReport(found, records, hanger, (options.band_low_hz, options.band_high_hz))
 
 

@@ -360,8 +360,8 @@ def _show_channels(look: Peek) -> None:
     """A row a channel; calibration and full scale only where a channel has one."""
     columns = {
         name: cells
-        for name, told in _COLUMNS.items()
-        if any(cells := [told(channel) for channel in look.channels]) or name not in _RARE
+        for name, cell_of in _COLUMNS.items()
+        if any(cells := [cell_of(channel) for channel in look.channels]) or name not in _RARE
     }
     show_rows(_title(look), tuple(columns), zip(*columns.values(), strict=True))
 

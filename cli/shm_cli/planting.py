@@ -95,7 +95,7 @@ def simulate_streams(workspace: Workspace, chosen: Live) -> None:
             arriving(list(zip(hangers, streams, strict=True)), plan, first, seconds, chosen.seed),
             ring_of(workspace).append_all,
             chosen.speed,
-            told=lambda at: bar("simulating", (at - first).total_seconds() / seconds),
+            on_sent=lambda at: bar("simulating", (at - first).total_seconds() / seconds),
         )
     if flags.wants_json():
         ends = first + timedelta(seconds=seconds)
@@ -120,7 +120,7 @@ def send(
     chunks: Iterator[Chunk],
     take: Callable[[Sequence[bytes]], object],
     speed: float,
-    told: Callable[[datetime], None],
+    on_sent: Callable[[datetime], None],
 ) -> int:
     """Send chunks and return their number; with a `speed`, each at its time."""
     begun, start, count = time.monotonic(), None, 0
@@ -131,7 +131,7 @@ def send(
             time.sleep(max(0.0, begun + due - time.monotonic()))
         take([chunk_document(chunk) for chunk in batch])
         count += len(batch)
-        told(end)
+        on_sent(end)
     return count
 
 

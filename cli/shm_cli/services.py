@@ -59,7 +59,7 @@ def daemon(
     """
     from shm_daemon.logs import begin_logging
     from shm_daemon.web.address import Address
-    from shm_daemon.web.serving import web_beside
+    from shm_daemon.web.serving import web_with_daemon
 
     tls = {"--certificate": certificate, "--key": key}
     if not with_web and any(tls.values()):
@@ -76,7 +76,7 @@ def daemon(
         return
     begin_logging(workspace.settings, log_file)
     address = Address(host, port) if with_web else None
-    with web_beside(workspace, address, log_file, certificate, key):
+    with web_with_daemon(workspace, address, log_file, certificate, key):
         from shm_daemon.loop import run  # while the interface, which needs less, begins
 
         run(workspace, once=once, standby=standby)
@@ -120,9 +120,9 @@ def web(
         return
     begin_logging(workspace.settings, log_file)
     page = address.page(certificate is not None)
-    said = f"The dashboard: {page}  (Ctrl+C ends it)"
+    line = f"The dashboard: {page}  (Ctrl+C ends it)"
     with leaving():
-        serve(workspace, address, certificate, key, lambda: click.echo(said))
+        serve(workspace, address, certificate, key, lambda: click.echo(line))
 
 
 _HOMES = (Path("/home"), Path("/root"), Path("/run/user"))

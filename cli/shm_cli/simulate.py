@@ -65,9 +65,9 @@ def _springs(function: flags.F) -> flags.F:
     planes = ("Transverse", "Longitudinal")
     for number in (4, 3, 2, 1):
         where = f"{planes[(number - 1) % 2]}, {'deck' if number < 3 else 'arch'} end"
-        told = f"{where}. End spring in N m/rad; clamped if left out."
+        help_text = f"{where}. End spring in N m/rad; clamped if left out."
         option = click.option(
-            f"--k{number}", type=float, default=math.inf, show_default=False, help=told
+            f"--k{number}", type=float, default=math.inf, show_default=False, help=help_text
         )
         function = option(function)
     return function

@@ -126,14 +126,14 @@ def export(ctx: click.Context, name: str, start: datetime, end: datetime, file: 
 
 def _show_streams(workspace: Workspace, store: Store, now: datetime) -> None:
     states = stream_states(workspace, ring_of(workspace), store, now)
-    beside = [against_hammer(store, each.stream) for each in states]
+    hammers = [against_hammer(store, each.stream) for each in states]
     if flags.wants_json():
-        show({"streams": [_document(*each) for each in zip(states, beside, strict=True)]})
+        show({"streams": [_document(*each) for each in zip(states, hammers, strict=True)]})
         return
     columns = ("stream", "hanger", "state", "last sample", "lag", "rate", "lost", "apart", "ring",
                "window", "tension")  # fmt: skip
     show_rows("Streams", columns, map(_cells, states))
-    for each in beside:
+    for each in hammers:
         if each.is_known:
             click.echo(each.text())
 
@@ -156,7 +156,7 @@ def _cells(state: StreamCondition) -> tuple[str, ...]:
     )
 
 
-def _document(state: StreamCondition, beside: AmbientBias) -> dict[str, Any]:
+def _document(state: StreamCondition, hammer: AmbientBias) -> dict[str, Any]:
     """An entry of `--json`; unknown numbers are NaN."""
     window, hour = state.window, state.hour
     return {
@@ -178,9 +178,9 @@ def _document(state: StreamCondition, beside: AmbientBias) -> dict[str, Any]:
         "tension_shift": hour.compensated_shift if hour else NAN,
         "tension_shift_sd": hour.compensated_sd if hour else NAN,
         "learning": hour.learning if hour else "",
-        "ambient_bias": beside.common,
-        "ambient_bias_sd": beside.common_sd,
-        "hammer_tests": beside.most_tests,
+        "ambient_bias": hammer.common,
+        "ambient_bias_sd": hammer.common_sd,
+        "hammer_tests": hammer.most_tests,
     }
 
 

@@ -25,9 +25,9 @@ from shm_cli.common import (
     paragraph,
     progress_bar,
     show,
+    show_doubts,
     show_rows,
     tests_and_hanger,
-    told_doubts,
 )
 
 _calibrated_by = click.option(
@@ -101,7 +101,7 @@ def command(
     """
     options = UpdateOptions(samples, seed, sampler=sampler)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
-    doubts = told_doubts(tests, hanger, apart=flags.wants_json())
+    doubts = show_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
     with progress_bar("updating") as progress:
         chosen = build(model, hanger, priors)
@@ -229,7 +229,7 @@ def select_command(
         from shm.inference.updating import check_class_priors
 
         check_class_priors(stated, [model.name for model in chosen])
-    doubts = told_doubts(tests, hanger, apart=flags.wants_json())
+    doubts = show_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
     with progress_bar("updating") as progress:
         options = calibrated(options, calibrated_by, chosen, progress)

@@ -96,22 +96,22 @@ def _refuse_without_raw_file(workspace: Workspace, store: Store, recording_id: i
 
 
 def sentences(rerun: Rerun, stage: Stage) -> list[str]:
-    """Return the document of a rerun: stages repeated, results replaced, results left."""
+    """Return sentences on a rerun: what is repeated, replaced and left as it is."""
     names, file = ", ".join(rerun.tests) or "no test yet", rerun.recording.file.file_name
     tests = f"tests: {len(rerun.tests)}, " if stage is Stage.IDENTIFIED else ""
-    said = [
+    lines = [
         f"{file} ({names}) is to be {stage} again. Superseded, and kept with their lineage: "
         f"{tests}posteriors: {rerun.posteriors}, watches: {rerun.watches}."
     ]
     if rerun.of_baseline:
-        own = ", ".join(rerun.of_baseline)
-        said.append(
-            f"The baseline was made from {own} and stays as it was made; {own} is not compared "
+        names = ", ".join(rerun.of_baseline)
+        lines.append(
+            f"The baseline was made from {names} and stays as it was made; {names} is not compared "
             "with it. To compare with the new result: `shm drift rebaseline`."
         )
     if rerun.recording.hanger is not None:
-        said.append("What was said of later tests stays; alerts that were raised stay raised.")
-    return said
+        lines.append("What was said of later tests stays; alerts that were raised stay raised.")
+    return lines
 
 
 def rerun_document(rerun: Rerun, stage: Stage) -> dict[str, Any]:

@@ -146,8 +146,8 @@ def is_safe(address: str) -> bool:
     except ValueError:
         return False
     plain = not (parts.username or parts.password or parts.fragment) and address.isprintable()
-    is_kept = parts.scheme == "https" or (parts.scheme == "http" and is_loopback(host))
-    return bool(host) and plain and is_kept
+    is_private = parts.scheme == "https" or (parts.scheme == "http" and is_loopback(host))
+    return bool(host) and plain and is_private
 
 
 @dataclass(frozen=True)
@@ -365,8 +365,8 @@ def _hours(document: Mapping[str, Any], path: Path) -> Mapping[str, float]:
         return dict(MEASUREMENT_HOURS)
     keys = {re.sub(r"\W", "_", kind): kind for kind in MEASUREMENT_HOURS}
     table.refuse_unknown(keys)
-    own = {kind: table.positive(key, "hours") for key, kind in keys.items() if key in table}
-    return {**MEASUREMENT_HOURS, **own}
+    stated = {kind: table.positive(key, "hours") for key, kind in keys.items() if key in table}
+    return {**MEASUREMENT_HOURS, **stated}
 
 
 def _disturbance(values: dict[str, Any], path: Path) -> Disturbance:

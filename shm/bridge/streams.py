@@ -67,7 +67,7 @@ def _name(table: Table, example: str) -> str:
 
 
 def _refuse_doubles(names: list[str], table: Table) -> None:
-    if pair := _alike(names):
+    if pair := _same_names(names):
         raise table.refusal(f"channel {_both(*pair)}", "Give each a name of its own.")
 
 
@@ -76,7 +76,7 @@ def streams_of(
 ) -> tuple[Stream, ...]:
     """Return the streams of all `[[stream]]` tables; raises BadInput."""
     streams = tuple(stream_of(table, path, hangers) for table in tables)
-    if pair := _alike([stream.name for stream in streams]):
+    if pair := _same_names([stream.name for stream in streams]):
         remedy = "Give each a name of its own: each has a folder, and some disks know no capitals."
         raise BadInput(f"stream name {_both(*pair)}.", file=path, remedy=remedy)
     _refuse_second(streams, path)
@@ -98,7 +98,7 @@ def _refuse_second(streams: Sequence[Stream], path: Path) -> None:
         first[each.hanger] = each.name
 
 
-def _alike(names: Sequence[str]) -> tuple[str, str] | None:
+def _same_names(names: Sequence[str]) -> tuple[str, str] | None:
     """Two names that are the same but for capitals."""
     seen: dict[str, str] = {}
     for name in names:

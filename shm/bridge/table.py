@@ -206,9 +206,9 @@ def _other(line: str, kind: str) -> bool:
     return header.startswith("[") and not re.match(rf"\[+{kind}\.", header)
 
 
-def _line_within(lines: Sequence[str], block: range, said: str) -> int:
+def _line_within(lines: Sequence[str], block: range, problem: str) -> int:
     """Return the last line of a block that sets or opens something that is named."""
-    words = set(re.findall(r"\w+", said))
+    words = set(re.findall(r"\w+", problem))
     for number in reversed(block):
         keys = re.findall(r"(\w+)\s*=", lines[number]) or re.findall(r"\.(\w+)\]", lines[number])
         if words.intersection(keys) - {"id", "name"}:

@@ -289,12 +289,12 @@ class Diagnosis(Shown):
 
     def __repr__(self) -> str:
         verdict, tension = self.verdict, self.tension_after_n
-        said = verdict.outcome.value.lower()
+        text = verdict.outcome.value.lower()
         if verdict.claim is not None:
             leading = verdict.claim.leading
-            said = f"{said}: {effect_label(leading.effect, leading.at)}"
-        told = tension_words(tension.mean, tension.q05, tension.q95)
-        return line("Diagnosis", self.hanger, f"{said}, {told}")
+            text = f"{text}: {effect_label(leading.effect, leading.at)}"
+        tension_text = tension_words(tension.mean, tension.q05, tension.q95)
+        return line("Diagnosis", self.hanger, f"{text}, {tension_text}")
 
     def to_dataframe(self) -> DataFrame:
         """Return the causes, a row a cause: the table of `shm.export.causes`."""

@@ -156,7 +156,7 @@ class Supports:
 
     def ends(self, *kinds: Support) -> tuple[int, ...]:
         """Return the ends (deck 0, arch 1) that are supported in one of these ways."""
-        return tuple(end for end, own in enumerate((self.deck, self.arch)) if own in kinds)
+        return tuple(end for end, support in enumerate((self.deck, self.arch)) if support in kinds)
 
 
 LengthBy: TypeAlias = Literal["faces", "pins", "nodes"]

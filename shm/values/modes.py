@@ -154,13 +154,13 @@ class ModalTest(Shown):
 
     def __repr__(self) -> str:
         found_hz = [mode.frequency_hz for mode in self.modes]
-        said = f"{len(found_hz)} modes"
+        text = f"{len(found_hz)} modes"
         if found_hz:
-            said += f", {min(found_hz):.3f} to {max(found_hz):.3f} Hz"
+            text += f", {min(found_hz):.3f} to {max(found_hz):.3f} Hz"
         read_n, half_n = self.tension_read_n, NINETY_PERCENT * self.tension_read_sd_n
         if math.isfinite(read_n):
-            said += f", read {tension_words(read_n, read_n - half_n, read_n + half_n)}"
-        return line(f"ModalTest {self.id}", self.hanger, said)
+            text += f", read {tension_words(read_n, read_n - half_n, read_n + half_n)}"
+        return line(f"ModalTest {self.id}", self.hanger, text)
 
     def to_dataframe(self) -> DataFrame:
         """Return the modes, a row a mode: the table of `shm.export.modes`."""

@@ -118,7 +118,7 @@ _INCLINATION_DECIDES, _SAMPLED_BY_EMCEE = "The inclination decides", "Sampled by
 COUNTED_ONCE, LEFT_OUT = "Counted once", "Left out"
 OTHER_UNIT = "The frequencies look given in"
 _NO_FAULTS = (_ENDS_DECIDE, _INCLINATION_DECIDES, _SAMPLED_BY_EMCEE, COUNTED_ONCE, LEFT_OUT)
-_SAID_ONCE = (
+_MESSAGES_GIVEN_ONCE = (
     _ENDS_DECIDE,
     _ORDERS_DECIDE,
     "The description does not fit",
@@ -381,8 +381,8 @@ class Posterior(Shown):
             modes = "1 measured frequency" if n_modes == 1 else f"{n_modes} measured frequencies"
             return line("Posterior", self.hanger, f"{modes}, no model")
         tension = Selection((self,), (1.0,)).averaged().tension_n
-        said = f"{self.model}, {tension_words(tension.mean, tension.q05, tension.q95)}"
-        return line("Posterior", self.hanger, said)
+        text = f"{self.model}, {tension_words(tension.mean, tension.q05, tension.q95)}"
+        return line("Posterior", self.hanger, text)
 
     def to_dataframe(self) -> DataFrame:
         """Return the draws, a row a draw: the table of `shm.export.samples`."""
@@ -474,5 +474,5 @@ def _distinct(caveats: Sequence[str]) -> tuple[str, ...]:
     found: dict[str, str] = {}
     for each in caveats:
         head = each.partition(":")[0].partition(", by ")[0]
-        found.setdefault(head if head in _SAID_ONCE else each, each)
+        found.setdefault(head if head in _MESSAGES_GIVEN_ONCE else each, each)
     return tuple(found.values())

@@ -176,9 +176,9 @@ def visitor_in_force(request: Request, site: Site, secret: str) -> Visitor:
     if found is not None:
         return found
     if secret.startswith(SESSION):
-        raise _nobody("You are not signed in any more.", "Sign in again at /sign-in.")
+        raise _not_signed_in("You are not signed in any more.", "Sign in again at /sign-in.")
     site.wrong_attempts.note_wrong(unless_throttled(request, site))
-    raise _nobody("This token is wrong or revoked.", _BY_HEADER)
+    raise _not_signed_in("This token is wrong or revoked.", _BY_HEADER)
 
 
 def is_signed_in(request: Request, site: Site) -> bool:
@@ -195,7 +195,7 @@ def session_of(request: Request, site: Site, name: str, password: str) -> str:
     secret = site.store.people.sign_in(name, password, utc_now())
     if secret is None:
         site.wrong_attempts.note_wrong(caller, name)
-        raise _nobody(
+        raise _not_signed_in(
             "Name or password is wrong.",
             "An engineer can give you another password. A program signs in with no password: it "
             "sends a token.",
@@ -203,7 +203,7 @@ def session_of(request: Request, site: Site, name: str, password: str) -> str:
     return secret
 
 
-def change_own_password(
+def change_password_of(
     request: Request, site: Site, person: Visitor, old: str, password: str
 ) -> None:
     """Raises UsageError where the new one is poor, Refused where the old one is wrong or too many
@@ -266,7 +266,7 @@ def _signed_in(request: Request, site: Site, otherwise: str, needed: Role) -> Vi
     """Return the person signed in with this browser; raises Refused with `otherwise` if none is."""
     secret = request.cookies.get(COOKIE)
     if not secret:
-        raise _nobody(otherwise, f"Sign in at /sign-in. A program: {_BY_HEADER}")
+        raise _not_signed_in(otherwise, f"Sign in at /sign-in. A program: {_BY_HEADER}")
     if request.method not in ("GET", "HEAD"):
         refuse_foreign(request)
     return replace(_visitor(request, site, secret, needed), via=PAGE)
@@ -277,5 +277,5 @@ def _is_at_home(request: Request, site: Site) -> bool:
     return site.address.is_loopback and not any(name in request.headers for name in _FORWARDED)
 
 
-def _nobody(message: str, remedy: str) -> Refused:
+def _not_signed_in(message: str, remedy: str) -> Refused:
     return Refused(401, message, remedy, {"WWW-Authenticate": "Bearer"})

@@ -109,8 +109,8 @@ _DOTS = (".", "..")
 
 def test_page(hanger_id: int, name: str) -> str:
     """The address of a test's page."""
-    told = f"{name}/" if name in _DOTS else name
-    return f"/hangers/{hanger_id}/tests/{quote(told, safe='')}"
+    segment = f"{name}/" if name in _DOTS else name
+    return f"/hangers/{hanger_id}/tests/{quote(segment, safe='')}"
 
 
 def test_json(hanger_id: int, name: str) -> str:

@@ -25,7 +25,7 @@ from shm_daemon.execution import children_ended, process_pool
 # Technical: each order takes seconds; the process goes when nobody looks at pages. Judgement: after
 # ten minutes it hangs, and who asks again within a minute is told why it failed.
 _MOST_WAITING = 8
-_MOST_KEPT_BYTES = 64_000_000
+_MAX_STORED_BYTES = 64_000_000
 _IDLE_S = 60.0
 _LONGEST_S = 600.0
 _FAILURE_LASTS_S = 60.0
@@ -65,7 +65,7 @@ class BackgroundWorker(Generic[Made]):
         self._thread: threading.Thread | None = None
         self._closed = False
 
-    def kept(self, order: Order) -> Made | None:
+    def stored(self, order: Order) -> Made | None:
         """Return the stored result of a request, None if there is none; start nothing."""
         with self._changed:
             if order not in self._kept:
@@ -79,7 +79,7 @@ class BackgroundWorker(Generic[Made]):
         Raises the ShmError with which it failed a short while ago.
         """
         with self._changed:
-            found = self.kept(order)
+            found = self.stored(order)
             if found is not None:
                 return found
             error, failed_at_s = self._failures.get(order, (None, 0.0))
@@ -140,8 +140,8 @@ class BackgroundWorker(Generic[Made]):
             remedy = (
                 "Have it written at leisure with `shm report`; see the log of the web interface."
             )
-            said = f"it took more than {self._longest_s:g} s and was given up."
-            self._failed(order, ShmError(said, remedy=remedy))
+            problem = f"it took more than {self._longest_s:g} s and was given up."
+            self._failed(order, ShmError(problem, remedy=remedy))
             return False
         except BrokenProcessPool:
             self._tried_again(order)
@@ -169,7 +169,7 @@ class BackgroundWorker(Generic[Made]):
             self._failures.pop(order, None)
             self._kept[order] = made, len(packed)
             while len(self._kept) > 1 and (
-                sum(size_bytes for _, size_bytes in self._kept.values()) > _MOST_KEPT_BYTES
+                sum(size_bytes for _, size_bytes in self._kept.values()) > _MAX_STORED_BYTES
             ):
                 self._kept.popitem(last=False)
 

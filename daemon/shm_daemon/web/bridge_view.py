@@ -172,7 +172,7 @@ _LIMITS = (0.01, 0.03, 0.06)
 # Judgement: drawing units, of which a laptop's page has about 1100. Hangers are so far apart that
 # their numbers (every second, fifth ... where 30 units are too few) can be read.
 _MOST_STEP, _LEAST_STEP, _WIDEST = 34.0, 9.0, 1100.0
-_TALLEST, _TOP, _BELOW, _BESIDE = 220.0, 48.0, 60.0, 36.0
+_TALLEST, _TOP, _BELOW, _SIDE = 220.0, 48.0, 60.0, 36.0
 _BETWEEN_NUMBERS = 30.0
 _TRIANGLE = 10.0
 
@@ -215,18 +215,18 @@ class Elevation:
 
 def elevation(hangers: Sequence[HangerGlance]) -> Elevation:
     """The hangers evenly spaced in their order, as long as they are, the arch over them."""
-    step = min(_MOST_STEP, max(_LEAST_STEP, (_WIDEST - 2 * _BESIDE) / (len(hangers) + 1)))
+    step = min(_MOST_STEP, max(_LEAST_STEP, (_WIDEST - 2 * _SIDE) / (len(hangers) + 1)))
     longest = max(each.hanger.length_m for each in hangers)
     deck = _TOP + _TALLEST
     tops = [deck - _TALLEST * each.hanger.length_m / longest for each in hangers]
-    places = [_BESIDE + step * (index + 1) for index in range(len(hangers))]
+    places = [_SIDE + step * (index + 1) for index in range(len(hangers))]
     numbered = _numbered(hangers, places)
     marks = tuple(
         _mark(each, x, top, index in numbered)
         for index, (each, x, top) in enumerate(zip(hangers, places, tops, strict=True))
     )
-    width = 2 * _BESIDE + step * (len(hangers) + 1)
-    ends = [(_BESIDE, deck), *zip(places, tops, strict=True), (width - _BESIDE, deck)]
+    width = 2 * _SIDE + step * (len(hangers) + 1)
+    ends = [(_SIDE, deck), *zip(places, tops, strict=True), (width - _SIDE, deck)]
     return Elevation(width, deck + _BELOW, deck, step, round(step / 4, 1), _curve(ends), marks)
 
 

@@ -176,10 +176,10 @@ class Guarded(H11Protocol):
         """Return the bytes that the caller has not received, buffers of the system included."""
         if self.transport is None or self._plain is None:
             return 0
-        kept = array("i", [0])
+        queued = array("i", [0])
         with suppress(OSError):  # another system may not tell
-            fcntl.ioctl(self._plain.get_extra_info("socket").fileno(), termios.TIOCOUTQ, kept)
-        return self.transport.get_write_buffer_size() + kept[0]
+            fcntl.ioctl(self._plain.get_extra_info("socket").fileno(), termios.TIOCOUTQ, queued)
+        return self.transport.get_write_buffer_size() + queued[0]
 
 
 def guarded_by(door: Door) -> type[Guarded]:

@@ -85,17 +85,17 @@ def done_or_again(
     return RedirectResponse(then, 303)
 
 
-def reason_in(told: Mapping[str, str], of: str) -> str:
+def reason_in(form: Mapping[str, str], of: str) -> str:
     """Return the reason for the record; raises UsageError if it is empty."""
-    why = told.get("why", "").replace("\r\n", "\n").strip()  # as browsers send lines
+    why = form.get("why", "").replace("\r\n", "\n").strip()  # as browsers send lines
     if not why:
         raise UsageError(f"{of} needs a reason.", remedy="Write why, for the record.")
     return why
 
 
-def time_in(told: Mapping[str, str], name: str) -> datetime | None:
+def time_in(form: Mapping[str, str], name: str) -> datetime | None:
     """A time or day in UTC, None where the field is empty; raises BadInput."""
-    text = told.get(name, "")
+    text = form.get(name, "")
     try:
         return parse_time(text) if text else None
     except (ValueError, OverflowError):

@@ -33,7 +33,7 @@ router = APIRouter(include_in_schema=False)
 STATIC = Path(__file__).with_name("static")
 """Our style sheets and scripts."""
 _KINDS = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
-_KEPT = "public, max-age=31536000, immutable"
+_CACHED = "public, max-age=31536000, immutable"
 _ASKED_AGAIN = "no-cache"
 _WORTH_PACKING_BYTES = 1000  # technical: less goes into one packet (1,460 bytes) anyhow
 
@@ -161,7 +161,8 @@ def static_file(request: Request, name: str) -> Response:
 def _answer(request: Request, name: str, is_of_version: bool) -> Response:
     packs = "gzip" in request.headers.get("accept-encoding", "")
     content, packed = _content(name), b""
-    headers = {"Cache-Control": _KEPT if is_of_version else _ASKED_AGAIN, "Vary": "Accept-Encoding"}
+    caching = _CACHED if is_of_version else _ASKED_AGAIN
+    headers = {"Cache-Control": caching, "Vary": "Accept-Encoding"}
     if packs and len(content) > _WORTH_PACKING_BYTES:
         packed, headers["Content-Encoding"] = _packed(name), "gzip"
     return Response(packed or content, headers=headers, media_type=_KINDS[Path(name).suffix])

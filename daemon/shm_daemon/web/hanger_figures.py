@@ -116,13 +116,13 @@ def _averaged_state(view: HangerView) -> QuantityOverTime | None:
 
 def _remark(view: HangerView) -> str:
     undated = sum(point.taken_at is None for point in view.trend)
-    told = (
+    sentences = (
         f"{formatting.counted(undated, 'test')} without a time drawn at the receipt."
         if undated
         else "",
         "The state over time is being worked out." if view.states is None else "",
     )
-    return " ".join(filter(None, told))
+    return " ".join(filter(None, sentences))
 
 
 def _courses(view: HangerView) -> list[hanger_stiffness.Course]:
@@ -250,8 +250,8 @@ def _chosen(view: HangerView) -> str:
 
 
 def _alt_of_models(view: HangerView) -> str:
-    told = [f"{name} {formatting.probability(share)}" for name, share in _rows(view)]
-    return f"Probabilities of the model classes: {'; '.join(told)}."
+    shares = [f"{name} {formatting.probability(share)}" for name, share in _rows(view)]
+    return f"Probabilities of the model classes: {'; '.join(shares)}."
 
 
 FIGURES: tuple[HangerFigure, ...] = (

@@ -117,12 +117,12 @@ def _of_silences(site: Site) -> list[Lead]:
         return []  # told as a trouble
     return [
         Lead(
-            f"{said[0].upper()}{said[1:]}.",
+            f"{text[0].upper()}{text[1:]}.",
             f"{'No' if each.is_maintenance else 'Each'} alert of that time is raised; it is ended "
             "on the page of alerts.",
         )
         for each in found
-        for said in [said_of(each)]
+        for text in [said_of(each)]
     ]
 
 

@@ -147,7 +147,7 @@ class TestView:
     @cached_property
     def worked(self) -> WorkedOut | None:
         """The whole sheet, where it is at hand; begins nothing."""
-        return None if self.missing else self.background_worker.kept(self.order)
+        return None if self.missing else self.background_worker.stored(self.order)
 
     @cached_property
     def sheet(self) -> ModalTestReport:

@@ -321,8 +321,8 @@ async def chunks(
 
     await receive_body(request, write, LARGEST_BYTES, refuse_long_chunk)
     chunk, workspace, store = [bytes(body)], site.workspace, site.store
-    (kept,) = await run_in_threadpool(take_chunks, workspace, store, name, chunk, utc_now())
-    return AcknowledgedChunk(**vars(kept))
+    (stored,) = await run_in_threadpool(take_chunks, workspace, store, name, chunk, utc_now())
+    return AcknowledgedChunk(**vars(stored))
 
 
 router = APIRouter()

@@ -35,7 +35,7 @@ ENDING_S = 5
 # Technical: at once where it died by chance, each minute where it cannot live, to spare the log.
 _FIRST_WAIT_S, _LONGEST_WAIT_S, _LIVED_WELL_S = 1.0, 60.0, 60.0
 
-_ENDING_BESIDE_S = 2 * ENDING_S  # its callers have been cut off by then
+_ENDING_WITH_DAEMON_S = 2 * ENDING_S  # its callers have been cut off by then
 
 log = logging.getLogger(__name__)
 
@@ -200,7 +200,7 @@ def refuse_unguarded(workspace: Workspace, address: Address) -> None:
 
 
 @contextmanager
-def web_beside(
+def web_with_daemon(
     workspace: Workspace,
     address: Address | None,
     log_file: Path | None = None,
@@ -264,7 +264,7 @@ class _Keeper:
                 lived_s += look_s
             process.terminate()
             try:
-                process.wait(_ENDING_BESIDE_S)
+                process.wait(_ENDING_WITH_DAEMON_S)
             except subprocess.TimeoutExpired:
                 process.kill()
         return lived_s

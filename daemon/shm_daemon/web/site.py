@@ -22,7 +22,7 @@ from shm_daemon.web.address import Address, network_of
 MOST_WRONG, WITHIN_S = 10, 60.0
 """A person mistypes a few; a program with an old token comes again and again."""
 _MOST_PASSWORDS = 100  # NIST SP 800-63B-4, 3.2.2, of one name anywhere; of all names at an address
-_COUNTS_KEPT = 4096  # technical: below a megabyte of memory
+_MAX_COUNTERS = 4096  # technical: below a megabyte of memory
 
 
 class WrongAttempts:
@@ -53,7 +53,7 @@ class WrongAttempts:
                 if now - began >= WITHIN_S:
                     began, times = now, 0
                 self._wrong[key] = (began, times + 1)
-                while len(self._wrong) > _COUNTS_KEPT:
+                while len(self._wrong) > _MAX_COUNTERS:
                     self._wrong.popitem(last=False)
             if times + 1 == most:
                 whose = address if key[0] else f"all addresses for the user {name!r}"

@@ -31,7 +31,7 @@ def origin(view: TestView) -> Table:
     """File, checksums and version; a checksum is written out, for it is there to be compared."""
     file, lineage = view.recording.file, view.stored.lineage
     size, is_now = file.size_bytes, view.order.terms == lineage
-    anew = f"have changed since: `shm ingest --again {view.recording.id}` identifies it anew"
+    remedy = f"have changed since: `shm ingest --again {view.recording.id}` identifies it anew"
     facts = {
         "raw file": file.file_name,
         "its SHA-256": file.sha256,
@@ -42,7 +42,7 @@ def origin(view: TestView) -> Table:
         "checksum of the input": lineage.input_sha256,
         "checksum of the settings": lineage.settings_sha256,
         "identified with": f"shm {lineage.version}",
-        "settings, description and version": "as they are now" if is_now else anew,
+        "settings, description and version": "as they are now" if is_now else remedy,
     }
     return Table("Raw file and lineage", ("what", "value"), tuple(facts.items()))
 

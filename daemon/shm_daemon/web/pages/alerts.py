@@ -177,13 +177,13 @@ def alerts(
     responses=answers(404, 409, 422),
     summary="Take note of an alert",
 )
-def acknowledge(site: AtSite, writer: Writer, alert_id: Row, told: Acknowledge) -> Any:
+def acknowledge(site: AtSite, writer: Writer, alert_id: Row, comment: Acknowledge) -> Any:
     """Notes on the record that somebody has seen an alert, or with `resolved` to its end."""
-    named = told.who is not None and not writer.is_person  # who signed in has a name
-    who = f"{told.who} (token {writer.name})" if named else writer.name
+    named = comment.who is not None and not writer.is_person  # who signed in has a name
+    who = f"{comment.who} (token {writer.name})" if named else writer.name
     alerts = site.store.acting_as(writer.actor).alerts
-    note = alerts.resolve if told.resolved else alerts.acknowledge
-    note(alert_id, who, told.why, utc_now())
+    note = alerts.resolve if comment.resolved else alerts.acknowledge
+    note(alert_id, who, comment.why, utc_now())
     return alert_documents([site.store.alerts.row(alert_id)], site)[0]
 
 
@@ -227,10 +227,10 @@ def _delivery(row: DeliveryRow, hook: Hook | None, message: str, now: datetime) 
 
 
 @router.post("/silences", include_in_schema=False)
-def silence(site: AtSite, writer: Writer, told: Form) -> Response:
+def silence(site: AtSite, writer: Writer, form: Form) -> Response:
     """Holds the messages of hooks back for a while."""
-    now, number, why = utc_now(), told.get("hanger", ""), reason_in(told, "a silence")
-    since, until = time_in(told, "from") or now, time_in(told, "until")
+    now, number, why = utc_now(), form.get("hanger", ""), reason_in(form, "a silence")
+    since, until = time_in(form, "from") or now, time_in(form, "until")
     if until is None or not (number == "all" or number.isdecimal()):
         raise BadInput("a silence has hangers and an end.", remedy="Choose them in the form.")
     hanger = None if number == "all" else int(number)
@@ -238,7 +238,7 @@ def silence(site: AtSite, writer: Writer, told: Form) -> Response:
         site.workspace.bridge.tested(hanger)
     who = writer.actor
     site.store.acting_as(who).silences.make(
-        hanger, (since, until), who.name, why, now, is_maintenance="maintenance" in told
+        hanger, (since, until), who.name, why, now, is_maintenance="maintenance" in form
     )
     return RedirectResponse("/alerts#silences", 303)
 

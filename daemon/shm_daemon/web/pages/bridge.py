@@ -27,8 +27,8 @@ from shm_daemon.web.bridge_summary import (
     Summary,
     groups,
     headline,
-    own_row,
     row_document,
+    site_rows,
     summary_of,
     worst_first,
 )
@@ -69,13 +69,13 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
         facts=_facts(bridge, now),
         held=held_documents(site),
         drawing=elevation(bridge.hangers) if bridge.hangers else None,
-        legend=[(kind, said, triangles(kind, 16, 24)) for kind, said in CLASSES],
+        legend=[(kind, text, triangles(kind, 16, 24)) for kind, text in CLASSES],
         moved=found.sentence if found else None,
         unit=unit.name,
         warnings=[
-            said
+            text
             for each in bridge.hangers
-            for said in each.line.message.beyond_lead(each.line.warnings)
+            for text in each.line.message.beyond_lead(each.line.warnings)
         ],
         notes=site.store.notes.list_all(of_bridge=True),
         rows=[SimpleNamespace(**_row(each, unit, now)) for each in bridge.hangers],
@@ -237,7 +237,7 @@ def _bridges(request: Request, site: Site) -> tuple[BridgeRow, ...]:
     asked: OtherBridges = request.app.state.other_bridges
     bridge = site.workspace.bridge
     others = asked.rows(bridge.other_bridges, site.workspace.folder)
-    return worst_first((*own_row(site, utc_now()), *others))
+    return worst_first((*site_rows(site, utc_now()), *others))
 
 
 def _words_of(row: BridgeRow, now: datetime) -> str:

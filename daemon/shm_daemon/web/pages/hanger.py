@@ -90,7 +90,7 @@ def hanger(request: Request, site: AtSite, _: Reader, view: View) -> HTMLRespons
     common: dict[str, Any] = {
         "name": formatting.hanger_name(one.id, one.name),
         "hanger": one,
-        "beside": _beside(site.workspace, one),
+        "beside": _neighbours(site.workspace, one),
         "tests": rows[:_LATEST_TESTS],
         "test_headings": headings(view),
         "has_more": len(rows) > _LATEST_TESTS,
@@ -122,15 +122,15 @@ def all_tests(request: Request, _: Reader, view: View, before: Before = None) ->
 
 
 def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
-    said = message(report)
-    assert said.status is not None  # a hanger with a test has one
+    lead = message(report)
+    assert lead.status is not None  # a hanger with a test has one
     tables = [make(report) for make in _TABLES]
     if view.states is not None:
         tables.insert(2, temperature_table(view.states))
     return {
-        "status_word": said.status.value,
-        "style": said.status.name.lower(),
-        "lead": said.words,
+        "status_word": lead.status.value,
+        "style": lead.status.name.lower(),
+        "lead": lead.words,
         "details": details(report),
         "facts": facts(report),
         "is_called": report.is_called,
@@ -169,7 +169,7 @@ def _events(view: HangerView) -> Table:
     )
 
 
-def _beside(workspace: Workspace, hanger: Hanger) -> list[tuple[str, Hanger]]:
+def _neighbours(workspace: Workspace, hanger: Hanger) -> list[tuple[str, Hanger]]:
     """The hangers before and after it in the description."""
     order: Sequence[Hanger] = workspace.bridge.hangers
     place = [each.id for each in order].index(hanger.id)

@@ -80,7 +80,7 @@ def one_test(
 
 def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
     """None where they are not worked out."""
-    whole = None if view.missing else view.background_worker.kept(view.order)
+    whole = None if view.missing else view.background_worker.stored(view.order)
     return filled(whole.hits) if whole else None
 
 
@@ -106,7 +106,7 @@ def _facts(view: TestView) -> tuple[tuple[str, str, str], ...]:
     """The figures on top: what, value, what stands beside it."""
     test, sheet = view.stored.test, view.sheet
     planes = {mode.plane for mode in sheet.modes}
-    aside = len(sheet.identification.set_aside)
+    n_foreign = len(sheet.identification.set_aside)
     return (
         ("Modes", str(len(sheet.modes)), f"in {formatting.counted(len(planes), 'plane')}"),
         _tension(view),
@@ -116,7 +116,7 @@ def _facts(view: TestView) -> tuple[tuple[str, str, str], ...]:
             formatting.moment(test.time),
             f"received {formatting.moment(view.recording.received_at)}",
         ),
-        ("Set aside", str(aside), "resonances without an order"),
+        ("Set aside", str(n_foreign), "resonances without an order"),
     )
 
 
@@ -133,5 +133,5 @@ def _tension(view: TestView) -> tuple[str, str, str]:
     unit = force_unit(tension_n.mean)
     tension = tension_n.in_unit(unit)
     span = f"90 % interval {formatting.span(tension)} {unit.name}"
-    beside = f"{span}, {formatting.model_class(posterior.model)}"
-    return "Tension by this test", f"{formatting.mean(tension)} {unit.name}", beside
+    details = f"{span}, {formatting.model_class(posterior.model)}"
+    return "Tension by this test", f"{formatting.mean(tension)} {unit.name}", details

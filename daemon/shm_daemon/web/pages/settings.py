@@ -69,9 +69,9 @@ def settings_page(request: Request, site: AtSite, _: Engineer, hanger: Before = 
 
 
 @router.post("/settings")
-def change(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Response:
+def change(request: Request, site: AtSite, engineer: Engineer, form: Form) -> Response:
     """Sets one value, or gives it back to `bridge.toml`."""
-    key, hanger, workspace = told.get("key", ""), None, site.workspace
+    key, hanger, workspace = form.get("key", ""), None, site.workspace
     rows = {row.key: row for row in _all_rows(workspace.bridge, workspace.settings)}
     if key not in rows:
         raise Refused(404, f"{key!r} is none of the settings of this page.", "See bridge.toml.")
@@ -85,10 +85,10 @@ def change(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Re
             workspace.change_setting(
                 site.store.acting_as(engineer.actor),
                 key,
-                _value(key, told),
+                _value(key, form),
                 utc_now(),
                 engineer.name,
-                based_on=int(told["based_on"]) if told.get("based_on", "").isdecimal() else 0,
+                based_on=int(form["based_on"]) if form.get("based_on", "").isdecimal() else 0,
                 in_file=rows[key].in_file,
             )
         finally:
@@ -97,13 +97,13 @@ def change(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Re
     return done_or_again(change, address, partial(_page, request, site, hanger))
 
 
-def _value(key: str, told: Mapping[str, str]) -> float | str | None:
+def _value(key: str, form: Mapping[str, str]) -> float | str | None:
     """None of what is given back; whether quiet hours are a span, `bridge.toml` itself checks."""
-    if told.get("action") == "back":
+    if form.get("action") == "back":
         return None
     if not key.endswith(QUIET_HOURS):
-        return _number(told.get("value", ""))
-    begins, ends = told.get("begins", ""), told.get("ends", "")
+        return _number(form.get("value", ""))
+    begins, ends = form.get("begins", ""), form.get("ends", "")
     return f"{begins}-{ends}" if begins or ends else ""
 
 

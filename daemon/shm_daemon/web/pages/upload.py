@@ -137,7 +137,7 @@ async def import_file(
         await run_in_threadpool(file.close)
 
 
-def _looked(file: Incoming, name: str, workspace: Workspace, said: str | None) -> ImportLook:
+def _looked(file: Incoming, name: str, workspace: Workspace, text: str | None) -> ImportLook:
     if file.size_bytes == 0:
         raise BadInput("the body is empty.", remedy="Send the bytes of the file.")
     with TemporaryDirectory(prefix="shm-import-") as folder:
@@ -145,8 +145,8 @@ def _looked(file: Incoming, name: str, workspace: Workspace, said: str | None) -
         shutil.copyfile(file.whole(), path)
         found = look_into(path, workspace, Answers())
     landed: Landed | None = None
-    if said is not None:
-        answers = _answers(said, found)
+    if text is not None:
+        answers = _answers(text, found)
         found = understand(found.survey, workspace, answers)
         if found.is_ready:
             keep_profile(found, workspace, each_time=answers.each_time)
@@ -155,10 +155,10 @@ def _looked(file: Incoming, name: str, workspace: Workspace, said: str | None) -
     return ImportLook(**plain(document), sha256=landed.sha256 if landed else None)
 
 
-def _answers(said: str, found: Import) -> Answers:
+def _answers(body: str, found: Import) -> Answers:
     """The answers of a request; raises BadInput for what is none."""
     try:
-        document = json.loads(said)
+        document = json.loads(body)
     except (ValueError, RecursionError) as error:
         raise _misread(str(error)[:100]) from error
     columns = document.get("columns", {}) if isinstance(document, dict) else None

@@ -29,15 +29,15 @@ def users_page(request: Request, site: AtSite, _: Engineer) -> Response:
 
 
 @router.post("/users")
-async def change_user(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Response:
+async def change_user(request: Request, site: AtSite, engineer: Engineer, form: Form) -> Response:
     """Adds or removes a user, changes their role or sets a password."""
     people, at = site.store.acting_as(engineer.actor).people, utc_now()
     by_provider = site.workspace.bridge.single_sign_on is not None
-    name, password = told.get("name", ""), told.get("password", "")
-    role = next((each for each in Role if each == told.get("role", "")), None)
+    name, password = form.get("name", ""), form.get("password", "")
+    role = next((each for each in Role if each == form.get("role", "")), None)
 
     def change() -> None:
-        match told.get("action", ""), role:
+        match form.get("action", ""), role:
             case "add", Role():
                 people.add(name, role, None if by_provider and not password else password, at)
             case "role", Role():
