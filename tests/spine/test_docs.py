@@ -76,6 +76,7 @@ def test_built_pages_are_ignored_by_git_and_named_by_the_tree() -> None:
     [
         ("docs/physics.md", "classes", "classes_table"),
         ("docs/api.md", "examples", "examples"),
+        ("docs/api.md", "functions", "functions"),
         ("CONTRIBUTING.md", "house", "house"),
     ],
 )

@@ -26,6 +26,7 @@ with TemporaryDirectory() as folder:
     write(planted, path)
     recording = shm.read(path)
 
+# Shown in the manual from here.
 test = shm.identify(recording, hanger=hanger)
 print(test.test.summary())
 
@@ -33,6 +34,7 @@ posterior = shm.update(test, hanger, model="beam1", seed=1)
 print(posterior.summary())
 
 figure = shm.plot.frequency_response(test, hanger)
+# Shown in the manual until here.
 
 assert len(test.test.modes) == 12  # six in each plane below 100 Hz
 assert abs(posterior.tension_n.mean() - truth_n) < 3 * posterior.tension_n.std()

@@ -27,8 +27,10 @@ def selected(spring_n_m_rad: float) -> shm.Selection:
         seconds_per_hit=10.0,
         seed=2,
     )
+    # Shown in the manual from here.
     test = shm.identify(recording, hanger=hanger, cross_check="none")
     return shm.select(test, hanger, models=["beam1", "beam2"], samples=500, seed=1)
+    # Shown in the manual until here.
 
 
 clamped, soft = selected(float("inf")), selected(2e6)

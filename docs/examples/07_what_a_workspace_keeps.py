@@ -51,6 +51,7 @@ def main() -> None:
         assert run(["init", str(arch), "--from", str(described)]) == 0
         assert run(["--workspace", str(arch), "ingest", str(modes)]) == 0
 
+        # Shown in the manual from here.
         with shm.Store(arch) as store:
             kept = store.tests(3)
             tensions = store.tensions(3)
@@ -58,6 +59,7 @@ def main() -> None:
             posteriors = store.posteriors(3)
             selection = store.selection(3)
             figure = shm.plot.trend(posteriors, kept, store.hanger(3))
+        # Shown in the manual until here.
 
     for test in kept:
         tension = tensions[test.id].tension_n

@@ -24,10 +24,12 @@ modes = tuple(
     for order, frequency_hz in enumerate(measured, 1)
 )
 
+# Shown in the manual from here.
 diagnosis = shm.diagnose(shm.ModalTest("t1", modes, hanger=3), hanger, draws=200, seed=1)
 cause = diagnosis.leading
 assert cause is not None
 print(diagnosis.summary())
+# Shown in the manual until here.
 
 found = {estimate.name: estimate for estimate in cause.parameters}
 assert cause.effect == "point_mass"

@@ -20,6 +20,7 @@ measured_hz = {
     "transverse": (5.82, 13.85, 26.17, 40.47, 59.30, 81.30),
     "longitudinal": (6.09, 14.80, 27.00, 41.80, 61.50, 83.68),
 }
+# Shown in the manual from here.
 test = shm.ModalTest(
     id="table 1.1",
     hanger=3,
@@ -30,6 +31,7 @@ test = shm.ModalTest(
     ),
 )
 posterior = shm.update(test, hanger, model="beam1", seed=1, priors="thesis")
+# Shown in the manual until here.
 tension_kn = posterior.tension_n / 1e3
 print(f"tension {tension_kn.mean():.0f} ± {tension_kn.std():.0f} kN")
 print(f"model error {posterior.parameter('sigma').mean():.1%} of a frequency")

@@ -24,9 +24,11 @@ string = replace(bar, bending_stiffness_factor=1e-6)
 order = np.arange(1, 5)
 closed_form_hz = order / (2 * bar.length_m) * np.sqrt(711e3 / bar.mass_per_length_kg_m)
 
+# Shown in the manual from here.
 parameters = np.array([[1.0, 1.0], [1.1, 1.0]])  # theta_F, theta_L
 as_string = build("beam1", string, priors="thesis").frequencies_hz(parameters, modes=4)
 as_bar = build("beam1", bar, priors="thesis").frequencies_hz(parameters, modes=4)
+# Shown in the manual until here.
 print("model classes:", ", ".join(MODELS))
 print("string, closed form (Hz):", closed_form_hz.round(3))
 print("string, beam1       (Hz):", as_string[0, 0].round(3))
