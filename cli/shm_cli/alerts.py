@@ -85,7 +85,7 @@ def silence(
     kind = "Maintenance window" if maintenance else "Silence"
     answer(
         silence_row(made, now),
-        f"{kind} {made.id}: hooks are told nothing of {hangers_of(made.hanger)} from "
+        f"{kind} {made.id}: hooks get nothing about {hangers_of(made.hanger)} from "
         f"{_at(made.starts_at)} until {_at(made.until)} UTC. End it early: "
         f"`shm alerts unsilence {made.id}`.",
     )
@@ -139,7 +139,8 @@ def unsilence(ctx: click.Context, silence_id: int, who: str) -> None:
         ended = store.silences.end(silence_id, who, now)
     answer(
         silence_row(ended, now),
-        f"Silence {silence_id} has ended: hooks are told of {hangers_of(ended.hanger)} again.",
+        f"Silence {silence_id} has ended: hooks are notified about {hangers_of(ended.hanger)} "
+        "again.",
     )
 
 
@@ -342,7 +343,7 @@ def _given_up_words(alert_id: int, delivery: dict[str, Any]) -> str:
     tries = "one try" if delivery["attempts"] == 1 else f"{delivery['attempts']} tries"
     why = delivery["last_error"] or "no reason is known"
     return (
-        f"The hook {delivery['hook']} was not told: given up after {tries}, {why} Mend it, then "
+        f"The hook {delivery['hook']} was not notified: given up after {tries}, {why} Fix it, then "
         f"`shm alerts resend {alert_id}`."
     )
 

@@ -17,7 +17,7 @@ from shm.values.messages import URGENCIES, Lead, Urgency
 from shm_daemon.web.health import notices, troubles
 from shm_daemon.web.site import Site
 
-NOT_REACHED, STOPPED = "Not reached", "Stands still"
+NOT_REACHED, STOPPED = "Not reached", "Stopped"
 
 
 @dataclass(frozen=True)

@@ -34,12 +34,12 @@ _Value = float | QuietHours | None
 _MEANINGS = {
     "thresholds.tension_shift_fraction": "shift of tension that matters, as a fraction",
     "thresholds.stiffness_shift_decades": "shift of end stiffness that matters, in decades",
-    "thresholds.alert_probability": "how probable such a shift must be for an alert",
+    "thresholds.alert_probability": "probability of such a shift that raises an alert",
     "thresholds.false_call_years": "mean time between false alarms of this hanger, in years",
-    "limits.tension_max_n": "overloaded above, in N",
-    "limits.tension_min_n": "slack below, in N",
-    "escalation_after_seconds": "told only of what nobody has acknowledged after, in s",
-    QUIET_HOURS: "told only of what is urgent within these, by time_zone of bridge.toml, else UTC",
+    "limits.tension_max_n": "upper limit of the tension, in N",
+    "limits.tension_min_n": "lower limit of the tension, in N",
+    "escalation_after_seconds": "escalate alerts that nobody has acknowledged after, in seconds",
+    QUIET_HOURS: "quiet hours, only urgent alerts are sent; in time_zone of bridge.toml, else UTC",
     **{row.name: f"{row.help}{f', in {row.unit}' if row.unit else ''}" for row in TABLE},
 }
 
