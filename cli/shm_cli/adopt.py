@@ -82,13 +82,13 @@ def adopted(ctx: click.Context, hanger_id: int | None, undone: bool) -> None:
             workspace.bridge.hanger(hanger_id)
         found = store.posteriors.list_adoptions(hanger_id, undone=undone)
         documents = [_watched(store, each) for each in found]
-    if flags.wants_json():
-        show({"adoptions": documents})
-        return
     if not found:
         raise NothingThere(
             "no effect has been adopted.", remedy="Adopt one with `shm gap adopt --effect NAME`."
         )
+    if flags.wants_json():
+        show({"adoptions": documents})
+        return
     headings = (
         "number", "hanger", "class", "adopted", "who", "why", "gap before, with it, now (%)",
         "dropped",

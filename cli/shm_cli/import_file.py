@@ -183,6 +183,8 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, **options: Any) ->
     """
     workspace = open_workspace(ctx)
     asks = not flags.wants_json() and sys.stdin.isatty() and sys.stdout.isatty()
+    if options["hanger"] is not None:
+        workspace.bridge.tested(options["hanger"])
     first = look_into(file, workspace, _whole_file(options))
     modes = None if first.columns else _modes_in(file, workspace)
     if modes is not None:

@@ -83,7 +83,7 @@ WRONG = (
     ("report --hanger 99", 4, "nothing_there"),
     ("drift --hanger 99", 4, "nothing_there"),
     ("alerts ack 99 --why x", 4, "nothing_there"),
-    ("stream events --stream h9", 4, "nothing_there"),
+    ("stream export h9 2026-05-01 2026-05-02 {}/x.csv", 4, "nothing_there"),
     ("report --hanger 4", 4, "nothing_there"),
     ("report --hanger three", 2, "usage"),
     ("report --since tomorrow --hanger 3", 2, "usage"),
