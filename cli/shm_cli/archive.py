@@ -95,16 +95,16 @@ class _Pruned:
 
     files: Sequence[str]
     freed_bytes: int
-    kept: dict[str, int]
+    remaining: dict[str, int]
 
     @property
     def document(self) -> dict[str, Any]:
-        return {"files": list(self.files), "freed_bytes": self.freed_bytes, "kept": self.kept}
+        return {"files": list(self.files), "freed_bytes": self.freed_bytes, "kept": self.remaining}
 
     def sentences(self, what: str, dry_run: bool) -> list[str]:
         verb = "would be removed, which would free" if dry_run else "removed, which freed"
         lines = [f"{what}: {len(self.files)} files {verb} {self.freed_bytes / 1e6:.1f} MB."]
-        lines += [f"  {count} old ones stay: {reason}." for reason, count in self.kept.items()]
+        lines += [f"  {count} old ones stay: {reason}." for reason, count in self.remaining.items()]
         return lines
 
 

@@ -48,7 +48,6 @@ _SOFTEST_PA, _STIFFEST_PA = 1e6, 2e12
 # Light timber and osmium; the strongest carbon fibre.
 _LIGHTEST_KG_M3, _DENSEST_KG_M3, _STRONGEST_PA = 300.0, 23000.0, 7e9
 _FLATTEST_DEG, _VERTICAL_DEG = 10.0, 90.0  # judgement: a flatter one is no hanger
-_GRAVITY_M_S2 = 9.81
 _LONGEST_M = 1000.0  # judgement: the longest stays have 580 m; of 4000 m and more no mode is solved
 
 # Judgement: from ten false calls a year, which nobody reads, to none in the life of all bridges.
@@ -74,7 +73,7 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
     _refuse_other_units(table, mass / area, nominal_tension_n / area)
     supports = supports_of(table.table("supports"))
     if supports == Supports():
-        _refuse_less_than_weight(table, nominal_tension_n, mass * length_m * _GRAVITY_M_S2)
+        _refuse_less_than_weight(table, nominal_tension_n, 9.81 * mass * length_m)
     fittings_m, plate = _fittings(table, length_m), _plate(table.table("plate"), length_m, diameter)
     open_ends = plate is None and not any(fittings_m)
     return Hanger(
