@@ -129,7 +129,7 @@ def drop(
 
 
 def _chosen(store: Store, hanger_id: int, number: int | None) -> StoredAdoption:
-    """The adoption asked for, or the only one; raises NothingThere or UsageError."""
+    """Return the adoption asked for, or the only one; raises NothingThere or UsageError."""
     found = store.posteriors.list_adoptions(hanger_id)
     numbers = ", ".join(str(each.id) for each in found)
     if not found:

@@ -269,7 +269,7 @@ def test(ctx: click.Context, name: str) -> None:
 
 
 def a_test_alert(bridge: Bridge, hook: Hook, now: datetime) -> Alert:
-    """An alert that says it is none, of the bridge's first hanger; raises NothingThere."""
+    """Return an alert that says it is none, of the bridge's first hanger; raises NothingThere."""
     if not bridge.hangers:
         raise NothingThere(
             "bridge.toml describes no hanger.", remedy="Describe one: an alert is of a hanger."

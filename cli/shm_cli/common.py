@@ -81,7 +81,7 @@ def show_rows(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]
 
 
 def show_table(table: Table) -> None:
-    """Prints a table on stdout; one that the terminal is too narrow for as a list a row."""
+    """Print a table on stdout; one that the terminal is too narrow for as a list a row."""
     console = Terminal(highlight=False)
     if not sys.stdout.isatty() and "COLUMNS" not in os.environ:
         console.width = max(console.width, _WIDTH_OF_A_FILE)
@@ -135,13 +135,13 @@ def _listed(headings: Sequence[str], cells: Sequence[RenderableType]) -> Table:
 
 
 def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table."""
+    """Return a Markdown table."""
     head, *others = [f"| {' | '.join(line)} |" for line in (heads, *rows)]
     return "\n".join([head, "|" + "---|" * len(heads), *others])
 
 
 def show_texts(texts: Texts) -> None:
-    """Prints a table of a report, and its note."""
+    """Print a table of a report, and its note."""
     from shm.report.as_text import in_terminal
 
     shown = in_terminal(texts)
@@ -156,12 +156,12 @@ def readable_width() -> int:
 
 
 def paragraph(text: str) -> str:
-    """A text in lines that fit the terminal, and are not too long to read."""
+    """Return a text in lines that fit the terminal, and are not too long to read."""
     return textwrap.fill(text, readable_width())
 
 
 def table(title: str, *columns: str) -> Table:
-    """An empty table; columns after the first are aligned to the right."""
+    """Return an empty table; columns after the first are aligned to the right."""
     made = Table(title=title, header_style="bold")
     for index, column in enumerate(columns):
         made.add_column(Text(column), justify="left" if index == 0 else "right")
@@ -169,7 +169,7 @@ def table(title: str, *columns: str) -> Table:
 
 
 def open_workspace(ctx: click.Context, **flags: object) -> Workspace:
-    """The workspace of the command; `flags` are settings given on the command line."""
+    """Return the workspace of the command; `flags` are settings given on the command line."""
     from shm.store import Workspace
     from shm.store.audit import COMMAND_LINE, Actor
 
@@ -184,14 +184,14 @@ def is_workspace(ctx: click.Context) -> bool:
 
 @contextmanager
 def opened_store(ctx: click.Context) -> Iterator[tuple[Workspace, Store]]:
-    """The workspace of the command and its store, open."""
+    """Return the workspace of the command and its store, open."""
     workspace = open_workspace(ctx)
     with workspace.store() as store:
         yield workspace, store
 
 
 def one_hanger(ctx: click.Context, hanger_file: Path | None, hanger_id: int | None) -> Hanger:
-    """The hanger that the options name; raises UsageError where they name none."""
+    """Return the hanger that the options name; raises UsageError where they name none."""
     if hanger_file is not None:
         return load_hanger(hanger_file, hanger_id)
     if hanger_id is None:
@@ -279,7 +279,7 @@ def _fraction_bar() -> Progress:
 
 
 def counting_bar() -> Progress:
-    """A bar on stderr that counts things done."""
+    """Return a bar on stderr that counts things done."""
     return _bar(MofNCompleteColumn())
 
 

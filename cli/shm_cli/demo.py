@@ -77,7 +77,7 @@ def live_description() -> str:
 
 
 def send_days(workspace: Workspace) -> datetime:
-    """Sends the days of all streams into the ring; when they end."""
+    """Send the days of all streams into the ring; when they end."""
     now = utc_now().replace(minute=0, second=0, microsecond=0)
     first = now - timedelta(days=DAYS)
     lost = Loss(LIVE_LOSING, LIVE_LOSS, first + timedelta(days=LOST_AFTER_DAYS))
@@ -96,7 +96,7 @@ def send_days(workspace: Workspace) -> datetime:
 
 
 def await_windows(workspace: Workspace, store: Store, looks: Iterator[int], ends: datetime) -> None:
-    """Waits until the daemon has read all streams; `looks` paces, and says when it gives up."""
+    """Wait until the daemon has read all streams; `looks` paces, and says when it gives up."""
     names = [each.name for each in workspace.bridge.streams]
     with counting_bar() as bar:
         total = round(DAYS * _WINDOWS_A_DAY * len(names))
@@ -221,7 +221,7 @@ def _random_state(hanger: Hanger, rng: np.random.Generator) -> HangerState:
 
 
 def dropped(tests: Sequence[PlannedTest], workspace: Workspace) -> Iterator[PlannedTest]:
-    """Simulates each test and drops its file into the spool."""
+    """Simulate each test and drop its file into the spool."""
     for test in tests:
         recording = hammer_test(
             test.hanger,
@@ -302,7 +302,7 @@ def _fresh_workspace(folder: Path, text: str) -> Workspace:
 
 @contextmanager
 def _daemon(workspace: Workspace) -> Iterator[subprocess.Popen[bytes]]:
-    """A daemon of its own process, ended by SIGTERM; its log stands in the workspace."""
+    """Return a daemon of its own process, ended by SIGTERM; its log stands in the workspace."""
     log = workspace.folder / "daemon.log"
     command_line = [sys.executable, "-m", "shm_daemon", str(workspace.folder)]
     with log.open("wb") as file:
@@ -319,7 +319,7 @@ def _daemon(workspace: Workspace) -> Iterator[subprocess.Popen[bytes]]:
 def _await(
     count: int, store: Store, daemon: subprocess.Popen[bytes], bar: Progress, label: str
 ) -> None:
-    """Waits until `count` recordings are through; raises ShmError where the daemon gives up."""
+    """Wait until `count` recordings are through; raises ShmError where the daemon gives up."""
     task = bar.add_task(label, total=count)
     for through in _watched(store, daemon):
         bar.update(task, completed=through)
@@ -340,7 +340,7 @@ def _watched(store: Store, daemon: subprocess.Popen[bytes], poll_s: float = 0.3)
 
 
 def _await_alert(store: Store, daemon: subprocess.Popen[bytes]) -> Sequence[StoredAlert]:
-    """The alerts, once the hook has had them."""
+    """Return the alerts, once the hook has had them."""
     for _ in _watched(store, daemon):
         alerts, deliveries = store.alerts.list_all(), store.alerts.list_deliveries()
         if not alerts or all(delivery.state == "delivered" for delivery in deliveries):

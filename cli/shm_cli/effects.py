@@ -72,7 +72,7 @@ think of then. What imitates what:
 )
 @flags.json
 def effects(name: str | None) -> None:
-    """The catalogue of effects: what each does, its ranges, what shows it, what imitates it.
+    """Return the catalogue of effects: what each does, its ranges, what shows it, what imitates it.
 
     The ranges are those of hanger 3 of the thesis, since they scale with the hanger.
 
@@ -127,7 +127,7 @@ def _document(effect: Effect) -> dict[str, object]:
 
 
 def effects_page() -> str:
-    """The page of all effects in Markdown, in the order of the catalogue."""
+    """Return the page of all effects in Markdown, in the order of the catalogue."""
     rows = [(f"[`{e.name}`](#{e.name})", e.title.lower(), _shown_by(e)) for e in EFFECTS.values()]
     parts = [_HEAD + "\n" + markdown(_OVERVIEW_HEADS, rows)]
     return "\n\n".join(parts + [_section(effect) for effect in EFFECTS.values()]) + "\n"
@@ -162,7 +162,7 @@ def _facts(effect: Effect) -> str:
 
 
 def _parameters(effect: Effect) -> dict[str, Parameter]:
-    """The parameters of all its variants by name, on hanger 3."""
+    """Return the parameters of all its variants by name, on hanger 3."""
     return {
         parameter.name: parameter
         for variant in effect.variants(_HANGER, _EVERYTHING)

@@ -31,7 +31,7 @@ class Words(click.ParamType[str]):
     name = "text"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """The text without blanks around it; refuses an empty one."""
+        """Return the text without blanks around it; refuse an empty one."""
         if not value.strip():
             self.fail("it is empty. Say it in a few words.", param, ctx)
         return value.strip()

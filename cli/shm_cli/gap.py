@@ -98,7 +98,7 @@ def plan(
     without: tuple[str, ...],
     seed: int,
 ) -> None:
-    """The next measurements in order, each with its cost and what it promises.
+    """Return the next measurements in order, each with its cost and what it promises.
 
     Of MODES.json, or of the latest 20 tests of a hanger of the workspace. Hours of each kind of
     measurement stand in the table [measurement_hours] of the bridge file.
@@ -234,7 +234,7 @@ for _verb in (adopt, adopted, check, drop, effects):
 def _of_workspace(
     ctx: click.Context, hanger: Hanger, count: int, options: GapOptions
 ) -> DiagnosisSheet:
-    """The diagnosis of the latest tests, which the store keeps."""
+    """Return the diagnosis of the latest tests, which the store keeps."""
     with opened_store(ctx) as (workspace, store):
         stored = latest_tests(store, hanger, count)
         found = _diagnosis([each.test for each in stored], hanger, options)
@@ -329,7 +329,7 @@ def _show(
     html: Path | None,
     figures: Path | None,
 ) -> None:
-    """Writes what is to be written, then answers."""
+    """Write the files, then the answer."""
     if html is not None or figures is not None:
         with drawing():
             if html is not None:

@@ -51,7 +51,7 @@ def decide(
     record: tuple[str | None, str | None],
     time: datetime | None,
 ) -> Decided:
-    """Notes a decision and does what follows from it, or leaves that to the daemon at work.
+    """Record a decision and do what follows, or leave that to the active daemon.
 
     `record` is who decided and why. Raises NothingThere, UsageError; then nothing is changed.
     """
@@ -180,13 +180,13 @@ def discarded_words(hold: Hold) -> str:
 
 
 def hold_line(hold: Hold) -> str:
-    """A hold as text: when, what and why, with the commands that end it."""
+    """Return a hold as text: when, what and why, with the commands that end it."""
     since = f"recording {hold.recording_id}, {hold.file_name}, held since"
     return paragraph(f"{since} {hold.held_at:%Y-%m-%d %H:%M}. {hold.message}")
 
 
 def hold_document(hold: Hold) -> dict[str, Any]:
-    """The same for programs; `decision` is null while nobody has decided."""
+    """Return the same for programs; `decision` is null while nobody has decided."""
     return {
         "recording": hold.recording_id,
         "file": hold.file_name,

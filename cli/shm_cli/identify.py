@@ -207,7 +207,7 @@ def _refuse_several_hangers(sheets: Sequence[ModalTestReport]) -> None:
 
 
 def _document(sheets: Sequence[ModalTestReport]) -> dict[str, Any]:
-    """The modal-tests document, each test with its quality and what was set aside."""
+    """Return the modal-tests document, each test with its quality and what was set aside."""
     found = [sheet.identification for sheet in sheets]
     document = modes_document([each.test for each in found])
     for entry, each in zip(document["tests"], found, strict=True):

@@ -53,7 +53,7 @@ def import_modes(
     modes: ForeignModes, workspace: Workspace, answers: Answers, planes: Sequence[str], *,
     dry_run: bool, asks: bool,
 ) -> int:  # fmt: skip
-    """Takes the modes of a file in, or says what is open; the exit code."""
+    """Take in the modes of a file, or say what is open; return the exit code."""
     answers = replace(answers, channels=_planes(planes, axes_of(modes.modes)))
     found = understand_modes(modes, workspace, answers)
     if found.questions and asks:
@@ -262,7 +262,7 @@ def _answers(options: dict[str, Any], found: Import) -> Answers:
 
 
 def _accelerations(found: Import, tables: dict[str, dict[str, object]]) -> list[str]:
-    """The accelerations in the order of the file, with those that the options make such."""
+    """Return the accelerations in the order of the file, with those that the options make such."""
     known = {column.name: column.quantity for column in found.columns}
     for name, given in tables.items():
         unit = unit_of(str(given.get("unit", "")))

@@ -23,7 +23,7 @@ OfChannel = Callable[[Question, str], dict[str, object]]
 def asked(
     questions: Sequence[Question], answers: Answers, workspace: Workspace, of_channel: OfChannel
 ) -> Answers:
-    """The answers with those of the person at the terminal."""
+    """Return the answers with those of the person at the terminal."""
     tables = {name: dict(given) for name, given in answers.channels.items()}
     for question in questions:
         if question.about == "hanger":

@@ -299,7 +299,7 @@ def show_peeks(files: Sequence[Path], workspace: Workspace | None = None) -> int
 
 
 def _looks(path: Path, workspace: Workspace | None) -> Sequence[Peek]:
-    """A file of which nothing can be made out is one with a problem and no channels."""
+    """Return a file that cannot be read as one with a problem and no channels."""
     try:
         if path.name.lower().endswith(_MODES_SUFFIX):
             return [_modes(path)]
@@ -357,7 +357,7 @@ def _modes(path: Path) -> Peek:
 
 
 def _show_channels(look: Peek) -> None:
-    """A row a channel; calibration and full scale only where a channel has one."""
+    """Return a row a channel; calibration and full scale only where a channel has one."""
     columns = {
         name: cells
         for name, cell_of in _COLUMNS.items()

@@ -57,7 +57,7 @@ def settings_command(
 
 
 def settings_page() -> str:
-    """The manual's page of settings in Markdown, from the one table of settings."""
+    """Return the manual's page of settings in Markdown, from the one table of settings."""
     head = (
         "# Settings\n\n"
         "A value comes from the flag, else the environment (`workers` from `SHM_WORKERS`), else "

@@ -204,7 +204,7 @@ def _use_workspace(ctx: click.Context, option: click.Parameter, folder: str | No
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Runs the command line and exits with the code of the contract."""
+    """Run the command line and exit with the code of the contract."""
     # Modules are no garbage: looking through them, while they load and at the end, takes a fifth
     # of the time of `shm status`.
     gc.disable()
@@ -264,7 +264,7 @@ def _about_file(error: OSError) -> BadInput:
 
 
 def _warn(message: Warning | str, *where: object, **_: object) -> None:
-    """A warning without the place in the code that Python adds."""
+    """Return a warning without the place in the code that Python adds."""
     _say(f"[bold yellow]Warning:[/] {escape(str(message))}")
 
 

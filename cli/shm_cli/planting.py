@@ -25,7 +25,7 @@ from shm_cli.common import advancing_bar, show
 
 
 def effect_of(text: str) -> PlantedEffect:
-    """Reads `NAME:AT:param=value,...`; raises UsageError where it is not that."""
+    """Read `NAME:AT:param=value,...`; raises UsageError where it is not that."""
     name, _, rest = text.partition(":")
     at, _, pairs = rest.partition(":")
     try:
@@ -75,7 +75,7 @@ class Live:
 
 
 def simulate_streams(workspace: Workspace, chosen: Live) -> None:
-    """Sends the days of every stream that `bridge.toml` describes; the ends of all are alike.
+    """Send the days of every stream that `bridge.toml` describes; the ends of all are alike.
 
     Raises NothingThere where it describes none.
     """
@@ -111,7 +111,7 @@ def arriving(
     seconds: float,
     seed: int,
 ) -> Iterator[Chunk]:
-    """The chunks of all streams in the order of time."""
+    """Return the chunks of all streams in the order of time."""
     each = [streamed(hanger, stream, plan, first, seconds, seed) for hanger, stream in sensed]
     return heapq.merge(*each, key=lambda chunk: chunk.start)
 
@@ -140,7 +140,7 @@ def _whole_hour(at: datetime) -> datetime:
 
 
 def _loss(text: str, first: datetime) -> Loss:
-    """Reads `HANGER:PERCENT:DAY`."""
+    """Read `HANGER:PERCENT:DAY`."""
     try:
         hanger, percent, day = text.split(":")
         return Loss(int(hanger), float(percent) / 100, first + timedelta(days=float(day)))

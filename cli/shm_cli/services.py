@@ -130,7 +130,7 @@ _PLAIN = re.compile(r"[A-Za-z0-9_./:@+,=-]+")
 
 
 def print_unit(name: str, workspace: Path, words: Sequence[str], *writes: Path) -> None:
-    """Prints the unit `name` of the shm that runs here: see `unit_text`."""
+    """Print the unit `name` of the shm that runs here: see `unit_text`."""
     click.echo(unit_text(name, workspace, Path(sys.prefix), words, *writes), nl=False)
 
 
@@ -141,7 +141,7 @@ def serving_words(host: str, port: int, files: Mapping[str, Path | None]) -> Seq
 
 
 def unit_text(name: str, workspace: Path, prefix: Path, words: Sequence[str], *writes: Path) -> str:
-    """The unit `name` for a workspace, with the shm installed under `prefix`.
+    """Return the unit `name` for a workspace, with the shm installed under `prefix`.
 
     It calls `shm` with `words` as the owner of the workspace, and may write to the workspace and
     to `writes`. Raises UsageError where a path or a word holds what a unit would have to quote.

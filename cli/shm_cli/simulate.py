@@ -217,7 +217,7 @@ def _tell(written: Sequence[Path]) -> None:
 
 
 def _refuse_other_supports(hanger: Hanger) -> None:
-    """The simulated bars stand on springs that clamp them in the end, and are in tension."""
+    """Raise UsageError unless the hanger is clamped or on springs, and in tension."""
     if hanger.as_hanger:
         return
     held = "" if hanger.supports.clamped else "is not clamped at both ends"

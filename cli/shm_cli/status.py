@@ -175,7 +175,7 @@ def _held_lines(held: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _shift(held: Mapping[str, Any]) -> float:
-    """The largest shift of tension that its tests imply; 0 where nothing is known."""
+    """Return the largest shift of tension that its tests imply; 0 where nothing is known."""
     shifts = [abs(test["tension_shift"]) for test in held["tests"]]
     return max((shift for shift in shifts if not math.isnan(shift)), default=0.0)
 
@@ -338,7 +338,7 @@ _OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
 
 
 def show_stages(ctx: click.Context, which: str) -> None:
-    """Raises NothingThere where there is no such recording or test."""
+    """Raise NothingThere where there is no such recording or test."""
     with opened_store(ctx) as (_, store):
         recording_id, _ = store.recordings.find(which)
         recording = store.recordings.get(recording_id)

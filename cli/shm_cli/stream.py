@@ -157,7 +157,7 @@ def _cells(state: StreamCondition) -> tuple[str, ...]:
 
 
 def _document(state: StreamCondition, hammer: AmbientBias) -> dict[str, Any]:
-    """An entry of `--json`; unknown numbers are NaN."""
+    """Return an entry of `--json`; unknown numbers are NaN."""
     window, hour = state.window, state.hour
     return {
         "name": state.stream.name,

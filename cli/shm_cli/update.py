@@ -47,7 +47,7 @@ _sampler = click.option(
 
 
 def _updating(function: flags.F) -> flags.F:
-    """The options that both have."""
+    """Return the options that both have."""
     updating = (flags.seed, flags.samples, flags.priors, _sampler, _calibrated_by)
     for option in reversed((flags.hanger(), flags.hanger_file, *updating, flags.json)):
         function = option(function)
@@ -142,7 +142,7 @@ def show_stated(averaged: Averaged) -> None:
 
 
 def show_posterior(posterior: Posterior, limits: Limits | None = None) -> None:
-    """The tension in words, parameters and predicted frequencies as tables."""
+    """Return the tension in words, parameters and predicted frequencies as tables."""
     show_stated(averaged_now(posterior, limits=limits))
     tension_n = summary(
         posterior.tension_n, posterior.most_probable[0] * posterior.nominal_tension_n

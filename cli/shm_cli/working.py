@@ -20,7 +20,7 @@ from shm_daemon.hooks import HookNotifier
 
 @contextmanager
 def working(workspace: Workspace) -> Iterator[Flow]:
-    """A flow while the context lasts; raises StoreBusy where another process ingests."""
+    """Return a flow while the context lasts; raises StoreBusy where another process ingests."""
     settings = workspace.settings
     with ExitStack() as stack:
         stack.enter_context(workspace.lock())
@@ -80,7 +80,7 @@ def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
 
 
 def _refuse_without_raw_file(workspace: Workspace, store: Store, recording_id: int) -> None:
-    """Raises NothingThere, saying where the raw file lies, where it is not in the archive.
+    """Raise NothingThere, saying where the raw file lies, where it is not in the archive.
 
     And StoreError where it is damaged there: nothing is superseded for want of it.
     """
@@ -115,7 +115,7 @@ def sentences(rerun: Rerun, stage: Stage) -> list[str]:
 
 
 def rerun_document(rerun: Rerun, stage: Stage) -> dict[str, Any]:
-    """The same for programs."""
+    """Return the same for programs."""
     return {
         "recording": rerun.recording.id,
         "from": stage.value,

@@ -63,7 +63,7 @@ class Visitor:
 
 
 def site_of(request: Request) -> Site:
-    """The site that the app serves."""
+    """Return the site that the app serves."""
     site = request.app.state.site
     assert isinstance(site, Site)
     return site
@@ -157,7 +157,7 @@ async def with_passwords(request: Request, does: Callable[[], Response]) -> Resp
 
 
 def refuse_foreign(request: Request) -> None:
-    """Raises Refused where a page of somebody else has a browser send this.
+    """Raise Refused where a page of somebody else has a browser send this.
 
     Browsers name the page's origin with whatever changes something; SameSite alone lets pages of
     other ports of this machine through.
@@ -206,7 +206,7 @@ def session_of(request: Request, site: Site, name: str, password: str) -> str:
 def change_password_of(
     request: Request, site: Site, person: Visitor, old: str, password: str
 ) -> None:
-    """Raises UsageError where the new one is poor, Refused where the old one is wrong or too many
+    """Raise UsageError where the new one is poor, Refused where the old one is wrong or too many
     were. The browser that asks stays signed in.
     """
     caller = unless_throttled(request, site, person.name)
@@ -217,7 +217,7 @@ def change_password_of(
 
 
 def unless_throttled(request: Request, site: Site, name: str | None = None) -> str:
-    """The address that asks; raises Refused where too much that is wrong came from there."""
+    """Return the address that asks; raises Refused where too much that is wrong came from there."""
     forwarded = request.headers.get("x-forwarded-for", "")
     peer = request.client.host if request.client else ""
     caller = caller_of(peer, forwarded, site.workspace.settings.web_proxies)
@@ -243,7 +243,7 @@ def _found(site: Site, secret: str) -> Visitor | None:
 
 
 def _visitor(request: Request, site: Site, secret: str, needed: Role) -> Visitor:
-    """The one place where a role is held against what a route needs."""
+    """Return the caller if its role is enough; raises Refused. No other place checks roles."""
     found = visitor_in_force(request, site, secret)
     if found.role.may(needed):
         return found
@@ -273,7 +273,7 @@ def _signed_in(request: Request, site: Site, otherwise: str, needed: Role) -> Vi
 
 
 def _is_at_home(request: Request, site: Site) -> bool:
-    """A proxy on this machine brings strangers in: what it passes on needs a token too."""
+    """Return True for a caller on this machine; a request through a proxy needs a token, too."""
     return site.address.is_loopback and not any(name in request.headers for name in _FORWARDED)
 
 

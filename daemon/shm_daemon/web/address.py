@@ -119,7 +119,7 @@ def test_json(hanger_id: int, name: str) -> str:
 
 
 def name_in(address: str) -> str:
-    """The name of the test whose address ends so, decoded."""
+    """Return the name of the test whose address ends so, decoded."""
     return address.removesuffix("/") if address.removesuffix("/") in _DOTS else address
 
 

@@ -115,7 +115,7 @@ log = logging.getLogger(__name__)
 
 
 def warm_up(app: FastAPI) -> None:
-    """Takes about a second; requests are answered meanwhile."""
+    """Load what pages need, for about a second; requests are answered meanwhile."""
     frame.prepare_templates()
     try:
         glance(app.state.site, utc_now())

@@ -94,7 +94,7 @@ class BackgroundWorker(Generic[Made]):
             return None
 
     def close(self) -> None:
-        """Ends the work and its process."""
+        """End the work and its process."""
         with self._changed:
             self._closed, thread = True, self._thread
             self._waiting.clear()
@@ -174,7 +174,7 @@ class BackgroundWorker(Generic[Made]):
                 self._kept.popitem(last=False)
 
     def _tried_again(self, order: Order) -> None:
-        """An order fails whose process died twice.
+        """Fail a request whose process died twice.
 
         Once may be no fault of its own: who ends all our processes often ends that one first, and
         whoever asks in the moment before we end as well must not be told of a fault.
@@ -197,7 +197,7 @@ class BackgroundWorker(Generic[Made]):
 
 
 def background_worker_of(request: Request) -> BackgroundWorker[Any]:
-    """The background worker of the app, for all that is ordered there."""
+    """Return the background worker of the app, for all that is ordered there."""
     found: BackgroundWorker[Any] = request.app.state.background_worker
     return found
 

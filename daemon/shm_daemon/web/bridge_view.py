@@ -125,7 +125,7 @@ class Comparison:
 
 
 def glance(site: Site, now: datetime) -> BridgeGlance:
-    """The bridge as the store has it now."""
+    """Return the bridge as the store has it now."""
     workspace, store = site.workspace, site.store
     tests, quiet_before = store.tests.latest(), now - timedelta(days=workspace.settings.quiet_days)
     hangers = tuple(
@@ -214,7 +214,7 @@ class Elevation:
 
 
 def elevation(hangers: Sequence[HangerGlance]) -> Elevation:
-    """The hangers evenly spaced in their order, as long as they are, the arch over them."""
+    """Return the hangers evenly spaced in their order, as long as they are, the arch over them."""
     step = min(_MOST_STEP, max(_LEAST_STEP, (_WIDEST - 2 * _SIDE) / (len(hangers) + 1)))
     longest = max(each.hanger.length_m for each in hangers)
     deck = _TOP + _TALLEST
@@ -242,7 +242,7 @@ def kind_of(glance: HangerGlance) -> str:
 
 
 def shift_words(glance: HangerGlance) -> str:
-    """The shift from the baseline as people say it."""
+    """Return the shift from the baseline as people say it."""
     if glance.is_baseline:
         return "is the baseline"
     if glance.shift is None:

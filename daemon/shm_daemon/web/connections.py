@@ -132,7 +132,7 @@ class Guarded(H11Protocol):
             super().connection_lost(exc)
 
     def cut_off(self) -> None:
-        """Ends it without a word: who does not ask is not answered."""
+        """End it without a word: who does not ask is not answered."""
         self._stop_waiting()
         if self._plain is not None:
             # Else the system would keep what is unsent, and try for minutes to deliver it.
@@ -183,7 +183,7 @@ class Guarded(H11Protocol):
 
 
 def guarded_by(door: Door) -> type[Guarded]:
-    """The protocol of a server with that door."""
+    """Return the protocol of a server with that door."""
     return type("Guarded", (Guarded,), {"door": door})
 
 

@@ -77,7 +77,7 @@ def answers(*statuses: int) -> dict[int | str, dict[str, Any]]:
 
 
 def handle_faults(app: FastAPI) -> None:
-    """Turns every error into an answer of ours; one that is not ours is logged and not told."""
+    """Turn every error into an answer of ours; one that is not ours is logged and not told."""
     app.add_exception_handler(HTTPException, _refused)
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(ShmError, _known)
@@ -87,7 +87,7 @@ def handle_faults(app: FastAPI) -> None:
 def fault(
     status: int, message: str, remedy: str = "", headers: dict[str, str] | None = None
 ) -> JSONResponse:
-    """The answer itself."""
+    """Return the answer itself."""
     return JSONResponse(Fault(message=message, remedy=remedy).model_dump(), status, headers)
 
 

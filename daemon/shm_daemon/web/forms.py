@@ -40,7 +40,7 @@ def _up_to(longest_bytes: int) -> Any:
 
 
 async def _with_photo(request: Request) -> dict[str, bytes]:
-    """Raises Refused where it is too long, or no form with a file."""
+    """Raise Refused where it is too long, or no form with a file."""
     found = _BOUNDARY.search(request.headers.get("content-type", ""))
     if found is None:
         raise Refused(415, "This is no form with a file.", "Send it from our page.")
@@ -74,7 +74,7 @@ FormWithPhoto = Annotated[dict[str, bytes], Depends(_with_photo)]
 def done_or_again(
     does: Callable[[], object], then: str, again: Callable[[str, int], Response]
 ) -> Response:
-    """Sends to the address `then` what a form asked for; `again` shows why it was not done."""
+    """Send to the address `then` what a form asked for; `again` shows why it was not done."""
     try:
         does()
     except (BadInput, NothingThere, UsageError) as error:
@@ -94,7 +94,7 @@ def reason_in(form: Mapping[str, str], of: str) -> str:
 
 
 def time_in(form: Mapping[str, str], name: str) -> datetime | None:
-    """A time or day in UTC, None where the field is empty; raises BadInput."""
+    """Return a time or day in UTC, None where the field is empty; raises BadInput."""
     text = form.get(name, "")
     try:
         return parse_time(text) if text else None

@@ -51,7 +51,7 @@ FOR_ENGINEERS = (("/settings", "Settings"), ("/users", "Users"), ("/audit", "Aud
 
 
 def page(request: Request, template: str, *, status: int = 200, **content: Any) -> HTMLResponse:
-    """A page in the frame; `content` is what its template needs.
+    """Return a page in the frame; `content` is what its template needs.
 
     Whoever may read sees the navigation, a stranger none: `access.reading` notes who asks.
     """
@@ -72,7 +72,7 @@ def page(request: Request, template: str, *, status: int = 200, **content: Any) 
 
 
 def prepare_templates() -> None:
-    """Reads all pages' templates, so that no visitor waits for it."""
+    """Read all pages' templates, so that no visitor waits for it."""
     templates = _environment()
     for name in templates.list_templates(extensions=["j2"]):
         templates.get_template(name)
@@ -104,7 +104,7 @@ def asset(name: str) -> str:
 
 @cache
 def plotly_address() -> str:
-    """The address of plotly's script, of the version that is installed."""
+    """Return the address of plotly's script, of the version that is installed."""
     try:
         return f"/static/plotly.js?v={version_of('plotly')}"
     except PackageNotFoundError:
@@ -145,13 +145,13 @@ def _address(request: Request) -> str:
 
 @router.get("/static/plotly.js")
 def plotly(request: Request) -> Response:
-    """The script that draws figures, under an address that changes with its version."""
+    """Return the script that draws figures, under an address that changes with its version."""
     return _answer(request, "plotly.js", request.query_params.get("v") == version_of("plotly"))
 
 
 @router.get("/static/{name}")
 def static_file(request: Request, name: str) -> Response:
-    """A file of ours."""
+    """Return a file of ours."""
     if name != "report.css" and name not in {path.name for path in STATIC.iterdir()}:
         raise NothingThere(f"There is no {name}.")
     is_of_version = name != "report.css" and asset(name).endswith(f"?{request.url.query}")

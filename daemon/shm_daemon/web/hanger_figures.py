@@ -57,7 +57,7 @@ class HangerFigure:
     is_wide: bool = False
 
     def document(self, view: HangerView) -> dict[str, Any]:
-        """The plotly document with its words."""
+        """Return the plotly document with its words."""
         found = self.draw(view)
         assert isinstance(found, Specification)
         return with_plotly.with_words(found, self.caption(view), self.alt(view))
@@ -160,12 +160,12 @@ def _reach(view: HangerView) -> float:
 
 
 def tension_unit(points: Sequence[TrendPoint]) -> ForceUnit:
-    """The one unit of the tensions of a hanger's tests."""
+    """Return the one unit of the tensions of a hanger's tests."""
     return force_unit(*(point.averaged.tension_n.mean for point in points))
 
 
 def _with_temperature(view: HangerView) -> list[TrendPoint]:
-    """Tests with a temperature."""
+    """Return the tests with a temperature."""
     return [point for point in view.trend if math.isfinite(point.temperature_c)]
 
 
@@ -229,7 +229,7 @@ def _shrinks(view: HangerView) -> bool:
 
 
 def report_of(view: HangerView) -> HangerReport:
-    """The report of a view that has one."""
+    """Return the report of a view that has one."""
     assert view.report is not None
     return view.report
 

@@ -49,7 +49,7 @@ class StatesOrder:
     false_call_years: float
 
     def make(self) -> StatesOverTime:
-        """Runs in a process of its own: the workspace is opened anew."""
+        """Run in a process of its own: the workspace is opened anew."""
         workspace = Workspace.open(self.folder)
         with workspace.store() as store:
             baseline = store.watch.baseline(self.hanger.id, self.model)
@@ -133,7 +133,7 @@ class HangerView:
 
 
 def view_of(request: Request, site: AtSite, hanger_id: HangerNumber) -> HangerView:
-    """The hanger that is asked for; raises NothingThere."""
+    """Return the hanger that is asked for; raises NothingThere."""
     hanger = described(site.workspace, hanger_id)
     return HangerView(site.workspace, site.store, hanger, background_worker_of(request))
 

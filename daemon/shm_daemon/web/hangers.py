@@ -192,7 +192,7 @@ _SHIFT = ("quantity", "shift_mean", "shift_sd", "threshold", "probability")
 
 @_of_all.get("/status", response_model=Status, summary="What is held and what waits")
 def status(site: AtSite, _: Reader) -> Any:
-    """Counts of recordings, files, alerts and deliveries."""
+    """Return counts of recordings, files, alerts and deliveries."""
     workspace, store = site.workspace, site.store
     return {
         "bridge": workspace.bridge.name,
@@ -299,7 +299,7 @@ def some_tests(
         Query(ge=0, le=LARGEST_NUMBER, description="`next_before` of the answer before."),
     ] = None,
 ) -> Any:
-    """The newest first; those before a test where `before` names its number."""
+    """Return the newest first; those before a test where `before` names its number."""
     shown, older = paged(lines_before(view, limit + 1, before), limit)
     return {"hanger": view.hanger.id, "tests": list(map(_test, shown)), "next_before": older}
 
@@ -312,7 +312,7 @@ def figure(
     view: View,
     name: Annotated[str, Path(max_length=40, description="`trend`, `stiffness`, ...")],
 ) -> JSONResponse:
-    """A plotly document with its caption; with `Retry-After` where it is not whole yet."""
+    """Return a plotly document with its caption; with `Retry-After` where it is not whole yet."""
     found = next((each for each in FIGURES if each.name == name and each.is_there(view)), None)
     if found is None:
         raise NothingThere(

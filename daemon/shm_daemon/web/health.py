@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 def health_document(site: Site) -> tuple[int, dict[str, Any]]:
-    """The answer of `/health`: its status and its document.
+    """Return the answer of `/health`: its status and its document.
 
     Who is degraded still works: only who fails answers 503.
     """

@@ -78,7 +78,7 @@ class Exposition(Collector):
         yield errors
 
     def _made(self, name: str, part: _Part) -> list[Metric]:
-        """A part as a whole; nothing where it fails, for whatever reason."""
+        """Return a part as a whole; nothing where it fails, for whatever reason."""
         try:
             made = list(part(self._site))
         except Exception as error:

@@ -64,7 +64,7 @@ class TestFigure:
         return self.member.title
 
     def document(self, shown: Shown) -> dict[str, Any] | None:
-        """The plotly document with its words; None where there is nothing to show."""
+        """Return the plotly document with its words; None where there is nothing to show."""
         found = self.member.draw(shown)
         if not isinstance(found, Specification):
             return None
@@ -181,7 +181,7 @@ class TestView:
         return " ".join(part for part in (trust(self.as_stored), advice(self.as_stored)) if part)
 
     def whole(self) -> WorkedOut | None:
-        """The whole sheet; None while it is worked out, which this begins.
+        """Return the whole sheet; None while it is worked out, which this begins.
 
         Raises NothingThere where there is no more than the store holds, and the ShmError with
         which working it out failed.
@@ -204,7 +204,7 @@ class TestView:
         return tuple(each for each in MEMBERS if each.source != "file" and each.member.draw(shown))
 
     def figure(self, figure: TestFigure, point: int) -> Figure:
-        """A figure at the response of index `point`; raises as `whole`, and NothingThere."""
+        """Return a figure at the response of index `point`; raises as `whole`, and NothingThere."""
         found = None if figure.source == "file" else figure.document(self.shown(point))
         packed = json.dumps(found, allow_nan=False).encode() if found else None
         if self.worked:
@@ -247,7 +247,7 @@ class ModalTestOrder:
     terms: Lineage
 
     def make(self) -> WorkedOut:
-        """Identifies the raw file once more; raises what `modal_test_report` does.
+        """Identify the raw file once more; raises what `modal_test_report` does.
 
         It runs in a process of its own: the workspace is opened anew.
         """

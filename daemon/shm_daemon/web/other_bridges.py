@@ -114,7 +114,7 @@ def _failure(error: Exception) -> NotTold:
 
 
 def _judged(bridge: OtherBridge, status: int, body: bytes | bytearray) -> Summary:
-    """The summary of an answer; raises NotTold."""
+    """Return the summary of an answer; raises NotTold."""
     try:
         found = json.loads(body)
     except (ValueError, RecursionError):
@@ -193,7 +193,7 @@ class OtherBridges:
             return [self._row(each, self._known.get(each), now) for each in bridges]
 
     def close(self) -> None:
-        """Breaks off what is being asked."""
+        """Break off what is being asked."""
         self._lines.close()
         self._pool.shutdown(wait=False, cancel_futures=True)
 

@@ -45,7 +45,7 @@ class WrongAttempts:
         return max([0.0, *(at - self._clock() for at in due)])
 
     def note_wrong(self, address: str, name: str | None = None) -> None:
-        """A password of this user, or a token, was wrong."""
+        """Count a wrong password of this user, or a wrong token."""
         now = self._clock()
         for key, most in _counted(address, name):
             with self._lock:
@@ -180,7 +180,7 @@ def held_documents(site: Site, hanger: int | None = None) -> list[dict[str, Any]
 
 
 def described(workspace: Workspace, hanger_id: int) -> Hanger:
-    """A hanger of the bridge; raises NothingThere."""
+    """Return a hanger of the bridge; raises NothingThere."""
     try:
         return workspace.bridge.hanger(hanger_id)
     except BadInput as error:

@@ -48,7 +48,7 @@ def origin(view: TestView) -> Table:
 
 
 def steps_of(view: TestView) -> tuple[Step, ...]:
-    """The steps of the file, and those of this test of it."""
+    """Return the steps of the file, and those of this test of it."""
     found = view.store.recordings.list_steps(view.recording.id)
     return tuple(step for step in found if step.test in (None, view.stored.test.id))
 
@@ -228,7 +228,7 @@ Point = Annotated[
 
 
 def view_of(request: Request, site: AtSite, hanger_id: HangerNumber, test: Name) -> TestView:
-    """The test that is asked for; raises NothingThere."""
+    """Return the test that is asked for; raises NothingThere."""
     store = site.store
     stored = store.tests.named(described(site.workspace, hanger_id).id, name_in(test))
     recording = store.recordings.get(stored.recording_id)
@@ -250,7 +250,7 @@ def figure(
     figure: Annotated[str, Path(description="One of the names in `figures` of the test.")],
     point: Point = 0,
 ) -> Response:
-    """A plotly document. A 200 with `Retry-After` is what the store has; more will come."""
+    """Return a plotly document. A 200 with `Retry-After` is what the store has; more will come."""
     if figure not in FIGURES:
         raise NothingThere(f"no figure {figure!r}.", remedy=f"Known: {', '.join(FIGURES)}.")
     found = view.figure(FIGURES[figure], point)
@@ -319,7 +319,7 @@ def test(_: Reader, view: View) -> Any:
 
 
 def waiting() -> JSONResponse:
-    """The answer while something is worked out."""
+    """Return the answer while something is worked out."""
     return JSONResponse({"message": AT_WORK}, 202, RETRY_AFTER)
 
 

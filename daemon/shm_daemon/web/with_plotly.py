@@ -110,7 +110,7 @@ class _Drawing:
         domains: tuple[list[float], ...],
         column: int,
     ) -> None:
-        """The vertical axis of a panel, its title and its words."""
+        """Return the vertical axis of a panel, its title and its words."""
         (x, y), (width, domain) = axes, domains
         upright = {**_axis_of(panel.y), "domain": domain, "anchor": x}
         if panel.shares_y:
@@ -144,7 +144,7 @@ class _Drawing:
             found["fixedrange"] = "tickvals" in found  # which would not follow
 
     def _overlay(self, y: str) -> str:
-        """An axis from 0 to 1 without numbers over the panel of the axis `y`."""
+        """Return an axis from 0 to 1 without numbers over the panel of the axis `y`."""
         key = f"yaxis{len(self.figure.panels) + self.overlays}"
         if self.layout.get(key, {}).get("overlaying") != y:
             self.overlays += 1
@@ -347,7 +347,7 @@ _TRACES: dict[type[spec.Mark], Any] = {
 
 
 def colour_of(name: str, opacity: float = 1.0) -> str:
-    """A colour of the palette (`blue`, `orange`, ..., `ink`), as plotly takes it."""
+    """Return a colour of the palette (`blue`, `orange`, ..., `ink`), as plotly takes it."""
     code = PALETTE[name]
     if opacity >= 1:
         return code

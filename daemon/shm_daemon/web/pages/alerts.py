@@ -122,7 +122,7 @@ def _now(alert: AlertRow, message: HangerMessage | None) -> str:
 
 
 def _address(alert: AlertRow, site: Site) -> str | None:
-    """An alert that only tries a hook is of no test."""
+    """Return the page that an alert is about; None for one that only tries a hook."""
     if stream := _stream_of(alert, site):
         return f"/streams/{stream}"
     if "held" in alert.kinds:  # what is held has no page of its own
@@ -131,7 +131,7 @@ def _address(alert: AlertRow, site: Site) -> str | None:
 
 
 def _stream_of(alert: AlertRow, site: Site) -> str | None:
-    """The stream whose hourly reading raised an alert; None of a hammer test."""
+    """Return the stream whose hourly reading raised an alert; None of a hammer test."""
     name, _, hour = alert.test.rpartition(" ")
     known = (each.name for each in site.workspace.bridge.streams)
     return name if hour and name in known else None
@@ -178,7 +178,7 @@ def alerts(
     summary="Take note of an alert",
 )
 def acknowledge(site: AtSite, writer: Writer, alert_id: Row, comment: Acknowledge) -> Any:
-    """Notes on the record that somebody has seen an alert, or with `resolved` to its end."""
+    """Record that somebody has seen an alert, or with `resolved` that it has ended."""
     named = comment.who is not None and not writer.is_person  # who signed in has a name
     who = f"{comment.who} (token {writer.name})" if named else writer.name
     alerts = site.store.acting_as(writer.actor).alerts
@@ -228,7 +228,7 @@ def _delivery(row: DeliveryRow, hook: Hook | None, message: str, now: datetime) 
 
 @router.post("/silences", include_in_schema=False)
 def silence(site: AtSite, writer: Writer, form: Form) -> Response:
-    """Holds the messages of hooks back for a while."""
+    """Hold the messages of hooks back for a while."""
     now, number, why = utc_now(), form.get("hanger", ""), reason_in(form, "a silence")
     since, until = time_in(form, "from") or now, time_in(form, "until")
     if until is None or not (number == "all" or number.isdecimal()):
@@ -245,6 +245,6 @@ def silence(site: AtSite, writer: Writer, form: Form) -> Response:
 
 @router.post("/silences/{number}/end", include_in_schema=False)
 def end_silence(site: AtSite, writer: Writer, number: Row) -> Response:
-    """Ends one before its time."""
+    """End one before its time."""
     site.store.acting_as(writer.actor).silences.end(number, writer.actor.name, utc_now())
     return RedirectResponse("/alerts#silences", 303)

@@ -57,7 +57,7 @@ _COMPARING = "The hangers are being compared …"
 
 @router.get("/", include_in_schema=False)
 def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
-    """The whole bridge at a glance."""
+    """Return the whole bridge at a glance."""
     now = utc_now()
     bridge = glance(site, now)
     found = compared(request, site) if len(bridge.hangers) <= QUICKLY_COMPARED else None
@@ -109,7 +109,7 @@ def bridge(site: AtSite, _: Reader) -> Any:
     summary="What moved over the bridge",
 )
 def moved(request: Request, site: AtSite, _: Reader) -> Any:
-    """The hangers compared with each other; 202 while that is being worked out."""
+    """Return the hangers compared with each other; 202 while that is being worked out."""
     found = compared(request, site)
     if found is None:
         return _underway()
@@ -121,7 +121,7 @@ def moved(request: Request, site: AtSite, _: Reader) -> Any:
 
 
 def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
-    """The tiles over the drawing."""
+    """Return the tiles over the drawing."""
     latest = bridge.latest
     alerts = sum(each.line.open_alerts for each in bridge.hangers)
     quiet = sum(each.is_quiet for each in bridge.hangers)
@@ -142,7 +142,7 @@ def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
 
 
 def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
-    """A hanger's row of the table."""
+    """Return a hanger's row of the table."""
     line, hanger = each.line, each.hanger
     latest, (tension, nominal, shift) = line.latest, each.cells(unit)
     return {

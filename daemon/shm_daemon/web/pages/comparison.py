@@ -77,7 +77,7 @@ def compare_page(
 def compare_figure(
     site: AtSite, _: Reader, hanger: _Chosen = None, since: _Since = None
 ) -> JSONResponse:
-    """A plotly document: the tension of each hanger since its baseline."""
+    """Return a plotly document: the tension of each hanger since its baseline."""
     courses = _courses(site, _chosen(site, hanger or []), since)
     if not courses:
         raise NothingThere(

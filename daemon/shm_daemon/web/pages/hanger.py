@@ -170,7 +170,7 @@ def _events(view: HangerView) -> Table:
 
 
 def _neighbours(workspace: Workspace, hanger: Hanger) -> list[tuple[str, Hanger]]:
-    """The hangers before and after it in the description."""
+    """Return the hangers before and after it in the description."""
     order: Sequence[Hanger] = workspace.bridge.hangers
     place = [each.id for each in order].index(hanger.id)
     before = [("previous", order[place - 1])] if place > 0 else []

@@ -19,7 +19,7 @@ router = APIRouter(prefix=NOTES, include_in_schema=False)
 
 @router.post("")
 def write(site: AtSite, writer: Uploader, form: FormWithPhoto) -> Response:
-    """Keeps what an operator wrote, and shows it where it was written."""
+    """Store a note of an operator, and show it where it was written."""
     words = {name: value.decode("utf-8", "replace").strip() for name, value in form.items()}
     number, now, who = words.get("hanger", ""), utc_now(), writer.actor
     try:
@@ -40,5 +40,5 @@ def write(site: AtSite, writer: Uploader, form: FormWithPhoto) -> Response:
 
 @router.get("/{number}/photo")
 def photo(site: AtSite, _: Reader, number: Row) -> Response:
-    """The photo of a note."""
+    """Return the photo of a note."""
     return Response(site.store.notes.photo(number), media_type="image/jpeg")

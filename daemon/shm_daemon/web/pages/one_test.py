@@ -35,7 +35,7 @@ _NOT_STORED = ("exponential window on the responses", "records")
 def one_test(
     request: Request, _: Reader, view: View, response: Response = None, part: Part = "page"
 ) -> HTMLResponse:
-    """The page; or, where `part` says so, its tables of hits, once they are worked out."""
+    """Return the page; or, where `part` says so, its tables of hits, once they are worked out."""
     if part == "hits":  # without the frame: the page that asked puts them in their place
         if view.whole() is None:
             return HTMLResponse(f'<p class="note">{AT_WORK}</p>', 202, RETRY_AFTER)
@@ -103,7 +103,7 @@ def _chart(view: TestView, figure: TestFigure, chosen: int) -> tuple[str, int]:
 
 
 def _facts(view: TestView) -> tuple[tuple[str, str, str], ...]:
-    """The figures on top: what, value, what stands beside it."""
+    """Return the figures on top: what, value, what stands beside it."""
     test, sheet = view.stored.test, view.sheet
     planes = {mode.plane for mode in sheet.modes}
     n_foreign = len(sheet.identification.set_aside)

@@ -122,7 +122,7 @@ def _refuse_decided(site: Site, recording: int) -> None:
 
 @router.get("/operation/examination", include_in_schema=False)
 def examination_fragment(request: Request, site: AtSite, _: Reader) -> Response:
-    """The examination alone, for a page that is shown already."""
+    """Return the examination alone, for a page that is shown already."""
     found = _examination(request, site)
     if found is None:
         return _underway()
@@ -169,7 +169,7 @@ def _operation(site: Site) -> dict[str, Any]:
 
 
 def _refused(workspace: Workspace) -> list[dict[str, Any]]:
-    """The newest first."""
+    """Return the newest first."""
     reasons = workspace.quarantine.folder.glob("*.reason.json")
     newest = sorted(((_modified_ns(path), path) for path in reasons), reverse=True)[:_SHOWN]
     return [_reason(path) for _, path in newest]

@@ -103,7 +103,7 @@ def streams(site: AtSite, _: Reader) -> Any:
     summary="What a stream has shown",
 )
 def stream_figure(site: AtSite, _: Reader, name: Name, days: Days = 7.0) -> JSONResponse:
-    """A plotly document: spectra, tracked frequencies, tension, sensors at fault."""
+    """Return a plotly document: spectra, tracked frequencies, tension, sensors at fault."""
     stream = _stream(site, name)
     until = ring_of(site.workspace).latest().get(name, utc_now())
     course = stream_course(site.store, stream, until - timedelta(days=days), until)

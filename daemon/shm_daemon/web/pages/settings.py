@@ -64,13 +64,13 @@ class _Row:
 
 @router.get("/settings")
 def settings_page(request: Request, site: AtSite, _: Engineer, hanger: Before = None) -> Response:
-    """The bridge's settings and hooks, and the thresholds and limits of one hanger."""
+    """Return the bridge's settings and hooks, and the thresholds and limits of one hanger."""
     return _page(request, site, hanger)
 
 
 @router.post("/settings")
 def change(request: Request, site: AtSite, engineer: Engineer, form: Form) -> Response:
-    """Sets one value, or gives it back to `bridge.toml`."""
+    """Set one value, or give it back to `bridge.toml`."""
     key, hanger, workspace = form.get("key", ""), None, site.workspace
     rows = {row.key: row for row in _all_rows(workspace.bridge, workspace.settings)}
     if key not in rows:

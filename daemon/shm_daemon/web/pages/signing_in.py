@@ -67,7 +67,7 @@ def sign_in_page(request: Request, site: AtSite, next: str = "/") -> Response:
 
 @router.post("/sign-in", dependencies=[Depends(refuse_foreign)])
 async def sign_in(request: Request, site: AtSite, form: FormOfAnybody) -> Response:
-    """Gives the cookie to who signs in; removing the user or revoking the token ends it at once."""
+    """Give the cookie to who signs in; removing the user or revoking the token ends it at once."""
     let_in = partial(_let_in, request, site, form)
     return await (with_passwords(request, let_in) if "name" in form else run_in_threadpool(let_in))
 
@@ -96,7 +96,7 @@ def _keep_signed_in(request: Request, answer: Response, secret: str) -> None:
 
 @router.post("/sign-out", dependencies=[Depends(refuse_foreign)])
 def sign_out(request: Request, site: AtSite) -> Response:
-    """Ends the session and takes the cookie back."""
+    """End the session and remove the cookie."""
     secret = request.cookies.get(COOKIE, "")
     if secret.startswith(SESSION):
         site.store.people.sign_out(secret, utc_now())
@@ -106,12 +106,12 @@ def sign_out(request: Request, site: AtSite) -> Response:
 
 
 def _ask(request: Request, wanted: str, status: int = 200, message: str = "") -> Response:
-    """The page that asks who one is, with what went wrong."""
+    """Return the page that asks who one is, with what went wrong."""
     return page(request, "sign_in.html.j2", status=status, message=message, next=_ours(wanted))
 
 
 def _ours(wanted: str) -> str:
-    """An address of this site: nobody is sent elsewhere after signing in."""
+    """Return an address of this site: nobody is sent elsewhere after signing in."""
     plain = wanted.startswith("/") and wanted.isascii() and wanted.isprintable()
     return wanted if plain and not wanted.startswith("//") and "\\" not in wanted else "/"
 
@@ -124,7 +124,7 @@ def password_page(request: Request, _: Person, changed: bool = False) -> Respons
 
 @router.post("/password")
 async def change_password(request: Request, site: AtSite, person: Person, form: Form) -> Response:
-    """Changes it; other browsers of the person are signed out."""
+    """Change it; other browsers of the person are signed out."""
     password = form.get("password", "")
 
     def change() -> None:
@@ -150,7 +150,7 @@ class SignOns:
         self._provider: Provider | None = None
 
     def provider(self, described: SingleSignOn | None) -> Provider:
-        """Raises NothingThere where none is described, UsageError where the extra is missing."""
+        """Raise NothingThere where none is described, UsageError where the extra is missing."""
         if described is None:
             raise NothingThere(
                 "This bridge has no single sign-on.", remedy="Sign in with a password."
@@ -178,7 +178,7 @@ class SignOns:
 
 @router.get("/sign-in/provider")
 def begin(request: Request, site: AtSite, next: str = "/") -> Response:
-    """Sends a person to the provider."""
+    """Send a person to the provider."""
     signs: SignOns = request.app.state.sign_ons
     host = request.headers["host"]  # one of ours: the middleware has looked
     back = f"http{'s' if is_https(request.scope) else ''}://{host}{_BACK}"

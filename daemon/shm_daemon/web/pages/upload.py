@@ -118,7 +118,7 @@ async def import_file(
         ),
     ] = None,
 ) -> Any:
-    """Shows what is understood of a file and asks what it does not say; keeps nothing yet.
+    """Show what is understood of a file and ask for the rest; store nothing yet.
 
     With answers to all, they are kept as the profile of its logger, and the file goes to the
     daemon as any other.
@@ -156,7 +156,7 @@ def _looked(file: Incoming, name: str, workspace: Workspace, text: str | None) -
 
 
 def _answers(body: str, found: Import) -> Answers:
-    """The answers of a request; raises BadInput for what is none."""
+    """Return the answers of a request; raises BadInput for what is none."""
     try:
         document = json.loads(body)
     except (ValueError, RecursionError) as error:

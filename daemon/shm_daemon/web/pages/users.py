@@ -30,7 +30,7 @@ def users_page(request: Request, site: AtSite, _: Engineer) -> Response:
 
 @router.post("/users")
 async def change_user(request: Request, site: AtSite, engineer: Engineer, form: Form) -> Response:
-    """Adds or removes a user, changes their role or sets a password."""
+    """Add or remove a user, change their role or set a password."""
     people, at = site.store.acting_as(engineer.actor).people, utc_now()
     by_provider = site.workspace.bridge.single_sign_on is not None
     name, password = form.get("name", ""), form.get("password", "")
