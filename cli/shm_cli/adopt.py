@@ -110,7 +110,7 @@ def drop(
     why: str,
     who: str,
 ) -> None:
-    """Undo an adoption, on the record.
+    """Undo an adoption.
 
     Class and baseline before it are in force again; tests updated meanwhile keep their posteriors.
 

@@ -58,11 +58,11 @@ def silence(
     why: str,
     who: str,
 ) -> None:
-    """Hold messages to hooks back until a time.
+    """Silence notifications until a time.
 
-    Alerts are raised and shown all the same; hooks are told of them at the end, unless they have
-    been acknowledged or resolved. Times without a zone are UTC. With --maintenance, tests made in
-    that time are taken in but not watched: record it before they come in.
+    Alerts are still raised and shown; at the end hooks receive those that are neither acknowledged
+    nor resolved. Times without a zone are UTC. With --maintenance, tests of that time are stored but
+    not watched: announce it before they arrive.
 
     \b
     Example: shm alerts silence --hanger 7 --until 2026-12-01 --why "sensor is replaced"
@@ -95,7 +95,7 @@ def silence(
 @flags.json
 @click.pass_context
 def silences(ctx: click.Context) -> None:
-    """Silences and maintenance windows, with who made them and why.
+    """List silences and maintenance windows, with author and reason.
 
     \b
     Example: shm alerts silences --json
@@ -129,7 +129,7 @@ def _silence_cells(each: Silence, now: datetime) -> tuple[str, ...]:
 @flags.json
 @click.pass_context
 def unsilence(ctx: click.Context, silence_id: int, who: str) -> None:
-    """End a silence now, on the record.
+    """End a silence now.
 
     \b
     Example: shm alerts unsilence 3
@@ -168,7 +168,7 @@ def _at(time: datetime) -> str:
 @flags.json
 @click.pass_context
 def acknowledge(ctx: click.Context, alert_id: int, why: str, resolved: bool, who: str) -> None:
-    """Take note of an alert, on the record.
+    """Acknowledge an alert.
 
     ID is the number that `shm alerts` shows. The alert is open no more; the watch goes on as it
     was, and raises another alert once something else moves. To compare a hanger with itself as it
@@ -212,7 +212,7 @@ def acknowledgement_words(stored: StoredAlert) -> str:
 @flags.json
 @click.pass_context
 def resend(ctx: click.Context, alert_id: int) -> None:
-    """Send an alert again to the hooks that it was given up by.
+    """Send an alert again to the hooks that gave it up.
 
     A hook that keeps failing is given up after `hook_attempts` tries. Mend it, see that it works
     with `shm alerts test`, then send the alert again: the daemon tries as often as before.
@@ -241,7 +241,7 @@ def resend(ctx: click.Context, alert_id: int) -> None:
 @flags.json
 @click.pass_context
 def test(ctx: click.Context, name: str) -> None:
-    """Send a hook a marked test alert, now.
+    """Send a test alert to a hook.
 
     It goes the way of every alert, once, whether the daemon runs or not, and is kept nowhere.
     Says what the hook answered, or what went wrong.

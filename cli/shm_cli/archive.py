@@ -51,11 +51,11 @@ def prune(
     quarantine_days: int | None,
     dry_run: bool,
 ) -> None:
-    """Remove old raw files of which a whole copy lies elsewhere; rows and results stay.
+    """Remove old raw files that have a copy elsewhere; all results stay.
 
-    A raw file goes only where `shm db backup --archive DIR` has noted a copy that is there now with
-    the same SHA-256, and where its recording is through. A refused file goes from the quarantine
-    only where its bytes lie in the archive or in such a copy. What has no copy stays, however old.
+    A raw file is removed only if its recording is done and a copy recorded by
+    `shm db backup --archive DIR` exists with the same SHA-256. A refused file is removed from the
+    quarantine only if it is also in the archive or in such a copy. A file without a copy stays.
 
     \b
     Example: shm archive prune --keep-days 400 --dry-run
@@ -75,7 +75,7 @@ def prune(
 @flags.json
 @click.pass_context
 def fetch_command(ctx: click.Context, which: str) -> None:
-    """Bring the raw file of a recording (by number) or test (by name) back from its copy.
+    """Fetch the raw file of a recording (by number) or test (by name) from its copy.
 
     \b
     Example: shm archive fetch t7

@@ -61,7 +61,7 @@ def command() -> None:
 @flags.json
 @click.pass_context
 def upgrade(ctx: click.Context) -> None:
-    """Bring the store to the schema of this version; make its tables where a server has none.
+    """Upgrade the store to the schema of this version; make its tables on a new server.
 
     Then what the reports show of older tests is summed up once more, hanger by hanger. That may be
     stopped and begun again.
@@ -88,7 +88,7 @@ def upgrade(ctx: click.Context) -> None:
 @flags.json
 @click.pass_context
 def check(ctx: click.Context, with_archive: bool) -> None:
-    """Read all that the store holds, and say whether it is whole; exit code 5 where it is not.
+    """Check the complete store; exit code 5 on any fault.
 
     With --archive, each raw file must be there with the SHA-256 that it is named by. Two stores
     with the same rows and checksums hold the same.
@@ -142,7 +142,7 @@ def backup(
     as_unit: bool,
     as_timer: bool,
 ) -> None:
-    """Write what the store holds into a new file, while the daemon goes on.
+    """Back up the store into a new file, while the daemon runs.
 
     The file is a SQLite store, of a store in PostgreSQL too. In a FOLDER that is there it becomes
     TIME/shm.db, beside copies of bridge.toml and loggers/. With --archive the raw files that are
@@ -207,7 +207,7 @@ def _print_backup_unit(workspace: Path, target: Path, copies: Path | None, timer
 @flags.json
 @click.pass_context
 def restore_command(ctx: click.Context, file: Path, replace: bool, copies: Path | None) -> None:
-    """Put a backup into the store, which must be empty or is kept as a file with --replace.
+    """Restore a backup into an empty store; --replace keeps the former contents as a file.
 
     No daemon may be active. A backup of an older schema is brought to the present one. With
     --archive the raw files that are missing here are copied back from DIR.

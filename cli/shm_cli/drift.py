@@ -147,17 +147,15 @@ def rebaseline(
     why: str,
     who: str,
 ) -> None:
-    """Compare a hanger with itself as it is since some day.
+    """Set a new baseline from the tests since a day.
 
-    After works on it, or once a shift was looked into and accepted. The tests since that day are
-    updated jointly in the hanger's class; that is its baseline, and tests taken in later are
-    watched against it. What was compared with the old baseline stays on record, and so do its
-    alerts.
+    Use it after works on the hanger, or once a shift has been examined and accepted. The tests since
+    that day are updated jointly in the class of the hanger, and later tests are compared with them.
+    Comparisons with the old baseline and their alerts stay on record.
 
-    With --kind only the alerts end that such an event explains, with a note who said so: a lamp
-    ends those of an added mass, but not of lost tension. The others stay open. What was repaired
-    or retensioned must show it in these tests, else nothing is done; a loss that is to stay is
-    "accepted as it is".
+    With --kind only the alerts end that such an event explains: a lamp ends those of an added mass,
+    but not those of lost tension. A repair or retensioning must be visible in these tests, else the
+    command is refused; for a loss that is to stay use "accepted as it is".
 
     \b
     Example: shm drift rebaseline --hanger 3 --since 2026-05-01 --why "pin replaced"

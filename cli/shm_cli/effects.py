@@ -72,7 +72,7 @@ think of then. What imitates what:
 )
 @flags.json
 def effects(name: str | None) -> None:
-    """Return the catalogue of effects: what each does, its ranges, what shows it, what imitates it.
+    """List the catalogue of effects: ranges, evidence and imitators of each.
 
     The ranges are those of hanger 3 of the thesis, since they scale with the hanger.
 

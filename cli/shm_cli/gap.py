@@ -98,10 +98,10 @@ def plan(
     without: tuple[str, ...],
     seed: int,
 ) -> None:
-    """Return the next measurements in order, each with its cost and what it promises.
+    """Rank the next measurements, each with its cost and expected benefit.
 
-    Of MODES.json, or of the latest 20 tests of a hanger of the workspace. Hours of each kind of
-    measurement stand in the table [measurement_hours] of the bridge file.
+    Uses MODES.json, or the latest 20 tests of a hanger of the workspace. State the hours of each
+    kind of measurement in the table [measurement_hours] of bridge.toml.
 
     \b
     Example: shm gap plan hanger3.modes.json --hanger-file H.toml --budget 8
@@ -199,12 +199,12 @@ def diagnose(
 ) -> None:
     """Diagnose the gap: where it is, its causes, how far they shrink it, what to measure next.
 
-    Of MODES.json with --hanger-file, or of the latest tests of a hanger of the workspace, which
-    keeps the diagnosis for its report and for `shm gap adopt`. The answer gives every effect of
-    the catalogue its probability, also no gap at all and something that the catalogue lacks.
+    Give MODES.json with --hanger-file, or a hanger of the workspace: its latest tests are used, and
+    the diagnosis is stored for its report and for `shm gap adopt`. The answer gives a probability
+    to every effect of the catalogue, to no gap, and to something that the catalogue lacks.
 
-    With --bridge, or of several MODES.json, each followed by its H.toml: whether hangers share a
-    cause, which of them have it, and what it does to their tensions.
+    With --bridge, or with several MODES.json, each followed by its H.toml: the cause that hangers
+    share, which of them have it, and what it means for their tensions.
 
     \b
     Example: shm gap diagnose hanger3.modes.json --hanger-file H.toml --html gap.html

@@ -132,10 +132,10 @@ def command(
 ) -> None:
     """Identify the modes of recordings.
 
-    Each file is a test of its own unless --together is given; a .zip holds the files of one test.
-    The hanger's description, where known, helps to number the modes; in a workspace the profile of
-    the file's logger says what `shm import` was told. The page (--html) shows time
-    histories, frequency responses with the fitted modes, stabilisation, shapes and quality.
+    Each file is one test, unless --together is given; a .zip holds the files of one test. The
+    description of the hanger helps to number the modes. In a workspace the answers stored for the
+    file's logger are used. The page (--html) shows time histories, frequency responses with the
+    fitted modes, stabilisation, shapes and quality.
 
     \b
     Example: shm identify hanger3.csv --hanger-file H.toml --html hanger3.html

@@ -35,9 +35,9 @@ def settings_command(
     """List every setting with default and range.
 
     A value comes from the flag, else the environment (`workers` from SHM_WORKERS), else
-    `[settings]` of `bridge.toml`, else the default. With --assumptions: what is taken of hangers,
-    sensors and measurements before any data, from `[assumptions]` of `bridge.toml`, else the
-    default; of a hanger with --hanger or --hanger-file.
+    `[settings]` of `bridge.toml`, else the default. With --assumptions: the assumptions on hangers,
+    sensors and measurements, from `[assumptions]` of `bridge.toml`, else the default; for one hanger
+    with --hanger or --hanger-file.
 
     \b
     Example: shm settings

@@ -83,12 +83,11 @@ def command(
 ) -> None:
     """Report on a hanger or the bridge, for the file.
 
-    Tension with its interval, against nominal and baseline; what changed, how it goes with the
-    temperature, what the hangers beside it did; predicted and measured frequencies; what the model
-    does not explain; what to do next. HTML and PDF hold the figures. With --since, the tests,
-    alerts and trend of a period, and what changed in it against its start. With --test, how one
-    test was identified: hits, quality, stabilisation, shapes. With --bridge, all hangers: their
-    state, who lost and who gained tension, and what explains it.
+    State, action and tension with its interval, compared with nominal and baseline; changes,
+    temperature effect and the neighbouring hangers; measured and predicted frequencies; the gap;
+    the next action. HTML and PDF contain the figures. With --since: tests, alerts and trend of a
+    period, and its changes. With --test: how one test was identified (hits, quality, stabilisation,
+    shapes). With --bridge: the state of all hangers, who lost and gained tension, and why.
 
     \b
     Example: shm report --hanger 3 --since 90d --out hanger3.pdf

@@ -100,10 +100,10 @@ def web(
 ) -> None:
     """Serve the dashboard and its API.
 
-    Open the address that it prints in a browser. Only this machine can reach it unless --host says
-    otherwise; then all but /health needs a token of `shm token create`, which a person gives once
-    at /sign-in. Writing (uploads, acknowledging alerts) always needs one. Runs beside the daemon,
-    or with it as `shm daemon --web`.
+    Open the printed address in a browser. Without --host only this machine can reach it. With
+    --host everything but /health needs a sign-in: a user of `shm user add` or a token of
+    `shm token create`. Writing (uploads, acknowledging alerts) always needs one. It runs as a
+    separate process, or with the daemon as `shm daemon --web`.
 
     \b
     Example: shm --workspace arch web --port 8400

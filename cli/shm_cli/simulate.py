@@ -182,8 +182,8 @@ def command(
 ) -> None:
     """Simulate hammer tests of a hanger.
 
-    The hanger is hit in the time domain; biaxial accelerometers record. Effects of the gap
-    diagnosis can be planted.
+    The hits are simulated in the time domain, with biaxial accelerometers. Effects of the gap
+    diagnosis can be included.
 
     \b
     Example: shm simulate --hanger-file H.toml --k1 1e7 --k3 1e7 --out tests

@@ -81,7 +81,7 @@ def command(ctx: click.Context, events: bool, days: float) -> None:
 @flags.json
 @click.pass_context
 def keep(ctx: click.Context, name: str, start: datetime, end: datetime, why: str) -> None:
-    """Keep the samples of a time for good.
+    """Keep the samples of a period permanently.
 
     The ring takes out what is older than the setting `ring_days`, but for what is kept.
 
@@ -106,7 +106,7 @@ def keep(ctx: click.Context, name: str, start: datetime, end: datetime, why: str
 @flags.json
 @click.pass_context
 def export(ctx: click.Context, name: str, start: datetime, end: datetime, file: Path) -> None:
-    """Write the samples of a time as a recording, which `shm identify` takes.
+    """Write the samples of a period as a recording for `shm identify`.
 
     FILE ends with .csv, .npz or .uff. What is missing is an empty value.
 

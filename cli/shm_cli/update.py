@@ -210,11 +210,11 @@ def select_command(
 ) -> None:
     """Infer the tension with all model classes, and compare them.
 
-    The classes are equally probable beforehand, but for clamped ones, which are as probable as the
-    kind of ends makes them (0.1 to 0.4: shm settings --assumptions); --priors thesis has all equal,
-    and --prior says otherwise. Those that
-    do not apply to the hanger are left out and say why. The tests come from MODES.json, or are the
-    latest of a hanger of the workspace, which brings the classes that it has adopted.
+    Before the test clamped classes have a probability of 0.1 to 0.4, by the kind of ends (see
+    `shm settings --assumptions`), and the others share the rest equally; change that with --prior,
+    or make all equal with --priors thesis. Classes that do not apply are listed with the reason. The
+    tests come from MODES.json, or are the latest of a hanger of the workspace, with its adopted
+    classes.
 
     \b
     Example: shm select hanger3.modes.json --hanger-file H.toml --models beam1,beam2
