@@ -61,8 +61,8 @@ def silence(
     """Silence notifications until a time.
 
     Alerts are still raised and shown; at the end hooks receive those that are neither acknowledged
-    nor resolved. Times without a zone are UTC. With --maintenance, tests of that time are stored but
-    not watched: announce it before they arrive.
+    nor resolved. Times without a zone are UTC. With --maintenance, tests of that time are stored
+    but not watched: announce it before they arrive.
 
     \b
     Example: shm alerts silence --hanger 7 --until 2026-12-01 --why "sensor is replaced"

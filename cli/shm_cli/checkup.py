@@ -35,8 +35,8 @@ def doctor(ctx: click.Context) -> int:
     """Check the installation and the workspace.
 
     Looks at folders, disks, store, daemon, spool, recordings, backups, clock, hooks, hangers,
-    versions and other bridges; changes nothing. Exit code 0 without a fault (warnings do not count),
-    5 for a fault of the store, else 1.
+    versions and other bridges; changes nothing. Exit code 0 without a fault (warnings do not
+    count), 5 for a fault of the store, else 1.
 
     \b
     Example: shm --workspace arch doctor

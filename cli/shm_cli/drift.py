@@ -149,7 +149,7 @@ def rebaseline(
 ) -> None:
     """Set a new baseline from the tests since a day.
 
-    Use it after works on the hanger, or once a shift has been examined and accepted. The tests since
+    Use it after works on the hanger, or once a shift is examined and accepted. The tests since
     that day are updated jointly in the class of the hanger, and later tests are compared with them.
     Comparisons with the old baseline and their alerts stay on record.
 

@@ -93,7 +93,7 @@ def check(
 
     Each effect is put into a simulated twin of the hanger, with its modes, sensors, errors and
     conditions, and diagnosed. The twin follows MODES.json with --hanger-file, the latest tests of a
-    hanger of the workspace or, without tests, a usual hammer test. Ctrl-C prints the results so far.
+    hanger of the workspace or, without tests, a usual hammer test. Ctrl-C prints what is done.
 
     \b
     Example: shm gap check --hanger 3

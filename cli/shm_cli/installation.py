@@ -36,7 +36,7 @@ def settings_command(
 
     A value comes from the flag, else the environment (`workers` from SHM_WORKERS), else
     `[settings]` of `bridge.toml`, else the default. With --assumptions: the assumptions on hangers,
-    sensors and measurements, from `[assumptions]` of `bridge.toml`, else the default; for one hanger
+    sensors and measurements, from `[assumptions]` of `bridge.toml`, else the default; of a hanger
     with --hanger or --hanger-file.
 
     \b

@@ -212,7 +212,7 @@ def select_command(
 
     Before the test clamped classes have a probability of 0.1 to 0.4, by the kind of ends (see
     `shm settings --assumptions`), and the others share the rest equally; change that with --prior,
-    or make all equal with --priors thesis. Classes that do not apply are listed with the reason. The
+    or make all equal with --priors thesis. Classes that do not apply are listed with a reason. The
     tests come from MODES.json, or are the latest of a hanger of the workspace, with its adopted
     classes.
 
