@@ -1,4 +1,4 @@
-"""Frequencies from elsewhere: type them in, and see what they say of the tension.
+"""Infer the tension from frequencies that you type in.
 
 Table 1.1 of the thesis: twelve frequencies of a 12 m round bar, without standard deviations. What
 is not known (the deviations, the time, the temperature) is simply left out. The thesis leaves the

@@ -1,4 +1,4 @@
-"""From a hammer recording to the tension, and back to the truth that was planted.
+"""Find the tension from a hammer recording, and compare it with the known truth.
 
 A recording of five hits is simulated by finite elements in the time domain (no code is shared with
 the models that find the tension again), written as CSV, read, identified and updated.

@@ -1,4 +1,4 @@
-"""The forward models by themselves: parameters in, frequencies out, beside a closed form.
+"""Compute the frequencies of a model class, and compare them with a closed form.
 
 A clamped bar without bending stiffness is a string: f_n = n / (2 L) sqrt(T / m). A model class is a
 name; `build` makes it for a hanger, with the thesis's priors of tension and length alone. Its array

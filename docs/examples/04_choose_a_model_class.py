@@ -1,4 +1,4 @@
-"""Which model class? The evidence pays for fit and charges for freedom.
+"""Choose a model class by its evidence, which pays for fit and charges for freedom.
 
 One bar is clamped, another turns in a soft bearing at its deck end. The evidence takes the clamped
 model (`beam1`) for the first and the one with springs (`beam2`) for the second; a wrong class gives

@@ -1,4 +1,4 @@
-"""Has the tension fallen? Two tests a year apart, the second of a hanger that lost 8 %.
+"""Decide if the tension has fallen: two tests a year apart, of a hanger that lost 8 %.
 
 The difference of two posteriors is a distribution of its own: the probability of a loss beyond 5 %
 is the share of its draws that lie there.

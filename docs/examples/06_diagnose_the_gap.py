@@ -1,4 +1,4 @@
-"""Why do model and measurement differ? A lamp of 60 kg hangs on the bar, and nobody noted it.
+"""Find out why model and measurement differ: an unknown lamp of 60 kg hangs on the bar.
 
 The frequencies are those of a bar with the lamp 3.4 m from an end, right to 1e-4. The diagnosis
 weighs every effect of its catalogue, no gap at all, and something that the catalogue lacks.

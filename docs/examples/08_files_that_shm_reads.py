@@ -1,4 +1,4 @@
-"""Files of your own program: the same test as HDF5, MATLAB, NumPy and TDMS, read without a sidecar.
+"""Write files that shm reads without a sidecar: HDF5, MATLAB, NumPy and TDMS.
 
 Names, units and planes as `shm` understands them; what a file does not say stands in a sidecar.
 `shm ingest --peek FILE` shows what it makes of any file.

@@ -1,4 +1,4 @@
-"""Posterior draws and modes as pandas tables, and as files for other programs.
+"""Use posterior draws and modes as pandas tables, and write them to files.
 
 Any quantity of a model is a function of the draws: here the safety of the bar against yielding.
 """

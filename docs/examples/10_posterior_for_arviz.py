@@ -1,4 +1,4 @@
-"""The posterior in ArviZ, with the likelihood of each measurement.
+"""Use the posterior in ArviZ, with the likelihood of each measurement.
 
 Needs `pip install 'shm[arviz]'`; then `arviz.summary`, `arviz.loo`, `arviz.plot_ppc` take it.
 """

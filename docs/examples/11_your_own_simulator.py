@@ -1,4 +1,4 @@
-"""Your own simulator: why a spring's readings differ from it, by effects that you list.
+"""Find out why readings differ from your own simulator, by effects that you list.
 
 A spring of unknown stiffness is pulled to five lengths. In truth it has a pretension, which the
 simulator does not know; the catalogue has that and two rivals.

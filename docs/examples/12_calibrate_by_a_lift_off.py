@@ -1,4 +1,4 @@
-"""How much does one lift-off help? A load cell reads the tension once; later tests profit from it.
+"""Calibrate a hanger by one reading of a load cell; later tests profit from it.
 
 Frequencies alone leave the mass and the length of the bar open, which is 1 to 2 % of the tension.
 A reading of 0.3 % closes most of that for this test and for every later one of the hanger.
