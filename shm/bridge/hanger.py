@@ -71,12 +71,9 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
     assumed = assumptions_of(table.table("assumptions"), assumed, origin)
     usual_ratio = assumed.poissons_ratio.value
     _refuse_other_units(table, mass / area, nominal_tension_n / area)
-    supports = supports_of(table.table("supports"))
-    if supports == Supports():
-        _refuse_less_than_weight(table, nominal_tension_n, 9.81 * mass * length_m)
     fittings_m, plate = _fittings(table, length_m), _plate(table.table("plate"), length_m, diameter)
     open_ends = plate is None and not any(fittings_m)
-    return Hanger(
+    hanger = Hanger(
         id=table.value(
             "id", int, "is not a whole number", "Give id = 1, 2, 3, ...", holds=lambda id_: id_ >= 0
         ),
@@ -96,7 +93,7 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
         models=_models(table),
         scatter=_scatter(table, length_m, area, open_ends, assumed),
         effect_priors=effect_priors_of(table.table("effects")),
-        supports=supports,
+        supports=supports_of(table.table("supports")),
         kind=_kind(table),
         family=str(values.get("family", "")),
         limits=_limits(table.table("limits")),
@@ -106,6 +103,8 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
         survey=_survey(table),
         assumptions=assumed,
     )
+    _refuse_less_than_weight(table, hanger)
+    return hanger
 
 
 def _refuse_length(table: Table, length_m: float, widest_m: float) -> None:
@@ -146,13 +145,15 @@ def _refuse_other_units(table: Table, density_kg_m3: float, stress_pa: float) ->
         )
 
 
-def _refuse_less_than_weight(table: Table, nominal_tension_n: float, weight_n: float) -> None:
+def _refuse_less_than_weight(table: Table, hanger: Hanger) -> None:
     """Refuse a nominal tension in kN: a hanger in service carries more than its weight."""
-    if 0 < nominal_tension_n < weight_n:
+    tension_n = hanger.nominal_tension_n
+    weight_n = 9.81 * hanger.mass_per_length_kg_m * hanger.length_m
+    if hanger.supports == Supports() and 0 < tension_n < weight_n:
         raise table.refusal(
-            f"nominal_tension_n = {nominal_tension_n:g} is less than the weight of the hanger, "
+            f"nominal_tension_n = {tension_n:g} is less than the weight of the hanger, "
             f"{weight_n / 1e3:.3g} kN",
-            f"Give it in N: {nominal_tension_n:g} kN is {nominal_tension_n:g}e3.",
+            f"Give it in N: {tension_n:g} kN is {tension_n:g}e3.",
         )
 
 

@@ -226,7 +226,7 @@ def test_a_stranger_is_told_nothing(there: Neighbourhood) -> None:
 
 def test_a_bridge_alone_says_how_others_are_added(tmp_path: Path) -> None:
     with served(make_workspace(tmp_path / "alone")) as site, site.client() as client:
-        assert "Others are added as [[other_bridge]]" in words_of(client.get("/bridges").text)
+        assert "Add others as [[other_bridge]]" in words_of(client.get("/bridges").text)
         assert "All bridges" not in client.get("/").text
 
 
