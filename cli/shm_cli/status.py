@@ -78,7 +78,7 @@ def command(ctx: click.Context, which: str | None) -> None:
         if row["creep_per_year"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['creep_per_year']['words']}")
         if row["gap"] is not None:
-            click.echo(f"hanger {row['hanger']}: {row['gap']['text']}")
+            click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
         for text in row["warnings"]:
             rest = text.removeprefix(f"{row['state']} {row['action']}").strip()
             if rest:
