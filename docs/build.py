@@ -137,7 +137,7 @@ def functions() -> str:
     lines = []
     for name in _FUNCTIONS:
         function = getattr(api, name)
-        purpose = inspect.getdoc(function).splitlines()[0]
+        purpose = (inspect.getdoc(function) or "").splitlines()[0]
         parameters = signature(function).parameters
         plain = [p.replace(annotation=p.empty) for n, p in parameters.items() if n != "progress"]
         call = f"shm.{name}{Signature(plain)}"
