@@ -78,4 +78,5 @@ def add_suggestion(error: click.ClickException) -> None:
     chosen = getattr(getattr(error, "param", None), "type", None)
     given = re.match(r"'(.*?)' is not one of", error.message)
     if given and isinstance(chosen, click.Choice):
-        error.message = f"{error.message} {suggest(given[1], map(str, chosen.choices))}".rstrip()
+        nearest = suggest(given[1], map(str, chosen.choices))
+        vars(error)["message"] = f"{error.message} {nearest}".rstrip()

@@ -84,8 +84,7 @@ class ExistingFile(click.Path):
             if path.exists() or not path.parent.is_dir():
                 raise
             nearest = suggest(path.name, (each.name for each in path.parent.iterdir()))
-            error.message = f"{error.message} {nearest}".strip()
-            raise
+            self.fail(f"{error.message} {nearest}".strip(), parameter, context)
 
 
 FILE = ExistingFile()
