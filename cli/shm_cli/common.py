@@ -55,8 +55,10 @@ def show(document: Mapping[str, object], kind: str = "") -> None:
     A document without `schema` gets `shm.KIND/1`; KIND is by default the command, as in
     `shm.alerts_silences/1`.
     """
-    command = click.get_current_context().command_path.split()[1:]
-    schema = document.get("schema", f"shm.{kind or '_'.join(command)}/1")
+    context = click.get_current_context()
+    assert context is not None
+    command = "_".join(context.command_path.split()[1:])
+    schema = document.get("schema", f"shm.{kind or command}/1")
     errors.printed_documents.append(str(schema))
     click.echo(dump({"schema": schema, **document}))
 
