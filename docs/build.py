@@ -1,11 +1,11 @@
 """Makes the generated pages: commands, settings, effects, and the tables of other pages.
 
-The pages of commands, settings, effects and the thesis are built here and not kept in the
-repository: `shm VERB --help`, `shm settings`, `shm gap effects` and
-`python tests/benchmarks/validate.py --list` say the same.
+The pages of commands, settings, effects, the thesis and the Python reference are built here and not
+kept in the repository: `shm VERB --help`, `shm settings`, `shm gap effects`,
+`python tests/benchmarks/validate.py --list` and `help(shm)` say the same.
 
 python docs/build.py --quick    # what follows from the code alone; `make docs` does this first
-python docs/build.py            # the computed tables too: validation, gap
+python docs/build.py            # the computed tables too: validation, hanger 3
 
 `python tests/benchmarks/blind_trial.py DIR --write-docs` fills the page of the blind trial.
 The real measurements are not in this repository; docs/real_cases_page.py fills their page in two
@@ -19,7 +19,9 @@ import csv
 import inspect
 import re
 import sys
+import textwrap
 from collections.abc import Mapping
+from inspect import Signature, signature
 from pathlib import Path
 
 import rich_click as click
@@ -28,6 +30,7 @@ from docs import validation_page
 from docs.filling import fill_in
 from docs.gap_page import hanger_3_table
 from docs.house import house
+from shm import api
 from shm.models.registry import MODELS
 from shm_cli.common import markdown
 from shm_cli.effects import effects_page
@@ -100,15 +103,55 @@ def classes_table() -> str:
 
 
 def examples() -> str:
-    """The programs of docs/examples for docs/api.md, each with what its docstring says first."""
+    """Return the programs of docs/examples for docs/api.md: title, purpose, and their core."""
     parts = []
     for path in sorted((DOCS / "examples").glob("*.py")):
-        said = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").strip()
-        link = f"[examples/{path.name}](examples/{path.name})"
-        shown = f"```{{literalinclude}} examples/{path.name}\n:language: python\n```"
-        title = path.stem.replace("_", " ").capitalize()
-        parts.append(f"### {title}\n\n{link}: {said.splitlines()[0]}\n\n{shown}")
+        text = path.read_text(encoding="utf-8")
+        purpose = (ast.get_docstring(ast.parse(text)) or "").splitlines()[0]
+        number, _, name = path.stem.partition("_")
+        title = f"{int(number)}. {name.replace('_', ' ').capitalize()}"
+        link = f"[The complete program](examples/{path.name})."
+        parts.append(f"### {title}\n\n{purpose} {link}\n\n```python\n{_core(text)}\n```")
     return "\n" + "\n\n".join(parts) + "\n"
+
+
+def _core(program: str) -> str:
+    """Return the lines of an example that the manual shows."""
+    found = re.search(
+        r"^ *# Shown in the manual from here\.\n(.*?)\n *# Shown in the manual until here\.$",
+        program, re.M | re.S,
+    )  # fmt: skip
+    if found is None:
+        raise SystemExit("Mark the core of each example: # Shown in the manual from here.")
+    return textwrap.dedent(found[1])
+
+
+_FUNCTIONS = (
+    "load_hanger", "round_bar", "read", "load_modes", "simulate", "identify", "update", "select",
+    "diagnose", "check_gap", "diagnose_simulator",
+)  # fmt: skip
+
+
+def functions() -> str:
+    """Return the calls of the Python front for docs/api.md, each with its purpose."""
+    lines = []
+    for name in _FUNCTIONS:
+        function = getattr(api, name)
+        purpose = (inspect.getdoc(function) or "").splitlines()[0]
+        parameters = signature(function).parameters
+        plain = [p.replace(annotation=p.empty) for n, p in parameters.items() if n != "progress"]
+        call = f"shm.{name}{Signature(plain)}"
+        lines += [f"# {purpose}", *textwrap.wrap(call, 100, subsequent_indent="    "), ""]
+    return "```python\n" + "\n".join(lines).rstrip() + "\n```"
+
+
+def reference_page() -> str:
+    """Return docs/reference.md, which Sphinx fills from the docstrings."""
+    names = [f".. autofunction:: shm.api.{name}" for name in _FUNCTIONS]
+    modules = [f".. automodule:: {name}\n   :members:" for name in ("shm.plot", "shm.export")]
+    store = ".. autoclass:: shm.api.Store\n   :members:"
+    head = "# Python reference\n\nMade by `make docs`; `help(shm.update)` says the same.\n"
+    return f"{head}\n```{{eval-rst}}\n" + "\n\n".join([*names, store, *modules]) + "\n```\n"
 
 
 _SOLIDS = ("s1", "s2", "solid0", "solid1", "solid2")
@@ -144,16 +187,17 @@ def main() -> None:
     (DOCS / "effects.md").write_text(effects_page(), encoding="utf-8")
     (DOCS / "thesis.md").write_text(thesis_page(), encoding="utf-8")
     fill_in(DOCS / "physics.md", "classes", classes_table())
+    (DOCS / "reference.md").write_text(reference_page(), encoding="utf-8")
     fill_in(DOCS / "api.md", "examples", examples())
+    fill_in(DOCS / "api.md", "functions", functions())
     fill_in(DOCS.parent / "CONTRIBUTING.md", "house", house())
     head, *rows = csv.reader((DOCS / "trials/proof.csv").read_text().splitlines())
     fill_in(DOCS / "trials/validation.md", "proof", markdown(head, rows))
-    fill_in(DOCS.parent / "README.md", "proof", markdown(head[:3], [row[:3] for row in rows]))
     if "--quick" in sys.argv:
         return
     tables, chosen = compared(seed=1)
     validation_page.write([*map(frequencies.cells, tables)], [*map(selection.cells, chosen)])
-    fill_in(DOCS / "gap.md", "hanger 3", hanger_3_table())
+    fill_in(DOCS / "trials/real_cases.md", "hanger 3", hanger_3_table())
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Makes the table of docs/gap.md: hanger 3's gap from two baselines and three catalogues."""
+"""Make the table of docs/trials/real_cases.md: hanger 3 by several baselines and catalogues."""
 
 from __future__ import annotations
 

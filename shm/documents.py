@@ -37,12 +37,12 @@ from shm.values.messages import Lead
 
 
 def dump(document: object) -> str:
-    """A document as JSON text: two-space indent, NaN as null."""
+    """Return a document as JSON text: two-space indent, NaN as null."""
     return json.dumps(_clean(document), indent=2, allow_nan=False)
 
 
 def compact(document: object) -> str:
-    """The same without a blank, for what is kept ten thousandfold."""
+    """Return the same without a blank, for what is kept ten thousandfold."""
     return json.dumps(_clean(document), separators=(",", ":"), allow_nan=False)
 
 
@@ -60,7 +60,7 @@ def _clean(node: object) -> object:
 
 
 def format_time(time: datetime | None) -> str | None:
-    """A time as ISO 8601 in UTC with a trailing Z."""
+    """Return a time as ISO 8601 in UTC with a trailing Z."""
     if time is None:
         return None
     return time.astimezone(UTC).isoformat().replace("+00:00", "Z")
@@ -80,15 +80,15 @@ _Hook = Callable[[Any, Any], Any]
 
 
 class Misfit(ValueError):
-    """What in a document does not fit the value that it should be; `key` is the one at fault."""
+    """A part of a document that is not the expected value; `key` is the one at fault."""
 
-    def __init__(self, said: str, key: str):
-        super().__init__(said)
+    def __init__(self, message: str, key: str):
+        super().__init__(message)
         self.key = key
 
 
 def value_of(kind: type[T], node: object, path: str = "", by: cattrs.Converter | None = None) -> T:
-    """A part of a document as a value of a kind, its types checked; raises Misfit.
+    """Return a part of a document as a value of a kind, its types checked; raises Misfit.
 
     `path` is where the part stands: of `tests[0]` it may say `tests[0].modes[1]: order = 2.5 is
     not a whole number`. `by` is a converter of `reader` with hooks of its own.
@@ -96,17 +96,17 @@ def value_of(kind: type[T], node: object, path: str = "", by: cattrs.Converter |
     try:
         return (by or _READER).structure(node, kind)
     except (cattrs.BaseValidationError, ValueError) as error:
-        said, _, at = transform_error(error, path, _said)[0].rpartition(" @ ")
+        message, _, at = transform_error(error, path, _message)[0].rpartition(" @ ")
     label, _, key = at.rpartition(".")
-    raise Misfit(f"{label and label + ': '}{key} {said}".strip(), key.partition("[")[0])
+    raise Misfit(f"{label and label + ': '}{key} {message}".strip(), key.partition("[")[0])
 
 
-def _said(error: BaseException, _: object) -> str:
+def _message(error: BaseException, _: object) -> str:
     return "is missing" if isinstance(error, KeyError) else str(error)
 
 
 def number(node: Any) -> float:
-    """A number of a document, where null is what is not known; raises ValueError."""
+    """Return a number of a document, where null is what is not known; raises ValueError."""
     if node is None:
         return NAN
     if isinstance(node, int | float) and not isinstance(node, bool):
@@ -118,7 +118,7 @@ _LARGEST = 1e300  # technical: a square root or two of what follows from it must
 
 
 def finite(node: Any) -> float:
-    """A number that a person wrote, where null is what is not known; raises ValueError."""
+    """Return a number that a person wrote, where null is what is not known; raises ValueError."""
     if node is None or (isinstance(node, int | float) and abs(node) < _LARGEST):
         return number(node)
     raise ValueError(f"= {node!r} is not a number")
@@ -127,7 +127,7 @@ def finite(node: Any) -> float:
 def reader(
     number: Callable[[Any], float] = number, make: Callable[..., _Hook] = make_dict_structure_fn
 ) -> cattrs.Converter:
-    """A converter of documents to frozen values, which takes nothing for what it is not.
+    """Return a converter of documents to frozen values, which takes nothing for what it is not.
 
     `number` says what a number is, `make` makes the hooks of our classes. By them null is NaN where
     a number is meant, and keys that the value does not have are left alone.
@@ -203,17 +203,17 @@ def _is_of(origin: Any) -> Callable[[Any], bool]:
 _READER = reader()
 
 
-_ALIKE = 0.75  # of a key to another, from which on a slip of the hand is likelier than a key
+_SIMILAR = 0.75  # of a key to another, from which on a slip of the hand is likelier than a key
 
 
 def key_meant(key: str, known: Sequence[str]) -> str | None:
-    """The key that a misspelt one stands for; None where it is known itself, or like none.
+    """Return the key that a misspelt one stands for; None where it is known itself, or like none.
 
     Keys of others are left alone, but not those that somebody may think are read.
     """
     if key in known:
         return None
-    return next(iter(get_close_matches(key, known, n=1, cutoff=_ALIKE)), None)
+    return next(iter(get_close_matches(key, known, n=1, cutoff=_SIMILAR)), None)
 
 
 # ---------------------------------------------------------------- posteriors
@@ -225,7 +225,7 @@ def summary(samples: FloatArray, most_probable: float) -> dict[str, float]:
 
 
 def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[str, Any]:
-    """The document of `shm update --json`; `probability` is known after a selection only.
+    """Return the document of `shm update --json`; `probability` is known after a selection only.
 
     A structure without a model has no tension: `tension_n` is null.
     """
@@ -274,7 +274,7 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
 
 
 def selection_document(selection: Selection, limits: Limits | None = None) -> dict[str, Any]:
-    """The document of `shm select --json`, with probabilities of the hanger's `limits`."""
+    """Return the document of `shm select --json`, with probabilities of the hanger's `limits`."""
     pairs = zip(selection.posteriors, selection.probabilities, strict=True)
     return {
         "models": [posterior_document(posterior, probability) for posterior, probability in pairs],
@@ -284,7 +284,7 @@ def selection_document(selection: Selection, limits: Limits | None = None) -> di
 
 
 def averaged_document(averaged: Averaged) -> dict[str, Any]:
-    """The tension over all model classes, as reports and alerts lead with it."""
+    """Return the tension over all model classes, as reports and alerts lead with it."""
     return {**asdict(averaged), "caveats": list(averaged.caveats)}
 
 
@@ -304,7 +304,7 @@ def creep_document(creep: CreepRate | None) -> dict[str, Any] | None:
 
 
 def alert_document(alert: Alert) -> dict[str, Any]:
-    """What a hook gets on its standard input; what its message leads with stands by itself, too."""
+    """Return the document that a hook gets on its standard input, with its lead as fields."""
     tension = alert.tension and averaged_document(alert.tension)
     lead = Lead.of(alert.message)
     document = {

@@ -4,6 +4,7 @@ ShmError                      exit code 1
 ├── UsageError                2   the call itself is off
 ├── BadInput                  3   a file, channel, line or value that cannot be used
 │   ├── NotIdentifiable       3   a readable recording in which no mode can be trusted
+│   ├── NotDescribed          4   a hanger or stream that bridge.toml does not describe
 │   ├── TooLarge              3   more bytes than are taken
 │   └── DoubledChunk          3   another chunk of a stream has its number and time
 ├── NothingThere              4   a right question that has no answer yet
@@ -17,8 +18,9 @@ ShmError                      exit code 1
 
 from __future__ import annotations
 
+import difflib
 import errno
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -96,6 +98,12 @@ class NotIdentifiable(BadInput):
     """A recording that reads well but holds no mode that can be trusted."""
 
 
+class NotDescribed(BadInput):
+    """A hanger, structure or stream that `bridge.toml` does not describe."""
+
+    exit_code = 4
+
+
 class TooLarge(BadInput):
     """A file of more bytes than are taken; it is neither copied nor read."""
 
@@ -140,6 +148,13 @@ class GateNotMet(ShmError):
     """A measured figure missed the mark that was set for it."""
 
     exit_code = 6
+
+
+def suggest(name: str, known: Iterable[str]) -> str:
+    """Return `Did you mean diameter_m? ` for a misspelt name, or "" if no known name is near."""
+    by_lower = {each.lower(): each for each in known}
+    near = difflib.get_close_matches(name.lower(), list(by_lower), n=1)
+    return f"Did you mean {by_lower[near[0]]}? " if near else ""
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from shm.errors import BadInput
+from shm.errors import BadInput, suggest
 
 
 @dataclass(frozen=True)
@@ -272,5 +272,5 @@ def _refuse_unknown(names: Mapping[str, object], source: str) -> None:
             raise BadInput(
                 f"unknown setting {name!r}.",
                 file=source,
-                remedy=f"Known: {', '.join(sorted(known))}.",
+                remedy=f"{suggest(name, known)}Known: {', '.join(sorted(known))}.",
             )

@@ -12,7 +12,7 @@ from shm_cli.common import answer, opened_store, show, show_rows
 
 @click.group()
 def token() -> None:
-    """Who may read and write over the network.
+    """Manage tokens for access over the network.
 
     \b
     Example: shm token list
@@ -30,7 +30,7 @@ def token() -> None:
 @flags.json
 @click.pass_context
 def create(ctx: click.Context, name: str, scope: str) -> None:
-    """Make a token and print it, this once.
+    """Make a token and print it, once.
 
     It goes into the header `Authorization: Bearer TOKEN`. Only its checksum is kept: where it is
     lost, revoke it and make another.
@@ -54,7 +54,7 @@ def create(ctx: click.Context, name: str, scope: str) -> None:
 @flags.json
 @click.pass_context
 def list_tokens(ctx: click.Context) -> None:
-    """Tokens, when they were last used, and which are revoked.
+    """List tokens, their last use, and revoked ones.
 
     \b
     Example: shm token list --json
@@ -68,8 +68,8 @@ def list_tokens(ctx: click.Context) -> None:
     rows = []
     for each in tokens:
         times = (each.created_at, each.last_used_at, each.revoked_at)
-        told = (f"{time:%Y-%m-%d %H:%M}" if time else "never" for time in times)
-        rows.append((each.name, ", ".join(sorted(each.scopes)), *told))
+        shown = (f"{time:%Y-%m-%d %H:%M}" if time else "never" for time in times)
+        rows.append((each.name, ", ".join(sorted(each.scopes)), *shown))
     show_rows("tokens", ("name", "may", "made", "last used", "revoked"), rows)
 
 
@@ -78,7 +78,7 @@ def list_tokens(ctx: click.Context) -> None:
 @flags.json
 @click.pass_context
 def revoke(ctx: click.Context, name: str) -> None:
-    """End a token, at once.
+    """Revoke a token at once.
 
     \b
     Example: shm token revoke logger
@@ -92,7 +92,7 @@ def revoke(ctx: click.Context, name: str) -> None:
 
 @click.group()
 def user() -> None:
-    """People who may sign in to the dashboard.
+    """Manage the people who may sign in.
 
     \b
     Example: shm user list
@@ -111,7 +111,7 @@ def user() -> None:
 @flags.json
 @click.pass_context
 def add(ctx: click.Context, name: str, role: str, vouched: bool) -> None:
-    """Let a person sign in. The password is asked for, or is a line of stdin.
+    """Add a user; the password is asked for, or read from stdin.
 
     \b
     Example: shm user add 'M. Huber' --role engineer
@@ -128,7 +128,7 @@ def add(ctx: click.Context, name: str, role: str, vouched: bool) -> None:
 @flags.json
 @click.pass_context
 def list_users(ctx: click.Context) -> None:
-    """Users, their roles, and which were removed.
+    """List users, their roles, and removed users.
 
     \b
     Example: shm user list --json
@@ -151,7 +151,7 @@ def list_users(ctx: click.Context) -> None:
 @flags.json
 @click.pass_context
 def remove(ctx: click.Context, name: str) -> None:
-    """End a user, in all browsers at once; the last engineer only after another is made.
+    """Remove a user and sign them out everywhere; the last engineer needs a successor first.
 
     \b
     Example: shm user remove 'M. Huber'
@@ -168,7 +168,7 @@ def remove(ctx: click.Context, name: str) -> None:
 @flags.json
 @click.pass_context
 def password(ctx: click.Context, name: str) -> None:
-    """Give a user a new password, asked for or a line of stdin; all browsers are signed out.
+    """Set a new password, asked for or read from stdin; signs the user out everywhere.
 
     \b
     Example: shm user password 'M. Huber'
@@ -185,7 +185,7 @@ def password(ctx: click.Context, name: str) -> None:
 @flags.json
 @click.pass_context
 def use_single_sign_on(ctx: click.Context, name: str) -> None:
-    """Let a user in by single sign-on alone, in place of a password; all browsers are signed out.
+    """Switch a user from password to single sign-on; signs the user out everywhere.
 
     \b
     Example: shm user single-sign-on ann@example.org

@@ -56,14 +56,14 @@ def adopt(
     \b
     Example: shm gap adopt --hanger 3 --effect point_mass --why "clamp of the lamp at 3.4 m"
     """
-    wish = Wish(effects, at, baseline, why, who)
+    request = Wish(effects, at, baseline, why, who)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         with progress_bar("adopting") as progress:
-            made = adopt_in_store(workspace, store, hanger, wish, utc_now(), progress)
+            made = adopt_in_store(workspace, store, hanger, request, utc_now(), progress)
         watch = gap_watch(store, hanger_id)
-    said = f"Hanger {hanger_id} has the model class {made.adoption.model} from now on."
-    answer(_document(made), f"{said}\n{watch}")
+    sentence = f"Hanger {hanger_id} has the model class {made.adoption.model} from now on."
+    answer(_document(made), f"{sentence}\n{watch}")
 
 
 @click.command()
@@ -72,7 +72,7 @@ def adopt(
 @flags.json
 @click.pass_context
 def adopted(ctx: click.Context, hanger_id: int | None, undone: bool) -> None:
-    """What was adopted, and what became of its gap.
+    """List adopted effects and the gap since then.
 
     \b
     Example: shm gap adopted --hanger 3
@@ -82,13 +82,13 @@ def adopted(ctx: click.Context, hanger_id: int | None, undone: bool) -> None:
             workspace.bridge.hanger(hanger_id)
         found = store.posteriors.list_adoptions(hanger_id, undone=undone)
         documents = [_watched(store, each) for each in found]
-    if flags.wants_json():
-        show({"adoptions": documents})
-        return
     if not found:
         raise NothingThere(
             "no effect has been adopted.", remedy="Adopt one with `shm gap adopt --effect NAME`."
         )
+    if flags.wants_json():
+        show({"adoptions": documents})
+        return
     headings = (
         "number", "hanger", "class", "adopted", "who", "why", "gap before, with it, now (%)",
         "dropped",
@@ -110,7 +110,7 @@ def drop(
     why: str,
     who: str,
 ) -> None:
-    """Undo an adoption, on the record.
+    """Undo an adoption.
 
     Class and baseline before it are in force again; tests updated meanwhile keep their posteriors.
 
@@ -129,7 +129,7 @@ def drop(
 
 
 def _chosen(store: Store, hanger_id: int, number: int | None) -> StoredAdoption:
-    """The adoption asked for, or the only one; raises NothingThere or UsageError."""
+    """Return the adoption asked for, or the only one; raises NothingThere or UsageError."""
     found = store.posteriors.list_adoptions(hanger_id)
     numbers = ", ".join(str(each.id) for each in found)
     if not found:

@@ -14,7 +14,7 @@ import rich_click as click
 
 from shm.bridge import Bridge, Hook
 from shm.documents import alert_document, format_time
-from shm.errors import NothingThere, UsageError
+from shm.errors import NothingThere, UsageError, suggest
 from shm.pipeline import utc_now
 from shm.pipeline.telling import quiet_until
 from shm.store import Delivery, DeliveryState, Silence, StoredAlert
@@ -29,7 +29,7 @@ from shm_cli.common import answer, open_workspace, opened_store, paragraph, show
 @flags.json
 @click.pass_context
 def command(ctx: click.Context, hanger_id: int | None) -> None:
-    """Alerts that were raised, and their deliveries.
+    """Show alerts and their deliveries; acknowledge them.
 
     \b
     Example: shm alerts --hanger 7 --json
@@ -58,11 +58,11 @@ def silence(
     why: str,
     who: str,
 ) -> None:
-    """Hold messages to hooks back until a time.
+    """Silence notifications until a time.
 
-    Alerts are raised and shown all the same; hooks are told of them at the end, unless they have
-    been acknowledged or resolved. Times without a zone are UTC. With --maintenance, tests made in
-    that time are taken in but not watched: record it before they come in.
+    Alerts are still raised and shown; at the end hooks receive those that are neither acknowledged
+    nor resolved. Times without a zone are UTC. With --maintenance, tests of that time are stored
+    but not watched: announce it before they arrive.
 
     \b
     Example: shm alerts silence --hanger 7 --until 2026-12-01 --why "sensor is replaced"
@@ -85,7 +85,7 @@ def silence(
     kind = "Maintenance window" if maintenance else "Silence"
     answer(
         silence_row(made, now),
-        f"{kind} {made.id}: hooks are told nothing of {hangers_of(made.hanger)} from "
+        f"{kind} {made.id}: hooks get nothing about {hangers_of(made.hanger)} from "
         f"{_at(made.starts_at)} until {_at(made.until)} UTC. End it early: "
         f"`shm alerts unsilence {made.id}`.",
     )
@@ -95,7 +95,7 @@ def silence(
 @flags.json
 @click.pass_context
 def silences(ctx: click.Context) -> None:
-    """Silences and maintenance windows, with who made them and why.
+    """List silences and maintenance windows, with author and reason.
 
     \b
     Example: shm alerts silences --json
@@ -129,7 +129,7 @@ def _silence_cells(each: Silence, now: datetime) -> tuple[str, ...]:
 @flags.json
 @click.pass_context
 def unsilence(ctx: click.Context, silence_id: int, who: str) -> None:
-    """End a silence now, on the record.
+    """End a silence now.
 
     \b
     Example: shm alerts unsilence 3
@@ -139,12 +139,13 @@ def unsilence(ctx: click.Context, silence_id: int, who: str) -> None:
         ended = store.silences.end(silence_id, who, now)
     answer(
         silence_row(ended, now),
-        f"Silence {silence_id} has ended: hooks are told of {hangers_of(ended.hanger)} again.",
+        f"Silence {silence_id} has ended: hooks are notified about {hangers_of(ended.hanger)} "
+        "again.",
     )
 
 
 def silence_row(silence: Silence, now: datetime) -> dict[str, object]:
-    """What `--json` says of a silence."""
+    """Return the JSON document of a silence."""
     return {**vars(silence), "state": state_of(silence, now), "until": silence.until}
 
 
@@ -167,7 +168,7 @@ def _at(time: datetime) -> str:
 @flags.json
 @click.pass_context
 def acknowledge(ctx: click.Context, alert_id: int, why: str, resolved: bool, who: str) -> None:
-    """Take note of an alert, on the record.
+    """Acknowledge an alert.
 
     ID is the number that `shm alerts` shows. The alert is open no more; the watch goes on as it
     was, and raises another alert once something else moves. To compare a hanger with itself as it
@@ -188,8 +189,10 @@ def acknowledge(ctx: click.Context, alert_id: int, why: str, resolved: bool, who
 
 
 def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
-    """What `shm alerts --json` says of it: `acknowledged` is null while nobody took note of it, and
-    `resolved` while its condition stands; it is open while both are.
+    """Return the JSON document of an alert.
+
+    `acknowledged` is null until somebody acknowledges it, `resolved` while its condition holds; it
+    is open while both are null.
     """
     noted, ended = stored.acknowledgement, stored.resolution
     return {"acknowledged": noted and noted.said, "resolved": ended and ended.said}
@@ -200,8 +203,8 @@ def acknowledgement_words(stored: StoredAlert) -> str:
     noted, ended = stored.acknowledgement, stored.resolution
     if noted is None:
         return "open" if ended is None else f"resolved {ended.at:%Y-%m-%d}: {ended.why}"
-    said = f"{noted.who}, {noted.at:%Y-%m-%d}: {noted.why}"
-    return said if ended is None else f"{said} (resolved {ended.at:%Y-%m-%d})"
+    text = f"{noted.who}, {noted.at:%Y-%m-%d}: {noted.why}"
+    return text if ended is None else f"{text} (resolved {ended.at:%Y-%m-%d})"
 
 
 @command.command()
@@ -209,7 +212,7 @@ def acknowledgement_words(stored: StoredAlert) -> str:
 @flags.json
 @click.pass_context
 def resend(ctx: click.Context, alert_id: int) -> None:
-    """Send an alert again to the hooks that it was given up by.
+    """Send an alert again to the hooks that gave it up.
 
     A hook that keeps failing is given up after `hook_attempts` tries. Mend it, see that it works
     with `shm alerts test`, then send the alert again: the daemon tries as often as before.
@@ -238,7 +241,7 @@ def resend(ctx: click.Context, alert_id: int) -> None:
 @flags.json
 @click.pass_context
 def test(ctx: click.Context, name: str) -> None:
-    """Send a hook a marked test alert, now.
+    """Send a test alert to a hook.
 
     It goes the way of every alert, once, whether the daemon runs or not, and is kept nowhere.
     Says what the hook answered, or what went wrong.
@@ -254,19 +257,19 @@ def test(ctx: click.Context, name: str) -> None:
     timeout_s = workspace.settings.hook_timeout_seconds
     notifier, began = HookNotifier(workspace.folder, timeout_s, os.environ), time.monotonic()
     try:
-        said = notifier(hook, alert)
+        response = notifier(hook, alert)
     finally:
         notifier.close()
     seconds = time.monotonic() - began
-    told = {"hook": name, "kind": hook.kind, "key": alert.key, "answer": said}
+    document = {"hook": name, "kind": hook.kind, "key": alert.key, "answer": response}
     answer(
-        {**told, "seconds": round(seconds, 3)},
-        f"The hook {name} took the test alert in {seconds:.1f} s: {said}.",
+        {**document, "seconds": round(seconds, 3)},
+        f"The hook {name} took the test alert in {seconds:.1f} s: {response}.",
     )
 
 
 def a_test_alert(bridge: Bridge, hook: Hook, now: datetime) -> Alert:
-    """An alert that says it is none, of the bridge's first hanger; raises NothingThere."""
+    """Return an alert that says it is none, of the bridge's first hanger; raises NothingThere."""
     if not bridge.hangers:
         raise NothingThere(
             "bridge.toml describes no hanger.", remedy="Describe one: an alert is of a hanger."
@@ -287,7 +290,8 @@ def _described(bridge: Bridge, name: str) -> Hook:
     known = ", ".join(hook.name for hook in bridge.hooks) or "none"
     raise UsageError(
         f"bridge.toml describes no hook {name} (known: {known}).",
-        remedy="Correct the name, or describe it in a [[hook]] table.",
+        remedy=f"{suggest(name, (hook.name for hook in bridge.hooks))}"
+        "Correct the name, or describe it in a [[hook]] table.",
     )
 
 
@@ -339,7 +343,7 @@ def _given_up_words(alert_id: int, delivery: dict[str, Any]) -> str:
     tries = "one try" if delivery["attempts"] == 1 else f"{delivery['attempts']} tries"
     why = delivery["last_error"] or "no reason is known"
     return (
-        f"The hook {delivery['hook']} was not told: given up after {tries}, {why} Mend it, then "
+        f"The hook {delivery['hook']} was not notified: given up after {tries}, {why} Fix it, then "
         f"`shm alerts resend {alert_id}`."
     )
 

@@ -30,7 +30,7 @@ _DAYS = click.IntRange(1, 36500)  # technical: a century, which dates can bear
 
 @click.group()
 def command() -> None:
-    """Keep the archive and the quarantine from growing for ever.
+    """Limit the size of the archive and the quarantine.
 
     \b
     Example: shm archive fetch t7
@@ -51,11 +51,11 @@ def prune(
     quarantine_days: int | None,
     dry_run: bool,
 ) -> None:
-    """Remove old raw files of which a whole copy lies elsewhere; rows and results stay.
+    """Remove old raw files that have a copy elsewhere; all results stay.
 
-    A raw file goes only where `shm db backup --archive DIR` has noted a copy that is there now with
-    the same SHA-256, and where its recording is through. A refused file goes from the quarantine
-    only where its bytes lie in the archive or in such a copy. What has no copy stays, however old.
+    A raw file is removed only if its recording is done and a copy recorded by
+    `shm db backup --archive DIR` exists with the same SHA-256. A refused file is removed from the
+    quarantine only if it is also in the archive or in such a copy. A file without a copy stays.
 
     \b
     Example: shm archive prune --keep-days 400 --dry-run
@@ -66,8 +66,8 @@ def prune(
         raw = _prune_archive(workspace, store, keep_days, dry_run)
         refused = _prune_quarantine(workspace, store, quarantine_days, dry_run)
     document = {"dry_run": dry_run, "archive": raw.document, "quarantine": refused.document}
-    said = [*raw.sentences("archive", dry_run), *refused.sentences("quarantine", dry_run)]
-    answer(document, "\n".join(said))
+    sentences = [*raw.sentences("archive", dry_run), *refused.sentences("quarantine", dry_run)]
+    answer(document, "\n".join(sentences))
 
 
 @command.command("fetch")
@@ -75,7 +75,7 @@ def prune(
 @flags.json
 @click.pass_context
 def fetch_command(ctx: click.Context, which: str) -> None:
-    """Bring the raw file of a recording (by number) or test (by name) back from its copy.
+    """Fetch the raw file of a recording (by number) or test (by name) from its copy.
 
     \b
     Example: shm archive fetch t7
@@ -91,21 +91,21 @@ def fetch_command(ctx: click.Context, which: str) -> None:
 
 @dataclass(frozen=True)
 class _Pruned:
-    """What went, or would go, of one of the folders, and why the rest of the old ones stays."""
+    """Return a sentence on the files removed from a folder, and why other old ones stay."""
 
     files: Sequence[str]
     freed_bytes: int
-    kept: dict[str, int]
+    remaining: dict[str, int]
 
     @property
     def document(self) -> dict[str, Any]:
-        return {"files": list(self.files), "freed_bytes": self.freed_bytes, "kept": self.kept}
+        return {"files": list(self.files), "freed_bytes": self.freed_bytes, "kept": self.remaining}
 
     def sentences(self, what: str, dry_run: bool) -> list[str]:
         verb = "would be removed, which would free" if dry_run else "removed, which freed"
-        said = [f"{what}: {len(self.files)} files {verb} {self.freed_bytes / 1e6:.1f} MB."]
-        said += [f"  {count} old ones stay: {reason}." for reason, count in self.kept.items()]
-        return said
+        lines = [f"{what}: {len(self.files)} files {verb} {self.freed_bytes / 1e6:.1f} MB."]
+        lines += [f"  {count} old ones stay: {reason}." for reason, count in self.remaining.items()]
+        return lines
 
 
 def _prune_archive(
@@ -134,5 +134,5 @@ def _prune_quarantine(
         empty_quarantine(going)
     names = [file.path.name for file in going]
     left = len(old) - len(going)
-    kept = {"their bytes lie nowhere else": left} if left else {}
-    return _Pruned(names, sum(file.size_bytes for file in going), kept)
+    remaining = {"their bytes lie nowhere else": left} if left else {}
+    return _Pruned(names, sum(file.size_bytes for file in going), remaining)

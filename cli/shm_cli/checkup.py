@@ -32,11 +32,11 @@ _FAULT = 1
 @flags.json
 @click.pass_context
 def doctor(ctx: click.Context) -> int:
-    """Whether all is well, and what to do where it is not.
+    """Check the installation and the workspace.
 
     Looks at folders, disks, store, daemon, spool, recordings, backups, clock, hooks, hangers,
-    versions and whether other bridges answer; changes nothing. Exit code 0 without a fault
-    (warnings are none), 5 where the store is at fault, else 1.
+    versions and other bridges; changes nothing. Exit code 0 without a fault (warnings do not
+    count), 5 for a fault of the store, else 1.
 
     \b
     Example: shm --workspace arch doctor
@@ -67,7 +67,7 @@ def _show_findings(findings: Sequence[Finding]) -> None:
 @flags.json
 @click.pass_context
 def bridges(ctx: click.Context) -> None:
-    """How this bridge and the others of bridge.toml are, the worst first.
+    """Show the state of this bridge and of the others of bridge.toml.
 
     The dashboard of each [[other_bridge]] is asked; one that does not answer is named, with what
     to do.
@@ -76,7 +76,7 @@ def bridges(ctx: click.Context) -> None:
     Example: shm --workspace arch bridges
     """
     from shm_daemon.web.address import Address
-    from shm_daemon.web.bridge_summary import headline, own_row, row_document, worst_first
+    from shm_daemon.web.bridge_summary import headline, row_document, site_rows, worst_first
     from shm_daemon.web.other_bridges import ask_all
     from shm_daemon.web.site import Description, Site
 
@@ -84,7 +84,7 @@ def bridges(ctx: click.Context) -> None:
     site = Site(Description(workspace), Address())
     try:
         others = ask_all(workspace.bridge.other_bridges, workspace.folder)
-        rows = worst_first((*own_row(site, utc_now()), *others))
+        rows = worst_first((*site_rows(site, utc_now()), *others))
     finally:
         site.close()
     if flags.wants_json():
@@ -93,6 +93,6 @@ def bridges(ctx: click.Context) -> None:
         return
     click.echo(paragraph(headline(rows)))
     for row in rows:
-        said = [lead.words for lead in row.leads] + ([row.summary.words] if row.summary else [])
+        words = [lead.words for lead in row.leads] + ([row.summary.words] if row.summary else [])
         state = f" ({', '.join(word for word, _ in row.states)})" if row.states else ""
-        click.echo(paragraph(printable(f"{row.name}{state}: {' '.join(said)}", " ")))
+        click.echo(paragraph(printable(f"{row.name}{state}: {' '.join(words)}", " ")))

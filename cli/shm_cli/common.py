@@ -1,4 +1,4 @@
-"""What verbs share: where they print, how they show progress and read their input."""
+"""Printing, progress and input that verbs share."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -35,6 +35,7 @@ from shm.documents import dump
 from shm.errors import NothingThere, UsageError
 from shm.modes_document import load_modes
 from shm.values import Hanger, ModalTest
+from shm_cli import errors
 from shm_cli.flags import wants_json
 from shm_cli.terminal import Terminal, escape_controls
 
@@ -48,15 +49,24 @@ _WIDTH_OF_A_FILE, _BEYOND_ANY = 120, 100_000
 _READABLE = 100
 
 
-def show(document: object) -> None:
-    """Prints one JSON document on stdout."""
-    click.echo(dump(document))
+def show(document: Mapping[str, object], kind: str = "") -> None:
+    """Print one JSON document on stdout, with its schema first.
+
+    A document without `schema` gets `shm.KIND/1`; KIND is by default the command, as in
+    `shm.alerts_silences/1`.
+    """
+    context = click.get_current_context()
+    assert context is not None
+    command = "_".join(context.command_path.split()[1:])
+    schema = document.get("schema", f"shm.{kind or command}/1")
+    errors.printed_documents.append(str(schema))
+    click.echo(dump({"schema": schema, **document}))
 
 
-def answer(document: object, words: str) -> None:
-    """One JSON document on stdout where --json asks for it, else words for a person."""
+def answer(document: Mapping[str, object], words: str, kind: str = "") -> None:
+    """Print one JSON document on stdout where --json asks for it, else words for a person."""
     if wants_json():
-        show(document)
+        show(document, kind)
     else:
         click.echo(words)
 
@@ -73,7 +83,7 @@ def show_rows(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]
 
 
 def show_table(table: Table) -> None:
-    """Prints a table on stdout; one that the terminal is too narrow for as a list a row."""
+    """Print a table on stdout; one that the terminal is too narrow for as a list a row."""
     console = Terminal(highlight=False)
     if not sys.stdout.isatty() and "COLUMNS" not in os.environ:
         console.width = max(console.width, _WIDTH_OF_A_FILE)
@@ -83,7 +93,7 @@ def show_table(table: Table) -> None:
 
 
 def _folded(table: Table, console: Console) -> bool:
-    """Whether the columns now fit the terminal with no word cut: the widest fold first."""
+    """Fit columns to the terminal without cutting a word; return False if they do not fit."""
     unbounded = console.options.update(max_width=_BEYOND_ANY)
     least, widths = [], []
     for column in table.columns:
@@ -104,7 +114,7 @@ def _folded(table: Table, console: Console) -> bool:
 
 
 def _is_one_word(column: Column) -> bool:
-    """Whether nothing in a column can be broken, as a bar that is drawn: it must not be cut."""
+    """Return True if nothing in a column can be broken, such as a drawn bar."""
     cells = [str(cell) for cell in column.cells]
     return len(str(column.header)) <= max(map(len, cells), default=0) and " " not in "".join(cells)
 
@@ -127,13 +137,13 @@ def _listed(headings: Sequence[str], cells: Sequence[RenderableType]) -> Table:
 
 
 def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table."""
+    """Return a Markdown table."""
     head, *others = [f"| {' | '.join(line)} |" for line in (heads, *rows)]
     return "\n".join([head, "|" + "---|" * len(heads), *others])
 
 
 def show_texts(texts: Texts) -> None:
-    """Prints a table of a report, and its note."""
+    """Print a table of a report, and its note."""
     from shm.report.as_text import in_terminal
 
     shown = in_terminal(texts)
@@ -148,12 +158,12 @@ def readable_width() -> int:
 
 
 def paragraph(text: str) -> str:
-    """A text in lines that fit the terminal, and are not too long to read."""
+    """Return a text in lines that fit the terminal, and are not too long to read."""
     return textwrap.fill(text, readable_width())
 
 
 def table(title: str, *columns: str) -> Table:
-    """An empty table; columns after the first are aligned to the right."""
+    """Return an empty table; columns after the first are aligned to the right."""
     made = Table(title=title, header_style="bold")
     for index, column in enumerate(columns):
         made.add_column(Text(column), justify="left" if index == 0 else "right")
@@ -161,7 +171,7 @@ def table(title: str, *columns: str) -> Table:
 
 
 def open_workspace(ctx: click.Context, **flags: object) -> Workspace:
-    """The workspace of the command; `flags` are settings given on the command line."""
+    """Return the workspace of the command; `flags` are settings given on the command line."""
     from shm.store import Workspace
     from shm.store.journal import COMMAND_LINE, Actor
 
@@ -170,20 +180,20 @@ def open_workspace(ctx: click.Context, **flags: object) -> Workspace:
 
 
 def is_workspace(ctx: click.Context) -> bool:
-    """Whether the folder that the command works in is one."""
+    """Return True if the folder of the command is a workspace."""
     return (Path(ctx.obj) / "bridge.toml").is_file()
 
 
 @contextmanager
 def opened_store(ctx: click.Context) -> Iterator[tuple[Workspace, Store]]:
-    """The workspace of the command and its store, open."""
+    """Return the workspace of the command and its store, open."""
     workspace = open_workspace(ctx)
     with workspace.store() as store:
         yield workspace, store
 
 
 def one_hanger(ctx: click.Context, hanger_file: Path | None, hanger_id: int | None) -> Hanger:
-    """The hanger that the options name; raises UsageError where they name none."""
+    """Return the hanger that the options name; raises UsageError where they name none."""
     if hanger_file is not None:
         return load_hanger(hanger_file, hanger_id)
     if hanger_id is None:
@@ -215,7 +225,7 @@ def latest_tests(store: Store, hanger: Hanger, count: int) -> Sequence[StoredTes
     return stored
 
 
-def told_doubts(
+def show_doubts(
     tests: Sequence[ModalTest], hanger: Hanger, *, apart: bool = True
 ) -> tuple[str, ...]:
     """Says, before any result, which tests are probably not of the described hanger.
@@ -232,10 +242,10 @@ def told_doubts(
     )
     doubts = {test.id: doubt_of(test, Known(hanger), []) for test in tests}
     found = tuple(f"Doubtful: test {id_}. {doubt.text}" for id_, doubt in doubts.items() if doubt)
-    said = (*others, *found)
-    for each in said:
+    messages = (*others, *found)
+    for each in messages:
         click.echo(each if apart else paragraph(each), err=apart)
-    return said
+    return messages
 
 
 @contextmanager
@@ -271,7 +281,7 @@ def _fraction_bar() -> Progress:
 
 
 def counting_bar() -> Progress:
-    """A bar on stderr that counts things done."""
+    """Return a bar on stderr that counts things done."""
     return _bar(MofNCompleteColumn())
 
 
@@ -312,5 +322,5 @@ def write_pictures(drawn: Iterable[Illustration], folder: Path, start: str = "")
 
 
 def drawing() -> AbstractContextManager[None]:
-    """What is shown while figures and pages are written."""
+    """Show that figures and pages are being written."""
     return waiting("drawing the figures")

@@ -20,7 +20,7 @@ _VARIABLE = "_SHM_COMPLETE"
 @click.argument("shell", type=click.Choice(["bash", "zsh"]))
 @click.pass_context
 def command(ctx: click.Context, shell: str) -> None:
-    """Print the script that completes `shm` in bash or zsh.
+    """Print the completion script of bash or zsh.
 
     It completes commands, options, the workspace's hangers and hooks, model classes and effects.
 
@@ -89,8 +89,8 @@ def effects(
 
 def _beginning(start: str, offered: Iterable[tuple[str, str]]) -> list[CompletionItem]:
     return [
-        CompletionItem(value, help=beside or None)
-        for value, beside in offered
+        CompletionItem(value, help=help_text or None)
+        for value, help_text in offered
         if value.startswith(start)
     ]
 

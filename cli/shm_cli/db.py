@@ -10,7 +10,7 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm.errors import StoreError, UsageError, sentence
+from shm.errors import BadInput, StoreError, UsageError, sentence
 from shm.store import Archive, Store, Workspace
 from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import (
@@ -45,6 +45,9 @@ _copies_option = click.option(
 )
 
 
+_SQLITE_HEADER = b"SQLite format 3\0"  # https://www.sqlite.org/fileformat.html
+
+
 @click.group()
 def command() -> None:
     """Upgrade, check, back up, restore or copy the store.
@@ -58,7 +61,7 @@ def command() -> None:
 @flags.json
 @click.pass_context
 def upgrade(ctx: click.Context) -> None:
-    """Bring the store to the schema of this version; make its tables where a server has none.
+    """Upgrade the store to the schema of this version; make its tables on a new server.
 
     Then what the reports show of older tests is summed up once more, hanger by hanger. That may be
     stopped and begun again.
@@ -85,7 +88,7 @@ def upgrade(ctx: click.Context) -> None:
 @flags.json
 @click.pass_context
 def check(ctx: click.Context, with_archive: bool) -> None:
-    """Read all that the store holds, and say whether it is whole; exit code 5 where it is not.
+    """Check the complete store; exit code 5 on any fault.
 
     With --archive, each raw file must be there with the SHA-256 that it is named by. Two stores
     with the same rows and checksums hold the same.
@@ -112,7 +115,7 @@ def check(ctx: click.Context, with_archive: bool) -> None:
         held = next(each.rows for each in checked.tables if each.table == "recordings")
         click.echo(f"The store has the present schema and holds {held} recordings.")
         if archive is not None:
-            click.echo(_archive_said(archive))
+            click.echo(_archive_words(archive))
     if findings:
         kinds = Counter(each.kind for each in findings)
         counted = ", ".join(_counted(count, kind) for kind, count in kinds.items())
@@ -139,7 +142,7 @@ def backup(
     as_unit: bool,
     as_timer: bool,
 ) -> None:
-    """Write what the store holds into a new file, while the daemon goes on.
+    """Back up the store into a new file, while the daemon runs.
 
     The file is a SQLite store, of a store in PostgreSQL too. In a FOLDER that is there it becomes
     TIME/shm.db, beside copies of bridge.toml and loggers/. With --archive the raw files that are
@@ -162,10 +165,10 @@ def backup(
         if target.is_dir():
             workspace.copy_description(file.parent)
         if copies is not None:
-            kept, removed = Archive(copies), store.upkeep.removed_names(workspace.archive)
+            copied_to, removed = Archive(copies), store.upkeep.removed_names(workspace.archive)
             names = [name for name in archived_names(store) if name not in removed]
-            copied = copy_archive(workspace.archive, kept, names, tell)
-            noted = store.upkeep.note_copies(kept, datetime.now(UTC))
+            copied = copy_archive(workspace.archive, copied_to, names, tell)
+            noted = store.upkeep.note_copies(copied_to, datetime.now(UTC))
         store.upkeep.note_backup(file.resolve(), datetime.now(UTC))
     if flags.wants_json():
         document = {"file": str(file), **_document(written.tables, copied), "newly_noted": noted}
@@ -204,7 +207,7 @@ def _print_backup_unit(workspace: Path, target: Path, copies: Path | None, timer
 @flags.json
 @click.pass_context
 def restore_command(ctx: click.Context, file: Path, replace: bool, copies: Path | None) -> None:
-    """Put a backup into the store, which must be empty or is kept as a file with --replace.
+    """Restore a backup into an empty store; --replace keeps the former contents as a file.
 
     No daemon may be active. A backup of an older schema is brought to the present one. With
     --archive the raw files that are missing here are copied back from DIR.
@@ -212,18 +215,19 @@ def restore_command(ctx: click.Context, file: Path, replace: bool, copies: Path 
     \b
     Example: shm db restore /backup/arch-2026-05-01.db --replace
     """
+    _refuse_no_backup(file)
     workspace = open_workspace(ctx)
     keep_as = workspace.folder / f"shm-before-restore-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.db"
     with workspace.lock(), progress_bar("restore") as tell:
         restored = restore(workspace.location, file, keep_as, tell, replace=replace)
         copied = _fetch(workspace, copies)
     if flags.wants_json():
-        kept = str(restored.kept) if restored.kept else None
-        show({"kept": kept, **_document(restored.tables, copied)})
+        previous = str(restored.kept) if restored.kept else None
+        show({"kept": previous, **_document(restored.tables, copied)})
     else:
         _show_tables(restored.tables)
-        kept_said = f" What it held before is in {restored.kept}." if restored.kept else ""
-        click.echo(f"The store holds what {file} holds.{kept_said}")
+        previous_words = f" What it held before is in {restored.kept}." if restored.kept else ""
+        click.echo(f"The store holds what {file} holds.{previous_words}")
         with workspace.store() as store:
             _say_unknown(unknown_files(store, workspace.archive))
         _say_copied(copied)
@@ -252,6 +256,18 @@ def copy(ctx: click.Context, target: str) -> None:
     else:
         _show_tables(tables)
         click.echo("Both stores hold the same. Name the new one in SHM_STORE.")
+
+
+def _refuse_no_backup(file: Path) -> None:
+    """Raise BadInput if a file cannot be a backup; one that is not there is reported later."""
+    if file.is_file():
+        with file.open("rb") as opened:
+            if opened.read(len(_SQLITE_HEADER)) != _SQLITE_HEADER:
+                raise BadInput(
+                    "this is not a backup: it is not an SQLite database.",
+                    file=file,
+                    remedy="Give a file that `shm db backup` has written.",
+                )
 
 
 def _fetch(workspace: Workspace, copies: Path | None) -> CopiedArchive | None:
@@ -284,7 +300,7 @@ def _say_unknown(names: Sequence[str]) -> None:
         click.echo(paragraph(f"Raw files: {what}. {remedy}"), err=True)
 
 
-def _archive_said(archive: CheckedArchive) -> str:
+def _archive_words(archive: CheckedArchive) -> str:
     return (
         f"Raw files: {archive.whole} whole, {len(archive.missing)} missing, "
         f"{len(archive.damaged)} damaged, {len(archive.unreferenced)} of no recording, "

@@ -77,7 +77,7 @@ def live_description() -> str:
 
 
 def send_days(workspace: Workspace) -> datetime:
-    """Sends the days of all streams into the ring; when they end."""
+    """Send the days of all streams into the ring; when they end."""
     now = utc_now().replace(minute=0, second=0, microsecond=0)
     first = now - timedelta(days=DAYS)
     lost = Loss(LIVE_LOSING, LIVE_LOSS, first + timedelta(days=LOST_AFTER_DAYS))
@@ -88,15 +88,15 @@ def send_days(workspace: Workspace) -> datetime:
     with counting_bar() as bar:
         task = bar.add_task("four days of wind and traffic", total=round(DAYS * _WINDOWS_A_DAY))
 
-        def told(at: datetime) -> None:
+        def on_sent(at: datetime) -> None:
             bar.update(task, completed=(at - first) / timedelta(minutes=10))
 
-        send(chunks, ring_of(workspace).append_all, 0.0, told)
+        send(chunks, ring_of(workspace).append_all, 0.0, on_sent)
     return now
 
 
 def await_windows(workspace: Workspace, store: Store, looks: Iterator[int], ends: datetime) -> None:
-    """Waits until the daemon has read all streams; `looks` paces, and says when it gives up."""
+    """Wait until the daemon has read all streams; `looks` paces, and says when it gives up."""
     names = [each.name for each in workspace.bridge.streams]
     with counting_bar() as bar:
         total = round(DAYS * _WINDOWS_A_DAY * len(names))
@@ -111,7 +111,7 @@ def await_windows(workspace: Workspace, store: Store, looks: Iterator[int], ends
 
 
 def conclude_live(workspace: Workspace, store: Store, alerts: tuple[StoredAlert, ...]) -> None:
-    """Says what was told; raises ShmError without the alert of the loss."""
+    """Print the alerts; raises ShmError without the alert of the loss."""
     for stored in alerts:
         click.echo(f"ALERT {stored.alert.message}")
     for state in stream_states(workspace, ring_of(workspace), store, utc_now()):
@@ -229,7 +229,7 @@ def _random_state(hanger: Hanger, rng: np.random.Generator) -> HangerState:
 
 
 def dropped(tests: Sequence[PlannedTest], workspace: Workspace) -> Iterator[PlannedTest]:
-    """Simulates each test and drops its file into the spool."""
+    """Simulate each test and drop its file into the spool."""
     for test in tests:
         recording = hammer_test(
             test.hanger,
@@ -257,7 +257,7 @@ _DAEMON_LIMIT_S = 600.0  # technical: several times what a slow machine takes
 )
 @click.option("--live", is_flag=True, help="A bridge with permanent sensors instead of a hammer.")
 def command(folder: Path, live: bool) -> None:
-    """See the whole job on a simulated bridge of 20 hangers.
+    """Run everything on a simulated bridge of 20 hangers.
 
     A season of hammer tests is dropped into the spool of a running daemon; hanger 7 loses 8 % of
     its tension; the alert fires; the reports are written. Nothing of hanger 18 is simulated: its
@@ -311,7 +311,7 @@ def _fresh_workspace(folder: Path, text: str) -> Workspace:
 
 @contextmanager
 def _daemon(workspace: Workspace) -> Iterator[subprocess.Popen[bytes]]:
-    """A daemon of its own process, ended by SIGTERM; its log stands in the workspace."""
+    """Return a daemon of its own process, ended by SIGTERM; its log stands in the workspace."""
     log = workspace.folder / "daemon.log"
     command_line = [sys.executable, "-m", "shm_daemon", str(workspace.folder)]
     with log.open("wb") as file:
@@ -328,7 +328,7 @@ def _daemon(workspace: Workspace) -> Iterator[subprocess.Popen[bytes]]:
 def _await(
     count: int, store: Store, daemon: subprocess.Popen[bytes], bar: Progress, label: str
 ) -> None:
-    """Waits until `count` recordings are through; raises ShmError where the daemon gives up."""
+    """Wait until `count` recordings are through; raises ShmError where the daemon gives up."""
     task = bar.add_task(label, total=count)
     for through in _watched(store, daemon):
         bar.update(task, completed=through)
@@ -349,7 +349,7 @@ def _watched(store: Store, daemon: subprocess.Popen[bytes], poll_s: float = 0.3)
 
 
 def _await_alert(store: Store, daemon: subprocess.Popen[bytes]) -> Sequence[StoredAlert]:
-    """The alerts, once the hook has had them."""
+    """Return the alerts, once the hook has had them."""
     for _ in _watched(store, daemon):
         alerts, deliveries = store.alerts.list_all(), store.alerts.list_deliveries()
         if not alerts or all(delivery.state == "delivered" for delivery in deliveries):

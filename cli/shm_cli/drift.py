@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,8 +30,6 @@ from shm.watch.repair_check import EVENT_KINDS
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, progress_bar, show, show_rows, show_texts
 
-_FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
-
 
 @click.group(invoke_without_command=True)
 @flags.hanger()
@@ -39,7 +37,7 @@ _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
 @flags.json
 @click.pass_context
 def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
-    """How far tension and stiffness have moved.
+    """Show how far tension and stiffness have moved.
 
     The shift of the latest test of each hanger from its baseline, if there is one at all: the
     tension in percent, an end stiffness as how many times what it was, with the probability that it
@@ -63,8 +61,8 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
             if all_tests
             else [drift for each in hangers for drift in latest_drifts(store, each)]
         )
-        anew = [] if all_tests else _without_a_test(store, hangers)
-    if not shown and not anew:
+        rebaselined = [] if all_tests else _without_a_test(store, hangers)
+    if not shown and not rebaselined:
         raise NothingThere(
             "no test has been compared with a baseline yet.",
             remedy="Take in more tests: the first ones of a hanger form its baseline.",
@@ -77,9 +75,12 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
         return
     if shown:
         _show(shown)
-    for each in anew:
-        said = f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has "
-        click.echo(paragraph(f"{said}come in after that baseline was set."))
+    for each in rebaselined:
+        sentence = (
+            f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has come "
+            "in after that baseline was set."
+        )
+        click.echo(paragraph(sentence))
     if states.temperature_coefficients:
         click.echo()
         show_texts(temperature_table(states))
@@ -95,7 +96,7 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
 )
 @click.pass_context
 def bridge(ctx: click.Context, figure: Path | None) -> None:
-    """Which hangers gained and which lost, and whether it is the bridge at all.
+    """Show which hangers gained and lost tension, and if the complete bridge moved.
 
     Compares the latest tension shift of each hanger with its neighbours': one hanger whose
     load moved to others, one that gained load, all alike (a temperature or a clock), or each
@@ -124,7 +125,7 @@ def bridge(ctx: click.Context, figure: Path | None) -> None:
 @flags.hanger(required=True)
 @click.option(
     "--since",
-    type=click.DateTime(_FORMATS),
+    type=flags.Day(),
     required=True,
     metavar="DAY",
     help="The first day (UTC) whose tests count, such as 2026-05-01.",
@@ -146,24 +147,22 @@ def rebaseline(
     why: str,
     who: str,
 ) -> None:
-    """Compare a hanger with itself as it is since some day.
+    """Set a new baseline from the tests since a day.
 
-    After works on it, or once a shift was looked into and accepted. The tests since that day are
-    updated jointly in the hanger's class; that is its baseline, and tests taken in later are
-    watched against it. What was compared with the old baseline stays on record, and so do its
-    alerts.
+    Use it after works on the hanger, or once a shift is examined and accepted. The tests since
+    that day are updated jointly in the class of the hanger, and later tests are compared with them.
+    Comparisons with the old baseline and their alerts stay on record.
 
-    With --kind only the alerts end that such an event explains, with a note who said so: a lamp
-    ends those of an added mass, but not of lost tension. The others stay open. What was repaired
-    or retensioned must show it in these tests, else nothing is done; a loss that is to stay is
-    "accepted as it is".
+    With --kind only the alerts end that such an event explains: a lamp ends those of an added mass,
+    but not those of lost tension. A repair or retensioning must be visible in these tests, else the
+    command is refused; for a loss that is to stay use "accepted as it is".
 
     \b
     Example: shm drift rebaseline --hanger 3 --since 2026-05-01 --why "pin replaced"
     Example: shm drift rebaseline --hanger 7 --since 2026-05-03 --kind retensioned --why "to 640 kN"
     """
     event = EVENT_KINDS[kind] if kind else None
-    order = Order(since.replace(tzinfo=UTC), why, who, event)
+    order = Order(since, why, who, event)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         with progress_bar("updating") as progress:

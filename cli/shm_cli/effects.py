@@ -72,7 +72,7 @@ think of then. What imitates what:
 )
 @flags.json
 def effects(name: str | None) -> None:
-    """The catalogue of effects: what each does, its ranges, what shows it, what imitates it.
+    """List the catalogue of effects: ranges, evidence and imitators of each.
 
     The ranges are those of hanger 3 of the thesis, since they scale with the hanger.
 
@@ -127,7 +127,7 @@ def _document(effect: Effect) -> dict[str, object]:
 
 
 def effects_page() -> str:
-    """The page of all effects in Markdown, in the order of the catalogue."""
+    """Return the page of all effects in Markdown, in the order of the catalogue."""
     rows = [(f"[`{e.name}`](#{e.name})", e.title.lower(), _shown_by(e)) for e in EFFECTS.values()]
     parts = [_HEAD + "\n" + markdown(_OVERVIEW_HEADS, rows)]
     return "\n\n".join(parts + [_section(effect) for effect in EFFECTS.values()]) + "\n"
@@ -147,7 +147,7 @@ def _shown_by(effect: Effect) -> str:
 
 
 def _facts(effect: Effect) -> str:
-    """Where it acts, what shows and what imitates it, and who says so; a line each."""
+    """Return lines on an effect: place, evidence, imitators and source."""
     places = ", ".join(f"*{each.at}*" for each in effect.variants(_HANGER, _EVERYTHING))
     needs = effect.invisible(_HANGER, _LEAST)
     lines = [
@@ -162,7 +162,7 @@ def _facts(effect: Effect) -> str:
 
 
 def _parameters(effect: Effect) -> dict[str, Parameter]:
-    """The parameters of all its variants by name, on hanger 3."""
+    """Return the parameters of all its variants by name, on hanger 3."""
     return {
         parameter.name: parameter
         for variant in effect.variants(_HANGER, _EVERYTHING)
@@ -172,11 +172,11 @@ def _parameters(effect: Effect) -> dict[str, Parameter]:
 
 def _parameter_rows(parameters: Sequence[Parameter]) -> list[tuple[str, ...]]:
     """One row a parameter; those of the other end or plane, which only repeat it, in one row."""
-    alike: dict[tuple[float, float, str], list[Parameter]] = {}
+    same_prior: dict[tuple[float, float, str], list[Parameter]] = {}
     for parameter in parameters:
         key = (parameter.lower, parameter.upper, parameter.reason)
-        alike.setdefault(key, []).append(parameter)
-    return [_row(group) for group in alike.values()]
+        same_prior.setdefault(key, []).append(parameter)
+    return [_row(group) for group in same_prior.values()]
 
 
 def _row(group: list[Parameter]) -> tuple[str, ...]:

@@ -40,7 +40,7 @@ def command(
     form: str | None,
     out: Path,
 ) -> None:
-    """Posterior samples of the selected model class for other programs.
+    """Export posterior samples for other programs.
 
     `shm report` states the tension over all classes, with a wider interval. One column a
     parameter, then tension_n and log_likelihood; equally weighted rows. NetCDF adds the measured

@@ -43,9 +43,9 @@ from shm_cli.common import (
     open_workspace,
     opened_store,
     readable_width,
+    show_doubts,
     show_rows,
     tests_and_hanger,
-    told_doubts,
     write_pictures,
 )
 from shm_cli.effects import effects
@@ -65,7 +65,7 @@ _HEADS = ("measurement", "hours", "in all", "promised log odds", "then", "probab
 
 @click.group()
 def command() -> None:
-    """Why model and measurement differ, and what that does to tension.
+    """Find out why model and measurement differ.
 
     \b
     Example: shm gap diagnose hanger3.modes.json
@@ -98,10 +98,10 @@ def plan(
     without: tuple[str, ...],
     seed: int,
 ) -> None:
-    """The next measurements in order, each with its cost and what it promises.
+    """Rank the next measurements, each with its cost and expected benefit.
 
-    Of MODES.json, or of the latest 20 tests of a hanger of the workspace. Hours of each kind of
-    measurement stand in the table [measurement_hours] of the bridge file.
+    Uses MODES.json, or the latest 20 tests of a hanger of the workspace. State the hours of each
+    kind of measurement in the table [measurement_hours] of bridge.toml.
 
     \b
     Example: shm gap plan hanger3.modes.json --hanger-file H.toml --budget 8
@@ -197,14 +197,14 @@ def diagnose(
     html: Path | None,
     figures: Path | None,
 ) -> None:
-    """Where the gap lies, which effect causes it, how far it shrinks, what would tell.
+    """Diagnose the gap: where it is, its causes, how far they shrink it, what to measure next.
 
-    Of MODES.json with --hanger-file, or of the latest tests of a hanger of the workspace, which
-    keeps the diagnosis for its report and for `shm gap adopt`. The answer gives every effect of
-    the catalogue its probability, also no gap at all and something that the catalogue lacks.
+    Give MODES.json with --hanger-file, or a hanger of the workspace: its latest tests are used, and
+    the diagnosis is stored for its report and for `shm gap adopt`. The answer gives a probability
+    to every effect of the catalogue, to no gap, and to something that the catalogue lacks.
 
-    With --bridge, or of several MODES.json, each followed by its H.toml: whether hangers share a
-    cause, which of them have it, and what it does to their tensions.
+    With --bridge, or with several MODES.json, each followed by its H.toml: the cause that hangers
+    share, which of them have it, and what it means for their tensions.
 
     \b
     Example: shm gap diagnose hanger3.modes.json --hanger-file H.toml --html gap.html
@@ -234,7 +234,7 @@ for _verb in (adopt, adopted, check, drop, effects):
 def _of_workspace(
     ctx: click.Context, hanger: Hanger, count: int, options: GapOptions
 ) -> DiagnosisSheet:
-    """The diagnosis of the latest tests, which the store keeps."""
+    """Return the diagnosis of the latest tests, which the store keeps."""
     with opened_store(ctx) as (workspace, store):
         stored = latest_tests(store, hanger, count)
         found = _diagnosis([each.test for each in stored], hanger, options)
@@ -279,7 +279,7 @@ def _jointly(
         return _of_bridge(ctx, count, options)
     found = [tests_and_hanger(ctx, modes, of, None) for modes, of in _pairs(files)]
     for tests, hanger in found:
-        told_doubts(tests, hanger)
+        show_doubts(tests, hanger)
     with advancing_bar() as progress:
         named = [(hanger, tests) for tests, hanger in found]
         bars = tuple(describe_bar(hanger, _sensors(tests)) for tests, hanger in found)
@@ -313,9 +313,9 @@ def _of_bridge(ctx: click.Context, count: int, options: GapOptions) -> BridgeDia
         with advancing_bar() as progress:
             named = [(hanger, [e.test for e in tests]) for hanger, tests in stored.items()]
             found = diagnose_bridge(named, options, progress)
-        for (hanger, tests), own in zip(stored.items(), found.diagnoses, strict=True):
+        for (hanger, tests), diagnosis in zip(stored.items(), found.diagnoses, strict=True):
             lineage = diagnosis_lineage(tests, hanger, asdict(options))
-            store.posteriors.save_diagnosis(hanger.id, own, lineage, utc_now())
+            store.posteriors.save_diagnosis(hanger.id, diagnosis, lineage, utc_now())
         bars = tuple(
             describe_bar(hanger, _stored_sensors(store, tests)) for hanger, tests in stored.items()
         )
@@ -329,7 +329,7 @@ def _show(
     html: Path | None,
     figures: Path | None,
 ) -> None:
-    """Writes what is to be written, then answers."""
+    """Write the files, then the answer."""
     if html is not None or figures is not None:
         with drawing():
             if html is not None:

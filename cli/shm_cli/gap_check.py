@@ -89,11 +89,11 @@ def check(
     seed: int,
     figure: Path | None,
 ) -> None:
-    """Say what a diagnosis would find on this hanger with these sensors, and from which size on.
+    """Report which effects a diagnosis would find on this hanger, and from which size.
 
-    Each effect is planted in a simulated twin of the hanger, with its modes, sensors, errors and
-    conditions, and diagnosed. Of MODES.json with --hanger-file, of the latest tests of a hanger of
-    the workspace, or, where there is no test, of a usual hammer test. Ctrl-C prints what is done.
+    Each effect is put into a simulated twin of the hanger, with its modes, sensors, errors and
+    conditions, and diagnosed. The twin follows MODES.json with --hanger-file, the latest tests of a
+    hanger of the workspace or, without tests, a usual hammer test. Ctrl-C prints what is done.
 
     \b
     Example: shm gap check --hanger 3

@@ -22,16 +22,16 @@ from shm_cli.common import paragraph, show
 
 
 def show_held(workspace: Workspace) -> int:
-    """What nobody has decided on yet."""
+    """List the recordings that wait for a decision."""
     with workspace.store() as store:
         found = store.recordings.list_holds()
     if flags.wants_json():
-        show({"held": [hold_document(hold) for hold in found]})
+        show({"held": [hold_document(hold) for hold in found]}, "held")
         return 0
     if not found:
         click.echo("Nothing is held.")
     for hold in found:
-        click.echo(told(hold) + "\n")
+        click.echo(hold_line(hold) + "\n")
     return 0
 
 
@@ -51,7 +51,7 @@ def decide(
     record: tuple[str | None, str | None],
     time: datetime | None,
 ) -> Decided:
-    """Notes a decision and does what follows from it, or leaves that to the daemon at work.
+    """Record a decision and do what follows, or leave that to the active daemon.
 
     `record` is who decided and why. Raises NothingThere, UsageError; then nothing is changed.
     """
@@ -87,7 +87,7 @@ def decide(
 
 
 def _is_held(store: Store, recording_id: int, test: str | None) -> bool:
-    """Whether the recording waits for a decision, or that test of it."""
+    """Return True if the recording, or that test of it, waits for a decision."""
     hold = store.recordings.latest_hold(recording_id)
     if hold is None or hold.decision is not None:
         return False
@@ -111,7 +111,7 @@ def _refuse_part(hold: Hold | None, test: str, decision: Decision) -> None:
 
 
 def _refuse_without_reason(store: Store, recording_id: int, decision: Decision, why: str) -> None:
-    """What counts, or was decided on, is not turned round by one word."""
+    """Require a reason to reverse a decision or to exclude a used recording."""
     recording, hold = store.recordings.get(recording_id), store.recordings.latest_hold(recording_id)
     confirms = decision is Decision.CONFIRMED
     is_out = hold is not None and hold.is_out
@@ -136,7 +136,7 @@ def _refuse_copy_without_reason(hold: Hold | None, why: str) -> None:
 
 
 def decided_words(decided: Decided, stage: Stage) -> str:
-    """What became of it."""
+    """Return a sentence on the decision and its consequence."""
     hold, exclusion = decided.hold, decided.exclusion
     what = f"Recording {hold.recording_id} ({hold.file_name})"
     if exclusion is not None and hold.decision is Decision.WITHDRAWN:
@@ -145,8 +145,8 @@ def decided_words(decided: Decided, stage: Stage) -> str:
         return f"{what} is discarded and counts in nothing. {taking_back(hold)}"
     if hold.decision is Decision.DISCARDED:
         names = ", ".join(test.name for test in hold.tests)
-        said = f"{names} is discarded and counts in nothing; its other tests go on counting."
-        return f"{what}: {said} {taking_back(hold)}"
+        sentence = f"{names} is discarded and counts in nothing; its other tests go on counting."
+        return f"{what}: {sentence} {taking_back(hold)}"
     verb = "counts again" if hold.decision is Decision.REINSTATED else "is confirmed and counts"
     time = ""
     if hold.time is not None:
@@ -158,35 +158,35 @@ def decided_words(decided: Decided, stage: Stage) -> str:
 
 def _excluded_words(what: str, exclusion: Exclusion) -> str:
     names = ", ".join(test.name for test in exclusion.hold.tests)
-    said = [f"{what}: {names} is discarded and counts in nothing from now on."]
+    sentences = [f"{what}: {names} is discarded and counts in nothing from now on."]
     if exclusion.watched_again:
-        said.append(
+        sentences.append(
             f"Later tests that are watched again: {exclusion.watched_again}; alerts that others "
             "raised stay raised."
         )
     if exclusion.of_baseline and exclusion.since is not None:
-        said.append(
+        sentences.append(
             f"The baseline was made from {', '.join(exclusion.of_baseline)} and stays until you "
             f"set another: `shm drift rebaseline --hanger {exclusion.hold.hanger} --since "
             f"{exclusion.since:%Y-%m-%d} --why TEXT`."
         )
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def discarded_words(hold: Hold) -> str:
-    """What is said where a discarded file comes again: one line."""
+    """Return the line for a discarded file that arrives again."""
     words = discarded_reason(hold).replace("discarded", "discarded before,", 1)
     return f"{words} {taking_back(hold)}"
 
 
-def told(hold: Hold) -> str:
-    """A hold as text: when, what and why, with the commands that end it."""
+def hold_line(hold: Hold) -> str:
+    """Return a hold as text: when, what and why, with the commands that end it."""
     since = f"recording {hold.recording_id}, {hold.file_name}, held since"
     return paragraph(f"{since} {hold.held_at:%Y-%m-%d %H:%M}. {hold.message}")
 
 
 def hold_document(hold: Hold) -> dict[str, Any]:
-    """The same for programs; `decision` is null while nobody has decided."""
+    """Return the same for programs; `decision` is null while nobody has decided."""
     return {
         "recording": hold.recording_id,
         "file": hold.file_name,

@@ -31,7 +31,7 @@ from shm_cli.common import (
     one_hanger,
     open_workspace,
     readable_width,
-    told_doubts,
+    show_doubts,
     write_pictures,
 )
 
@@ -138,12 +138,12 @@ def command(
     hanger_file: Path | None,
     **chosen: Any,
 ) -> None:
-    """Modal parameters of recordings.
+    """Identify the modes of recordings.
 
-    Each file is a test of its own unless --together is given; a .zip holds the files of one test.
-    The hanger's description, where known, helps to number the modes; in a workspace the profile of
-    the file's logger says what `shm import` was told. The page (--html) shows time
-    histories, frequency responses with the fitted modes, stabilisation, shapes and quality.
+    Each file is one test, unless --together is given; a .zip holds the files of one test. The
+    description of the hanger helps to number the modes. In a workspace the answers stored for the
+    file's logger are used. The page (--html) shows time histories, frequency responses with the
+    fitted modes, stabilisation, shapes and quality.
 
     \b
     Example: shm identify hanger3.csv --hanger-file H.toml --html hanger3.html
@@ -196,7 +196,7 @@ def _identified(
             remedy="Give the description of its hanger, or correct the file.",
         )
     if hanger is not None:
-        told_doubts([found.test], hanger)
+        show_doubts([found.test], hanger)
     return ModalTestReport(found, records, hanger, (options.band_low_hz, options.band_high_hz))
 
 
@@ -221,7 +221,7 @@ def _refuse_several_hangers(sheets: Sequence[ModalTestReport]) -> None:
 
 
 def _document(sheets: Sequence[ModalTestReport]) -> dict[str, Any]:
-    """The modal-tests document, each test with its quality and what was set aside."""
+    """Return the modal-tests document, each test with its quality and what was set aside."""
     found = [sheet.identification for sheet in sheets]
     document = modes_document([each.test for each in found])
     for entry, each in zip(document["tests"], found, strict=True):

@@ -53,7 +53,7 @@ def import_modes(
     modes: ForeignModes, workspace: Workspace, answers: Answers, planes: Sequence[str], *,
     dry_run: bool, asks: bool,
 ) -> int:  # fmt: skip
-    """Takes the modes of a file in, or says what is open; the exit code."""
+    """Take in the modes of a file, or say what is open; return the exit code."""
     answers = replace(answers, channels=_planes(planes, axes_of(modes.modes)))
     found = understand_modes(modes, workspace, answers)
     if found.questions and asks:
@@ -67,7 +67,7 @@ def import_modes(
         keep_modes_profile(found, workspace, answers)
         landed = _land_modes(found, workspace)
     if flags.wants_json():
-        show(_modes_document(found, landed))
+        show(_modes_document(found, landed), "import_modes")
     else:
         _show_modes(found, landed)
     return 0 if found.test is not None else BadInput.exit_code
@@ -166,13 +166,14 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
 @click.option("--dry-run", is_flag=True, help="Only show what is understood; keep nothing.")
 @flags.json
 @click.pass_context
-def command(ctx: click.Context, /, file: Path, dry_run: bool, **said: Any) -> int:
-    """Take a logger's file in for the first time, asking only what it does not say.
+def command(ctx: click.Context, /, file: Path, dry_run: bool, **options: Any) -> int:
+    """Take in the first file of a logger; asks what it does not say.
 
-    Shows each column, what it is taken for, its range, hits and clipping. What you answer (hanger,
-    place and plane of the sensors) is kept in the workspace, in loggers/; later files of the same
-    logger need nothing and may go into the spool as they are. With --each-time the hanger is not
-    kept: each file says it, or you do.
+    Later files of that logger need no answers: use `shm ingest FILE`, or copy them into the spool.
+
+    Shows each column with its meaning, range, hits and clipping, and asks for what the file does
+    not say: hanger, positions and planes of the sensors, units. The answers are stored in
+    loggers/. With --each-time the hanger is not stored: each file must name it.
 
     Without a terminal nothing is asked: exit code 3, and the options to add.
 
@@ -182,15 +183,19 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, **said: Any) -> in
     """
     workspace = open_workspace(ctx)
     asks = not flags.wants_json() and sys.stdin.isatty() and sys.stdout.isatty()
-    first = look_into(file, workspace, _whole_file(said))
+    if options["hanger"] is not None:
+        workspace.bridge.tested(options["hanger"])
+    first = look_into(file, workspace, _whole_file(options))
     modes = None if first.columns else _modes_in(file, workspace)
     if modes is not None:
         return import_modes(
-            modes, workspace, _whole_file(said), said["plane"],
+            modes, workspace, _whole_file(options), options["plane"],
             dry_run=dry_run, asks=asks,
         )  # fmt: skip
-    answers = _answers(said, first)
-    found = understand(first.survey, workspace, answers) if answers != _whole_file(said) else first
+    answers = _answers(options, first)
+    found = (
+        first if answers == _whole_file(options) else understand(first.survey, workspace, answers)
+    )
     if found.questions and asks:
         _show(found)
         answers = asked(found.of_test, answers, workspace, partial(_answer, found))
@@ -223,42 +228,42 @@ def _modes_in(file: Path, workspace: Workspace) -> ForeignModes | None:
 # ---------------------------------------------------------------- answers
 
 
-def _whole_file(said: dict[str, Any]) -> Answers:
-    """What the options say of the whole file."""
-    rate, temperature = said["rate"], said["temperature"]
+def _whole_file(options: dict[str, Any]) -> Answers:
+    """Return the answers of the options for the complete file."""
+    rate, temperature = options["rate"], options["temperature"]
     if rate is not None and not 0 < rate < math.inf:
         raise UsageError(
             f"--rate {rate:g} is no rate.", remedy="Give samples a second: --rate 512."
         )
     answers = Answers(
-        said["hanger"],
+        options["hanger"],
         math.nan if rate is None else rate,
         temperature_c=math.nan if temperature is None else temperature,
-        each_time=said["each_time"],
+        each_time=options["each_time"],
     )
-    return answers if said["time"] is None else answer_time(said["time"], answers)
+    return answers if options["time"] is None else answer_time(options["time"], answers)
 
 
-def _answers(said: dict[str, Any], found: Import) -> Answers:
-    """What the options say, of the channels too."""
+def _answers(options: dict[str, Any], found: Import) -> Answers:
+    """Return the answers of the options, those for channels included."""
     names = [column.name for column in found.survey.columns]
     tables: dict[str, dict[str, object]] = {}
-    for name in said["leave_out"]:
+    for name in options["leave_out"]:
         tables.setdefault(_column(name, names), {})["leave_out"] = True
-    for key, values in (("unit", said["unit"]), ("sensitivity", said["sensitivity"])):
+    for key, values in (("unit", options["unit"]), ("sensitivity", options["sensitivity"])):
         for name, value in _named(key, values, names, names):
             tables.setdefault(name, {}).update(
                 channel_answer(key, value, unit_recorded(name, found))
             )
     sensors = _accelerations(found, tables)
-    for key, values in (("place", said["place"]), ("plane", said["plane"])):
+    for key, values in (("place", options["place"]), ("plane", options["plane"])):
         for name, value in _named(key, values, names, sensors):
             tables.setdefault(name, {}).update(channel_answer(key, value))
-    return replace(_whole_file(said), channels=tables)
+    return replace(_whole_file(options), channels=tables)
 
 
 def _accelerations(found: Import, tables: dict[str, dict[str, object]]) -> list[str]:
-    """The accelerations in the order of the file, with those that the options make such."""
+    """Return the accelerations in the order of the file, with those that the options make such."""
     known = {column.name: column.quantity for column in found.columns}
     for name, given in tables.items():
         unit = unit_of(str(given.get("unit", "")))
@@ -321,7 +326,7 @@ def _show(found: Import) -> None:
         f"{survey.samples} samples" if survey.samples else "",
         f"{survey.samples / rate:.1f} s at {rate:g} Hz" if rate > 0 else "rate not recorded",
     )
-    rows = [[told(column) for told in _COLUMNS.values()] for column in found.columns]
+    rows = [[cell_of(column) for cell_of in _COLUMNS.values()] for column in found.columns]
     show_rows(", ".join(part for part in parts if part), tuple(_COLUMNS), rows)
     for remark in found.remarks:
         click.echo(f"note: {remark}")
@@ -335,10 +340,10 @@ def _range(column: Understood) -> str:
 
 
 def _seen(column: Understood) -> str:
-    told = [] if column.hits is None else [f"{column.hits} hit{'s' * (column.hits != 1)}"]
-    told += [f"{column.overloads} overloads"] if column.overloads else []
-    told += ["clipped"] if column.is_clipped else []
-    return ", ".join(told)
+    words = [] if column.hits is None else [f"{column.hits} hit{'s' * (column.hits != 1)}"]
+    words += [f"{column.overloads} overloads"] if column.overloads else []
+    words += ["clipped"] if column.is_clipped else []
+    return ", ".join(words)
 
 
 _COLUMNS: dict[str, Callable[[Understood], str]] = {

@@ -1,4 +1,4 @@
-"""What `shm import` asks a person at a terminal; a wrong answer is asked for again."""
+"""Questions of `shm import` at a terminal; a wrong answer is asked for again."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ OfChannel = Callable[[Question, str], dict[str, object]]
 def asked(
     questions: Sequence[Question], answers: Answers, workspace: Workspace, of_channel: OfChannel
 ) -> Answers:
-    """The answers with those of the person at the terminal."""
+    """Return the answers with those of the person at the terminal."""
     tables = {name: dict(given) for name, given in answers.channels.items()}
     for question in questions:
         if question.about == "hanger":
@@ -41,7 +41,7 @@ def asked(
 
 
 def asked_if_it_stays(answers: Answers, *, is_known: bool) -> Answers:
-    """Whether a new logger's profile may name its hanger; nothing is asked of a known one."""
+    """Ask if the profile of a new logger may name its hanger; a known one is not asked."""
     if is_known or answers.hanger is None or answers.each_time:
         return answers
     text = f"Are all later files of this logger of hanger {answers.hanger}, too?"

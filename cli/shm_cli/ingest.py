@@ -86,13 +86,15 @@ def command(
     look: bool,
     **about: Any,
 ) -> int:
-    """Take recordings in, look into them with --peek, or do one again with --again.
+    """Take in files of known loggers; --peek looks, --again redoes.
 
-    Each file is archived, identified, updated and watched as the daemon would; it may also be a
-    *.modes.json. The files stay where they are. Exit code 3 when any was refused.
+    A logger that shm has not seen before needs answers: use `shm import FILE` for its first file.
 
-    What is implausible is held and counts in nothing: --held shows it, --confirm and --discard
-    answer it. With --why they also take out what counts, and take back what was discarded.
+    Each file is archived, identified, updated and watched as the daemon would do it; it may also be
+    a *.modes.json. The files stay where they are. Exit code 3 if any was refused.
+
+    An implausible recording is held and not used: --held lists them, --confirm and --discard
+    decide. With --why they also exclude a used recording, or take back a discarded one.
 
     \b
     Example: shm ingest hanger3_*.csv
@@ -163,7 +165,7 @@ def _decide(workspace: Workspace, about: Mapping[str, Any]) -> int:
         stage = store.recordings.get(made.hold.recording_id).stage
     if flags.wants_json():
         alerts = [alert_document(stored.alert) for stored in made.alerts]
-        show({**hold_document(made.hold), "stage": stage.value, "alerts": alerts})
+        show({**hold_document(made.hold), "stage": stage.value, "alerts": alerts}, "decision")
         return 0
     click.echo(decided_words(made, stage))
     for stored in made.alerts:
@@ -278,7 +280,8 @@ def show_peeks(files: Sequence[Path], workspace: Workspace | None = None) -> int
     missing = [_missing(look, workspace) for look in looks]
     if flags.wants_json():
         found = zip(looks, missing, strict=True)
-        show({"files": [{**asdict(look), "missing": lacks} for look, lacks in found]})
+        files_found = [{**asdict(look), "missing": lacks} for look, lacks in found]
+        show({"files": files_found}, "peek")
     else:
         for look, lacks in zip(looks, missing, strict=True):
             if look.channels:
@@ -296,7 +299,7 @@ def show_peeks(files: Sequence[Path], workspace: Workspace | None = None) -> int
 
 
 def _looks(path: Path, workspace: Workspace | None) -> Sequence[Peek]:
-    """A file of which nothing can be made out is one with a problem and no channels."""
+    """Return a file that cannot be read as one with a problem and no channels."""
     try:
         if path.name.lower().endswith(_MODES_SUFFIX):
             return [_modes(path)]
@@ -354,11 +357,11 @@ def _modes(path: Path) -> Peek:
 
 
 def _show_channels(look: Peek) -> None:
-    """A row a channel; calibration and full scale only where a channel has one."""
+    """Return a row a channel; calibration and full scale only where a channel has one."""
     columns = {
         name: cells
-        for name, told in _COLUMNS.items()
-        if any(cells := [told(channel) for channel in look.channels]) or name not in _RARE
+        for name, cell_of in _COLUMNS.items()
+        if any(cells := [cell_of(channel) for channel in look.channels]) or name not in _RARE
     }
     show_rows(_title(look), tuple(columns), zip(*columns.values(), strict=True))
 
@@ -394,7 +397,7 @@ def _title(look: Peek) -> str:
 
 
 def _kind(look: Peek) -> str:
-    """What the file is, where that is not a plain hammer test."""
+    """Return the kind of file, if it is not a single hammer test."""
     if look.lines:
         return f"frequency responses of {look.lines} lines every {look.frequency_step_hz:g} Hz"
     ambient = look.samples and all(channel.quantity == "acceleration" for channel in look.channels)

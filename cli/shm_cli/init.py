@@ -45,7 +45,7 @@ def command(ctx: click.Context, folder: Path | None, config: Path | None, name: 
 
 
 def _rename(path: Path, name: str) -> None:
-    """Puts the name into the table [bridge], comments and all else left as they are."""
+    """Put the name into the table [bridge], comments and all else left as they are."""
     text = path.read_text(encoding="utf-8")
     line = f"name = {json.dumps(name, ensure_ascii=False)}"
     head = re.compile(r"^\[bridge\][^\n]*\n(?:name\s*=[^\n]*\n)?", re.MULTILINE)

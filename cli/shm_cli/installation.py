@@ -32,12 +32,12 @@ _HEADS = ("setting", "default", "unit", "range", "meaning")
 def settings_command(
     ctx: click.Context, assumptions: bool, hanger_id: int | None, hanger_file: Path | None
 ) -> None:
-    """Every setting: its default, its range, what it means.
+    """List every setting with default and range.
 
     A value comes from the flag, else the environment (`workers` from SHM_WORKERS), else
-    `[settings]` of `bridge.toml`, else the default. With --assumptions: what is taken of hangers,
-    sensors and measurements before any data, from `[assumptions]` of `bridge.toml`, else the
-    default; of a hanger with --hanger or --hanger-file.
+    `[settings]` of `bridge.toml`, else the default. With --assumptions: the assumptions on hangers,
+    sensors and measurements, from `[assumptions]` of `bridge.toml`, else the default; of a hanger
+    with --hanger or --hanger-file.
 
     \b
     Example: shm settings
@@ -57,7 +57,7 @@ def settings_command(
 
 
 def settings_page() -> str:
-    """The manual's page of settings in Markdown, from the one table of settings."""
+    """Return the manual's page of settings in Markdown, from the one table of settings."""
     head = (
         "# Settings\n\n"
         "A value comes from the flag, else the environment (`workers` from `SHM_WORKERS`), else "
@@ -111,7 +111,7 @@ class Notice:
 @click.command("notices")
 @flags.json
 def notices_command() -> None:
-    """Other people's packages that work here, with the licence that each declares.
+    """List installed packages and licences.
 
     Those of an extra, such as `web`, are listed where they are installed. The texts of the licences
     lie in each package's own folder of the installation.

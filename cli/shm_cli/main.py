@@ -15,14 +15,14 @@ import rich_click as click
 from rich.markup import escape
 
 from shm import __version__
-from shm.errors import DISK_FULL, BadInput, ShmError
+from shm.errors import DISK_FULL, BadInput, ShmError, suggest
 from shm.resources import one_thread_a_process
+from shm_cli import errors
 from shm_cli.terminal import Terminal, cleaned_output, escape_controls
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-UNEXPECTED = 1
 _LISTING = "shm_cli.listing"
 
 
@@ -35,73 +35,68 @@ class Verb:
     name: str = "command"
 
 
-VERBS: dict[str, Verb] = {
-    "init": Verb("shm_cli.init", "Make a workspace for a bridge."),
-    "demo": Verb("shm_cli.demo", "See the whole job on a simulated bridge of 20 hangers."),
-    "import": Verb(
-        "shm_cli.import_file",
-        "Take a logger's file in for the first time, asking only what it does not say.",
-    ),
-    "ingest": Verb(
-        "shm_cli.ingest",
-        "Take recordings in, look into them with --peek, or do one again with --again.",
-    ),
-    "stream": Verb("shm_cli.stream", "Permanent sensors: what is live, and what was lost."),
-    "daemon": Verb(
-        "shm_cli.services", "Watch the spool and do the whole job, unattended.", "daemon"
-    ),
-    "web": Verb(
-        "shm_cli.services",
-        "The dashboard and its API: pages for people, upload, alerts, health and metrics.",
-        "web",
-    ),
-    "token": Verb("shm_cli.access", "Who may read and write over the network.", "token"),
-    "user": Verb("shm_cli.access", "People who may sign in to the dashboard.", "user"),
-    "note": Verb(
-        "shm_cli.records", "Notes, inspections and repairs of a hanger or of the bridge.", "note"
-    ),
-    "audit": Verb("shm_cli.records", "Who changed what, when and how: the newest first.", "audit"),
-    "identify": Verb("shm_cli.identify", "Modal parameters of recordings."),
-    "predict": Verb("shm_cli.predict", "Frequencies of a model class for given parameters."),
-    "update": Verb("shm_cli.update", "Posterior of tension and end stiffness."),
-    "select": Verb("shm_cli.update", "Compare model classes by their evidence.", "select_command"),
-    "gap": Verb("shm_cli.gap", "Why model and measurement differ, and what that does to tension."),
-    "report": Verb(
-        "shm_cli.report", "Print the state of a hanger or the bridge, or write its report."
-    ),
-    "drift": Verb("shm_cli.drift", "How far tension and stiffness have moved."),
-    "alerts": Verb("shm_cli.alerts", "Alerts that were raised, and their deliveries."),
-    "simulate": Verb("shm_cli.simulate", "Hammer tests of a hanger whose truth you choose."),
-    "export": Verb(
-        "shm_cli.export", "Posterior samples of the selected model class for other programs."
-    ),
-    "db": Verb("shm_cli.db", "Upgrade, check, back up, restore or copy the store."),
-    "archive": Verb(
-        "shm_cli.archive", "Keep the archive and the quarantine from growing for ever."
-    ),
-    "doctor": Verb(
-        "shm_cli.checkup", "Whether all is well, and what to do where it is not.", "doctor"
-    ),
-    "status": Verb("shm_cli.status", "What the workspace holds and what waits."),
-    "bridges": Verb(
-        "shm_cli.checkup",
-        "How this bridge and the others of bridge.toml are, the worst first.",
-        "bridges",
-    ),
-    "settings": Verb(
-        "shm_cli.installation",
-        "Every setting: its default, its range, what it means.",
-        "settings_command",
-    ),
-    "notices": Verb(
-        "shm_cli.installation",
-        "Other people's packages that work here, with the licence that each declares.",
-        "notices_command",
-    ),
-    "completion": Verb(
-        "shm_cli.completion", "Print the script that completes `shm` in bash or zsh."
-    ),
+GROUPS: dict[str, dict[str, Verb]] = {
+    "Start": {
+        "init": Verb("shm_cli.init", "Make a workspace for a bridge."),
+        "demo": Verb("shm_cli.demo", "Run everything on a simulated bridge of 20 hangers."),
+        "import": Verb(
+            "shm_cli.import_file",
+            "Take in the first file of a logger; asks what it does not say.",
+        ),
+        "ingest": Verb(
+            "shm_cli.ingest",
+            "Take in files of known loggers; --peek looks, --again redoes.",
+        ),
+    },
+    "Look": {
+        "status": Verb("shm_cli.status", "Show the state of every hanger and of the workspace."),
+        "report": Verb("shm_cli.report", "Report on a hanger or the bridge, for the file."),
+        "drift": Verb("shm_cli.drift", "Show how far tension and stiffness have moved."),
+        "alerts": Verb("shm_cli.alerts", "Show alerts and their deliveries; acknowledge them."),
+        "gap": Verb("shm_cli.gap", "Find out why model and measurement differ."),
+        "bridges": Verb(
+            "shm_cli.checkup",
+            "Show the state of this bridge and of the others of bridge.toml.",
+            "bridges",
+        ),
+        "audit": Verb("shm_cli.records", "Show who changed what, and when.", "audit"),
+        "note": Verb(
+            "shm_cli.records", "Record notes, inspections and repairs of a hanger.", "note"
+        ),
+    },
+    "Serve": {
+        "daemon": Verb("shm_cli.services", "Watch the spool and process every file.", "daemon"),
+        "web": Verb("shm_cli.services", "Serve the dashboard and its API.", "web"),
+        "stream": Verb("shm_cli.stream", "Show permanent sensors: what is live, what was lost."),
+        "user": Verb("shm_cli.access", "Manage the people who may sign in.", "user"),
+        "token": Verb("shm_cli.access", "Manage tokens for access over the network.", "token"),
+    },
+    "Files alone": {
+        "identify": Verb("shm_cli.identify", "Identify the modes of recordings."),
+        "select": Verb(
+            "shm_cli.update",
+            "Infer the tension with all model classes, and compare them.",
+            "select_command",
+        ),
+        "update": Verb("shm_cli.update", "Infer tension and end stiffness with one model class."),
+        "predict": Verb("shm_cli.predict", "Predict the frequencies of a model class."),
+        "simulate": Verb("shm_cli.simulate", "Simulate hammer tests of a hanger."),
+        "export": Verb("shm_cli.export", "Export posterior samples for other programs."),
+    },
+    "Upkeep": {
+        "db": Verb("shm_cli.db", "Upgrade, check, back up, restore or copy the store."),
+        "archive": Verb("shm_cli.archive", "Limit the size of the archive and the quarantine."),
+        "settings": Verb(
+            "shm_cli.installation", "List every setting with default and range.", "settings_command"
+        ),
+        "doctor": Verb("shm_cli.checkup", "Check the installation and the workspace.", "doctor"),
+        "completion": Verb("shm_cli.completion", "Print the completion script of bash or zsh."),
+        "notices": Verb(
+            "shm_cli.installation", "List installed packages and licences.", "notices_command"
+        ),
+    },
 }
+VERBS = {name: verb for group in GROUPS.values() for name, verb in group.items()}
 
 
 class Verbs(click.RichGroup):
@@ -122,6 +117,15 @@ class Verbs(click.RichGroup):
         _clean_output(command)
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the verb; raises click.UsageError that names the nearest one."""
+        if args[0] in VERBS or args[0].startswith("-") or ctx.resilient_parsing:
+            return super().resolve_command(ctx, args)
+        nearest = suggest(args[0], VERBS)
+        raise click.UsageError(f"No such command {args[0]!r}. {nearest}".rstrip(), ctx)
+
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         ctx.meta[_LISTING] = True
         return super().shell_complete(ctx, incomplete)
@@ -131,6 +135,14 @@ class Verbs(click.RichGroup):
         super().format_help(ctx, formatter)
 
 
+def _in_panels(group: click.Group) -> click.Group:
+    """Show the verbs of `shm --help` in their groups."""
+    for title, verbs in GROUPS.items():
+        group = click.command_panel(title, commands=list(verbs))(group)
+    return group
+
+
+@_in_panels
 @click.group(
     cls=Verbs, context_settings={"help_option_names": ["-h", "--help"], "show_default": True}
 )
@@ -192,7 +204,7 @@ def _use_workspace(ctx: click.Context, option: click.Parameter, folder: str | No
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Runs the command line and exits with the code of the contract."""
+    """Run the command line and exit with the code of the contract."""
     # Modules are no garbage: looking through them, while they load and at the end, takes a fifth
     # of the time of `shm status`.
     gc.disable()
@@ -204,16 +216,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Runs one command; its exit code. What goes wrong is said on stderr, stdout stays clean."""
+    """Run one command and return its exit code; an error is reported on stderr.
+
+    With --json the error is a document on stdout too, unless a command has printed its own.
+    """
+    errors.printed_documents.clear()
     try:
         result = cli.main(list(arguments), prog_name="shm", standalone_mode=False)
     except click.ClickException as error:
+        errors.add_suggestion(error)
         vars(error)["message"] = escape_controls(error.message)
         error.show()
-        return error.exit_code
+        failure = errors.of_click(error)
     except ShmError as error:
         _say(f"[bold red]Error:[/] {escape(str(error))}")
-        return error.exit_code
+        failure = errors.of_shm(error)
     except (click.Abort, KeyboardInterrupt):
         _say("Stopped.")
         return 130
@@ -221,27 +238,33 @@ def run(arguments: Sequence[str]) -> int:
         if "--debug" in arguments:
             raise
         if isinstance(error, OSError) and error.filename is not None:
-            _say(f"[bold red]Error:[/] {escape(_about_file(error))}")
-            return BadInput.exit_code
-        if isinstance(error, OSError) and error.errno in DISK_FULL:
+            failure = errors.of_shm(_about_file(error))
+            _say(f"[bold red]Error:[/] {escape(f'{failure.message} {failure.remedy}')}")
+        elif isinstance(error, OSError) and error.errno in DISK_FULL:
             _say("[bold red]Error:[/] no room is left where the answer goes. Make some.")
             return BadInput.exit_code
-        _say(f"[bold red]Unexpected {type(error).__name__}:[/] {escape(str(error))}")
-        _say("This is a fault of shm. `shm --debug ...` shows where; please report it.")
-        return UNEXPECTED
-    return result if isinstance(result, int) else 0
+        else:
+            failure = errors.of_unexpected(error)
+            _say(f"[bold red]{escape(failure.message)}[/]")
+            _say(failure.remedy)
+    else:
+        return result if isinstance(result, int) else 0
+    if "--json" in arguments and not errors.printed_documents:
+        click.echo(escape_controls(failure.document()))
+    return failure.exit_code
 
 
-def _about_file(error: OSError) -> str:
-    """What a person can do about a file or folder that the system refuses to open or to make."""
-    return (
-        f"{error.filename}: {(error.strerror or 'it cannot be used').lower()}. Check the path, "
-        "that its folder is there, that you may read and write it, and that the disk has room."
+def _about_file(error: OSError) -> BadInput:
+    """Return the error of a file or folder that the system refuses to open or to make."""
+    return BadInput(
+        f"{error.filename}: {(error.strerror or 'it cannot be used').lower()}.",
+        remedy="Check the path, that its folder is there, that you may read and write it, and that "
+        "the disk has room.",
     )
 
 
 def _warn(message: Warning | str, *where: object, **_: object) -> None:
-    """A warning without the place in the code that Python adds."""
+    """Return a warning without the place in the code that Python adds."""
     _say(f"[bold yellow]Warning:[/] {escape(str(message))}")
 
 

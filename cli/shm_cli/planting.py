@@ -25,7 +25,7 @@ from shm_cli.common import advancing_bar, show
 
 
 def effect_of(text: str) -> PlantedEffect:
-    """Reads `NAME:AT:param=value,...`; raises UsageError where it is not that."""
+    """Read `NAME:AT:param=value,...`; raises UsageError where it is not that."""
     name, _, rest = text.partition(":")
     at, _, pairs = rest.partition(":")
     try:
@@ -65,7 +65,7 @@ _AT_ONCE = 6  # technical: 20 MB of memory, and folders are synchronised once fo
 
 @dataclass(frozen=True)
 class Live:
-    """What is simulated; `speed` is how many seconds pass on the bridge in one of ours, 0: any."""
+    """Simulated streams; `speed` is seconds on the bridge per second here, 0 for no limit."""
 
     days: float
     first: datetime | None
@@ -75,7 +75,7 @@ class Live:
 
 
 def simulate_streams(workspace: Workspace, chosen: Live) -> None:
-    """Sends the days of every stream that `bridge.toml` describes; the ends of all are alike.
+    """Send the days of every stream that `bridge.toml` describes; the ends of all are alike.
 
     Raises NothingThere where it describes none.
     """
@@ -95,7 +95,7 @@ def simulate_streams(workspace: Workspace, chosen: Live) -> None:
             arriving(list(zip(hangers, streams, strict=True)), plan, first, seconds, chosen.seed),
             ring_of(workspace).append_all,
             chosen.speed,
-            told=lambda at: bar("simulating", (at - first).total_seconds() / seconds),
+            on_sent=lambda at: bar("simulating", (at - first).total_seconds() / seconds),
         )
     if flags.wants_json():
         ends = first + timedelta(seconds=seconds)
@@ -111,7 +111,7 @@ def arriving(
     seconds: float,
     seed: int,
 ) -> Iterator[Chunk]:
-    """The chunks of all streams in the order of time."""
+    """Return the chunks of all streams in the order of time."""
     each = [streamed(hanger, stream, plan, first, seconds, seed) for hanger, stream in sensed]
     return heapq.merge(*each, key=lambda chunk: chunk.start)
 
@@ -120,9 +120,9 @@ def send(
     chunks: Iterator[Chunk],
     take: Callable[[Sequence[bytes]], object],
     speed: float,
-    told: Callable[[datetime], None],
+    on_sent: Callable[[datetime], None],
 ) -> int:
-    """How many were taken; with a `speed`, each once the bridge's clock has come to its end."""
+    """Send chunks and return their number; with a `speed`, each at its time."""
     begun, start, count = time.monotonic(), None, 0
     while batch := list(islice(chunks, 1 if speed > 0 else _AT_ONCE)):
         start, end = start or batch[0].start, batch[-1].end
@@ -131,7 +131,7 @@ def send(
             time.sleep(max(0.0, begun + due - time.monotonic()))
         take([chunk_document(chunk) for chunk in batch])
         count += len(batch)
-        told(end)
+        on_sent(end)
     return count
 
 
@@ -140,7 +140,7 @@ def _whole_hour(at: datetime) -> datetime:
 
 
 def _loss(text: str, first: datetime) -> Loss:
-    """Reads `HANGER:PERCENT:DAY`."""
+    """Read `HANGER:PERCENT:DAY`."""
     try:
         hanger, percent, day = text.split(":")
         return Loss(int(hanger), float(percent) / 100, first + timedelta(days=float(day)))

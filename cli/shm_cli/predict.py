@@ -53,7 +53,7 @@ def command(
     hanger_id: int | None,
     hanger_file: Path | None,
 ) -> None:
-    """Frequencies of a model class for given parameters.
+    """Predict the frequencies of a model class.
 
     theta_F is tension over nominal tension, theta_L effective over nominal length (both 1 unless
     set), log10_k1 to log10_k4 the end springs: N m/rad for beams (k1, k3 transverse; k2, k4
@@ -146,7 +146,7 @@ def _show_sweep(
             {name: float(point), "frequencies": _rows(row)}
             for point, row in zip(points, frequencies, strict=True)
         ]
-        show({"model": model.name, "parameters": values, "sweep": name, "points": rows})
+        show({"model": model.name, "parameters": values, "sweep": name, "points": rows}, "sweep")
         return
     orders = range(1, frequencies.shape[2] + 1)
     heads = [f"{plane[0].upper()}{order}" for plane in PLANES for order in orders]

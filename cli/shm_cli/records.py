@@ -16,7 +16,7 @@ from shm_cli.common import answer, opened_store, show_rows
 
 @click.group()
 def note() -> None:
-    """Notes, inspections and repairs of a hanger or of the bridge.
+    """Record notes, inspections and repairs of a hanger.
 
     \b
     Example: shm note list --hanger 3
@@ -53,7 +53,7 @@ def add(
     photo: Path | None,
     who: str,
 ) -> None:
-    """Write a note, for good: a later one corrects it.
+    """Write a permanent note; a later one can correct it.
 
     \b
     Example: shm note add "new pin, lower end" --hanger 3 --kind repair --at 2026-05-01
@@ -74,7 +74,7 @@ def add(
 @flags.json
 @click.pass_context
 def list_notes(ctx: click.Context, hanger_id: int | None) -> None:
-    """All notes, or those of a hanger and of the bridge; what was seen or done last comes first.
+    """List notes on a hanger and on the bridge, or all notes, the latest first.
 
     \b
     Example: shm note list --hanger 3 --json
@@ -101,7 +101,7 @@ def list_notes(ctx: click.Context, hanger_id: int | None) -> None:
 @flags.json
 @click.pass_context
 def audit(ctx: click.Context, limit: int | None) -> None:
-    """Who changed what, when and how: the newest first.
+    """Show who changed what, and when.
 
     What shm does by itself is not listed, nor what is edited in bridge.toml.
 

@@ -30,7 +30,7 @@ _SUFFIXES = {".html": "html", ".htm": "html", ".json": "json", ".pdf": "pdf"}
 
 @dataclass(frozen=True)
 class _Report:
-    """What is to be written: of what, as which paper, as which document."""
+    """A report to write: its content, paper and JSON document."""
 
     content: Any
     paper: Callable[[Any], Paper]
@@ -164,5 +164,5 @@ def _refuse_pdf_on_a_terminal(form: str, out: Path | None) -> None:
 
 
 def on_a_terminal() -> bool:
-    """Whether a person looks at what is written."""
+    """Return True if stdout is a terminal."""
     return sys.stdout.isatty()

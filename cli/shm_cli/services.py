@@ -49,7 +49,7 @@ def daemon(
     log_file: Path | None,
     as_unit: bool,
 ) -> None:
-    """Watch the spool and do the whole job, unattended.
+    """Watch the spool and process every file.
 
     A file dropped into spool/ is archived, identified, updated and watched; alerts go to the hooks
     of bridge.toml. SIGTERM ends the daemon; what was under way goes on at the next start.
@@ -59,7 +59,7 @@ def daemon(
     """
     from shm_daemon.logs import begin_logging
     from shm_daemon.web.address import Address
-    from shm_daemon.web.serving import web_beside
+    from shm_daemon.web.serving import web_with_daemon
 
     tls = {"--certificate": certificate, "--key": key}
     if not with_web and any(tls.values()):
@@ -76,7 +76,7 @@ def daemon(
         return
     begin_logging(workspace.settings, log_file)
     address = Address(host, port) if with_web else None
-    with web_beside(workspace, address, log_file, certificate, key):
+    with web_with_daemon(workspace, address, log_file, certificate, key):
         from shm_daemon.loop import run  # while the interface, which needs less, begins
 
         run(workspace, once=once, standby=standby)
@@ -98,12 +98,12 @@ def web(
     log_file: Path | None,
     as_unit: bool,
 ) -> None:
-    """The dashboard and its API: pages for people, upload, alerts, health and metrics.
+    """Serve the dashboard and its API.
 
-    Open the address that it prints in a browser. Only this machine can reach it unless --host says
-    otherwise; then all but /health needs a token of `shm token create`, which a person gives once
-    at /sign-in. Writing (uploads, acknowledging alerts) always needs one. Runs beside the daemon,
-    or with it as `shm daemon --web`.
+    Open the printed address in a browser. Without --host only this machine can reach it. With
+    --host everything but /health needs a sign-in: a user of `shm user add` or a token of
+    `shm token create`. Writing (uploads, acknowledging alerts) always needs one. It runs as a
+    separate process, or with the daemon as `shm daemon --web`.
 
     \b
     Example: shm --workspace arch web --port 8400
@@ -120,9 +120,9 @@ def web(
         return
     begin_logging(workspace.settings, log_file)
     page = address.page(certificate is not None)
-    said = f"The dashboard: {page}  (Ctrl+C ends it)"
+    line = f"The dashboard: {page}  (Ctrl+C ends it)"
     with leaving():
-        serve(workspace, address, certificate, key, lambda: click.echo(said))
+        serve(workspace, address, certificate, key, lambda: click.echo(line))
 
 
 _HOMES = (Path("/home"), Path("/root"), Path("/run/user"))
@@ -130,18 +130,18 @@ _PLAIN = re.compile(r"[A-Za-z0-9_./:@+,=-]+")
 
 
 def print_unit(name: str, workspace: Path, words: Sequence[str], *writes: Path) -> None:
-    """Prints the unit `name` of the shm that runs here: see `unit_text`."""
+    """Print the unit `name` of the shm that runs here: see `unit_text`."""
     click.echo(unit_text(name, workspace, Path(sys.prefix), words, *writes), nl=False)
 
 
 def serving_words(host: str, port: int, files: Mapping[str, Path | None]) -> Sequence[str]:
-    """Where the web interface listens, as options with paths that hold from everywhere."""
+    """Return the address of the web interface as options with absolute paths."""
     given = [str(word) for name, file in files.items() if file for word in (name, file.resolve())]
     return ["--host", host, "--port", str(port), *given]
 
 
 def unit_text(name: str, workspace: Path, prefix: Path, words: Sequence[str], *writes: Path) -> str:
-    """The unit `name` for a workspace, with the shm installed under `prefix`.
+    """Return the unit `name` for a workspace, with the shm installed under `prefix`.
 
     It calls `shm` with `words` as the owner of the workspace, and may write to the workspace and
     to `writes`. Raises UsageError where a path or a word holds what a unit would have to quote.

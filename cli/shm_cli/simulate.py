@@ -38,7 +38,7 @@ _SENSORS = 2
 
 
 class Chosen(TypedDict):
-    """What is planted, how it is measured, and what each recording is told beside its data."""
+    """Planted truth, measurement set-up and the header of each recording."""
 
     tension_n: float | None
     k1: float
@@ -65,9 +65,9 @@ def _springs(function: flags.F) -> flags.F:
     planes = ("Transverse", "Longitudinal")
     for number in (4, 3, 2, 1):
         where = f"{planes[(number - 1) % 2]}, {'deck' if number < 3 else 'arch'} end"
-        told = f"{where}. End spring in N m/rad; clamped if left out."
+        help_text = f"{where}. End spring in N m/rad; clamped if left out."
         option = click.option(
-            f"--k{number}", type=float, default=math.inf, show_default=False, help=told
+            f"--k{number}", type=float, default=math.inf, show_default=False, help=help_text
         )
         function = option(function)
     return function
@@ -157,7 +157,7 @@ def _springs(function: flags.F) -> flags.F:
     show_default=False,
     help="Unknown if left out.",
 )
-@click.option("--first", type=click.DateTime(), help="Time of the first test; then weekly.")
+@click.option("--first", type=flags.Day(), help="Time of the first test; then weekly.")
 @click.option("--format", "form", type=click.Choice(_SUFFIXES), default="csv")
 @click.option(
     "--out", type=flags.FOLDER, metavar="DIR", help="Where the files go; a stream needs none."
@@ -180,25 +180,24 @@ def command(
     seed: int,
     **chosen: Unpack[Chosen],
 ) -> None:
-    """Hammer tests of a hanger whose truth you choose.
+    """Simulate hammer tests of a hanger.
 
-    The hanger is hit in the time domain; biaxial accelerometers record. Effects of the gap
-    diagnosis can be planted.
+    The hits are simulated in the time domain, with biaxial accelerometers. Effects of the gap
+    diagnosis can be included.
 
     \b
     Example: shm simulate --hanger-file H.toml --k1 1e7 --k3 1e7 --out tests
     Example: shm simulate --stream --days 3 --loss 7:2:2.5
     """
-    start = first.replace(tzinfo=UTC) if first else None
     if as_stream:
-        live = Live(days, start, losses, speed, seed)
+        live = Live(days, first, losses, speed, seed)
         simulate_streams(open_workspace(ctx), live)
         return
     if out is None:
         raise UsageError("no folder is named for the files.", remedy="Add --out DIR.")
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     _refuse_other_supports(hanger)
-    start = start or _FIRST
+    start = first or _FIRST
     out.mkdir(parents=True, exist_ok=True)
     written = []
     with counting_bar() as bar:
@@ -218,7 +217,7 @@ def _tell(written: Sequence[Path]) -> None:
 
 
 def _refuse_other_supports(hanger: Hanger) -> None:
-    """The simulated bars stand on springs that clamp them in the end, and are in tension."""
+    """Raise UsageError unless the hanger is clamped or on springs, and in tension."""
     if hanger.as_hanger:
         return
     held = "" if hanger.supports.clamped else "is not clamped at both ends"
@@ -267,7 +266,7 @@ def _hit(hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Gene
 
 
 def _conditions(chosen: Chosen) -> Conditions:
-    """What a recording is made under; an unknown temperature is the reference."""
+    """Return the conditions of a recording; an unknown temperature is the reference."""
     shift_k = chosen["temperature_c"] - chosen["reference_c"]
     mass = mass_of(chosen["added_mass"])
     return Conditions("", 0.0 if math.isnan(shift_k) else shift_k, chosen["amplitude"], mass)

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 @flags.json
 @click.pass_context
 def command(ctx: click.Context, which: str | None) -> None:
-    """What the workspace holds and what waits.
+    """Show the state of every hanger and of the workspace.
 
     \b
     Example: shm --workspace arch status
@@ -68,31 +68,31 @@ def command(ctx: click.Context, which: str | None) -> None:
         show(document)
         return
     _show(document)
-    for said in document["changed_settings"]:
-        click.echo(paragraph(f"changed on the page Settings: {said}"))
+    for text in document["changed_settings"]:
+        click.echo(paragraph(f"changed on the page Settings: {text}"))
     for row in document["hangers"]:
         if row["urgency"] != "none" and row["tests"]:
-            said = " ".join((row["state"], row["action"], *row["notes"]))
-            click.echo(paragraph(said))
-    for said, hangers in _competitions(document["hangers"]).items():
-        click.echo(f"hanger{'s' if ',' in hangers else ''} {hangers}: {said}")
+            text = " ".join((row["state"], row["action"], *row["notes"]))
+            click.echo(paragraph(text))
+    for text, hangers in _competitions(document["hangers"]).items():
+        click.echo(f"hanger{'s' if ',' in hangers else ''} {hangers}: {text}")
     for row in document["hangers"]:
         if row["creep_per_year"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['creep_per_year']['words']}")
         if row["gap"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
-        for said in row["warnings"]:
-            rest = said.removeprefix(f"{row['state']} {row['action']}").strip()
+        for text in row["warnings"]:
+            rest = text.removeprefix(f"{row['state']} {row['action']}").strip()
             if rest:
                 click.echo(paragraph(f"hanger {row['hanger']}: check: {rest}"))
         if row["dated_by_receipt"]:
             undated = dated_by_receipt(row["dated_by_receipt"])
             click.echo(paragraph(f"hanger {row['hanger']}: {undated}"))
         if row["left_out"]:
-            said = "; ".join(row["left_out"])
-            click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {said}"))
+            text = "; ".join(row["left_out"])
+            click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {text}"))
     for row in document["structures"]:
-        click.echo(paragraph(_told_of_structure(row)))
+        click.echo(paragraph(_structure_line(row)))
 
 
 def _show(document: dict[str, Any]) -> None:
@@ -104,8 +104,8 @@ def _show(document: dict[str, Any]) -> None:
     oldest = document["oldest_waiting_at"]
     since = f", the oldest since {oldest:%Y-%m-%d %H:%M}" if oldest else ""
     owed = ", ".join(f"{n} {state}" for state, n in deliveries.items() if n)
-    said = document["message"]
-    parts = (said["state"], said["action"], *said["notes"], said["others"])
+    text = document["message"]
+    parts = (text["state"], text["action"], *text["notes"], text["others"])
     click.echo(paragraph(" ".join(part for part in parts if part)))
     click.echo(f"{document['bridge']}: recordings: {recordings or 'none yet'}")
     click.echo(f"daemon: {daemon['active'] or 'none active'}{ago}")
@@ -122,12 +122,12 @@ def _show(document: dict[str, Any]) -> None:
         f"alerts: {document['alerts']}, {document['open_alerts']} open; "
         f"deliveries: {owed or 'none'}"
     )
-    for said in (*document["quiet_hours"], *document["silences"], *document["streams"]):
-        click.echo(said)
+    for text in (*document["quiet_hours"], *document["silences"], *document["streams"]):
+        click.echo(text)
     click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
     _show_hangers(document)
-    for said in _told_of_held(document["held"]):
-        click.echo(said)
+    for text in _held_lines(document["held"]):
+        click.echo(text)
 
 
 def _show_hangers(document: dict[str, Any]) -> None:
@@ -166,38 +166,38 @@ def _tension(row: Mapping[str, Any], unit: ForceUnit) -> str:
     return with_half(tension_n, unit).removesuffix(f" {unit.name}")
 
 
-def _told_of_structure(row: Mapping[str, Any]) -> str:
+def _structure_line(row: Mapping[str, Any]) -> str:
     latest, since = row["latest_test"], row["baseline_since"]
     name = f" ({row['name']})" if row["name"] else ""
-    told = f"structure {row['structure']}{name}: {row['tests']} tests"
-    told += f", the latest {latest:%Y-%m-%d %H:%M}" if latest else ""
-    told += f", baseline since {since:%Y-%m-%d}" if since else ", no baseline yet"
+    line = f"structure {row['structure']}{name}: {row['tests']} tests"
+    line += f", the latest {latest:%Y-%m-%d %H:%M}" if latest else ""
+    line += f", baseline since {since:%Y-%m-%d}" if since else ", no baseline yet"
     undated = dated_by_receipt(row["dated_by_receipt"])
-    return f"{told}, {row['open_alerts']} open alerts. {row['said']} {undated}".rstrip()
+    return f"{line}, {row['open_alerts']} open alerts. {row['said']} {undated}".rstrip()
 
 
-def _told_of_held(held: Sequence[Mapping[str, Any]]) -> list[str]:
+def _held_lines(held: Sequence[Mapping[str, Any]]) -> list[str]:
     """Of each hanger how many are held, and the one whose modes say most."""
     of_hangers: dict[int, list[Mapping[str, Any]]] = {}
     for each in held:
         of_hangers.setdefault(each["hanger"], []).append(each)
-    told = []
-    for hanger, own in sorted(of_hangers.items()):
-        leading = max(own, key=_shift)
-        many = f"{len(own)} recordings (`shm ingest --held`); " if len(own) > 1 else ""
+    lines = []
+    for hanger, holds in sorted(of_hangers.items()):
+        leading = max(holds, key=_shift)
+        many = f"{len(holds)} recordings (`shm ingest --held`); " if len(holds) > 1 else ""
         of_one = f"recording {leading['recording']}: {leading['message']}"
-        told.append(paragraph(f"held, hanger {hanger}: {many}{of_one}"))
-    return told
+        lines.append(paragraph(f"held, hanger {hanger}: {many}{of_one}"))
+    return lines
 
 
 def _shift(held: Mapping[str, Any]) -> float:
-    """The largest shift of tension that its tests imply; 0 where nothing is known."""
+    """Return the largest shift of tension that its tests imply; 0 where nothing is known."""
     shifts = [abs(test["tension_shift"]) for test in held["tests"]]
     return max((shift for shift in shifts if not math.isnan(shift)), default=0.0)
 
 
 def _gap(store: Store, hanger: int) -> dict[str, Any] | None:
-    """How the gap has gone since an effect was adopted; None where none is."""
+    """Return the gap since an effect was adopted; None if none is."""
     # It brings the whole pipeline, and of few hangers an effect is adopted.
     from shm.pipeline.adopting import gap_watch
 
@@ -214,14 +214,15 @@ def _gap(store: Store, hanger: int) -> dict[str, Any] | None:
 
 
 def _competitions(rows: list[dict[str, Any]]) -> dict[str, str]:
-    """Which classes compete and why others do not, each with the hangers that it is true of."""
+    """Return the competing classes, and the reasons against others, with their hangers."""
     found: dict[str, list[str]] = {}
     for row in rows:
-        said = f"{', '.join(map(model_class, row['competing'])) or 'no model class'} may compete"
+        competing = ", ".join(map(model_class, row["competing"]))
+        sentence = f"{competing or 'no model class'} may compete"
         for reason, names in _by_reason(row["not_applicable"]).items():
-            said += f"; {', '.join(names)} {'do' if names[1:] else 'does'} not apply: {reason}"
-        found.setdefault(f"{said}.", []).append(str(row["hanger"]))
-    return {said: ", ".join(hangers) for said, hangers in found.items()}
+            sentence += f"; {', '.join(names)} {'do' if names[1:] else 'does'} not apply: {reason}"
+        found.setdefault(f"{sentence}.", []).append(str(row["hanger"]))
+    return {sentence: ", ".join(hangers) for sentence, hangers in found.items()}
 
 
 def _by_reason(not_applicable: Mapping[str, str]) -> dict[str, list[str]]:
@@ -274,7 +275,7 @@ def _quiet(workspace: Workspace, store: Store, now: datetime) -> list[str]:
         for each in store.alerts.list_deliveries(DeliveryState.WAITING)
         if (until := quiet_until(each, workspace.bridge.hooks, now))
     )
-    return [f"{said}: {count}" for said, count in waits.items()]
+    return [f"{reason}: {count}" for reason, count in waits.items()]
 
 
 def _daemon(workspace: Workspace) -> dict[str, Any]:
@@ -287,7 +288,7 @@ def _daemon(workspace: Workspace) -> dict[str, Any]:
 def _structures(
     workspace: Workspace, store: Store, open_alerts: Mapping[int, int]
 ) -> list[dict[str, Any]]:
-    """Those without a model, of which frequencies alone are watched."""
+    """Show structures without a model, of which only frequencies are watched."""
     latest, rows, undated = store.tests.latest(), [], store.tests.names_without_time()
     for each in workspace.bridge.structures:
         found, baseline = latest.get(each.id), store.watch.baseline(each.id)
@@ -353,7 +354,7 @@ _OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
 
 
 def show_stages(ctx: click.Context, which: str) -> None:
-    """Raises NothingThere where there is no such recording or test."""
+    """Raise NothingThere where there is no such recording or test."""
     with opened_store(ctx) as (_, store):
         recording_id, _ = store.recordings.find(which)
         recording = store.recordings.get(recording_id)
@@ -391,8 +392,8 @@ def show_stages(ctx: click.Context, which: str) -> None:
     for event in noticed:
         if event.message:
             kind = "" if event.message.startswith(event.kind) else f"{event.kind}: "
-            said = f"{event.at:%Y-%m-%d %H:%M:%S} {kind}{event.message}"
-            click.echo(paragraph(said))
+            line = f"{event.at:%Y-%m-%d %H:%M:%S} {kind}{event.message}"
+            click.echo(paragraph(line))
     for test in tests:
         click.echo(f"{test.name}: identified by shm {test.lineage.version}{_until(test)}")
         for made in test.posteriors:

@@ -46,7 +46,7 @@ _name = click.argument("name", metavar="NAME", shell_complete=completion.streams
 @flags.json
 @click.pass_context
 def command(ctx: click.Context, events: bool, days: float) -> None:
-    """Permanent sensors: what is live, and what was lost.
+    """Show permanent sensors: what is live, what was lost.
 
     A stream is late once its last sample is 5 minutes old, silent after an hour. The share that was
     lost is of the last 24 hours, up to the last sample; what comes late takes it back. Apart are
@@ -81,7 +81,7 @@ def command(ctx: click.Context, events: bool, days: float) -> None:
 @flags.json
 @click.pass_context
 def keep(ctx: click.Context, name: str, start: datetime, end: datetime, why: str) -> None:
-    """Keep the samples of a time for good.
+    """Keep the samples of a period permanently.
 
     The ring takes out what is older than the setting `ring_days`, but for what is kept.
 
@@ -106,7 +106,7 @@ def keep(ctx: click.Context, name: str, start: datetime, end: datetime, why: str
 @flags.json
 @click.pass_context
 def export(ctx: click.Context, name: str, start: datetime, end: datetime, file: Path) -> None:
-    """Write the samples of a time as a recording, which `shm identify` takes.
+    """Write the samples of a period as a recording for `shm identify`.
 
     FILE ends with .csv, .npz or .uff. What is missing is an empty value.
 
@@ -126,14 +126,14 @@ def export(ctx: click.Context, name: str, start: datetime, end: datetime, file: 
 
 def _show_streams(workspace: Workspace, store: Store, now: datetime) -> None:
     states = stream_states(workspace, ring_of(workspace), store, now)
-    beside = [against_hammer(store, each.stream) for each in states]
+    hammers = [against_hammer(store, each.stream) for each in states]
     if flags.wants_json():
-        show({"streams": [_document(*each) for each in zip(states, beside, strict=True)]})
+        show({"streams": [_document(*each) for each in zip(states, hammers, strict=True)]})
         return
     columns = ("stream", "hanger", "state", "last sample", "lag", "rate", "lost", "apart", "ring",
                "window", "tension")  # fmt: skip
     show_rows("Streams", columns, map(_cells, states))
-    for each in beside:
+    for each in hammers:
         if each.is_known:
             click.echo(each.text())
 
@@ -156,8 +156,8 @@ def _cells(state: StreamCondition) -> tuple[str, ...]:
     )
 
 
-def _document(state: StreamCondition, beside: AmbientBias) -> dict[str, Any]:
-    """An entry of `--json`; unknown numbers are NaN."""
+def _document(state: StreamCondition, hammer: AmbientBias) -> dict[str, Any]:
+    """Return an entry of `--json`; unknown numbers are NaN."""
     window, hour = state.window, state.hour
     return {
         "name": state.stream.name,
@@ -178,9 +178,9 @@ def _document(state: StreamCondition, beside: AmbientBias) -> dict[str, Any]:
         "tension_shift": hour.compensated_shift if hour else NAN,
         "tension_shift_sd": hour.compensated_sd if hour else NAN,
         "learning": hour.learning if hour else "",
-        "ambient_bias": beside.common,
-        "ambient_bias_sd": beside.common_sd,
-        "hammer_tests": beside.most_tests,
+        "ambient_bias": hammer.common,
+        "ambient_bias_sd": hammer.common_sd,
+        "hammer_tests": hammer.most_tests,
     }
 
 

@@ -25,9 +25,9 @@ from shm_cli.common import (
     paragraph,
     progress_bar,
     show,
+    show_doubts,
     show_rows,
     tests_and_hanger,
-    told_doubts,
 )
 
 _calibrated_by = click.option(
@@ -47,7 +47,7 @@ _sampler = click.option(
 
 
 def _updating(function: flags.F) -> flags.F:
-    """The options that both have."""
+    """Return the options that both have."""
     updating = (flags.seed, flags.samples, flags.priors, _sampler, _calibrated_by)
     for option in reversed((flags.hanger(), flags.hanger_file, *updating, flags.json)):
         function = option(function)
@@ -92,7 +92,7 @@ def command(
     sampler: str,
     calibrated_by: Path | None,
 ) -> None:
-    """Posterior of tension and end stiffness.
+    """Infer tension and end stiffness with one model class.
 
     The tests come from MODES.json, or are the latest of a hanger of the workspace.
 
@@ -101,7 +101,7 @@ def command(
     """
     options = UpdateOptions(samples, seed, sampler=sampler)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
-    doubts = told_doubts(tests, hanger, apart=flags.wants_json())
+    doubts = show_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
     with progress_bar("updating") as progress:
         chosen = build(model, hanger, priors)
@@ -134,7 +134,7 @@ def tell_irregular(tests: Sequence[ModalTest]) -> None:
 
 
 def show_stated(averaged: Averaged) -> None:
-    """What keeps a tension from being taken at its word, then the tension with both intervals."""
+    """Return the caveats of a tension, then the tension with both intervals."""
     for caveat in averaged.caveats:
         click.echo(paragraph(caveat))
     for sentence in stated(averaged).sentences:
@@ -142,7 +142,7 @@ def show_stated(averaged: Averaged) -> None:
 
 
 def show_posterior(posterior: Posterior, limits: Limits | None = None) -> None:
-    """The tension in words, parameters and predicted frequencies as tables."""
+    """Return the tension in words, parameters and predicted frequencies as tables."""
     show_stated(averaged_now(posterior, limits=limits))
     tension_n = summary(
         posterior.tension_n, posterior.most_probable[0] * posterior.nominal_tension_n
@@ -208,13 +208,13 @@ def select_command(
     sampler: str,
     calibrated_by: Path | None,
 ) -> None:
-    """Compare model classes by their evidence.
+    """Infer the tension with all model classes, and compare them.
 
-    The classes are equally probable beforehand, but for clamped ones, which are as probable as the
-    kind of ends makes them (0.1 to 0.4: shm settings --assumptions); --priors thesis has all equal,
-    and --prior says otherwise. Those that
-    do not apply to the hanger are left out and say why. The tests come from MODES.json, or are the
-    latest of a hanger of the workspace, which brings the classes that it has adopted.
+    Before the test clamped classes have a probability of 0.1 to 0.4, by the kind of ends (see
+    `shm settings --assumptions`), and the others share the rest equally; change that with --prior,
+    or make all equal with --priors thesis. Classes that do not apply are listed with a reason. The
+    tests come from MODES.json, or are the latest of a hanger of the workspace, with its adopted
+    classes.
 
     \b
     Example: shm select hanger3.modes.json --hanger-file H.toml --models beam1,beam2
@@ -229,7 +229,7 @@ def select_command(
         from shm.inference.updating import check_class_priors
 
         check_class_priors(stated, [model.name for model in chosen])
-    doubts = told_doubts(tests, hanger, apart=flags.wants_json())
+    doubts = show_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
     with progress_bar("updating") as progress:
         options = calibrated(options, calibrated_by, chosen, progress)

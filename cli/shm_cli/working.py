@@ -1,4 +1,4 @@
-"""What `shm ingest` takes in, or does again with --again, is done at once, in a flow of its own."""
+"""Immediate processing for `shm ingest`, in a separate flow."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from shm_daemon.hooks import HookNotifier
 
 @contextmanager
 def working(workspace: Workspace) -> Iterator[Flow]:
-    """A flow while the context lasts; raises StoreBusy where another process ingests."""
+    """Return a flow while the context lasts; raises StoreBusy where another process ingests."""
     settings = workspace.settings
     with ExitStack() as stack:
         stack.enter_context(workspace.lock())
@@ -80,7 +80,7 @@ def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
 
 
 def _refuse_without_raw_file(workspace: Workspace, store: Store, recording_id: int) -> None:
-    """Raises NothingThere, saying where the raw file lies, where it is not in the archive.
+    """Raise NothingThere, saying where the raw file lies, where it is not in the archive.
 
     And StoreError where it is damaged there: nothing is superseded for want of it.
     """
@@ -96,26 +96,26 @@ def _refuse_without_raw_file(workspace: Workspace, store: Store, recording_id: i
 
 
 def sentences(rerun: Rerun, stage: Stage) -> list[str]:
-    """What is done anew, what that supersedes, and what it leaves as it is."""
+    """Return sentences on a rerun: what is repeated, replaced and left as it is."""
     names, file = ", ".join(rerun.tests) or "no test yet", rerun.recording.file.file_name
     tests = f"tests: {len(rerun.tests)}, " if stage is Stage.IDENTIFIED else ""
-    said = [
+    lines = [
         f"{file} ({names}) is to be {stage} again. Superseded, and kept with their lineage: "
         f"{tests}posteriors: {rerun.posteriors}, watches: {rerun.watches}."
     ]
     if rerun.of_baseline:
-        own = ", ".join(rerun.of_baseline)
-        said.append(
-            f"The baseline was made from {own} and stays as it was made; {own} is not compared "
+        names = ", ".join(rerun.of_baseline)
+        lines.append(
+            f"The baseline was made from {names} and stays as it was made; {names} is not compared "
             "with it. To compare with the new result: `shm drift rebaseline`."
         )
     if rerun.recording.hanger is not None:
-        said.append("What was said of later tests stays; alerts that were raised stay raised.")
-    return said
+        lines.append("What was said of later tests stays; alerts that were raised stay raised.")
+    return lines
 
 
 def rerun_document(rerun: Rerun, stage: Stage) -> dict[str, Any]:
-    """The same for programs."""
+    """Return the same for programs."""
     return {
         "recording": rerun.recording.id,
         "from": stage.value,

@@ -12,7 +12,8 @@ from dataclasses import replace
 from typing import Any
 
 from shm.assumptions import DEFAULTS, FILE, Assumption, Assumptions, number_text
-from shm.bridge.table import Table, suggest
+from shm.bridge.table import Table
+from shm.errors import suggest
 
 _ALL_ROWS = "`shm settings --assumptions` lists all."
 _NUMBERS = {
@@ -92,9 +93,9 @@ def _refuse_sd(table: Table, row: Assumption) -> None:
     allowed = (
         f"from {row.least_sd:g} to {row.most_sd:.3g}" if bounded else f"{row.least_sd:g} or more"
     )
-    beside = f" beside a value of {row.value:g}" if bounded else ""
+    of_value = f" beside a value of {row.value:g}" if bounded else ""
     which = "a" if is_stated else "its unchanged"
-    what = f"{row.name}: {which} standard deviation of {row.sd:g}{beside} is not {allowed}"
+    what = f"{row.name}: {which} standard deviation of {row.sd:g}{of_value} is not {allowed}"
     if is_stated:
         raise table.refusal(what, _how(row))
     example = f"{row.name} = {{value = {row.value:g}, sd = {row.most_sd / 2:.2g}}}"

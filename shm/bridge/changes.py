@@ -1,4 +1,4 @@
-"""What the page Settings may change of `bridge.toml`, and how a change is laid over the file.
+"""Changes of `bridge.toml` by the page Settings, laid over the file.
 
 A key names a place: `hanger.3.thresholds.alert_probability`, `settings.false_call_years`,
 `hook.mail.escalation_after_seconds`. Programs, addresses and secrets of hooks are not among them:

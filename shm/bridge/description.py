@@ -24,7 +24,7 @@ from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, escalations_s, hook_of, zone_of
 from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table, is_loopback, web_address
-from shm.errors import BadInput
+from shm.errors import BadInput, NotDescribed, suggest
 from shm.values import MEASUREMENT_HOURS, Hanger, MonitoredHanger
 from shm.values.stream import Stream
 
@@ -34,7 +34,7 @@ _SUFFIXES = (".png", ".jpg", ".jpeg")
 
 @dataclass(frozen=True)
 class Letterhead:
-    """Who makes the reports of a bridge, as their head and their signatures name them.
+    """Letterhead of the reports of a bridge: company, author, signatures.
 
     Empty texts and None: nothing is given. `logo` is an image file, which need not be there.
     """
@@ -139,15 +139,15 @@ def single_sign_on_of(document: Mapping[str, Any], path: Path) -> SingleSignOn |
 
 
 def is_safe(address: str) -> bool:
-    """Whether what is sent to an address is encrypted, or stays on this computer."""
+    """Return True if a connection is encrypted or stays on this computer."""
     try:
         parts = urlsplit(address)
         host = parts.hostname or ""
     except ValueError:
         return False
     plain = not (parts.username or parts.password or parts.fragment) and address.isprintable()
-    is_kept = parts.scheme == "https" or (parts.scheme == "http" and is_loopback(host))
-    return bool(host) and plain and is_kept
+    is_private = parts.scheme == "https" or (parts.scheme == "http" and is_loopback(host))
+    return bool(host) and plain and is_private
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class Bridge:
-    """What `bridge.toml` says; `built` is None where it does not say.
+    """The description of a bridge by `bridge.toml`; `built` is None if it is not stated.
 
     `structures` are those without a model, of which frequencies alone are watched: a deck, a pylon.
     Their numbers are none of a hanger. `measurement_hours` is what each kind of measurement costs.
@@ -218,7 +218,7 @@ class Bridge:
                 f"{hanger_id}` for its frequencies.",
             )
         known = ", ".join(str(hanger.id) for hanger in self.hangers) or "none"
-        raise BadInput(
+        raise NotDescribed(
             f"hanger {hanger_id} is not described in {Path(self.source).name} (known: {known}).",
             remedy="Add a [[hanger]] table with this id, or correct the number.",
         )
@@ -236,7 +236,24 @@ def load_bridge(path: Path, changed: Mapping[str, object] = MappingProxyType({})
     return replace(_described(overlaid(document, changed), path), as_in_file=plain)
 
 
+_TABLES = (
+    "bridge", "hanger", "structure", "hook", "other_bridge", "stream", "settings", "disturbance",
+    "report", "measurement_hours", "single_sign_on", "assumptions",
+)  # fmt: skip
+_OF_BRIDGE = ("name", "built", "time_zone")
+
+
+def _refuse_unknown_tables(document: Mapping[str, Any], path: Path) -> None:
+    """Raise BadInput for a table that nothing reads, and for such a key of `[bridge]`."""
+    for name in document.keys() - set(_TABLES):
+        remedy = f"{suggest(name, _TABLES)}Known: {', '.join(_TABLES)}."
+        raise BadInput(f"unknown table or key {name}.", file=path, remedy=remedy)
+    if table := _table(document, "bridge", path):
+        table.refuse_unknown(_OF_BRIDGE)
+
+
 def _described(document: dict[str, Any], path: Path) -> Bridge:
+    _refuse_unknown_tables(document, path)
     assumed = assumptions_of(_table(document, "assumptions", path), DEFAULTS)
     hangers = tuple(hanger_of(table, path, assumed) for table in _tables(document, "hanger", path))
     structures = tuple(structure_of(table, path) for table in _tables(document, "structure", path))
@@ -350,8 +367,8 @@ def _hours(document: Mapping[str, Any], path: Path) -> Mapping[str, float]:
         return dict(MEASUREMENT_HOURS)
     keys = {re.sub(r"\W", "_", kind): kind for kind in MEASUREMENT_HOURS}
     table.refuse_unknown(keys)
-    own = {kind: table.positive(key, "hours") for key, kind in keys.items() if key in table}
-    return {**MEASUREMENT_HOURS, **own}
+    stated = {kind: table.positive(key, "hours") for key, kind in keys.items() if key in table}
+    return {**MEASUREMENT_HOURS, **stated}
 
 
 def _disturbance(values: dict[str, Any], path: Path) -> Disturbance:

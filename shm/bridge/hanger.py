@@ -73,7 +73,7 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
     _refuse_other_units(table, mass / area, nominal_tension_n / area)
     fittings_m, plate = _fittings(table, length_m), _plate(table.table("plate"), length_m, diameter)
     open_ends = plate is None and not any(fittings_m)
-    return Hanger(
+    hanger = Hanger(
         id=table.value(
             "id", int, "is not a whole number", "Give id = 1, 2, 3, ...", holds=lambda id_: id_ >= 0
         ),
@@ -103,6 +103,8 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
         survey=_survey(table),
         assumptions=assumed,
     )
+    _refuse_less_than_weight(table, hanger)
+    return hanger
 
 
 def _refuse_length(table: Table, length_m: float, widest_m: float) -> None:
@@ -140,6 +142,18 @@ def _refuse_other_units(table: Table, density_kg_m3: float, stress_pa: float) ->
         raise table.refusal(
             f"nominal_tension_n makes a stress of {stress_pa / 1e6:g} MPa, which no hanger carries",
             "Give it in N, lengths in m.",
+        )
+
+
+def _refuse_less_than_weight(table: Table, hanger: Hanger) -> None:
+    """Refuse a nominal tension in kN: a hanger in service carries more than its weight."""
+    tension_n = hanger.nominal_tension_n
+    weight_n = 9.81 * hanger.mass_per_length_kg_m * hanger.length_m
+    if hanger.supports == Supports() and 0 < tension_n < weight_n:
+        raise table.refusal(
+            f"nominal_tension_n = {tension_n:g} is less than the weight of the hanger, "
+            f"{weight_n / 1e3:.3g} kN",
+            f"Give it in N: {tension_n:g} kN is {tension_n:g}e3.",
         )
 
 
@@ -239,7 +253,7 @@ def _inclination_deg(table: Table) -> float:
 
 
 def _positive(table: Table, kind: Any) -> dict[str, float]:
-    """Those of the numbers of a kind that stand in a table, which holds nothing else."""
+    """Return the numbers of a kind that a table states; raises BadInput for other keys."""
     table.refuse_unknown(field.name for field in fields(kind))
     return {key: table.positive(key) for key in table.values}
 

@@ -42,7 +42,7 @@ class QuietHours:
         return f"{self.begins:%H:%M}-{self.ends:%H:%M}"
 
     def until(self, at: datetime) -> datetime | None:
-        """When the hours end that a moment lies in, by the clocks there; None where in none."""
+        """Return the end of the quiet hours around a moment by local time; None if in none."""
         today = at.astimezone(self.zone).date()
         for day in (today - timedelta(days=1), today):
             last_day = day if self.begins < self.ends else day + timedelta(days=1)
@@ -55,7 +55,7 @@ class QuietHours:
 
 
 def quiet_hours_of(table: Table, zone: tzinfo) -> QuietHours | None:
-    """Those of a `[[hook]]` table, None where it states none; raises BadInput."""
+    """Return the quiet hours of a `[[hook]]` table, None if it states none; raises BadInput."""
     if QUIET_HOURS not in table:
         return None
     text = table.values[QUIET_HOURS]

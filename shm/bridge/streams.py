@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from shm.bridge.table import Table
-from shm.errors import BadInput
+from shm.errors import BadInput, NotDescribed
 from shm.values import NAN, PLANES, Hanger
 from shm.values.stream import Stream, StreamChannel
 
@@ -17,7 +17,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
 def is_stream_name(text: str) -> bool:
-    """Whether a stream or a channel may be called so."""
+    """Return True if a stream or a channel may have that name."""
     return _NAME.fullmatch(text) is not None
 
 
@@ -67,7 +67,7 @@ def _name(table: Table, example: str) -> str:
 
 
 def _refuse_doubles(names: list[str], table: Table) -> None:
-    if pair := _alike(names):
+    if pair := _same_names(names):
         raise table.refusal(f"channel {_both(*pair)}", "Give each a name of its own.")
 
 
@@ -76,7 +76,7 @@ def streams_of(
 ) -> tuple[Stream, ...]:
     """Return the streams of all `[[stream]]` tables; raises BadInput."""
     streams = tuple(stream_of(table, path, hangers) for table in tables)
-    if pair := _alike([stream.name for stream in streams]):
+    if pair := _same_names([stream.name for stream in streams]):
         remedy = "Give each a name of its own: each has a folder, and some disks know no capitals."
         raise BadInput(f"stream name {_both(*pair)}.", file=path, remedy=remedy)
     _refuse_second(streams, path)
@@ -98,7 +98,7 @@ def _refuse_second(streams: Sequence[Stream], path: Path) -> None:
         first[each.hanger] = each.name
 
 
-def _alike(names: Sequence[str]) -> tuple[str, str] | None:
+def _same_names(names: Sequence[str]) -> tuple[str, str] | None:
     """Two names that are the same but for capitals."""
     seen: dict[str, str] = {}
     for name in names:
@@ -121,7 +121,7 @@ def stream_named(streams: tuple[Stream, ...], name: str) -> Stream:
             return stream
     known = ", ".join(stream.name for stream in streams) or "none"
     meant = next((each.name for each in streams if each.name.lower() == name.lower()), None)
-    raise BadInput(
+    raise NotDescribed(
         f"stream {name[:64]!r} is not described in bridge.toml (known: {known}).",
         remedy=f"Capitals count: write {meant}."
         if meant

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import ipaddress
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -12,15 +11,9 @@ from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
 from shm.documents import Misfit, finite, reader, value_of
-from shm.errors import BadInput
+from shm.errors import BadInput, suggest
 
 _READER = reader(finite)
-
-
-def suggest(key: str, known: Iterable[str]) -> str:
-    """Return `Did you mean diameter_m? ` for a misspelt key, with the known one nearest to it."""
-    near = difflib.get_close_matches(key, known, n=1)
-    return f"Did you mean {near[0]}? " if near else ""
 
 
 @dataclass(frozen=True)
@@ -156,7 +149,7 @@ def web_address(table: Table, key: str, remedy: str, no_password: str) -> str:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host is this machine itself."""
+    """Return True if a host is this machine."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -208,14 +201,14 @@ def _line_of_plain_table(lines: Sequence[str], name: str, problem: str) -> int |
 
 
 def _other(line: str, kind: str) -> bool:
-    """Whether another table begins, which is no part of this one."""
+    """Return True if another table starts that is no part of this one."""
     header = line.strip()
     return header.startswith("[") and not re.match(rf"\[+{kind}\.", header)
 
 
-def _line_within(lines: Sequence[str], block: range, said: str) -> int:
+def _line_within(lines: Sequence[str], block: range, problem: str) -> int:
     """Return the last line of a block that sets or opens something that is named."""
-    words = set(re.findall(r"\w+", said))
+    words = set(re.findall(r"\w+", problem))
     for number in reversed(block):
         keys = re.findall(r"(\w+)\s*=", lines[number]) or re.findall(r"\.(\w+)\]", lines[number])
         if words.intersection(keys) - {"id", "name"}:

@@ -11,7 +11,7 @@ from shlex import quote
 
 import numpy as np
 
-from shm.errors import UsageError
+from shm.errors import UsageError, suggest
 from shm.models.adopted import Adopted, AdoptedAsMade, AdoptedName, is_adopted, with_parameters
 from shm.models.adopted import unfit as adopted_unfit
 from shm.models.as_made import AsMade
@@ -126,7 +126,8 @@ def _refuse_unknown(name: str, hanger: Hanger) -> None:
             where = "" if each == name else f" in `models` of hanger {hanger.id}"
             raise UsageError(
                 f"unknown model class {each!r}{where}.",
-                remedy=f"Known: {', '.join(MODELS)}; with an effect: beam1+point_mass@everywhere.",
+                remedy=f"{suggest(each, MODELS)}Known: {', '.join(MODELS)}; with an effect: "
+                "beam1+point_mass@everywhere.",
             )
 
 

@@ -24,7 +24,7 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from shm.errors import BadInput, UsageError
+from shm.errors import BadInput, UsageError, suggest
 from shm.models.as_made import BENDING, LENGTH, SHEAR, TENSION, AsMade
 from shm.models.base import DESCRIPTION, THESIS, Conditions, Model
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey, Variant
@@ -288,8 +288,9 @@ def _variants(effect: Effect, hanger: Hanger) -> dict[str, Variant]:
 
 def _effect(name: str) -> Effect:
     if name not in EFFECTS:
-        adoptable = (each for each in EFFECTS if EFFECTS[each].of_the_hanger)
-        raise UsageError(f"unknown effect {name!r}.", remedy=f"Known: {', '.join(adoptable)}.")
+        adoptable = [each for each in EFFECTS if EFFECTS[each].of_the_hanger]
+        remedy = f"{suggest(name, adoptable)}Known: {', '.join(adoptable)}."
+        raise UsageError(f"unknown effect {name!r}.", remedy=remedy)
     if not EFFECTS[name].of_the_hanger:
         raise UsageError(
             f"{name} is one of the sensors, not of the hanger: other tests would not have it.",

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from shm.errors import BadInput, UsageError
+from shm.errors import BadInput, UsageError, suggest
 from shm.models.end_effects import EndWaves, coupled_bar
 from shm.models.hanger import PointMass, solve
 from shm.values import PLANES, AddedMass, FloatArray, Hanger, IntArray, ModalTest, Plane, Prior
@@ -239,9 +239,10 @@ class Model:
         unknown, missing = values.keys() - self.bounds.keys(), self.bounds.keys() - values.keys()
         if unknown or missing:
             fault = f"unknown {sorted(unknown)}" if unknown else f"missing {sorted(missing)}"
+            nearest = "".join(suggest(name, self.parameter_names) for name in sorted(unknown)[:1])
             raise UsageError(
                 f"parameters of model class {self.name}: {fault}.",
-                remedy=f"It takes {', '.join(self.parameter_names)}.",
+                remedy=f"{nearest}It takes {', '.join(self.parameter_names)}.",
             )
         return np.array([values[name] for name in self.parameter_names], dtype=float)
 

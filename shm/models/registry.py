@@ -5,7 +5,7 @@ Packages from outside add theirs by the entry points `shm.models` (`shm.models.p
 
 from __future__ import annotations
 
-from shm.errors import UsageError
+from shm.errors import UsageError, suggest
 from shm.models.base import Model, held_otherwise
 from shm.models.beam import Beam1, Beam2, Beam3
 from shm.models.plug_ins import MODELS_GROUP, members_with_plug_ins
@@ -24,7 +24,8 @@ def registered(name: str, hanger: Hanger) -> Model:
     Raises UsageError for an unknown name, and where the class cannot describe the hanger.
     """
     if name not in MODELS:
-        raise UsageError(f"unknown model class {name!r}.", remedy=f"Known: {', '.join(MODELS)}.")
+        remedy = f"{suggest(name, MODELS)}Known: {', '.join(MODELS)}."
+        raise UsageError(f"unknown model class {name!r}.", remedy=remedy)
     reason = MODELS[name].unfit(hanger) or held_otherwise(hanger)
     if reason:
         raise UsageError(

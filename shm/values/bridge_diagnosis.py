@@ -1,4 +1,4 @@
-"""What a joint diagnosis of several hangers finds."""
+"""Values of a joint gap diagnosis of several hangers."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class HangerTensions:
 
 @dataclass(frozen=True)
 class BridgeDiagnosis:
-    """Whether hangers of a bridge share a cause, which, who has it, and what that changes.
+    """Diagnosis of a cause shared by hangers of a bridge: its probability, members and effect.
 
     The probabilities of `causes` (best first), `each_for_itself_probability` and
     `unknown_probability` (something that the catalogue lacks is shared) add to 1. `groups` are

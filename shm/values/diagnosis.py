@@ -1,4 +1,4 @@
-"""What a gap diagnosis finds."""
+"""Values of a gap diagnosis."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Residual:
 
 @dataclass(frozen=True)
 class Trend:
-    """How the gap grows with a `condition`.
+    """Trend of the gap over a `condition`.
 
     It is `temperature`, `amplitude`, `order`, `added mass` or `plane` (from transverse to
     longitudinal).
@@ -82,7 +82,7 @@ class Trend:
 
 @dataclass(frozen=True)
 class GapPlace:
-    """Where along the hanger a local cause of one `kind` would have to sit, and what it explains.
+    """Most probable place of a local cause of one `kind`, and what it explains.
 
     Kinds are `point mass`, `lateral spring`, `section loss` and `flexible end` (0 or the length).
 
@@ -141,11 +141,11 @@ class Cause:
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Where each of its effects acts."""
+        """Return the place of each of its effects."""
         return self.each_at(self.at)
 
     def each_at(self, at: str) -> tuple[str, ...]:
-        """Where each of its effects acts, by `at`; one place is that of both."""
+        """Return the place of each effect from `at`; a single place is that of both."""
         found = parted(at)
         return found if len(found) == len(self.effects) else (at,) * len(self.effects)
 
@@ -289,12 +289,12 @@ class Diagnosis(Shown):
 
     def __repr__(self) -> str:
         verdict, tension = self.verdict, self.tension_after_n
-        said = verdict.outcome.value.lower()
+        text = verdict.outcome.value.lower()
         if verdict.claim is not None:
             leading = verdict.claim.leading
-            said = f"{said}: {effect_label(leading.effect, leading.at)}"
-        told = tension_words(tension.mean, tension.q05, tension.q95)
-        return line("Diagnosis", self.hanger, f"{said}, {told}")
+            text = f"{text}: {effect_label(leading.effect, leading.at)}"
+        tension_text = tension_words(tension.mean, tension.q05, tension.q95)
+        return line("Diagnosis", self.hanger, f"{text}, {tension_text}")
 
     def to_dataframe(self) -> DataFrame:
         """Return the causes, a row a cause: the table of `shm.export.causes`."""

@@ -1,4 +1,4 @@
-"""What watching a hanger over time finds."""
+"""Values of the watch over a hanger."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 @dataclass(frozen=True)
 class QuantityKind:
-    """What all watched quantities of a kind have in common: what people call one, and its shifts.
+    """Names and units of one kind of watched quantity.
 
     A small shift is `percent_a_unit` times as many percent of the quantity.
     """
@@ -45,7 +45,7 @@ class QuantityKind:
 
     @property
     def is_ratio(self) -> bool:
-        """Whether shifts of a quantity are fractions of it."""
+        """Return True if shifts are fractions of the quantity."""
         return self.shift_unit == "fraction"
 
 
@@ -63,12 +63,12 @@ def kind_of(quantity: str) -> QuantityKind:
 
 
 def is_frequency(quantity: str) -> bool:
-    """Whether a watched quantity is a frequency itself, of a structure without a model."""
+    """Return True if a quantity is a frequency of a structure without a model."""
     return kind_of(quantity) is _KINDS[FREQUENCY]
 
 
 def is_ratio(quantity: str) -> bool:
-    """Whether shifts of a quantity are fractions of it: of the tension and frequencies they are."""
+    """Return True if shifts are fractions of the quantity, as for tension and frequencies."""
     return kind_of(quantity).is_ratio
 
 
@@ -130,7 +130,7 @@ class ModeReading:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What one test by itself says of the watched quantities of a hanger, without any prior.
+    """Likelihood of the watched quantities of a hanger from one test, without any prior.
 
     Its log likelihood at coordinates x (q,) is -(x - mean)' information (x - mean) / 2, of the
     errors that differ from test to test: what all tests share, the model's error above all, cancels
@@ -153,7 +153,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Drift:
-    """How far one quantity has moved from its baseline, with the probability that it matters.
+    """Shift of one quantity from its baseline, with the probability that it matters.
 
     `quantity` is `tension` (shift as a fraction of the baseline) or a parameter such as
     `log10_k1` (shift in decades), given that it has changed at all: where nothing was called this
@@ -174,13 +174,13 @@ class Drift:
     probability: float
 
     def may_be_beyond(self, way: float) -> bool:
-        """Whether the 90 % interval reaches beyond the threshold, to the side of the sign `way`."""
+        """Return True if the 90 % interval passes the threshold on the side of sign `way`."""
         shift = math.copysign(1, way) * self.shift_mean
         return shift + NINETY_PERCENT * self.shift_sd >= self.threshold
 
     @property
     def is_clearly_beyond(self) -> bool:
-        """Whether all of the 90 % interval lies beyond the threshold, if anything changed."""
+        """Return True if the complete 90 % interval lies beyond the threshold, given a change."""
         return abs(self.shift_mean) - NINETY_PERCENT * self.shift_sd >= self.threshold
 
 
@@ -207,7 +207,7 @@ class Moved:
 
 @dataclass(frozen=True)
 class Change:
-    """What the sequential test says after one test of a hanger.
+    """Result of the sequential test after one test of a hanger.
 
     `evidence_years` is the Shiryaev-Roberts statistic in years of this hanger; a change is called
     once it exceeds `limit_years`, which is the mean time to a false call, or less than it.
@@ -233,18 +233,18 @@ class Change:
 
     @property
     def is_baseline_alone(self) -> bool:
-        """Whether it is the baseline that does not fit, as far as anybody can say."""
+        """Return True if the baseline is the most probable reason of the misfit."""
         return self.against_baseline >= ENOUGH_AGAINST and not self.called
 
     @property
     def called(self) -> bool:
-        """Whether the evidence is beyond its limit, and what changed is no trifle."""
+        """Return True if the evidence exceeds its limit and the change is not negligible."""
         return self.evidence_years > self.limit_years and self.material_probability > 0.5
 
 
 @dataclass(frozen=True)
 class CreepRate:
-    """How fast the tension creeps, a fraction per year; `prior_sd` is the sd before any test.
+    """Creep rate of the tension, a fraction per year; `prior_sd` is the sd before any test.
 
     Relaxation at such a rate is reported, and is no alarm.
     """
@@ -255,7 +255,7 @@ class CreepRate:
 
     @property
     def is_known(self) -> bool:
-        """Whether the tests, and not what is assumed before them, say what it is."""
+        """Return True if the tests, and not the prior, determine the value."""
         return math.isfinite(self.mean) and self.sd < _INFORMED * self.prior_sd
 
     @property
@@ -291,7 +291,7 @@ class RepeatedMistake:
 
     @property
     def is_notable(self) -> bool:
-        """Whether it is no single slip any more, but numbered wrongly each time, or true."""
+        """Return True if it recurs: numbered wrongly each time, or a real change."""
         return self.tests >= ENOUGH_MISTAKES
 
 
@@ -340,7 +340,7 @@ class WatchedTest:
 
 @dataclass(frozen=True)
 class TemperatureCoefficient:
-    """How a quantity goes with the temperature: per kelvin, a fraction or decades, with its sd.
+    """Temperature coefficient of a quantity: a fraction or decades per kelvin, with its sd.
 
     `prior_sd` is the sd before any test, about 0: as long as `sd` is hardly less, the tests say
     next to nothing of it.
@@ -353,7 +353,7 @@ class TemperatureCoefficient:
 
     @property
     def is_known(self) -> bool:
-        """Whether the tests, and not what is assumed before them, say what it is."""
+        """Return True if the tests, and not the prior, determine the value."""
         return math.isfinite(self.mean) and not self.sd > _INFORMED * self.prior_sd
 
 

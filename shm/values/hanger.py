@@ -1,4 +1,4 @@
-"""What a hanger is, as its owner describes it."""
+"""The description of a hanger by its owner."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ENDS_BELOW = 0.5  # judgement: so that a state at the limit does not come and g
 
 @dataclass(frozen=True)
 class Thresholds:
-    """How large a shift of this hanger matters, and how sure one must be to say so.
+    """Thresholds of alerts: the size of a shift that matters, and the required probability.
 
     `false_call_years` is the mean time until the hanger is called changed though it has not; None:
     the setting of that name.
@@ -140,7 +140,7 @@ Support: TypeAlias = Literal["clamped", "pinned", "free"]
 
 @dataclass(frozen=True)
 class Supports:
-    """What holds the two ends, and the mass that hangs from the free one of them, if any.
+    """Supports of the two ends, and the mass that hangs from a free end.
 
     The mass swings along with the end, sideways; its weight is part of the nominal tension.
     """
@@ -151,12 +151,12 @@ class Supports:
 
     @property
     def clamped(self) -> bool:
-        """Whether both ends are."""
+        """Return True if both ends are clamped."""
         return self.ends("clamped") == (0, 1)
 
     def ends(self, *kinds: Support) -> tuple[int, ...]:
-        """Which ends (deck 0, arch 1) are held in one of these ways."""
-        return tuple(end for end, own in enumerate((self.deck, self.arch)) if own in kinds)
+        """Return the ends (deck 0, arch 1) that are supported in one of these ways."""
+        return tuple(end for end, support in enumerate((self.deck, self.arch)) if support in kinds)
 
 
 LengthBy: TypeAlias = Literal["faces", "pins", "nodes"]
@@ -271,17 +271,17 @@ class Hanger(Shown):
 
     @property
     def is_modelled(self) -> bool:
-        """Whether a model class may describe it."""
+        """Return True if a model class may describe it."""
         return self.kind != "any"
 
     @property
     def has_sensors(self) -> bool:
-        """Whether sensors stay on it: its owner is not asked to hit it."""
+        """Return True if sensors stay on it, so that nobody is asked to hit it."""
         return False
 
     @property
     def as_hanger(self) -> bool:
-        """Whether it is what the model classes take it for: clamped at both ends, in tension."""
+        """Return True if it is clamped at both ends and in tension."""
         return self.supports.clamped and self.nominal_tension_n > 0
 
 

@@ -1,4 +1,4 @@
-"""What a message to a person leads with: the state of a hanger, what to do about it, how soon.
+"""The lead of a message to a person: state of a hanger, action and urgency.
 
 The urgency is read off the words of the action, so that the two cannot disagree.
 """
@@ -15,7 +15,7 @@ URGENCIES: tuple[Urgency, ...] = ("none", "next_test", "week", "today")
 NEXT_TEST, WEEK, TODAY = "at the next planned test", "within a week", "today"
 """The words of each; without any of them nothing needs doing."""
 
-_SAID: dict[Urgency, re.Pattern[str]] = {
+_PATTERNS: dict[Urgency, re.Pattern[str]] = {
     "today": re.compile(r"\btoday\b", re.IGNORECASE),
     "week": re.compile(r"\bwithin (a week|days)\b", re.IGNORECASE),
     # Former versions wrote `date`, and stored messages keep their words.
@@ -42,7 +42,8 @@ class Lead:
     @property
     def urgency(self) -> Urgency:
         """The most urgent of what the action says."""
-        return next((each for each, said in _SAID.items() if said.search(self.action)), "none")
+        found = (each for each, pattern in _PATTERNS.items() if pattern.search(self.action))
+        return next(found, "none")
 
     @property
     def words(self) -> str:

@@ -1,4 +1,4 @@
-"""What an identification finds."""
+"""Values of an identification: modes and tests."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Mode:
 
     @property
     def depends_on_amplitude(self) -> bool:
-        """Whether its slope is sure and of note: `frequency_hz` is then that of small amplitude."""
+        """Return True if its slope is significant: `frequency_hz` is that of small amplitude."""
         slope = abs(self.amplitude_slope)
         return SLOPE_OF_NOTE <= slope < MOST_SLOPE and slope > SURE_SDS * self.amplitude_slope_sd
 
@@ -113,7 +113,7 @@ LONGEST_TEST_ID = 200
 
 
 def is_test_id(text: str) -> bool:
-    """Whether a text may name a test."""
+    """Return True if a text may name a test."""
     return 0 < len(text) <= LONGEST_TEST_ID and text.isprintable()
 
 
@@ -129,7 +129,7 @@ def printable(text: str, instead: str = "_") -> str:
 
 @dataclass(frozen=True)
 class ModalTest(Shown):
-    """What one hammer test says about a hanger: its identified modes and the conditions.
+    """One hammer test of a hanger: its identified modes and conditions.
 
     `id` is of 1 to LONGEST_TEST_ID printable characters, else that is a ValueError: no document
     with another can be read back. `tension_read_n` is what a load cell or a lift-off showed during
@@ -154,13 +154,13 @@ class ModalTest(Shown):
 
     def __repr__(self) -> str:
         found_hz = [mode.frequency_hz for mode in self.modes]
-        said = f"{len(found_hz)} modes"
+        text = f"{len(found_hz)} modes"
         if found_hz:
-            said += f", {min(found_hz):.3f} to {max(found_hz):.3f} Hz"
+            text += f", {min(found_hz):.3f} to {max(found_hz):.3f} Hz"
         read_n, half_n = self.tension_read_n, NINETY_PERCENT * self.tension_read_sd_n
         if math.isfinite(read_n):
-            said += f", read {tension_words(read_n, read_n - half_n, read_n + half_n)}"
-        return line(f"ModalTest {self.id}", self.hanger, said)
+            text += f", read {tension_words(read_n, read_n - half_n, read_n + half_n)}"
+        return line(f"ModalTest {self.id}", self.hanger, text)
 
     def to_dataframe(self) -> DataFrame:
         """Return the modes, a row a mode: the table of `shm.export.modes`."""
@@ -169,7 +169,7 @@ class ModalTest(Shown):
 
     @property
     def regular_modes(self) -> tuple[Mode, ...]:
-        """Those from which a tension is inferred; see `Mode.irregular`."""
+        """Return the modes from which a tension is inferred; see `Mode.irregular`."""
         return tuple(mode for mode in self.modes if not mode.irregular)
 
     @property

@@ -1,4 +1,4 @@
-"""What people saw or did at a hanger or at the bridge, in their words."""
+"""Notes of people on what they saw or did at a hanger or at the bridge."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ class MistakenTest:
 
 @dataclass(frozen=True)
 class BaselineCheck:
-    """What is left out of a baseline, modes and whole tests, and in what it does not fit.
+    """Modes and tests excluded from a baseline, and its misfit.
 
     `misfit` is a clause, empty where the baseline fits. `unchecked` says why mistakes could not
     have been found, empty where they could.
@@ -75,7 +75,7 @@ class BaselineCheck:
         return tuple(self.kept(test) for test in tests if not self.leaves_out(test.id))
 
     def leaves_out(self, test: str) -> bool:
-        """Whether a test is left out as a whole."""
+        """Return True if a test is excluded completely."""
         return any(each.test == test for each in self.tests)
 
     @property
@@ -118,7 +118,7 @@ _INCLINATION_DECIDES, _SAMPLED_BY_EMCEE = "The inclination decides", "Sampled by
 COUNTED_ONCE, LEFT_OUT = "Counted once", "Left out"
 OTHER_UNIT = "The frequencies look given in"
 _NO_FAULTS = (_ENDS_DECIDE, _INCLINATION_DECIDES, _SAMPLED_BY_EMCEE, COUNTED_ONCE, LEFT_OUT)
-_SAID_ONCE = (
+_MESSAGES_GIVEN_ONCE = (
     _ENDS_DECIDE,
     _ORDERS_DECIDE,
     "The description does not fit",
@@ -235,7 +235,7 @@ class Posterior(Shown):
 
     @property
     def caveats(self) -> tuple[str, ...]:
-        """What keeps this posterior from being taken at its word, worst first; empty: nothing."""
+        """Return the caveats of this posterior, worst first; empty if there is none."""
         faults = self.faults
         # What no other line is worth reading beside, and then what says that there is no answer.
         first = [each for each in faults if each.startswith(OTHER_UNIT)]
@@ -247,7 +247,7 @@ class Posterior(Shown):
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What says that something is wrong, not only that the data leave more open."""
+        """Return the caveats that mean an error, not only a wide posterior."""
         found = []
         string = self._compare_with_string()
         if self.effective_sample_size < min(ENOUGH_EFFECTIVE, len(self.samples)):
@@ -479,5 +479,5 @@ def _distinct(caveats: Sequence[str]) -> tuple[str, ...]:
     found: dict[str, str] = {}
     for each in caveats:
         head = each.partition(":")[0].partition(", by ")[0]
-        found.setdefault(head if head in _SAID_ONCE else each, each)
+        found.setdefault(head if head in _MESSAGES_GIVEN_ONCE else each, each)
     return tuple(found.values())

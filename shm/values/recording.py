@@ -1,4 +1,4 @@
-"""What loggers and analysers deliver, and why a recording is not taken at its word."""
+"""Recordings of loggers and analysers, and reasons to doubt one."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ class Recording(Shown):
 
 @dataclass(frozen=True)
 class ResponsePoint:
-    """Where a response was measured, or (roving hammer, by reciprocity) where it was excited."""
+    """Return the position of the response or, with a roving hammer, of the hit (reciprocity)."""
 
     name: str
     plane: Plane | None = None
@@ -165,7 +165,7 @@ class Doubt:
 
 @dataclass(frozen=True, eq=False)
 class Fingerprint:
-    """What the samples of a recording look like, whatever the file around them says.
+    """Fingerprint of the samples of a recording, independent of the file around them.
 
     `digest` is a SHA-256 of the samples of all channels, each to single precision and in whatever
     order. `shapes` (shapes, samples) are stretches of the channels about places that the samples

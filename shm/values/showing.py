@@ -1,4 +1,4 @@
-"""How a value shows itself to a researcher: one line, a summary, a notebook's table.
+"""Display of values to a researcher: one line, a summary, a table in a notebook.
 
 The line is made here. Summaries and tables are made floors above, which values may not import: as
 `shm.values` is loaded, the front of the package gives itself to `hand_over_to`, and it loads what
@@ -40,10 +40,10 @@ def front() -> Any:
     return _front
 
 
-def line(what: str, hanger: int | None, said: str) -> str:
+def line(what: str, hanger: int | None, text: str) -> str:
     """`<Posterior of hanger 3: 654 kN (90 % credible interval 640 to 671 kN)>`."""
     whose = "" if hanger is None else f" of hanger {hanger}"
-    return f"<{what}{whose}: {said}>"
+    return f"<{what}{whose}: {text}>"
 
 
 def tension_words(mean_n: float, low_n: float, high_n: float) -> str:

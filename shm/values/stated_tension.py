@@ -9,7 +9,7 @@ from shm.values.hanger import Limits
 from shm.values.posterior import Averaged, Posterior, Selection
 from shm.values.rounding import MOST_DECIMALS, ForceUnit, force_unit, to_two_digits
 
-_LEAST_SAID = 0.01  # ten of a thousand draws: they tell a smaller probability to no digit
+_MIN_STATED = 0.01  # ten of a thousand draws: they tell a smaller probability to no digit
 
 
 def averaged_now(
@@ -34,8 +34,8 @@ def selection_now(posterior: Posterior, selection: Selection | None = None) -> S
     probable = list(zip(compared, selection.probabilities, strict=True))
     others = [(each, share) for each, share in probable if each is not same[0]]
     now = [replace(each, nominal_tension_n=each.nominal_tension_n * moved) for each, _ in others]
-    own = next(share for each, share in probable if each is same[0])
-    return Selection((posterior, *now), (own, *(share for _, share in others)))
+    probability = next(share for each, share in probable if each is same[0])
+    return Selection((posterior, *now), (probability, *(share for _, share in others)))
 
 
 def _of_one_class(one: Posterior, other: Posterior) -> bool:
@@ -83,13 +83,13 @@ def stated(averaged: Averaged, unit: ForceUnit | None = None) -> StatedTension:
     tension_n, sd_n = averaged.tension_n, averaged.repeatability_sd_n
     unit = unit or force_unit(tension_n.mean)
     low, mean, high = (unit.of(n) for n in (tension_n.q05, tension_n.mean, tension_n.q95))
-    low_said, said, high_said = (
+    low_text, text, high_text = (
         to_two_digits(each, (high - low) / 2) for each in (low, mean, high)
     )
     repeats = unit.of(sd_n)
     return StatedTension(
-        f"{said} {unit.name}",
-        f"{low_said} to {high_said} {unit.name}",
+        f"{text} {unit.name}",
+        f"{low_text} to {high_text} {unit.name}",
         f"{repeats:.{decimals(repeats)}f} {unit.name}" if math.isfinite(repeats) else "",
         _probability(averaged.probability_above_limit),
         _probability(averaged.probability_slack),
@@ -107,6 +107,6 @@ def _probability(value: float) -> str:
     """As many digits as a thousand draws can tell; empty where there is no limit."""
     if math.isnan(value):
         return ""
-    if value < _LEAST_SAID:
-        return f"below {_LEAST_SAID}"
-    return f"above {1 - _LEAST_SAID}" if value > 1 - _LEAST_SAID else f"{value:.2f}"
+    if value < _MIN_STATED:
+        return f"below {_MIN_STATED}"
+    return f"above {1 - _MIN_STATED}" if value > 1 - _MIN_STATED else f"{value:.2f}"

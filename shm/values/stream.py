@@ -94,7 +94,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class StreamEvent:
-    """What was noticed of a stream, its clock or a sensor, and how it was dealt with."""
+    """An event of a stream, its clock or a sensor, and how it was handled."""
 
     stream: str
     kind: StreamEventKind

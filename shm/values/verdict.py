@@ -274,6 +274,6 @@ def _holds_out(shrinkage: Shrinkage) -> bool | None:
 
 def _rms_z(diagnosis: Diagnosis, field: Literal["z", "after_z"]) -> float:
     """Return the root mean square of the standardised residuals that were not excluded."""
-    kept = [getattr(r, field) for r in diagnosis.where if not is_excluded(diagnosis, r)]
-    known = [value for value in kept if math.isfinite(value)]
+    values = [getattr(r, field) for r in diagnosis.where if not is_excluded(diagnosis, r)]
+    known = [value for value in values if math.isfinite(value)]
     return math.hypot(*known) / math.sqrt(len(known)) if known else NAN

@@ -28,5 +28,5 @@ def test_an_example_says_what_it_shows_and_asserts_it(example: Path) -> None:
     assert sum(isinstance(node, ast.Assert) for node in ast.walk(tree)) >= 3
 
 
-def test_there_are_examples() -> None:
-    assert len(EXAMPLES) >= 8
+def test_examples_are_numbered() -> None:
+    assert [path.stem[:3] for path in EXAMPLES] == [f"{n:02d}_" for n in range(1, 13)]

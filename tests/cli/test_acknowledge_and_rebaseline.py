@@ -77,7 +77,7 @@ def test_the_list_of_alerts_says_who_took_note(shm: Shm, workspace: Path) -> Non
         (("drift", "rebaseline", "--since", "2026-05-01", "--why", "x"), 2, "--hanger"),
         (("drift", "rebaseline", "--hanger", 4, "--since", "2026-05-01", "--why", "x"), 4,
          "no baseline yet"),
-        (("drift", "rebaseline", "--hanger", 9, "--since", "2026-05-01", "--why", "x"), 3,
+        (("drift", "rebaseline", "--hanger", 9, "--since", "2026-05-01", "--why", "x"), 4,
          "hanger 9"),
     ],
 )  # fmt: skip

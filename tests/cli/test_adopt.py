@@ -73,7 +73,7 @@ def test_the_record_names_who_and_why_and_outlives_the_dropping(shm: Shm, worksp
         (("adopt", "--hanger", 3, "--effect", "temperature_tension", "--why", "x"), 3, "single"),
         (("adopt", "--hanger", 3, "--effect", "geometric_hardening", "--why", "x"), 3, "diagnos"),
         (("adopt", "--hanger", 4, "--effect", "sag", "--why", "x"), 4, "no baseline yet"),
-        (("adopt", "--hanger", 9, "--effect", "sag", "--why", "x"), 3, "hanger 9"),
+        (("adopt", "--hanger", 9, "--effect", "sag", "--why", "x"), 4, "hanger 9"),
         (("adopt", "--hanger", 3, "--effect", "sag"), 2, "--why"),
         (("drop", "--hanger", 3, "--why", "x"), 4, "adopted nothing"),
         (("adopted", "--hanger", 3), 4, "no effect has been adopted"),

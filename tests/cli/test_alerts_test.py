@@ -49,7 +49,7 @@ def test_a_test_alert_leaves_nothing_in_the_store(shm: Shm, hooked: Workspace) -
     before = (hooked.folder / "shm.db").read_bytes()
     shm("--workspace", hooked.folder, "alerts", "test", "--hook", "mail")
     assert (hooked.folder / "shm.db").read_bytes() == before
-    assert shm("--workspace", hooked.folder, "alerts", "--json").document == {"alerts": []}
+    assert shm("--workspace", hooked.folder, "alerts", "--json").document["alerts"] == []
 
 
 def test_a_webhook_is_tested_while_the_daemon_holds_the_workspace(
@@ -68,7 +68,7 @@ def test_a_hook_that_does_not_take_the_test_gives_an_error_with_a_remedy(
 ) -> None:
     listener.answer = lambda told: Answer(status, b"not today")
     ended = shm("--workspace", hooked.folder, "alerts", "test", "--hook", "ops", "--json")
-    assert (ended.code, ended.out) == (1, "")
+    assert (ended.code, ended.document["error"]) == (1, "failed")
     assert f"answered {status}: not today" in ended.err
     assert remedy in ended.err
     assert len(listener.told) == 1  # tried once

@@ -107,10 +107,16 @@ def test_a_wrong_call_ends_with_its_exit_code_and_a_remedy(
     assert ended.out == ""
 
 
-def test_with_json_an_error_leaves_stdout_empty(shm: Shm, empty: Workspace) -> None:
+def test_with_json_an_error_is_a_document(shm: Shm, empty: Workspace) -> None:
     ended = shm("--workspace", empty.folder, "report", "--hanger", 3, "--json")
     assert ended.code == 4
-    assert ended.out == ""
+    assert ended.document == {
+        "schema": "shm.error/1",
+        "error": "nothing_there",
+        "message": "no test of hanger 3 has been through updating yet.",
+        "remedy": "Take recordings in with `shm ingest FILE`, or see `shm status`.",
+        "exit_code": 4,
+    }
     assert "shm ingest" in ended.err
 
 

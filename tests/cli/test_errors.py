@@ -29,10 +29,17 @@ RUNNABLE = {
 }
 
 
-def assert_told(ended: Ended, codes: set[int]) -> None:
-    """An exit code of the contract, nothing on stdout, and a message of at least two sentences."""
+def assert_told(ended: Ended, codes: set[int], *, as_json: bool = False) -> None:
+    """Check exit code, stdout and a message of at least two sentences.
+
+    Stdout is empty; with --json it holds the error as a document.
+    """
     assert ended.code in codes, ended.err
-    assert ended.out == ""
+    if as_json:
+        assert ended.document["schema"] == "shm.error/1"
+        assert ended.document["exit_code"] == ended.code
+    else:
+        assert ended.out == ""
     for word in ("Traceback", "Unexpected", "Errno"):
         assert word not in ended.err
     assert "Error" in ended.err
@@ -44,8 +51,8 @@ def test_every_command_says_that_there_is_no_workspace_or_file(
     shm: Shm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    line = examples(RUNNABLE[name])[0]
-    assert_told(shm(*words_of(line)), {2, 3})
+    words = words_of(examples(RUNNABLE[name])[0])
+    assert_told(shm(*words), {2, 3}, as_json="--json" in words)
 
 
 def test_a_missing_workspace_is_named(shm: Shm, tmp_path: Path) -> None:

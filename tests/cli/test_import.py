@@ -198,7 +198,7 @@ def test_a_dry_run_keeps_nothing(shm: Shm, workspace: Workspace, tmp_path: Path)
         (("--unit", "A1=V"), 2, "no unit that is read"),
         (("--sensitivity", "A1=much"), 2, "no sensitivity"),
         (("--rate", "0"), 2, "no rate"),
-        ((*SAID[2:], "--hanger", 9), 3, "hanger 9 is not described"),
+        ((*SAID[2:], "--hanger", 9), 4, "hanger 9 is not described"),
     ],
 )
 def test_a_wrong_answer_is_refused_with_what_may_be_said(

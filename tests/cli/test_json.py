@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -72,10 +73,48 @@ READING = (
 def test_a_reading_command_gives_one_json_document(shm: Shm, bridge: Workspace, line: str) -> None:
     ended = shm("--workspace", bridge.folder, *line.split(), "--json")
     assert ended.code in (0, 1, 4), ended.err
-    if ended.code == 4:
-        assert ended.out == ""
-    else:
-        assert isinstance(parsed(ended.out), dict)
+    document = parsed(ended.out)
+    expected = r"shm\.error/1" if ended.code == 4 else r"shm\.[a-z_-]+/\d"
+    assert re.fullmatch(expected, document["schema"]), document["schema"]
+    assert next(iter(document)) == "schema"
+
+
+WRONG = (
+    ("report --hanger 99", 4, "nothing_there"),
+    ("drift --hanger 99", 4, "nothing_there"),
+    ("alerts ack 99 --why x", 4, "nothing_there"),
+    ("stream export h9 2026-05-01 2026-05-02 {}/x.csv", 4, "nothing_there"),
+    ("report --hanger 4", 4, "nothing_there"),
+    ("report --hanger three", 2, "usage"),
+    ("report --since tomorrow --hanger 3", 2, "usage"),
+    ("drift rebaseline --hanger 3 --since tomorrow --why x", 2, "usage"),
+    ("gap adopt --hanger 3 --effect nonsense --why x", 2, "usage"),
+    ("db restore {}/notes.txt", 3, "bad_input"),
+    ("db restore {}/none.db", 4, "nothing_there"),
+    ("ingest {}/none.csv", 2, "usage"),
+)
+
+
+@pytest.mark.parametrize(("line", "code", "kind"), WRONG)
+def test_error_is_document_of_same_exit_code(
+    shm: Shm, bridge: Workspace, tmp_path: Path, line: str, code: int, kind: str
+) -> None:
+    (tmp_path / "notes.txt").write_text("buy milk")
+    words = ("--workspace", bridge.folder, *line.format(tmp_path).split())
+    assert shm(*words).code == code
+    ended = shm(*words, "--json")
+    document = parsed(ended.out)
+    assert (ended.code, document["exit_code"], document["error"]) == (code, code, kind)
+    assert document["schema"] == "shm.error/1"
+    assert len(document["message"]) > 8
+    assert len(document["remedy"]) > 8
+    assert " ".join(document["message"].split())[:20] in " ".join(ended.err.split())
+
+
+@pytest.mark.parametrize("line", READING)
+def test_exit_code_is_the_same_with_json(shm: Shm, empty: Workspace, line: str) -> None:
+    words = ("--workspace", empty.folder, *line.split())
+    assert shm(*words).code == shm(*words, "--json").code
 
 
 @pytest.mark.parametrize("line", ["ingest --peek {}", "select {} --models beam1 --samples 200",
@@ -103,7 +142,11 @@ def test_writing_commands_say_what_they_did(
     token = of("token", "create", "logger", "--scope", "write")
     assert token["name"] == "logger"
     assert token["token"]
-    assert of("token", "revoke", "logger") == {"name": "logger", "revoked": True}
+    assert of("token", "revoke", "logger") == {
+        "schema": "shm.token_revoke/1",
+        "name": "logger",
+        "revoked": True,
+    }
     assert of("db", "upgrade")["upgraded"] is True
     simulated = of(
         "simulate", "--hanger-file", hanger_file, "--hits", 1, "--out", tmp_path / "made"
@@ -112,4 +155,9 @@ def test_writing_commands_say_what_they_did(
     write_test(tmp_path / "t1.modes.json", empty)
     of("ingest", tmp_path / "t1.modes.json")
     fetched = of("archive", "fetch", 1)
-    assert fetched == {"recording": 1, "file": "t1.modes.json", "from": None}
+    assert fetched == {
+        "schema": "shm.archive_fetch/1",
+        "recording": 1,
+        "file": "t1.modes.json",
+        "from": None,
+    }

@@ -162,7 +162,7 @@ def test_a_recording_that_cannot_be_used_is_bad_input(
     path = tmp_path / "bad.csv"
     path.write_text(content)
     ended = shm("identify", path, "--json")
-    assert (ended.code, ended.out) == (3, "")
+    assert (ended.code, ended.document["error"]) == (3, "bad_input")
     assert said in ended.err
 
 

@@ -142,7 +142,7 @@ def test_what_is_kept_stays_when_the_rest_goes(
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (("export", "h9", "2026-05-01", "2026-05-02", "x.csv"), 3, "is not described"),
+        (("export", "h9", "2026-05-01", "2026-05-02", "x.csv"), 4, "is not described"),
         (("export", "h3", "yesterday", "2026-05-02", "x.csv"), 3, "not an ISO 8601 time"),
         (("export", "h3", "2026-05-01T10:00", "2026-05-01T11:00", "x.csv"), 4, "has no sample"),
         (("export", "h3", "2026-05-01", "2027-05-01", "x.csv"), 2, "more than the 10000000"),

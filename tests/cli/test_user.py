@@ -25,7 +25,11 @@ def user(shm: Shm, empty: Workspace, monkeypatch: pytest.MonkeyPatch) -> Shm:
 
 def test_a_user_is_made_listed_without_a_secret_and_removed(user: Shm) -> None:
     made = user("add", "M. Huber", "--role", "operator", "--json", password=PASSWORD)
-    assert made.document == {"name": "M. Huber", "role": "operator"}
+    assert made.document == {
+        "schema": "shm.user_add/1",
+        "name": "M. Huber",
+        "role": "operator",
+    }
     listed = user("list", "--json")
     (one,) = listed.document["users"]
     assert (one["name"], one["role"], one["removed_at"]) == ("M. Huber", "operator", None)

@@ -97,12 +97,12 @@ def test_the_suffix_of_the_file_chooses_the_form_of_the_report(
 
 
 @pytest.mark.parametrize("verb", ["report", "drift", "alerts", "export"])
-def test_a_hanger_that_the_bridge_lacks_is_bad_input(
+def test_a_hanger_that_the_bridge_lacks_is_not_there(
     shm: Shm, bridge: Workspace, tmp_path: Path, verb: str
 ) -> None:
     out = ["--out", tmp_path / "x.csv"] if verb == "export" else []
     ended = shm("--workspace", bridge.folder, verb, "--hanger", 9, *out)
-    assert ended.code == 3
+    assert ended.code == 4
     assert "known: 3, 4" in ended.err
 
 
@@ -201,7 +201,10 @@ def test_a_wrong_description_names_the_key(shm: Shm, empty: Workspace) -> None:
     path = empty.folder / "bridge.toml"
     path.write_text(path.read_text().replace("length_m = 12.0", "length_m = -1"))
     ended = shm("--workspace", empty.folder, "status", "--json")
-    assert (ended.code, ended.out) == (3, "")
+    assert ended.code == 3
+    assert ended.document["schema"] == "shm.error/1"
+    assert "length_m = -1" in ended.document["message"]
+    assert ended.document["line"] == 7
     assert "length_m = -1" in ended.err
 
 

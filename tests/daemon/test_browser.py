@@ -172,7 +172,7 @@ def test_an_alert_is_acknowledged_with_a_name_and_a_reason(signed_in: Browser, s
     before = page.locator("article.card.open").count()
     card = page.locator("article.card").last
     card.get_by_text("Acknowledge", exact=True).click()
-    card.get_by_label("What came of it").fill("A clamp had slipped; <set> right.")
+    card.get_by_label("Result").fill("A clamp had slipped; <set> right.")
     card.get_by_role("button").click()
     expect(card).to_contain_text("Acknowledged by Anna")
     expect(card).to_contain_text("A clamp had slipped; <set> right.")
@@ -183,7 +183,7 @@ def test_an_alert_is_acknowledged_with_a_name_and_a_reason(signed_in: Browser, s
     assert page.locator("article.card.open").count() == before - 1
     card = page.locator("article.card", has_text="A clamp had slipped")
     card.get_by_text("Resolve", exact=True).click()
-    card.get_by_label("What came of it").fill("The clamp holds.")
+    card.get_by_label("Result").fill("The clamp holds.")
     card.get_by_role("button").click()
     expect(card).to_contain_text("Resolved by Anna: The clamp holds.")
     assert page.locator("article.card.open").count() == before - 1

@@ -95,20 +95,20 @@ def test_a_month_needs_no_shell(month: tuple[Page, Workspace, str], tmp_path: Pa
 
     alert = at("/alerts").locator("article.card.open", has_text="tension").first
     alert.get_by_text("Acknowledge", exact=True).click()
-    alert.get_by_label("What came of it").fill("A clamp had slipped.")
+    alert.get_by_label("Result").fill("A clamp had slipped.")
     alert.get_by_role("button").click()
     expect(page.get_by_text("Acknowledged by Anna: A clamp had slipped.").first).to_be_visible()
 
     silences = page.locator("section[aria-labelledby=silences]")
-    silences.get_by_text("Hold messages back").click()
+    silences.get_by_text("Silence notifications").click()
     silences.get_by_label("Of", exact=True).select_option("3")
     silences.get_by_label("Until, UTC").fill(f"{utc_now() + timedelta(days=2):%Y-%m-%dT%H:%M}")
     silences.get_by_label("Why").fill("The clamp is replaced.")
-    silences.get_by_role("button", name="Hold back").click()
+    silences.get_by_role("button", name="Start silence").click()
     expect(silences.get_by_text("hooks are told nothing of hanger 3")).to_be_visible()
     whole(page)
     silences.get_by_role("button", name="End silence").click()
-    expect(silences.get_by_text("Hooks are told of every hanger.")).to_be_visible()
+    expect(silences.get_by_text("Notifications are on for all hangers.")).to_be_visible()
 
     at("/compare").get_by_role("checkbox", name="Hanger 3").check()
     page.get_by_role("button", name="Compare").click()

@@ -20,7 +20,7 @@ from shm.errors import UsageError
 from shm.modes_document import modes_document
 from shm.store import Stage, Workspace
 from shm_daemon.web.address import Address
-from shm_daemon.web.serving import web_beside
+from shm_daemon.web.serving import web_with_daemon
 from tests.helpers.brokers import a_broker
 from tests.helpers.daemons import ROOT, quick_daemons, until_serving
 from tests.helpers.waiting import until
@@ -31,8 +31,9 @@ import sys, time
 from pathlib import Path
 from shm.store import Workspace
 from shm_daemon.web.address import Address
-from shm_daemon.web.serving import web_beside
-with web_beside(Workspace.open(sys.argv[1]), Address(port=int(sys.argv[2])), Path(sys.argv[3])):
+from shm_daemon.web.serving import web_with_daemon
+workspace, address = Workspace.open(sys.argv[1]), Address(port=int(sys.argv[2]))
+with web_with_daemon(workspace, address, Path(sys.argv[3])):
     time.sleep(300)
 """
 ENDED = """
@@ -107,7 +108,10 @@ def test_what_its_processes_hold_is_given_back_when_it_is_ended() -> None:
 
 
 def test_it_does_not_open_to_others_without_a_token(workspace: Workspace) -> None:
-    with pytest.raises(UsageError, match="no token"), web_beside(workspace, Address("0.0.0.0")):
+    with (
+        pytest.raises(UsageError, match="no token"),
+        web_with_daemon(workspace, Address("0.0.0.0")),
+    ):
         pass
 
 

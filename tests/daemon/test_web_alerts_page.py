@@ -94,7 +94,7 @@ def test_person_token_and_reason_go_on_the_record(writer: httpx.Client, alert: i
     assert again.status_code == 409
     assert "already" in again.json()["message"]
     page = writer.get("/alerts").text
-    assert "Somebody took note of every alert" in page
+    assert "No alert is open: all are acknowledged." in page
     assert "Ada &lt;b&gt; (token write)" in page
     assert "Nut tightened." in page
     assert f"Resolve alert {alert}" in page

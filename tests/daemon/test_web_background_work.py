@@ -76,11 +76,11 @@ def until(found: Callable[[], Text | None]) -> Text:
 
 def test_an_order_is_made_once_and_kept(background_worker: BackgroundWorker[Text]) -> None:
     order = Order("one", "slow")
-    assert background_worker.kept(order) is None
+    assert background_worker.stored(order) is None
     assert [background_worker.wanted(order) for _ in range(5)] == [None] * 5
     _LET_GO.set()
     assert until(lambda: background_worker.wanted(order)) == Text("one")
-    assert background_worker.kept(Order("one", "slow")) == Text("one")
+    assert background_worker.stored(Order("one", "slow")) == Text("one")
     assert _MADE == ["one"]
 
 
@@ -92,8 +92,8 @@ def test_orders_are_made_one_at_a_time_and_only_a_few_wait(
     time.sleep(0.1)
     assert _MADE == ["0"]
     _LET_GO.set()
-    until(lambda: background_worker.kept(orders[7]))
-    assert [background_worker.kept(order) for order in orders[8:]] == [None] * 12
+    until(lambda: background_worker.stored(orders[7]))
+    assert [background_worker.stored(order) for order in orders[8:]] == [None] * 12
     assert until(lambda: background_worker.wanted(orders[19])) == Text("19")
 
 
@@ -114,7 +114,7 @@ def test_the_oldest_go_where_memory_runs_out(background_worker: BackgroundWorker
     orders = [Order(str(number), size_bytes=25_000_000) for number in range(3)]
     for order in orders:
         until(lambda order=order: background_worker.wanted(order))  # type: ignore[misc]
-    assert [background_worker.kept(order) is None for order in orders] == [True, False, False]
+    assert [background_worker.stored(order) is None for order in orders] == [True, False, False]
 
 
 def test_what_takes_too_long_is_given_up() -> None:

@@ -161,10 +161,10 @@ def test_the_worst_comes_first_and_what_nobody_watches_is_never_quiet(
     assert names[-1] == "Home"
     assert set(names[1:-1]) == {"Dead", "Gone", "Wrong", "Open"}
     assert found["headline"].startswith("6 bridges. Action today: Lost. Not reached: Gone, ")
-    assert "Stands still: Dead." in found["headline"]
+    assert "Stopped: Dead." in found["headline"]
     rows = {each["name"]: each for each in found["bridges"]}
     assert rows["Dead"]["summary"]["status"] == "first"
-    assert (rows["Dead"]["states"], rows["Dead"]["urgency"]) == (["Stands still"], "today")
+    assert (rows["Dead"]["states"], rows["Dead"]["urgency"]) == (["Stopped"], "today")
     page = there.client.get("/bridges").text
     for name in ("Dead", "Gone", "Wrong", "Open"):
         part = page.split(f'aria-labelledby="bridge-{name}"')[1].split("</article>")[0]
@@ -226,7 +226,7 @@ def test_a_stranger_is_told_nothing(there: Neighbourhood) -> None:
 
 def test_a_bridge_alone_says_how_others_are_added(tmp_path: Path) -> None:
     with served(make_workspace(tmp_path / "alone")) as site, site.client() as client:
-        assert "Others are added as [[other_bridge]]" in words_of(client.get("/bridges").text)
+        assert "Add others as [[other_bridge]]" in words_of(client.get("/bridges").text)
         assert "All bridges" not in client.get("/").text
 
 

@@ -47,10 +47,10 @@ def test_an_operator_holds_messages_back_and_every_page_says_so_until_it_ends(
 ) -> None:
     asked = {"hanger": "3", "from": "", "until": in_days(2), "why": "new <joint>"}
     sign_in(browser, "reader")
-    assert "Hold messages back" not in browser.get("/alerts").text
+    assert "Silence notifications" not in browser.get("/alerts").text
     assert browser.post("/silences", data=asked).status_code == 403
     sign_in(browser, "operator")
-    assert "Hooks are told of every hanger." in browser.get("/alerts").text
+    assert "Notifications are on for all hangers." in browser.get("/alerts").text
     for wrong in (
         {"hanger": ""},
         {"until": ""},

@@ -215,7 +215,7 @@ def test_each_test_links_to_its_page_whatever_its_name(client: httpx.Client, pag
 def test_a_hanger_without_tests_says_so(client: httpx.Client) -> None:
     found = client.get("/hangers/4", headers=_PAGE)
     assert found.status_code == 200
-    assert "its tension is not known" in words_of(found.text)
+    assert "Its tension is unknown without a test" in words_of(found.text)
     assert "data-figure" not in found.text
     assert client.get("/api/hangers/4/trend").json()["points"] == []
     assert client.get("/api/hangers/4/tests").json()["tests"] == []

@@ -46,10 +46,10 @@ def test_it_says_that_no_daemon_runs_and_then_that_work_flows(
     bridge: Workspace, client: httpx.Client
 ) -> None:
     page = client.get("/operation").text
-    assert "Stands still" in page
+    assert "Stopped" in page
     assert "The daemon has never run here." in page
     beat(bridge)
-    assert "Work flows" in client.get("/operation").text
+    assert "Running normally" in client.get("/operation").text
 
 
 def test_a_daemon_whose_turns_fail_is_no_healthy_one(
@@ -63,7 +63,7 @@ def test_a_daemon_whose_turns_fail_is_no_healthy_one(
     assert (answer.status_code, answer.json()["status"]) == (503, "failing")
     assert "last turn failed" in answer.text
     assert "secret" not in answer.text
-    assert "Stands still" in client.get("/operation").text
+    assert "Stopped" in client.get("/operation").text
     turn_failed(bridge, "")
     assert client.get("/health").status_code == 200
 

@@ -84,7 +84,7 @@ def test_a_hanger_described_as_it_hangs_is_not_stretched_again() -> None:
     assert not drawn.as_it_hangs().is_unstressed
 
 
-# The table of docs/physics.md: least and largest change of modes 1 to 6 in percent.
+# The table of docs/trials/validation.md: least and largest change of modes 1 to 6 in percent.
 
 
 def test_the_hanger_with_plates_and_fixed_faces_gives_table_a_3() -> None:

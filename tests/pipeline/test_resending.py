@@ -61,7 +61,7 @@ def test_the_list_says_why_a_hook_was_not_told_and_the_command_sends_it_again(
     at = ["--workspace", str(given_up.folder), "alerts"]
     assert run(at) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "The hook mail was not told: given up after one try, no answer" in said
+    assert "The hook mail was not notified: given up after one try, no answer" in said
     assert "`shm alerts resend 2`" in said
     assert run([*at, "resend", "2"]) == 0
     assert "Alert 2 is owed again to mail" in capsys.readouterr().out

@@ -263,6 +263,30 @@ def test_an_unknown_hanger_is_refused_with_the_known_ones(tmp_path: Path) -> Non
         load_bridge(written(tmp_path, ROUND)).hanger(9)
 
 
+@pytest.mark.parametrize(
+    ("text", "problem", "remedy"),
+    [
+        (ROUND.replace("711e3", "711"), "less than the weight of the hanger, 12.2 kN", "711e3"),
+        (ROUND.replace("[[hanger]]", "[[hnager]]"), "unknown table or key hnager", "hanger?"),
+        (ROUND.replace("length_m", "lenght_m"), "unknown key lenght_m", "Did you mean length_m?"),
+        ('[bridge]\nnmae = "x"\n' + ROUND, "unknown key nmae", "Did you mean name?"),
+    ],
+)
+def test_slips_of_a_description_are_named(
+    tmp_path: Path, text: str, problem: str, remedy: str
+) -> None:
+    with pytest.raises(BadInput, match=problem) as caught:
+        load_bridge(written(tmp_path, text))
+    assert remedy in caught.value.remedy
+    assert "bridge.toml" in str(caught.value)
+
+
+@pytest.mark.parametrize("tension", ["0", "13e3"])
+def test_tension_of_no_load_or_above_weight_is_taken(tmp_path: Path, tension: str) -> None:
+    hanger = load_hanger(written(tmp_path, ROUND.replace("711e3", tension)))
+    assert hanger.nominal_tension_n == float(tension)
+
+
 def test_one_hanger_is_asked_for_where_a_file_has_several(tmp_path: Path) -> None:
     path = written(tmp_path, ROUND + ROUND.replace("id = 3", "id = 4"))
     assert load_hanger(path, 4).id == 4

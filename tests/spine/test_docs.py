@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib.util
 import json
 import re
@@ -75,6 +76,7 @@ def test_built_pages_are_ignored_by_git_and_named_by_the_tree() -> None:
     [
         ("docs/physics.md", "classes", "classes_table"),
         ("docs/api.md", "examples", "examples"),
+        ("docs/api.md", "functions", "functions"),
         ("CONTRIBUTING.md", "house", "house"),
     ],
 )
@@ -143,6 +145,44 @@ def test_manual_pages_link_inside_manual(page: Path) -> None:
     targets = [(page.parent / name).resolve() for name, _ in links(page.read_text()) if name]
     outside = [t.name for t in targets if t.suffix == ".md" and not t.is_relative_to(DOCS)]
     assert outside == []
+
+
+PROOF = {
+    "Tension": ("tension from modes",),
+    "Change": ("loss of 5 %, hammer tests",),
+    "Diagnosis": (
+        "cause of a gap, true cause named first",
+        "sure of a false cause, true effect withheld",
+    ),
+    "Data": ("files, under kills and power cuts",),
+    "Not tested": (),
+}
+"""The rows of docs/trials/proof.csv behind each sentence of trust in the README."""
+
+
+@pytest.mark.parametrize("subject", PROOF)
+def test_readme_states_proven_figures(subject: str) -> None:
+    """Counts of several trials may be added: 14 of 22 and 7 of 21 make 21 of 43."""
+    section = (ROOT / "README.md").read_text().split("## How far you can trust it\n")[1]
+    found = re.findall(r"^- \*\*(.+?)\*\*: ((?:.+\n)(?:  .+\n)*)", section.split("\n## ")[0], re.M)
+    assert [name for name, _ in found] == list(PROOF)
+    sentence = " ".join(dict(found)[subject].split())
+    with (DOCS / "trials/proof.csv").open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["what"] in PROOF[subject]]
+    assert {row["what"] for row in rows} == set(PROOF[subject])
+    proven: set[str] = set()
+    for what in PROOF[subject]:
+        cells = [f"{r['what']} {r['reached']}" for r in rows if r["what"] == what]
+        counts = [[int(n) for n in pair] for c in cells for pair in COUNT.findall(c)]
+        proven |= {figure for cell in cells for figure in FIGURE.findall(cell)}
+        proven.add(" of ".join(str(sum(column)) for column in zip(*counts, strict=True)))
+    stated = FIGURE.findall(sentence.replace("90 % interval", ""))
+    assert bool(stated) == bool(PROOF[subject])
+    assert set(stated) <= proven
+
+
+FIGURE = re.compile(r"\d+ of \d+|\d+(?:\.\d+)?|third|eighth|one hanger of four")
+COUNT = re.compile(r"(\d+) of (\d+)")
 
 
 def test_glossary_defines_terms_once() -> None:

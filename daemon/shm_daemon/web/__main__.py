@@ -21,7 +21,7 @@ from shm_daemon.web.serving import leaving, serve
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Serves one workspace; the exit code."""
+    """Serve one workspace and return the exit code."""
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s")
     parser = argparse.ArgumentParser("shm_daemon.web", description="Begin it with `shm web`.")
     parser.add_argument("workspace", type=Path)

@@ -1,4 +1,4 @@
-"""Who may do what: people and their roles, tokens and their scopes.
+"""Access: people and their roles, tokens and their scopes.
 
 A program sends its token in a header; a browser sends the cookie that signing in gave it.
 """
@@ -41,7 +41,7 @@ _FORWARDED = ("forwarded", "x-forwarded-for", "x-forwarded-host", "x-real-ip")
 
 @dataclass(frozen=True)
 class Visitor:
-    """Who asks: the name of the person or token, empty for this machine without one."""
+    """The caller: the name of the person or token, empty for this machine without one."""
 
     name: str
     role: Role = Role.READER
@@ -58,12 +58,12 @@ class Visitor:
 
     @property
     def actor(self) -> Actor:
-        """Whose their changes are, in the audit log."""
+        """Return the author of their changes for the audit log."""
         return Actor(self.name if self.is_person else f"token {self.name}", self.via)
 
 
 def site_of(request: Request) -> Site:
-    """The site that the app serves."""
+    """Return the site that the app serves."""
     site = request.app.state.site
     assert isinstance(site, Site)
     return site
@@ -157,7 +157,7 @@ async def with_passwords(request: Request, does: Callable[[], Response]) -> Resp
 
 
 def refuse_foreign(request: Request) -> None:
-    """Raises Refused where a page of somebody else has a browser send this.
+    """Raise Refused where a page of somebody else has a browser send this.
 
     Browsers name the page's origin with whatever changes something; SameSite alone lets pages of
     other ports of this machine through.
@@ -168,7 +168,7 @@ def refuse_foreign(request: Request) -> None:
 
 
 def visitor_in_force(request: Request, site: Site, secret: str) -> Visitor:
-    """Whose token or session this is; raises Refused where it is wrong or has ended.
+    """Return the caller of a token or session; raises Refused if it is wrong or has ended.
 
     One in force is never kept waiting, whatever came from the same address.
     """
@@ -176,13 +176,13 @@ def visitor_in_force(request: Request, site: Site, secret: str) -> Visitor:
     if found is not None:
         return found
     if secret.startswith(SESSION):
-        raise _nobody("You are not signed in any more.", "Sign in again at /sign-in.")
+        raise _not_signed_in("You are not signed in any more.", "Sign in again at /sign-in.")
     site.wrong_attempts.note_wrong(unless_throttled(request, site))
-    raise _nobody("This token is wrong or revoked.", _BY_HEADER)
+    raise _not_signed_in("This token is wrong or revoked.", _BY_HEADER)
 
 
 def is_signed_in(request: Request, site: Site) -> bool:
-    """Whether the browser's cookie is in force."""
+    """Return True if the browser's cookie is valid."""
     secret = request.cookies.get(COOKIE)
     return bool(secret) and _found(site, secret or "") is not None
 
@@ -195,7 +195,7 @@ def session_of(request: Request, site: Site, name: str, password: str) -> str:
     secret = site.store.people.sign_in(name, password, utc_now())
     if secret is None:
         site.wrong_attempts.note_wrong(caller, name)
-        raise _nobody(
+        raise _not_signed_in(
             "Name or password is wrong.",
             "An engineer can give you another password. A program signs in with no password: it "
             "sends a token.",
@@ -203,10 +203,10 @@ def session_of(request: Request, site: Site, name: str, password: str) -> str:
     return secret
 
 
-def change_own_password(
+def change_password_of(
     request: Request, site: Site, person: Visitor, old: str, password: str
 ) -> None:
-    """Raises UsageError where the new one is poor, Refused where the old one is wrong or too many
+    """Raise UsageError where the new one is poor, Refused where the old one is wrong or too many
     were. The browser that asks stays signed in.
     """
     caller = unless_throttled(request, site, person.name)
@@ -217,7 +217,7 @@ def change_own_password(
 
 
 def unless_throttled(request: Request, site: Site, name: str | None = None) -> str:
-    """The address that asks; raises Refused where too much that is wrong came from there."""
+    """Return the address that asks; raises Refused where too much that is wrong came from there."""
     forwarded = request.headers.get("x-forwarded-for", "")
     peer = request.client.host if request.client else ""
     caller = caller_of(peer, forwarded, site.workspace.settings.web_proxies)
@@ -243,7 +243,7 @@ def _found(site: Site, secret: str) -> Visitor | None:
 
 
 def _visitor(request: Request, site: Site, secret: str, needed: Role) -> Visitor:
-    """The one place where a role is held against what a route needs."""
+    """Return the caller if its role is enough; raises Refused. No other place checks roles."""
     found = visitor_in_force(request, site, secret)
     if found.role.may(needed):
         return found
@@ -263,19 +263,19 @@ def _visitor(request: Request, site: Site, secret: str, needed: Role) -> Visitor
 
 
 def _signed_in(request: Request, site: Site, otherwise: str, needed: Role) -> Visitor:
-    """Who has signed in with this browser; `otherwise` is said where nobody has."""
+    """Return the person signed in with this browser; raises Refused with `otherwise` if none is."""
     secret = request.cookies.get(COOKIE)
     if not secret:
-        raise _nobody(otherwise, f"Sign in at /sign-in. A program: {_BY_HEADER}")
+        raise _not_signed_in(otherwise, f"Sign in at /sign-in. A program: {_BY_HEADER}")
     if request.method not in ("GET", "HEAD"):
         refuse_foreign(request)
     return replace(_visitor(request, site, secret, needed), via=PAGE)
 
 
 def _is_at_home(request: Request, site: Site) -> bool:
-    """A proxy on this machine brings strangers in: what it passes on needs a token too."""
+    """Return True for a caller on this machine; a request through a proxy needs a token, too."""
     return site.address.is_loopback and not any(name in request.headers for name in _FORWARDED)
 
 
-def _nobody(message: str, remedy: str) -> Refused:
+def _not_signed_in(message: str, remedy: str) -> Refused:
     return Refused(401, message, remedy, {"WWW-Authenticate": "Bearer"})

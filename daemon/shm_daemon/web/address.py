@@ -1,4 +1,4 @@
-"""Where the web interface listens, who may call it by which name, and where a test is found."""
+"""Addresses: where the web interface listens, by which names it is called, links to tests."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ class Address:
 
     @property
     def is_loopback(self) -> bool:
-        """Whether only this machine can reach it."""
+        """Return True if only this machine can reach it."""
         return _is_loopback(self.host)
 
     def page(self, is_https: bool = False) -> str:
-        """What a person opens in a browser; this machine's name where it listens everywhere."""
+        """Return the address to open in a browser; this machine's name if it listens everywhere."""
         host = _machine() if self.host in ("0.0.0.0", "::") else self.host  # noqa: S104
         named = f"[{host}]" if ":" in host else host
         return f"http{'s' if is_https else ''}://{named}:{self.port}/"
 
     def answers_to(self, host_header: str, names: tuple[str, ...]) -> bool:
-        """Whether a request with this `Host` is meant for us.
+        """Return True if a request with this `Host` is meant for us.
 
         A page of a stranger may have its own name resolve to this machine; numbers cannot be
         turned that way. `names` are further names of ours.
@@ -55,9 +55,7 @@ class Address:
 
 
 def network_of(address: str) -> str:
-    """Who calls, as one caller is told from another: a network of IPv6 is given out to one owner in
-    blocks of 64 bits.
-    """
+    """Return the network of a caller: one owner of IPv6 holds a block of 64 bits."""
     try:
         number = ip_address(address.partition("%")[0])
     except ValueError:
@@ -111,8 +109,8 @@ _DOTS = (".", "..")
 
 def test_page(hanger_id: int, name: str) -> str:
     """The address of a test's page."""
-    told = f"{name}/" if name in _DOTS else name
-    return f"/hangers/{hanger_id}/tests/{quote(told, safe='')}"
+    segment = f"{name}/" if name in _DOTS else name
+    return f"/hangers/{hanger_id}/tests/{quote(segment, safe='')}"
 
 
 def test_json(hanger_id: int, name: str) -> str:
@@ -121,7 +119,7 @@ def test_json(hanger_id: int, name: str) -> str:
 
 
 def name_in(address: str) -> str:
-    """The name of the test whose address ends so, decoded."""
+    """Return the name of the test whose address ends so, decoded."""
     return address.removesuffix("/") if address.removesuffix("/") in _DOTS else address
 
 

@@ -107,7 +107,7 @@ def load_pages(site: Site) -> Pages:
 
 @_described.get("/openapi.json")
 def openapi(request: Request, _: Reader) -> JSONResponse:
-    """What the interface takes and answers, as OpenAPI."""
+    """Return the description of the interface as OpenAPI."""
     return JSONResponse(request.app.openapi())
 
 
@@ -115,7 +115,7 @@ log = logging.getLogger(__name__)
 
 
 def warm_up(app: FastAPI) -> None:
-    """Takes about a second; requests are answered meanwhile."""
+    """Load what pages need, for about a second; requests are answered meanwhile."""
     frame.prepare_templates()
     try:
         glance(app.state.site, utc_now())

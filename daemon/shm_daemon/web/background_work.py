@@ -1,4 +1,4 @@
-"""What takes seconds to work out, beside the requests that want it: one at a time, a few waiting.
+"""Background work: requests that take seconds to compute, one at a time, a few waiting.
 
 It runs in a process of its own that ends when nothing has been wanted for a while, so that neither
 a heavy file nor a crash of what reads it touches the interface. The latest results are kept in
@@ -25,7 +25,7 @@ from shm_daemon.execution import children_ended, process_pool
 # Technical: each order takes seconds; the process goes when nobody looks at pages. Judgement: after
 # ten minutes it hangs, and who asks again within a minute is told why it failed.
 _MOST_WAITING = 8
-_MOST_KEPT_BYTES = 64_000_000
+_MAX_STORED_BYTES = 64_000_000
 _IDLE_S = 60.0
 _LONGEST_S = 600.0
 _FAILURE_LASTS_S = 60.0
@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 
 
 class Order(Protocol):
-    """What is wanted: equal orders have the same result. `make` runs in the other process."""
+    """A request for work: equal ones have the same result. `make` runs in the other process."""
 
     def __hash__(self) -> int: ...
 
@@ -65,8 +65,8 @@ class BackgroundWorker(Generic[Made]):
         self._thread: threading.Thread | None = None
         self._closed = False
 
-    def kept(self, order: Order) -> Made | None:
-        """What was made of an order already; begins nothing."""
+    def stored(self, order: Order) -> Made | None:
+        """Return the stored result of a request, None if there is none; start nothing."""
         with self._changed:
             if order not in self._kept:
                 return None
@@ -74,12 +74,12 @@ class BackgroundWorker(Generic[Made]):
             return self._kept[order][0]
 
     def wanted(self, order: Order) -> Made | None:
-        """What was made of an order; None while it is being worked on, or while many others wait.
+        """Return the result of a request; None while it is computed, or while many others wait.
 
         Raises the ShmError with which it failed a short while ago.
         """
         with self._changed:
-            found = self.kept(order)
+            found = self.stored(order)
             if found is not None:
                 return found
             error, failed_at_s = self._failures.get(order, (None, 0.0))
@@ -94,7 +94,7 @@ class BackgroundWorker(Generic[Made]):
             return None
 
     def close(self) -> None:
-        """Ends the work and its process."""
+        """End the work and its process."""
         with self._changed:
             self._closed, thread = True, self._thread
             self._waiting.clear()
@@ -140,8 +140,8 @@ class BackgroundWorker(Generic[Made]):
             remedy = (
                 "Have it written at leisure with `shm report`; see the log of the web interface."
             )
-            said = f"it took more than {self._longest_s:g} s and was given up."
-            self._failed(order, ShmError(said, remedy=remedy))
+            problem = f"it took more than {self._longest_s:g} s and was given up."
+            self._failed(order, ShmError(problem, remedy=remedy))
             return False
         except BrokenProcessPool:
             self._tried_again(order)
@@ -169,12 +169,12 @@ class BackgroundWorker(Generic[Made]):
             self._failures.pop(order, None)
             self._kept[order] = made, len(packed)
             while len(self._kept) > 1 and (
-                sum(size_bytes for _, size_bytes in self._kept.values()) > _MOST_KEPT_BYTES
+                sum(size_bytes for _, size_bytes in self._kept.values()) > _MAX_STORED_BYTES
             ):
                 self._kept.popitem(last=False)
 
     def _tried_again(self, order: Order) -> None:
-        """An order fails whose process died twice.
+        """Fail a request whose process died twice.
 
         Once may be no fault of its own: who ends all our processes often ends that one first, and
         whoever asks in the moment before we end as well must not be told of a fault.
@@ -197,11 +197,11 @@ class BackgroundWorker(Generic[Made]):
 
 
 def background_worker_of(request: Request) -> BackgroundWorker[Any]:
-    """The background worker of the app, for all that is ordered there."""
+    """Return the background worker of the app, for all that is ordered there."""
     found: BackgroundWorker[Any] = request.app.state.background_worker
     return found
 
 
 def _packed(order: Order) -> bytes:
-    """What is made of an order, as it comes from the other process: its length is its size here."""
+    """Return the result of a request, packed in the other process: its length is its size here."""
     return pickle.dumps(order.make())

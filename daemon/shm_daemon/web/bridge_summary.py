@@ -17,12 +17,12 @@ from shm.values.messages import URGENCIES, Lead, Urgency
 from shm_daemon.web.health import notices, troubles
 from shm_daemon.web.site import Site
 
-NOT_REACHED, STANDS_STILL = "Not reached", "Stands still"
+NOT_REACHED, STOPPED = "Not reached", "Stopped"
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What a bridge says of itself.
+    """Summary of a bridge by itself.
 
     `notices` are what every page of its dashboard says at its top, `troubles` why its work stands
     still; `others` says which other hangers need action.
@@ -45,12 +45,12 @@ class Summary:
 
     @property
     def words(self) -> str:
-        said = f"{self.state} {self.action}", *self.notes, self.others
-        return " ".join(part for part in said if part)
+        parts = f"{self.state} {self.action}", *self.notes, self.others
+        return " ".join(part for part in parts if part)
 
 
 def summary_of(site: Site, now: datetime) -> Summary:
-    """What the site's own home page says first. Raises StoreError where the store is out."""
+    """Return the lead of the home page of this site. Raises StoreError if the store is unusable."""
     workspace, store = site.workspace, site.store
     lines = hanger_summaries(workspace, store, now)
     message = bridge_message({each.hanger.id: each.message for each in lines})
@@ -89,32 +89,32 @@ class BridgeRow:
 
     @property
     def leads(self) -> tuple[Lead, ...]:
-        """What is said before its own words: that it is not reached, or what limits its work."""
+        """Return the notices before its lead: it is not reached, or its work is limited."""
         if self.trouble or self.summary is None:
             return (self.trouble,) if self.trouble else ()
-        said = self.summary.notices
-        more = set(self.summary.troubles) - {each.state for each in said}
+        notices = self.summary.notices
+        more = set(self.summary.troubles) - {each.state for each in notices}
         look = "See its page Operation today."
-        return (*(Lead(each, look) for each in sorted(more)), *said)
+        return (*(Lead(each, look) for each in sorted(more)), *notices)
 
     @property
     def states(self) -> tuple[tuple[str, str], ...]:
-        """How it is in a word or two, each with its style; empty before its first test.
+        """Return its state in a word or two, each with its style; empty before its first test.
 
         What is not watched is never quiet, whatever its last tests said.
         """
         status = (
             Status[self.summary.status.upper()] if self.summary and self.summary.status else None
         )
-        own = ((status.value, status.name.lower()),) if status else ()
+        status_word = ((status.value, status.name.lower()),) if status else ()
         if self.is_watched:
-            return own
-        lost = (NOT_REACHED if self.trouble else STANDS_STILL, "alert")
-        return (lost, *(own if status not in QUIET and not self.trouble else ()))
+            return status_word
+        lost = (NOT_REACHED if self.trouble else STOPPED, "alert")
+        return (lost, *(status_word if status not in QUIET and not self.trouble else ()))
 
     @property
     def is_watched(self) -> bool:
-        """Whether its words are of now, and work goes on: else nothing of it is quiet."""
+        """Return True if its summary is current and its work goes on; else it is never quiet."""
         return not self.trouble and self.summary is not None and not self.summary.troubles
 
     @property
@@ -123,7 +123,7 @@ class BridgeRow:
         return "today" if not self.is_watched or self.summary is None else self.summary.urgency
 
 
-def own_row(site: Site, now: datetime) -> tuple[BridgeRow, ...]:
+def site_rows(site: Site, now: datetime) -> tuple[BridgeRow, ...]:
     """The site's own bridge; empty where nothing of it is described, so that it only lists others.
 
     A store that is out is told like a bridge that is not reached.
@@ -134,8 +134,8 @@ def own_row(site: Site, now: datetime) -> tuple[BridgeRow, ...]:
     try:
         return (BridgeRow(bridge.name, "/", summary_of(site, now), now),)
     except ShmError as error:
-        said = Lead(f"{bridge.name} cannot be read: {error.message}", error.remedy)
-        return (BridgeRow(bridge.name, "/", None, None, said),)
+        lead = Lead(f"{bridge.name} cannot be read: {error.message}", error.remedy)
+        return (BridgeRow(bridge.name, "/", None, None, lead),)
 
 
 def row_document(row: BridgeRow) -> dict[str, object]:
@@ -174,19 +174,20 @@ _GROUPS = {
 
 
 def groups(rows: Sequence[BridgeRow]) -> dict[str, tuple[BridgeRow, ...]]:
-    """Which bridges need what, the most urgent first; one that stands still may need more."""
+    """Group bridges by the action they need, most urgent first; stopped ones may need more."""
     found: dict[str, list[BridgeRow]] = {
-        said: [] for said in (_GROUPS["today"], NOT_REACHED, STANDS_STILL, *_GROUPS.values())
+        title: [] for title in (_GROUPS["today"], NOT_REACHED, STOPPED, *_GROUPS.values())
     }
     for row in worst_first(rows):
         if not row.is_watched:
             found[row.states[0][0]].append(row)
         if row.summary and not row.trouble and (row.is_watched or row.summary.urgency != "none"):
             found[_GROUPS[row.summary.urgency]].append(row)
-    return {said: tuple(of) for said, of in found.items() if of}
+    return {title: tuple(of) for title, of in found.items() if of}
 
 
 def headline(rows: Sequence[BridgeRow]) -> str:
-    """How many bridges there are, and which need what."""
-    said = (f"{key}: {listed([each.name for each in of])}." for key, of in groups(rows).items())
-    return " ".join((f"{counted(len(rows), 'bridge')}.", *said))
+    """Return a sentence: how many bridges there are, and which of them need what."""
+    found = groups(rows).items()
+    sentences = (f"{key}: {listed([each.name for each in of])}." for key, of in found)
+    return " ".join((f"{counted(len(rows), 'bridge')}.", *sentences))

@@ -65,7 +65,7 @@ class BridgeGlance:
 
     @cached_property
     def message(self) -> BridgeMessage:
-        """What the page says first."""
+        """Return the lead of the page."""
         return bridge_message({each.hanger.id: each.summary.message for each in self.hangers})
 
     @property
@@ -77,7 +77,7 @@ class BridgeGlance:
 
 @dataclass(frozen=True)
 class Compared:
-    """What moved over the bridge; `pattern` is None where too few hangers can be compared."""
+    """Changes over the bridge; `pattern` is None if too few hangers can be compared."""
 
     pattern: BridgePattern | None
     why_not: str = ""
@@ -104,7 +104,7 @@ class Comparison:
 
 
 def glance(site: Site, now: datetime) -> BridgeGlance:
-    """The bridge as the store has it now."""
+    """Return the bridge as the store has it now."""
     workspace, store = site.workspace, site.store
     tests, quiet_before = store.tests.latest(), now - timedelta(days=workspace.settings.quiet_days)
     hangers = tuple(
@@ -119,7 +119,7 @@ def glance(site: Site, now: datetime) -> BridgeGlance:
 
 
 def compared(request: Request, site: Site) -> Compared | None:
-    """What moved over the bridge; None while it is being worked out."""
+    """Return the changes over the bridge; None while they are computed."""
     order = tuple(hanger.id for hanger in site.workspace.bridge.hangers)
     # One NaN, which equals itself, where a change of temperature is not known.
     shifts = tuple(
@@ -151,7 +151,7 @@ _LIMITS = (0.01, 0.03, 0.06)
 # Judgement: drawing units, of which a laptop's page has about 1100. Hangers are so far apart that
 # their numbers (every second, fifth ... where 30 units are too few) can be read.
 _MOST_STEP, _LEAST_STEP, _WIDEST = 34.0, 9.0, 1100.0
-_TALLEST, _TOP, _BELOW, _BESIDE = 220.0, 48.0, 60.0, 36.0
+_TALLEST, _TOP, _BELOW, _SIDE = 220.0, 48.0, 60.0, 36.0
 _BETWEEN_NUMBERS = 30.0
 _TRIANGLE = 10.0
 
@@ -196,17 +196,17 @@ def elevation(hangers: Sequence[HangerGlance]) -> Elevation:
 
     Where they are along the bridge is not described, so no arch is drawn.
     """
-    step = min(_MOST_STEP, max(_LEAST_STEP, (_WIDEST - 2 * _BESIDE) / (len(hangers) + 1)))
+    step = min(_MOST_STEP, max(_LEAST_STEP, (_WIDEST - 2 * _SIDE) / (len(hangers) + 1)))
     longest = max(each.hanger.length_m for each in hangers)
     deck = _TOP + _TALLEST
     tops = [deck - _TALLEST * each.hanger.length_m / longest for each in hangers]
-    places = [_BESIDE + step * (index + 1) for index in range(len(hangers))]
+    places = [_SIDE + step * (index + 1) for index in range(len(hangers))]
     numbered = _numbered(hangers, places)
     marks = tuple(
         _mark(each, x, top, index in numbered)
         for index, (each, x, top) in enumerate(zip(hangers, places, tops, strict=True))
     )
-    width = 2 * _BESIDE + step * (len(hangers) + 1)
+    width = 2 * _SIDE + step * (len(hangers) + 1)
     return Elevation(width, deck + _BELOW, deck, step, round(step / 4, 1), marks)
 
 
@@ -222,7 +222,7 @@ def kind_of(glance: HangerGlance) -> str:
 
 
 def shift_words(glance: HangerGlance) -> str:
-    """The shift from the baseline as people say it."""
+    """Return the shift from the baseline as people say it."""
     summary = glance.summary
     if summary.is_baseline and summary.baseline:
         return "is the baseline"
@@ -268,7 +268,7 @@ def _mark(glance: HangerGlance, x: float, top: float, number: bool) -> HangerMar
 
 
 def _numbered(hangers: Sequence[HangerGlance], places: Sequence[float]) -> set[int]:
-    """Which have room for their number: those with an alert, then those that moved, go before."""
+    """Return the hangers with room for their number: alerts first, then those that moved."""
 
     def urgency(index: int) -> tuple[bool, float]:
         glance = hangers[index]

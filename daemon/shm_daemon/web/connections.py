@@ -1,4 +1,4 @@
-"""Who may keep a connection: callers that say what they want, soon.
+"""Limits of connections: a caller must send its request soon.
 
 Uvicorn counts connections, not requests, and sets no deadline to a caller that connects and falls
 silent, or drips in a byte at a time. Here a connection *waits* until its request has come as a
@@ -132,7 +132,7 @@ class Guarded(H11Protocol):
             super().connection_lost(exc)
 
     def cut_off(self) -> None:
-        """Ends it without a word: who does not ask is not answered."""
+        """End it without a word: who does not ask is not answered."""
         self._stop_waiting()
         if self._plain is not None:
             # Else the system would keep what is unsent, and try for minutes to deliver it.
@@ -142,7 +142,7 @@ class Guarded(H11Protocol):
             self._plain.abort()
 
     def _look(self) -> None:
-        """Whether it waits, or is being answered."""
+        """Check if the connection waits, or is being answered."""
         cycle = self.cycle
         asked = cycle is not None and not cycle.response_complete
         if asked and (not cycle.more_body or is_upload(self.scope)):
@@ -173,17 +173,17 @@ class Guarded(H11Protocol):
             self.cut_off()
 
     def _unsent(self) -> int:
-        """What the caller has yet to take, with what the system keeps for them."""
+        """Return the bytes that the caller has not received, buffers of the system included."""
         if self.transport is None or self._plain is None:
             return 0
-        kept = array("i", [0])
+        queued = array("i", [0])
         with suppress(OSError):  # another system may not tell
-            fcntl.ioctl(self._plain.get_extra_info("socket").fileno(), termios.TIOCOUTQ, kept)
-        return self.transport.get_write_buffer_size() + kept[0]
+            fcntl.ioctl(self._plain.get_extra_info("socket").fileno(), termios.TIOCOUTQ, queued)
+        return self.transport.get_write_buffer_size() + queued[0]
 
 
 def guarded_by(door: Door) -> type[Guarded]:
-    """The protocol of a server with that door."""
+    """Return the protocol of a server with that door."""
     return type("Guarded", (Guarded,), {"door": door})
 
 

@@ -1,4 +1,4 @@
-"""What goes wrong, as answers: a status, what is wrong and what to do.
+"""Errors as responses: a status, the problem and a remedy.
 
 A document where a document was asked for, a page where a page was.
 """
@@ -53,7 +53,7 @@ _WORDS = {
 
 
 class Fault(BaseModel):
-    """What is wrong and what to do about it."""
+    """A problem and its remedy."""
 
     message: str
     remedy: str = ""
@@ -77,7 +77,7 @@ def answers(*statuses: int) -> dict[int | str, dict[str, Any]]:
 
 
 def handle_faults(app: FastAPI) -> None:
-    """Turns every error into an answer of ours; one that is not ours is logged and not told."""
+    """Turn every error into an answer of ours; one that is not ours is logged and not told."""
     app.add_exception_handler(HTTPException, _refused)
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(ShmError, _known)
@@ -87,11 +87,11 @@ def handle_faults(app: FastAPI) -> None:
 def fault(
     status: int, message: str, remedy: str = "", headers: dict[str, str] | None = None
 ) -> JSONResponse:
-    """The answer itself."""
+    """Return the answer itself."""
     return JSONResponse(Fault(message=message, remedy=remedy).model_dump(), status, headers)
 
 
-def _told(
+def _response(
     request: Request,
     status: int,
     message: str,
@@ -109,7 +109,7 @@ def _refused(request: Request, error: Exception) -> Response:
     remedy, message = getattr(error, "remedy", ""), error.detail
     if message == "Not Found":  # as the framework says it
         message = "There is no such page."
-    return _told(request, error.status_code, message, remedy, headers)
+    return _response(request, error.status_code, message, remedy, headers)
 
 
 def _invalid(request: Request, error: Exception) -> Response:
@@ -117,7 +117,7 @@ def _invalid(request: Request, error: Exception) -> Response:
     first = error.errors()[0]
     where = " ".join(str(part) for part in first["loc"])
     remedy = "See /openapi.json for what is expected."
-    return _told(request, 422, f"{where}: {first['msg']}.", remedy)
+    return _response(request, 422, f"{where}: {first['msg']}.", remedy)
 
 
 def _known(request: Request, error: Exception) -> Response:
@@ -128,10 +128,10 @@ def _known(request: Request, error: Exception) -> Response:
     headers = {"Retry-After": f"{error.retry_after_s or 60:.0f}"} if status == 503 else None
     if status >= 500:
         log.error("%s", error)
-    return _told(request, status, error.message, error.remedy, headers)
+    return _response(request, status, error.message, error.remedy, headers)
 
 
 def _unknown(request: Request, error: Exception) -> Response:
     if isinstance(error, OSError) and error.errno in DISK_FULL:
-        return _told(request, 503, "the disk is full.", "Make room on it, and send it again.")
-    return _told(request, 500, "an internal error.", "The log of the web interface says more.")
+        return _response(request, 503, "the disk is full.", "Make room on it, and send it again.")
+    return _response(request, 500, "an internal error.", "The log of the web interface says more.")

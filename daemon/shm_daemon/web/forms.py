@@ -27,7 +27,7 @@ _BOUNDARY = re.compile(r'boundary="?([^";]+)')
 
 
 def _up_to(longest_bytes: int) -> Any:
-    """What reads a form that is no longer; raises Refused where there is more than we ask for."""
+    """Return a reader of forms up to a length; it raises Refused for longer ones."""
 
     async def fields(request: Request) -> dict[str, str]:
         body = await _body(
@@ -40,7 +40,7 @@ def _up_to(longest_bytes: int) -> Any:
 
 
 async def _with_photo(request: Request) -> dict[str, bytes]:
-    """Raises Refused where it is too long, or no form with a file."""
+    """Raise Refused where it is too long, or no form with a file."""
     found = _BOUNDARY.search(request.headers.get("content-type", ""))
     if found is None:
         raise Refused(415, "This is no form with a file.", "Send it from our page.")
@@ -74,7 +74,7 @@ FormWithPhoto = Annotated[dict[str, bytes], Depends(_with_photo)]
 def done_or_again(
     does: Callable[[], object], then: str, again: Callable[[str, int], Response]
 ) -> Response:
-    """Sends to the address `then` what a form asked for; `again` shows why it was not done."""
+    """Send to the address `then` what a form asked for; `again` shows why it was not done."""
     try:
         does()
     except (BadInput, NothingThere, UsageError) as error:
@@ -85,17 +85,17 @@ def done_or_again(
     return RedirectResponse(then, 303)
 
 
-def reason_in(told: Mapping[str, str], of: str) -> str:
-    """Why, for the record; raises UsageError where nothing is written."""
-    why = told.get("why", "").replace("\r\n", "\n").strip()  # as browsers send lines
+def reason_in(form: Mapping[str, str], of: str) -> str:
+    """Return the reason for the record; raises UsageError if it is empty."""
+    why = form.get("why", "").replace("\r\n", "\n").strip()  # as browsers send lines
     if not why:
         raise UsageError(f"{of} needs a reason.", remedy="Write why, for the record.")
     return why
 
 
-def time_in(told: Mapping[str, str], name: str) -> datetime | None:
-    """A time or day in UTC, None where the field is empty; raises BadInput."""
-    text = told.get(name, "")
+def time_in(form: Mapping[str, str], name: str) -> datetime | None:
+    """Return a time or day in UTC, None where the field is empty; raises BadInput."""
+    text = form.get(name, "")
     try:
         return parse_time(text) if text else None
     except (ValueError, OverflowError):

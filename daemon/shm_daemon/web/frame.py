@@ -33,7 +33,7 @@ router = APIRouter(include_in_schema=False)
 STATIC = Path(__file__).with_name("static")
 """Our style sheets and scripts."""
 _KINDS = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
-_KEPT = "public, max-age=31536000, immutable"
+_CACHED = "public, max-age=31536000, immutable"
 _ASKED_AGAIN = "no-cache"
 _WORTH_PACKING_BYTES = 1000  # technical: less goes into one packet (1,460 bytes) anyhow
 
@@ -51,7 +51,7 @@ FOR_ENGINEERS = (("/settings", "Settings"), ("/users", "Users"), ("/audit", "Aud
 
 
 def page(request: Request, template: str, *, status: int = 200, **content: Any) -> HTMLResponse:
-    """A page in the frame; `content` is what its template needs.
+    """Return a page in the frame; `content` is what its template needs.
 
     Whoever may read sees the navigation, a stranger none: `access.reading` notes who asks.
     """
@@ -72,7 +72,7 @@ def page(request: Request, template: str, *, status: int = 200, **content: Any) 
 
 
 def prepare_templates() -> None:
-    """Reads all pages' templates, so that no visitor waits for it."""
+    """Read all pages' templates, so that no visitor waits for it."""
     templates = _environment()
     for name in templates.list_templates(extensions=["j2"]):
         templates.get_template(name)
@@ -81,7 +81,7 @@ def prepare_templates() -> None:
 def problem(
     request: Request, status: int, message: str, remedy: str, headers: dict[str, str] | None
 ) -> HTMLResponse:
-    """What went wrong, for a person: a stranger is asked to sign in."""
+    """Show an error to a person; a stranger is asked to sign in."""
     template = "sign_in.html.j2" if status == 401 else "problem.html.j2"
     found = page(
         request, template, status=status, message=message, remedy=remedy, next=_address(request)
@@ -91,7 +91,7 @@ def problem(
 
 
 def for_a_person(request: Request) -> bool:
-    """Whether a page was asked for, not a document: errors are told in kind."""
+    """Return True if a page was requested, not a document: errors have the same format."""
     path, accepted = request.url.path, request.headers.get("accept", "")
     return "text/html" in accepted and not path.startswith("/api/")
 
@@ -104,7 +104,7 @@ def asset(name: str) -> str:
 
 @cache
 def plotly_address() -> str:
-    """The address of plotly's script, of the version that is installed."""
+    """Return the address of plotly's script, of the version that is installed."""
     try:
         return f"/static/plotly.js?v={version_of('plotly')}"
     except PackageNotFoundError:
@@ -138,20 +138,20 @@ def _open_alerts(site: Site) -> int | None:
 
 
 def _address(request: Request) -> str:
-    """Where a person wanted to go."""
+    """Return the address that a person asked for."""
     query = f"?{request.url.query}" if request.url.query else ""
     return request.url.path + query if request.method == "GET" else "/"
 
 
 @router.get("/static/plotly.js")
 def plotly(request: Request) -> Response:
-    """The script that draws figures, under an address that changes with its version."""
+    """Return the script that draws figures, under an address that changes with its version."""
     return _answer(request, "plotly.js", request.query_params.get("v") == version_of("plotly"))
 
 
 @router.get("/static/{name}")
 def static_file(request: Request, name: str) -> Response:
-    """A file of ours."""
+    """Return a file of ours."""
     if name != "report.css" and name not in {path.name for path in STATIC.iterdir()}:
         raise NothingThere(f"There is no {name}.")
     is_of_version = name != "report.css" and asset(name).endswith(f"?{request.url.query}")
@@ -161,7 +161,8 @@ def static_file(request: Request, name: str) -> Response:
 def _answer(request: Request, name: str, is_of_version: bool) -> Response:
     packs = "gzip" in request.headers.get("accept-encoding", "")
     content, packed = _content(name), b""
-    headers = {"Cache-Control": _KEPT if is_of_version else _ASKED_AGAIN, "Vary": "Accept-Encoding"}
+    caching = _CACHED if is_of_version else _ASKED_AGAIN
+    headers = {"Cache-Control": caching, "Vary": "Accept-Encoding"}
     if packs and len(content) > _WORTH_PACKING_BYTES:
         packed, headers["Content-Encoding"] = _packed(name), "gzip"
     return Response(packed or content, headers=headers, media_type=_KINDS[Path(name).suffix])

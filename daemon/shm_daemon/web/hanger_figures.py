@@ -55,7 +55,7 @@ class HangerFigure:
     is_wide: bool = False
 
     def document(self, view: HangerView) -> dict[str, Any]:
-        """The plotly document with its words."""
+        """Return the plotly document with its words."""
         found = self.draw(view)
         assert isinstance(found, Specification)
         return with_plotly.with_words(found, self.caption(view), self.alt(view))
@@ -104,13 +104,13 @@ def _course(view: HangerView) -> hanger_trend.Course:
 
 def _remark(view: HangerView) -> str:
     undated = sum(point.taken_at is None for point in view.trend)
-    told = (
+    sentences = (
         f"{formatting.counted(undated, 'test')} without a time drawn at the receipt."
         if undated
         else "",
         "The state over time is being worked out." if view.states is None else "",
     )
-    return " ".join(filter(None, told))
+    return " ".join(filter(None, sentences))
 
 
 def _courses(view: HangerView) -> list[hanger_stiffness.Course]:
@@ -148,12 +148,12 @@ def _reach(view: HangerView) -> float:
 
 
 def tension_unit(points: Sequence[TrendPoint]) -> ForceUnit:
-    """The one unit of the tensions of a hanger's tests."""
+    """Return the one unit of the tensions of a hanger's tests."""
     return force_unit(*(point.averaged.tension_n.mean for point in points))
 
 
 def _with_temperature(view: HangerView) -> list[TrendPoint]:
-    """Tests with a temperature."""
+    """Return the tests with a temperature."""
     return [point for point in view.trend if math.isfinite(point.temperature_c)]
 
 
@@ -217,7 +217,7 @@ def _shrinks(view: HangerView) -> bool:
 
 
 def report_of(view: HangerView) -> HangerReport:
-    """The report of a view that has one."""
+    """Return the report of a view that has one."""
     assert view.report is not None
     return view.report
 

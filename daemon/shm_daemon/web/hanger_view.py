@@ -1,4 +1,4 @@
-"""What the page of one hanger and its figures show: each part is read when it is first wanted."""
+"""Data of the page of one hanger and its figures; each part is read when it is first used."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class StatesOrder:
     false_call_years: float
 
     def make(self) -> StatesOverTime:
-        """Runs in a process of its own: the workspace is opened anew."""
+        """Run in a process of its own: the workspace is opened anew."""
         workspace = Workspace.open(self.folder)
         with workspace.store() as store:
             baseline = store.watch.baseline(self.hanger.id, self.model)
@@ -84,7 +84,7 @@ class HangerView:
 
     @cached_property
     def notes(self) -> tuple[Note, ...]:
-        """What people wrote of it and of the bridge, the latest first."""
+        """Return the notes on the hanger and on the bridge, the latest first."""
         return self.store.notes.list_all(self.hanger.id)
 
     @cached_property
@@ -97,7 +97,7 @@ class HangerView:
 
     @cached_property
     def report(self) -> HangerReport | None:
-        """What the report says of the latest test; None before the first is through."""
+        """Return the report after the latest test; None before the first is processed."""
         if not self.trend:
             return None
         return hanger_now(self.workspace, self.store, self.hanger, self.trend, utc_now())
@@ -136,7 +136,7 @@ class HangerView:
 
 
 def view_of(request: Request, site: AtSite, hanger_id: HangerNumber) -> HangerView:
-    """The hanger that is asked for; raises NothingThere."""
+    """Return the hanger that is asked for; raises NothingThere."""
     hanger = described(site.workspace, hanger_id)
     return HangerView(site.workspace, site.store, hanger, background_worker_of(request))
 

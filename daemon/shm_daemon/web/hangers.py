@@ -1,6 +1,4 @@
-"""What is known of the hangers, in numbers: the state of all; of one its trend, its tests, the
-documents of its figures. The lines of the table of tests are in the words of the report.
-"""
+"""Hangers as documents: the state of all; the trend, tests and figures of one."""
 
 from __future__ import annotations
 
@@ -62,7 +60,7 @@ class TrendPoint(BaseModel):
 
 
 class TrendEvent(BaseModel):
-    """What happened to the hanger beside its tests."""
+    """An event of the hanger other than a test."""
 
     at: datetime
     kind: str = Field(description="baseline, adopted, adoption undone, alert, acknowledged")
@@ -80,7 +78,7 @@ class CalledChange(BaseModel):
 
 
 class StateOverTime(BaseModel):
-    """What all tests up to each say of one quantity: tension in N, stiffness log10 of its unit.
+    """Estimate of one quantity from all tests so far: tension in N, stiffness log10 of its unit.
 
     It holds at the reference temperature: the swing with the temperature is taken out.
     """
@@ -194,7 +192,7 @@ _SHIFT = ("quantity", "shift_mean", "shift_sd", "threshold", "probability")
 
 @_of_all.get("/status", response_model=Status, summary="What is held and what waits")
 def status(site: AtSite, _: Reader) -> Any:
-    """Counts of recordings, files, alerts and deliveries."""
+    """Return counts of recordings, files, alerts and deliveries."""
     workspace, store = site.workspace, site.store
     return {
         "bridge": workspace.bridge.name,
@@ -300,7 +298,7 @@ def some_tests(
         Query(ge=0, le=LARGEST_NUMBER, description="`next_before` of the answer before."),
     ] = None,
 ) -> Any:
-    """The newest first; those before a test where `before` names its number."""
+    """Return the newest first; those before a test where `before` names its number."""
     shown, older = paged(lines_before(view, limit + 1, before), limit)
     return {"hanger": view.hanger.id, "tests": list(map(_test, shown)), "next_before": older}
 
@@ -313,7 +311,7 @@ def figure(
     view: View,
     name: Annotated[str, Path(max_length=40, description="`trend`, `stiffness`, ...")],
 ) -> JSONResponse:
-    """A plotly document with its caption; with `Retry-After` where it is not whole yet."""
+    """Return a plotly document with its caption; with `Retry-After` where it is not whole yet."""
     found = next((each for each in FIGURES if each.name == name and each.is_there(view)), None)
     if found is None:
         raise NothingThere(

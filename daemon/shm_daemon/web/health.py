@@ -1,4 +1,4 @@
-"""Whether all is well: what stops the work, and what only limits it.
+"""Health: what stops the work, and what only limits it.
 
 `/health` answers for load balancers and service managers even while the pages are being loaded, so
 that nothing here may import what they need.
@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 def health_document(site: Site) -> tuple[int, dict[str, Any]]:
-    """The answer of `/health`: its status and its document.
+    """Return the answer of `/health`: its status and its document.
 
     Who is degraded still works: only who fails answers 503.
     """
@@ -39,22 +39,22 @@ def health_document(site: Site) -> tuple[int, dict[str, Any]]:
 
 
 def troubles(site: Site) -> list[str]:
-    """Why work stands still; empty where all is well."""
+    """Return the reasons why work has stopped; empty if all is well."""
     return _found(site, _store, _folders, _disk, _daemon)
 
 
 def limits(site: Site) -> list[str]:
-    """Why work goes on otherwise than it is described; empty where all is well."""
+    """Return the reasons why work differs from its description; empty if all is well."""
     return _found(site, _of_description, _of_strangers, _of_backlog, _of_disk)
 
 
 def attention(site: Site) -> list[str]:
-    """What a person should look at though nothing fails."""
+    """Return what a person should look at although nothing fails."""
     return _found(site, _held, _never_taken, _of_streams)
 
 
 def notices(site: Site) -> list[Lead]:
-    """What every page says at its top: what limits the work, and its remedy.
+    """Return the notices at the top of every page: limits of the work, with their remedies.
 
     A page is shown whatever befalls this.
     """
@@ -118,12 +118,12 @@ def _of_silences(site: Site) -> list[Lead]:
         return []  # told as a trouble
     return [
         Lead(
-            f"{said[0].upper()}{said[1:]}.",
+            f"{text[0].upper()}{text[1:]}.",
             f"{'No' if each.is_maintenance else 'Each'} alert of that time is raised; it is ended "
             "on the page of alerts.",
         )
         for each in found
-        for said in [said_of(each)]
+        for text in [said_of(each)]
     ]
 
 

@@ -1,4 +1,4 @@
-"""What Prometheus scrapes: made anew at each scrape, so that no process needs to keep counts.
+"""Metrics for Prometheus, computed at each scrape, so that no process needs to store counts.
 
 It is made in parts. A part that fails is left out, counted in `shm_scrape_errors_total` and logged;
 the others answer, so that one odd row or folder never blinds those who watch.
@@ -78,7 +78,7 @@ class Exposition(Collector):
         yield errors
 
     def _made(self, name: str, part: _Part) -> list[Metric]:
-        """A part as a whole; nothing where it fails, for whatever reason."""
+        """Return a part as a whole; nothing where it fails, for whatever reason."""
         try:
             made = list(part(self._site))
         except Exception as error:
@@ -147,7 +147,7 @@ def _stages(site: Site) -> Iterator[Metric]:
 def _streams(site: Site) -> Iterator[Metric]:
     ring, now = ring_of(site.workspace), utc_now()
     states = stream_states(site.workspace, ring, site.store, now)
-    told: tuple[tuple[str, str, Callable[[StreamCondition], float | timedelta | None]], ...] = (
+    columns: tuple[tuple[str, str, Callable[[StreamCondition], float | timedelta | None]], ...] = (
         ("lag_seconds", "How long ago the last sample of a stream was measured.",
          lambda state: state.lag),
         ("behind_seconds", "How much of a stream has come and is not read yet.",
@@ -159,7 +159,7 @@ def _streams(site: Site) -> Iterator[Metric]:
         ("ring_bytes", "Room that the raw samples of a stream take.",
          lambda state: state.ring_bytes),
     )  # fmt: skip
-    for name, text, value in told:
+    for name, text, value in columns:
         family = GaugeMetricFamily(f"shm_stream_{name}", text, labels=["stream"])
         for state in states:
             found = value(state)

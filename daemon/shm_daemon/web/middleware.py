@@ -85,16 +85,16 @@ class Around:
         if self._site.answers_to(host):
             await self._app(scope, receive, send)
             return
-        said = {
+        headers = {
             "message": "The request is meant for another host.",
             "remedy": "Call the interface by its address, or name the host in the setting "
             "web_hosts.",
         }
-        await JSONResponse(said, 400)(scope, receive, send)
+        await JSONResponse(headers, 400)(scope, receive, send)
 
 
 def is_https(scope: Scope) -> bool:
-    """Whether the caller came by HTTPS, to us or to a proxy before us.
+    """Return True if the caller came by HTTPS, to us or to a proxy before us.
 
     A proxy's word is enough, whoever it is: to believe it only makes cookies and browsers stricter.
     """
@@ -115,7 +115,7 @@ _LONGEST_BODY_BYTES = 65_536
 
 
 class Kind(StrEnum):
-    """What is wanted, by what it may take."""
+    """Kinds of requests by the resources that they may take."""
 
     PAGE = "pages"
     UPLOAD = "uploads"
@@ -131,7 +131,7 @@ passwords, which wait in line for a thread of their own.
 
 @dataclass(frozen=True)
 class Pages:
-    """What is loaded behind the front, how it is ended, and what its first visitor need not do."""
+    """The pages behind the front: how they are loaded, warmed up and ended."""
 
     app: ASGIApp
     close: Callable[[], None]
@@ -199,8 +199,8 @@ class Front:
                 return
             receive = whole
         if self._taken[kind] >= PLACES[kind]:
-            said = f"Too many requests at once: all places of {kind} are taken."
-            await _fault(503, said, "Try again in some seconds.")(scope, receive, send)
+            headers = f"Too many requests at once: all places of {kind} are taken."
+            await _fault(503, headers, "Try again in some seconds.")(scope, receive, send)
             return
         self._taken[kind] += 1
         try:
@@ -215,8 +215,8 @@ class Front:
         except TimeoutError:
             log.warning("the pages are still being loaded")
         if self._pages is None:
-            said = "failed to load" if self._failed else "are still being loaded"
-            refusal = _fault(503, f"The pages {said}.", "The log of the web interface says more.")
+            state = "failed to load" if self._failed else "are still being loaded"
+            refusal = _fault(503, f"The pages {state}.", "The log of the web interface says more.")
             await refusal(scope, receive, send)
             return
         await self._pages.app(scope, receive, send)
@@ -242,7 +242,7 @@ class Front:
 
 
 def is_upload(scope: Mapping[str, object]) -> bool:
-    """Whether a request may have a long body: who sends it needs a token first."""
+    """Return True if a request may have a long body: its sender needs a token first."""
     path = str(scope["path"])
     is_chunk = path.startswith(f"{STREAMS}/") and path.endswith("/chunks")
     return scope["method"] == "POST" and (path in (UPLOADS, IMPORTS, NOTES) or is_chunk)
@@ -264,10 +264,10 @@ async def _whole(receive: Receive) -> Receive | None:
     if message["type"] != "http.request":
         first = [message]
 
-    async def told() -> Message:
+    async def receive_limited() -> Message:
         return first.pop() if first else await receive()
 
-    return told
+    return receive_limited
 
 
 def _fault(status: int, message: str, remedy: str = "") -> JSONResponse:

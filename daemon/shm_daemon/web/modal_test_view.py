@@ -64,7 +64,7 @@ class TestFigure:
         return self.member.title
 
     def document(self, shown: Shown) -> dict[str, Any] | None:
-        """The plotly document with its words; None where there is nothing to show."""
+        """Return the plotly document with its words; None where there is nothing to show."""
         found = self.member.draw(shown)
         if not isinstance(found, Specification):
             return None
@@ -120,7 +120,7 @@ class TestView:
 
     @property
     def missing(self) -> str:
-        """Why there is no more than the store holds; empty where the raw file can be asked."""
+        """Return why only stored results are shown; empty if the raw file can be read."""
         name = self.recording.file.file_name
         if name.lower().endswith(MODES_SUFFIX):
             return (
@@ -136,7 +136,7 @@ class TestView:
 
     @cached_property
     def order(self) -> ModalTestOrder:
-        """What to work out of a test as it is stored and would be identified now."""
+        """Return the request for the results of a test, as stored and as identified now."""
         stored, workspace = self.stored, self.workspace
         terms = identify_lineage(self.recording, stored.hanger, workspace)
         return ModalTestOrder(
@@ -146,7 +146,7 @@ class TestView:
     @cached_property
     def worked(self) -> WorkedOut | None:
         """The whole sheet, where it is at hand; begins nothing."""
-        return None if self.missing else self.background_worker.kept(self.order)
+        return None if self.missing else self.background_worker.stored(self.order)
 
     @cached_property
     def sheet(self) -> ModalTestReport:
@@ -155,7 +155,7 @@ class TestView:
 
     @cached_property
     def as_stored(self) -> ModalTestReport:
-        """What the store knows of a test: no records, hits, poles and fit."""
+        """Return the stored results of a test: no records, hits, poles and fit."""
         stored, settings = self.stored, self.workspace.settings
         response = self.store.tests.frequency_response(stored)
         found = Identification(
@@ -180,7 +180,7 @@ class TestView:
         return " ".join(part for part in (trust(self.as_stored), advice(self.as_stored)) if part)
 
     def whole(self) -> WorkedOut | None:
-        """The whole sheet; None while it is worked out, which this begins.
+        """Return the whole sheet; None while it is worked out, which this begins.
 
         Raises NothingThere where there is no more than the store holds, and the ShmError with
         which working it out failed.
@@ -190,20 +190,20 @@ class TestView:
         return self.background_worker.wanted(self.order)
 
     def shown(self, point: int = 0) -> Shown:
-        """What figures are drawn from, without any record."""
+        """Return the data of the figures, without any record."""
         if self.worked:
             return Shown(self.worked.sheet, self.worked.spectrum, point)
         return Shown.of(self.as_stored, point)
 
     def figures(self) -> tuple[TestFigure, ...]:
-        """Those that this test has, or may have once its raw file is identified once more."""
+        """Return the figures that this test has, or may have after a new identification."""
         if not self.missing:
             return MEMBERS
         shown = self.shown()
         return tuple(each for each in MEMBERS if each.source != "file" and each.member.draw(shown))
 
     def figure(self, figure: TestFigure, point: int) -> Figure:
-        """A figure at the response of index `point`; raises as `whole`, and NothingThere."""
+        """Return a figure at the response of index `point`; raises as `whole`, and NothingThere."""
         found = None if figure.source == "file" else figure.document(self.shown(point))
         packed = json.dumps(found, allow_nan=False).encode() if found else None
         if self.worked:
@@ -246,7 +246,7 @@ class ModalTestOrder:
     terms: Lineage
 
     def make(self) -> WorkedOut:
-        """Identifies the raw file once more; raises what `modal_test_report` does.
+        """Identify the raw file once more; raises what `modal_test_report` does.
 
         It runs in a process of its own: the workspace is opened anew.
         """

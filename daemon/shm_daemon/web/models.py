@@ -57,12 +57,12 @@ class Uploaded(BaseModel):
 
     sha256: str
     size_bytes: int
-    file_name: str = Field(description="The name in the spool; another where that was taken.")
+    file_name: str = Field(description="The name in the spool; changed if it was taken.")
     outcome: Literal["new", "duplicate", "reopened", "discarded before"] = Field(
         description="`duplicate`: these bytes are stored already. `reopened`: they were refused "
         "before and are tried again. `discarded before`: a person has discarded them; they stay so."
     )
-    status_url: str = Field(description="Says how far it has come, once the daemon has taken it.")
+    status_url: str = Field(description="Progress, once the daemon has taken it.")
 
 
 class TestLink(BaseModel):
@@ -82,9 +82,9 @@ class RecordingStatus(BaseModel):
     received_at: datetime
     stage: Literal["received", "identified", "updated", "watched", "done", "refused", "held"]
     hanger: int | None
-    tests: list[TestLink] = Field(description="What came of it so far.")
+    tests: list[TestLink] = Field(description="Results so far.")
     reason: dict[str, Any] | None = Field(
-        description="Why it was refused or is held; null where it is not."
+        description="Why it was refused or is held; null if neither."
     )
 
 
@@ -111,44 +111,46 @@ class Quantity(Posterior):
 
 
 class Shift(BaseModel):
-    """How far a quantity has moved from its baseline: tension a fraction, a spring decades."""
+    """Shift of a quantity from its baseline: a fraction of the tension, decades of a spring."""
 
     quantity: str
     shift_mean: float | None
     shift_sd: float | None
     threshold: float | None
-    probability: float | None = Field(description="That the shift is beyond the threshold.")
+    probability: float | None = Field(description="Probability of a shift beyond the threshold.")
 
 
 class AveragedTension(BaseModel):
     """The tension over all model classes, each with its probability; its interval is absolute."""
 
     tension_n: Posterior
-    repeatability_sd_n: float | None = Field(description="With which a test tells a change of it.")
+    repeatability_sd_n: float | None = Field(
+        description="Standard deviation for comparing two tests."
+    )
     probability_above_limit: float | None = Field(description="Null where no limit is set.")
     probability_slack: float | None = Field(description="Null where no limit is set.")
-    caveats: list[str] = Field(description="What keeps it from being taken at its word.")
+    caveats: list[str] = Field(description="What limits its use.")
 
 
 class Creep(BaseModel):
-    """How fast the tension creeps: a fraction a year, below 0 where it relaxes."""
+    """Creep rate of the tension: a fraction a year, below 0 if it relaxes."""
 
     mean: float
     sd: float
 
 
 class Message(BaseModel):
-    """What is said first, the same on every surface; `status` is null where nothing is known."""
+    """The lead, the same on every surface; `status` is null if nothing is known."""
 
     status: Literal["alert", "watch", "check", "unclear", "steady", "first"] | None
-    state: str = Field(description="What is the matter, with its interval.")
+    state: str = Field(description="The state, with its interval.")
     action: str = Field(description="What to do, and how soon.")
     urgency: Literal["none", "next_test", "week", "today"]
-    notes: list[str] = Field(description="What people did about it.")
+    notes: list[str] = Field(description="Actions of people.")
 
 
 class HangerState(Message):
-    """What is known of a hanger after its latest test; null or empty before the first."""
+    """State of a hanger after its latest test; null or empty before the first."""
 
     hanger: int
     tests: int
@@ -162,7 +164,7 @@ class HangerState(Message):
     by_latest_test: AveragedTension | None = Field(description="By the latest test alone.")
     baseline_set_at: datetime | None
     shifts: list[Shift]
-    creep_per_year: Creep | None = Field(description="Null where the tests do not show it.")
+    creep_per_year: Creep | None = Field(description="Null if the tests do not show it.")
     open_alerts: int
 
 
@@ -178,14 +180,14 @@ class DeliveryState(BaseModel):
     hook: str
     state: str
     attempts: int
-    last_error: str = Field(description="Why the latest attempt failed; empty where none did.")
+    last_error: str = Field(description="Why the latest attempt failed; empty if none did.")
     news: Literal["raised", "resolved"]
-    escalation: bool = Field(description="Told only of what nobody acknowledged in time.")
+    escalation: bool = Field(description="Only for alerts that nobody acknowledged in time.")
     waits_until: datetime | None = Field(description="The end of its hook's quiet hours.")
 
 
 class Acknowledged(BaseModel):
-    """Who has taken note of an alert, when, and what they say to it."""
+    """Acknowledgement of an alert: person, time and comment."""
 
     who: str
     why: str
@@ -207,10 +209,10 @@ class AlertState(BaseModel):
     urgency: Literal["none", "next_test", "week", "today"]
     acknowledged: Acknowledged | None
     resolved: Acknowledged | None = Field(
-        description="How its condition ended; null while it stands."
+        description="How its condition ended; null while it holds."
     )
     silenced_until: datetime | None = Field(
-        description="Hooks are told of this hanger again from then on; null where they are told."
+        description="Hooks are notified about this hanger again from then on; null if they are now."
     )
     deliveries: list[DeliveryState]
 
@@ -227,23 +229,23 @@ class Alerts(BaseModel):
 
 
 class Acknowledge(BaseModel):
-    """What a person makes of an alert."""
+    """Comment of a person on an alert."""
 
-    why: Written = Field(description="What came of it, for the record.")
+    why: Written = Field(description="The result, for the record.")
     who: Written | None = Field(
         default=None,
-        description="The person behind a token, which is noted too; a user has a name.",
+        description="The person behind a token, recorded with it; a user has a name.",
     )
     resolved: bool = Field(
-        default=False, description="Its cause is gone or explained: hooks hear of it."
+        default=False, description="Its cause is gone or explained; the hooks are notified."
     )
 
 
 class Status(BaseModel):
-    """What the workspace holds and what waits."""
+    """Contents of the workspace, and files that wait."""
 
     bridge: str
-    recordings: dict[str, int] = Field(description="How many stand at each stage.")
+    recordings: dict[str, int] = Field(description="How many are at each stage.")
     spool: int
     quarantine: int
     open_alerts: int
@@ -252,7 +254,7 @@ class Status(BaseModel):
 
 
 class Health(BaseModel):
-    """Whether all is well; `reasons` says what is not. What is degraded works, not as described."""
+    """Health; `reasons` states the problems. Degraded parts work, but not as described."""
 
     status: Literal["ok", "degraded", "failing"]
     reasons: list[str]
@@ -281,12 +283,12 @@ class RefusedFile(BaseModel):
 
 
 class Operation(BaseModel):
-    """Whether the work flows; `troubles` is empty where it does."""
+    """Operation; `troubles` is empty if the work goes on."""
 
     troubles: list[str]
-    daemon: str | None = Field(description="Which daemon is active; null where none is.")
+    daemon: str | None = Field(description="The active daemon; null if there is none.")
     daemon_seen_seconds_ago: float | None
-    recordings: dict[str, int] = Field(description="How many stand at each stage.")
+    recordings: dict[str, int] = Field(description="How many are at each stage.")
     spool: int
     oldest_waiting_at: datetime | None
     deliveries: dict[str, int]
@@ -300,7 +302,7 @@ class Operation(BaseModel):
 
 
 class Finding(BaseModel):
-    """What one check of `shm doctor` found."""
+    """Result of one check of `shm doctor`."""
 
     check: str
     level: Literal["ok", "unknown", "warning", "fault"]
@@ -320,7 +322,7 @@ class FigureDocument(BaseModel):
     data: list[dict[str, Any]]
     layout: dict[str, Any]
     caption: str
-    alt: str = Field(description="What a blind reader needs.")
+    alt: str = Field(description="Description for screen readers.")
 
 
 class Underway(BaseModel):
@@ -355,7 +357,7 @@ class HangerAtAGlance(Message):
     )
     called: str = Field(description="Changes called since the baseline; empty where none was.")
     open_alerts: int
-    warnings: list[str] = Field(description="What is wrong with what the hanger is compared with.")
+    warnings: list[str] = Field(description="Faults of the baseline.")
 
 
 class BridgeState(Message):
@@ -366,14 +368,14 @@ class BridgeState(Message):
 
 
 class Moved(BaseModel):
-    """What moved over the bridge, in words, and what may explain it."""
+    """Changes over the bridge in words, and possible explanations."""
 
     sentence: str
     explanations: dict[str, float] = Field(description="The probability of each explanation.")
 
 
 def plain(value: Any) -> Any:
-    """What JSON can say: arrays as lists, times in ISO 8601, NaN and infinity as null."""
+    """Convert to JSON values: arrays to lists, times to ISO 8601, NaN and infinity to null."""
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if isinstance(value, np.ndarray):

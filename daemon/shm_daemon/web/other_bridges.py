@@ -48,7 +48,7 @@ class NotTold(ShmError):
 
 
 def ask(bridge: OtherBridge, folder: Path, lines: Lines, timeout_s: float = LONGEST_S) -> Summary:
-    """What a bridge says of itself; `folder` is that of our workspace. Raises NotTold."""
+    """Return the summary of another bridge; `folder` is that of our workspace. Raises NotTold."""
     headers = {"Accept": "application/json", "User-Agent": "shm", **_token(bridge, folder)}
     verify = _certificate(bridge, folder)
     with lines.session(timeout_s) as (session, line):
@@ -114,7 +114,7 @@ def _failure(error: Exception) -> NotTold:
 
 
 def _judged(bridge: OtherBridge, status: int, body: bytes | bytearray) -> Summary:
-    """The summary of an answer; raises NotTold."""
+    """Return the summary of an answer; raises NotTold."""
     try:
         found = json.loads(body)
     except (ValueError, RecursionError):
@@ -135,14 +135,14 @@ def _judged(bridge: OtherBridge, status: int, body: bytes | bytearray) -> Summar
     if status == 200 or "message" not in document:
         raise _no_shm(f"{status}")
     if status == 401:
-        said, where = "It asks for a token", "a file, and name that in bridge.toml: token_file"
+        problem, where = "It asks for a token", "a file, and name that in bridge.toml: token_file"
         if bridge.token_file:
-            said, where = f"It refuses the token of {bridge.token_file}", bridge.token_file
-        raise NotTold(f"{said}.", remedy=f"{_MAKE_ONE}. Write it into {where}.")
+            problem, where = f"It refuses the token of {bridge.token_file}", bridge.token_file
+        raise NotTold(f"{problem}.", remedy=f"{_MAKE_ONE}. Write it into {where}.")
     if status == 404:
         raise NotTold("Its shm is older than this one.", remedy=f"Upgrade it to {shm.__version__}.")
-    said, remedy = (one_line(str(document.get(key, ""))) for key in ("message", "remedy"))
-    raise NotTold(f"It answers {status}: {said}", remedy=remedy or _LOOK)
+    problem, remedy = (one_line(str(document.get(key, ""))) for key in ("message", "remedy"))
+    raise NotTold(f"It answers {status}: {problem}", remedy=remedy or _LOOK)
 
 
 def _no_shm(answered: str) -> NotTold:
@@ -154,7 +154,7 @@ def _no_shm(answered: str) -> NotTold:
 
 @dataclass(frozen=True)
 class _Known:
-    """What is known of a bridge; `failing_since` is None where it answered the last time."""
+    """State of another bridge; `failing_since` is None if it answered the last time."""
 
     asked_at: datetime
     summary: Summary | None = None
@@ -164,7 +164,7 @@ class _Known:
 
 
 class OtherBridges:
-    """What other bridges said last. May be used from many threads."""
+    """Latest summaries of other bridges. May be used from many threads."""
 
     def __init__(
         self,
@@ -193,7 +193,7 @@ class OtherBridges:
             return [self._row(each, self._known.get(each), now) for each in bridges]
 
     def close(self) -> None:
-        """Breaks off what is being asked."""
+        """Break off what is being asked."""
         self._lines.close()
         self._pool.shutdown(wait=False, cancel_futures=True)
 
@@ -221,14 +221,14 @@ class OtherBridges:
                 f"No answer within {self._page_waits_s:g} s.",
                 "It is still being asked: open this page again in some seconds.",
             )
-        trouble = _said(bridge, known, why, now) if why else None
+        trouble = _lead(bridge, known, why, now) if why else None
         told_at = known.told_at if known else None
         return BridgeRow(
             bridge.name, f"{bridge.address}/", known.summary if known else None, told_at, trouble
         )
 
 
-def _said(bridge: OtherBridge, known: _Known | None, why: Lead, now: datetime) -> Lead:
+def _lead(bridge: OtherBridge, known: _Known | None, why: Lead, now: datetime) -> Lead:
     """That a bridge is not reached, since when and why."""
     since = "is not reached"
     if known and known.told_at:

@@ -64,7 +64,7 @@ def described_by(
     calibration: List = None,
     full_scale: List = None,
 ) -> dict[str, object]:
-    """What the file cannot say: becomes its sidecar and goes before what the file says.
+    """Build the sidecar from a form: it overrides the file.
 
     The last five are lists in the order of the channels, parted by commas, as in the header of a
     CSV file. More (single channels by name) is said by a sidecar in a .zip with the file.
@@ -106,7 +106,7 @@ async def upload(
         str | None, Header(pattern="^[0-9a-fA-F]{64}$", description="Checked where it is given.")
     ] = None,
 ) -> Uploaded:
-    """Takes the bytes of one file and answers once they are safe on disk.
+    """Take the bytes of one file and answer once they are safe on disk.
 
     The daemon then takes the file from the spool as any other. The same bytes may be sent again
     after a broken connection: they are stored once.
@@ -145,7 +145,7 @@ def status(
         str, Path(pattern="^([0-9]{1,9}|[0-9a-fA-F]{64})$", description="Its number or SHA-256.")
     ],
 ) -> Any:
-    """The stage of a recording, and why it was refused where it was."""
+    """Return the stage of a recording, and why it was refused where it was."""
     return _row(site.store, _recording(site.store, key))
 
 
@@ -230,7 +230,7 @@ def _recording(store: Store, key: str) -> StoredRecording:
 
 
 def _tests(store: Store, recording: StoredRecording) -> list[dict[str, str]]:
-    """The tests in force that came of a recording, but for those that are held."""
+    """Return the tests in force that came of a recording, but for those that are held."""
     if recording.hanger is None:
         return []
     found = store.tests.list_former(recording.id)
@@ -304,7 +304,7 @@ class AcknowledgedChunk(BaseModel):
 async def chunks(
     request: Request, site: AtSite, _: Uploader, name: Annotated[str, Path(max_length=64)]
 ) -> AcknowledgedChunk:
-    """Takes one chunk (`shm.chunk/1`) and answers once it is on disk.
+    """Take one chunk (`shm.chunk/1`) and answer once it is on disk.
 
     The same chunk may be sent again after a broken connection: it is kept once. 409 says that its
     number and time are another's, whose samples differ and stay. 503 says to keep it and to send it
@@ -321,8 +321,8 @@ async def chunks(
 
     await receive_body(request, write, LARGEST_BYTES, refuse_long_chunk)
     chunk, workspace, store = [bytes(body)], site.workspace, site.store
-    (kept,) = await run_in_threadpool(take_chunks, workspace, store, name, chunk, utc_now())
-    return AcknowledgedChunk(**vars(kept))
+    (stored,) = await run_in_threadpool(take_chunks, workspace, store, name, chunk, utc_now())
+    return AcknowledgedChunk(**vars(stored))
 
 
 router = APIRouter()

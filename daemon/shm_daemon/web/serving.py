@@ -35,7 +35,7 @@ ENDING_S = 5
 # Technical: at once where it died by chance, each minute where it cannot live, to spare the log.
 _FIRST_WAIT_S, _LONGEST_WAIT_S, _LIVED_WELL_S = 1.0, 60.0, 60.0
 
-_ENDING_BESIDE_S = 2 * ENDING_S  # its callers have been cut off by then
+_ENDING_WITH_DAEMON_S = 2 * ENDING_S  # its callers have been cut off by then
 
 log = logging.getLogger(__name__)
 
@@ -47,7 +47,7 @@ def serve(
     key: Path | None = None,
     announce: Callable[[], object] = lambda: None,
 ) -> None:
-    """Serves a workspace until SIGTERM or SIGINT; `announce` is called once nothing forbids it.
+    """Serve a workspace until SIGTERM or SIGINT; `announce` is called once nothing forbids it.
 
     Raises UsageError where others could reach it and nobody may sign in, and where the extra
     `[web]` is not installed; BadInput where the certificate cannot be used.
@@ -85,7 +85,7 @@ def make_app(
 
 @contextmanager
 def ending_in_order() -> Iterator[None]:
-    """Ends the process of SIGTERM as of itself: once it has ended, uvicorn sends us the signal that
+    """End the process of SIGTERM as of itself: once it has ended, uvicorn sends us the signal that
     ended it, and killed by that we would give nothing back that our processes hold.
     """
     if threading.current_thread() is not threading.main_thread():
@@ -100,7 +100,7 @@ def ending_in_order() -> Iterator[None]:
 
 @contextmanager
 def leaving() -> Iterator[None]:
-    """Ends the process with the context, without taking Python apart: a thread that is still at
+    """End the process with the context, without taking Python apart: a thread that is still at
     work, loading pages or writing a line of the log, would have that end in a fatal error.
 
     What is raised but an exit goes on as it would without.
@@ -146,7 +146,7 @@ def make_server(
 
 
 def context_of(certificate: Path | None, key: Path | None) -> ssl.SSLContext | None:
-    """What HTTPS is served with; None where no certificate is given.
+    """Return the TLS context of HTTPS; None if no certificate is given.
 
     Raises BadInput where it cannot be used, UsageError for a key without one.
     """
@@ -167,7 +167,7 @@ def context_of(certificate: Path | None, key: Path | None) -> ssl.SSLContext | N
 
 
 def refuse_uninstalled() -> None:
-    """Raises UsageError where the extra `[web]` is not installed; loads nothing of it."""
+    """Raise UsageError where the extra `[web]` is not installed; loads nothing of it."""
     with needing("web"):
         for name in ("fastapi", "plotly", "prometheus_client", "uvicorn"):
             if find_spec(name) is None:
@@ -183,7 +183,7 @@ def _allow_connections() -> None:
 
 
 def refuse_unguarded(workspace: Workspace, address: Address) -> None:
-    """Raises UsageError where others than this machine could come in and nobody may sign in."""
+    """Raise UsageError where others than this machine could come in and nobody may sign in."""
     if address.is_loopback:
         return
     with workspace.store() as store:
@@ -200,14 +200,14 @@ def refuse_unguarded(workspace: Workspace, address: Address) -> None:
 
 
 @contextmanager
-def web_beside(
+def web_with_daemon(
     workspace: Workspace,
     address: Address | None,
     log_file: Path | None = None,
     certificate: Path | None = None,
     key: Path | None = None,
 ) -> Iterator[None]:
-    """Serves the web interface while the context lasts; without an address, nothing.
+    """Serve the web interface while the context lasts; without an address, nothing.
 
     What befalls it does not touch the daemon; it ends with the daemon, however that ends. Where the
     daemon writes its log to a file, the interface has one beside it: two processes cannot put one
@@ -264,7 +264,7 @@ class _Keeper:
                 lived_s += look_s
             process.terminate()
             try:
-                process.wait(_ENDING_BESIDE_S)
+                process.wait(_ENDING_WITH_DAEMON_S)
             except subprocess.TimeoutExpired:
                 process.kill()
         return lived_s
@@ -277,7 +277,7 @@ def _command(
     key: Path | None,
     log_file: Path | None,
 ) -> list[str]:
-    """The words that begin it in a process of its own."""
+    """Return the words that begin it in a process of its own."""
     options = {"--certificate": certificate, "--key": key, "--log-file": log_file}
     given = [str(word) for option in options.items() if option[1] is not None for word in option]
     place = [str(workspace), address.host, str(address.port)]

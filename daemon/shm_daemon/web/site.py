@@ -1,4 +1,4 @@
-"""What every request works with: the workspace as it is described now, and its open store.
+"""The site of a request: the workspace as described now, and its open store.
 
 Who comes with wrong tokens too often has to wait, and is named in the log.
 """
@@ -22,7 +22,7 @@ from shm_daemon.web.address import Address, network_of
 MOST_WRONG, WITHIN_S = 10, 60.0
 """A person mistypes a few; a program with an old token comes again and again."""
 _MOST_PASSWORDS = 100  # NIST SP 800-63B-4, 3.2.2, of one name anywhere; of all names at an address
-_COUNTS_KEPT = 4096  # technical: below a megabyte of memory
+_MAX_COUNTERS = 4096  # technical: below a megabyte of memory
 
 
 class WrongAttempts:
@@ -38,16 +38,14 @@ class WrongAttempts:
         self._wrong: OrderedDict[tuple[str, ...], tuple[float, int]] = OrderedDict()
 
     def wait_s(self, address: str, name: str | None = None) -> float:
-        """How long until a password of this user, or a token where there is no name, is looked at
-        from there; 0 where at once.
-        """
+        """Return the seconds until a password (or, without a name, a token) is checked again."""
         with self._lock:
             counts = [(self._wrong.get(key), most) for key, most in _counted(address, name)]
             due = [found[0] + WITHIN_S for found, most in counts if found and found[1] >= most]
         return max([0.0, *(at - self._clock() for at in due)])
 
     def note_wrong(self, address: str, name: str | None = None) -> None:
-        """A password of this user, or a token, was wrong."""
+        """Count a wrong password of this user, or a wrong token."""
         now = self._clock()
         for key, most in _counted(address, name):
             with self._lock:
@@ -55,7 +53,7 @@ class WrongAttempts:
                 if now - began >= WITHIN_S:
                     began, times = now, 0
                 self._wrong[key] = (began, times + 1)
-                while len(self._wrong) > _COUNTS_KEPT:
+                while len(self._wrong) > _MAX_COUNTERS:
                     self._wrong.popitem(last=False)
             if times + 1 == most:
                 whose = address if key[0] else f"all addresses for the user {name!r}"
@@ -67,7 +65,7 @@ class WrongAttempts:
 
 
 def _counted(address: str, name: str | None) -> tuple[tuple[tuple[str, ...], int], ...]:
-    """What a wrong password or token counts for, and how many of those are let through."""
+    """Return the counters of a wrong password or token, and the limit of each."""
     network = network_of(address)
     if name is None:
         return (((network, "token"), MOST_WRONG),)
@@ -129,7 +127,7 @@ class Site:
 
     @property
     def fault(self) -> ShmError | None:
-        """What is wrong with `bridge.toml` as it is now."""
+        """Return the error of the present `bridge.toml`, None if there is none."""
         return self._description.now()[1]
 
     def forget_description(self) -> None:
@@ -148,7 +146,7 @@ class Site:
             return self._store
 
     def answers_to(self, host_header: str) -> bool:
-        """Whether a request with this `Host` is meant for us."""
+        """Return True if a request with this `Host` is meant for us."""
         names = self.workspace.settings.web_hosts.lower().split(",")
         return self.address.answers_to(host_header, tuple(name.strip() for name in names if name))
 
@@ -160,7 +158,7 @@ class Site:
 
 
 def modified_ns(workspace: Workspace) -> int:
-    """When `bridge.toml` was last written; 0 where it cannot be looked at."""
+    """Return when `bridge.toml` was last written (ns); 0 if it cannot be read."""
     try:
         return Path(workspace.bridge.source).stat().st_mtime_ns
     except OSError:
@@ -168,7 +166,7 @@ def modified_ns(workspace: Workspace) -> int:
 
 
 def held_documents(site: Site, hanger: int | None = None) -> list[dict[str, Any]]:
-    """What nobody has decided on yet, the oldest first; of one hanger where named."""
+    """Return the held recordings, the oldest first; of one hanger if given."""
     return [
         {
             "recording": hold.recording_id,
@@ -182,7 +180,7 @@ def held_documents(site: Site, hanger: int | None = None) -> list[dict[str, Any]
 
 
 def described(workspace: Workspace, hanger_id: int) -> Hanger:
-    """A hanger of the bridge; raises NothingThere."""
+    """Return a hanger of the bridge; raises NothingThere."""
     try:
         return workspace.bridge.hanger(hanger_id)
     except BadInput as error:
@@ -190,5 +188,5 @@ def described(workspace: Workspace, hanger_id: int) -> Hanger:
 
 
 def quarantined(workspace: Workspace) -> int:
-    """How many refused files lie in the quarantine."""
+    """Count the refused files in the quarantine."""
     return sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json"))

@@ -1,9 +1,4 @@
-"""What is known of one test, in numbers and as figures.
-
-The documents of one test. Unknown numbers are null.
-
-Where a test's results come from: its file, checksums, steps with times, what was superseded.
-"""
+"""Documents and figures of one test. Unknown numbers are null."""
 
 from __future__ import annotations
 
@@ -36,7 +31,7 @@ def origin(view: TestView) -> Table:
     """File, checksums and version; a checksum is written out, for it is there to be compared."""
     file, lineage = view.recording.file, view.stored.lineage
     size, is_now = file.size_bytes, view.order.terms == lineage
-    anew = f"have changed since: `shm ingest --again {view.recording.id}` identifies it anew"
+    remedy = f"have changed since: `shm ingest --again {view.recording.id}` identifies it anew"
     facts = {
         "raw file": file.file_name,
         "its SHA-256": file.sha256,
@@ -47,13 +42,13 @@ def origin(view: TestView) -> Table:
         "checksum of the input": lineage.input_sha256,
         "checksum of the settings": lineage.settings_sha256,
         "identified with": f"shm {lineage.version}",
-        "settings, description and version": "as they are now" if is_now else anew,
+        "settings, description and version": "as they are now" if is_now else remedy,
     }
     return Table("Raw file and lineage", ("what", "value"), tuple(facts.items()))
 
 
 def steps_of(view: TestView) -> tuple[Step, ...]:
-    """The steps of the file, and those of this test of it."""
+    """Return the steps of the file, and those of this test of it."""
     found = view.store.journal.list_steps(view.recording.id)
     return tuple(step for step in found if step.test in (None, view.stored.test.id))
 
@@ -82,9 +77,7 @@ def formers_of(view: TestView) -> tuple[FormerTest, ...]:
 
 
 def _replaced(view: TestView) -> list[tuple[str | None, datetime, FormerTest | FormerPosterior]]:
-    """What later runs have replaced: its model class (None of an identification), when it was made,
-    and itself.
-    """
+    """Return replaced results: model class (None for an identification), time, result."""
     found: list[tuple[str | None, datetime, FormerTest | FormerPosterior]] = []
     for test in formers_of(view):
         found.append((None, test.identified_at, test))
@@ -129,7 +122,7 @@ class Check(BaseModel):
 
 
 class RawFile(BaseModel):
-    """What the test came as."""
+    """The raw file of a test."""
 
     file_name: str
     sha256: str
@@ -139,7 +132,7 @@ class RawFile(BaseModel):
 
 
 class LineageState(BaseModel):
-    """What a result comes from."""
+    """The lineage of a result."""
 
     input_sha256: str
     settings_sha256: str
@@ -201,7 +194,7 @@ class HitState(BaseModel):
 
 
 class DroppedState(BaseModel):
-    """What else was left out, and why."""
+    """Other excluded data, with the reason."""
 
     what: str
     count: int
@@ -235,7 +228,7 @@ Point = Annotated[
 
 
 def view_of(request: Request, site: AtSite, hanger_id: HangerNumber, test: Name) -> TestView:
-    """The test that is asked for; raises NothingThere."""
+    """Return the test that is asked for; raises NothingThere."""
     store = site.store
     stored = store.tests.named(described(site.workspace, hanger_id).id, name_in(test))
     recording = store.recordings.get(stored.recording_id)
@@ -257,7 +250,7 @@ def figure(
     figure: Annotated[str, Path(description="One of the names in `figures` of the test.")],
     point: Point = 0,
 ) -> Response:
-    """A plotly document. A 200 with `Retry-After` is what the store has; more will come."""
+    """Return a plotly document. A 200 with `Retry-After` is what the store has; more will come."""
     if figure not in FIGURES:
         raise NothingThere(f"no figure {figure!r}.", remedy=f"Known: {', '.join(FIGURES)}.")
     found = view.figure(FIGURES[figure], point)
@@ -326,7 +319,7 @@ def test(_: Reader, view: View) -> Any:
 
 
 def waiting() -> JSONResponse:
-    """The answer while something is worked out."""
+    """Return the answer while something is worked out."""
     return JSONResponse({"message": AT_WORK}, 202, RETRY_AFTER)
 
 

@@ -18,7 +18,7 @@ from shm.report.figures.style import PALETTE
 from shm.values import FloatArray
 from shm_daemon.web.models import plain
 
-_GAP, _GAP_NUMBERED, _GAP_BESIDE, _GAP_GRID = 0.045, 0.13, 0.08, 0.03
+_GAP, _GAP_NUMBERED, _GAP_COLUMNS, _GAP_GRID = 0.045, 0.13, 0.08, 0.03
 """Between two panels, as shares of the figure: over one horizontal axis, over one each, side by
 side, of a grid."""
 _SHARE_OF_ROW = 0.74
@@ -97,7 +97,7 @@ class _Drawing:
 
     def _widths(self, row: Sequence[spec.Panel]) -> list[list[float]]:
         if not self.figure.is_grid:
-            return _shares([panel.width for panel in row], [_GAP_BESIDE] * (len(row) - 1))
+            return _shares([panel.width for panel in row], [_GAP_COLUMNS] * (len(row) - 1))
         columns = max(len(each) for each in self.figure.rows)
         return _shares([1.0] * columns, [_GAP_GRID] * (columns - 1))[: len(row)]
 
@@ -108,7 +108,7 @@ class _Drawing:
         domain: list[float],
         column: int,
     ) -> None:
-        """Place the vertical axis of a panel and its title."""
+        """Return the vertical axis of a panel, its title and its words."""
         x, y = axes
         upright = {**_axis_of(panel.y), "domain": domain, "anchor": x}
         if panel.shares_y:
@@ -136,7 +136,7 @@ class _Drawing:
             found["fixedrange"] = "tickvals" in found  # which would not follow
 
     def _overlay(self, y: str) -> str:
-        """An axis from 0 to 1 without numbers over the panel of the axis `y`."""
+        """Return an axis from 0 to 1 without numbers over the panel of the axis `y`."""
         key = f"yaxis{len(self.figure.panels) + self.overlays}"
         if self.layout.get(key, {}).get("overlaying") != y:
             self.overlays += 1
@@ -159,7 +159,7 @@ class _Drawing:
         axes = {"xaxis": x, "yaxis": self._overlay(y) if mark.in_shares else y}
         colour = colour_of(mark.colour)
         for trace in _TRACES[type(mark)](mark, colour):
-            self.traces.append({**axes, **_told(mark), **self._legend(mark, trace), **trace})
+            self.traces.append({**axes, **_hover(mark), **self._legend(mark, trace), **trace})
 
     def _legend(self, mark: spec.Mark, trace: dict[str, Any]) -> dict[str, Any]:
         if not mark.name:
@@ -216,7 +216,7 @@ def _heights(figure: spec.Specification) -> list[list[float]]:
 
 
 def _begins_left(row: Sequence[spec.Panel]) -> bool:
-    """Whether a title stands where the legend begins."""
+    """Return True if a title is where the legend starts."""
     return any(panel.title and panel.title_side == "left" for panel in row)
 
 
@@ -254,13 +254,13 @@ def _axis_of(axis: spec.Axis) -> dict[str, Any]:
     return found
 
 
-def _told(mark: spec.Mark) -> dict[str, Any]:
+def _hover(mark: spec.Mark) -> dict[str, Any]:
     if not mark.hover and not len(mark.texts):
         return {"hoverinfo": "skip"}
-    told = {"hovertemplate": (mark.hover or "%{text}") + "<extra></extra>"}
+    hover = {"hovertemplate": (mark.hover or "%{text}") + "<extra></extra>"}
     if len(mark.texts):
-        told["text"] = [wrapped(escaped(each)) for each in mark.texts]  # type: ignore[assignment]
-    return told
+        hover["text"] = [wrapped(escaped(each)) for each in mark.texts]  # type: ignore[assignment]
+    return hover
 
 
 def _line(mark: spec.Line, colour: str) -> list[dict[str, Any]]:
@@ -339,7 +339,7 @@ _TRACES: dict[type[spec.Mark], Any] = {
 
 
 def colour_of(name: str, opacity: float = 1.0) -> str:
-    """A colour of the palette (`blue`, `orange`, ..., `ink`), as plotly takes it."""
+    """Return a colour of the palette (`blue`, `orange`, ..., `ink`), as plotly takes it."""
     code = PALETTE[name]
     if opacity >= 1:
         return code

@@ -110,7 +110,7 @@ def _some(
 
 
 def _messages(shown: Sequence[StoredAlert], site: Site) -> dict[int, HangerMessage]:
-    """What is said first of the hangers of these alerts, by their numbers."""
+    """Return the leads of the hangers of these alerts, by number."""
     numbers = {each.alert.hanger for each in shown if each.resolution is None}
     hangers = [each for each in site.workspace.bridge.hangers if each.id in numbers]
     if not hangers:
@@ -120,7 +120,7 @@ def _messages(shown: Sequence[StoredAlert], site: Site) -> dict[int, HangerMessa
 
 
 def _now(stored: StoredAlert, message: HangerMessage | None) -> str:
-    """How the hanger of an alert that stands is now; empty where the alert says just that."""
+    """Return the present state of the hanger of an open alert; empty if the alert states it."""
     alert = stored.alert
     if message is None or stored.resolution or alert.kinds == ("test",):
         return ""
@@ -128,7 +128,7 @@ def _now(stored: StoredAlert, message: HangerMessage | None) -> str:
 
 
 def _address(stored: StoredAlert, site: Site) -> str | None:
-    """An alert that only tries a hook is of no test."""
+    """Return the page that an alert is about; None for one that only tries a hook."""
     alert = stored.alert
     if stream := _stream_of(stored, site):
         return f"/streams/{stream}"
@@ -138,7 +138,7 @@ def _address(stored: StoredAlert, site: Site) -> str | None:
 
 
 def _stream_of(stored: StoredAlert, site: Site) -> str | None:
-    """The stream whose hourly reading raised an alert; None of a hammer test."""
+    """Return the stream whose hourly reading raised an alert; None of a hammer test."""
     name, _, hour = stored.alert.test.rpartition(" ")
     known = (each.name for each in site.workspace.bridge.streams)
     return name if hour and name in known else None
@@ -184,13 +184,13 @@ def alerts(
     responses=answers(404, 409, 422),
     summary="Take note of an alert",
 )
-def acknowledge(site: AtSite, writer: Writer, alert_id: Row, told: Acknowledge) -> Any:
-    """Notes on the record that somebody has seen an alert, or with `resolved` to its end."""
-    named = told.who is not None and not writer.is_person  # who signed in has a name
-    who = f"{told.who} (token {writer.name})" if named else writer.name
+def acknowledge(site: AtSite, writer: Writer, alert_id: Row, comment: Acknowledge) -> Any:
+    """Record that somebody has seen an alert, or with `resolved` that it has ended."""
+    named = comment.who is not None and not writer.is_person  # who signed in has a name
+    who = f"{comment.who} (token {writer.name})" if named else writer.name
     alerts = site.store.acting_as(writer.actor).alerts
-    note = alerts.resolve if told.resolved else alerts.acknowledge
-    note(alert_id, who, told.why, utc_now())
+    note = alerts.resolve if comment.resolved else alerts.acknowledge
+    note(alert_id, who, comment.why, utc_now())
     return alert_documents([site.store.alerts.get(alert_id)], site)[0]
 
 
@@ -241,10 +241,10 @@ def _delivery(row: Delivery, hook: Hook | None, message: str, now: datetime) -> 
 
 
 @router.post("/silences", include_in_schema=False)
-def silence(site: AtSite, writer: Writer, told: Form) -> Response:
-    """Holds the messages of hooks back for a while."""
-    now, number, why = utc_now(), told.get("hanger", ""), reason_in(told, "a silence")
-    since, until = time_in(told, "from") or now, time_in(told, "until")
+def silence(site: AtSite, writer: Writer, form: Form) -> Response:
+    """Hold the messages of hooks back for a while."""
+    now, number, why = utc_now(), form.get("hanger", ""), reason_in(form, "a silence")
+    since, until = time_in(form, "from") or now, time_in(form, "until")
     if until is None or not (number == "all" or number.isdecimal()):
         raise BadInput("a silence has hangers and an end.", remedy="Choose them in the form.")
     hanger = None if number == "all" else int(number)
@@ -252,13 +252,13 @@ def silence(site: AtSite, writer: Writer, told: Form) -> Response:
         site.workspace.bridge.tested(hanger)
     who = writer.actor
     site.store.acting_as(who).silences.make(
-        hanger, (since, until), who.name, why, now, is_maintenance="maintenance" in told
+        hanger, (since, until), who.name, why, now, is_maintenance="maintenance" in form
     )
     return RedirectResponse("/alerts#silences", 303)
 
 
 @router.post("/silences/{number}/end", include_in_schema=False)
 def end_silence(site: AtSite, writer: Writer, number: Row) -> Response:
-    """Ends one before its time."""
+    """End one before its time."""
     site.store.acting_as(writer.actor).silences.end(number, writer.actor.name, utc_now())
     return RedirectResponse("/alerts#silences", 303)

@@ -32,8 +32,8 @@ _AT_WORK = "Its tests are updated together; that takes some seconds …"
 
 
 @dataclass(frozen=True)
-class Told:
-    """What came of it, to be shown."""
+class Outcome:
+    """Outcome of a request, to be shown."""
 
     warning: str
     sentences: tuple[str, ...]
@@ -49,16 +49,16 @@ class SetBaseline:
     actor: Actor
     at: datetime
 
-    def make(self) -> Told:
+    def make(self) -> Outcome:
         workspace = Workspace.described(self.folder)
         with workspace.store() as store:
             hanger = workspace.bridge.hanger(self.hanger)
             acting = store.acting_as(self.actor)
             found = set_baseline(workspace, acting, hanger, self.order, self.at)
-        return Told(found.warning, found.sentences)
+        return Outcome(found.warning, found.sentences)
 
 
-Ordered = OrderedDict[str, SetBaseline | Told | ShmError]
+Ordered = OrderedDict[str, SetBaseline | Outcome | ShmError]
 """By the word that the page of an order asks with: the order, later what came of it."""
 
 
@@ -66,7 +66,7 @@ Ordered = OrderedDict[str, SetBaseline | Told | ShmError]
 def baseline_page(
     request: Request, site: AtSite, _: Engineer, hanger_id: HangerNumber, order: str = ""
 ) -> HTMLResponse:
-    """What the hanger is compared with, and the form for another; what comes of an order."""
+    """Show the baseline, the form for another, and the outcome of a request."""
     one = described(site.workspace, hanger_id)
     return page(
         request,
@@ -82,11 +82,11 @@ def baseline_page(
 
 @router.post("")
 def order_baseline(
-    request: Request, site: AtSite, engineer: Engineer, hanger_id: HangerNumber, told: Form
+    request: Request, site: AtSite, engineer: Engineer, hanger_id: HangerNumber, form: Form
 ) -> Response:
     """Has it made beside the interface."""
     one = described(site.workspace, hanger_id)
-    since, why, kind = time_in(told, "since"), reason_in(told, "a baseline"), told.get("kind", "")
+    since, why, kind = time_in(form, "since"), reason_in(form, "a baseline"), form.get("kind", "")
     if since is None:
         raise BadInput("a baseline has a first day.", remedy="Choose it in the form.")
     if kind and kind not in EVENT_KINDS:
@@ -104,7 +104,7 @@ def order_baseline(
 
 @router.get("/outcome")
 def outcome(request: Request, _: Engineer, hanger_id: HangerNumber, order: str) -> Response:
-    """What came of an order, without the frame; 202 while it is being made."""
+    """Return the outcome of a request without the frame; 202 while it is computed."""
     ordered: Ordered = request.app.state.ordered_baselines
     found = ordered.get(order)
     if isinstance(found, SetBaseline):

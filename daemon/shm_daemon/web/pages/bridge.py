@@ -27,8 +27,8 @@ from shm_daemon.web.bridge_summary import (
     Summary,
     groups,
     headline,
-    own_row,
     row_document,
+    site_rows,
     summary_of,
     worst_first,
 )
@@ -57,7 +57,7 @@ _COMPARING = "The hangers are being compared …"
 
 @router.get("/", include_in_schema=False)
 def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
-    """The whole bridge at a glance."""
+    """Return the whole bridge at a glance."""
     now = utc_now()
     bridge = glance(site, now)
     found = compared(request, site) if len(bridge.hangers) <= QUICKLY_COMPARED else None
@@ -69,13 +69,13 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
         facts=_facts(bridge, now),
         held=held_documents(site),
         drawing=elevation(bridge.hangers) if bridge.hangers else None,
-        legend=[(kind, said, triangles(kind, 16, 24)) for kind, said in CLASSES],
+        legend=[(kind, text, triangles(kind, 16, 24)) for kind, text in CLASSES],
         moved=found.sentence if found else None,
         unit=unit.name,
         warnings=[
-            said
+            text
             for each in bridge.hangers
-            for said in each.summary.message.beyond_lead(each.summary.warnings)
+            for text in each.summary.message.beyond_lead(each.summary.warnings)
         ],
         notes=site.store.notes.list_all(of_bridge=True),
         rows=[SimpleNamespace(**_row(each, unit, now)) for each in bridge.hangers],
@@ -84,7 +84,7 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
 
 @router.get("/moved", include_in_schema=False)
 def moved_fragment(request: Request, site: AtSite, _: Reader) -> Response:
-    """What moved over the bridge, for a page that is shown already."""
+    """Return the changes over the bridge, for a page that is shown already."""
     found = compared(request, site)
     if found is None:
         return _underway()
@@ -109,7 +109,7 @@ def bridge(site: AtSite, _: Reader) -> Any:
     summary="What moved over the bridge",
 )
 def moved(request: Request, site: AtSite, _: Reader) -> Any:
-    """The hangers compared with each other; 202 while that is being worked out."""
+    """Return the hangers compared with each other; 202 while that is being worked out."""
     found = compared(request, site)
     if found is None:
         return _underway()
@@ -121,7 +121,7 @@ def moved(request: Request, site: AtSite, _: Reader) -> Any:
 
 
 def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
-    """The tiles over the drawing."""
+    """Return the tiles over the drawing."""
     latest = bridge.latest
     alerts = sum(each.summary.open_alerts for each in bridge.hangers)
     quiet = sum(each.is_quiet for each in bridge.hangers)
@@ -142,7 +142,7 @@ def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
 
 
 def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
-    """A hanger's row of the table."""
+    """Return a hanger's row of the table."""
     line, hanger = each.summary, each.hanger
     latest, (tension, nominal, shift) = line.latest, each.cells(unit)
     return {
@@ -208,7 +208,7 @@ class Bridges(BaseModel):
 
 @router.get("/bridges", include_in_schema=False)
 def bridges_page(request: Request, site: AtSite, _: Reader) -> Response:
-    """How all bridges are, and the way to each."""
+    """Show the state of all bridges with links to them."""
     now, rows = utc_now(), _bridges(request, site)
     return page(
         request,
@@ -229,7 +229,7 @@ def bridges(request: Request, site: AtSite, _: Reader) -> Any:
 
 @router.get(SUMMARY, response_model=Summary, summary="This bridge in a line")
 def summary(site: AtSite, _: Reader) -> Summary:
-    """What its home page says first; it does not ask other bridges."""
+    """Return the lead of its home page; other bridges are not asked."""
     return summary_of(site, utc_now())
 
 
@@ -237,11 +237,11 @@ def _bridges(request: Request, site: Site) -> tuple[BridgeRow, ...]:
     asked: OtherBridges = request.app.state.other_bridges
     bridge = site.workspace.bridge
     others = asked.rows(bridge.other_bridges, site.workspace.folder)
-    return worst_first((*own_row(site, utc_now()), *others))
+    return worst_first((*site_rows(site, utc_now()), *others))
 
 
 def _words_of(row: BridgeRow, now: datetime) -> str:
-    """What is told small below a bridge's words."""
+    """Return the small print below the lead of a bridge."""
     found = row.summary
     if found is None or row.told_at is None:
         return ""

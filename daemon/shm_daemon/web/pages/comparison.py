@@ -78,7 +78,7 @@ def compare_page(
 def compare_figure(
     site: AtSite, _: Reader, hanger: _Chosen = None, since: _Since = None
 ) -> JSONResponse:
-    """A plotly document: the tension of each hanger since its baseline."""
+    """Return a plotly document: the tension of each hanger since its baseline."""
     courses = _courses(site, _chosen(site, hanger or []), since)
     if not courses:
         raise NothingThere(
@@ -100,7 +100,7 @@ def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:
 
 
 def _is_there(rows: Sequence[HangerSummary], since: date | None) -> bool:
-    """Whether `_courses` has anything of these hangers."""
+    """Return True if `_courses` has data of these hangers."""
     return any(
         row.baseline is not None and row.latest and row.latest.time >= _begin(since) for row in rows
     )

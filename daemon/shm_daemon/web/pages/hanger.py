@@ -90,7 +90,7 @@ def hanger(request: Request, site: AtSite, _: Reader, view: View) -> HTMLRespons
     common: dict[str, Any] = {
         "name": formatting.hanger_name(one.id, one.name),
         "hanger": one,
-        "beside": _beside(site.workspace, one),
+        "beside": _neighbours(site.workspace, one),
         "tests": rows[:_LATEST_TESTS],
         "test_headings": headings(view),
         "has_more": len(rows) > _LATEST_TESTS,
@@ -122,15 +122,15 @@ def all_tests(request: Request, _: Reader, view: View, before: Before = None) ->
 
 
 def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
-    said = report.now.message
-    assert said.status is not None  # a hanger with a test has one
+    lead = report.now.message
+    assert lead.status is not None  # a hanger with a test has one
     tables = [make(report) for make in _TABLES]
     if view.states is not None:
         tables.insert(2, temperature_table(view.states))
     return {
-        "status_word": said.status.value,
-        "style": said.status.name.lower(),
-        "lead": said.words,
+        "status_word": lead.status.value,
+        "style": lead.status.name.lower(),
+        "lead": lead.words,
         "details": details(report),
         "facts": facts(report),
         "is_called": bool(report.now.called),
@@ -154,7 +154,7 @@ def _chart(view: HangerView, figure: HangerFigure) -> Chart:
 
 
 def _events(view: HangerView) -> Table:
-    """What people did and what the watch detected, the latest first."""
+    """Return the actions of people and the detections of the watch, the latest first."""
     done = [(e.at, _EVENTS[e.kind], e.who, e.why) for e in view.events if e.kind in _EVENTS]
     called = [
         (call.watched.time, "change detected", "the watch", called_words(call.watched.change))
@@ -169,8 +169,8 @@ def _events(view: HangerView) -> Table:
     )
 
 
-def _beside(workspace: Workspace, hanger: Hanger) -> list[tuple[str, Hanger]]:
-    """The hangers before and after it in the description."""
+def _neighbours(workspace: Workspace, hanger: Hanger) -> list[tuple[str, Hanger]]:
+    """Return the hangers before and after it in the description."""
     order: Sequence[Hanger] = workspace.bridge.hangers
     place = [each.id for each in order].index(hanger.id)
     before = [("previous", order[place - 1])] if place > 0 else []
@@ -203,7 +203,7 @@ class ReportOrder:
 def report(
     request: Request, site: AtSite, _: Reader, hanger_id: HangerNumber, form: Literal["pdf", "html"]
 ) -> Response:
-    """What `shm report` writes; 503 with `Retry-After` where many others wait."""
+    """Return the document of `shm report`; 503 with `Retry-After` if many others wait."""
     _refuse_untested(site.store, described(site.workspace, hanger_id))
     minute = int(time.time() // _FRESH_S)
     order = ReportOrder(site.workspace.folder, hanger_id, form, minute)

@@ -18,9 +18,9 @@ router = APIRouter(prefix=NOTES, include_in_schema=False)
 
 
 @router.post("")
-def write(site: AtSite, writer: Uploader, told: FormWithPhoto) -> Response:
-    """Keeps what an operator wrote, and shows it where it was written."""
-    words = {name: value.decode("utf-8", "replace").strip() for name, value in told.items()}
+def write(site: AtSite, writer: Uploader, form: FormWithPhoto) -> Response:
+    """Store a note of an operator, and show it where it was written."""
+    words = {name: value.decode("utf-8", "replace").strip() for name, value in form.items()}
     number, now, who = words.get("hanger", ""), utc_now(), writer.actor
     try:
         hanger = int(number) if number else None
@@ -33,12 +33,12 @@ def write(site: AtSite, writer: Uploader, told: FormWithPhoto) -> Response:
     if hanger is not None:
         site.workspace.bridge.tested(hanger)
     text = words.get("text", "").replace("\r\n", "\n")  # as browsers send lines
-    store, image = site.store.acting_as(who), told.get("photo", b"")
+    store, image = site.store.acting_as(who), form.get("photo", b"")
     store.notes.add(hanger, at, kind, text, who.name, now, image)
     return RedirectResponse("/#notes" if hanger is None else f"/hangers/{hanger}#notes", 303)
 
 
 @router.get("/{number}/photo")
 def photo(site: AtSite, _: Reader, number: Row) -> Response:
-    """The photo of a note."""
+    """Return the photo of a note."""
     return Response(site.store.notes.photo(number), media_type="image/jpeg")

@@ -35,7 +35,7 @@ _NOT_STORED = ("exponential window on the responses", "records")
 def one_test(
     request: Request, _: Reader, view: View, response: Response = None, part: Part = "page"
 ) -> HTMLResponse:
-    """The page; or, where `part` says so, its tables of hits, once they are worked out."""
+    """Return the page; or, where `part` says so, its tables of hits, once they are worked out."""
     if part == "hits":  # without the frame: the page that asked puts them in their place
         if view.whole() is None:
             return HTMLResponse(f'<p class="note">{AT_WORK}</p>', 202, RETRY_AFTER)
@@ -80,12 +80,12 @@ def one_test(
 
 def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
     """None where they are not worked out."""
-    whole = None if view.missing else view.background_worker.kept(view.order)
+    whole = None if view.missing else view.background_worker.stored(view.order)
     return filled(whole.hits) if whole else None
 
 
 def _details(view: TestView) -> tuple[Table, ...]:
-    """What was dropped stands by itself where it was worked out; in the store, among the notes."""
+    """Return tables of details; dropped data are separate if computed, else among the notes."""
     notes = modal_test_report.notes(view.sheet)
     if view.worked:
         return filled(notes, view.worked.dropped, view.worked.conditions)
@@ -95,7 +95,7 @@ def _details(view: TestView) -> tuple[Table, ...]:
 
 
 def _chart(view: TestView, figure: TestFigure, chosen: int) -> tuple[str, int]:
-    """Where a figure's document is, and how high it is."""
+    """Return the address of a figure's document, and its height."""
     address = f"{test_json(view.stored.hanger, view.stored.test.id)}/figures/{figure.name}"
     if figure.source == "both":
         address += f"?point={chosen}"
@@ -103,10 +103,10 @@ def _chart(view: TestView, figure: TestFigure, chosen: int) -> tuple[str, int]:
 
 
 def _facts(view: TestView) -> tuple[tuple[str, str, str], ...]:
-    """The figures on top: what, value, what stands beside it."""
+    """Return the figures on top: what, value, what stands beside it."""
     test, sheet = view.stored.test, view.sheet
     planes = {mode.plane for mode in sheet.modes}
-    aside = len(sheet.identification.set_aside)
+    n_foreign = len(sheet.identification.set_aside)
     return (
         ("Modes", str(len(sheet.modes)), f"in {formatting.counted(len(planes), 'plane')}"),
         _tension(view),
@@ -116,7 +116,7 @@ def _facts(view: TestView) -> tuple[tuple[str, str, str], ...]:
             formatting.moment(test.time),
             f"received {formatting.moment(view.recording.received_at)}",
         ),
-        ("Set aside", str(aside), "resonances without an order"),
+        ("Set aside", str(n_foreign), "resonances without an order"),
     )
 
 
@@ -133,5 +133,5 @@ def _tension(view: TestView) -> tuple[str, str, str]:
     unit = force_unit(tension_n.mean)
     tension = tension_n.in_unit(unit)
     span = f"90 % interval {formatting.span(tension)} {unit.name}"
-    beside = f"{span}, {formatting.model_class(posterior.model)}"
-    return "Tension by this test", f"{formatting.mean(tension)} {unit.name}", beside
+    details = f"{span}, {formatting.model_class(posterior.model)}"
+    return "Tension by this test", f"{formatting.mean(tension)} {unit.name}", details

@@ -88,14 +88,14 @@ def operation_page(request: Request, site: AtSite, _: Reader, decided: Before = 
 
 
 @router.post("/held/{recording}", include_in_schema=False)
-def decide(site: AtSite, writer: Writer, recording: Row, told: Form) -> Response:
+def decide(site: AtSite, writer: Writer, recording: Row, form: Form) -> Response:
     """Lets a recording count from now on, or takes it out; the daemon does what follows."""
-    who, why, now = writer.actor, reason_in(told, "a decision"), utc_now()
+    who, why, now = writer.actor, reason_in(form, "a decision"), utc_now()
     decisions = site.store.acting_as(who).recordings
-    match told.get("action"):
+    match form.get("action"):
         case "confirm":
             _refuse_decided(site, recording)
-            time = time_in(told, "time")
+            time = time_in(form, "time")
             refuse_impossible(time, site.workspace.bridge.built)
             hold = decisions.accept(recording, who.name, why, now, time)
             learn_from_answer(site.workspace, site.store, hold)
@@ -103,7 +103,7 @@ def decide(site: AtSite, writer: Writer, recording: Row, told: Form) -> Response
             _refuse_decided(site, recording)
             decisions.exclude(recording, who.name, why, now)
         case "withdraw":
-            decisions.exclude(recording, who.name, why, now, told.get("test"))
+            decisions.exclude(recording, who.name, why, now, form.get("test"))
         case "reinstate":
             decisions.accept(recording, who.name, why, now)
         case _:
@@ -122,7 +122,7 @@ def _refuse_decided(site: Site, recording: int) -> None:
 
 @router.get("/operation/examination", include_in_schema=False)
 def examination_fragment(request: Request, site: AtSite, _: Reader) -> Response:
-    """The examination alone, for a page that is shown already."""
+    """Return the examination alone, for a page that is shown already."""
     found = _examination(request, site)
     if found is None:
         return _underway()
@@ -169,22 +169,22 @@ def _operation(site: Site) -> dict[str, Any]:
 
 
 def _refused(workspace: Workspace) -> list[dict[str, Any]]:
-    """The newest first."""
+    """Return the newest first."""
     reasons = workspace.quarantine.folder.glob("*.reason.json")
     newest = sorted(((_modified_ns(path), path) for path in reasons), reverse=True)[:_SHOWN]
     return [_reason(path) for _, path in newest]
 
 
 def _reason(path: Path) -> dict[str, Any]:
-    """What is written beside a refused file, as far as it can be read."""
+    """Return the stored reason of a refused file, as far as it can be read."""
     try:
-        said = json.loads(path.read_text(encoding="utf-8"))
-        where = f" (line {said['line']})" if said["line"] else ""
+        document = json.loads(path.read_text(encoding="utf-8"))
+        where = f" (line {document['line']})" if document["line"] else ""
         return {
-            "file": f"{said['file']}{where}",
-            "message": str(said["message"]),
-            "remedy": str(said["remedy"]),
-            "at": parse_time(said["time"]),
+            "file": f"{document['file']}{where}",
+            "message": str(document["message"]),
+            "remedy": str(document["remedy"]),
+            "at": parse_time(document["time"]),
         }
     except (OSError, ValueError, KeyError, TypeError):
         name = path.name.removesuffix(".reason.json")

@@ -103,7 +103,7 @@ def streams(site: AtSite, _: Reader) -> Any:
     summary="What a stream has shown",
 )
 def stream_figure(site: AtSite, _: Reader, name: Name, days: Days = 7.0) -> JSONResponse:
-    """A plotly document: spectra, tracked frequencies, tension, sensors at fault."""
+    """Return a plotly document: spectra, tracked frequencies, tension, sensors at fault."""
     stream = _stream(site, name)
     until = ring_of(site.workspace).latest().get(name, utc_now())
     course = stream_course(site.store, stream, until - timedelta(days=days), until)
@@ -179,7 +179,7 @@ def _events(events: tuple[StreamEvent, ...]) -> Table:
 
 def _document(state: StreamCondition, site: Site) -> dict[str, Any]:
     window, hour = state.window, state.hour
-    beside = against_hammer(site.store, state.stream)
+    hammer = against_hammer(site.store, state.stream)
     return {
         "stream": state.stream.name,
         "hanger": state.stream.hanger,
@@ -195,8 +195,8 @@ def _document(state: StreamCondition, site: Site) -> dict[str, Any]:
         "tension_shift": hour.compensated_shift if hour else None,
         "tension_shift_sd": hour.compensated_sd if hour else None,
         "learning": hour.learning if hour else None,
-        "ambient_bias": beside.common,
-        "ambient_bias_sd": beside.common_sd,
-        "hammer_tests": beside.most_tests,
+        "ambient_bias": hammer.common,
+        "ambient_bias_sd": hammer.common_sd,
+        "hammer_tests": hammer.most_tests,
         "events": [vars(each) for each in state.events],
     }  # fmt: skip

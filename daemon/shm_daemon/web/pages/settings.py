@@ -34,12 +34,12 @@ _Value = float | QuietHours | None
 _MEANINGS = {
     "thresholds.tension_shift_fraction": "shift of tension that matters, as a fraction",
     "thresholds.stiffness_shift_decades": "shift of end stiffness that matters, in decades",
-    "thresholds.alert_probability": "how probable such a shift must be for an alert",
+    "thresholds.alert_probability": "probability of such a shift that raises an alert",
     "thresholds.false_call_years": "mean time between false alarms of this hanger, in years",
-    "limits.tension_max_n": "overloaded above, in N",
-    "limits.tension_min_n": "slack below, in N",
-    "escalation_after_seconds": "told only of what nobody has acknowledged after, in s",
-    QUIET_HOURS: "told only of what is urgent within these, by time_zone of bridge.toml, else UTC",
+    "limits.tension_max_n": "upper limit of the tension, in N",
+    "limits.tension_min_n": "lower limit of the tension, in N",
+    "escalation_after_seconds": "escalate alerts that nobody has acknowledged after, in seconds",
+    QUIET_HOURS: "quiet hours, only urgent alerts are sent; in time_zone of bridge.toml, else UTC",
     **{row.name: f"{row.help}{f', in {row.unit}' if row.unit else ''}" for row in TABLE},
 }
 
@@ -64,14 +64,14 @@ class _Row:
 
 @router.get("/settings")
 def settings_page(request: Request, site: AtSite, _: Engineer, hanger: Before = None) -> Response:
-    """The bridge's settings and hooks, and the thresholds and limits of one hanger."""
+    """Return the bridge's settings and hooks, and the thresholds and limits of one hanger."""
     return _page(request, site, hanger)
 
 
 @router.post("/settings")
-def change(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Response:
-    """Sets one value, or gives it back to `bridge.toml`."""
-    key, hanger, workspace = told.get("key", ""), None, site.workspace
+def change(request: Request, site: AtSite, engineer: Engineer, form: Form) -> Response:
+    """Set one value, or give it back to `bridge.toml`."""
+    key, hanger, workspace = form.get("key", ""), None, site.workspace
     rows = {row.key: row for row in _all_rows(workspace.bridge, workspace.settings)}
     if key not in rows:
         raise Refused(404, f"{key!r} is none of the settings of this page.", "See bridge.toml.")
@@ -85,10 +85,10 @@ def change(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Re
             workspace.change_setting(
                 site.store.acting_as(engineer.actor),
                 key,
-                _value(key, told),
+                _value(key, form),
                 utc_now(),
                 engineer.name,
-                based_on=int(told["based_on"]) if told.get("based_on", "").isdecimal() else 0,
+                based_on=int(form["based_on"]) if form.get("based_on", "").isdecimal() else 0,
                 in_file=rows[key].in_file,
             )
         finally:
@@ -97,13 +97,13 @@ def change(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Re
     return done_or_again(change, address, partial(_page, request, site, hanger))
 
 
-def _value(key: str, told: Mapping[str, str]) -> float | str | None:
+def _value(key: str, form: Mapping[str, str]) -> float | str | None:
     """None of what is given back; whether quiet hours are a span, `bridge.toml` itself checks."""
-    if told.get("action") == "back":
+    if form.get("action") == "back":
         return None
     if not key.endswith(QUIET_HOURS):
-        return _number(told.get("value", ""))
-    begins, ends = told.get("begins", ""), told.get("ends", "")
+        return _number(form.get("value", ""))
+    begins, ends = form.get("begins", ""), form.get("ends", "")
     return f"{begins}-{ends}" if begins or ends else ""
 
 
@@ -145,7 +145,7 @@ def _page(
 
 
 def _judged(site: Site, hanger: Hanger) -> str:
-    """Whether the stored tests of a hanger are judged with what is in force."""
+    """Return a sentence if stored tests of a hanger were judged with other settings."""
     waiting = [each for each in site.store.tests.list_waiting() if each.hanger == hanger.id]
     if any(each.stage is Stage.UPDATED for each in waiting):
         return f"Yet to be judged: {formatting.counted(len(waiting), 'stored test')} of it."

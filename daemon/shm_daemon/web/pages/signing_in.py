@@ -26,7 +26,7 @@ from shm_daemon.web.access import (
     COOKIE,
     AtSite,
     Person,
-    change_own_password,
+    change_password_of,
     is_signed_in,
     refuse_foreign,
     session_of,
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 router = APIRouter(include_in_schema=False)
 
-_KEPT_S = int(SIGNED_IN_FOR.total_seconds())
+_COOKIE_S = int(SIGNED_IN_FOR.total_seconds())
 _BACK = "/sign-in/back"
 _COOKIE, _ITS_PATH = "shm_sign_on", "/sign-in"
 _WITHIN = timedelta(minutes=10)  # judgement: to type a password and confirm on a telephone
@@ -66,17 +66,17 @@ def sign_in_page(request: Request, site: AtSite, next: str = "/") -> Response:
 
 
 @router.post("/sign-in", dependencies=[Depends(refuse_foreign)])
-async def sign_in(request: Request, site: AtSite, told: FormOfAnybody) -> Response:
-    """Gives the cookie to who signs in; removing the user or revoking the token ends it at once."""
-    let_in = partial(_let_in, request, site, told)
-    return await (with_passwords(request, let_in) if "name" in told else run_in_threadpool(let_in))
+async def sign_in(request: Request, site: AtSite, form: FormOfAnybody) -> Response:
+    """Give the cookie to who signs in; removing the user or revoking the token ends it at once."""
+    let_in = partial(_let_in, request, site, form)
+    return await (with_passwords(request, let_in) if "name" in form else run_in_threadpool(let_in))
 
 
-def _let_in(request: Request, site: Site, told: Mapping[str, str]) -> Response:
-    wanted, secret = told.get("next", "/"), told.get("token", "").strip()
+def _let_in(request: Request, site: Site, form: Mapping[str, str]) -> Response:
+    wanted, secret = form.get("next", "/"), form.get("token", "").strip()
     try:
-        if "name" in told:
-            secret = session_of(request, site, told["name"], told.get("password", ""))
+        if "name" in form:
+            secret = session_of(request, site, form["name"], form.get("password", ""))
         else:
             visitor_in_force(request, site, secret)
     except Refused as refused:
@@ -90,13 +90,13 @@ def _let_in(request: Request, site: Site, told: Mapping[str, str]) -> Response:
 
 def _keep_signed_in(request: Request, answer: Response, secret: str) -> None:
     """Has the browser keep the secret of a session."""
-    answer.set_cookie(COOKIE, secret, max_age=_KEPT_S, httponly=True, samesite="strict",
+    answer.set_cookie(COOKIE, secret, max_age=_COOKIE_S, httponly=True, samesite="strict",
                       secure=is_https(request.scope))  # fmt: skip
 
 
 @router.post("/sign-out", dependencies=[Depends(refuse_foreign)])
 def sign_out(request: Request, site: AtSite) -> Response:
-    """Ends the session and takes the cookie back."""
+    """End the session and remove the cookie."""
     secret = request.cookies.get(COOKIE, "")
     if secret.startswith(SESSION):
         site.store.people.sign_out(secret, utc_now())
@@ -106,12 +106,12 @@ def sign_out(request: Request, site: AtSite) -> Response:
 
 
 def _ask(request: Request, wanted: str, status: int = 200, message: str = "") -> Response:
-    """The page that asks who one is, with what went wrong."""
+    """Return the page that asks who one is, with what went wrong."""
     return page(request, "sign_in.html.j2", status=status, message=message, next=_ours(wanted))
 
 
 def _ours(wanted: str) -> str:
-    """An address of this site: nobody is sent elsewhere after signing in."""
+    """Return an address of this site: nobody is sent elsewhere after signing in."""
     plain = wanted.startswith("/") and wanted.isascii() and wanted.isprintable()
     return wanted if plain and not wanted.startswith("//") and "\\" not in wanted else "/"
 
@@ -123,14 +123,14 @@ def password_page(request: Request, _: Person, changed: bool = False) -> Respons
 
 
 @router.post("/password")
-async def change_password(request: Request, site: AtSite, person: Person, told: Form) -> Response:
-    """Changes it; other browsers of the person are signed out."""
-    password = told.get("password", "")
+async def change_password(request: Request, site: AtSite, person: Person, form: Form) -> Response:
+    """Change it; other browsers of the person are signed out."""
+    password = form.get("password", "")
 
     def change() -> None:
-        if password != told.get("again", ""):
+        if password != form.get("again", ""):
             raise UsageError("the new passwords differ.", remedy="Type the same one twice.")
-        change_own_password(request, site, person, told.get("old", ""), password)
+        change_password_of(request, site, person, form.get("old", ""), password)
 
     def again(message: str, status: int) -> Response:
         return page(request, "password.html.j2", status=status, message=message, changed=False)
@@ -150,7 +150,7 @@ class SignOns:
         self._provider: Provider | None = None
 
     def provider(self, described: SingleSignOn | None) -> Provider:
-        """Raises NothingThere where none is described, UsageError where the extra is missing."""
+        """Raise NothingThere where none is described, UsageError where the extra is missing."""
         if described is None:
             raise NothingThere(
                 "This bridge has no single sign-on.", remedy="Sign in with a password."
@@ -170,7 +170,7 @@ class SignOns:
                 self._begun.popitem(last=False)
 
     def take(self, state: str) -> tuple[Begun, str] | None:
-        """What was noted of a state, once and in time."""
+        """Return the stored data of a state, once and in time."""
         with self._lock:
             noted = self._begun.pop(state, None)
         return noted[1:] if noted is not None and utc_now() - noted[0] < _WITHIN else None
@@ -178,14 +178,14 @@ class SignOns:
 
 @router.get("/sign-in/provider")
 def begin(request: Request, site: AtSite, next: str = "/") -> Response:
-    """Sends a person to the provider."""
+    """Send a person to the provider."""
     signs: SignOns = request.app.state.sign_ons
     host = request.headers["host"]  # one of ours: the middleware has looked
     back = f"http{'s' if is_https(request.scope) else ''}://{host}{_BACK}"
     try:
         begun = signs.provider(site.workspace.bridge.single_sign_on).begin(back)
     except ShmError as error:
-        return _told(request, next, error)
+        return _show_error(request, next, error)
     signs.note(begun, _ours(next))
     answer = RedirectResponse(begun.url, 303)
     # Lax: it must come back with a person whom a page of the provider sends.
@@ -200,22 +200,22 @@ def come_back(
 ) -> Response:
     """Signs in whom the provider names, where that is a user; nobody by default."""
     caller, signs = unless_throttled(request, site), request.app.state.sign_ons
-    kept = request.cookies.get(_COOKIE, "")
-    is_its_browser = secrets.compare_digest(kept.encode(), state.encode())
+    cookie = request.cookies.get(_COOKIE, "")
+    is_its_browser = secrets.compare_digest(cookie.encode(), state.encode())
     noted = signs.take(state) if is_its_browser else None
     if noted is None:
         return _refused(request, "/", 403, _FORGOTTEN)
     begun, wanted = noted
     if error or not code:
         log.warning("single sign-on was not completed: %.80r", error or "no code came")
-        said = "You have not signed in there" + (f" ({error[:80]})." if error else ".")
-        return _refused(request, wanted, 403, said)
+        message = "You have not signed in there" + (f" ({error[:80]})." if error else ".")
+        return _refused(request, wanted, 403, message)
     try:
         name = signs.provider(site.workspace.bridge.single_sign_on).name_of(begun, code)
     except ShmError as failure:
         if failure.retry_after_s is None:
             site.wrong_attempts.note_wrong(caller)
-        return _told(request, wanted, failure)
+        return _show_error(request, wanted, failure)
     return _signed_in(request, site, name, wanted)
 
 
@@ -223,7 +223,7 @@ def _signed_in(request: Request, site: Site, name: str, wanted: str) -> Response
     try:
         secret = site.store.people.sign_in_as(name, utc_now())
     except UsageError as error:
-        return _told(request, wanted, error)
+        return _show_error(request, wanted, error)
     if secret is None:
         log.warning("single sign-on: %.255r is no user of this bridge", name)
         return _refused(
@@ -241,13 +241,13 @@ def _signed_in(request: Request, site: Site, name: str, wanted: str) -> Response
     return answer
 
 
-def _told(request: Request, wanted: str, error: ShmError) -> Response:
+def _show_error(request: Request, wanted: str, error: ShmError) -> Response:
     log.warning("single sign-on: %s", error)
     passing = error.retry_after_s is not None
     return _refused(request, wanted, 503 if passing else 403, f"{error.message} {error.remedy}")
 
 
-def _refused(request: Request, wanted: str, status: int, said: str) -> Response:
-    answer = _ask(request, wanted, status, said)
+def _refused(request: Request, wanted: str, status: int, message: str) -> Response:
+    answer = _ask(request, wanted, status, message)
     answer.delete_cookie(_COOKIE, path=_ITS_PATH)
     return answer

@@ -77,7 +77,7 @@ class ImportedColumn(BaseModel):
 
 
 class ImportQuestion(BaseModel):
-    """What only a person knows; `channel` is empty for the whole file."""
+    """A question to a person; `channel` is empty for the complete file."""
 
     about: str
     channel: str
@@ -126,7 +126,7 @@ async def import_file(
         ),
     ] = None,
 ) -> Any:
-    """Shows what is understood of a file and asks what it does not say; keeps nothing yet.
+    """Show what is understood of a file and ask for the rest; store nothing yet.
 
     With answers to all, they are kept as the profile of its logger, and the file goes to the
     daemon as any other.
@@ -145,7 +145,7 @@ async def import_file(
         await run_in_threadpool(file.close)
 
 
-def _looked(file: Incoming, name: str, workspace: Workspace, said: str | None) -> ImportLook:
+def _looked(file: Incoming, name: str, workspace: Workspace, text: str | None) -> ImportLook:
     if file.size_bytes == 0:
         raise BadInput("the body is empty.", remedy="Send the bytes of the file.")
     with TemporaryDirectory(prefix="shm-import-") as folder:
@@ -153,8 +153,8 @@ def _looked(file: Incoming, name: str, workspace: Workspace, said: str | None) -
         shutil.copyfile(file.whole(), path)
         found = look_into(path, workspace, Answers())
     landed: Landed | None = None
-    if said is not None:
-        answers = _answers(said, found)
+    if text is not None:
+        answers = _answers(text, found)
         found = understand(found.survey, workspace, answers)
         if found.is_ready:
             keep_profile(found, workspace, each_time=answers.each_time)
@@ -163,10 +163,10 @@ def _looked(file: Incoming, name: str, workspace: Workspace, said: str | None) -
     return ImportLook(**plain(document), sha256=landed.sha256 if landed else None)
 
 
-def _answers(said: str, found: Import) -> Answers:
-    """The answers of a request; raises BadInput for what is none."""
+def _answers(body: str, found: Import) -> Answers:
+    """Return the answers of a request; raises BadInput for what is none."""
     try:
-        document = json.loads(said)
+        document = json.loads(body)
     except (ValueError, RecursionError) as error:
         raise _misread(str(error)[:100]) from error
     columns = document.get("columns", {}) if isinstance(document, dict) else None

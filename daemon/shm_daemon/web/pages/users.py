@@ -1,6 +1,4 @@
-"""Who may sign in, and as what; and what people changed: engineers let people in, change what they
-may and end them, and read the audit log.
-"""
+"""Users and audit log: engineers add people, change their roles, end their access."""
 
 from __future__ import annotations
 
@@ -26,20 +24,20 @@ _SHOWN = 100  # technical: changes on a page, which links to older ones
 
 @router.get("/users")
 def users_page(request: Request, site: AtSite, _: Engineer) -> Response:
-    """Who may sign in, and as what."""
+    """Show the users and their roles."""
     return _page(request, site)
 
 
 @router.post("/users")
-async def change_user(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Response:
-    """Adds or removes a user, changes their role or sets a password."""
+async def change_user(request: Request, site: AtSite, engineer: Engineer, form: Form) -> Response:
+    """Add or remove a user, change their role or set a password."""
     people, at = site.store.acting_as(engineer.actor).people, utc_now()
     by_provider = site.workspace.bridge.single_sign_on is not None
-    name, password = told.get("name", ""), told.get("password", "")
-    role = next((each for each in Role if each == told.get("role", "")), None)
+    name, password = form.get("name", ""), form.get("password", "")
+    role = next((each for each in Role if each == form.get("role", "")), None)
 
     def change() -> None:
-        match told.get("action", ""), role:
+        match form.get("action", ""), role:
             case "add", Role():
                 people.add(name, role, None if by_provider and not password else password, at)
             case "role", Role():
@@ -66,7 +64,7 @@ def _page(request: Request, site: Site, message: str = "", status: int = 200) ->
 
 @router.get("/audit")
 def audit_page(request: Request, site: AtSite, _: Engineer, before: Before = None) -> Response:
-    """What people changed, by page, API or command line, the newest first."""
+    """Show the changes by people through page, API or command line, the newest first."""
     shown, older = paged(site.store.journal.list_changes(_SHOWN + 1, before), _SHOWN)
     table = Table(
         "Changes",

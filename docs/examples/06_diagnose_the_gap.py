@@ -1,4 +1,4 @@
-"""Why do model and measurement differ? A lamp of 60 kg hangs on the bar, and nobody noted it.
+"""Find out why model and measurement differ: an unknown lamp of 60 kg hangs on the bar.
 
 The frequencies are those of a bar with the lamp 3.4 m from an end, right to 1e-4. The diagnosis
 weighs every effect of its catalogue, no gap at all, and something that the catalogue lacks.
@@ -24,10 +24,12 @@ modes = tuple(
     for order, frequency_hz in enumerate(measured, 1)
 )
 
+# Shown in the manual from here.
 diagnosis = shm.diagnose(shm.ModalTest("t1", modes, hanger=3), hanger, draws=200, seed=1)
 cause = diagnosis.leading
 assert cause is not None
 print(diagnosis.summary())
+# Shown in the manual until here.
 
 found = {estimate.name: estimate for estimate in cause.parameters}
 assert cause.effect == "point_mass"

@@ -1,4 +1,4 @@
-"""Frequencies from elsewhere: type them in, and see what they say of the tension.
+"""Infer the tension from frequencies that you type in.
 
 Table 1.1 of the thesis: twelve frequencies of a 12 m round bar, without standard deviations. What
 is not known (the deviations, the time, the temperature) is simply left out. The thesis leaves the
@@ -20,6 +20,7 @@ measured_hz = {
     "transverse": (5.82, 13.85, 26.17, 40.47, 59.30, 81.30),
     "longitudinal": (6.09, 14.80, 27.00, 41.80, 61.50, 83.68),
 }
+# Shown in the manual from here.
 test = shm.ModalTest(
     id="table 1.1",
     hanger=3,
@@ -30,6 +31,7 @@ test = shm.ModalTest(
     ),
 )
 posterior = shm.update(test, hanger, model="beam1", seed=1, priors="thesis")
+# Shown in the manual until here.
 tension_kn = posterior.tension_n / 1e3
 print(f"tension {tension_kn.mean():.0f} ± {tension_kn.std():.0f} kN")
 print(f"model error {posterior.parameter('sigma').mean():.1%} of a frequency")

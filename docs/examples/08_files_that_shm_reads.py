@@ -1,4 +1,4 @@
-"""Files of your own program: the same test as HDF5, MATLAB, NumPy and TDMS, read without a sidecar.
+"""Write files that shm reads without a sidecar: HDF5, MATLAB, NumPy and TDMS.
 
 Names, units and planes as `shm` understands them; what a file does not say stands in a sidecar.
 `shm ingest --peek FILE` shows what it makes of any file.
@@ -29,12 +29,14 @@ in_tdms = {"wf_increment": 1 / 512}
 
 with tempfile.TemporaryDirectory() as name:
     folder = Path(name)
+    # Shown in the manual from here.
     with h5py.File(folder / "hanger3.h5", "w") as file:
         file.attrs.update(hanger=3, time="2026-05-01T10:00:00Z", sampling_rate_hz=512.0)
         file.create_dataset("force", data=force).attrs["unit"] = "N"
         file.create_dataset("acc_1", data=acceleration).attrs.update(
             unit="g", plane="transverse", x_m=2.52
         )
+    # Shown in the manual until here.
     scipy.io.savemat(folder / "hanger3.mat", named)
     np.savez(folder / "hanger3.npz", **named)
     with TdmsWriter(folder / "hanger3.tdms") as writer:

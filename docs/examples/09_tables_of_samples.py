@@ -1,4 +1,4 @@
-"""Posterior draws and modes as pandas tables, and as files for other programs.
+"""Use posterior draws and modes as pandas tables, and write them to files.
 
 Any quantity of a model is a function of the draws: here the safety of the bar against yielding.
 """
@@ -26,9 +26,11 @@ posterior = shm.update(test, hanger, model="beam1", samples=500, seed=1)
 modes = test.test.to_dataframe()
 print(modes[["plane", "order", "frequency_hz", "frequency_sd_hz"]].to_string(index=False))
 
+# Shown in the manual from here.
 table = posterior.to_dataframe()
 table["stress_mpa"] = table["tension_n"] / hanger.area_m2 / 1e6
 safety = 355 / table["stress_mpa"]
+# Shown in the manual until here.
 print(f"stress {table['stress_mpa'].mean():.2f} MPa, safety {safety.quantile(0.05):.2f} at least")
 
 with TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""Your own simulator: why a spring's readings differ from it, by effects that you list.
+"""Find out why readings differ from your own simulator, by effects that you list.
 
 A spring of unknown stiffness is pulled to five lengths. In truth it has a pretension, which the
 simulator does not know; the catalogue has that and two rivals.
@@ -20,6 +20,7 @@ def effect(name, **parameters):
     return shm.SimulatorEffect(name, parameters, spring)
 
 
+# Shown in the manual from here.
 simulator = shm.Simulator(
     spring,
     {"k_n_m": shm.Prior("lognormal", 200.0, 0.1)},
@@ -30,6 +31,7 @@ simulator = shm.Simulator(
     ],
     vectorised=True,
 )
+# Shown in the manual until here.
 rng = np.random.default_rng(1)
 readings = [
     shm.Reading(

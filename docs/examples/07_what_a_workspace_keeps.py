@@ -1,4 +1,4 @@
-"""A workspace as a daemon fills it, read from a notebook.
+"""Read a workspace, as a daemon fills it, in a notebook.
 
 The command line makes a workspace and takes in two modal tests; `shm.Store` then reads what it
 keeps: the hangers, their tests, and the posterior of each.
@@ -51,20 +51,22 @@ def main() -> None:
         assert run(["init", str(arch), "--from", str(described)]) == 0
         assert run(["--workspace", str(arch), "ingest", str(modes)]) == 0
 
+        # Shown in the manual from here.
         with shm.Store(arch) as store:
-            kept = store.tests(3)
+            stored = store.tests(3)
             tensions = store.tensions(3)
             latest = store.tension(3).tension_n
             posteriors = store.posteriors(3)
             selection = store.selection(3)
-            figure = shm.plot.trend(posteriors, kept, store.hanger(3))
+            figure = shm.plot.trend(posteriors, stored, store.hanger(3))
+        # Shown in the manual until here.
 
-    for test in kept:
+    for test in stored:
         tension = tensions[test.id].tension_n
         interval = f"90 % interval {tension.q05 / 1e3:.0f} to {tension.q95 / 1e3:.0f} kN"
         print(f"{test.time:%Y-%m-%d}: {tension.mean / 1e3:.0f} kN, {interval}")
 
-    assert [test.id for test in kept] == ["day 0", "day 30"]
+    assert [test.id for test in stored] == ["day 0", "day 30"]
     assert selection.selected.model == "beam1"
     assert latest == tensions["day 30"].tension_n
     assert latest.q05 < 700e3 < latest.q95

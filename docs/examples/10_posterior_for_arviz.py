@@ -1,4 +1,4 @@
-"""The posterior in ArviZ, with the likelihood of each measurement.
+"""Use the posterior in ArviZ, with the likelihood of each measurement.
 
 Needs `pip install 'shm[arviz]'`; then `arviz.summary`, `arviz.loo`, `arviz.plot_ppc` take it.
 """
@@ -19,9 +19,11 @@ recording = shm.simulate(hanger, hits=3, seconds_per_hit=10.0, seed=5)
 test = shm.identify(recording, hanger=hanger, cross_check="none")
 posterior = shm.update(test, hanger, model="beam1", samples=500, seed=1, priors="thesis")
 
+# Shown in the manual from here.
 tree = posterior.to_arviz([test.test], hanger)
 
 tension = tree["posterior"]["tension_n"]
+# Shown in the manual until here.
 print(f"tension {float(tension.mean()):.0f} {tension.attrs['units']}")
 replicated = tree["posterior_predictive"]["frequency_hz"]
 observed = tree["observed_data"]["frequency_hz"]

@@ -1,4 +1,4 @@
-"""The forward models by themselves: parameters in, frequencies out, beside a closed form.
+"""Compute the frequencies of a model class, and compare them with a closed form.
 
 A clamped bar without bending stiffness is a string: f_n = n / (2 L) sqrt(T / m). A model class is a
 name; `build` makes it for a hanger, with the thesis's priors of tension and length alone. Its array
@@ -24,9 +24,11 @@ string = replace(bar, bending_stiffness_factor=1e-6)
 order = np.arange(1, 5)
 closed_form_hz = order / (2 * bar.length_m) * np.sqrt(711e3 / bar.mass_per_length_kg_m)
 
+# Shown in the manual from here.
 parameters = np.array([[1.0, 1.0], [1.1, 1.0]])  # theta_F, theta_L
 as_string = build("beam1", string, priors="thesis").frequencies_hz(parameters, modes=4)
 as_bar = build("beam1", bar, priors="thesis").frequencies_hz(parameters, modes=4)
+# Shown in the manual until here.
 print("model classes:", ", ".join(MODELS))
 print("string, closed form (Hz):", closed_form_hz.round(3))
 print("string, beam1       (Hz):", as_string[0, 0].round(3))

@@ -1,4 +1,4 @@
-"""Which model class? The evidence pays for fit and charges for freedom.
+"""Choose a model class by its evidence, which pays for fit and charges for freedom.
 
 One bar is clamped, another turns in a soft bearing at its deck end. The evidence takes the clamped
 model (`beam1`) for the first and the one with springs (`beam2`) for the second; a wrong class gives
@@ -27,8 +27,10 @@ def selected(spring_n_m_rad: float) -> shm.Selection:
         seconds_per_hit=10.0,
         seed=2,
     )
+    # Shown in the manual from here.
     test = shm.identify(recording, hanger=hanger, cross_check="none")
     return shm.select(test, hanger, models=["beam1", "beam2"], samples=500, seed=1)
+    # Shown in the manual until here.
 
 
 clamped, soft = selected(float("inf")), selected(2e6)

@@ -1,4 +1,4 @@
-"""Has the tension fallen? Two tests a year apart, the second of a hanger that lost 8 %.
+"""Decide if the tension has fallen: two tests a year apart, of a hanger that lost 8 %.
 
 The difference of two posteriors is a distribution of its own: the probability of a loss beyond 5 %
 is the share of its draws that lie there.
@@ -32,10 +32,12 @@ for year, tension_n in ((2025, 600e3), (2026, 552e3)):
     tests.append(found.test)
     posteriors.append(shm.update(found, hanger, model="beam1", seed=1))
 
+# Shown in the manual from here.
 before, after = (posterior.tension_n for posterior in posteriors)
 change = after / before - 1
 low, high = np.quantile(change, [0.05, 0.95])
 beyond = np.mean(change < -0.05)
+# Shown in the manual until here.
 print(
     f"change {change.mean():+.1%} (90 % from {low:+.1%} to {high:+.1%}), "
     f"probability of more than 5 % lost: {beyond:.3f}"

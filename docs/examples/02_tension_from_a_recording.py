@@ -1,4 +1,4 @@
-"""From a hammer recording to the tension, and back to the truth that was planted.
+"""Find the tension from a hammer recording, and compare it with the known truth.
 
 A recording of five hits is simulated by finite elements in the time domain (no code is shared with
 the models that find the tension again), written as CSV, read, identified and updated.
@@ -26,6 +26,7 @@ with TemporaryDirectory() as folder:
     write(planted, path)
     recording = shm.read(path)
 
+# Shown in the manual from here.
 test = shm.identify(recording, hanger=hanger)
 print(test.test.summary())
 
@@ -33,6 +34,7 @@ posterior = shm.update(test, hanger, model="beam1", seed=1)
 print(posterior.summary())
 
 figure = shm.plot.frequency_response(test, hanger)
+# Shown in the manual until here.
 
 assert len(test.test.modes) == 12  # six in each plane below 100 Hz
 assert abs(posterior.tension_n.mean() - truth_n) < 3 * posterior.tension_n.std()
