@@ -459,6 +459,29 @@ def hypotheses(
     return tuple(replace(each, log_weight=each.log_weight - total) for each in joined)
 
 
+def _probable_pairs(log_weight: FloatArray, n: int) -> IntArray:
+    """Return the pairs (pairs, 2) of `n` hangers of which one is among the most probable ones."""
+    probable = scipy.special.logsumexp(log_weight.reshape(-1, n), axis=0).argsort()
+    first = probable[-_SUSPECTS:].tolist()
+    return np.array([(i, j) for i in first for j in range(n) if i < j or j not in first])
+
+
+def _independent_shifts(bridge: Bridge, options: NeighbourOptions) -> Hypotheses:
+    """Return the hypothesis that hangers moved individually."""
+    log_evidence, gained, lost = independent(bridge, options)
+    log_weight = log_evidence + math.log(options.prior["independent shifts"])
+    unknown = np.full((1, len(gained)), NAN)
+    return Hypotheses(
+        "independent shifts",
+        np.array([log_weight]),
+        np.empty((1, 0), np.int64),
+        gained[None],
+        lost[None],
+        unknown,
+        unknown,
+    )
+
+
 def _at_one_scale(
     bridge: Bridge, causes: Sequence[CommonCause], options: NeighbourOptions
 ) -> list[Hypotheses]:
@@ -489,13 +512,9 @@ def _at_one_scale(
         sign=-1,
     )
     # Both of two equal losses stand among the likeliest single ones.
-    likeliest = scipy.special.logsumexp(one.log_weight.reshape(-1, n), axis=0).argsort()
-    first = likeliest[-_SUSPECTS:].tolist()
-    pairs = np.array([(i, j) for i in first for j in range(n) if i < j or j not in first])
+    pairs = _probable_pairs(one.log_weight, n)
     both = np.concatenate([shed[pairs[:, 0]], shed[pairs[:, 1]]], axis=2)
     share = 2 * len(pairs) / (n * (n - 1))  # of all pairs
-    log_evidence, gained, lost = independent(bridge, options)
-    unknown = np.full((1, n), NAN)
     return [
         normal("no change", prior["no change"], np.zeros((1, n, 1)), nobody),
         normal(
@@ -511,15 +530,7 @@ def _at_one_scale(
             *sized(both, pairs),
             sign=-1,
         ),
-        Hypotheses(
-            "independent shifts",
-            np.array([log_evidence + math.log(prior["independent shifts"])]),
-            nobody,
-            gained[None],
-            lost[None],
-            unknown,
-            unknown,
-        ),
+        _independent_shifts(bridge, options),
     ]
 
 
