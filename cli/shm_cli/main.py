@@ -50,7 +50,9 @@ GROUPS: dict[str, dict[str, Verb]] = {
     },
     "Look": {
         "status": Verb("shm_cli.status", "Show the state of every hanger and of the workspace."),
-        "report": Verb("shm_cli.report", "Report on a hanger or the bridge, for the file."),
+        "report": Verb(
+            "shm_cli.report", "Print the state of a hanger or the bridge, or write its report."
+        ),
         "drift": Verb("shm_cli.drift", "Show how far tension and stiffness have moved."),
         "alerts": Verb("shm_cli.alerts", "Show alerts and their deliveries; acknowledge them."),
         "gap": Verb("shm_cli.gap", "Find out why model and measurement differ."),

@@ -60,26 +60,32 @@ class Store:
         return tuple(stored.test for stored in self._store.tests.list_all(hanger_id))
 
     def tension(self, hanger_id: int, test_id: str | None = None) -> Averaged:
-        """Return the tension by the latest test of a hanger, or by one test, in N.
+        """Return a hanger's tension in N: the best estimate since its last change, or by a test.
 
-        It is averaged over all model classes and absolute, as reports and pages state it:
-        `tension_n.mean`, with a 90 % interval from `tension_n.q05` to `tension_n.q95`. Raises
-        NothingThere.
+        It is averaged over all model classes and absolute, the headline of reports and pages:
+        `tension_n.mean`, with a 90 % interval from `tension_n.q05` to `tension_n.q95`. With
+        `test_id` it is what that test says alone. Raises NothingThere.
         """
-        known = self.tensions(hanger_id) if test_id is not None else self._latest(hanger_id)
-        if not known or test_id not in (None, *known):
+        found = (
+            self._headline(hanger_id) if test_id is None else self.tensions(hanger_id).get(test_id)
+        )
+        if found is None:
             self._store.posteriors.get(hanger_id, test_id)  # raises what is missing
             raise NothingThere(f"hanger {hanger_id} has no tension.", remedy="Run `shm doctor`.")
-        return next(reversed(known.values())) if test_id is None else known[test_id]
+        return found
 
     def tensions(self, hanger_id: int) -> dict[str, Averaged]:
         """Return the tension by each test of a hanger, oldest first: see `tension`."""
         points = self._store.posteriors.trend(self.hanger(hanger_id))
         return {point.test: point.averaged for point in points}
 
-    def _latest(self, hanger_id: int) -> dict[str, Averaged]:
-        points = self._store.posteriors.latest_trends([self.hanger(hanger_id)])
-        return {point.test: point.averaged for point in points.values()}
+    def _headline(self, hanger_id: int) -> Averaged | None:
+        from shm.pipeline import utc_now
+        from shm.pipeline.bridge_reporting import hanger_summaries
+
+        hanger = self.hanger(hanger_id)
+        (summary,) = hanger_summaries(self._workspace, self._store, utc_now(), [hanger])
+        return summary.tension
 
     def posterior(
         self, hanger_id: int, test_id: str | None = None, model: str | None = None

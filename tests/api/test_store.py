@@ -45,7 +45,7 @@ def test_tension_is_headline(bridge: Workspace, capsys: pytest.CaptureFixture[st
     with shm.Store(bridge.folder) as store:
         tensions = store.tensions(3)
         assert list(tensions) == ["t0", "t1", "t2"]
-        assert store.tension(3) == tensions["t2"]
+        assert store.tension(3, "t2") == tensions["t2"]
         assert store.tension(3, "t0") == tensions["t0"]
         headline = store.tension(3).tension_n
         assert (headline.mean, headline.q05, headline.q95) == pytest.approx(

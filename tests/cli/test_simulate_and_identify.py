@@ -66,9 +66,7 @@ def test_a_page_and_figures_let_a_person_check_the_modes(
     unpaint(monkeypatch)
     page, figures = tmp_path / "sheet.html", tmp_path / "figures"
     ask = ("--hanger-file", hanger_file, "--html", page)
-    ended = shm(
-        "identify", recording, *ask, "--cross-check", "pyoma2", "--figures", figures, "--json"
-    )
+    ended = shm("identify", recording, *ask, "--cross-check", "ssi", "--figures", figures, "--json")
     assert ended.code == 0, ended.err
     (test,) = ended.document["tests"]
     checks = {check["name"]: check["verdict"] for check in test["quality"]}
