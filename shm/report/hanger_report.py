@@ -69,38 +69,8 @@ def hanger_paper(data: HangerReport) -> Paper:
                 tables=[tables.frequencies(data)],
             ),
             short_gap_part(data),
-            Part(
-                "Test, alerts and notes",
-                paragraphs=[assumptions_line(data.hanger)],
-                tables=filled(
-                    tables.doubts(data),
-                    tables.latest_alerts(data),
-                    tables.inspections(data),
-                    tables.conditions(data),
-                ),
-            ),
-            *appendices(
-                Part("Figures", figures=lambda: hanger_figures(data, _further_figures(data))),
-                Part(
-                    "Numbers",
-                    tables=filled(
-                        tables.parameters(data),
-                        tables.models(data),
-                        tables.quality(data),
-                        tables.history(data),
-                        tables.alerts(data),
-                    ),
-                ),
-                *([gap_part(data)] if data.diagnosis else []),
-                Part(
-                    "Settings",
-                    tables=filled(
-                        tables.sampling(data),
-                        settings(data.settings),
-                        assumptions_table(data.hanger),
-                    ),
-                ),
-            ),
+            _events_part(data),
+            *_appendices(data),
         ),
         is_signed=True,
         letterhead=data.letterhead,
@@ -109,6 +79,46 @@ def hanger_paper(data: HangerReport) -> Paper:
         closing=f"{CREDIBLE}; times are UTC.",
         more=f"All of it: `shm report --hanger {data.hanger.id} --full`, or "
         f"`--out hanger{data.hanger.id}.pdf`.",
+    )
+
+
+def _events_part(data: HangerReport) -> Part:
+    """Return what was doubted, reported, noted and measured with."""
+    return Part(
+        "Test, alerts and notes",
+        paragraphs=[assumptions_line(data.hanger)],
+        tables=filled(
+            tables.doubts(data),
+            tables.latest_alerts(data),
+            tables.inspections(data),
+            tables.conditions(data),
+        ),
+    )
+
+
+def _appendices(data: HangerReport) -> tuple[Part, ...]:
+    """Return what only the page and `--full` show: figures, numbers, the gap, settings."""
+    return appendices(
+        Part("Figures", figures=lambda: hanger_figures(data, _further_figures(data))),
+        Part(
+            "Numbers",
+            tables=filled(
+                tables.parameters(data),
+                tables.models(data),
+                tables.quality(data),
+                tables.history(data),
+                tables.alerts(data),
+            ),
+        ),
+        *([gap_part(data)] if data.diagnosis else []),
+        Part(
+            "Settings",
+            tables=filled(
+                tables.sampling(data),
+                settings(data.settings),
+                assumptions_table(data.hanger),
+            ),
+        ),
     )
 
 

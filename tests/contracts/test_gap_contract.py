@@ -177,7 +177,7 @@ def test_an_adopted_cause_has_its_name() -> None:
     when, lineage = datetime(2026, 5, 1, tzinfo=UTC), Lineage("", "", "")
     stored = StoredDiagnosis(1, 3, diagnosis, when, lineage)
     name = adopted_name(("point_mass",), (), "", shm.load_hanger(ROD), stored, ())
-    assert str(name) == "beam1+point_mass@everywhere:x_m=3.38112..3.40278"
+    assert str(name) == "beam1+point_mass@everywhere:x_m=3.36973..3.42859"
 
 
 # ---------------------------------------------------------------- names and signatures
@@ -234,7 +234,7 @@ def test_outcomes_have_their_names() -> None:
         (2, ("missing.modes.json", "--hanger-file", ROD)),
         (3, (ROD, "--hanger-file", ROD)),
         (3, (calls.SOFT, "--hanger-file", calls.SOFT)),
-        (3, (calls.SOFT, "--hanger-file", ROD, "--hanger", 9)),
+        (4, (calls.SOFT, "--hanger-file", ROD, "--hanger", 9)),
         (3, ("empty.modes.json", "--hanger-file", ROD)),
     ],
 )

@@ -361,7 +361,7 @@ WRONG_CALLS: Mapping[str, tuple[int, tuple[object, ...]]] = {
     "update, few samples": (2, (*UPDATE, "--samples", 99)),
     "update, negative seed": (2, (*UPDATE, "--seed", -1)),
     "update, unknown priors": (2, (*UPDATE, "--priors", "mine")),
-    "update, unknown hanger": (3, (*UPDATE, "--hanger", 4)),
+    "update, unknown hanger": (4, (*UPDATE, "--hanger", 4)),
     "update, calibrated by no reading": (3, (*UPDATE, *CALIBRATED)),
     "update, thesis calibrated": (2, (*UPDATE, *CALIBRATED, "--priors", "thesis")),
     "select, missing file": (2, ("select", "there_is_none.modes.json")),

@@ -120,7 +120,7 @@ def test_a_chunk_is_read() -> None:
 @pytest.mark.parametrize(
     ("code", "words"),
     [
-        (3, ("alerts", "--hanger", 9)),
+        (4, ("alerts", "--hanger", 9)),
         (4, ("status", "--of", "nothing")),
         (4, ("ingest", "--confirm", 99)),
         (4, ("ingest", "--discard", 99, "--why", "a slip")),

@@ -128,7 +128,7 @@ def test_schemas_are_as_they_were() -> None:
 @pytest.mark.parametrize("name", [*calls.STATES, "deck"])
 def test_what_is_stored_of_a_test_is_read_and_written_back_as_it_was(name: str) -> None:
     known = calls.golden(name)["watch"]
-    back, level = watch_in(dump({**known, "alert_probability": 0.95}))
+    back, level, _ = watch_in(dump({**known, "alert_probability": 0.95}))
     assert (calls.read_back(watch_document(back)), level) == (known, 0.95)
 
 
@@ -138,9 +138,9 @@ def test_what_version_0_1_0_stored_of_a_test_is_read() -> None:
     del known["creep_per_year"], known["mistaken"]
     for key in ("material_probability", "against_baseline"):
         del known["change"][key]
-    back, _ = watch_in(dump(known))
+    back, _, alert = watch_in(dump(known))
     assert back.change.called
-    assert (back.creep_per_year, back.mistaken) == (None, ())
+    assert (back.creep_per_year, back.mistaken, alert) == (None, (), None)
 
 
 def test_fields_are_in_their_order() -> None:

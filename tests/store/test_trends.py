@@ -291,11 +291,11 @@ def test_clamped_ends_have_no_stiffness(file_store: Store) -> None:
 
 def test_a_database_of_before_the_summaries_answers_the_same(tmp_path: Path) -> None:
     path = tmp_path / "shm.db"
-    shutil.copyfile(Path(__file__).parent / "data" / "schema_0001.db", path)
+    shutil.copyfile(Path(__file__).parent / "data" / "schema_0014.db", path)
     Store.upgrade(path)
     with Store.open(path) as store:
         expected = from_history(store, HANGER_3)
-        assert len(expected) == 2
+        assert len(expected) == 3
         assert from_trend(store, HANGER_3) == expected
         assert store.posteriors.save_summaries(HANGER_3) > 0
         without_samples(store)

@@ -90,10 +90,10 @@ class Description:
 
 
 def described_bars(hanger: Hanger) -> Bars:
-    """Return the bars around a description, tension by 2 % and length by 1 %."""
+    """Return the bars around a description, in steps of 2 % of tension and 1 % of length."""
     told = Description.of(hanger)
     log_xi = told.log_xi + np.arange(-0.6, 0.6, 0.012)
-    unit = told.log_unit + np.linspace(-0.4, 0.4, 33)
+    unit = told.log_unit + np.linspace(-0.8, 0.8, 65)
     offset = np.broadcast_to(unit, (len(log_xi), len(unit)))
     prior = told.cost(offset, log_xi[:, np.newaxis])
     shift = turnbuckle_shift(hanger)

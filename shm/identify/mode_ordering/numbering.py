@@ -221,6 +221,7 @@ def _at_best_springs(
     shape = (*bars.offset.shape, bars.log_factor.shape[1])
     number = np.array(numbers, dtype=int).reshape(-1, *shape)
     cost = np.array(costs).reshape(-1, *shape)
+    _cut_off(number, cost, bars.missing_cost)
     total = np.where(number > 0, cost, FOREIGN).sum(axis=0)
     passed_over = number.max(axis=0, initial=0) - (number > 0).sum(axis=0)
     total += bars.missing_cost * passed_over
@@ -230,6 +231,18 @@ def _at_best_springs(
         np.take_along_axis(number, spring[np.newaxis], -1)[..., 0],
         np.take_along_axis(np.array(misfits).reshape(-1, *shape), spring[np.newaxis], -1)[..., 0],
     )
+
+
+def _cut_off(number: IntArray, cost: FloatArray, missing_cost: float) -> None:
+    """Make the highest modes foreign where that costs less than the orders they pass over."""
+    above = np.zeros(number.shape[1:], dtype=bool)
+    for mode in range(len(number) - 1, -1, -1):
+        passed_over = number[mode] - number[:mode].max(axis=0, initial=0) - 1
+        dear = cost[mode] + missing_cost * passed_over > FOREIGN
+        number[mode] = np.where(dear & ~above, 0, number[mode])
+        above |= number[mode] > 0
+        if above.all():
+            break
 
 
 def _shape_costs(plane: PlaneModes, bars: Bars, tolerance: float) -> FloatArray | None:
