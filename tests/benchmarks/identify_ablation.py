@@ -163,11 +163,15 @@ def of_world(*kinds: str) -> Callable[[int], Iterator[Test]]:
 
 
 def simulated(*faults: str) -> Callable[[int], Iterator[Test]]:
-    """Return what draws random hangers with each of the faults."""
+    """Return what draws random hangers with each of the faults; of none, their planes coincide."""
 
     def draw(seed: int) -> Iterator[Test]:
-        for fault in faults:
-            case = random_case(33, seed, fault)
+        for fault in faults or (None,):
+            number = seed
+            case = random_case(33, number, fault)
+            while not fault and not any(truth.merged for truth in case.truths):
+                number += 1000
+                case = random_case(33, number)
             truths = [
                 (truth.plane, truth.order, truth.frequency_hz)
                 for truth in case.truths
@@ -216,6 +220,7 @@ def turned(seed: int) -> Iterator[Test]:
 HZ = (6.0, 13.5, 23.0)
 Draw = Callable[[int], Iterator[Test]]
 STEPS: Mapping[str, tuple[tuple[tuple[Any, str, Any], ...], Draw]] = {
+    "close pairs": (((stabilise, "told_apart", lambda one, again, *_: (one, again)),), simulated()),
     "hits of both directions": (((identification, "alike", lambda _: False),), turned),
     "calm part": (((identification, "_once_calm", lambda *_: None),), guided),
     "closer look through the band": (

@@ -111,10 +111,14 @@ FAR = 1e6  # of a pair that must not be: far above the cost of any allowed one, 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A track of stable poles, and those of its poles that its estimates are taken from."""
+    """A track of stable poles, and those of its poles that its estimates are taken from.
+
+    `blur_hz` is a standard deviation of the frequency that no other hit or order shows.
+    """
 
     track: Track
     poles: tuple[Pole, ...]
+    blur_hz: float = 0.0
 
     @cached_property
     def frequency_hz(self) -> float:

@@ -237,7 +237,8 @@ def _alike(candidate: Candidate, shapes: FloatArray) -> float:
 
 def _within(candidate: Candidate) -> float:
     """Standard deviation of the frequency that all hits together have, in Hz."""
-    return float(order_sd([pole.frequency_hz for pole in candidate.poles]))
+    by_order = float(order_sd([pole.frequency_hz for pole in candidate.poles]))
+    return math.hypot(by_order, candidate.blur_hz)
 
 
 def _mode(

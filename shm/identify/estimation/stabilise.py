@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.identify.contract import Dropped, Finding, FoundMode, Poles
+from shm.identify.estimation.close_pairs import told_apart
 from shm.identify.estimation.poles import (
     Candidate,
     PoleSet,
@@ -63,8 +64,10 @@ def stabilised(
         without_each_hit = [[simultaneous(p, late_s) for p in of] for of in without_each_hit]
         candidates = [as_simultaneous(candidate, late_s) for candidate in candidates]
     single, doubles = resolved(candidates, seconds)
+    final = [poles for poles in sets if poles.order in orders]
     again = find_again(single, without_each_hit)
-    modes, kept, doubtful, refused = proven(single, again, options)
+    told, again = told_apart(single, again, (final, without_each_hit), seconds, options)
+    modes, kept, doubtful, refused = proven(told, again, options)
     lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in kept)
     followed = Dropped("poles", lost, "stable, but of a mode that was dropped")
     dropped = (*unstable, followed, *doubles, *refused)

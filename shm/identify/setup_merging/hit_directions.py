@@ -70,9 +70,10 @@ def sharpened(measurements: Sequence[Measurement], apart: Joined, found: Finding
     groups = matched((everything, everything), (found.modes, apart.finding.modes))
     pairs = [{seen.set_up: seen.mode for seen in group} for group in groups]
     modes = [_better(pair[0], pair.get(1), apart.points) for pair in pairs if 0 in pair]
-    for mode in [pair[1] for pair in pairs if 0 not in pair]:
+    missed = [pair[1] for pair in pairs if 0 not in pair]
+    for mode in missed:
         if not any(_same(mode, other) for other in modes):
-            beside = any(_near(mode, other) for other in modes)
+            beside = any(_near(mode, other) for other in [*modes, *missed] if other is not mode)
             modes.append(_turned(mode, _UNKNOWN_TURN, apart.points) if beside else mode)
     return _as_joined(measurements, replace(found, modes=_by_frequency(modes)))
 
