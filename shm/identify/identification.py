@@ -56,7 +56,7 @@ from shm.values import (
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """What a test says, and how it came to say so.
+    """Hold what a test says, and how it came to say so.
 
     `quality` holds a figure for everything that can be wrong with a test; `set_aside` what rings
     in it without being a mode of the hanger; `dropped` counts all that was left out with the

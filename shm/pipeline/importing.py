@@ -77,7 +77,7 @@ class Answers:
 
 @dataclass(frozen=True)
 class Question:
-    """What only a person knows: of a channel, or of the whole file where `channel` is empty.
+    """Hold what only a person knows: of a channel, or of the whole file where `channel` is empty.
 
     A file can be taken in without what is not `needed`. `choices` are the usual answers.
     """

@@ -177,7 +177,7 @@ def watch_test(
     kept: bytes | None = None,
     beside: Beside | None = None,
 ) -> WatchResult | None:
-    """What the watch says after a test, the alert that it calls for, and what to keep of it.
+    """Return what the watch says after a test, the alert that it calls for, what to keep of it.
 
     `tests` are those of the baseline and those since, the last of which is the one in question; or
     that one alone, with what was `kept` before it: None where nothing can go on from that. The

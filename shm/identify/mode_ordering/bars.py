@@ -69,7 +69,7 @@ class Bars:
 
 @dataclass(frozen=True)
 class Description:
-    """What a hanger's description says: `log_unit` of sqrt(EI/m)/(2 pi L^2) in Hz, `log_xi`."""
+    """State what a hanger describes: `log_unit` of sqrt(EI/m)/(2 pi L^2) in Hz, `log_xi`."""
 
     log_unit: float
     log_xi: float

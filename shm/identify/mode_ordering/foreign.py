@@ -126,7 +126,7 @@ def _lies_at(mode: FoundMode, tone: Tone) -> bool:
 
 
 def _is_steady(mode: FoundMode, modes: Sequence[FoundMode]) -> bool:
-    """Whether its damping is a small part of the others'."""
+    """Return True if its damping is a small part of the others'."""
     others = [each.damping_ratio for each in modes if each is not mode]
     return bool(others) and mode.damping_ratio < _STEADY * float(np.median(others))
 

@@ -18,7 +18,7 @@ from shm.values.rounding import listed
 
 @dataclass(frozen=True)
 class Reading:
-    """What a statistic comes to; `words` fill the row's sentences.
+    """Hold what a statistic comes to; `words` fill the row's sentences.
 
     `verdict`, `limit`, `found` and `remedy` take the place of the row's where they are given.
     """
