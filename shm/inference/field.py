@@ -23,6 +23,7 @@ loads U: the covariance is phi^2 S + tau^2 R + U U' with S = diag(s^2).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -186,7 +187,7 @@ class FieldLikelihood(MeasuredFrequencies):
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.hstack([np.log(scalars / self.frequency_hz) + self._shift, shapes])
 
-    def nodes(self, step_in_sd: float) -> list[NoiseNode]:
+    def frequency_nodes(self, step_in_sd: float) -> list[NoiseNode]:
         part = slice(self.frequencies)
         own, together, always = np.zeros((3, len(self.frequency_hz), len(self.frequency_hz)))
         own[part, part] = np.diag(self.identification_error[part] ** 2)
@@ -196,18 +197,31 @@ class FieldLikelihood(MeasuredFrequencies):
             always[-1, -1] = self.identification_error[-1] ** 2
         return [
             NoiseNode(
-                Covariance(
-                    phi**2 * own + tau**2 * together + always,
-                    np.full(self.shapes.size, of_shapes**2),
-                    np.empty((self.shapes.size, 0)),
-                ),
-                float(self._constant + share + log_phi + log_of_shapes),
+                Covariance.of_frequencies(phi**2 * own + tau**2 * together + always),
+                float(self._constant + share + log_phi),
                 float(tau),
             )
             for tau, share in zip(*self.sigma_grid(step_in_sd), strict=True)
             for phi, log_phi in zip(self._phi, self._log_phi, strict=True)
-            for of_shapes, log_of_shapes in self.shapes.factors
         ]
+
+    def nodes(self, step_in_sd: float) -> list[NoiseNode]:
+        return [
+            replace(
+                node,
+                covariance=replace(
+                    node.covariance,
+                    shape=np.full(self.shapes.size, factor**2),
+                    shape_loads=np.empty((self.shapes.size, 0)),
+                ),
+                log_weight=node.log_weight + log_weight,
+            )
+            for node in self.frequency_nodes(step_in_sd)
+            for factor, log_weight in self.shapes.factors
+        ]
+
+    def log_shapes(self, misfit: FloatArray) -> FloatArray:
+        return self.shapes.log_likelihood(misfit[:, len(self.frequency_hz) :])
 
     def explained(self, predicted: FloatArray) -> FloatArray:
         """Predictions (n, frequencies) from those of the data (n, data), with the sensors,

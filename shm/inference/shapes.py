@@ -109,6 +109,13 @@ class MeasuredShapes:
         weight = self._log_weight + self._log_scale
         return list(zip(np.exp(self._log_phi).tolist(), weight.tolist(), strict=True))
 
+    def log_likelihood(self, misfits: FloatArray) -> FloatArray:
+        """Return the log likelihood (n,) of misfits (n, size), all factors integrated out."""
+        if not self.size:
+            return np.zeros(len(misfits))
+        constant = self._log_scale - self.size * np.log(2 * np.pi) / 2
+        return np.asarray(scipy.special.logsumexp(self._joint(misfits), axis=1) + constant)
+
     def factor(self, misfits: FloatArray) -> float:
         """Return the most probable phi of misfits (1, size)."""
         return float(np.exp(self._log_phi[self._joint(misfits)[0].argmax()])) if self.size else 1.0
