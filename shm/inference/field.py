@@ -101,16 +101,28 @@ class FieldLikelihood(MeasuredFrequencies):
             self._constant -= np.log(tension)
         self.shapes = MeasuredShapes(tests if model.has_shapes else (), model.hanger)
         self._shapes_factor = SHAPES.loose
+        # Of no shape there are no places, and none costs anything.
+        self._places_m = self.shapes.places_m if self.shapes.size else np.empty(0)
+        self._modes = max(self.highest_order, self.shapes.highest_order)
+        self._tension = model.parameter_names.index(TENSION)
         self._together = self._goes_together()
         self._shift, self._loads = self._systematic(model, self._typical(model))
 
     def predict(self, model: Model, theta: FloatArray) -> FloatArray:
-        """The model's frequency for each datum (n, frequencies), in Hz, its ends as they usually
-        are.
+        """The model's frequencies in Hz, with its ends as they usually are, a tension that was read
+        in N, and misfits of shapes (n, data).
         """
-        bare = predicted_hz(model, theta, self._conditions, self._plane, self._order)
+        if isinstance(model, AsMade) and model.has_slopes and self.alike_conditions:
+            modes = model.modes_at(theta, self._modes, self._places_m)
+            bare, shapes = modes.frequency[:, self._plane, self._order], modes.deflection
+            misfits = self.shapes.misfits_of(shapes)
+        else:
+            bare = predicted_hz(model, theta, self._conditions, self._plane, self._order)
+            misfits = self.shapes.misfits(model, theta)
         ends = model.end_waves(theta, bare, self._plane)
-        return bare * np.exp(mean_of_ends(ends, model.stiff_ends_m, self._assumed))
+        found = bare * np.exp(mean_of_ends(ends, model.stiff_ends_m, self._assumed))
+        read = theta[:, [self._tension] * self.has_reading] * model.hanger.nominal_tension_n
+        return np.hstack([found, read, misfits])
 
     @property
     def alike_conditions(self) -> bool:
@@ -118,14 +130,20 @@ class FieldLikelihood(MeasuredFrequencies):
         return len(set(self._conditions)) == 1 and self._conditions[0].added_mass is None
 
     def changes(self, model: AsMade, theta: FloatArray, others: Sequence[FloatArray]) -> FloatArray:
-        """Return changes (n, frequencies, others) of ln of frequencies to near parameter sets.
+        """Return changes (n, data, others) of misfits to near parameter sets.
 
         To first order, and those of supports and sensors left out.
         """
-        found, near = model.frequencies_near(theta, others, self.highest_order)
+        found, near = model.modes_near(theta, others, self._modes, self._places_m)
+        here, column = self.shapes.misfits_of(found.deflection), [self._tension] * self.has_reading
+        changes = []
         with np.errstate(divide="ignore", invalid="ignore"):
-            change = np.log(near / found)[:, :, self._plane, self._order]
-        return np.moveaxis(change, 0, -1)
+            for other, modes in zip(others, near, strict=True):
+                ratio = (modes.frequency / found.frequency)[:, self._plane, self._order]
+                read = other[:, column] / theta[:, column]
+                moved = self.shapes.misfits_of(modes.deflection) - here
+                changes.append(np.hstack([np.log(np.hstack([ratio, read])), moved]))
+        return np.stack(changes, axis=2)
 
     def settle(self, model: Model, theta: FloatArray) -> None:
         super().settle(model, theta)
