@@ -227,9 +227,11 @@ class _Matrices:
         found = []
         for plane in (0, 1):
             whitened, back = self._whitened(*self.factors(terms, plane))
-            square, vectors = np.linalg.eigh(whitened)
-            seen = table @ back(vectors[:, :, :modes])
-            found.append(_modes(square[:, :modes], seen))
+            if len(table):
+                square, vectors = np.linalg.eigh(whitened)
+            else:
+                square, vectors = np.linalg.eigvalsh(whitened), whitened
+            found.append(_modes(square[:, :modes], table @ back(vectors[:, :, :modes])))
         return _of_planes(found)
 
     def modes_about(
