@@ -177,10 +177,11 @@ class BarOfTerms:
         )
         mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
         masses_kg = mass_kg * rng.uniform(0, 0.2, (n, places))
+        shorter = rng.uniform(1 - 2 * plate_m / hanger.length_m, 1.0, n)
         values = replace(
             values,
-            section=rng.uniform(1 - 2 * plate_m / hanger.length_m, 1.0, n) ** -2,
             shear=np.exp(rng.uniform(math.log(flexible[0]), math.log(flexible[1]), n)),
+            section=np.exp(hanger.scatter.section * rng.standard_normal(n)) / shorter**2,
         )
         return self.terms(values, masses_kg)
 

@@ -171,13 +171,11 @@ class _Matrices:
         return _Matrices(stiffness, mass, self.zones, self.shears)
 
     def diagonalised(self, usual: BarTerms) -> FloatArray:
-        """Return a change of basis (d, d) in which all masses like `usual` are diagonal.
+        """Return a change of basis (d, d) in which masses like `usual` are as diagonal as can be.
 
-        The identity where they are combinations of more than two matrices.
+        Two matrices are made so at once: the mean mass and what it varies by.
         """
         factors = self.factors(usual, 0)[1]
-        if _rank(factors) > _TWO:
-            return np.eye(self.mass.shape[1])
         mean, spread = factors.mean(axis=0), factors.std(axis=0)
         _, vectors = scipy.linalg.eigh(
             np.tensordot(spread, self.mass, 1), np.tensordot(mean, self.mass, 1)
@@ -186,7 +184,10 @@ class _Matrices:
 
     def with_masses_of(self, usual: BarTerms) -> _Matrices:
         """Return the same, with the note whether masses like `usual` are diagonal."""
-        return replace(self, diagonal_mass=_rank(self.factors(usual, 0)[1]) <= _TWO)
+        mass = _sum(self.factors(usual, 0)[1], self.mass)
+        size = np.sqrt(np.einsum("nii->ni", mass))
+        beside = np.abs(mass / size[:, :, None] / size[:, None, :] - np.eye(mass.shape[1]))
+        return replace(self, diagonal_mass=bool(beside.max() < _BESIDE))
 
     def factors(self, terms: BarTerms, plane: int) -> tuple[FloatArray, FloatArray]:
         """Return the factors (n, terms) of stiffness and mass in one plane."""
@@ -312,13 +313,8 @@ def _of_planes(planes: Sequence[Modes]) -> Modes:
     )
 
 
-def _rank(factors: FloatArray) -> int:
-    """Return of how many combinations of columns all rows of factors (n, terms) are made."""
-    size = np.linalg.svd(factors, compute_uv=False)
-    return int(np.sum(size > _SMALL * size[0]))
-
-
-_TWO, _SMALL = 2, 1e-9
+_BESIDE = 1e-4
+"""Numerical: of the diagonal, off it; a frequency changes by its square."""
 
 
 def _energies(matrices: FloatArray, shapes: FloatArray) -> FloatArray:
