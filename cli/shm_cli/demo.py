@@ -158,7 +158,7 @@ def bridge_description() -> str:
         '[bridge]\nname = "Arch bridge of the demo"',
         '[[hook]]\nname = "file"\ncommand = ["tee", "-a", "alerts.jsonl"]',
         '[settings]\nworkers = 2\nmodels = "beam1,beam2"\n'
-        "spool_scan_seconds = 0.5\nspool_stable_seconds = 0.5",
+        "spool_scan_seconds = 0.5\nspool_stable_seconds = 0.5\nalert_grouping_seconds = 5",
     ]
     for number in range(1, HANGERS + 1):
         name = 'name = "measured for the thesis"\n' if number == MEASURED else ""
