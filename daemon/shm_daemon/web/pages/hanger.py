@@ -53,13 +53,11 @@ _EVENTS = {
     EventKind.UNDONE: "adoption undone",
     EventKind.ACKNOWLEDGED: "alert acknowledged",
 }
-_TABLES = (
-    hanger_tables.results,
-    hanger_tables.frequencies,
-    hanger_tables.parameters,
-    hanger_tables.models,
-    hanger_tables.quality,
-)
+_TABLES = {
+    "numbers": (hanger_tables.results, hanger_tables.frequencies),
+    "model": (hanger_tables.models, hanger_tables.parameters),
+    "tests": (hanger_tables.quality, hanger_tables.conditions),
+}
 _TYPES = {"pdf": "application/pdf", "html": "text/html; charset=utf-8"}
 # Judgement: a report takes 5 to 15 s; a browser's user waits for a minute, hardly longer.
 _LONGEST_S = 60.0
@@ -124,9 +122,9 @@ def all_tests(request: Request, _: Reader, view: View, before: Before = None) ->
 def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
     lead = report.now.message
     assert lead.status is not None  # a hanger with a test has one
-    tables = [make(report) for make in _TABLES]
+    tables = {part: [make(report) for make in of] for part, of in _TABLES.items()}
     if view.states is not None:
-        tables.insert(2, temperature_table(view.states))
+        tables["numbers"].append(temperature_table(view.states))
     return {
         "status_word": lead.status.value,
         "style": lead.status.name.lower(),
@@ -138,13 +136,12 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
             part: [_chart(view, e) for e in FIGURES if e.part == part and e.is_there(view)]
             for part in ("trends", "model", "gap")
         },
-        "tables": [table for table in tables if table.rows],
+        "tables": {part: [each for each in of if each.rows] for part, of in tables.items()},
         "alerts": hanger_tables.alerts(report),
         "events": _events(view),
         "gap": gap_part(report),
         "answers": answers(view.sheet) if view.sheet else (),
         "evidence": evidence(view.sheet) if view.sheet else (),
-        "origin": hanger_tables.conditions(report),
     }
 
 
