@@ -39,6 +39,15 @@ _DRAW_ALL = """async (longest_ms) => {
   scrollTo(0, 0);
   return charts.filter(undrawn).map((chart) => chart.innerText || chart.dataset.figure);
 }"""
+# Figures of a part that was hidden take their new width a moment after it is shown.
+_WIDTH = """async () => {
+  const whole = document.documentElement;
+  const end = Date.now() + 5000;
+  while (whole.scrollWidth > whole.clientWidth && Date.now() < end) {
+    await new Promise((done) => setTimeout(done, 50));
+  }
+  return whole.scrollWidth;
+}"""
 _RULES = {"resultTypes": ["violations"]}
 _COLOURS = {**_RULES, "runOnly": {"type": "rule", "values": ["color-contrast"]}}
 _AXE = Axe()
@@ -94,7 +103,7 @@ def undrawn_charts(page: Page) -> list[str]:
 
 
 def faults(page: Page, *, colours_only: bool = False) -> list[str]:
-    """What axe-core calls serious or critical in any tab; not of the insides of plotly's drawings."""
+    """Return what axe-core calls serious or critical in any tab, but for what plotly draws."""
     tabs = page.get_by_role("tab").all()
     found = [] if tabs else _faults_shown(page, colours_only)
     for tab in tabs:
@@ -119,5 +128,5 @@ def width_px(page: Page) -> int:
     widest = 0
     for show in [tab.click for tab in page.get_by_role("tab").all()] or [lambda: None]:
         show()
-        widest = max(widest, page.evaluate("document.documentElement.scrollWidth"))
+        widest = max(widest, page.evaluate(_WIDTH))
     return widest

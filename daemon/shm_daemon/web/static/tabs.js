@@ -12,6 +12,7 @@
       button.setAttribute("aria-selected", String(isChosen));
       button.tabIndex = isChosen ? 0 : -1;
     }
+    dispatchEvent(new Event("resize")); // a figure that was hidden has missed it
   }
 
   function tabOf(tabs, address) {
