@@ -28,7 +28,12 @@ def working(workspace: Workspace) -> Iterator[Flow]:
         stack.enter_context(children_ended())
         executor = executor_of(settings)
         stack.callback(executor.shutdown, wait=False, cancel_futures=True)
-        notifier = HookNotifier(workspace.folder, settings.hook_timeout_seconds, os.environ)
+        notifier = HookNotifier(
+            workspace.folder,
+            settings.hook_timeout_seconds,
+            os.environ,
+            settings.pages_address,
+        )
         stack.callback(notifier.close)
         flow = Flow(workspace, store, executor, notifier=notifier, lanes=settings.workers)
         stack.callback(flow.close)

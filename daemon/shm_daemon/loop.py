@@ -106,7 +106,12 @@ def _begin(
     store = stack.enter_context(workspace.store())
     stack.enter_context(children_ended())
     if notifier is None:
-        notifier = HookNotifier(workspace.folder, settings.hook_timeout_seconds, os.environ)
+        notifier = HookNotifier(
+            workspace.folder,
+            settings.hook_timeout_seconds,
+            os.environ,
+            settings.pages_address,
+        )
         stack.callback(notifier.close)
     executor = make_executor(settings)
     flow = Flow(

@@ -109,8 +109,10 @@ class FieldLikelihood(MeasuredFrequencies):
         self._shift, self._loads = self._systematic(model, self._typical(model))
 
     def predict(self, model: Model, theta: FloatArray) -> FloatArray:
-        """The model's frequencies in Hz, with its ends as they usually are, a tension that was read
-        in N, and misfits of shapes (n, data).
+        """Return predictions of all data (n, data).
+
+        Frequencies in Hz with ends as they usually are, a tension that was read in N, and misfits
+        of shapes.
         """
         if isinstance(model, AsMade) and model.has_slopes and self.alike_conditions:
             modes = model.modes_at(theta, self._modes, self._places_m)

@@ -51,9 +51,7 @@ class MeasuredFrequencies(ABC):
 
     @abstractmethod
     def frequency_nodes(self, step_in_sd: float) -> list[NoiseNode]:
-        """Return the possible errors of frequencies, those of one sigma together, as the grid has
-        them.
-        """
+        """Return the possible errors of frequencies, those of one sigma of the grid together."""
 
     def nodes(self, step_in_sd: float) -> list[NoiseNode]:
         """Return the possible errors of all data."""

@@ -117,8 +117,9 @@ class ReducedBar:
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes of n hangers in both planes: circular `frequency` (n, 2, modes), and `deflection`
-    (n, 2, modes, points), each mode's of any size.
+    """Hold modes of n hangers in both planes.
+
+    Circular `frequency` (n, 2, modes), and `deflection` (n, 2, modes, points), each of any size.
     """
 
     frequency: FloatArray

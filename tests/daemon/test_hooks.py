@@ -86,6 +86,13 @@ def test_what_a_hook_answers_is_told(tmp_path: Path) -> None:
     assert notifier(python("pass"), an_alert()) == "exit code 0"
 
 
+def test_an_alert_links_to_the_page_that_it_is_about(tmp_path: Path) -> None:
+    notifier = HookNotifier(tmp_path, 30.0, ENVIRONMENT, "https://shm.example.org/")
+    told = python("import json, sys; print(json.load(sys.stdin).get('link', 'none'))")
+    assert notifier(told, an_alert()).endswith("https://shm.example.org/hangers/3#alerts")
+    assert a_notifier(tmp_path)(told, an_alert()).endswith("none")
+
+
 def test_a_hook_that_does_not_listen_has_not_failed(tmp_path: Path) -> None:
     assert a_notifier(tmp_path)(CommandHook("mail", ("true",)), an_alert()) == "exit code 0"
 

@@ -33,14 +33,14 @@ def put(client: httpx.Client, key: str, value: str, back: bool = False) -> httpx
 
 
 def filled_in(key: str, opened: str, back: bool = False, **values: str) -> dict[str, str]:
-    """The form of a page opened at `opened`, with what a person wrote in one setting's fields."""
+    """Fill in one setting's fields in the form of a page opened at `opened`."""
     told = {f"{part}.{key}": value for part, value in values.items()}
     told |= {f"was_{part}.{key}": "as it was" for part in values}
     return {**told, f"based_on.{key}": opened or "0", **({f"back.{key}": "on"} if back else {})}
 
 
 def based_on(client: httpx.Client, key: str) -> str:
-    """What the form of a page that is opened now carries."""
+    """Read what the form of a page that is opened now carries."""
     page = client.get("/settings?hanger=3").text
     found = re.search(f'name="based_on.{re.escape(key)}" value="([0-9]+)"', page)
     return found[1] if found else ""

@@ -35,8 +35,10 @@ def send_test_alert(
     Raises HookFailed or DeliveryRefused where it did not arrive, NothingThere without a hanger.
     """
     alert = make_test_alert(workspace.bridge, hook, now)
-    timeout_s = workspace.settings.hook_timeout_seconds
-    notifier, began = HookNotifier(workspace.folder, timeout_s, environment), time.monotonic()
+    settings, began = workspace.settings, time.monotonic()
+    notifier = HookNotifier(
+        workspace.folder, settings.hook_timeout_seconds, environment, settings.pages_address
+    )
     try:
         answer = notifier(hook, alert)
     finally:
