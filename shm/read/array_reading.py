@@ -1,4 +1,4 @@
-"""What each named array of a file is for: a channel, a frequency response, times, or nothing."""
+"""Give each named array of a file its role: a channel, a frequency response, times, or none."""
 
 from __future__ import annotations
 

@@ -1,13 +1,14 @@
-"""Named arrays, as HDF5, MATLAB, TDMS and NumPy files hold them, before they are loaded, and the
-one layout in which they are looked for and NumPy's are written.
+"""Describe the named arrays of HDF5, MATLAB, TDMS and NumPy files before they are loaded.
+
+This is the one layout that readers look for and that NumPy files are written in:
 
     force, acc_1, ...                     time records, N and m/s^2, float64 (samples,)
     frequency_hz                          of frequency responses, float64 (lines,)
     NAME, NAME_coherence                  accelerance, m/s^2/N, complex128; coherence, float64
-    hanger, time, temperature_c, sampling_rate_hz     of the whole, as far as they are known
+    hanger, time, temperature_c, sampling_rate_hz     of the recording, as far as they are known
     unit, plane, x_m, full_scale          of each channel, as far as they are known
 
-HDF5 and TDMS keep what belongs to the whole or to a channel as attributes (properties); NumPy and
+HDF5 and TDMS hold the facts of the recording and of a channel as attributes (properties); NumPy and
 MATLAB files as further arrays, NAME_unit and so on.
 """
 
@@ -66,12 +67,12 @@ class Variable:
 
     @property
     def is_series(self) -> bool:
-        """Whether it can be a channel: numbers in one row."""
+        """Return whether it can be a channel: numbers in one row."""
         return self.kind in "iufc" and len(self.shape) == 1 and self.size > 1
 
     @property
     def is_fact(self) -> bool:
-        """Whether it is a single number or a short text."""
+        """Return whether it is a single number or a short text."""
         return self.size <= _MOST_TEXT if self.kind == "U" else self.size == 1
 
 
@@ -85,10 +86,10 @@ class Arrays:
 
 
 def arranged(arrays: Arrays) -> Arrays:
-    """The same with single numbers and texts as attributes, and tables as single rows.
+    """Return arrays with single numbers and texts as attributes, and tables as single rows.
 
-    `acc_1_unit` becomes the attribute `unit` of `acc_1`, other facts those of the whole. The rows
-    or columns of a table DATA, whichever are longer, become DATA_1, DATA_2, ...
+    `acc_1_unit` becomes the attribute `unit` of `acc_1`; other facts become general attributes.
+    The rows or columns of a table DATA, whichever are longer, become DATA_1, DATA_2, ...
     """
     facts = {v.name: _fact(v) for v in arrays.variables if v.is_fact}
     series = [part for v in arrays.variables if not v.is_fact for part in _parts(v)]
@@ -100,12 +101,12 @@ def arranged(arrays: Arrays) -> Arrays:
 
 
 def own_facts(name: str, facts: Mapping[str, object]) -> dict[str, object]:
-    """What facts such as acc_1_unit say about acc_1."""
+    """Return the facts about `name` by channel key: `acc_1_unit` is the unit of acc_1."""
     return {key: facts[f"{name}_{key}"] for key in CHANNEL_KEYS if f"{name}_{key}" in facts}
 
 
 def plain(value: object) -> object:
-    """An attribute as text, number or time; None for anything else."""
+    """Return an attribute as text, number or time; None for any other type."""
     if isinstance(value, np.ndarray):
         return plain(value.ravel()[0]) if value.size == 1 else None
     if isinstance(value, np.datetime64):
@@ -118,19 +119,19 @@ def plain(value: object) -> object:
 
 
 def attributes_of(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
-    """Attributes that have a plain value, by lower-case name."""
+    """Return attributes that have a plain value, by lower-case name."""
     found = {str(key).lower(): plain(value) for key, value in pairs}
     return {key: value for key, value in found.items() if value is not None}
 
 
 def natural(name: str) -> list[tuple[int, int, str]]:
-    """Sorts acc_2 before acc_10."""
+    """Return a sort key that places acc_2 before acc_10."""
     pieces = re.split(r"(\d+)", name.lower())
     return [(1, int(p), "") if p.isdecimal() and p.isascii() else (0, 0, p) for p in pieces]
 
 
 def named_apart(paths: Sequence[tuple[str, ...]]) -> list[str]:
-    """The last part of each path where that is unique, else the path with slashes."""
+    """Return the last part of each path where that is unique, else the path with slashes."""
     last = [path[-1] for path in paths]
     return [path[-1] if last.count(path[-1]) == 1 else "/".join(path) for path in paths]
 
@@ -143,7 +144,7 @@ def _fact(variable: Variable) -> object:
 
 
 def _parts(variable: Variable) -> list[Variable]:
-    """The variable itself in one row, or the rows of a table."""
+    """Return the variable itself in one row, or the rows of a table."""
     lengths = [length for length in variable.shape if length != 1]
     if variable.kind not in "iufc" or len(lengths) < 2:
         shape = tuple(lengths) or (1,)
@@ -194,7 +195,7 @@ class Layout:
 
 
 def layout_of(described: Recording | FrequencyResponse) -> Layout:
-    """The arrays of a recording or of frequency responses.
+    """Return the arrays of a recording or of frequency responses.
 
     Raises UsageError for names that some program could not take or take apart.
     """

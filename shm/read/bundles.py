@@ -40,7 +40,7 @@ T = TypeVar("T")
 
 
 def holds_test(path: Path) -> bool:
-    """Whether a name is that of an archive with the files of one test."""
+    """Return whether a name is that of an archive with the files of one test."""
     return path.suffix.lower() == SUFFIX
 
 
@@ -93,15 +93,15 @@ def _start_of_phyphox(path: Path) -> dict[str, Entry]:
 
 
 def each_member(path: Path, verb: Callable[[Path, str], T]) -> tuple[T, ...]:
-    """What `verb` gives for each recording of an archive and its name to the outside."""
+    """Return the results of `verb` for each recording of an archive and its member name."""
     with unpacked(path) as files:
         return tuple(verb(file, str(path / file.name)) for file in files)
 
 
 def entries_of_test(path: Path) -> Header:
-    """What the sidecar of the archive says of the whole test.
+    """Return the header that the sidecar of an archive gives for the complete test.
 
-    Raises BadInput where it lists something of channels by their order.
+    Raises BadInput for lists of channel values, as their order is undefined in an archive.
     """
     for key in document_beside(path).keys() & {*CHANNEL_KEYS}:
         raise BadInput(
@@ -115,11 +115,11 @@ def entries_of_test(path: Path) -> Header:
 
 
 def bundle(paths: Sequence[Path], archive: Path) -> Path:
-    """Writes the files of one test, with their sidecars, to a .zip, whole or not at all.
+    """Write the files of one test, with their sidecars, to a .zip, and return its path.
 
-    Gives the path of the archive.
-    The same files give the same bytes: names are sorted, times fixed and nothing is compressed.
-    Raises UsageError for two files of one name, an archive among them, or too many.
+    The same files give the same bytes: names are sorted, times fixed, contents stored
+    uncompressed. An interrupted write leaves no archive. Raises UsageError for two files of one
+    name, an archive among them, or too many.
     """
     files = sorted({*paths, *(s for p in paths if (s := sidecar_path(p)).is_file() and s != p)})
     names = [file.name for file in files]
@@ -146,7 +146,10 @@ def _pack(files: Sequence[Path], target: Path) -> None:
 def _unpack_all(
     archive: zipfile.ZipFile, members: Sequence[zipfile.ZipInfo], folder: Path
 ) -> list[Path]:
-    """All members in one folder; raises BadInput where two have one name or all are too large."""
+    """Unpack all members into one folder and return their paths.
+
+    Raises BadInput where two have one name or all are too large.
+    """
     files: list[Path] = []
     left = limits().bytes_at_once
     for member in members:

@@ -159,7 +159,7 @@ class _Text:
         )  # fmt: skip
 
     def _points(self) -> dict[str, dict[str, int]]:
-        """The columns of each point; a point without a name is point_1, point_2, ..."""
+        """Return the columns of each point; a point without a name is point_1, point_2, ..."""
         places: dict[str, dict[str, int]] = {}
         for place, column in enumerate(self.names[1:], start=1):
             found = _PART.fullmatch(column)
@@ -185,7 +185,7 @@ class _Text:
                 raise self._refusal(what, "Give each column its own name", self.at, name)
 
     def _header(self, names: Sequence[str]) -> tuple[Header, tuple[str, ...]]:
-        """What the lines before the names say, and remarks on keys not known."""
+        """Return the header of the lines above the names, and remarks on unknown keys."""
         channels: dict[str, dict[str, Entry]] = {name: {} for name in names}
         keys = {f"{a}{dot}{b}": (n, k) for n in names for k in CHANNEL_KEYS for dot in "._ "
                 for a, b in ((n.lower(), k), (k, n.lower()))}  # fmt: skip
@@ -214,12 +214,12 @@ class _Text:
         return Header(self.path, channels, entries), tuple(remarks)
 
     def _body(self, start: int) -> list[tuple[int, str]]:
-        """The lines with numbers, each with its number."""
+        """Return the lines with numbers, each with its number."""
         body = [(i + 1, self.lines[i]) for i in range(start, len(self.lines))]
         return [(i, line) for i, line in body if line.strip(" \t\x1a") and not _is_remark(line)]
 
     def _numbers(self, body: list[tuple[int, str]]) -> FloatArray:
-        """All columns (columns, rows), empty cells as NaN."""
+        """Return all columns (columns, rows), empty cells as NaN."""
         if self.mark != ",":
             body = [(i, line.replace(",", ".")) for i, line in body]
         lines = [line for _, line in body]
@@ -290,7 +290,7 @@ def _write(described: Recording | FrequencyResponse, path: Path) -> None:
 
 
 def recording_text(recording: Recording) -> str:
-    """Rows of nine digits, one more than a 24-bit converter gives."""
+    """Return rows of nine digits, one more than a 24-bit converter gives."""
     channels = recording.channels
     said = {
         "sampling_rate_hz": recording.sampling_rate_hz,
@@ -302,7 +302,7 @@ def recording_text(recording: Recording) -> str:
 
 
 def response_text(response: FrequencyResponse) -> str:
-    """A column of frequencies, then of each point real and imaginary part and coherence."""
+    """Return a column of frequencies, then of each point real and imaginary part and coherence."""
     columns = {"frequency": response.frequency_hz}
     for row, point in enumerate(response.points):
         columns[f"{point.name}_real"] = response.accelerance[row].real
@@ -340,7 +340,7 @@ def _places(points: Sequence[Channel] | Sequence[ResponsePoint]) -> dict[str, ob
 
 
 def _said(value: object) -> str:
-    """A value, or one a column, as text; what is not known is empty."""
+    """Return a value, or a list of one for each column, as text; empty where unknown."""
     if isinstance(value, list):
         return ", ".join(map(_said, value))
     if value is None or (isinstance(value, float) and math.isnan(value)):

@@ -1,4 +1,4 @@
-"""What a file and its sidecar say about a recording, each entry with the place where it says so."""
+"""Collect the entries of a file and its sidecar about a recording, each with its file and line."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Header:
     entries: Mapping[str, Entry] = field(default_factory=dict)
 
     def overridden_by(self, other: Header) -> Header:
-        """This header with what `other` says in its place."""
+        """Return this header with the entries of `other` in place of its equal keys."""
         channels = {
             name: {**own, **other.channels.get(name, {})} for name, own in self.channels.items()
         }
@@ -65,7 +65,7 @@ class Header:
 
     @property
     def of_test(self) -> dict[str, Any]:
-        """What it says of the whole test: hanger, time, temperature, known mass."""
+        """Return the entries about the complete test: hanger, time, temperature, known mass."""
         return {key: getattr(self, key) for key in OF_TEST}
 
     @property
@@ -137,7 +137,7 @@ class Header:
         return rate
 
     def quantity_and_unit(self, name: str) -> tuple[Quantity, Unit]:
-        """What a channel measures, by its unit; by its name, in SI, where no unit is given."""
+        """Return the quantity and unit of a channel: by its unit, else by its name, in SI."""
         entry = self.channels[name].get("unit")
         named = quantity_named(name)
         if entry is None or not entry.text:
@@ -158,7 +158,7 @@ class Header:
         return unit.quantity, unit
 
     def unit_text(self, name: str) -> str:
-        """The unit as written; the SI unit of what the name says where none is written."""
+        """Return the unit as written, else the SI unit of the quantity that the name gives."""
         entry = self.channels[name].get("unit")
         named = quantity_named(name)
         if entry is not None and entry.text:
@@ -166,7 +166,7 @@ class Header:
         return SI[named] if named else ""
 
     def accelerance_si(self, name: str) -> float:
-        """Factor of a frequency response to m/s^2/N, by its unit; 1 where none is given."""
+        """Return the factor of a frequency response to m/s^2/N by its unit; 1 without a unit."""
         text = self.unit_text(name) if self.says(name, "unit") else ACCELERANCE
         factor = accelerance_si(text, "")
         if factor is None or unit_of(text) is not None:
@@ -178,7 +178,7 @@ class Header:
         return factor
 
     def calibration(self, name: str) -> float:
-        """Units of `unit` per recorded unit, NaN where the values are recorded in `unit`."""
+        """Return the units of `unit` per recorded unit, NaN where values are recorded in `unit`."""
         if not self.says(name, "calibration"):
             return NAN
         entry = self.channels[name]["calibration"]
@@ -188,7 +188,7 @@ class Header:
         return factor
 
     def full_scale(self, name: str) -> float:
-        """The largest value that can be recorded, in `unit`; NaN where nobody says."""
+        """Return the largest value that can be recorded, in `unit`; NaN if unknown."""
         if not self.says(name, "full_scale"):
             return NAN
         entry = self.channels[name]["full_scale"]
@@ -198,11 +198,11 @@ class Header:
         return largest
 
     def leaves_out(self, name: str) -> bool:
-        """Whether a channel is not to be used."""
+        """Return whether a channel is not to be used."""
         return self.says(name, "leave_out") and says_yes(self.channels[name]["leave_out"])
 
     def says(self, name: str, key: str) -> bool:
-        """Whether anything is given for a key of a channel."""
+        """Return whether anything is given for a key of a channel."""
         entry = self.channels[name].get(key)
         return entry is not None and bool(entry.text)
 
@@ -229,7 +229,7 @@ class Header:
 
 
 def quantity_named(name: str) -> Quantity | None:
-    """What a channel measures by its name: force..., hammer..., acc..."""
+    """Return the quantity that a channel's name gives: force..., hammer..., acc...; else None."""
     lowered = name.lower()
     if lowered.startswith(("force", "hammer")):
         return "force"
@@ -237,7 +237,7 @@ def quantity_named(name: str) -> Quantity | None:
 
 
 def says_yes(entry: Entry) -> bool:
-    """The truth of `leave_out`; raises BadInput for anything but true and false."""
+    """Return the truth of `leave_out`; raises BadInput for anything but true and false."""
     if entry.text.lower() not in ("true", "false"):
         raise entry.refusal(
             f"leave_out = {entry.text!r} is neither true nor false.", "Give leave_out = true."
@@ -248,7 +248,7 @@ def says_yes(entry: Entry) -> bool:
 def spread(
     key: str, values: Sequence[Entry], names: Sequence[str], where: Entry
 ) -> dict[str, Entry]:
-    """The values of a list, one a channel, by channel name.
+    """Return the values of a list, one a channel, by channel name.
 
     One value alone, and a list as long as the accelerations, goes to the accelerations, except
     that units, calibrations and full scales must be given for all channels.
@@ -267,7 +267,7 @@ def spread(
 
 
 def _number(entry: Entry, key: str, remedy: str, channel: str = "") -> float:
-    """A finite number, or NaN where it is written as such."""
+    """Return a finite number, or NaN where it is written as such."""
     text = entry.text
     if "," in text and "." not in text:
         text = text.replace(",", ".")
@@ -289,7 +289,7 @@ def _radius_m(entry: Entry) -> float:
 
 
 def mass_entries(added_mass: AddedMass | None) -> dict[str, float]:
-    """The entries that say of a known mass; none where there is none."""
+    """Return the entries that describe a known mass; empty where there is none."""
     if added_mass is None:
         return {}
     said = {"added_mass_kg": added_mass.mass_kg, "added_mass_at_m": added_mass.x_m}

@@ -1,7 +1,7 @@
-"""What stands above the numbers of a logger's text: names, units, rate, time, hanger.
+"""Parse the heading above the numbers of a logger's text: names, units, rate, time, hanger.
 
-Names and units may stand in one row (`Kraft [N]`), in two, or in rows that begin with a label
-(`Einheit;s;N;g`). All else is lines of a key and its value.
+Names and units may be in one row (`Kraft [N]`), in two, or in rows that begin with a label
+(`Einheit;s;N;g`). All other lines are a key and its value.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Heading:
 
 
 def heading_of(above: Sequence[str], script: Script) -> Heading:
-    """What the lines above the numbers say."""
+    """Return the heading that the lines above the numbers give."""
     rows = {
         place: cells
         for place, line in enumerate(above)
@@ -92,7 +92,7 @@ def _axes_named(cells: list[str]) -> list[str]:
 
 
 def _cells(line: str, script: Script) -> list[str]:
-    """The cells of a line without empty ones at its end, and without a sign of remarks."""
+    """Return the cells of a line without empty ones at its end, and without a sign of remarks."""
     plain = line.lstrip("\ufeff#%! ") if line.strip() else ""
     cells = _blank_parted(plain, script) if script.mark == " " else script.cells(plain)
     while cells and not cells[-1]:
@@ -101,7 +101,7 @@ def _cells(line: str, script: Script) -> list[str]:
 
 
 def _blank_parted(line: str, script: Script) -> list[str]:
-    """The names above columns that blanks part: a name may hold one, before its unit."""
+    """Return the names above columns that blanks part: a name may hold one, before its unit."""
     wide = [cell for cell in re.split(r"\s{2,}|\t", line.strip()) if cell]
     if len(wide) == len(script.kinds):
         return wide
@@ -121,14 +121,14 @@ def _no_label(text: str, is_first: bool) -> str:
 
 
 def _names_at(rows: dict[int, list[str]], script: Script) -> int:
-    """The row that names the columns, -1 where none does: what is understood, then the last."""
+    """Return the index of the row that names the columns, the last of the best; -1 for none."""
     scored = {place: _score(cells, script) for place, cells in rows.items()}
     best = max(scored, key=lambda place: (scored[place], place), default=-1)
     return best if best >= 0 and scored[best] > 0 else -1
 
 
 def _score(cells: Sequence[str], script: Script) -> float:
-    """How well a row names the columns of numbers; 0 where it leaves one without a name."""
+    """Return the score of a row as column names; 0 where it leaves numbers without a name."""
     needed = [c for c, kind in zip(cells, script.kinds, strict=True) if kind == "number"]
     named = [cell for cell in needed if cell and not is_number(cell, script.decimal)]
     if not named or all(map(words.is_unit, named)) or cells[0].endswith(":"):
@@ -148,7 +148,7 @@ def _is_understood(cell: str) -> bool:
 
 
 def _units_at(rows: dict[int, list[str]], names_at: int, script: Script) -> int:
-    """The row of units nearest to the names, -1 where there is none."""
+    """Return the row of units nearest to the names, -1 where there is none."""
     fitting = [place for place, cells in rows.items() if _are_units(cells, script)]
     return min(fitting, key=lambda place: abs(place - names_at), default=-1)
 
@@ -191,7 +191,7 @@ def with_channel_units(heading: Heading, above: Sequence[str]) -> Heading:
 
 
 def unlike(names: Sequence[str]) -> tuple[str, ...]:
-    """Names of printable characters, each once; a column without one by its number."""
+    """Return names of printable characters, each once; a column without one by its number."""
     taken: list[str] = []
     for place, name in enumerate(names, start=1):
         plain = "".join(c for c in name if c.isprintable() and ord(c) < 0x10000)[:60].strip()
@@ -204,7 +204,7 @@ def unlike(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _fact_at(place: int, above: Sequence[str], script: Script) -> tuple[str, str] | None:
-    """The fact of a line; where that is a key alone, `dt:`, its value is the line below."""
+    """Return the fact of a line; where that is a key alone, `dt:`, its value is the line below."""
     plain = above[place].strip()
     if plain.endswith(":") and plain.count(":") == 1 and place + 1 < len(above):
         below = _cells(above[place + 1], script)
@@ -213,7 +213,7 @@ def _fact_at(place: int, above: Sequence[str], script: Script) -> tuple[str, str
 
 
 def _fact(line: str, script: Script) -> tuple[str, str] | None:
-    """Key and value of a line of the preamble; its unit, where the key has one, after the value."""
+    """Return key and value of a line of the preamble; a unit of the key is put after the value."""
     plain = line.strip().lstrip("\ufeff#%!* ").strip()
     cells = [cell for cell in _cells(line, script) if cell] if script.mark != " " else [plain]
     if len(cells) > 1 and not cells[0].rstrip().endswith(("=",)):
@@ -227,7 +227,7 @@ def _fact(line: str, script: Script) -> tuple[str, str] | None:
 
 
 def _joined(cells: Sequence[str], script: Script) -> str:
-    """A value with its unit, or the first of several."""
+    """Return a value with its unit, or the first of several."""
     more = cells[1] if len(cells) > 1 and not is_number(cells[1], script.decimal) else ""
     return (
         f"{cells[0]} {more}".strip() if words.is_unit(more) or _HERTZ.fullmatch(more) else cells[0]
@@ -243,7 +243,7 @@ def _with_unit(key: str, value: str) -> tuple[str, str]:
 
 
 def rate_said(facts: Sequence[tuple[str, str]], decimal: str) -> float:
-    """The sampling rate that a preamble says, in Hz; NaN where it says none."""
+    """Return the sampling rate of a preamble in Hz; NaN where it gives none."""
     for key, value in facts:
         number, unit = quantity_said(value, decimal)
         if not number > 0:
@@ -266,7 +266,7 @@ def rate_said(facts: Sequence[tuple[str, str]], decimal: str) -> float:
 def unrounded(
     rate_hz: float, times_hz: float, facts: Sequence[tuple[str, str]], decimal: str
 ) -> float:
-    """The rate that is said, or that of the times where a step as rounded as that means both."""
+    """Return `rate_hz`, or `times_hz` where the rounded step of the preamble means both."""
     for key, value in facts:
         number, unit = quantity_said(value, decimal)
         seconds = (words.seconds_of(unit) if unit else 1.0) or math.nan
@@ -280,7 +280,7 @@ def unrounded(
 
 
 def quantity_said(text: str, decimal: str) -> tuple[float, str]:
-    """The number at the beginning of a text, and what follows it; NaN where there is none.
+    """Return the number at the beginning of a text, and the text after it; NaN where there is none.
 
     A preamble does not always keep to the decimal mark of the numbers: 0.001 is a thousandth.
     """

@@ -1,8 +1,8 @@
-"""Where the numbers of a logger's text are, and how they are written.
+"""Find the rows of numbers in a logger's text, and how they are written.
 
-Found from lines in the midst of the file, where there is nothing but numbers: what separates the
-columns, which mark is decimal, what kind of cells each column has. From there up to the heading and
-down to the tail.
+Lines from the middle of the file, where there are only numbers, show the separator, the decimal
+mark and the kind of each column. From there the rows are followed up to the heading and down to the
+tail.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _MARKS = ("\t", ";", "|", ", ", ",", " ")
 
 @dataclass(frozen=True)
 class Script:
-    """How the rows are written: `mark` between cells, decimal mark, kind of each column."""
+    """Describe how rows are written: `mark` between cells, decimal mark, kind of each column."""
 
     mark: str
     decimal: str
@@ -62,7 +62,7 @@ class Script:
     quoted: bool
 
     def cells(self, line: str) -> list[str]:
-        """The cells of a line, without blanks and quotes around them."""
+        """Return the cells of a line, without surrounding blanks and quotes."""
         if self.quoted and '"' in line:
             quoted = next(csv.reader([line], delimiter=self.mark[0], skipinitialspace=True), [])
             return [cell.strip() for cell in quoted]
@@ -71,7 +71,7 @@ class Script:
         return [cell.strip() for cell in line.split(self.mark)]
 
     def row(self, line: str) -> list[str] | None:
-        """The cells of a line as long as the columns; None where it cannot be a row of numbers."""
+        """Return the cells of a line, as many as columns; None where it is no row of numbers."""
         cells = self.cells(line)
         count = len(self.kinds)
         if len(cells) > count and not any(cells[count:]):
@@ -114,22 +114,22 @@ class Block:
 
 
 def is_number(text: str, decimal: str) -> bool:
-    """Whether a text is a number with that decimal mark, its thousands grouped or not."""
+    """Return whether a text is a number with that decimal mark, its thousands grouped or not."""
     return _NUMBERS[decimal].fullmatch(text) is not None
 
 
 def is_gap(text: str) -> bool:
-    """Whether a cell says that there is no value."""
+    """Return whether a cell marks a missing value."""
     return text.lower() in _MISSING or _NAN.fullmatch(text) is not None
 
 
 def is_over(text: str) -> bool:
-    """Whether a cell says that the value was beyond what the logger can record."""
+    """Return whether a cell marks a value beyond the range of the logger."""
     return _OVER.fullmatch(text) is not None
 
 
 def number_of(text: str, decimal: str) -> float:
-    """The number that a text with that decimal mark says; raises ValueError."""
+    """Return the number that a text with that decimal mark gives; raises ValueError."""
     plain = re.sub(_GROUPS, "", text)
     plain = plain.replace(".", "").replace(",", ".") if decimal == "," else plain.replace(",", "")
     return float(plain.replace("d", "e").replace("D", "e"))
@@ -139,7 +139,7 @@ def number_of(text: str, decimal: str) -> float:
 
 
 def script_of(lines: Sequence[str]) -> Script | None:
-    """How the rows in the midst of a text are written; None where there are none."""
+    """Return how the rows in the middle of a text are written; None where there are none."""
     filled = [line for line in lines if line.strip()]
     if len(filled) < 2:
         return None
@@ -154,7 +154,7 @@ def script_of(lines: Sequence[str]) -> Script | None:
 
 
 def _script(sample: Sequence[str], mark: str, quoted: bool) -> Script | None:
-    """How a sample is written if that is the mark; None where it is not."""
+    """Return how a sample with that separator is written; None where it separates no columns."""
     if sum(mark in line for line in sample) < _SHARE * len(sample):
         return None
     plain = Script(mark, ".", (), quoted)
@@ -174,7 +174,7 @@ def _script(sample: Sequence[str], mark: str, quoted: bool) -> Script | None:
 
 
 def _decimal(columns: Sequence[Sequence[str]]) -> str:
-    """The decimal mark by which more cells are numbers; where both do, by how they are grouped."""
+    """Return the decimal mark that makes more cells numbers; if both do, decide by the grouping."""
     cells = [c for column in columns for c in column if c and ("," in c or "." in c)]
     cells = [cell for cell in cells if not is_stamp(cell)]
     by_point, by_comma = (sum(is_number(c, mark) for c in cells) for mark in ".,")
@@ -198,9 +198,9 @@ def _kind(cells: Sequence[str], decimal: str) -> Kind:
 
 
 def block_of(lines: Sequence[str], script: Script, path: Path) -> Block | None:
-    """The rows of a text, up from its heading and down to its tail; None where there are none.
+    """Return the rows between heading and tail of a text; None where there are none.
 
-    Raises BadInput for a line in their midst that is none.
+    Raises BadInput for a line among them that is no row.
     """
     start = _first(lines, script)
     if start is None:
@@ -230,7 +230,7 @@ def block_of(lines: Sequence[str], script: Script, path: Path) -> Block | None:
 
 
 def _first(lines: Sequence[str], script: Script) -> int | None:
-    """The first line of two running that are rows."""
+    """Return the first line of two running that are rows."""
     before: int | None = None
     for place, line in enumerate(lines[:_MOST_PREAMBLE]):
         if not line.strip():
@@ -245,7 +245,7 @@ def _first(lines: Sequence[str], script: Script) -> int | None:
 
 
 def _last(lines: Sequence[str], script: Script, start: int) -> tuple[int, tuple[str, ...]]:
-    """The end of the rows, and a remark on what is left out behind it."""
+    """Return the end of the rows, and a remark on the lines left out after it."""
     stop = len(lines)
     while stop > start and (not lines[stop - 1].strip() or script.row(lines[stop - 1]) is None):
         stop -= 1
@@ -256,7 +256,7 @@ def _last(lines: Sequence[str], script: Script, start: int) -> tuple[int, tuple[
 
 
 def second_record(line: int, path: Path) -> BadInput:
-    """The refusal of a file in which a second record begins at a line."""
+    """Return the refusal of a file in which a second record starts at `line`."""
     return BadInput(
         "a second record begins here, with a heading of its own.",
         file=path,
@@ -266,7 +266,7 @@ def second_record(line: int, path: Path) -> BadInput:
 
 
 def _no_row(cells: Sequence[str], line: int, script: Script, path: Path) -> BadInput:
-    """The refusal of a damaged line in the midst of the rows."""
+    """Return the refusal of a damaged line in the midst of the rows."""
     return BadInput(
         f"{' '.join(cells)[:60]!r} is no row of {len(script.kinds)} values.",
         file=path,
@@ -276,7 +276,7 @@ def _no_row(cells: Sequence[str], line: int, script: Script, path: Path) -> BadI
 
 
 def values_of(block: Block, column: int, path: Path) -> tuple[FloatArray, int]:
-    """The numbers of a column, NaN where there are none, and how many were beyond the range.
+    """Return the numbers of a column, NaN where there are none, and how many were beyond the range.
 
     Raises BadInput for a cell that is none of these.
     """
@@ -299,7 +299,7 @@ def values_of(block: Block, column: int, path: Path) -> tuple[FloatArray, int]:
 
 
 def _plainly(texts: Sequence[str], decimal: str) -> FloatArray | None:
-    """The numbers of cells that hold nothing else, without grouped thousands; else None."""
+    """Return the numbers of cells that hold nothing else, without grouped thousands; else None."""
     if decimal == ",":
         if any("." in text for text in texts):
             return None

@@ -57,7 +57,7 @@ _HEAD = 20_000  # characters in which a heading of our own says so
 
 
 def is_ours(text: str) -> bool:
-    """Whether a text is CSV as `comma_separated` describes it: our keys, or bare names we know."""
+    """Return whether a text is CSV as `comma_separated` defines it: our keys, or names we know."""
     filled = [line.strip() for line in LINE_BREAK.split(text[:_HEAD]) if line.strip()]
     for place, line in enumerate(filled):
         if not line.strip('"').startswith("#"):
@@ -69,7 +69,7 @@ def is_ours(text: str) -> bool:
 
 
 def _names_bare(line: str, below: str) -> bool:
-    """Whether a line names columns as our own do, and what is below it are not units."""
+    """Return whether a line names columns without units, and the line below holds no units."""
     mark = mark_between(line)
     cells, values = (cells_of(each.lower(), mark) for each in (line, below))
     bare = all(cell and set(cell) <= _PLAIN_NAME for cell in cells)
@@ -206,7 +206,7 @@ def _column(
 
 
 def _refuse_split_decimals(heading: Heading, block: Block, path: Path) -> None:
-    """Raises BadInput where commas part both the cells and the decimals of the numbers."""
+    """Raise BadInput where commas part both the cells and the decimals of the numbers."""
     script = block.script
     if script.mark != "," or script.quoted or not block.above:
         return
@@ -222,7 +222,7 @@ def _refuse_split_decimals(heading: Heading, block: Block, path: Path) -> None:
 
 
 def _refuse_wrapped(block: Block, path: Path) -> None:
-    """Raises BadInput where a list of a seismic archive says another number of samples."""
+    """Raise BadInput where a seismic list gives another number of samples than follows."""
     said = next((int(found[1]) for line in block.above if (found := _LISTED.match(line))), None)
     if said is not None and said != len(block.rows):
         raise BadInput(
@@ -242,7 +242,7 @@ def _of_one_signal(heading: Heading, means: Callable[[str], bool]) -> str:
 
 
 def _unit_of_one(heading: Heading) -> str:
-    """The unit of the signal of a text that has one signal and names no columns."""
+    """Return the unit of the signal of a text that has one signal and names no columns."""
     unit = _of_one_signal(heading, words.means_unit)
     return unit if words.is_unit(unit) else ""
 
@@ -307,9 +307,9 @@ def _first(pair: tuple[int, Column]) -> int:
 
 
 def _layout(heading: Heading, block: Block) -> tuple[str, ...]:
-    """What all files of one logger share: how they are written, keys, names and units; no values.
+    """Return what files of one logger share: separator, decimal mark, keys, names and units.
 
-    But the serial numbers, as another device has other sensors.
+    Serial numbers are included, as another device has other sensors; other values are not.
     """
     script = block.script
     keys = sorted({words.key_of(key) for key, _ in heading.facts if words.key_of(key)})

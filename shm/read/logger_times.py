@@ -114,7 +114,7 @@ def _is_time(heading: Heading, place: int) -> bool:
 
 
 def _keeps_step(heading: Heading, block: Block, place: int, said_hz: float, path: Path) -> bool:
-    """Whether a column without a name runs on by the step that the preamble says."""
+    """Return whether a column without a name increases by the step that the preamble gives."""
     if math.isnan(said_hz) or heading.names[place] != f"column_{place + 1}":
         return False
     values, _ = values_of(block, place, path)
@@ -138,7 +138,7 @@ def _is_counter(heading: Heading, block: Block, place: int, path: Path) -> bool:
 
 
 def _nameless_times(heading: Heading, block: Block, counters: list[int], path: Path) -> list[int]:
-    """A nameless first column in even steps of less than one: times, as nothing counts so."""
+    """Return a nameless first column with even steps below one, which no counter has, as times."""
     first = counters[0]
     values, _ = values_of(block, first, path)
     is_times = heading.names[first] == "column_1" and 0 < values[1] - values[0] < 1
@@ -148,7 +148,7 @@ def _nameless_times(heading: Heading, block: Block, counters: list[int], path: P
 def _of_numbers(
     heading: Heading, block: Block, place: int, said_hz: float, path: Path
 ) -> tuple[FloatArray, datetime | None] | None:
-    """Seconds since the start, and the start where they say it; None where their unit is open."""
+    """Return seconds since the start, and the start if known; None where their unit is unknown."""
     values, _ = values_of(block, place, path)
     if len(values) < 2 or not np.isfinite(values).all():
         return None
@@ -163,7 +163,7 @@ def _of_numbers(
 
 
 def _since_epoch(values: FloatArray) -> tuple[FloatArray, datetime] | None:
-    """Times as seconds since 1970 or days since 1900."""
+    """Return the seconds and the start of times since 1970 (seconds) or 1900 (days)."""
     first, step = float(values[0]), float(np.median(np.diff(values)))
     if _SHEET_DAYS[0] < first < _SHEET_DAYS[1] and 0 < step * 86400 < 1:
         return 86400 * (values - first), _SHEET_START + timedelta(days=first)
@@ -175,7 +175,7 @@ def _since_epoch(values: FloatArray) -> tuple[FloatArray, datetime] | None:
 
 
 def _factor(values: FloatArray, said_hz: float) -> float | None:
-    """The unit of times that have none, in s: by the rate that is said, else s if it can be."""
+    """Return the unit in s of times without a unit: by the stated rate, else s if possible."""
     span = float(values[-1] - values[0])
     if not span > 0:
         return None
@@ -216,7 +216,7 @@ def _even(
     seconds: FloatArray, said_hz: float, start: datetime | None, used: frozenset[int],
     name: str, block: Block, path: Path,
 ) -> Clock:  # fmt: skip
-    """The clock of seconds that may be rounded so that several rows have the same."""
+    """Return the clock of seconds that may be rounded so that several rows have the same."""
     fault = _fault(block, name, path)
     back = np.flatnonzero(np.diff(seconds) < 0)
     if block.seam and len(back):
@@ -233,7 +233,7 @@ def _even(
 def _rate_of_coarse(
     seconds: FloatArray, said_hz: float, fault: Callable[[int, str], BadInput]
 ) -> float:
-    """The rate by times of which several are the same; NaN where the preamble must say it."""
+    """Return the rate of times of which several are equal; NaN if only the preamble gives it."""
     steps = np.diff(seconds)
     back = np.flatnonzero(steps < 0)
     if len(back):

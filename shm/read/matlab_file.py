@@ -64,7 +64,7 @@ def _opened(path: Path) -> Iterator[Arrays]:
 
 
 def _interpreted(variable: Variable) -> Variable:
-    """MATLAB keeps texts as numbers of their characters."""
+    """Return a variable with MATLAB's numbered characters as text."""
     if variable.attributes.get("matlab_class") != "char" or variable.kind not in "iu":
         return variable
     return replace(variable, kind="U", load=lambda: _text(variable.load()))
@@ -91,7 +91,7 @@ _KINDS = {
 
 
 def arrays_in(path: Path) -> Arrays:
-    """Variables of numbers and texts, others left out; raises BadInput for sizes beyond limits."""
+    """Return the variables that are numbers or texts; raises BadInput beyond the limits."""
     content = bytes_of(path)
     with guarded(path):
         elements = tuple(elements_of(content))
@@ -233,14 +233,14 @@ class Element:
 
     @property
     def is_complex(self) -> bool:
-        """Whether its values are complex; ValueError where the head is damaged."""
+        """Return whether its values are complex; ValueError where the head is damaged."""
         (kind, flags), dimensions, name = self._head(next(self.pieces()))
         if (kind, len(flags), dimensions[0], name[0]) != (_UINT32, 8, _INT32, _INT8):
             raise ValueError("the head of a variable is damaged")
         return bool(self._number(flags, 0) & _COMPLEX_FLAG)
 
     def pieces(self) -> Iterator[bytes]:
-        """A matrix with its tag, unpacked piece by piece, until it outgrows the limit."""
+        """Yield a matrix with its tag, unpacked piece by piece, until it outgrows the limit."""
         if self.kind != _COMPRESSED:
             yield struct.pack(f"{self.byte_order}II", self.kind, len(self.packed)) + self.packed
             return
@@ -252,7 +252,7 @@ class Element:
             yield piece
 
     def refuse_damaged(self, shape: tuple[int, ...], is_text: bool) -> None:
-        """Raises ValueError where the values are not what the shape says, or far too many."""
+        """Raise ValueError where the values do not match the shape, or are far too many."""
         content = b"".join(self.pieces())
         if len(content) > limits().bytes_at_once:
             raise ValueError("a variable unpacks to more than is read at once")
@@ -298,12 +298,12 @@ class Element:
                 raise ValueError("a field's values are not as many as its shape says")
 
     def _head(self, piece: bytes) -> list[tuple[int, bytes]]:
-        """Flags, dimensions and name of a matrix, each with its type."""
+        """Return flags, dimensions and name of a matrix, each with its type."""
         parts = self._parts(piece)
         return [next(parts, (0, b"")) for _ in range(3)]
 
     def _parts(self, content: bytes) -> Iterator[tuple[int, bytes]]:
-        """Type and content of each part of a matrix."""
+        """Yield type and content of each part of a matrix."""
         if self._number(content, 0) != _MATRIX or len(content) < 8:
             raise ValueError("an element is no matrix")
         place, end = 8, min(len(content), 8 + self._number(content, 4))
@@ -322,7 +322,7 @@ class Element:
 
 
 def elements_of(content: bytes) -> Iterator[Element]:
-    """The elements of a file in memory; ValueError or struct.error where they do not fit in."""
+    """Yield the elements of a file in memory; raises ValueError or struct.error if cut off."""
     order = "<" if content[126:128] == b"IM" else ">"
     place = _HEADER_BYTES
     while place < len(content):

@@ -67,7 +67,7 @@ class Profile:
 
 
 def profile_for(layout: Layout, workspace: Path) -> Profile | None:
-    """The profile of the logger whose files look so; None where there is none.
+    """Return the profile of the logger whose files look so; None where there is none.
 
     Raises BadInput naming a profile that is damaged.
     """
@@ -76,7 +76,7 @@ def profile_for(layout: Layout, workspace: Path) -> Profile | None:
 
 
 def any_profile(workspace: Path) -> bool:
-    """Whether any logger was imported into this workspace."""
+    """Return whether any logger was imported into this workspace."""
     return bool(_files(workspace))
 
 
@@ -138,7 +138,7 @@ def learn_day_order(layout: Layout, order: DayOrder | None, workspace: Path) -> 
 def save_profile(
     described: Described, layout: Layout, workspace: Path, *, roams: bool = False
 ) -> Profile:
-    """Keeps what was said of the files of a layout, in the place of what was kept before."""
+    """Save the description of a logger's files as its profile, in place of an earlier one."""
     before = profile_for(layout, workspace)
     kept = {key: described[key] for key in _OF_PROFILE if key in described}
     moved = roams or (before is not None and _moved(before, kept))
@@ -157,7 +157,7 @@ def save_profile(
 
 
 def _moved(before: Profile, kept: Described) -> bool:
-    """Whether a logger has been at two hangers, so that no profile can know the next."""
+    """Return whether a logger was used at two hangers, so that no profile can know the next."""
     former = before.described.get("hanger")
     return before.roams or (former is not None and kept.get("hanger", former) != former)
 

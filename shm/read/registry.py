@@ -1,8 +1,7 @@
-"""The formats that are known, and the verbs for a single file: reading, a look at its headers, and
-a survey of all its columns before it is known which of them is what.
+"""Hold the known formats and the verbs for a file: read, peek at headers, survey all columns.
 
-A whole test: one file, or all files of an archive; a document of modal tests with the sidecar
-beside it, which goes before it.
+A complete test is one file, or all files of an archive. A sidecar of a document of modal tests
+overrides the document.
 """
 
 from __future__ import annotations
@@ -92,10 +91,10 @@ def _looks(path: Path) -> tuple[Peek, ...]:
 
 
 def write(recording: Recording | FrequencyResponse, path: Path) -> None:
-    """Writes a file in the format of its suffix, whole or not at all.
+    """Write a file in the format of its suffix; an interrupted write leaves the old file.
 
     A format that cannot hold everything gets a sidecar, written first. Raises UsageError for a
-    suffix of no format that is written, and for what the format cannot hold.
+    suffix without a format that is written, and for data that the format cannot hold.
     """
     found = _format_of_suffix(path)
     if found is None or found.write is None:
@@ -108,7 +107,7 @@ def write(recording: Recording | FrequencyResponse, path: Path) -> None:
 
 
 def format_of(path: Path) -> Format:
-    """The format of the suffix, after a look at the content; raises BadInput."""
+    """Return the format of the suffix, after a look at the content; raises BadInput."""
     head = head_of(path)
     if holds_test(path):
         raise BadInput(
@@ -141,7 +140,7 @@ def _suffixes() -> list[str]:
 
 
 def libraries_for(path: Path) -> tuple[str, ...]:
-    """What reading a file loads, by its suffix; an archive may hold any format."""
+    """Return the libraries that reading a file loads, by its suffix; an archive may need all."""
     suffix = _unpacked_name(path).suffix.lower()
     formats = (
         FORMATS
@@ -152,7 +151,7 @@ def libraries_for(path: Path) -> tuple[str, ...]:
 
 
 def write_single(recording: Recording, path: Path) -> None:
-    """Writes an .npz file, not compressed: its size tells the numbers of samples and channels."""
+    """Write an uncompressed .npz file: its size gives the numbers of samples and channels."""
     write(replace(recording, channels=tuple(map(_single, recording.channels))), path)
 
 
@@ -201,7 +200,7 @@ def _peek_member(file: Path, name: str) -> tuple[Peek, ...]:
 
 
 def _named(verb: Callable[[Path], T], file: Path, name: str) -> T:
-    """What `verb` gives; its refusals name the member of the archive, not where it was unpacked."""
+    """Return the result of `verb`; refusals name the member, not its temporary file."""
     try:
         return verb(file)
     except BadInput as refusal:
@@ -216,7 +215,7 @@ def _named(verb: Callable[[Path], T], file: Path, name: str) -> T:
 
 
 def load_modes(path: Path) -> tuple[ModalTest, ...]:
-    """The tests of a `*.modes.json` file; raises BadInput with file, test, mode and remedy.
+    """Return the tests of a `*.modes.json` file; raises BadInput with file, test, mode and remedy.
 
     Hanger, time, temperature and the known mass of a sidecar are those of its tests.
     """

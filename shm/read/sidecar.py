@@ -42,9 +42,9 @@ _SHAPE = "Write hanger = 3 and the like, and a table [channel.acc_1] for each ch
 
 
 def sidecar_path(path: Path) -> Path:
-    """Where the sidecar of a file stands, whether it exists or not.
+    """Return the path of a file's sidecar, which need not exist.
 
-    Beside a name so long that the sidecar's would be too long, it is the name cut to fit.
+    Where the sidecar's name would be too long, the file's name is cut to fit.
     """
     plain = path.with_suffix("") if path.suffix.lower() == ".gz" else path
     name = os.fsencode(plain.with_suffix(SIDECAR_SUFFIX).name)
@@ -91,7 +91,7 @@ def _refuse_misspelt(document: Iterable[str], sidecar: Path) -> None:
 
 
 def channels_described(path: Path) -> dict[str, dict[str, Entry]]:
-    """What the sidecar of a file says in tables of single channels; empty without a sidecar."""
+    """Return the tables of single channels in the sidecar of a file; empty without a sidecar."""
     sidecar = sidecar_path(path)
     tables = _tables(document_beside(path), sidecar)
     return {name: _entries(table, sidecar) for name, table in tables.items()}
@@ -102,7 +102,7 @@ def _entries(table: dict[str, Any], sidecar: Path) -> dict[str, Entry]:
 
 
 def document_beside(path: Path) -> dict[str, Any]:
-    """All that the sidecar of a file says; empty without a sidecar."""
+    """Return the content of a file's sidecar; empty without a sidecar."""
     sidecar = sidecar_path(path)
     return _document(sidecar) if sidecar != path and sidecar.is_file() else {}
 
@@ -121,7 +121,7 @@ def _document(sidecar: Path) -> dict[str, Any]:
 
 
 def _refuse_link_outside(sidecar: Path) -> None:
-    """Raises BadInput for a link to another folder, whose text a refusal would show."""
+    """Raise BadInput for a link to another folder, whose text a refusal would show."""
     if sidecar.resolve().parent != sidecar.parent.resolve():
         raise BadInput(
             "is a link out of its folder.", file=sidecar, remedy="Lay the sidecar itself there."
@@ -166,7 +166,7 @@ def write_sidecar(
     sampling_rate_hz: float,
     path: Path,
 ) -> None:
-    """Writes the sidecar of `path`, whole or not at all."""
+    """Write the sidecar of `path`; an interrupted write leaves the old one."""
     whole = {
         "hanger": described.hanger,
         "time": described.time,
@@ -192,7 +192,7 @@ Described = Mapping[str, Any]
 
 
 def sidecar_text(described: Described) -> str:
-    """The TOML of a sidecar: keys of the whole, then a table for each channel."""
+    """Return the TOML of a sidecar: general keys, then a table for each channel."""
     lines = [f"{key} = {_toml(value)}" for key, value in described.items() if key != "channel"]
     for name, table in described.get("channel", {}).items():
         lines += ["", f"[channel.{_quoted(name)}]"]
@@ -211,6 +211,6 @@ def _toml(value: object) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A text as TOML takes it: control characters and half pairs as blanks."""
+    """Return a text as TOML takes it: control characters and half pairs as blanks."""
     plain = "".join(c if c.isprintable() else " " for c in text)
     return json.dumps(plain, ensure_ascii=False)

@@ -1,7 +1,7 @@
-"""What a format finds in a file: its columns, and what the file itself says of them and of all.
+"""Define what a format finds in a file: its columns, and the file's entries about them.
 
-`open_table` of a format makes a `Table`; `describe` adds what a sidecar says; `assemble` makes the
-recording of it. A look, reading, the import and its survey are uses of these three.
+`open_table` of a format makes a `Table`; `describe` adds the sidecar; `assemble` makes the
+recording. Peek, reading, import and its survey are uses of these three.
 """
 
 from __future__ import annotations

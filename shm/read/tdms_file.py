@@ -36,7 +36,7 @@ def _opened(path: Path) -> Iterator[Arrays]:
 
 
 def _library(path: Path) -> Any:
-    """The class that opens files, of npTDMS, which is LGPL and therefore an extra."""
+    """Return the class that opens files, of npTDMS, which is LGPL and therefore an extra."""
     try:
         from nptdms import TdmsFile
         from nptdms.log import log_manager

@@ -139,18 +139,18 @@ _TIME, _EVEN, _DOUBLE = 17, 1, 4
 
 
 def histories(content: Content) -> list[FunctionSet]:
-    """The sets over time, whatever they hold."""
+    """Return the sets over time, of any quantity."""
     return [found for found in content.functions if found.function == TIME_RESPONSE]
 
 
 def quantity(found: FunctionSet) -> Quantity | None:
-    """What a set measures, by its unit or else by its type; None for anything else."""
+    """Return the quantity of a set by its unit, else by its type; None for any other."""
     unit = unit_of(found.unit)
     return unit.quantity if unit is not None else _QUANTITIES.get(found.quantity)
 
 
 def sets_of(recording: Recording) -> list[dict[str, Any]]:
-    """The data sets of a recording for pyuff."""
+    """Return the data sets of a recording for pyuff."""
     places = [channel.x_m for channel in recording.channels]
     nodes = universal_frf.number_nodes(places)
     rate = recording.sampling_rate_hz
@@ -184,7 +184,7 @@ def sets_of(recording: Recording) -> list[dict[str, Any]]:
 
 
 def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
-    """The names of forces and accelerations, and the titles of all else."""
+    """Return the names of forces and accelerations, and the titles of all else."""
     measured = [found for found in sets if quantity(found) is not None]
     known = iter(_names_of_measured(measured, path))
     return list(
@@ -198,7 +198,7 @@ def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
 
 
 def _names_of_measured(sets: Sequence[FunctionSet], path: Path) -> list[str]:
-    """The names that we wrote; else force, acc_1, acc_2, ... in the order of the file."""
+    """Return the names that we wrote; else force, acc_1, acc_2, ... in the order of the file."""
     own = [found.lines[0] for found in sets if universal_frf.facts(found)]
     if len(own) == len(sets):
         _refuse_doubles(own, sets, path)
@@ -215,7 +215,7 @@ def _names_of_measured(sets: Sequence[FunctionSet], path: Path) -> list[str]:
 
 
 def _sensor(found: FunctionSet) -> tuple[object, ...]:
-    """What tells one sensor from another; loggers give one node to several accelerometers."""
+    """Return what identifies a sensor; loggers give one node to several accelerometers."""
     title = "" if quantity(found) == "force" else found.lines[0]
     return quantity(found), *found.response[1:], title
 

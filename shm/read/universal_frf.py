@@ -78,7 +78,7 @@ def _real(found: FunctionSet, values: Callable[[FunctionSet], Any]) -> FloatArra
 
 
 def sets_of(response: FrequencyResponse) -> list[dict[str, Any]]:
-    """The data sets of frequency responses, and their coherences, for pyuff."""
+    """Return the data sets of frequency responses, and their coherences, for pyuff."""
     places = [point.x_m for point in response.points]
     nodes = number_nodes(places)
     sets = node_set(places, nodes)
@@ -161,7 +161,7 @@ def _frequencies(sets: Sequence[FunctionSet], path: Path) -> FloatArray:
 
 
 def _step(found: FunctionSet) -> float:
-    """The step in Hz, with all its digits where the file is ours."""
+    """Return the step in Hz, with all its digits where the file is ours."""
     try:
         own = float(facts(found).get(_STEP, math.nan))
     except ValueError:
@@ -187,13 +187,13 @@ def _accelerance(
 
 
 def facts(found: FunctionSet) -> dict[str, str]:
-    """The pairs of a set's id lines; empty for files of others."""
+    """Return the pairs of a set's id lines; empty for files of others."""
     words = [word for line in found.lines if line.startswith(f"{_MARK} ") for word in line.split()]
     return dict(word.split("=", 1) for word in words if "=" in word)
 
 
 def entries(found: FunctionSet, path: Path) -> dict[str, Entry]:
-    """Hanger, time, temperature and sampling rate, as far as a set says them."""
+    """Return hanger, time, temperature and sampling rate, as far as a set gives them."""
     own = {key: Entry(value, path) for key, value in facts(found).items() if key in KEYS}
     moment = _date(found.lines[2])
     if "time" in own or moment is None:
@@ -204,7 +204,7 @@ def entries(found: FunctionSet, path: Path) -> dict[str, Entry]:
 def channel_entries(
     found: FunctionSet, node: int, direction: int, content: Content, path: Path
 ) -> dict[str, Entry]:
-    """Unit, and in our own files place and plane, of the set at a node."""
+    """Return the unit, and in our files position and plane, of the set at a node."""
     said: dict[str, Any] = {"unit": found.unit}
     if facts(found):
         said["plane"] = _AXES.get(abs(direction), "")
@@ -213,7 +213,7 @@ def channel_entries(
 
 
 def sign(*directions: int) -> float:
-    """-1 where an odd number of directions runs against its axis."""
+    """Return -1 where an odd number of directions is opposite to its axis, else 1."""
     return float(np.prod([-1.0 if direction < 0 else 1.0 for direction in directions]))
 
 
@@ -246,14 +246,14 @@ def direction(plane: Plane | None) -> int:
 
 
 def number_nodes(places_m: Sequence[float]) -> list[int]:
-    """A node number for each place, the same for equal places, from 1."""
+    """Return a node number for each place, the same for equal places, from 1."""
     numbers: dict[object, int] = {}
     keys = [("unknown", i) if math.isnan(x) else x for i, x in enumerate(places_m)]
     return [numbers.setdefault(key, len(numbers) + 1) for key in keys]
 
 
 def node_set(places_m: Sequence[float], nodes: Sequence[int]) -> list[dict[str, Any]]:
-    """The data set of nodes whose place is known; none where no place is."""
+    """Return the data set of nodes whose place is known; none where no place is."""
     known = {node: x for node, x in zip(nodes, places_m, strict=True) if not math.isnan(x)}
     if not known:
         return []
@@ -273,7 +273,7 @@ def node_set(places_m: Sequence[float], nodes: Sequence[int]) -> list[dict[str, 
 
 
 def _date(text: str) -> datetime | None:
-    """A date such as 18-Apr-16 13:49:58, taken as UTC; None for any other text."""
+    """Return a date such as 18-Apr-16 13:49:58, taken as UTC; None for any other text."""
     day, _, clock = text.partition(" ")
     parts = day.split("-")
     if len(parts) != 3 or parts[1].title() not in _MONTHS:
