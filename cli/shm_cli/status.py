@@ -32,7 +32,7 @@ from shm.store import (
     Store,
     Workspace,
 )
-from shm.store.stored_alerts import said_of
+from shm.store.stored_alerts import describe_silence
 from shm.values import Summary
 from shm.values.rounding import ForceUnit, force_unit, rounded_percent
 from shm.watch.change_words import frequency_words
@@ -258,7 +258,9 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
         "quiet_hours": _quiet(workspace, store, now),
-        "silences": [said_of(each) for each in store.silences.list_all() if each.is_in_force(now)],
+        "silences": [
+            describe_silence(each) for each in store.silences.list_all() if each.is_in_force(now)
+        ],
         "streams": [each.words for each in stream_leads(workspace, store, now)],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],

@@ -43,7 +43,7 @@ from shm.store import (
     TrendPoint,
     Workspace,
 )
-from shm.store.stored_alerts import said_of, silenced_until
+from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
@@ -85,7 +85,7 @@ def warnings_from(
         if watched is not None and watched.watched.time >= point.time:
             return ""
         windows = [each for each in works if each.covers(hanger.id, point.time)]
-        return passed_over(hanger, said_of(windows[-1])) if windows else ""
+        return passed_over(hanger, describe_silence(windows[-1])) if windows else ""
 
     return {
         hanger.id: open_warnings(

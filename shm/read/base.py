@@ -160,7 +160,7 @@ class Layout:
     format: str
     columns: tuple[str, ...]
     hanger: int | None = None
-    says_rate: bool = False
+    has_rate: bool = False
     day_order: DayOrder | None = None
     possible_times: tuple[PossibleTime, ...] = ()
     local_time: datetime | None = None

@@ -15,14 +15,14 @@ from pathlib import Path, PurePosixPath
 from typing import TypeVar
 
 from shm.errors import BadInput, UsageError
-from shm.read.arrays import natural
+from shm.read.arrays import natural_sort_key
 from shm.read.atomic import replace_file
 from shm.read.content import MOST_MEMBERS, checked_members, refusal, unpack, unpacking_folder
 from shm.read.header import CHANNEL_KEYS, Entry, Header
 from shm.read.limits import guarded, limits
 from shm.read.sidecar import (
     SIDECAR_SUFFIX,
-    document_beside,
+    sidecar_document,
     sidecar_path,
     sidecar_text,
     with_sidecar,
@@ -56,7 +56,7 @@ def unpacked(path: Path) -> Iterator[tuple[Path, ...]]:
         with guarded(path, "the archive"), zipfile.ZipFile(path) as archive:
             files = _unpack_all(archive, members, folder)
         sidecars = {file for file in files if file.suffix == SIDECAR_SUFFIX}
-        recordings = sorted(set(files) - sidecars, key=lambda file: natural(str(file)))
+        recordings = sorted(set(files) - sidecars, key=lambda file: natural_sort_key(str(file)))
         _refuse_alone(sidecars, recordings, path)
         if not recordings:
             raise BadInput(
@@ -64,11 +64,11 @@ def unpacked(path: Path) -> Iterator[tuple[Path, ...]]:
                 file=path,
                 remedy="Pack the files of one test with `shm ingest --together`.",
             )
-        shared = {key: v for key, v in document_beside(path).items() if key in _OF_EACH}
+        shared = {key: v for key, v in sidecar_document(path).items() if key in _OF_EACH}
         for file in recordings if shared else ():
-            own = document_beside(file)
-            tables = {**shared.get("channel", {}), **own.get("channel", {})}
-            text = sidecar_text({**shared, **own, "channel": tables})
+            of_file = sidecar_document(file)
+            tables = {**shared.get("channel", {}), **of_file.get("channel", {})}
+            text = sidecar_text({**shared, **of_file, "channel": tables})
             sidecar_path(file).write_text(text, encoding="utf-8")
         yield tuple(recordings)
 
@@ -103,7 +103,7 @@ def entries_of_test(path: Path) -> Header:
 
     Raises BadInput for lists of channel values, as their order is undefined in an archive.
     """
-    for key in document_beside(path).keys() & {*CHANNEL_KEYS}:
+    for key in sidecar_document(path).keys() & {*CHANNEL_KEYS}:
         raise BadInput(
             f"{key!r} is said of a whole test.",
             file=sidecar_path(path),

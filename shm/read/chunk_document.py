@@ -97,9 +97,9 @@ def parse_chunk(content: bytes) -> Chunk:
             f"it has {values.shape[1]} samples, which is none or over ten minutes",
             f"Send 1 to {LONGEST.total_seconds() * rate:.0f} samples of each channel.",
         )
-    told = header.temperature_c, header.wind_m_s, header.event[:_LONGEST_EVENT]
+    conditions = header.temperature_c, header.wind_m_s, header.event[:_LONGEST_EVENT]
     start = header.time
-    return Chunk(header.stream, header.sequence, start, rate, channels, values, *told)
+    return Chunk(header.stream, header.sequence, start, rate, channels, values, *conditions)
 
 
 def _refuse_header(header: _Header) -> None:
@@ -166,9 +166,9 @@ def _samples(header: _Header, body: bytes) -> tuple[tuple[str, ...], NDArray[np.
     else:
         rows = [_of_list(header, name) for name in channels]
         if len({len(row) for row in rows}) > 1:
-            told = ", ".join(f"{n} has {len(r)}" for n, r in zip(channels, rows, strict=True))
+            counts = ", ".join(f"{n} has {len(r)}" for n, r in zip(channels, rows, strict=True))
             raise _wrong(
-                f"its values are not as many of each channel: {told}",
+                f"its values are not as many of each channel: {counts}",
                 "Write null for a missing one.",
             )
         values = np.array(rows)

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from shm.errors import BadInput
 from shm.read.array_reading import format_of_arrays
-from shm.read.arrays import Arrays, Variable, attributes_of, named_apart, natural
+from shm.read.arrays import Arrays, Variable, attributes_of, natural_sort_key, unique_names
 from shm.read.limits import guarded, refuse_large
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -84,7 +84,7 @@ def opened_nodes(path: Path) -> Iterator[list[Node]]:
 def variables(nodes: list[Node]) -> tuple[Variable, ...]:
     """Return the datasets of nodes, named by their last part where that is unique."""
     found = [node for node in nodes if node.dataset is not None]
-    names = named_apart([node.path for node in found])
+    names = unique_names([node.path for node in found])
     return tuple(_variable(name, node) for name, node in zip(names, found, strict=True))
 
 
@@ -113,7 +113,7 @@ def _ordered(group: h5g.GroupID) -> list[bytes]:
     links = {name: group.links.get_info(name) for name in names}
     if names and all(link.corder_valid for link in links.values()):
         return sorted(names, key=lambda name: links[name].corder)
-    return sorted(names, key=lambda name: natural(name.decode("utf-8", errors="replace")))
+    return sorted(names, key=lambda name: natural_sort_key(name.decode("utf-8", errors="replace")))
 
 
 def _refuse_storage(dataset: h5d.DatasetID, place: tuple[str, ...], path: Path) -> None:

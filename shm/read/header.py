@@ -11,7 +11,15 @@ from typing import Any
 
 from shm.documents import parse_time
 from shm.errors import BadInput
-from shm.read.logger_words import ACCELERANCE, KNOWN, SI, UNSAID, Unit, accelerance_si, unit_of
+from shm.read.logger_words import (
+    ACCELERANCE,
+    KNOWN,
+    SI,
+    UNIT_MISSING,
+    Unit,
+    accelerance_si,
+    unit_of,
+)
 from shm.values import NAN, PLANES, AddedMass, Plane, Quantity, outdoor_c
 
 KEYS = (
@@ -56,10 +64,11 @@ class Header:
     channels: Mapping[str, Mapping[str, Entry]]
     entries: Mapping[str, Entry] = field(default_factory=dict)
 
-    def overridden_by(self, other: Header) -> Header:
+    def merged_with(self, other: Header) -> Header:
         """Return this header with the entries of `other` in place of its equal keys."""
         channels = {
-            name: {**own, **other.channels.get(name, {})} for name, own in self.channels.items()
+            name: {**stated, **other.channels.get(name, {})}
+            for name, stated in self.channels.items()
         }
         return Header(self.file, channels, {**self.entries, **other.entries})
 
@@ -149,7 +158,7 @@ class Header:
                     remedy=f"Name it force or acc_1, or give its unit: {KNOWN}.",
                 )
             return named, Unit(named, 1.0)
-        if entry.text == UNSAID:
+        if entry.text == UNIT_MISSING:
             raise entry.refusal("nothing says its unit.", f"Give one of {KNOWN}.", name)
         unit = unit_of(entry.text)
         if unit is None or named not in (None, unit.quantity):
@@ -167,7 +176,7 @@ class Header:
 
     def accelerance_si(self, name: str) -> float:
         """Return the factor of a frequency response to m/s^2/N by its unit; 1 without a unit."""
-        text = self.unit_text(name) if self.says(name, "unit") else ACCELERANCE
+        text = self.unit_text(name) if self.has_entry(name, "unit") else ACCELERANCE
         factor = accelerance_si(text, "")
         if factor is None or unit_of(text) is not None:
             raise self.channels[name]["unit"].refusal(
@@ -179,7 +188,7 @@ class Header:
 
     def calibration(self, name: str) -> float:
         """Return the units of `unit` per recorded unit, NaN where values are recorded in `unit`."""
-        if not self.says(name, "calibration"):
+        if not self.has_entry(name, "calibration"):
             return NAN
         entry = self.channels[name]["calibration"]
         factor = _number(entry, "calibration", _FACTOR_REMEDY, name)
@@ -189,7 +198,7 @@ class Header:
 
     def full_scale(self, name: str) -> float:
         """Return the largest value that can be recorded, in `unit`; NaN if unknown."""
-        if not self.says(name, "full_scale"):
+        if not self.has_entry(name, "full_scale"):
             return NAN
         entry = self.channels[name]["full_scale"]
         largest = _number(entry, "full_scale", _SCALE_REMEDY, name)
@@ -199,9 +208,9 @@ class Header:
 
     def leaves_out(self, name: str) -> bool:
         """Return whether a channel is not to be used."""
-        return self.says(name, "leave_out") and says_yes(self.channels[name]["leave_out"])
+        return self.has_entry(name, "leave_out") and is_true(self.channels[name]["leave_out"])
 
-    def says(self, name: str, key: str) -> bool:
+    def has_entry(self, name: str, key: str) -> bool:
         """Return whether anything is given for a key of a channel."""
         entry = self.channels[name].get(key)
         return entry is not None and bool(entry.text)
@@ -236,7 +245,7 @@ def quantity_named(name: str) -> Quantity | None:
     return "acceleration" if lowered.startswith("acc") else None
 
 
-def says_yes(entry: Entry) -> bool:
+def is_true(entry: Entry) -> bool:
     """Return the truth of `leave_out`; raises BadInput for anything but true and false."""
     if entry.text.lower() not in ("true", "false"):
         raise entry.refusal(
@@ -288,11 +297,23 @@ def _radius_m(entry: Entry) -> float:
     return radius_m
 
 
+def known_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values that are neither None, nor NaN, nor an empty text."""
+    return {
+        key: value for key, value in values.items() if value not in (None, "") and value == value
+    }
+
+
+def entries_of(values: Mapping[str, Any], path: Path) -> dict[str, Entry]:
+    """Return the known values of a file as entries."""
+    return {key: Entry(value, path) for key, value in known_values(values).items()}
+
+
 def mass_entries(added_mass: AddedMass | None) -> dict[str, float]:
     """Return the entries that describe a known mass; empty where there is none."""
     if added_mass is None:
         return {}
-    said = {"added_mass_kg": added_mass.mass_kg, "added_mass_at_m": added_mass.x_m}
+    entries = {"added_mass_kg": added_mass.mass_kg, "added_mass_at_m": added_mass.x_m}
     if added_mass.radius_of_gyration_m is not None:
-        said["added_mass_radius_m"] = added_mass.radius_of_gyration_m
-    return said
+        entries["added_mass_radius_m"] = added_mass.radius_of_gyration_m
+    return entries

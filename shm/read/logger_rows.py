@@ -53,7 +53,7 @@ _MARKS = ("\t", ";", "|", ", ", ",", " ")
 
 
 @dataclass(frozen=True)
-class Script:
+class Dialect:
     """Describe how rows are written: `mark` between cells, decimal mark, kind of each column."""
 
     mark: str
@@ -98,14 +98,14 @@ class Script:
 
 
 @dataclass(frozen=True)
-class Block:
+class DataRows:
     """The rows of numbers: `above` are the lines before them, `first_line` counts from 1.
 
     `rows` are cells by row, `lines` the number of the line of each; `seam` is the line at which a
     heading stands in their midst, 0 without: then times must run on over it.
     """
 
-    script: Script
+    dialect: Dialect
     above: tuple[str, ...]
     rows: list[list[str]]
     lines: list[int]
@@ -138,7 +138,7 @@ def number_of(text: str, decimal: str) -> float:
 # ---------------------------------------------------------------- how it is written
 
 
-def script_of(lines: Sequence[str]) -> Script | None:
+def dialect_of(lines: Sequence[str]) -> Dialect | None:
     """Return how the rows in the middle of a text are written; None where there are none."""
     filled = [line for line in lines if line.strip()]
     if len(filled) < 2:
@@ -147,17 +147,17 @@ def script_of(lines: Sequence[str]) -> Script | None:
     sample = filled[middle : middle + _SAMPLE_LINES] or filled[-_SAMPLE_LINES:]
     quoted = any('"' in line for line in (*filled[:_SAMPLE_LINES], *sample))
     for mark in _MARKS:
-        found = _script(sample, mark, quoted)
+        found = _dialect(sample, mark, quoted)
         if found is not None:
             return found
     return None
 
 
-def _script(sample: Sequence[str], mark: str, quoted: bool) -> Script | None:
+def _dialect(sample: Sequence[str], mark: str, quoted: bool) -> Dialect | None:
     """Return how a sample with that separator is written; None where it separates no columns."""
     if sum(mark in line for line in sample) < _SHARE * len(sample):
         return None
-    plain = Script(mark, ".", (), quoted)
+    plain = Dialect(mark, ".", (), quoted)
     rows = [plain.cells(line) for line in sample]
     count, times = Counter(map(len, rows)).most_common(1)[0]
     if count < 2 or times < _SHARE * len(rows):
@@ -170,7 +170,7 @@ def _script(sample: Sequence[str], mark: str, quoted: bool) -> Script | None:
     kinds = tuple(_kind(column, decimal) for column in columns)
     if "number" not in kinds or kinds.count("text") > kinds.count("number") + 1:
         return None
-    return Script(mark, decimal, kinds, quoted)
+    return Dialect(mark, decimal, kinds, quoted)
 
 
 def _decimal(columns: Sequence[Sequence[str]]) -> str:
@@ -186,56 +186,56 @@ def _decimal(columns: Sequence[Sequence[str]]) -> str:
 
 
 def _kind(cells: Sequence[str], decimal: str) -> Kind:
-    said = [cell for cell in cells if not is_gap(cell) and not is_over(cell)]
-    if not said:
+    filled = [cell for cell in cells if not is_gap(cell) and not is_over(cell)]
+    if not filled:
         return "number" if any(map(is_over, cells)) else "empty"
-    if sum(is_number(cell, decimal) for cell in said) >= _SHARE * len(said):
+    if sum(is_number(cell, decimal) for cell in filled) >= _SHARE * len(filled):
         return "number"
-    return "stamp" if sum(map(is_stamp, said)) >= _SHARE * len(said) else "text"
+    return "stamp" if sum(map(is_stamp, filled)) >= _SHARE * len(filled) else "text"
 
 
 # ---------------------------------------------------------------- where it is
 
 
-def block_of(lines: Sequence[str], script: Script, path: Path) -> Block | None:
+def block_of(lines: Sequence[str], dialect: Dialect, path: Path) -> DataRows | None:
     """Return the rows between heading and tail of a text; None where there are none.
 
     Raises BadInput for a line among them that is no row.
     """
-    start = _first(lines, script)
+    start = _first(lines, dialect)
     if start is None:
         return None
-    stop, remarks = _last(lines, script, start)
+    stop, remarks = _last(lines, dialect, start)
     rows: list[list[str]] = []
     numbers: list[int] = []
-    keys = {cells[0] for line in lines[:start] if (cells := script.cells(line))[0]}
+    keys = {cells[0] for line in lines[:start] if (cells := dialect.cells(line))[0]}
     seam = 0
     for place in range(start, stop):
         line = lines[place]
         if not line.strip() or line.lstrip().startswith(_REMARK):
             continue
-        row = script.cells(line)
-        if len(row) != len(script.kinds):
-            row = script.row(line) or []
+        row = dialect.cells(line)
+        if len(row) != len(dialect.kinds):
+            row = dialect.row(line) or []
         if row and row[0] in keys:
             row = []
-        if not row and script.cells(line)[0] in keys:
+        if not row and dialect.cells(line)[0] in keys:
             seam = seam or place + 1
             continue
         if not row:
-            raise _no_row(script.cells(line), place + 1, script, path)
+            raise _no_row(dialect.cells(line), place + 1, dialect, path)
         rows.append(row)
         numbers.append(place + 1)
-    return Block(script, tuple(lines[:start]), rows, numbers, remarks, seam) if rows else None
+    return DataRows(dialect, tuple(lines[:start]), rows, numbers, remarks, seam) if rows else None
 
 
-def _first(lines: Sequence[str], script: Script) -> int | None:
+def _first(lines: Sequence[str], dialect: Dialect) -> int | None:
     """Return the first line of two running that are rows."""
     before: int | None = None
     for place, line in enumerate(lines[:_MOST_PREAMBLE]):
         if not line.strip():
             continue
-        if script.row(line) is None:
+        if dialect.row(line) is None:
             before = None
         elif before is not None:
             return before
@@ -244,10 +244,10 @@ def _first(lines: Sequence[str], script: Script) -> int | None:
     return before
 
 
-def _last(lines: Sequence[str], script: Script, start: int) -> tuple[int, tuple[str, ...]]:
+def _last(lines: Sequence[str], dialect: Dialect, start: int) -> tuple[int, tuple[str, ...]]:
     """Return the end of the rows, and a remark on the lines left out after it."""
     stop = len(lines)
-    while stop > start and (not lines[stop - 1].strip() or script.row(lines[stop - 1]) is None):
+    while stop > start and (not lines[stop - 1].strip() or dialect.row(lines[stop - 1]) is None):
         stop -= 1
     left = [line for line in lines[stop:] if line.strip(" \t\x1a\x00")]
     if not left:
@@ -265,36 +265,36 @@ def second_record(line: int, path: Path) -> BadInput:
     )
 
 
-def _no_row(cells: Sequence[str], line: int, script: Script, path: Path) -> BadInput:
+def _no_row(cells: Sequence[str], line: int, dialect: Dialect, path: Path) -> BadInput:
     """Return the refusal of a damaged line in the midst of the rows."""
     return BadInput(
-        f"{' '.join(cells)[:60]!r} is no row of {len(script.kinds)} values.",
+        f"{' '.join(cells)[:60]!r} is no row of {len(dialect.kinds)} values.",
         file=path,
         line=line,
         remedy="Complete or remove the line, or export again; a bad value may be left empty.",
     )
 
 
-def values_of(block: Block, column: int, path: Path) -> tuple[FloatArray, int]:
+def values_of(block: DataRows, column: int, path: Path) -> tuple[FloatArray, int]:
     """Return the numbers of a column, NaN where there are none, and how many were beyond the range.
 
     Raises BadInput for a cell that is none of these.
     """
     texts = [row[column] for row in block.rows]
-    plain = _plainly(texts, block.script.decimal)
+    plain = _plainly(texts, block.dialect.decimal)
     if plain is not None:
         return plain, 0
     over = 0
     values = np.full(len(texts), NAN)
     for place, text in enumerate(texts):
-        if is_number(text, block.script.decimal):
-            values[place] = number_of(text, block.script.decimal)
+        if is_number(text, block.dialect.decimal):
+            values[place] = number_of(text, block.dialect.decimal)
             if np.isinf(values[place]):
-                raise _no_row(block.rows[place], block.lines[place], block.script, path)
+                raise _no_row(block.rows[place], block.lines[place], block.dialect, path)
         elif is_over(text):
             over += 1
         elif not is_gap(text):
-            raise _no_row(block.rows[place], block.lines[place], block.script, path)
+            raise _no_row(block.rows[place], block.lines[place], block.dialect, path)
     return values, over
 
 

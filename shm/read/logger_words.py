@@ -58,7 +58,7 @@ _UNITS: dict[str, Unit] = {
 }
 KNOWN = "N, daN, kN, lbf for forces; m/s2, mm/s2, um/s2, g, mg for accelerations"
 ACCELERANCE = "m/s2/N"
-UNSAID = "unknown"
+UNIT_MISSING = "unknown"
 """The unit of a channel whose file says none, where its name alone promises nothing."""
 SI: dict[Quantity, str] = {"force": "N", "acceleration": "m/s2"}
 
@@ -196,12 +196,12 @@ def name_and_unit(text: str) -> tuple[str, str]:
         inner = name_and_unit(name) if name else ("", "")
         return (f"{inner[0]} {found[0].strip()}", inner[1]) if inner[1] else (text, "")
     for mark in _APART.finditer(text):
-        if mark.start() and _stands_apart(mark[1], text[mark.end() :]):
+        if mark.start() and _is_unit_mark(mark[1], text[mark.end() :]):
             return text[: mark.start()], text[mark.end() :]
     return text, ""
 
 
-def _stands_apart(mark: str, unit: str) -> bool:
+def _is_unit_mark(mark: str, unit: str) -> bool:
     """Return whether the end of a name is a unit; after a blank or underscore only a clear one."""
     known = unit_of(unit) is not None or volts_of(unit) is not None
     if mark in ("_", " ", ":"):  # a letter there may be a direction or a number

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from shm.errors import BadInput
 from shm.read.array_reading import format_of_arrays
-from shm.read.arrays import Arrays, Variable, named_apart
+from shm.read.arrays import Arrays, Variable, unique_names
 from shm.read.content import bytes_of
 from shm.read.hdf5_file import opened_nodes, variables
 from shm.read.limits import guarded, limits, refuse_large
@@ -82,7 +82,7 @@ _MOST_VARIABLES = 1000
 _OF = "\0"  # between a struct and its field, until names are told apart
 _NAME_FIELDS = ("channel_names", "names", "channels", "labels")
 _UNIT_FIELDS = ("unit", "units")
-_MOST_BESIDE = 20  # judgement: a struct among more is settings of a program, no recording
+_MAX_FIELDS = 20  # judgement: a struct among more is settings of a program, no recording
 _KINDS = {
     "double": ("f", 8), "single": ("f", 4), "char": ("U", 4), "int8": ("i", 1), "uint8": ("u", 1),
     "int16": ("i", 2), "uint16": ("u", 2), "int32": ("i", 4), "uint32": ("u", 4),
@@ -107,13 +107,13 @@ def arrays_in(path: Path) -> Arrays:
     ):
         if kind in _KINDS:
             found.append(_variable(name, shape, kind, is_complex, element, content, path))
-        elif kind == "struct" and math.prod(shape) == 1 and len(listed) < _MOST_BESIDE:
+        elif kind == "struct" and math.prod(shape) == 1 and len(listed) < _MAX_FIELDS:
             fields = _fields(name, element, content, path)
             found += fields
             left_out += [] if fields else [f"{name} ({kind})"]
         else:
             left_out.append(f"{name} ({kind})")
-    names = named_apart([tuple(variable.name.split(_OF)) for variable in found])
+    names = unique_names([tuple(variable.name.split(_OF)) for variable in found])
     apart = [replace(v, name=name) for v, name in zip(found, names, strict=True)]
     return Arrays(tuple(apart), {}, tuple(left_out))
 
@@ -160,7 +160,7 @@ def _rows(
     """Return the records in a field: a row, or the columns of a table that another field names."""
     if value.ndim == 1 and value.size > 1:
         return [(key, value)]
-    if value.ndim != 2 or min(value.shape) > _MOST_BESIDE or max(value.shape) < 2:
+    if value.ndim != 2 or min(value.shape) > _MAX_FIELDS or max(value.shape) < 2:
         return []
     columns = value.T if value.shape[0] >= value.shape[1] else value
     names = _listed(fields, _NAME_FIELDS, len(columns))

@@ -54,9 +54,9 @@ def open_tables(path: Path) -> tuple[Table, ...]:
     rates = [trace.sampling_rate_hz for trace in traces]
     rate, start_ns = rates[0], min(trace.start_ns for trace in traces)
     if max(rates) - min(rates) > _SAME_RATE * rate:
-        told = ", ".join(f"{each:g}" for each in sorted(set(rates)))
+        listed = ", ".join(f"{each:g}" for each in sorted(set(rates)))
         raise BadInput(
-            f"the channels have different sampling rates ({told}).",
+            f"the channels have different sampling rates ({listed}).",
             file=path,
             remedy="Export all channels of one recording with one rate.",
         )

@@ -32,11 +32,11 @@ from shm.read.content import (
 )
 from shm.read.excel_file import FORMAT as EXCEL
 from shm.read.hdf5_file import FORMAT as HDF5
-from shm.read.header import CHANNEL_KEYS, Header
+from shm.read.header import CHANNEL_KEYS, Header, known_values
 from shm.read.matlab_file import FORMAT as MATLAB
 from shm.read.mini_seed_file import FORMAT as MINI_SEED
 from shm.read.numpy_file import FORMAT as NUMPY
-from shm.read.sidecar import document_beside, sidecar_path
+from shm.read.sidecar import sidecar_document, sidecar_path
 from shm.read.table import Column, Table, describe
 from shm.read.tdms_file import FORMAT as TDMS
 from shm.read.universal_file import FORMAT as UFF
@@ -169,8 +169,10 @@ def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
     if not holds_test(path):
         return _records(path)
     head_of(path)
-    said = entries_of_test(path).of_test
-    read_all = (_as_said(each, said) for found in each_member(path, _read_member) for each in found)
+    stated = entries_of_test(path).of_test
+    read_all = (
+        _with_stated(each, stated) for found in each_member(path, _read_member) for each in found
+    )
     return tuple(read_all)
 
 
@@ -187,8 +189,10 @@ def peek_test(path: Path) -> tuple[Peek, ...]:
         return _looks(path)
     head_of(path)
     problems: list[str] = []
-    said = read_of_test(entries_of_test(path), collecting(problems))
-    looks = (_as_said(each, said) for found in each_member(path, _peek_member) for each in found)
+    stated = read_of_test(entries_of_test(path), collecting(problems))
+    looks = (
+        _with_stated(each, stated) for found in each_member(path, _peek_member) for each in found
+    )
     return tuple(replace(each, problems=(*each.problems, *problems)) for each in looks)
 
 
@@ -221,20 +225,19 @@ def load_modes(path: Path) -> tuple[ModalTest, ...]:
     """
     tests = modes_document.load_modes(path)
     _refuse_channels(path)
-    said = entries_of_test(path)
-    _refuse_what_samples_have(said, tests, path)
-    return tuple(_as_said(test, said.of_test) for test in tests)
+    stated = entries_of_test(path)
+    _refuse_what_samples_have(stated, tests, path)
+    return tuple(_with_stated(test, stated.of_test) for test in tests)
 
 
-def _as_said(found: Found, said: Mapping[str, Any]) -> Found:
+def _with_stated(found: Found, stated: Mapping[str, Any]) -> Found:
     """Return a test with what a sidecar says of all of it; None and NaN change nothing."""
-    known = {key: value for key, value in said.items() if value is not None and value == value}
-    known = {key: value for key, value in known.items() if hasattr(found, key)}
-    return replace(found, **known)
+    known = known_values(stated)
+    return replace(found, **{key: value for key, value in known.items() if hasattr(found, key)})
 
 
 def _refuse_channels(path: Path) -> None:
-    for key in document_beside(path).keys() & {"channel", *CHANNEL_KEYS}:
+    for key in sidecar_document(path).keys() & {"channel", *CHANNEL_KEYS}:
         raise BadInput(
             f"{key!r} is said of modes, which have no channels.",
             file=sidecar_path(path),
@@ -242,15 +245,15 @@ def _refuse_channels(path: Path) -> None:
         )
 
 
-def _refuse_what_samples_have(said: Header, tests: tuple[ModalTest, ...], path: Path) -> None:
+def _refuse_what_samples_have(stated: Header, tests: tuple[ModalTest, ...], path: Path) -> None:
     sidecar = sidecar_path(path)
-    if not math.isnan(said.sampling_rate_hz):
+    if not math.isnan(stated.sampling_rate_hz):
         raise BadInput(
             "sampling_rate_hz is said of modes, whose frequencies are known.",
             file=sidecar,
             remedy=f"Correct the frequencies in {path.name} and send it again.",
         )
-    if said.time is not None and len(tests) > 1:
+    if stated.time is not None and len(tests) > 1:
         raise BadInput(
             f"one time is said of {len(tests)} tests.",
             file=sidecar,
@@ -274,7 +277,7 @@ def survey(path: Path) -> Survey:
             remedy="Unpack it and import one of its files of each.",
         )
     entries, several = entries_of_test(path), f"the first of {len(found)} files is shown"
-    first, remarks = _as_said(found[0], entries.of_test), [several] if len(found) > 1 else []
+    first, remarks = _with_stated(found[0], entries.of_test), [several] if len(found) > 1 else []
     orders = {each.layout.day_order for each in found} - {None}
     layout = replace(
         first.layout,
@@ -293,7 +296,7 @@ def _survey_file(path: Path) -> Survey:
 
 def _surveyed(tables: Sequence[Table], file_format: str, path: Path) -> Survey:
     table = tables[0]
-    seen, is_response = look(table, file_format), describe(table, with_beside=False).is_response
+    seen, is_response = look(table, file_format), describe(table, with_sidecars=False).is_response
     channels = {channel.name: channel for channel in seen.channels}
     columns: list[SurveyedColumn] = []
     problems = list(seen.problems)
@@ -371,19 +374,19 @@ def _layout(table: Table, file_format: str, columns: Sequence[SurveyedColumn]) -
     """Return the layout by what the file itself says, whatever a sidecar adds."""
     is_response = bool(columns) and columns[0].values is None
     names = tuple(column.name for column in columns)
-    said = names if is_response else table.layout
-    digest = hashlib.sha256("\n".join((file_format, *said)).encode()).hexdigest()
-    attempt, own = collecting([]), table.own_header
+    stated = names if is_response else table.layout
+    digest = hashlib.sha256("\n".join((file_format, *stated)).encode()).hexdigest()
+    attempt, in_file = collecting([]), table.file_header
     timed = any(column.role == "times" or column.rate_hz > 0 for column in table.columns)
-    says_rate = timed or table.clock_rate_hz > 0 or attempt(lambda: own.sampling_rate_hz, 0) > 0
+    has_rate = timed or table.clock_rate_hz > 0 or attempt(lambda: in_file.sampling_rate_hz, 0) > 0
     return Layout(
         digest[:_FINGERPRINT_DIGITS],
         file_format,
         names
         if is_response
         else tuple(f"{c.name} [{c.unit}]" if c.unit else c.name for c in columns),
-        attempt(lambda: own.hanger, None),
-        says_rate,
+        attempt(lambda: in_file.hanger, None),
+        has_rate,
         table.day_order,
         table.possible_times,
         table.local_time,

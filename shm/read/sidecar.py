@@ -19,7 +19,6 @@ leave_out = true
 from __future__ import annotations
 
 import json
-import math
 import os
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
@@ -32,7 +31,7 @@ from shm.errors import BadInput
 from shm.read.atomic import replace_text
 from shm.read.base import PeekChannel
 from shm.read.content import unreadable
-from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, mass_entries, spread
+from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, known_values, mass_entries, spread
 from shm.read.limits import refuse_long_header
 from shm.values import FrequencyResponse, Recording
 
@@ -62,7 +61,7 @@ def with_sidecar(
     says of channels is left alone where it is not asked for.
     """
     sidecar = sidecar_path(path)
-    document = document_beside(path)
+    document = sidecar_document(path)
     if not document:
         return header
     _refuse_misspelt(document, sidecar)
@@ -78,7 +77,7 @@ def with_sidecar(
         _refuse_unknown(tables, [*names, *others], sidecar)
     for name in [name for name in names if name in tables]:
         channels[name].update(_entries(tables[name], sidecar))
-    return header.overridden_by(Header(sidecar, channels, entries))
+    return header.merged_with(Header(sidecar, channels, entries))
 
 
 def _refuse_misspelt(document: Iterable[str], sidecar: Path) -> None:
@@ -93,7 +92,7 @@ def _refuse_misspelt(document: Iterable[str], sidecar: Path) -> None:
 def channels_described(path: Path) -> dict[str, dict[str, Entry]]:
     """Return the tables of single channels in the sidecar of a file; empty without a sidecar."""
     sidecar = sidecar_path(path)
-    tables = _tables(document_beside(path), sidecar)
+    tables = _tables(sidecar_document(path), sidecar)
     return {name: _entries(table, sidecar) for name, table in tables.items()}
 
 
@@ -101,7 +100,7 @@ def _entries(table: dict[str, Any], sidecar: Path) -> dict[str, Entry]:
     return {key: Entry(table[key], sidecar) for key in CHANNEL_KEYS if key in table}
 
 
-def document_beside(path: Path) -> dict[str, Any]:
+def sidecar_document(path: Path) -> dict[str, Any]:
     """Return the content of a file's sidecar; empty without a sidecar."""
     sidecar = sidecar_path(path)
     return _document(sidecar) if sidecar != path and sidecar.is_file() else {}
@@ -175,16 +174,8 @@ def write_sidecar(
         "sampling_rate_hz": sampling_rate_hz,
     }
     keys = ("unit", "plane", "x_m", "full_scale")
-    tables = {c.name: _known({key: getattr(c, key) for key in keys}) for c in channels}
-    replace_text(sidecar_path(path), sidecar_text({**_known(whole), "channel": tables}))
-
-
-def _known(said: Described) -> dict[str, Any]:
-    return {
-        key: value
-        for key, value in said.items()
-        if value not in (None, "") and not (isinstance(value, float) and math.isnan(value))
-    }
+    tables = {c.name: known_values({key: getattr(c, key) for key in keys}) for c in channels}
+    replace_text(sidecar_path(path), sidecar_text({**known_values(whole), "channel": tables}))
 
 
 Described = Mapping[str, Any]

@@ -73,7 +73,7 @@ def parsed(text: str, order: DayOrder | None = None) -> tuple[datetime, bool] | 
         return None
 
 
-def says_zone(text: str) -> bool:
+def names_zone(text: str) -> bool:
     """Return whether a time says of which zone it is."""
     found = _STAMP.fullmatch(text.strip())
     return found is not None and found["zone"] is not None

@@ -20,7 +20,7 @@ from shm.errors import BadInput, UsageError
 from shm.read import universal_frf
 from shm.read.atomic import replace_file
 from shm.read.base import Format, PeekChannel, at_once
-from shm.read.logger_heading import unlike
+from shm.read.logger_heading import distinct_names
 from shm.read.logger_words import SI, unit_of
 from shm.read.sidecar import write_sidecar
 from shm.read.table import Column, Table
@@ -188,7 +188,7 @@ def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
     measured = [found for found in sets if quantity(found) is not None]
     known = iter(_names_of_measured(measured, path))
     return list(
-        unlike(
+        distinct_names(
             [
                 next(known) if quantity(found) is not None else found.lines[0] or found.label
                 for found in sets
@@ -199,10 +199,10 @@ def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
 
 def _names_of_measured(sets: Sequence[FunctionSet], path: Path) -> list[str]:
     """Return the names that we wrote; else force, acc_1, acc_2, ... in the order of the file."""
-    own = [found.lines[0] for found in sets if universal_frf.facts(found)]
-    if len(own) == len(sets):
-        _refuse_doubles(own, sets, path)
-        return own
+    names = [found.lines[0] for found in sets if universal_frf.facts(found)]
+    if len(names) == len(sets):
+        _refuse_doubles(names, sets, path)
+        return names
     _refuse_doubles([_sensor(found) for found in sets if found.response[1] != 0], sets, path)
     forces, accelerations = count(2), count(1)
     names = []
@@ -221,8 +221,10 @@ def _sensor(found: FunctionSet) -> tuple[object, ...]:
 
 
 def _refuse_doubles(keys: Sequence[object], sets: Sequence[FunctionSet], path: Path) -> None:
-    alike = len({(found.points, found.step) for found in sets}) == 1  # else it is refused for that
-    if alike and len(set(keys)) < len(keys):
+    same_grid = (
+        len({(found.points, found.step) for found in sets}) == 1
+    )  # else it is refused for that
+    if same_grid and len(set(keys)) < len(keys):
         raise BadInput(
             f"{len(sets)} time histories, several of one sensor.",
             file=path,

@@ -16,7 +16,7 @@ from typing import Any
 from shm.errors import ShmError, sentence
 from shm.pipeline import utc_now
 from shm.pipeline.unheard import backlog_leads, heard, leads_of, ring_leads, stream_leads
-from shm.store.stored_alerts import said_of
+from shm.store.stored_alerts import describe_silence
 from shm.values.messages import Lead
 from shm_daemon.heartbeat import NEARLY_FULL, patience_s, seconds_since_beat, told, why_turn_failed
 from shm_daemon.spool import never_taken, scan
@@ -123,7 +123,7 @@ def _of_silences(site: Site) -> list[Lead]:
             "on the page of alerts.",
         )
         for each in found
-        for text in [said_of(each)]
+        for text in [describe_silence(each)]
     ]
 
 

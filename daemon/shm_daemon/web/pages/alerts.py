@@ -22,7 +22,7 @@ from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report import formatting
 from shm.report.hanger_status import HangerMessage
 from shm.store import Delivery, DeliveryState, News, Silence, StoredAlert
-from shm.store.stored_alerts import said_of, silenced_until
+from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values.messages import Lead
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import test_page
@@ -87,7 +87,7 @@ def alerts_page(
 
 
 def _sentence(silence: Silence) -> str:
-    words = f"{said_of(silence)}, from {silence.starts_at:%Y-%m-%d %H:%M} on."
+    words = f"{describe_silence(silence)}, from {silence.starts_at:%Y-%m-%d %H:%M} on."
     return words[0].upper() + words[1:]
 
 
