@@ -24,8 +24,10 @@ _SAME_MODE = 0.005  # judgement: set-ups and the end of softening see one mode a
 
 @dataclass(frozen=True)
 class HitModes:
-    """A hit with the frequency in Hz and damping ratio of each numbered mode, in their order; NaN
-    where the mode does not stand out of it."""
+    """Hold the frequency in Hz and damping ratio of each numbered mode after one hit.
+
+    They are in the order of the modes; NaN where a mode is below the noise of that hit.
+    """
 
     hit: Hit
     frequency_hz: tuple[float, ...]

@@ -79,7 +79,7 @@ class Identification:
     each_hit: tuple[HitModes, ...] = ()
 
     def with_orders(self, source: str) -> Identification:
-        """Itself, where modes have orders; else NotIdentifiable, which lists what was found."""
+        """Return self, where modes have orders; else raise NotIdentifiable listing the modes."""
         if self.test.modes:
             return self
         checks = [each for each in self.quality if each.verdict == "refused"]
@@ -102,11 +102,11 @@ def identify(
     test_id: str,
     hanger: Hanger | None = None,
 ) -> Identification:
-    """The modes of one test from its records: time records with hits, or frequency responses.
+    """Identify the modes of one test from its records: time records with hits, or responses.
 
     The description of the `hanger`, where known, helps to number the modes. Raises BadInput
-    where the records cannot be used together, NotIdentifiable where no mode can be trusted. Modes
-    whose orders are not known are set aside: the test is without modes where all are.
+    where the records cannot be used together, NotIdentifiable where no mode can be trusted.
+    Modes of unknown order are foreign: the test is without modes where all are.
     """
     refuse_off_the_hanger(records, hanger)
     recordings = [record for record in records if isinstance(record, Recording)]
@@ -170,7 +170,7 @@ def _placed(
 def _closer(
     found: Joined, measurements: Sequence[Measurement], options: IdentifyOptions
 ) -> Joined | None:
-    """With what windows over the whole band show of one set-up; None where they show no more."""
+    """Return the finding completed by windows over the band; None where they show no more."""
     if len(measurements) > 1 or options.identifier != "ssi":
         return None
     again = looked_at_again(measurements[0], options)
@@ -186,7 +186,7 @@ def _looked_at(
     options: IdentifyOptions,
     at_hz: Sequence[float],
 ) -> tuple[tuple[FoundMode, ...], tuple[FoundMode, ...]]:
-    """What windows show about the frequencies `at_hz`, of one set-up, and what may be a mode."""
+    """Return the modes that windows show around `at_hz` of one set-up, and weak candidates."""
     again = None
     if len(measurements) == 1 and options.identifier == "ssi":
         again = looked_at_again(measurements[0], options, at_hz)
@@ -203,7 +203,7 @@ def _of_placed(
     hanger: Hanger | None,
     options: IdentifyOptions,
 ) -> list[QualityCheck]:
-    """What numbered modes say of their numbers and of the sensors."""
+    """Return the quality checks of numbered modes, their numbers and the sensors."""
     checks = [placement.check]
     if hanger and hanger.as_hanger and placement.modes:
         if any(point.plane for point in found.points):  # else no plane can lack a mode
@@ -219,10 +219,10 @@ def _once_calm(
     hanger: Hanger | None,
     steady: Sequence[Tone],
 ) -> tuple[Placement, float, tuple[str, ...]] | None:
-    """What the ring-downs say once they have died away so far that they are a bar's, with what is
-    left of their level by then, and a note; None where they never are.
+    """Return the result of the late parts of ring-downs, once they are a bar's; None if never.
 
-    Of the parts that shows most modes counts.
+    With it come the fraction of their level that is left by then, and a note. The parts that
+    show most modes count.
     """
     if not all(m.driven for m in measurements):
         return None
@@ -267,7 +267,7 @@ def _cross_check(
 
 
 def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOptions) -> Joined:
-    """What the identifier of that name finds in each set-up, as one finding."""
+    """Run the identifier of that name on each set-up and return its findings joined."""
     function = identifier(name)
     # What tests differ by is allowed for once, not set-up by set-up.
     alone = options if len(measurements) == 1 else replace(options, frequency_allowance=0.0)
@@ -282,7 +282,7 @@ def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOpti
 
 
 def _of_modes_alone(found: Joined) -> Joined:
-    """Without the sidebands of modes."""
+    """Return the finding without the sidebands of modes."""
     finding = without_sidebands(found.finding)
     kept = [any(mode is own for own in finding.modes) for mode in found.finding.modes]
     apart = tuple(tuple(compress(modes, kept)) for modes in found.apart)
@@ -290,7 +290,7 @@ def _of_modes_alone(found: Joined) -> Joined:
 
 
 def _allowed_for(found: Finding, shape_allowance: float) -> Finding:
-    """With what shapes differ by from test to test in their standard deviations."""
+    """Add the scatter of shapes from test to test to their standard deviations."""
     modes = tuple(
         replace(mode, shape_sd=np.hypot(mode.shape_sd, shape_allowance)) for mode in found.modes
     )
@@ -303,7 +303,7 @@ def _test(
     modes: tuple[Mode, ...],
     amplitude: float,
 ) -> ModalTest:
-    """The test with the earliest time and the mean temperature of its records."""
+    """Return the test with the earliest time and the mean temperature of its records."""
     temperatures = [r.temperature_c for r in records if not math.isnan(r.temperature_c)]
     return ModalTest(
         id=as_test_id(test_id),
@@ -358,7 +358,7 @@ def _no_force(measurements: Sequence[Measurement]) -> tuple[str, ...]:
 
 
 def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
-    """Median peak force of the used hits over that of the reference level."""
+    """Return the median peak force of the used hits over that of the reference level."""
     forces = [hit.peak_force_n for hit in hits if hit.used and math.isfinite(hit.peak_force_n)]
     return float(np.median(forces)) / options.reference_force_n if forces else NAN
 
@@ -370,7 +370,7 @@ IDENTIFIERS: dict[str, Identifier] = {
 
 
 def identifier(name: str) -> Identifier:
-    """The identifier of that name; raises UsageError for an unknown one."""
+    """Return the identifier of that name; raises UsageError for an unknown one."""
     if name not in IDENTIFIERS:
         raise UsageError(
             f"unknown identifier {name!r}.", remedy=f"Known: {', '.join(IDENTIFIERS)}."

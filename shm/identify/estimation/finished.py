@@ -1,7 +1,7 @@
-"""What a finding must still pass once an identifier has made it.
+"""Check a finding after identification: windows, incoherence and sidebands.
 
-Of an exponential window, incoherence, and lines that something makes beside a mode by changing the
-size of its ringing: no modes.
+An exponential window's damping is removed; incoherent modes and lines that modulation of a mode's
+ringing makes are no modes.
 """
 
 from __future__ import annotations
@@ -24,14 +24,16 @@ _LINES_AROUND = 4  # judgement: nine lines have a median that one bad line does 
 
 
 def finished(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
-    """The finding without the window's damping and incoherent modes, with how frequencies depend on
-    the amplitude."""
+    """Return the finding without window damping, incoherent modes and sidebands.
+
+    Frequencies have their dependence on amplitude.
+    """
     found = coherent_only(without_window(found, measurement), measurement, options)
     return _unsure_of_damping(with_amplitude_dependence(found, measurement), measurement)
 
 
 def _unsure_of_damping(found: Finding, measurement: Measurement) -> Finding:
-    """The finding with what an analyser's window may add to its damping as an uncertainty."""
+    """Return the finding with an analyser's possible window as uncertainty of the damping."""
     rate = recorded_window_rate(measurement)
     modes = tuple(
         replace(m, damping_sd=math.hypot(m.damping_sd, rate / (2 * math.pi * m.frequency_hz)))
@@ -41,7 +43,7 @@ def _unsure_of_damping(found: Finding, measurement: Measurement) -> Finding:
 
 
 def without_window(found: Finding, measurement: Measurement) -> Finding:
-    """The finding with the damping of an exponential window taken off its damping ratios."""
+    """Return the finding with the damping of an exponential window taken off its damping ratios."""
     rate = 1 / measurement.decay_time_constant_s
     modes, doubtful = (
         tuple(
@@ -54,10 +56,10 @@ def without_window(found: Finding, measurement: Measurement) -> Finding:
 
 
 def coherent_only(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
-    """The finding without modes at which the measured coherence is low.
+    """Return the finding without modes at which the measured coherence is low.
 
-    Only for decays made from frequency responses: after hits, coherence also falls where a hit came
-    before the last had rung down, which free decays do not mind.
+    Only for decays made from frequency responses: after hits, coherence also falls where a hit
+    came before the last had rung down, which free decays do not mind.
     """
     response = measurement.frequency_response
     if measurement.hits or response is None or response.coherence is None:
@@ -74,7 +76,7 @@ def coherent_only(found: Finding, measurement: Measurement, options: IdentifyOpt
 
 
 def _coherence(mode: FoundMode, frequency_hz: FloatArray, coherence: FloatArray) -> float:
-    """Median coherence over the points and the lines around a mode."""
+    """Return the median coherence over the points and the lines around a mode."""
     line = int(np.argmin(np.abs(frequency_hz - mode.frequency_hz)))
     near = coherence[:, max(0, line - _LINES_AROUND) : line + _LINES_AROUND + 1]
     return float(np.median(near))
@@ -91,12 +93,12 @@ _SIDEBAND_TOLERANCE = 0.1
 
 
 def without_sidebands(found: Finding) -> Finding:
-    """The finding without pairs of lines that are sidebands of a mode between them.
+    """Return the finding without pairs of lines that are sidebands of a mode between them.
 
-    A slow machine makes them by moving the size of the mode's ringing: exp(-s t) cos(w t) (1 + m
-    cos(v t)) is the mode and two lines at w - v and w + v with its shape and its rate of decay s,
-    and m/2 of its amplitude each. Two modes of a hanger that lie so about a third do not also decay
-    as it does and are not equally strong.
+    A slow machine makes them by modulating the mode's ringing: exp(-s t) cos(w t) (1 + m cos(v
+    t)) is the mode and two lines at w - v and w + v with its shape and its rate of decay s, and
+    m/2 of its amplitude each. Two modes of a hanger at such frequencies do not also decay at
+    its rate with equal strength.
     """
     lines: dict[int, FoundMode] = {}
     for carrier in found.modes:
@@ -118,7 +120,7 @@ def without_sidebands(found: Finding) -> Finding:
 
 
 def _weaker_beside(carrier: FoundMode, modes: Sequence[FoundMode]) -> list[FoundMode]:
-    """Those of its shape and rate of decay that are near to it and weaker."""
+    """Return weaker modes close to the carrier that share its shape and rate of decay."""
     rate = _decay_rate(carrier)
     return [
         mode
@@ -132,7 +134,7 @@ def _weaker_beside(carrier: FoundMode, modes: Sequence[FoundMode]) -> list[Found
 
 
 def _are_sidebands(carrier: FoundMode, one: FoundMode, other: FoundMode) -> bool:
-    """Whether the two lie evenly about the mode and are about equally strong."""
+    """Return whether the two are symmetric about the mode and about equally strong."""
     off_hz = abs(one.frequency_hz + other.frequency_hz - 2 * carrier.frequency_hz)
     sds = [mode.frequency_sd_hz for mode in (one, other, carrier, carrier)]
     hits_known = not any(math.isnan(mode.damping_sd) for mode in (one, other, carrier))
@@ -143,5 +145,5 @@ def _are_sidebands(carrier: FoundMode, one: FoundMode, other: FoundMode) -> bool
 
 
 def _decay_rate(mode: FoundMode) -> float:
-    """Of its decay, in rad/s."""
+    """Return the rate of the mode's decay in rad/s."""
     return 2 * math.pi * mode.frequency_hz * mode.damping_ratio

@@ -79,10 +79,10 @@ class Window:
         return max(1, int(sampling_rate_hz / (4 * self._reach_hz)))
 
     def through(self, decay: FloatArray, sampling_rate_hz: float) -> FloatArray:
-        """A free decay (channels, samples) lowered by `shift_hz`, at `rate_hz`.
+        """Return a free decay (channels, samples) lowered by `shift_hz`, at `rate_hz`.
 
-        The filter runs from the end to the beginning: so a sum of decaying sines stays one from its
-        first sample on, and only its end, where the filter starts, is lost.
+        The filter runs from the end to the beginning: so a sum of decaying sines stays one
+        from its first sample on, and only its end, where the filter starts, is lost.
         """
         middle = self.shift_hz + self._reach_hz
         turned = decay * np.exp(-2j * np.pi * middle / sampling_rate_hz * np.arange(decay.shape[1]))
@@ -97,10 +97,10 @@ class Window:
         return np.asarray((slow * back).real)
 
     def options(self, options: IdentifyOptions) -> IdentifyOptions:
-        """Those of the band for this window; windows overlap, so that no mode falls between two.
+        """Return the options with this window's band; windows overlap to miss no mode.
 
-        Poles of noise lie as dense in one window as in another, so what a frequency may differ by
-        from model to model grows with it no further than `_SURE_BELOW_HZ`.
+        Poles of noise are as dense in one window as in another, so the tolerance of a
+        frequency from model to model grows with it no further than `_SURE_BELOW_HZ`.
         """
         more = _OVERLAP * (self.high_hz - self.low_hz)
         strict = min(1.0, 2 * _SURE_BELOW_HZ / (self.low_hz + self.high_hz))
@@ -116,12 +116,12 @@ class Window:
 
 @lru_cache(maxsize=16)
 def _low_pass(edge: float) -> FloatArray:
-    """Sections of a Chebyshev filter that stops from a share of half the sampling rate on."""
+    """Return the sections of a Chebyshev filter that stops above a fraction of half the rate."""
     return np.asarray(scipy.signal.cheby2(_FILTER_ORDER, _STOP_DB, min(edge, 0.99), output="sos"))
 
 
 def windows(sampling_rate_hz: float, options: IdentifyOptions) -> Iterator[Window]:
-    """Windows of equal width, side by side over the band."""
+    """Yield windows of equal width, side by side over the band."""
     low_hz = options.band_low_hz
     high_hz = min(options.band_high_hz, sampling_rate_hz / 2)
     count = max(1, round((high_hz - low_hz) / WIDTH_HZ))
@@ -171,7 +171,7 @@ _RANK_TOLERANCE = 1e-17
 
 
 def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Finding:
-    """Modes of a measurement by multi-hit SSI (see the module's text)."""
+    """Return modes of a measurement by multi-hit SSI (see the module's text)."""
     nobody_hit = measurement.frequency_response is None and not measurement.hits
     if nobody_hit:
         samples = sum(part.shape[1] for part in measurement.decays)
@@ -200,8 +200,10 @@ def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Fin
 def looked_at_again(
     measurement: Measurement, options: IdentifyOptions, at_hz: Sequence[float] | None = None
 ) -> Finding | None:
-    """What windows show about `at_hz`, or anywhere; None where they were looked through before, or
-    cannot be."""
+    """Identify modes in windows around `at_hz`, or over the band.
+
+    Returns None where windows were used before or cannot be.
+    """
     every = windows(measurement.sampling_rate_hz, options)
     around = [w for w in every if at_hz is None or any(w.low_hz <= hz <= w.high_hz for hz in at_hz)]
     if not around or not measurement.hits or not _repeated(measurement):
@@ -212,7 +214,7 @@ def looked_at_again(
 def through_windows(
     measurement: Measurement, options: IdentifyOptions, every: Iterable[Window]
 ) -> Finding:
-    """The modes that each window shows by itself."""
+    """Return the modes that each window shows by itself."""
     return reduce(completed, (_in_window(window, measurement, options) for window in every))
 
 
@@ -234,7 +236,7 @@ def _in_window(window: Window, measurement: Measurement, options: IdentifyOption
 
 
 def _few_sums(matrices: Sequence[FloatArray]) -> list[FloatArray]:
-    """The matrices as no more than ten sums, each to be left out in turn."""
+    """Return the matrices as no more than ten sums, each to be left out in turn."""
     return [np.sum(matrices[n::_MOST_SUMS], axis=0) for n in range(min(len(matrices), _MOST_SUMS))]
 
 
@@ -258,7 +260,7 @@ class _Size:
 
 
 def references(responses: Sequence[FloatArray], most: int = _REFERENCES) -> FloatArray:
-    """Rows (references, channels) that mix the channels into the `most` that carry most energy."""
+    """Return rows (references, channels) that mix channels into the `most` with most energy."""
     channels = len(responses[0])
     if channels <= most:
         return np.eye(channels)
@@ -268,13 +270,13 @@ def references(responses: Sequence[FloatArray], most: int = _REFERENCES) -> Floa
 
 
 def _repeated(measurement: Measurement) -> bool:
-    """Whether hits enough tell modes from noise."""
+    """Return whether there are hits enough to separate modes from noise."""
     hit = bool(measurement.hits) or measurement.frequency_response is not None
     return hit and len(measurement.decays) >= LEAST_HITS
 
 
 def block_rows(measurement: Measurement, options: IdentifyOptions) -> int:
-    """How many time lags the Hankel matrices hold."""
+    """Return the number of time lags in the Hankel matrices."""
     shortest = min(decay.shape[1] for decay in measurement.decays)
     channels = len(measurement.points)
     rows, bounds = (_ROWS, _BLOCK_ROWS) if _repeated(measurement) else (_ROWS_FEW, _BLOCK_ROWS_FEW)
@@ -290,7 +292,7 @@ def modes_of_hankel(
     options: IdentifyOptions,
     shift_hz: float = 0.0,
 ) -> Finding:
-    """Modes from the Hankel matrices of the hits, each of `rows` blocks of rows.
+    """Return modes from the Hankel matrices of the hits, each of `rows` blocks of rows.
 
     `shift_hz` is what their frequencies lie below the true ones.
     """
@@ -308,7 +310,7 @@ def modes_of_hankel(
 
 
 def _max_order(shape: tuple[int, int], values: FloatArray, rows: int, most: int) -> int:
-    """The highest even order up to `most` that a matrix has the size and numerical rank for."""
+    """Return the highest even order up to `most` that a matrix' size and numerical rank allow."""
     rank = int(np.sum(values > _RANK_TOLERANCE * values[0]))
     shifted_rows = shape[0] // rows * (rows - 1)
     largest = min(most, rank, shifted_rows // 2, shape[1])
@@ -318,7 +320,10 @@ def _max_order(shape: tuple[int, int], values: FloatArray, rows: int, most: int)
 def _models_without_each_hit(
     matrices: Sequence[FloatArray], basis: FloatArray, size: _Size
 ) -> list[list[PoleSet]]:
-    """Of the columns that `basis`, the whole matrix' right singular vectors, combines."""
+    """Return the models with each hit left out, in the columns that `basis` combines.
+
+    `basis` are right singular vectors of the full matrix.
+    """
     if len(matrices) < 2:
         return []
     projected = [matrix @ basis for matrix in matrices]

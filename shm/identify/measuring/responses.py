@@ -31,12 +31,12 @@ Place: TypeAlias = tuple[Plane | None, float | None, str]
 
 
 def point_of(channel: Channel) -> ResponsePoint:
-    """Where a channel's sensor sits, or its hammer hits."""
+    """Return the point where a channel's sensor is mounted, or its hammer hits."""
     return ResponsePoint(channel.name, channel.plane, channel.x_m)
 
 
 def place_of(point: ResponsePoint) -> Place:
-    """What makes the point the same in several set-ups."""
+    """Return what identifies a point in several set-ups."""
     if math.isnan(point.x_m):
         return point.plane, None, point.name
     return point.plane, point.x_m, ""
@@ -53,7 +53,7 @@ _USED_SHARE = 0.8
 def measurement_of_responses(
     responses: Sequence[FrequencyResponse], options: IdentifyOptions
 ) -> Measurement:
-    """The measurement in the frequency responses of one test.
+    """Return the measurement in the frequency responses of one test.
 
     Raises BadInput where their lines differ, NotIdentifiable where no point is left to use.
     """
@@ -93,7 +93,7 @@ def _refuse_different(first: FrequencyResponse, second: FrequencyResponse) -> No
 def _merged(
     responses: Sequence[FrequencyResponse], options: IdentifyOptions
 ) -> tuple[FrequencyResponse, tuple[Dropped, ...]]:
-    """All points with finite lines in the band as one response; and those without."""
+    """Merge all points with finite lines in the band into one response; also return the others."""
     first = responses[0]
     lines = (first.frequency_hz >= options.band_low_hz) & (
         first.frequency_hz <= options.band_high_hz
@@ -116,7 +116,7 @@ def _merged(
 def _impulse_responses(
     response: FrequencyResponse, options: IdentifyOptions, most_samples: int
 ) -> tuple[FloatArray, float]:
-    """Impulse responses (points, samples) without their first and last part, and their rate."""
+    """Return impulse responses (points, samples) without first and last part, and their rate."""
     rate = 2 * float(response.frequency_hz[-1])
     # Lines outside of the band, such as H1's 0/0 at zero frequency, may be unknown: they count 0.
     known = np.where(np.isfinite(response.accelerance), response.accelerance, 0)
@@ -139,7 +139,7 @@ _MOST_ASTRAY = 0.4
 
 
 def recorded_window_rate(measurement: Measurement) -> float:
-    """Its rate of decay in 1/s, the median over the hits; 0 where there is none to be seen."""
+    """Return the window's rate of decay in 1/s, the median over the hits; 0 where none is seen."""
     if not measurement.hits:
         return 0.0
     rate_hz, after = measurement.sampling_rate_hz, int(_AFTER_S * measurement.sampling_rate_hz)
@@ -152,7 +152,7 @@ def recorded_window_rate(measurement: Measurement) -> float:
 
 
 def _rate_of_motion(measurement: Measurement, after: int) -> float:
-    """That by which the noise of all accelerometers falls after all hits."""
+    """Return the rate by which the noise of all accelerometers falls after all hits."""
     rates = []
     for row in range(len(measurement.points)):
         parts = [decay[row] for decay in measurement.decays if decay.shape[1] > _BLOCKS * after]
@@ -165,7 +165,7 @@ def _rate_of_motion(measurement: Measurement, after: int) -> float:
 
 
 def _rate(noise: FloatArray, rate_hz: float) -> float:
-    """The rate by which the level of noise falls; 0 where it does not, or not evenly."""
+    """Return the rate by which the level of noise falls; 0 where it does not, or not evenly."""
     length = len(noise) // _BLOCKS
     if length < _LEAST_SAMPLES:
         return 0.0

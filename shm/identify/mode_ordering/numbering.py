@@ -1,11 +1,12 @@
-"""Orders of modes as one likelihood over bars: of each bar a mode takes the nearest order or is
-foreign, the cheapest bar numbers the modes, and the next cheapest that gives a mode another order
-says how sure its number is.
+"""Number modes by one likelihood over bars.
 
-Both planes share the tension and nearly the length, not the springs. Where length and sensor places
-are known, shapes have a say. A hanger that is but a bar in springs is one to a thousandth with its
-own orders and seldom with others: there one least-squares bar decides between orders that the grid
-leaves open, and says where a missing order lies.
+On each bar a mode takes the nearest order or is foreign. The cheapest bar numbers the modes; the
+next cheapest that gives a mode another order tells how sure its number is.
+
+Both planes share the tension and nearly the length, not the springs. Where length and sensor
+positions are known, shapes count. A hanger that is a bar in springs fits to a thousandth with its
+orders and seldom with others: there one least-squares bar decides between orders that the grid
+leaves open, and shows where an order is missing.
 """
 
 from __future__ import annotations
@@ -99,10 +100,10 @@ class Numbering:
 
 
 def number_modes(planes: Sequence[PlaneModes], hanger: Hanger | None) -> Numbering:
-    """Number the modes of one or two planes.
+    """Assign orders to the modes of one or two planes.
 
-    Where too many would be foreign, the description is doubted, then that there is a bar at all:
-    without either, modes are counted.
+    Where too many would be foreign, first the description is dropped, then the bar: without
+    either, modes are counted.
     """
     counts = [len(plane.frequency_hz) for plane in planes]
     if 0 < max(counts) <= HIGHEST_ORDER:
@@ -139,8 +140,11 @@ def _is_believed(planes: Sequence[PlaneModes], found: Numbering, bars: Bars | No
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Hold a plane on a grid at the best springs: `total` (tensions, units), `number` from 1, 0 for
-    foreign, and `misfit` of the frequency, (modes, tensions, units)."""
+    """Hold the fit of a plane on a grid of (tensions, units), at the best springs.
+
+    `total` is the cost, `number` the orders from 1, 0 for foreign, and `misfit` the error of
+    the frequency, both (modes, tensions, units).
+    """
 
     total: FloatArray
     number: IntArray

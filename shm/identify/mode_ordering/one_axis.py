@@ -1,8 +1,8 @@
-"""Which of two modes at one order is the axis' own, where sensors of one axis hear both planes.
+"""Assign two modes at one order to planes, where sensors of one axis measure both planes.
 
-A sensor that is turned by a few degrees, or hears a few percent across, shows the modes of the
-other plane beside those of its own. Which is whose says the strength, as sensors hear their own
-plane better, and with several sensors the shape: each is turned by its own angle, so the other
+A sensor that is rotated by a few degrees, or has a few percent of cross-axis sensitivity, shows the
+modes of the other plane next to those of its plane. The strength decides, as sensors measure their
+plane better, and with several sensors the shape: each is rotated by another angle, so the other
 plane's modes do not have the shape of a bar.
 """
 
@@ -34,8 +34,9 @@ _DECIDED = 6.0
 
 @dataclass(frozen=True)
 class Heard:
-    """Orders from 1 (modes,) `own` of the axis' plane and `askew` of the other, 0 for neither;
-    `undecided` counts the orders of which nothing tells which mode is whose: they are in neither.
+    """Hold orders from 1 (modes,) in the axis' plane and in the other, 0 for neither.
+
+    `undecided` counts the orders with two modes that cannot be assigned: they are in neither.
     """
 
     own: tuple[int, ...]

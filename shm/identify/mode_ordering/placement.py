@@ -351,7 +351,7 @@ def _of_no_planes(numbered: _Numbered) -> QualityCheck:
 
 
 def _of_no_order(numbered: _Numbered) -> QualityCheck:
-    """That modes are known and their orders are not."""
+    """Return the check for modes that are known while their orders are not."""
     found = "the modes fit neither the hanger's description nor any tensioned bar"
     if numbered.unsure:
         found = f"the lowest may be order {min(numbered.unsure.values())}, or another"
@@ -364,7 +364,7 @@ def _of_no_order(numbered: _Numbered) -> QualityCheck:
 
 
 def _doubt_of_numbers(numbered: _Numbered, known: Hanger | None) -> tuple[str, str]:
-    """What is not known of the numbers, and the remedy; empty where nothing is."""
+    """Return what is uncertain about the numbers, and the remedy; empty where nothing is."""
     if numbered.basis == "counting":
         return "the modes fit no tensioned beam: they are counted", "Describe the hanger."
     if known and numbered.basis == "pattern":

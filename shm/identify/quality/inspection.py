@@ -1,4 +1,4 @@
-"""What a quality check looks at, and how hits and channels are counted and told to the crew."""
+"""Hold the data that a quality check evaluates, and describe hits and channels to the crew."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ class Inspection:
 
 
 def hits_of(inspection: Inspection) -> list[Hit]:
-    """All hits of all set-ups, used or not."""
+    """Return all hits of all set-ups, used or not."""
     return [hit for measurement in inspection.measurements for hit in measurement.hits]
 
 
 def hits_for(inspection: Inspection, reasons: Sequence[str]) -> list[Hit]:
-    """The hits that were left out for one of the reasons."""
+    """Return the hits that were left out for one of the reasons."""
     return [hit for hit in hits_of(inspection) if hit.reason.startswith(tuple(reasons))]
 
 
 def channels_for(inspection: Inspection, reasons: Sequence[str]) -> list[str]:
-    """The channels that were left out for one of the reasons, as `channel acc_3`."""
+    """Return the channels that were left out for one of the reasons, as `channel acc_3`."""
     dropped = [d for measurement in inspection.measurements for d in measurement.dropped]
     return sorted(
         {d.what for d in dropped if "channel" in d.what and d.reason.startswith(tuple(reasons))}
@@ -49,7 +49,7 @@ def channels_for(inspection: Inspection, reasons: Sequence[str]) -> list[str]:
 
 
 def places(inspection: Inspection, hits: Sequence[Hit]) -> str:
-    """Such as `the hits at 12.3 s and 45.1 s`, with the record where there are several.
+    """Describe hits, as `the hits at 12.3 s and 45.1 s`, with the record where there are several.
 
     More than four are counted.
     """

@@ -1,6 +1,4 @@
-"""What can be wrong with the blows: too few, two in one swing, no time before or after, unlike each
-other, a tip too soft for the band.
-"""
+"""Check the hits: too few, double, too close, inconsistent, or of too soft a tip."""
 
 from __future__ import annotations
 
@@ -51,7 +49,7 @@ def _hits_used(inspection: Inspection) -> Reading | None:
 
 
 def _dies_away(inspection: Inspection) -> bool:
-    """Whether ring-downs fall by 10 dB, and most modes are seen to turn steadily as they do."""
+    """Return whether ring-downs fall by 10 dB while most modes keep a steady phase."""
     decays = [decay for m in inspection.measurements for decay in m.decays]
     modes = inspection.finding.modes if inspection.finding else ()
     steady = [mode for mode in modes if math.isfinite(mode.amplitude_slope)]
@@ -60,7 +58,7 @@ def _dies_away(inspection: Inspection) -> bool:
 
 
 def _unforced(inspection: Inspection) -> bool:
-    """Whether the hits are known from the accelerations alone."""
+    """Return whether the hits are known from the accelerations alone."""
     return any(record.force is None for record in inspection.records)
 
 
@@ -144,7 +142,7 @@ def _force_spectrum(inspection: Inspection) -> Reading | None:
 
 
 def _spectrum_db(inspection: Inspection, hit: Hit) -> tuple[FloatArray, FloatArray]:
-    """Frequencies (lines,) in the band and the pulse's level at them over its largest, in dB."""
+    """Return the lines (lines,) in the band and the pulse's relative level at them in dB."""
     record, options = inspection.records[hit.record], inspection.options
     force, rate = record.force, record.sampling_rate_hz
     assert force is not None

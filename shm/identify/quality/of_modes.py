@@ -1,4 +1,4 @@
-"""Does the force explain the modes, does a second identifier find them, are the lowest there?"""
+"""Check the modes: explained by the force, confirmed by a second identifier, lowest present."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _explained(inspection: Inspection) -> Reading | None:
 
 
 def _coherence(measurement: Measurement, inspection: Inspection) -> FloatArray | None:
-    """Coherence of all points at the lines that count, flat."""
+    """Return coherence of all points at the lines that count, flat."""
     response = measurement.frequency_response
     if response is None or response.coherence is None:
         return None
@@ -89,7 +89,7 @@ def _coherence(measurement: Measurement, inspection: Inspection) -> FloatArray |
 
 
 def _coherence_by_plane(measurement: Measurement) -> FloatArray:
-    """Of each point with the hits of its plane, where both planes were struck in turn."""
+    """Return the coherence of each point with the hits of its plane, where both were hit."""
     response = measurement.frequency_response
     assert response is not None
     assert response.coherence is not None
@@ -105,7 +105,7 @@ def _coherence_by_plane(measurement: Measurement) -> FloatArray:
 
 
 def _near(frequency_hz: FloatArray, modes_hz: FloatArray) -> BoolArray:
-    """The lines at modes and two to either side."""
+    """Return the lines at modes and two to either side."""
     spacing = float(frequency_hz[1] - frequency_hz[0])
     distance = np.abs(frequency_hz[:, None] - modes_hz)
     return np.asarray(np.any(distance <= (_LINES_AROUND + 0.5) * spacing, axis=1))
@@ -208,7 +208,10 @@ def _alone(who: str, frequency_hz: FloatArray, common: list[int]) -> str:
 
 
 def first_orders(modes: Sequence[Mode], hanger: Hanger, low_hz: float) -> QualityCheck | None:
-    """How many modes the described hanger has above `low_hz` and below the first one of a plane."""
+    """Return the check for modes of the described hanger below the first one found in a plane.
+
+    Only modes above `low_hz` count.
+    """
     lost = {plane: _below_first(modes, plane, hanger, low_hz) for plane in PLANES}
     if not modes:
         return None

@@ -1,9 +1,9 @@
-"""Whether the sensors move as the described hanger does: right unit, gain and place?
+"""Check unit, gain and position of the sensors against the described hanger.
 
 A hit's residue is the shape at the sensor times that at the hammer, each for unit modal mass. Away
 from its ends a hanger of mass M has the shape sqrt(2/M) sin(beta s + theta), whatever tension and
-ends, so that a unit that is off by 9.81 shows. Of several places each mode's shape tells whether
-one reads too much or too little, or is elsewhere: that one change mends all modes.
+ends, so that a unit that is wrong by 9.81 shows. With several positions each mode's shape shows
+whether one reads too much or too little, or is elsewhere: that one change corrects all modes.
 """
 
 from __future__ import annotations
@@ -55,10 +55,11 @@ def sensor_gain(
     modes: Sequence[Mode],
     hanger: Hanger,
 ) -> QualityCheck | None:
-    """Motion for the force over that of the described mass; None where it cannot be told.
+    """Return the check of motion per force over that of the described mass; None if unknown.
 
-    `found` are the modes of each set-up, `modes` those with an order. Of frequencies that change
-    much with amplitude the residues are too small. Not checked where no hammer's place is stated.
+    `found` are the modes of each set-up, `modes` those with an order. Of frequencies that
+    change much with amplitude the residues are too small. Not checked where no hammer's
+    position is stated.
     """
     hammers = [measurement.hammer for measurement in measurements if measurement.driven]
     if hammers and not any(hammer and np.isfinite(hammer.x_m) for hammer in hammers):
@@ -95,7 +96,7 @@ def sensor_gain(
 def _factors(
     measurement: Measurement, found: Sequence[FoundMode], modes: Sequence[Mode], hanger: Hanger
 ) -> FloatArray:
-    """What each hit moves over what the described hanger would, both planes together."""
+    """Return each hit's motion over that of the described hanger, both planes together."""
     hammer = measurement.hammer
     if hammer is None or not np.isfinite(hammer.x_m):
         return np.empty(0)
@@ -118,7 +119,7 @@ def _factors(
 def _numbered(
     found: Sequence[FoundMode], modes: Sequence[Mode], plane: Plane
 ) -> Iterator[tuple[int, int]]:
-    """Of each found mode of a plane, its index and its order."""
+    """Yield index and order of each found mode of a plane."""
     for mode in modes:
         away = [abs(each.frequency_hz / mode.frequency_hz - 1) for each in found]
         if mode.plane == plane and mode.order <= HIGHEST_ORDER and min(away) < _SAME_MODE:
@@ -128,9 +129,9 @@ def _numbered(
 def _ratio(
     residue: FloatArray, orders: IntArray, places_m: Sequence[float], hanger: Hanger
 ) -> FloatArray:
-    """Median ratio of residues (hits, points, modes) to the described ones, a hit each.
+    """Return the median ratio of residues (hits, points, modes) to the described ones, per hit.
 
-    The hammer's is the last of the places. Of all end springs those whose ratios agree best.
+    The hammer's is the last of the positions. Of all end springs those whose ratios agree best.
     """
     best, least = np.full(len(residue), np.nan), np.inf
     for shape in described_shapes(np.array(places_m), orders, hanger):
@@ -148,8 +149,11 @@ def _ratio(
 
 
 def sensor_places(modes: Sequence[Mode], hanger: Hanger) -> QualityCheck | None:
-    """Whether one sensor's factor or place spoils the shapes; None where they do not tell, as those
-    of a bar with turnbuckles, which bend otherwise by as much as a wrong place does."""
+    """Return the check of whether one sensor's factor or position spoils the shapes.
+
+    None where shapes do not tell, as those of a bar with turnbuckles, which bend otherwise by
+    as much as a wrong position does.
+    """
     if hanger.turnbuckles:
         return None
     results = [
@@ -195,8 +199,10 @@ def _in_plane(modes: Sequence[Mode], plane: Plane, hanger: Hanger) -> QualityChe
 def _explained(
     values: FloatArray, places_m: FloatArray, orders: IntArray, hanger: Hanger
 ) -> tuple[float, float, list[_Wrong]]:
-    """The misfit of shapes (modes, places), its mean and its median over the modes, and of each
-    place what its factor or its place mends."""
+    """Return misfits of shapes (modes, places): mean, median, and the fix of each position.
+
+    The fix is by its factor or its position.
+    """
     every = np.concatenate([places_m, _PLACES * hanger.length_m])
     shapes = described_shapes(every, orders, hanger)
     own, elsewhere = shapes[:, :, : len(places_m)], shapes[:, :, len(places_m) :]
@@ -227,7 +233,7 @@ def _mended_by_factor(misfit: float, x_m: float, factor: float) -> _Wrong:
 
 
 def _misfits(values: FloatArray, shapes: FloatArray) -> FloatArray:
-    """1 - MAC of each mode (..., modes); both (..., modes, places)."""
+    """Return 1 - MAC of each mode (..., modes); both arguments are (..., modes, places)."""
     product = np.sum(values * shapes, axis=-1) ** 2
     norms = np.sum(values**2, axis=-1) * np.sum(shapes**2, axis=-1)
     return np.asarray(1 - product / np.maximum(norms, 1e-300))

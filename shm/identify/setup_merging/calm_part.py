@@ -37,7 +37,7 @@ _UNSURE = 0.3  # judgement: of a damping without standard deviation
 
 
 def calmed(measurements: Sequence[Measurement], left_out: float) -> tuple[Measurement, ...]:
-    """The measurements without the beginnings of their ring-downs.
+    """Return the measurements without the beginnings of their ring-downs.
 
     Hits in several directions count together, since what the force says of them went with the
     beginning.
@@ -50,7 +50,7 @@ def calmed(measurements: Sequence[Measurement], left_out: float) -> tuple[Measur
 
 
 def level_left_at(measurements: Sequence[Measurement], left_out: float) -> float:
-    """What a typical ring-down has left of its level where its later part begins."""
+    """Return the median fraction of its level that a ring-down has at its later part."""
     decays = [decay for each in measurements for decay in each.decays]
     left = [_loudness(_later(decay, left_out)) / _loudness(decay) for decay in decays]
     return float(np.median(left))
@@ -66,9 +66,9 @@ def _loudness(decay: FloatArray) -> float:
 
 
 def free_below(measurements: Sequence[Measurement], modes: Sequence[Mode]) -> float:
-    """What a typical ring-down has left of its level where it begins to be a sum of `modes`.
+    """Return the median fraction of level below which a ring-down is a sum of `modes`.
 
-    1 where it is one from its beginning on, and where fewer than three hits say nothing of it.
+    1 where it is one from its beginning on, and where fewer than three hits show it.
     """
     hit = [each for each in measurements if each.driven]
     known = all(mode.damping_ratio > 0 and mode.frequency_sd_hz > 0 for mode in modes)
@@ -90,8 +90,11 @@ def free_below(measurements: Sequence[Measurement], modes: Sequence[Mode]) -> fl
 def _astray(
     measurement: Measurement, modes: Sequence[Mode], refine: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """What the later part does not foretell of each part's swing, over it, and the swing over that
-    of the first part; both (decays, parts). Swings are displacements: they close a gap."""
+    """Return the unpredicted fraction of each part's swing, and its size over the first part's.
+
+    The later part predicts the others; both are (decays, parts). Swings are displacements: they
+    close a gap.
+    """
     rate = measurement.sampling_rate_hz
     omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])
     damping = np.array([mode.damping_ratio for mode in modes])
@@ -108,7 +111,7 @@ def _astray(
 
 
 def _swings(decay: FloatArray, poles: ComplexArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Of each part (parts,): the swing that the later ones do not foretell, and the whole one."""
+    """Return the unpredicted and the full swing of each part, both (parts,)."""
     size = decay.shape[1] // _PARTS
     later = slice(_FITTED_FROM * size, None)
     columns = _columns(decay.shape[1], poles, rate, _FITTED_FROM * size)
@@ -130,8 +133,10 @@ def _columns(samples: int, poles: ComplexArray, rate: float, zero: int) -> Float
 def _correction(
     decays: Sequence[FloatArray], poles: ComplexArray, sd: FloatArray, rate: float
 ) -> ComplexArray:
-    """One step of Gauss and Newton towards the poles of the later parts; `sd` (2 poles,) are the
-    standard deviations of their real and imaginary parts as identified."""
+    """Return one Gauss-Newton step towards the poles of the later parts.
+
+    `sd` (2 poles,) are the standard deviations of their real and imaginary parts as identified.
+    """
     count = len(poles)
     square, right, left, free = np.zeros((2 * count, 2 * count)), np.zeros(2 * count), 0.0, 0
     for decay in decays:

@@ -39,7 +39,7 @@ _OTHER = dict(zip(PLANES, reversed(PLANES), strict=True))
 
 
 def alike(measurements: Sequence[Measurement]) -> bool:
-    """Whether they have the same two-axis sensors, and enough hits in several directions."""
+    """Return whether they have the same two-axis sensors, and enough hits in several directions."""
     layouts = {tuple(place_of(point) for point in m.points) for m in measurements}
     hammers = [m.hammer for m in measurements if m.hammer is not None]
     directions = {hammer.plane for hammer in hammers} - {None}
@@ -52,7 +52,7 @@ def alike(measurements: Sequence[Measurement]) -> bool:
 
 
 def together(measurements: Sequence[Measurement]) -> Measurement:
-    """The hits of all as one measurement; what hangs on the force is the first one's."""
+    """Return the hits of all as one measurement; what depends on the force is the first one's."""
     return replace(
         measurements[0],
         decays=tuple(decay for m in measurements for decay in m.decays),
@@ -62,9 +62,9 @@ def together(measurements: Sequence[Measurement]) -> Measurement:
 
 
 def sharpened(measurements: Sequence[Measurement], apart: Joined, found: Finding) -> Joined:
-    """What was found in all hits together, `found`, with modes found `apart` where they say more.
+    """Return the modes of all hits, completed by modes found `apart` in one direction.
 
-    These are those of which all hits together do not know the direction, or which they miss.
+    Those replace modes whose direction is unknown in all hits together, and add missing ones.
     """
     everything = together(measurements)
     groups = matched((everything, everything), (found.modes, apart.finding.modes))
@@ -83,7 +83,7 @@ def _by_frequency(modes: Sequence[FoundMode]) -> tuple[FoundMode, ...]:
 
 
 def _as_joined(measurements: Sequence[Measurement], found: Finding) -> Joined:
-    """A finding over the points of all set-ups, with the levels at which its modes ring."""
+    """Return a finding over the points of all set-ups, with the levels at which its modes ring."""
     modes = found.modes
     if modes:
         modes = with_levels(modes, [ringing(m, modes, _struck(m, modes)) for m in measurements])
@@ -95,7 +95,7 @@ def _as_joined(measurements: Sequence[Measurement], found: Finding) -> Joined:
 def _better(
     mode: FoundMode, by_itself: FoundMode | None, points: Sequence[ResponsePoint]
 ) -> FoundMode:
-    """The mode of all hits where its direction is known, else that of its own hits."""
+    """Return the mode of all hits where its direction is known, else that of one direction."""
     turn = float(np.linalg.norm(mode.shape_sd) / np.linalg.norm(mode.shape))
     if by_itself is None or turn <= _MOST_TURN:
         return mode
@@ -105,13 +105,13 @@ def _better(
 
 
 def _turned(mode: FoundMode, turn_rad: float, points: Sequence[ResponsePoint]) -> FoundMode:
-    """The mode with standard deviations of a shape that may be turned about the hanger's axis."""
+    """Return the mode with standard deviations for a possible rotation about the hanger's axis."""
     across = np.abs(_across(mode.shape, points))
     return replace(mode, shape_sd=np.hypot(mode.shape_sd, turn_rad * across))
 
 
 def _across(shape: FloatArray, points: Sequence[ResponsePoint]) -> FloatArray:
-    """At each point what the shape is at the same place in the other plane; 0 where unknown."""
+    """Return the shape's value in the other plane at each point's position; 0 where unknown."""
     value = {place_of(p): each for p, each in zip(points, shape.tolist(), strict=True)}
     others = [replace(p, plane=_OTHER[p.plane]) if p.plane else p for p in points]
     return np.array([value.get(place_of(other), 0.0) for other in others])
@@ -126,7 +126,7 @@ def _same(mode: FoundMode, other: FoundMode) -> bool:
 
 
 def _struck(measurement: Measurement, modes: Sequence[FoundMode]) -> list[bool]:
-    """Which modes move more in the hammer's direction than across it."""
+    """Return which modes move more in the hammer's direction than across it."""
     plane = measurement.hammer.plane if measurement.hammer else None
     share = np.array([transverse_share(mode.shape, measurement.points) for mode in modes])
     return list((share >= 0.5) == (plane == PLANES[0]))

@@ -51,11 +51,11 @@ class Joined:
 def joined(
     measurements: Sequence[Measurement], findings: Sequence[Finding], options: IdentifyOptions
 ) -> Joined:
-    """The modes of all set-ups over all points; those of a single one as they are.
+    """Join the modes of all set-ups over all points; those of a single one are unchanged.
 
-    Frequency and damping are pooled. A mode that one set-up alone has seen is kept if three hits
-    or more prove it there. Without a force, whatever is not seen by all set-ups is dropped: its
-    shape is not known at all points. Raises BadInput where set-ups cannot be joined.
+    Frequency and damping are pooled. A mode seen by one set-up only is accepted if three hits
+    or more validate it there. Without a force, modes that not all set-ups see are dropped:
+    their shape is not known at all points. Raises BadInput where set-ups cannot be joined.
     """
     if len(measurements) == 1:
         return _single(measurements[0], findings[0])
@@ -88,7 +88,7 @@ def _over_all_points(
     apart: Sequence[Sequence[FoundMode]],
     groups: Sequence[Sequence[Seen]],
 ) -> tuple[tuple[ResponsePoint, ...], tuple[FoundMode, ...]]:
-    """The pooled modes with their shapes over all points."""
+    """Return the pooled modes with their shapes over all points."""
     if measurements[0].driven:
         seen = [[any(own.set_up == n for own in g) for g in groups] for n in range(len(apart))]
         rings = [
@@ -106,7 +106,7 @@ def _over_all_points(
 
 
 def _see_the_same(measurements: Sequence[Measurement]) -> bool:
-    """Whether all set-ups have the same sensors, so that none needs the scale of another's."""
+    """Return whether all set-ups have equal sensors, so that none needs another's scale."""
     points = [[place_of(point) for point in m.points] for m in measurements]
     return all(own == points[0] for own in points) and not hammer_roves(measurements)
 
@@ -134,7 +134,7 @@ def _sorted_out(
 
 
 def _doubt(group: Sequence[Seen], set_ups: int, hammered: bool) -> str:
-    """Why a mode is not kept; empty where it is."""
+    """Return the reason why a mode is not accepted; empty where it is."""
     if not hammered and len(group) < set_ups:
         return "not seen in all set-ups, so its shape is not known at all points"
     if len(group) == 1 and math.isnan(group[0].mode.damping_sd):
@@ -143,7 +143,7 @@ def _doubt(group: Sequence[Seen], set_ups: int, hammered: bool) -> str:
 
 
 def _pool(group: Sequence[Seen], allowance: float) -> FoundMode:
-    """The mode with pooled frequency and damping, still without a shape."""
+    """Return the mode with pooled frequency and damping, still without a shape."""
     modes = [seen.mode for seen in group]
     damping_sds = np.array([mode.damping_sd for mode in modes])
     # Without a standard deviation of its damping, that of a mode's frequency is but a floor.
@@ -162,7 +162,7 @@ def _pool(group: Sequence[Seen], allowance: float) -> FoundMode:
 def _as_seen(
     groups: Sequence[list[Seen]], pools: Sequence[FoundMode], number: int
 ) -> tuple[FoundMode, ...]:
-    """Each mode as the set-up of this number has it, or as all have where it did not see it."""
+    """Return each mode as this set-up has it, or as all have where it does not see it."""
     return tuple(
         next((seen.mode for seen in group if seen.set_up == number), pool)
         for group, pool in zip(groups, pools, strict=True)
@@ -195,14 +195,14 @@ def _all_poles(parts: Sequence[Poles]) -> Poles:
 
 
 def pooled(values: FloatArray, sds: FloatArray) -> tuple[float, float]:
-    """Mean and standard deviation of `values` (set-ups,) with their own `sds`, NaN where unknown.
+    """Return mean and standard deviation of `values` (set-ups,) with `sds`, NaN where unknown.
 
     Random effects: what set-ups differ by (mounting of sensors, temperature) is estimated from
-    their scatter and added to the variance of each (DerSimonian and Laird 1986, eq. 6 to 9); its
-    share of the result is widened as Student's 95 % quantile is over the normal one. An unknown
-    standard deviation counts as the largest known one, and none as smaller than the median: from a
-    few hits it may be small by chance. Where none is known, three set-ups or more tell by their
-    scatter alone; the result of fewer is NaN.
+    their scatter and added to the variance of each (DerSimonian and Laird 1986, eq. 6 to 9);
+    its share of the result is widened as Student's 95 % quantile is over the normal one. An
+    unknown standard deviation counts as the largest known one, and none as smaller than the
+    median: from a few hits it may be small by chance. Where none is known, three set-ups or
+    more tell by their scatter alone; the result of fewer is NaN.
     """
     count = len(values)
     if count == 1:
@@ -220,7 +220,7 @@ def pooled(values: FloatArray, sds: FloatArray) -> tuple[float, float]:
 
 
 def _between(values: FloatArray, own: FloatArray) -> float:
-    """The variance between set-ups beyond their `own` variances (set-ups,)."""
+    """Return the variance between set-ups beyond their `variances` (set-ups,)."""
     weights = 1 / own
     total = np.sum(weights)
     excess = weights @ (values - values @ weights / total) ** 2 - (len(values) - 1)
@@ -248,10 +248,11 @@ class Seen:
 def matched(
     measurements: Sequence[Measurement], found: Sequence[Sequence[FoundMode]]
 ) -> list[list[Seen]]:
-    """The modes of all set-ups in groups that are one mode each, by rising frequency.
+    """Return the modes of all set-ups in groups that are one mode each, by rising frequency.
 
-    Set-ups are taken from the one with most modes on; each of its modes joins the nearest group,
-    one to one, if its frequency and its shape on common points (else its direction) allow.
+    Set-ups are taken from the one with most modes on; each of its modes joins the nearest
+    group, one to one, if its frequency and its shape on common points (else its direction)
+    allow.
     """
     seen = [
         [Seen.of(index, mode, measurement) for mode in modes]
@@ -291,7 +292,7 @@ def _cost(group: Sequence[Seen], mode: Seen) -> float:
 
 
 def _likeness(one: Seen, other: Seen) -> float:
-    """MAC on common points; without, of the directions; 1 where nothing is common."""
+    """Return the MAC on common points; else of the directions; 1 where nothing is common."""
     common = sorted(one.shape.keys() & other.shape.keys(), key=str)
     shapes = [np.array([seen.shape[place] for place in common]) for seen in (one, other)]
     if all(_tells(part, seen.shape) for part, seen in zip(shapes, (one, other), strict=True)):
