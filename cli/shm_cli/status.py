@@ -177,7 +177,7 @@ def _structure_line(row: Mapping[str, Any]) -> str:
 
 
 def _held_lines(held: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Of each hanger how many are held, and the one whose modes say most."""
+    """Return for each hanger the number held, and the one whose modes show most."""
     of_hangers: dict[int, list[Mapping[str, Any]]] = {}
     for each in held:
         of_hangers.setdefault(each["hanger"], []).append(each)

@@ -36,10 +36,10 @@ def open_warnings(
     latest: WatchedTest | None = None,
     now: Sequence[str] = (),
 ) -> tuple[str, ...]:
-    """Each a state, what to do, and why; empty where nothing is wrong.
+    """Return warnings, each a state, an action and a reason; empty where there are none.
 
-    `check` is that of the baseline, `neighbours` what `standing_out` says of it, `latest` what the
-    watch says after the newest test, `now` what `nearly_slack` and `passed_over` say of that.
+    `check` is that of the baseline, `neighbours` the result of `standing_out`, `latest` the
+    watch after the newest test, `now` the results of `nearly_slack` and `passed_over`.
     """
     found = [each for each in now if each]
     if check is not None and check.misfit:
@@ -131,7 +131,7 @@ def standing_out(hanger: Hanger, hangers: Sequence[Hanger], tensions: Mapping[in
 
 
 def _share(hanger: Hanger, tensions: Mapping[int, Summary]) -> tuple[float, float, float] | None:
-    """Mean and 90 % interval of the baseline's tension over the nominal one."""
+    """Return mean and 90 % interval of the baseline's tension over the nominal one."""
     found, nominal_n = tensions.get(hanger.id), hanger.nominal_tension_n
     if found is None or not nominal_n > 0:
         return None

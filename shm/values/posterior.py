@@ -147,7 +147,7 @@ class Summary:
 
     @classmethod
     def of(cls, samples: FloatArray) -> Self:
-        """Of equally weighted draws, shape (samples,)."""
+        """Return the summary of equally weighted draws, shape (samples,)."""
         q05, q50, q95 = np.quantile(samples, [0.05, 0.5, 0.95])
         spread = float(samples.std(ddof=1))
         return cls(float(samples.mean()), spread, float(q05), float(q50), float(q95))
@@ -475,7 +475,7 @@ class Selection(Shown):
 
 
 def _distinct(caveats: Sequence[str]) -> tuple[str, ...]:
-    """Each once, in order; of these every class says the same with a number of its own."""
+    """Return each caveat once, in order; of those that differ in a number, the first."""
     found: dict[str, str] = {}
     for each in caveats:
         head = each.partition(":")[0].partition(", by ")[0]

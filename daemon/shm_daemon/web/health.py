@@ -151,7 +151,7 @@ def _of_backlog(site: Site) -> Sequence[Lead]:
 
 
 def _found(site: Site, *checks: Callable[[Site], Sequence[str | Lead]]) -> list[str]:
-    """Whatever befalls one check, the others answer, and so does `/health`."""
+    """Return the findings of all checks; a check that fails does not stop the others."""
     found = []
     for check in checks:
         try:
@@ -210,7 +210,7 @@ def _of_disk(site: Site) -> list[Lead]:
 
 
 def _silence(site: Site) -> str:
-    """That the daemon has not reported for longer than it may take; empty where it has."""
+    """Return the message that the daemon is overdue; empty where it is not."""
     ago = seconds_since_beat(site.workspace)
     if ago is None:
         return "The daemon has never run here."

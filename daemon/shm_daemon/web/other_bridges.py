@@ -179,7 +179,7 @@ class OtherBridges:
         self._asking: dict[OtherBridge, Future[None]] = {}
 
     def rows(self, bridges: Sequence[OtherBridge], folder: Path) -> list[BridgeRow]:
-        """Each as it is now or, where it does not say so while a page waits, as it was last."""
+        """Return each bridge as it is now or, if it does not answer in time, as it was last."""
         now = self._clock()
         with self._lock:
             for each in bridges:
@@ -229,7 +229,7 @@ class OtherBridges:
 
 
 def _lead(bridge: OtherBridge, known: _Known | None, why: Lead, now: datetime) -> Lead:
-    """That a bridge is not reached, since when and why."""
+    """Return the message that a bridge is not reached, since when and why."""
     since = "is not reached"
     if known and known.told_at:
         since = f"has not been reached for {told(now - known.told_at)}"
@@ -239,7 +239,7 @@ def _lead(bridge: OtherBridge, known: _Known | None, why: Lead, now: datetime) -
 
 
 def ask_all(bridges: Sequence[OtherBridge], folder: Path) -> list[BridgeRow]:
-    """All bridges asked once, as long as each may take."""
+    """Return all bridges asked once, as long as each may take."""
     asking = OtherBridges(page_waits_s=LONGEST_S + 1.0)
     try:
         return asking.rows(bridges, folder)

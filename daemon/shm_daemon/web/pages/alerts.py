@@ -1,8 +1,4 @@
-"""Alerts: listed and taken note of over HTTP, and their page, some at a time: those that are open,
-then the others.
-
-Silences and maintenance windows: made and ended on the page of alerts.
-"""
+"""Show and acknowledge alerts; create and end silences and maintenance windows."""
 
 from __future__ import annotations
 
@@ -56,7 +52,7 @@ def alerts_page(
     open_before: Before = None,
     noted_before: Before = None,
 ) -> Response:
-    """Alerts of all hangers or of one, the newest first.
+    """Return alerts of all hangers or of one, the newest first.
 
     `open_before` goes on among the open ones alone, `noted_before` among the others.
     """
@@ -94,7 +90,7 @@ def _sentence(silence: Silence) -> str:
 def _some(
     site: Site, hanger: int | None, before: int | None, *, is_open: bool
 ) -> tuple[list[dict[str, Any]], int | None]:
-    """Alerts as the page shows them, and the number to go on after, if there are more."""
+    """Return a page of alerts, and the number to continue after, if there are more."""
     rows = site.store.alerts.list_page(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
     shown, older = paged(rows, _SHOWN)
     documents, now = alert_documents(shown, site), _messages(shown, site)
@@ -195,7 +191,7 @@ def acknowledge(site: AtSite, writer: Writer, alert_id: Row, comment: Acknowledg
 
 
 def alert_documents(found: Sequence[StoredAlert], site: Site) -> list[dict[str, Any]]:
-    """Alerts with what became of their deliveries, and what holds them back."""
+    """Return alerts with the state of their deliveries, and what holds these back."""
     silences, now = site.store.silences.list_all(), utc_now()
     hooks = {hook.name: hook for hook in site.workspace.bridge.hooks}
     owed = defaultdict[int, list[Delivery]](list)

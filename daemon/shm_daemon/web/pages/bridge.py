@@ -1,6 +1,4 @@
-"""The page of the bridge: its elevation, what moved over it, and all hangers in a table; and the
-page of all bridges: this one and those of `[[other_bridge]]`, the worst first.
-"""
+"""Show the page of the bridge and the page of all bridges, the worst first."""
 
 from __future__ import annotations
 

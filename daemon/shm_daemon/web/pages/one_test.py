@@ -79,7 +79,7 @@ def one_test(
 
 
 def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
-    """None where they are not worked out."""
+    """Return the tables of hits; None where they are not computed."""
     whole = None if view.missing else view.background_worker.stored(view.order)
     return filled(whole.hits) if whole else None
 

@@ -1,6 +1,4 @@
-"""The page of operation: whether the work flows, what was refused, what `shm doctor` says; and what
-is held until a person decides whether it counts.
-"""
+"""Show the page of operation: state of the work, refused files, `shm doctor`, held recordings."""
 
 from __future__ import annotations
 
@@ -71,9 +69,9 @@ class Examine:
 
 @router.get("/operation", include_in_schema=False)
 def operation_page(request: Request, site: AtSite, _: Reader, decided: Before = None) -> Response:
-    """Everything an operator asks first, and the full examination as soon as it is there.
+    """Show the state of operation, and the full examination as soon as it is available.
 
-    `decided` is a recording that was held, of which its decision is told.
+    `decided` is a held recording whose decision is shown.
     """
     state = _operation(site)
     return page(
@@ -89,7 +87,7 @@ def operation_page(request: Request, site: AtSite, _: Reader, decided: Before = 
 
 @router.post("/held/{recording}", include_in_schema=False)
 def decide(site: AtSite, writer: Writer, recording: Row, form: Form) -> Response:
-    """Lets a recording count from now on, or takes it out; the daemon does what follows."""
+    """Accept a held recording or discard it; the daemon does the rest."""
     who, why, now = writer.actor, reason_in(form, "a decision"), utc_now()
     decisions = site.store.acting_as(who).recordings
     match form.get("action"):

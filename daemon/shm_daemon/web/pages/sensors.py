@@ -65,7 +65,7 @@ class Row:
 
 @router.get("/streams", include_in_schema=False)
 def streams_page(request: Request, site: AtSite, _: Reader) -> Response:
-    """All streams of the bridge."""
+    """Return all streams of the bridge."""
     rows = [_row(each) for each in _states(site)]
     headings = ("Last sample", "Lag", "Lost in 24 h", "Last window", "Tension since the beginning")
     return page(request, "streams.html.j2", rows=rows, headings=headings)
@@ -75,7 +75,7 @@ def streams_page(request: Request, site: AtSite, _: Reader) -> Response:
 def stream_page(
     request: Request, site: AtSite, _: Reader, name: Name, days: Days = 7.0
 ) -> Response:
-    """One stream: its state, what it showed, what befell it."""
+    """Show one stream: its state, its measurements, its events."""
     stream = _stream(site, name)
     state = next(each for each in _states(site) if each.stream.name == name)
     return page(

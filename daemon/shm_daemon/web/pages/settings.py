@@ -98,7 +98,7 @@ def change(request: Request, site: AtSite, engineer: Engineer, form: Form) -> Re
 
 
 def _value(key: str, form: Mapping[str, str]) -> float | str | None:
-    """None of what is given back; whether quiet hours are a span, `bridge.toml` itself checks."""
+    """Return a setting's new value, None for its default; `bridge.toml` checks quiet hours."""
     if form.get("action") == "back":
         return None
     if not key.endswith(QUIET_HOURS):
