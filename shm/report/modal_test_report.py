@@ -217,7 +217,7 @@ def advice(sheet: ModalTestReport) -> str:
 
 def results(sheet: ModalTestReport) -> tuple[Table, ...]:
     """Return the tables of the results, as far as there are any."""
-    return filled(modes(sheet), _doubts_in_terminal(quality(sheet)), set_aside(sheet))
+    return filled(modes(sheet), _doubts_in_terminal(quality(sheet)), foreign_modes(sheet))
 
 
 def _doubts_in_terminal(checks: Table) -> Table:
@@ -269,7 +269,7 @@ def quality(sheet: ModalTestReport) -> Table:
     return quality_table(sheet.identification.quality)
 
 
-def set_aside(sheet: ModalTestReport) -> Table:
+def foreign_modes(sheet: ModalTestReport) -> Table:
     return Table(
         "Set aside: not known as modes of the hanger",
         ("what", "frequency, Hz", "sd, Hz", "damping, %", "why"),

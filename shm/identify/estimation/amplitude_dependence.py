@@ -64,7 +64,7 @@ _INDEPENDENT = 8.0
 _UNLIKE = 0.17
 """Of the rate by which a mode's amplitude falls otherwise than its pole says: so much its frequency
 may be off. A chirp that was found as a mode of thrice its damping is off by that."""
-_MOST_ASTRAY = 0.1
+_MAX_MISFIT = 0.1
 """Radians by which phases leave a law, the surer ones counting more: then it is something else that
 turns them. A law that is wrong by a tenth of 0.5 % leaves 0.03 in a second of 20 Hz."""
 _FINE = 16  # technical: steps of the integral a stretch
@@ -124,8 +124,8 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
     # A joint that slips lowers all frequencies, stretching raises all.
     expected = float(np.median(shifts)) if len(shifts) > 1 else 0.0
     modes = tuple(
-        _unlike(_with_slope(mode, fit, bool(own), expected, usual), index, courses, mode)
-        for index, (mode, fit, own) in enumerate(zip(found.modes, fits, sure, strict=True))
+        _unlike(_with_slope(mode, fit, bool(is_sure), expected, usual), index, courses, mode)
+        for index, (mode, fit, is_sure) in enumerate(zip(found.modes, fits, sure, strict=True))
     )
     used = [hit for hit in measurement.hits if hit.used]
     return with_drift(replace(found, modes=modes), courses, used)
@@ -175,8 +175,8 @@ def _leads_s(measurement: Measurement) -> list[float]:
     leads = []
     for driven, decay in zip(measurement.driven, measurement.decays, strict=True):
         free = driven.shape[1] - decay.shape[1]
-        struck = int(np.argmax(np.abs(driven[0, :free]))) if free else 0
-        leads.append((free - struck) / measurement.sampling_rate_hz)
+        at_hit = int(np.argmax(np.abs(driven[0, :free]))) if free else 0
+        leads.append((free - at_hit) / measurement.sampling_rate_hz)
     return leads
 
 
@@ -191,8 +191,8 @@ def _fits(
         return None
     leads = np.array([lead for lead, row in zip(leads_s, seen, strict=True) if row is not None])
     starts = np.array([size[0] for *_, size in rows])
-    struck = float(np.median(starts * np.exp(decay * leads)))
-    laws = [_fit(mode, [_through(row, decay, law, struck) for row in rows]) for law in _LAWS]
+    at_hit = float(np.median(starts * np.exp(decay * leads)))
+    laws = [_fit(mode, [_through(row, decay, law, at_hit) for row in rows]) for law in _LAWS]
     fit = _averaged([law for law in laws if law is not None])
     if fit is None:
         return None
@@ -266,10 +266,10 @@ _LAWS: tuple[_Law, ...] = (
 """How a frequency falls with the amplitude: dry friction, stretching, and a joint that slips."""
 
 
-def _through(row: Row, decay: float, law: _Law, struck: float) -> _Grown:
+def _through(row: Row, decay: float, law: _Law, at_hit: float) -> _Grown:
     time_s, phase, sd, size = row
     fine_s = np.linspace(time_s[0], time_s[-1], _FINE * (len(time_s) - 1) + 1)
-    amplitude = np.exp(np.interp(fine_s, time_s, np.log(size)) - decay * fine_s) / struck
+    amplitude = np.exp(np.interp(fine_s, time_s, np.log(size)) - decay * fine_s) / at_hit
     height = law(amplitude)
     areas = np.diff(fine_s) * (height[1:] + height[:-1]) / 2
     grown = np.concatenate(([0.0], np.cumsum(areas)))
@@ -296,7 +296,7 @@ def _fit(mode: FoundMode, rows: Sequence[_Grown]) -> _Fit | None:
         return None
     solved, inverse, left_over = solution
     misfit = float(left_over @ left_over)
-    if misfit > (_MOST_ASTRAY * np.linalg.norm(weight)) ** 2:
+    if misfit > (_MAX_MISFIT * np.linalg.norm(weight)) ** 2:
         return None
     spread = np.sqrt(np.diag(inverse) * max(1.0, misfit / freedom)) * widening(freedom) * OVERLAP
     spread = np.fmax(

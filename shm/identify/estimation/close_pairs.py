@@ -48,7 +48,7 @@ class _Pair:
         return 2 * self.damping_ratio * self.frequency_hz
 
 
-def told_apart(
+def split_close_pairs(
     candidates: Sequence[Candidate],
     repeats: Sequence[Repeats],
     models: tuple[Sequence[PoleSet], Sequence[Sequence[PoleSet]]],
@@ -128,7 +128,7 @@ def _apart(
 ) -> list[tuple[Candidate, Repeats]]:
     """Return the two modes on the pair's axes, with their repeats; empty where not seen."""
     together, without_each = models
-    whole = {p.order: _on_axes(pair, p) for p in together if len(_own(pair, p)) == 2}
+    whole = {p.order: _on_axes(pair, p) for p in together if len(_poles_of_pair(pair, p)) == 2}
     seen = {order: both for order, both in whole.items() if both}
     if 2 * len(seen) <= len(together):
         return []
@@ -150,7 +150,7 @@ def _on_axes(pair: _Pair, poles: PoleSet) -> tuple[Pole, Pole] | None:
 
     One pole alone is the motion of both modes; None where there is no pole.
     """
-    best = _own(pair, poles)
+    best = _poles_of_pair(pair, poles)
     if not len(best):
         return None
     shapes = poles.shapes / np.linalg.norm(poles.shapes, axis=0)
@@ -165,14 +165,14 @@ def _on_axes(pair: _Pair, poles: PoleSet) -> tuple[Pole, Pole] | None:
     return one, other
 
 
-def _own(pair: _Pair, poles: PoleSet) -> IntArray:
+def _poles_of_pair(pair: _Pair, poles: PoleSet) -> IntArray:
     """Return the indices of one model's poles in the pair: none, one or the closest two."""
     shapes = poles.shapes / np.linalg.norm(poles.shapes, axis=0)
     inside = np.linalg.norm(pair.axes.T @ shapes, axis=0) ** 2 > _WITHIN
     middle = _rates(np.array(pair.frequency_hz), np.array(pair.damping_ratio))
     away = np.abs(_rates(poles.frequency_hz, poles.damping_ratio) - middle)
-    own = inside & (away < 2 * np.pi * pair.reach_hz)
-    return np.asarray(np.argsort(np.where(own, away, np.inf))[: min(2, int(np.sum(own)))])
+    chosen = inside & (away < 2 * np.pi * pair.reach_hz)
+    return np.asarray(np.argsort(np.where(chosen, away, np.inf))[: min(2, int(np.sum(chosen)))])
 
 
 def _rates(frequency_hz: FloatArray, damping_ratio: FloatArray) -> ComplexArray:

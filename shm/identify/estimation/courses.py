@@ -28,7 +28,7 @@ from shm.values.modes import SLOPE_OF_NOTE
 
 _LEAK = 0.01
 """Of a neighbour's motion, at least: comes into a mode's by the error of its shape."""
-_BESIDE_HZ = 2.0  # what stretches of half a second do not part by frequency: one over their length
+_RESOLUTION_HZ = 2.0  # one over the half second of a stretch
 OVERLAP = math.sqrt(41 / 35)
 """Stretches overlap by half: noise in two neighbours has the correlation 3/35 (the integral of
 sin^4 cos^4 over that of sin^8), which makes the variance of a mean 1 + 6/35 times larger."""
@@ -84,10 +84,10 @@ def course_of(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> 
     motion = solved[:, :half] + 1j * solved[:, half:]
     begin_s = np.arange(len(flat)) * hop / rate_hz
     hertz = omega / (2 * np.pi)
-    beside = np.abs(hertz[:, np.newaxis] - hertz) < _BESIDE_HZ
-    np.fill_diagonal(beside, False)
+    unresolved = np.abs(hertz[:, np.newaxis] - hertz) < _RESOLUTION_HZ
+    np.fill_diagonal(unresolved, False)
     sd = np.sqrt(np.outer(noise, variance[:half] + variance[half:]) / 2)
-    sd = np.hypot(sd, np.sqrt(np.abs(motion * _leaks(modes)) ** 2 @ beside))
+    sd = np.hypot(sd, np.sqrt(np.abs(motion * _leaks(modes)) ** 2 @ unresolved))
     turned = np.exp(-np.outer(begin_s, poles))
     middle_s = begin_s + length / (2 * rate_hz)
     return Course(middle_s, motion * turned, sd * np.abs(turned))

@@ -209,15 +209,15 @@ def resolved(
     Two of similar shape (MAC above 0.9) closer than 1/seconds are one mode whose frequency
     falls with its amplitude; the one that varies less over the model orders stays.
     """
-    kept: list[Candidate] = []
+    accepted: list[Candidate] = []
     dropped: list[Dropped] = []
     for candidate in sorted(candidates, key=lambda c: c.frequency_spread):
-        if any(_double(candidate, other, seconds) for other in kept):
+        if any(_double(candidate, other, seconds) for other in accepted):
             what = f"mode at {candidate.frequency_hz:.4g} Hz"
             dropped.append(Dropped(what, 1, _DOUBLE, candidate.frequency_hz))
         else:
-            kept.append(candidate)
-    return kept, tuple(dropped)
+            accepted.append(candidate)
+    return accepted, tuple(dropped)
 
 
 def _double(one: Candidate, other: Candidate, seconds: float) -> bool:

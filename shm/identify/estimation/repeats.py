@@ -127,14 +127,14 @@ def _repeat(
     )
 
 
-def proven(
+def validate_candidates(
     candidates: Sequence[Candidate], repeats: Sequence[Repeats], options: IdentifyOptions
 ) -> tuple[tuple[FoundMode, ...], list[Candidate], tuple[FoundMode, ...], tuple[Dropped, ...]]:
     """Return the modes that repeat, by rising frequency, and their candidates; then the dropped.
 
     The dropped come as the modes that they may be, and with the reason.
     """
-    kept: list[Candidate] = []
+    accepted: list[Candidate] = []
     again: list[Repeats] = []
     doubtful: list[FoundMode] = []
     dropped: list[Dropped] = []
@@ -148,13 +148,15 @@ def proven(
             by_hits_hz = frequency_sd(candidate.frequency_hz, repeat.frequency_hz)
             doubtful.append(_mode(candidate, repeat, by_hits_hz, options))
         else:
-            kept.append(candidate)
+            accepted.append(candidate)
             again.append(repeat)
     modes = tuple(
         _mode(candidate, repeat, by_hits, options)
-        for candidate, repeat, by_hits in zip(kept, again, _by_hits(kept, again), strict=True)
+        for candidate, repeat, by_hits in zip(
+            accepted, again, _by_hits(accepted, again), strict=True
+        )
     )
-    return modes, kept, tuple(doubtful), tuple(dropped)
+    return modes, accepted, tuple(doubtful), tuple(dropped)
 
 
 def _by_hits(candidates: Sequence[Candidate], repeats: Sequence[Repeats]) -> list[float]:
@@ -165,7 +167,7 @@ def _by_hits(candidates: Sequence[Candidate], repeats: Sequence[Repeats]) -> lis
         for candidate, repeat in zip(candidates, repeats, strict=True)
     ])  # fmt: skip
     hits = len(repeats[0].frequency_hz) if repeats else 0
-    steady: list[float] = (steadied(sd_hz / frequency_hz, hits) * frequency_hz).tolist()
+    steady: list[float] = (smooth_sds(sd_hz / frequency_hz, hits) * frequency_hz).tolist()
     return steady
 
 
@@ -215,14 +217,14 @@ def _of_one_hit(candidate: Candidate, repeat: Repeats, options: IdentifyOptions)
 def _like(candidate: Candidate, shapes: FloatArray) -> bool:
     """Return whether the shape is that of one mode whichever hit is left out."""
     enough = _points(candidate) > _LEAST_POINTS
-    return enough and _alike(candidate, shapes) > _SAME_SHAPE
+    return enough and _lowest_mac(candidate, shapes) > _SAME_SHAPE
 
 
 def _steady(candidate: Candidate) -> bool:
     """Return whether the shape is that of one mode in the models of all orders."""
     shapes = np.array([real_shape(pole.shape) for pole in candidate.poles])
     enough = _points(candidate) > _LEAST_POINTS_FEW
-    return enough and _alike(candidate, shapes) > _STEADY_SHAPE
+    return enough and _lowest_mac(candidate, shapes) > _STEADY_SHAPE
 
 
 def _points(candidate: Candidate) -> float:
@@ -233,7 +235,7 @@ def _points(candidate: Candidate) -> float:
     return float(np.sum(squares) ** 2 / np.sum(squares**2))
 
 
-def _alike(candidate: Candidate, shapes: FloatArray) -> float:
+def _lowest_mac(candidate: Candidate, shapes: FloatArray) -> float:
     """Return the lowest modal assurance criterion with one of `shapes` (some, channels)."""
     return min(modal_assurance(candidate.shape, shape) for shape in shapes)
 
@@ -287,7 +289,7 @@ def order_sd(estimates: Sequence[float] | Sequence[FloatArray]) -> FloatArray:
     return np.asarray(_SHARE_OF_ORDERS * np.std(values, axis=0, ddof=1))
 
 
-def steadied(sds: FloatArray, hits: int) -> FloatArray:
+def smooth_sds(sds: FloatArray, hits: int) -> FloatArray:
     """Smooth standard deviations (modes,) over neighbouring modes.
 
     From a few hits one may be far too small by chance. As in G. K. Smyth's moderated variances
@@ -299,11 +301,11 @@ def steadied(sds: FloatArray, hits: int) -> FloatArray:
     """
     if hits < LEAST_HITS or len(sds) < _LEAST_NEIGHBOURS:
         return sds
-    expected = np.array([_beside(sds, index) for index in range(len(sds))])
+    expected = np.array([_neighbours_sd(sds, index) for index in range(len(sds))])
     return np.asarray(np.sqrt(((hits - 1) * sds**2 + expected**2) / hits))
 
 
-def _beside(sds: FloatArray, index: int) -> float:
+def _neighbours_sd(sds: FloatArray, index: int) -> float:
     near = np.arange(max(0, index - _REACH), min(len(sds), index + _REACH + 1))
     return float(np.median(sds[near[near != index]]))
 

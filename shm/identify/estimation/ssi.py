@@ -30,9 +30,9 @@ from shm.identify.estimation.poles import PoleSet
 from shm.identify.estimation.pyoma import poles_of_orders
 from shm.identify.estimation.repeats import LEAST_HITS
 from shm.identify.estimation.stabilise import (
-    completed,
+    empty_finding,
     final_orders,
-    nothing_moves,
+    merge_findings,
     stabilised,
 )
 from shm.identify.options import IdentifyOptions
@@ -130,7 +130,7 @@ def windows(sampling_rate_hz: float, options: IdentifyOptions) -> Iterator[Windo
         yield Window(low, high)
 
 
-_NOBODY_HIT = 2.0
+_AMBIENT_SD = 2.0
 """The chance in ambient motion moves a frequency more than noise does a ring-down's: so many times
 the largest standard deviation of a hammer test are taken."""
 # Rows are channels times lags and cost their cube; so many leave 0.9 s a test. Of modes 20 dB above
@@ -172,32 +172,32 @@ _RANK_TOLERANCE = 1e-17
 
 def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Finding:
     """Return modes of a measurement by multi-hit SSI (see the module's text)."""
-    nobody_hit = measurement.frequency_response is None and not measurement.hits
-    if nobody_hit:
+    is_ambient = measurement.frequency_response is None and not measurement.hits
+    if is_ambient:
         samples = sum(part.shape[1] for part in measurement.decays)
         options = replace(
             options,
-            max_frequency_sd=_NOBODY_HIT * options.max_frequency_sd,
+            max_frequency_sd=_AMBIENT_SD * options.max_frequency_sd,
             ambient_s=samples / measurement.sampling_rate_hz,
         )
-    mixed = references(measurement.decays, _REFERENCES_AMBIENT if nobody_hit else _REFERENCES)
+    mixed = references(measurement.decays, _REFERENCES_AMBIENT if is_ambient else _REFERENCES)
     rows = block_rows(measurement, options)
     matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
-    if nobody_hit:
+    if is_ambient:
         matrices = _few_sums(matrices)
     found = modes_of_hankel(matrices, rows, measurement, options)
-    if nobody_hit:
+    if is_ambient:
         few = replace(options, max_order=min(options.max_order or _FEW_ORDERS, _FEW_ORDERS))
-        found = completed(found, modes_of_hankel(matrices, rows, measurement, few))
+        found = merge_findings(found, modes_of_hankel(matrices, rows, measurement, few))
     checked = len(measurement.decays) > 1 or len(measurement.points) >= _LEAST_POINTS
-    timed = bool(measurement.hits) or nobody_hit
+    timed = bool(measurement.hits) or is_ambient
     if _repeated(measurement) or not (timed and checked):
         return found
     every = windows(measurement.sampling_rate_hz, options)
-    return completed(found, through_windows(measurement, options, every))
+    return merge_findings(found, through_windows(measurement, options, every))
 
 
-def looked_at_again(
+def search_windows(
     measurement: Measurement, options: IdentifyOptions, at_hz: Sequence[float] | None = None
 ) -> Finding | None:
     """Identify modes in windows around `at_hz`, or over the band.
@@ -215,7 +215,7 @@ def through_windows(
     measurement: Measurement, options: IdentifyOptions, every: Iterable[Window]
 ) -> Finding:
     """Return the modes that each window shows by itself."""
-    return reduce(completed, (_in_window(window, measurement, options) for window in every))
+    return reduce(merge_findings, (_in_window(window, measurement, options) for window in every))
 
 
 def _in_window(window: Window, measurement: Measurement, options: IdentifyOptions) -> Finding:
@@ -225,7 +225,7 @@ def _in_window(window: Window, measurement: Measurement, options: IdentifyOption
     long = [decay for decay in measurement.decays if decay.shape[1] >= least]
     decays = tuple(window.through(decay, rate) for decay in long)
     if _size(decays) < STOPPED * _size(long):
-        return nothing_moves(len(decays))
+        return empty_finding(len(decays))
     mixed = references(decays)
     rows = min(_ROWS_WINDOW, min(decay.shape[1] for decay in decays) // 3)
     matrices = [hankel(decay, mixed @ decay, rows) for decay in decays]
@@ -300,7 +300,7 @@ def modes_of_hankel(
     left, values, right = np.linalg.svd(total, full_matrices=False)
     max_order = _max_order(total.shape, values, rows, options.max_order or _MAX_ORDER)
     if max_order < _LEAST_ORDER:
-        return nothing_moves(len(matrices))
+        return empty_finding(len(matrices))
     size = _Size(rows, max_order, measurement.sampling_rate_hz, shift_hz)
     leading = left[:, :max_order] * values[:max_order]
     sets = poles_of_orders(leading, rows, size.orders, size.sampling_rate_hz, shift_hz)

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.identify.contract import Dropped, Finding, FoundMode, Poles
-from shm.identify.estimation.close_pairs import told_apart
+from shm.identify.estimation.close_pairs import split_close_pairs
 from shm.identify.estimation.poles import (
     Candidate,
     PoleSet,
@@ -24,7 +24,7 @@ from shm.identify.estimation.poles import (
     resolved,
     stable_candidates,
 )
-from shm.identify.estimation.repeats import FEW_HITS, LEAST_HITS, find_again, proven
+from shm.identify.estimation.repeats import FEW_HITS, LEAST_HITS, find_again, validate_candidates
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray, FloatArray
 
@@ -59,21 +59,21 @@ def stabilised(
     candidates, unstable = stable_candidates(sets, orders, options, gaps=gaps)
     late_s = delays_s(candidates, options)
     if late_s is not None:
-        sets = [simultaneous(poles, late_s) for poles in sets]
-        without_each_hit = [[simultaneous(p, late_s) for p in of] for of in without_each_hit]
-        candidates = [as_simultaneous(candidate, late_s) for candidate in candidates]
+        sets = [remove_delays(poles, late_s) for poles in sets]
+        without_each_hit = [[remove_delays(p, late_s) for p in of] for of in without_each_hit]
+        candidates = [remove_candidate_delays(candidate, late_s) for candidate in candidates]
     single, doubles = resolved(candidates, seconds)
     final = [poles for poles in sets if poles.order in orders]
     again = find_again(single, without_each_hit)
-    told, again = told_apart(single, again, (final, without_each_hit), seconds, options)
-    modes, kept, doubtful, refused = proven(told, again, options)
-    lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in kept)
+    separated, again = split_close_pairs(single, again, (final, without_each_hit), seconds, options)
+    modes, accepted, doubtful, refused = validate_candidates(separated, again, options)
+    lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in accepted)
     followed = Dropped("poles", lost, "stable, but of a mode that was dropped")
     dropped = (*unstable, followed, *doubles, *refused)
-    return Finding(modes, dropped, diagram(sets, kept, options), doubtful)
+    return Finding(modes, dropped, diagram(sets, accepted, options), doubtful)
 
 
-def completed(found: Finding, other: Finding) -> Finding:
+def merge_findings(found: Finding, other: Finding) -> Finding:
     """Return `found` with the modes of `other` that it lacks; dropped are those of both."""
     added = [mode for mode in other.modes if not any(_same(mode, each) for each in found.modes)]
     modes = tuple(sorted((*found.modes, *added), key=lambda mode: mode.frequency_hz))
@@ -97,7 +97,7 @@ def _of(entry: Dropped, frequency_hz: float) -> bool:
     return abs(entry.frequency_hz - frequency_hz) < _SAME * frequency_hz
 
 
-def nothing_moves(hits: int) -> Finding:
+def empty_finding(hits: int) -> Finding:
     """Return the finding where no sensor moves after any of `hits`."""
     nothing = np.empty(0)
     dropped = (Dropped("ring-downs", hits, "nothing moves in them"),)
@@ -159,22 +159,22 @@ def _most_real(frequency_hz: FloatArray, shapes: ComplexArray, highest_hz: float
                 turned = squares * np.exp(4j * np.pi * np.outer(frequency_hz, late_s))
                 others = turned.sum(axis=1) - turned[:, channel]
                 tried_s = steps_s + (late_s[channel] if finer else 0.0)
-                own = squares[:, channel] * np.exp(4j * np.pi * np.outer(tried_s, frequency_hz))
-                late_s[channel] = tried_s[np.argmax(np.abs(others + own).sum(axis=1))]
+                orders = squares[:, channel] * np.exp(4j * np.pi * np.outer(tried_s, frequency_hz))
+                late_s[channel] = tried_s[np.argmax(np.abs(others + orders).sum(axis=1))]
     return late_s
 
 
-def simultaneous(poles: PoleSet, late_s: FloatArray) -> PoleSet:
+def remove_delays(poles: PoleSet, late_s: FloatArray) -> PoleSet:
     """Return the poles with the shapes that channels without delays have."""
     turns = np.exp(2j * np.pi * np.outer(late_s, poles.frequency_hz))
     return replace(poles, shapes=poles.shapes * turns)
 
 
-def as_simultaneous(candidate: Candidate, late_s: FloatArray) -> Candidate:
+def remove_candidate_delays(candidate: Candidate, late_s: FloatArray) -> Candidate:
     """Return the candidate with the shapes that channels without delays have."""
     track = tuple(
         replace(pole, shape=pole.shape * np.exp(2j * np.pi * pole.frequency_hz * late_s))
         for pole in candidate.track
     )
-    own = {pole.order for pole in candidate.poles}
-    return replace(candidate, track=track, poles=tuple(p for p in track if p.order in own))
+    orders = {pole.order for pole in candidate.poles}
+    return replace(candidate, track=track, poles=tuple(p for p in track if p.order in orders))

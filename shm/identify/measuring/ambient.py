@@ -63,7 +63,7 @@ def set_apart(parts: Sequence[FloatArray]) -> tuple[list[FloatArray], int]:
     What moves the structure for seconds is no noise, and its modes are those under the load.
     """
     level = np.array([loudness(part) for part in parts])
-    quiet = [p for p, own in zip(parts, level, strict=True) if own <= LOUDER * np.median(level)]
+    quiet = [p for p, each in zip(parts, level, strict=True) if each <= LOUDER * np.median(level)]
     if len(quiet) < LEAST_PARTS:
         return list(parts), 0
     return quiet, len(parts) - len(quiet)

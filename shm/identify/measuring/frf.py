@@ -120,7 +120,7 @@ def _spectra(
     """Return spectra of the windowed force (row 0) and accelerations, (1 + points, lines)."""
     begin = hit.pulse.start - window.before
     cut = slice(begin, begin + window.length)
-    keep = hit.struck - begin + _margin(sampling_rate_hz)
+    keep = hit.impact_end - begin + _margin(sampling_rate_hz)
     faded = _force_window(window.length, keep)
     rows = np.vstack([hit.force[np.newaxis, cut], hit.accelerations[:, cut]])
     rows[0] -= np.nanmedian(rows[0])

@@ -66,10 +66,10 @@ class HitRecord:
     @property
     def free(self) -> int:
         """The first sample at which the hanger rings freely and is recorded as it rings."""
-        return max(self.struck, self.clipped_end)
+        return max(self.impact_end, self.clipped_end)
 
     @property
-    def struck(self) -> int:
+    def impact_end(self) -> int:
         """The first sample at which nothing strikes any more."""
         return max(self.pulse.end, self.pulse.second_end)
 
@@ -154,7 +154,7 @@ def _pulse(
     falls = np.flatnonzero(push[first:stop] < _quiet(push[first], noise))
     end = first + int(falls[0]) if len(falls) else stop
     hardest = max(_between_samples(push, peak) for peak in peaks)
-    again = first + _struck_again(push[first:stop], end - first, noise, rate)
+    again = first + _second_impacts(push[first:stop], end - first, noise, rate)
     apart = again[again > peaks[-1] + int(GROUP_SECONDS * rate)]
     if len(apart):  # too weak for a hit, and no second blow of this one
         stop = int(apart[0]) - int(PULSE_SECONDS * rate) - RINGING_SAMPLES
@@ -179,7 +179,9 @@ def _same_pulse(sampling_rate_hz: float) -> int:
     return max(int(PULSE_SECONDS * sampling_rate_hz), RINGING_SAMPLES)
 
 
-def _struck_again(after: FloatArray, fall: int, noise: float, sampling_rate_hz: float) -> IntArray:
+def _second_impacts(
+    after: FloatArray, fall: int, noise: float, sampling_rate_hz: float
+) -> IntArray:
     """Return the samples of `after`, from the first peak on, at which another impact begins.
 
     Up to 6 ms after the peak, and until it has fallen after `fall` samples (a soft tip's pulse
@@ -197,14 +199,14 @@ _CLEARLY = 4.0
 _FEWEST = 2  # of a plane: one alone may have struck the wrong way
 
 
-def struck_planes(power: FloatArray, planes: Sequence[Plane | None]) -> dict[Plane, list[int]]:
+def hits_by_plane(power: FloatArray, planes: Sequence[Plane | None]) -> dict[Plane, list[int]]:
     """Return the hits of each plane by the motion after them; empty unless both were hit.
 
     `power` (hits, channels) is that of the channels of `planes`.
     """
     if not len(power) or {*PLANES} - {*planes}:
         return {}
-    share = {plane: power[:, [own == plane for own in planes]].mean(axis=1) for plane in PLANES}
+    share = {plane: power[:, [each == plane for each in planes]].mean(axis=1) for plane in PLANES}
     one, other = PLANES
     above = share[one] > _CLEARLY * share[other]
     below = share[other] > _CLEARLY * share[one]

@@ -86,7 +86,7 @@ def knocked_at(ring_downs: Sequence[FloatArray], number: int, limit: float) -> i
     blocks = []
     for row, part in enumerate(ring_downs[number]):
         every = [ring[row] for ring in ring_downs if ring.shape[1] >= 2 * _ORDER]
-        error = _beside_usual(part, prediction_rule(every))
+        error = _relative_error(part, prediction_rule(every))
         blocks.append(int(np.argmax(error > limit)))
     return max(0, int(np.median(blocks)) - 1) * _BLOCK + _ORDER
 
@@ -107,10 +107,10 @@ def prediction_rule(parts: Sequence[FloatArray]) -> FloatArray:
 def _worst(part: FloatArray, rule: FloatArray) -> float:
     if len(part) < 2 * _ORDER:
         return float("nan")
-    return float(np.max(_beside_usual(part, rule)))
+    return float(np.max(_relative_error(part, rule)))
 
 
-def _beside_usual(part: FloatArray, rule: FloatArray) -> FloatArray:
+def _relative_error(part: FloatArray, rule: FloatArray) -> FloatArray:
     """Return the largest prediction error of each block over its usual size, (blocks,)."""
     error = np.abs(np.convolve(part, rule, mode="valid"))
     peaks = error[: len(error) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).max(axis=1)

@@ -134,7 +134,7 @@ _LEAST_SAMPLES = 32  # of a block: its level is known to an eighth
 _LEAST_FALL = math.log(3.0)
 """Of the noise over a ring-down: eight times what chance makes of it in such blocks. Of 28 sound
 tests of tests/worlds/recordings.py the accelerometers' fell by 0.4 at most, in the median."""
-_MOST_ASTRAY = 0.4
+_MAX_SCATTER = 0.4
 """Of the logarithm of a block's level, root mean square: three times what chance does."""
 
 
@@ -160,8 +160,8 @@ def _rate_of_motion(measurement: Measurement, after: int) -> float:
         for part in parts:
             error = np.convolve(part, rule, mode="valid")[after:]
             rates.append(_rate(error, measurement.sampling_rate_hz))
-    own = 1 / measurement.decay_time_constant_s
-    return float(np.median(rates)) - own if rates and min(rates) > own else 0.0
+    of_motion = 1 / measurement.decay_time_constant_s
+    return float(np.median(rates)) - of_motion if rates and min(rates) > of_motion else 0.0
 
 
 def _rate(noise: FloatArray, rate_hz: float) -> float:
@@ -174,6 +174,6 @@ def _rate(noise: FloatArray, rate_hz: float) -> float:
         return 0.0
     middle_s = np.arange(_BLOCKS) * length / rate_hz
     line = np.polynomial.Polynomial.fit(middle_s, np.log(levels), 1)
-    astray = float(np.std(np.log(levels) - line(middle_s)))
+    scatter = float(np.std(np.log(levels) - line(middle_s)))
     fall = float(line(middle_s[0]) - line(middle_s[-1]))
-    return fall / float(middle_s[-1]) if fall > _LEAST_FALL and astray < _MOST_ASTRAY else 0.0
+    return fall / float(middle_s[-1]) if fall > _LEAST_FALL and scatter < _MAX_SCATTER else 0.0

@@ -26,7 +26,7 @@ from shm.identify.measuring.hits import (
     HitRecord,
     Pulse,
     find_pulses,
-    struck_planes,
+    hits_by_plane,
 )
 from shm.identify.measuring.signal_faults import (
     CLIPPED,
@@ -70,7 +70,7 @@ class Screening:
     unlike: float
 
 
-def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screening:
+def screen(records: Sequence[Recording], options: IdentifyOptions) -> Screening:
     """Select the usable hits and channels of one set-up; raises NotIdentifiable for none."""
     hits, ring_downs = _hits(records, options)
     channels, rate = records[0].accelerations, records[0].sampling_rate_hz
@@ -135,13 +135,13 @@ def _cut(ring_down: HitRecord, clipped_channels: Sequence[str]) -> str:
 
 def _with_rows(ring_downs: Sequence[HitRecord], rows: list[int]) -> list[HitRecord]:
     """Return the hits with some rows of their accelerations; hits of one record share them."""
-    kept = {
+    chosen = {
         id(r.accelerations): r.accelerations
         if len(rows) == len(r.accelerations)
         else r.accelerations[rows]
         for r in {id(r.accelerations): r for r in ring_downs}.values()
     }
-    return [replace(r, accelerations=kept[id(r.accelerations)]) for r in ring_downs]
+    return [replace(r, accelerations=chosen[id(r.accelerations)]) for r in ring_downs]
 
 
 def _usable_channels(
@@ -281,10 +281,10 @@ def disagreement(
     flat = responses.reshape(len(known), -1)
     level = np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
     with np.errstate(invalid="ignore"):  # a hit with lost samples is like none: NaN
-        alike = np.abs((flat / level) @ (flat / level).conj().T) ** 2
+        mac = np.abs((flat / level) @ (flat / level).conj().T) ** 2
     power = np.sum(np.abs(responses) ** 2, axis=2)
-    for group in list(struck_planes(power, planes).values()) or [list(range(len(known)))]:
-        ordered = np.sort((1 - alike + 2 * np.eye(len(known)))[np.ix_(group, group)], axis=1)
+    for group in list(hits_by_plane(power, planes).values()) or [list(range(len(known)))]:
+        ordered = np.sort((1 - mac + 2 * np.eye(len(known)))[np.ix_(group, group)], axis=1)
         apart[np.array(known)[group]] = np.maximum(ordered[:, (len(group) - 2) // 2], 0.0)
     return apart
 

@@ -31,7 +31,7 @@ from shm.identify.measuring.frf import (
 )
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
 from shm.identify.measuring.responses import measurement_of_responses, point_of
-from shm.identify.measuring.screening import FEWEST_TO_COMPARE, Screening, pulses_of, screened
+from shm.identify.measuring.screening import FEWEST_TO_COMPARE, Screening, pulses_of, screen
 from shm.identify.measuring.signal_faults import HITS_NOT_SHOWN, KNOCK
 from shm.identify.options import IdentifyOptions
 from shm.values import Channel, ComplexArray, FloatArray, FrequencyResponse, Hanger, Recording
@@ -49,7 +49,7 @@ class _SetUp:
     places: tuple[int, ...]
 
 
-def measured(
+def measure_set_ups(
     records: Sequence[Recording | FrequencyResponse], options: IdentifyOptions
 ) -> tuple[Measurement, ...]:
     """Return one measurement a set-up; those of hits have frequency responses on the same lines.
@@ -67,10 +67,10 @@ def measured(
         )
     if responses:
         return (measurement_of_responses(responses, options),)
-    return measured_recordings(recordings, options)
+    return measure_recordings(recordings, options)
 
 
-def measured_recordings(
+def measure_recordings(
     records: Sequence[Recording], options: IdentifyOptions
 ) -> tuple[Measurement, ...]:
     """Return one measurement a set-up of time records; see `measured`."""
@@ -79,7 +79,7 @@ def measured_recordings(
         _refuse_incomplete(record, hammered, options)
         _refuse_other_rate(records[0], record)
     set_ups = _grouped(records)
-    if not hammered and not all(_struck(record, options) for record in records):
+    if not hammered and not all(_has_hits(record, options) for record in records):
         return tuple(ambient_measurement(set_up.records, options) for set_up in set_ups)
     try:
         if len(set_ups) == 1:
@@ -126,14 +126,14 @@ def _by_motion_alone(
     rest = [replace(record, channels=record.accelerations) for record in records]
     alive = all(np.ptp(np.nan_to_num(force.values)) > 0 for force in forces)
     alive = alive and all(record.samples >= LEAST_SAMPLES for record in rest)
-    if not (forces and alive and all(_struck(record, options) for record in rest)):
+    if not (forces and alive and all(_has_hits(record, options) for record in rest)):
         raise refused
-    first, *others = measured_recordings(rest, options)
+    first, *others = measure_recordings(rest, options)
     lost = Dropped(f"channel {forces[0].name}", 1, HITS_NOT_SHOWN)
     return (replace(first, dropped=(lost, *first.dropped)), *others)
 
 
-def _struck(record: Recording, options: IdentifyOptions) -> bool:
+def _has_hits(record: Recording, options: IdentifyOptions) -> bool:
     """Return whether a record has hammer hits, not only a lorry at the joint in many minutes."""
     return record.duration_s <= _MOST_SECONDS_A_HIT * len(pulses_of(record, options))
 
@@ -212,7 +212,7 @@ def _screened(
     usable, failures = [], []
     for set_up in set_ups:
         try:
-            usable.append((set_up, screened(set_up.records, options)))
+            usable.append((set_up, screen(set_up.records, options)))
         except NotIdentifiable as failure:
             failures.append(failure)
     if not usable:
@@ -286,7 +286,7 @@ def measurement_of_recordings(
 
     Raises NotIdentifiable where no hit is left to use.
     """
-    found = screened(records, options)
+    found = screen(records, options)
     window = common_window(found.used, records[0].sampling_rate_hz, options.band_high_hz)
     return screened_measurement(records, found, window, options)
 

@@ -107,7 +107,7 @@ def until_disturbed(
     reason.
     """
     free, step = _thin(ring_downs, sampling_rate_hz, options)
-    kept = list(ring_downs)
+    cut_down = list(ring_downs)
     for number, (r, names) in enumerate(zip(ring_downs, faults, strict=True)):
         heard = [name == KNOCK for name in names]
         gaps = [row for row in range(len(names)) if _drops_out(row, number, faults)]
@@ -120,10 +120,10 @@ def until_disturbed(
         else:
             continue
         if stop - r.free >= least_samples:
-            kept[number] = replace(r, pulse=replace(r.pulse, stop=stop), cut=cut)
-    if not any(r.cut for r in kept):
-        return kept, faults
-    return kept, faults_of_channels(channels, kept, sampling_rate_hz, options)
+            cut_down[number] = replace(r, pulse=replace(r.pulse, stop=stop), cut=cut)
+    if not any(r.cut for r in cut_down):
+        return cut_down, faults
+    return cut_down, faults_of_channels(channels, cut_down, sampling_rate_hz, options)
 
 
 def _drops_out(row: int, number: int, faults: Sequence[Sequence[str]]) -> bool:
@@ -234,7 +234,7 @@ def _surprises(free: Sequence[FloatArray], known: Faults, planes: Sequence[Plane
         if sound:
             found[sound, row] = surprise([free[hit][row] for hit in sound])
     wild = found > _SURPRISE
-    groups = [np.array([plane == own for own in planes]) for plane in PLANES]
+    groups = [np.array([plane == each for each in planes]) for plane in PLANES]
     groups = [group for group in (*groups, np.full(channels, True)) if group.sum() > 1]
     knocks = np.full(len(free), False)
     for group in groups:
@@ -336,11 +336,11 @@ def frozen(signals: FloatArray) -> BoolArray:
     thin = signals[:, ::stride]
     suspects = np.flatnonzero(np.any(thin[:, 1:] == thin[:, :-1], axis=1))
     found = np.zeros(len(signals), dtype=bool)
-    found[suspects] = [_stands_still(signals[row]) for row in suspects]
+    found[suspects] = [_is_constant(signals[row]) for row in suspects]
     return found
 
 
-def _stands_still(signal: FloatArray) -> bool:
+def _is_constant(signal: FloatArray) -> bool:
     return bool(_still_runs(signal))
 
 

@@ -35,22 +35,22 @@ def without_tones(
     A mode is a tone where it is at one and hardly decays compared with the other modes; where
     no order could tell that it is one (`unordered`), either is enough.
     """
-    rest, aside = [], []
+    rest, foreign = [], []
     for mode in found:
         tone = next((tone for tone in tones if _lies_at(mode, tone)), None)
         steady = _is_steady(mode, found)
         if tone and (steady or unordered):
             decay = " and hardly decays" if steady else ""
             reason = f"It lies at {tone.frequency_hz:.4g} Hz ({tone.name}){decay}."
-            aside.append(ForeignMode("tone", mode.frequency_hz, mode.damping_ratio, reason))
+            foreign.append(ForeignMode("tone", mode.frequency_hz, mode.damping_ratio, reason))
         elif steady and unordered:
-            aside.append(_driven(mode))
+            foreign.append(_driven(mode))
         else:
             rest.append(mode)
-    return rest, aside
+    return rest, foreign
 
 
-def explained(
+def explain_foreign(
     mode: FoundMode, modes: Sequence[FoundMode], hanger_modes: Sequence[FoundMode]
 ) -> ForeignMode:
     """Return a mode without order as foreign; `modes` are all, `hanger_modes` have orders."""
@@ -73,7 +73,7 @@ def _driven(mode: FoundMode) -> ForeignMode:
     return ForeignMode("tone", mode.frequency_hz, mode.damping_ratio, reason)
 
 
-def askew_mode(mode: FoundMode, order: int) -> ForeignMode:
+def cross_axis_mode(mode: FoundMode, order: int) -> ForeignMode:
     """Return a mode of the plane that no sensor measures, of that order."""
     reason = (
         f"It is order {order} of the other plane, which the sensors hear askew, or a neighbour's "

@@ -185,12 +185,12 @@ def with_both_planes(
     both: list[tuple[FoundMode, Plane]] = []
     single = bool(set(PLANES) - {point.plane for point in points})
     for mode, plane in zip(modes, planes, strict=True):
-        twice = not single and _stands_for_both(mode, modes, points, turned_rad)
+        twice = not single and _is_unresolved_pair(mode, modes, points, turned_rad)
         both += [(mode, each) for each in PLANES] if twice else [(mode, plane)]
     return [mode for mode, _ in both], [plane for _, plane in both]
 
 
-def _stands_for_both(
+def _is_unresolved_pair(
     mode: FoundMode, modes: Sequence[FoundMode], points: Sequence[ResponsePoint], turned_rad: float
 ) -> bool:
     share = transverse_share(mode.shape, points, turned_rad)
@@ -208,7 +208,7 @@ def moves_in_one_plane(mode: FoundMode, points: Sequence[ResponsePoint], turned_
     return not SHARE_OF_BOTH <= share <= 1 - SHARE_OF_BOTH
 
 
-def blurred(mode: FoundMode) -> FoundMode:
+def blur(mode: FoundMode) -> FoundMode:
     """Return an unresolved pair's mode with a tenth of the bandwidth added to its uncertainty.
 
     The bandwidth is twice damping ratio times frequency; either of the two has its frequency

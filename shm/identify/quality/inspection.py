@@ -10,7 +10,7 @@ from shm.identify.options import IdentifyOptions
 from shm.values import Recording
 from shm.values.rounding import listed
 
-_MOST_TOLD = 4  # technical: of a sentence that can be read
+_MAX_NAMED = 4  # technical: of a sentence that can be read
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +53,10 @@ def places(inspection: Inspection, hits: Sequence[Hit]) -> str:
 
     More than four are counted.
     """
-    if len(hits) > _MOST_TOLD:
+    if len(hits) > _MAX_NAMED:
         return f"{len(hits)} hits"
     several = len(inspection.records) > 1
-    told = [
+    names = [
         f"{hit.start_s:.1f} s" + (f" of record {hit.record + 1}" if several else "") for hit in hits
     ]
-    return ("the hit at " if len(told) == 1 else "the hits at ") + listed(told)
+    return ("the hit at " if len(names) == 1 else "the hits at ") + listed(names)

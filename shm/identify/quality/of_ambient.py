@@ -23,7 +23,7 @@ _AROUND = 0.15  # of a frequency, to either side: where the floor beside a peak 
 _FLOOR = 0.2  # quantile of the spectrum there; neighbouring modes fill less than the rest
 _PROMINENCE_DB = 5.0  # judgement: five deviations of a mean of twenty spectra
 _SAME = 0.02  # judgement: half-power width of 1 % damping
-_MOST_TOLD = 4  # technical: of a sentence that can be read
+_MAX_NAMED = 4  # technical: of a sentence that can be read
 
 
 def _stationarity(inspection: Inspection) -> Reading | None:
@@ -55,8 +55,8 @@ def _peaks(inspection: Inspection) -> Reading | None:
         return None
     known = [mode.frequency_hz for mode in inspection.finding.modes]
     missed = sorted({hz for m in inspection.measurements for hz in _missed(m, known, inspection)})
-    named = listed([f"{hz:.3g} Hz" for hz in missed[:_MOST_TOLD]])
-    more = f" and {len(missed) - _MOST_TOLD} more" if len(missed) > _MOST_TOLD else ""
+    named = listed([f"{hz:.3g} Hz" for hz in missed[:_MAX_NAMED]])
+    more = f" and {len(missed) - _MAX_NAMED} more" if len(missed) > _MAX_NAMED else ""
     return Reading(len(missed), {"named": named + more})
 
 

@@ -64,8 +64,8 @@ def _unforced(inspection: Inspection) -> bool:
 
 def _reasons(reasons: list[str]) -> str:
     counts = Counter(reason for reason in reasons if reason)
-    told = "; ".join(f"{count} {reason}" for reason, count in counts.items())
-    return f" (left out: {told})" if told else ""
+    text = "; ".join(f"{count} {reason}" for reason, count in counts.items())
+    return f" (left out: {text})" if text else ""
 
 
 def _double_hits(inspection: Inspection) -> Reading | None:
@@ -113,11 +113,11 @@ def _repeatability(inspection: Inspection) -> Reading | None:
     dropped = hits_for(inspection, (OUTLIER, KNOCK))
     known = [m.unlike for m in inspection.measurements if np.isfinite(m.unlike)]
     value = max(known, default=NAN)
-    struck = [hit for hit in hits_of(inspection) if hit.cut == KNOCK]
-    if dropped or struck:
-        told = [f"left out as unlike the others: {places(inspection, dropped)}"] if dropped else []
-        told += [f"something else struck: {places(inspection, struck)}"] if struck else []
-        return Reading(value, {}, "warning", found="; ".join(told))
+    knocked = [hit for hit in hits_of(inspection) if hit.cut == KNOCK]
+    if dropped or knocked:
+        text = [f"left out as unlike the others: {places(inspection, dropped)}"] if dropped else []
+        text += [f"something else struck: {places(inspection, knocked)}"] if knocked else []
+        return Reading(value, {}, "warning", found="; ".join(text))
     if not known:
         found = f"fewer than {FEWEST_TO_COMPARE} hits: nothing to compare"
         return Reading(NAN, {}, "unknown", found=found, remedy="Hit more often.")

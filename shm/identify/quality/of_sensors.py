@@ -72,22 +72,22 @@ def sensor_gain(
         return None
     factors = [
         factor
-        for measurement, own in zip(measurements, found, strict=True)
-        if measurement.driven and own
-        for factor in _factors(measurement, own, modes, hanger)
+        for measurement, modes_of in zip(measurements, found, strict=True)
+        if measurement.driven and modes_of
+        for factor in _factors(measurement, modes_of, modes, hanger)
     ]
     if not factors:
         return None
     value = float(np.median(factors))
     times, side = max(value, 1 / value), "more" if value > 1 else "less"
-    told = (
+    text = (
         f"the hanger moves {times:.2g} times {side} for the force than its described mass lets it"
     )
     if times < LARGEST_FACTOR:
-        return QualityCheck("gain", "good", value, LARGEST_FACTOR, "", told)
+        return QualityCheck("gain", "good", value, LARGEST_FACTOR, "", text)
     cause = ", as accelerations in g do under the name m/s2" if 7 < 1 / value < 14 else ""
     return QualityCheck(
-        "gain", "warning", value, LARGEST_FACTOR, "", told + cause,
+        "gain", "warning", value, LARGEST_FACTOR, "", text + cause,
         "Check unit and sensitivity of hammer and accelerometers, the hammer's place, and the "
         "described section and length.",
     )  # fmt: skip
@@ -105,10 +105,10 @@ def _factors(
     squares = []
     for plane in PLANES:
         rows = [n for n, p in enumerate(measurement.points) if p.plane == plane and p.x_m == p.x_m]
-        own = list(_numbered(found, modes, plane))
-        if not rows or not own or (len(measured) == 1 and hammer.plane not in measured):
+        numbered = list(_numbered(found, modes, plane))
+        if not rows or not numbered or (len(measured) == 1 and hammer.plane not in measured):
             continue  # a hit across the only plane that is measured moves little in it
-        at, orders = (np.array(each) for each in zip(*own, strict=True))
+        at, orders = (np.array(each) for each in zip(*numbered, strict=True))
         places_m = [measurement.points[row].x_m for row in rows]
         part = residue[:, rows][:, :, at]
         squares.append(_ratio(part, orders, [*places_m, hammer.x_m], hanger) ** 2)
@@ -177,21 +177,21 @@ def _in_plane(modes: Sequence[Mode], plane: Plane, hanger: Hanger) -> QualityChe
     misfit, typical, wrong = _explained(values[:, seen], places_m, orders, hanger)
     best = min(wrong, key=lambda each: each.misfit)
     if misfit < LARGEST_MISFIT:
-        told = "the sensors' shapes are those of the described hanger"
-        return QualityCheck("places", "good", misfit, LARGEST_MISFIT, "", told)
+        text = "the sensors' shapes are those of the described hanger"
+        return QualityCheck("places", "good", misfit, LARGEST_MISFIT, "", text)
     in_most = typical >= _TYPICAL * LARGEST_MISFIT
     if not in_most or not best.is_large or best.misfit > _EXPLAINED * misfit:
-        told = "the shapes are not those of the described hanger, and no one sensor explains it"
+        text = "the shapes are not those of the described hanger, and no one sensor explains it"
         remedy = (
             "Compare the sensors' places with the sheet: two may be exchanged, or one 0.2 m off."
         )
         verdict: Verdict = "warning" if in_most and misfit > _SURELY_OFF else "unknown"
-        return QualityCheck("places", verdict, misfit, LARGEST_MISFIT, "", told, remedy)
-    alike = [each for each in wrong if each.misfit < _NEARLY * best.misfit]
-    told = " or ".join(each.text for each in sorted(alike, key=lambda each: each.misfit)[:3])
+        return QualityCheck("places", verdict, misfit, LARGEST_MISFIT, "", text, remedy)
+    candidates = [each for each in wrong if each.misfit < _NEARLY * best.misfit]
+    text = " or ".join(each.text for each in sorted(candidates, key=lambda each: each.misfit)[:3])
     return QualityCheck(
         "places", "warning", misfit, LARGEST_MISFIT, "",
-        f"{len(modes)} {plane} modes fit the described hanger if {told}",
+        f"{len(modes)} {plane} modes fit the described hanger if {text}",
         "Check place, unit, sensitivity and sign of that sensor.",
     )  # fmt: skip
 
@@ -205,20 +205,20 @@ def _explained(
     """
     every = np.concatenate([places_m, _PLACES * hanger.length_m])
     shapes = described_shapes(every, orders, hanger)
-    own, elsewhere = shapes[:, :, : len(places_m)], shapes[:, :, len(places_m) :]
+    at_places, elsewhere = shapes[:, :, : len(places_m)], shapes[:, :, len(places_m) :]
     wrong = []
     for n, x_m in enumerate(places_m):
         scaled = np.repeat(values[np.newaxis], len(_FACTORS), axis=0)
         scaled[:, :, n] *= _FACTORS[:, np.newaxis]
-        left = np.min([_misfits(scaled, shape).mean(axis=-1) for shape in own], axis=0)
+        left = np.min([_misfits(scaled, shape).mean(axis=-1) for shape in at_places], axis=0)
         wrong.append(_mended_by_factor(float(left.min()), x_m, _FACTORS[int(np.argmin(left))]))
-        moved = np.repeat(own[np.newaxis], len(_PLACES), axis=0)
+        moved = np.repeat(at_places[np.newaxis], len(_PLACES), axis=0)
         moved[:, :, :, n] = elsewhere.transpose(2, 0, 1)
         left = _misfits(values, moved).mean(axis=-1).min(axis=1)
         there_m = float(every[len(places_m) + int(np.argmin(left))])
         text = f"the sensor said to be at {x_m:.3g} m is at {there_m:.1f} m"
         wrong.append(_Wrong(float(left.min()), abs(there_m - x_m) > _LEAST_MOVE_M, text))
-    least = min((_misfits(values, shape) for shape in own), key=np.mean)
+    least = min((_misfits(values, shape) for shape in at_places), key=np.mean)
     return float(np.mean(least)), float(np.median(least)), wrong
 
 

@@ -67,7 +67,7 @@ def _clipping(inspection: Inspection) -> Reading | None:
     late = [hit for hit in hits_of(inspection) if hit.cut.startswith(CLIPPED)]
     clipped_channels = sorted({hit.cut.removeprefix(f"{CLIPPED}: ") for hit in late})
     pulses = _clipped_pulses(inspection)
-    told = [
+    texts = [
         *([f"left out: {listed([places(inspection, dropped)])}"] if dropped else []),
         *([f"left out: {listed(channels)}"] if channels else []),
         *(
@@ -80,9 +80,9 @@ def _clipping(inspection: Inspection) -> Reading | None:
         ),
         *(f"{name} is clipped in the pulse of {places(inspection, h)}" for name, h in pulses),
     ]
-    struck = {(hit.record, hit.start) for _, hits in pulses for hit in hits}
-    struck |= {(hit.record, hit.start) for hit in (*dropped, *late)}
-    return Reading(max(len(struck), len(channels)), {"faults": "; ".join(told)})
+    hits_affected = {(hit.record, hit.start) for _, hits in pulses for hit in hits}
+    hits_affected |= {(hit.record, hit.start) for hit in (*dropped, *late)}
+    return Reading(max(len(hits_affected), len(channels)), {"faults": "; ".join(texts)})
 
 
 def _clipped_pulses(inspection: Inspection) -> list[tuple[str, list[Hit]]]:

@@ -142,7 +142,7 @@ def _candidates(parts: Stretches, options: IdentifyOptions) -> list[float]:
     peaks = (power == scipy.ndimage.maximum_filter1d(power, 9)) & (power > _PROMINENCE * floor)
     places = np.flatnonzero(peaks & _may_be_there_before(spectra, length, lines, parts, options))
     strongest = places[np.argsort(-power[places])][:_MOST_CANDIDATES]
-    tops = frequency[lines][strongest] + frequency[1] * _beside(power, strongest)
+    tops = frequency[lines][strongest] + frequency[1] * _peak_offset(power, strongest)
     return [float(value) for value in tops]
 
 
@@ -164,7 +164,7 @@ def _may_be_there_before(
     return np.asarray(there)
 
 
-def _beside(power: FloatArray, places: NDArray[np.intp]) -> FloatArray:
+def _peak_offset(power: FloatArray, places: NDArray[np.intp]) -> FloatArray:
     """Return the distance of peaks from their largest lines in lines, by a parabola."""
     inner = np.clip(places, 1, len(power) - 2)
     left, top, right = (np.log(power[inner + step]) for step in (-1, 0, 1))
@@ -286,12 +286,12 @@ def stretches(
     margin = int(np.ceil(RINGING_SAMPLES / factor)) + 1
     starts = [hit.start // factor for hit in hits]
     spans = _spans(starts, margin, signals.shape[1])
-    struck = [hits[bisect(starts, a) - 1] if hits else None for a, _ in spans]
+    hit_before = [hits[bisect(starts, a) - 1] if hits else None for a, _ in spans]
     later = tuple(
         _stretch(signals, a, b)
         if hit is None
         else replace(_stretch(signals, a, b), hit=hit.start / factor, force_n=_size(hit))
-        for (a, b), hit in zip(spans, struck, strict=True)
+        for (a, b), hit in zip(spans, hit_before, strict=True)
         if b - a >= LEAST_SAMPLES
     )
     quiet = starts[0] - margin if starts else 0

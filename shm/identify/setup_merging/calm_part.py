@@ -18,7 +18,7 @@ import numpy as np
 
 from shm.identify.contract import Measurement
 from shm.identify.estimation.repeats import LEAST_HITS
-from shm.identify.setup_merging.hit_directions import alike, together
+from shm.identify.setup_merging.hit_directions import have_same_sensors, pool_hits
 from shm.values import ComplexArray, FloatArray, Mode
 
 LEFT_OUT = (1 / 4, 1 / 2, 3 / 4)
@@ -26,7 +26,7 @@ LEFT_OUT = (1 / 4, 1 / 2, 3 / 4)
 _LOUDNESS = 0.05  # technical: share of a ring-down over which its level is taken
 _PARTS, _FITTED_FROM = 8, 2
 """A ring-down in eighths, the first two of which are foretold from the others. Technical."""
-_LEAST_ASTRAY, _MOST_ASTRAY, _GROWTH = 0.05, 1.5, 12.0
+_MIN_UNPREDICTED, _MAX_UNPREDICTED, _GROWTH = 0.05, 1.5, 12.0
 """Of the swing in the first eighth, what is not foretold, and how often that is what the later part
 leaves. Of 97 awkward records with three hits and more (tests/worlds/recordings.py, seeds 7000 to
 7006) one was astray, with sidebands; of bars of tests/benchmarks/gap_dynamics.py with a guide that
@@ -36,20 +36,20 @@ _CALM = 2.0  # judgement: of what the later part leaves; noise alone scatters by
 _UNSURE = 0.3  # judgement: of a damping without standard deviation
 
 
-def calmed(measurements: Sequence[Measurement], left_out: float) -> tuple[Measurement, ...]:
+def late_parts(measurements: Sequence[Measurement], left_out: float) -> tuple[Measurement, ...]:
     """Return the measurements without the beginnings of their ring-downs.
 
     Hits in several directions count together, since what the force says of them went with the
     beginning.
     """
-    whole = (together(measurements),) if alike(measurements) else tuple(measurements)
+    whole = (pool_hits(measurements),) if have_same_sensors(measurements) else tuple(measurements)
     return tuple(
         replace(each, decays=tuple(_later(decay, left_out) for decay in each.decays), driven=())
         for each in whole
     )
 
 
-def level_left_at(measurements: Sequence[Measurement], left_out: float) -> float:
+def late_part_level(measurements: Sequence[Measurement], left_out: float) -> float:
     """Return the median fraction of its level that a ring-down has at its later part."""
     decays = [decay for each in measurements for decay in each.decays]
     left = [_loudness(_later(decay, left_out)) / _loudness(decay) for decay in decays]
@@ -65,7 +65,7 @@ def _loudness(decay: FloatArray) -> float:
     return float(np.sqrt(np.mean(decay[:, :samples] ** 2))) or np.finfo(float).tiny
 
 
-def free_below(measurements: Sequence[Measurement], modes: Sequence[Mode]) -> float:
+def linear_below_level(measurements: Sequence[Measurement], modes: Sequence[Mode]) -> float:
     """Return the median fraction of level below which a ring-down is a sum of `modes`.
 
     1 where it is one from its beginning on, and where fewer than three hits show it.
@@ -75,19 +75,19 @@ def free_below(measurements: Sequence[Measurement], modes: Sequence[Mode]) -> fl
     if not known or sum(len(each.decays) for each in hit) < LEAST_HITS:
         return 1.0
     for refine in (False, True):
-        found = [_astray(each, modes, refine) for each in hit]
-        astray, level = (np.concatenate(each) for each in zip(*found, strict=True))
-        least = astray[:, _FITTED_FROM:].min(axis=1)
-        first, growth = np.median(astray[:, 0]), np.median(astray[:, 0] / least)
-        if not first > _LEAST_ASTRAY:
+        found = [_unpredicted(each, modes, refine) for each in hit]
+        unpredicted, level = (np.concatenate(each) for each in zip(*found, strict=True))
+        least = unpredicted[:, _FITTED_FROM:].min(axis=1)
+        first, growth = np.median(unpredicted[:, 0]), np.median(unpredicted[:, 0] / least)
+        if not first > _MIN_UNPREDICTED:
             return 1.0
-    if not (first < _MOST_ASTRAY and growth > _GROWTH):
+    if not (first < _MAX_UNPREDICTED and growth > _GROWTH):
         return 1.0
-    calm = np.median(astray, axis=0) < _CALM * np.median(least)
+    calm = np.median(unpredicted, axis=0) < _CALM * np.median(least)
     return float(np.median(level, axis=0)[calm.argmax()])
 
 
-def _astray(
+def _unpredicted(
     measurement: Measurement, modes: Sequence[Mode], refine: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Return the unpredicted fraction of each part's swing, and its size over the first part's.
@@ -101,9 +101,9 @@ def _astray(
     poles = omega * (-damping + 1j * np.sqrt(1 - damping**2))
     poles = poles - 1 / measurement.decay_time_constant_s
     if refine:
-        own = np.array([(mode.damping_sd, mode.frequency_sd_hz) for mode in modes])
-        decay_sd = omega * np.where(own[:, 0] > 0, own[:, 0], _UNSURE * damping)
-        sd = np.concatenate([decay_sd, 2 * np.pi * own[:, 1]])
+        real = np.array([(mode.damping_sd, mode.frequency_sd_hz) for mode in modes])
+        decay_sd = omega * np.where(real[:, 0] > 0, real[:, 0], _UNSURE * damping)
+        sd = np.concatenate([decay_sd, 2 * np.pi * real[:, 1]])
         poles = poles + _correction(measurement.decays, poles, sd, rate)
     rows = [_swings(decay, poles, rate) for decay in measurement.decays]
     rest, whole = (np.array(each) for each in zip(*rows, strict=True))
@@ -151,9 +151,9 @@ def _correction(
         grown = (wave[:, :count] - 1j * wave[:, count:]) * np.arange(len(wave))[:, None] / rate
         for channel in range(len(decay)):
             slope = grown * (found[:count, channel] + 1j * found[count:, channel])
-            own = np.hstack([slope.real, -slope.imag])
-            own = own - base @ (base.T @ own)
-            square += own.T @ own
-            right += own.T @ rest[:, channel]
+            real = np.hstack([slope.real, -slope.imag])
+            real = real - base @ (base.T @ real)
+            square += real.T @ real
+            right += real.T @ rest[:, channel]
     step = np.linalg.solve(square / (left / free) + np.diag(sd**-2.0), right / (left / free))
     return np.asarray(step[:count] + 1j * step[count:])

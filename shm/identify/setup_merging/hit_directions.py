@@ -27,18 +27,18 @@ from shm.identify.estimation.poles import modal_assurance
 from shm.identify.estimation.repeats import LEAST_HITS
 from shm.identify.measuring.responses import place_of
 from shm.identify.mode_ordering.planes import transverse_share
-from shm.identify.setup_merging.joined import LARGEST_SHIFT, Joined, matched
+from shm.identify.setup_merging.join_set_ups import LARGEST_SHIFT, Joined, matched
 from shm.identify.setup_merging.modal_participation import ringing, with_levels
 from shm.values import PLANES, FloatArray, ResponsePoint
 
 _MOST_TURN = 0.1
 """Radians: shapes that noise turns by more (as a standard deviation) have no direction."""
 _UNKNOWN_TURN = math.pi / 4  # nothing is farther from the nearer of two axes
-_ALIKE = 0.5  # MAC: less than 45 degrees apart
+_SAME_DIRECTION = 0.5  # MAC: less than 45 degrees apart
 _OTHER = dict(zip(PLANES, reversed(PLANES), strict=True))
 
 
-def alike(measurements: Sequence[Measurement]) -> bool:
+def have_same_sensors(measurements: Sequence[Measurement]) -> bool:
     """Return whether they have the same two-axis sensors, and enough hits in several directions."""
     layouts = {tuple(place_of(point) for point in m.points) for m in measurements}
     hammers = [m.hammer for m in measurements if m.hammer is not None]
@@ -51,7 +51,7 @@ def alike(measurements: Sequence[Measurement]) -> bool:
     return several and enough and biaxial and len(layouts) == len(places) == len(windows) == 1
 
 
-def together(measurements: Sequence[Measurement]) -> Measurement:
+def pool_hits(measurements: Sequence[Measurement]) -> Measurement:
     """Return the hits of all as one measurement; what depends on the force is the first one's."""
     return replace(
         measurements[0],
@@ -61,20 +61,24 @@ def together(measurements: Sequence[Measurement]) -> Measurement:
     )
 
 
-def sharpened(measurements: Sequence[Measurement], apart: Joined, found: Finding) -> Joined:
+def refine_by_direction(
+    measurements: Sequence[Measurement], apart: Joined, found: Finding
+) -> Joined:
     """Return the modes of all hits, completed by modes found `apart` in one direction.
 
     Those replace modes whose direction is unknown in all hits together, and add missing ones.
     """
-    everything = together(measurements)
+    everything = pool_hits(measurements)
     groups = matched((everything, everything), (found.modes, apart.finding.modes))
     pairs = [{seen.set_up: seen.mode for seen in group} for group in groups]
     modes = [_better(pair[0], pair.get(1), apart.points) for pair in pairs if 0 in pair]
     missed = [pair[1] for pair in pairs if 0 not in pair]
     for mode in missed:
         if not any(_same(mode, other) for other in modes):
-            beside = any(_near(mode, other) for other in [*modes, *missed] if other is not mode)
-            modes.append(_turned(mode, _UNKNOWN_TURN, apart.points) if beside else mode)
+            has_neighbour = any(
+                _near(mode, other) for other in [*modes, *missed] if other is not mode
+            )
+            modes.append(_turned(mode, _UNKNOWN_TURN, apart.points) if has_neighbour else mode)
     return _as_joined(measurements, replace(found, modes=_by_frequency(modes)))
 
 
@@ -86,7 +90,9 @@ def _as_joined(measurements: Sequence[Measurement], found: Finding) -> Joined:
     """Return a finding over the points of all set-ups, with the levels at which its modes ring."""
     modes = found.modes
     if modes:
-        modes = with_levels(modes, [ringing(m, modes, _struck(m, modes)) for m in measurements])
+        modes = with_levels(
+            modes, [ringing(m, modes, _moves_with_hammer(m, modes)) for m in measurements]
+        )
     note = f"the hits of {len(measurements)} directions are identified together"
     apart = (modes,) * len(measurements)
     return Joined(measurements[0].points, replace(found, modes=modes), apart, (note,))
@@ -122,10 +128,10 @@ def _near(mode: FoundMode, other: FoundMode) -> bool:
 
 
 def _same(mode: FoundMode, other: FoundMode) -> bool:
-    return _near(mode, other) and modal_assurance(mode.shape, other.shape) > _ALIKE
+    return _near(mode, other) and modal_assurance(mode.shape, other.shape) > _SAME_DIRECTION
 
 
-def _struck(measurement: Measurement, modes: Sequence[FoundMode]) -> list[bool]:
+def _moves_with_hammer(measurement: Measurement, modes: Sequence[FoundMode]) -> list[bool]:
     """Return which modes move more in the hammer's direction than across it."""
     plane = measurement.hammer.plane if measurement.hammer else None
     share = np.array([transverse_share(mode.shape, measurement.points) for mode in modes])

@@ -52,7 +52,7 @@ def ringing(
     none: the ring-down would be divided between the two by chance.
     """
     rings = np.ones(len(modes), bool) if all(seen) else ~_hidden(measurement, modes, seen)
-    found = _ringing(measurement, [mode for mode, own in zip(modes, rings, strict=True) if own])
+    found = _ringing(measurement, [mode for mode, each in zip(modes, rings, strict=True) if each])
     return Ringing(_spread(found.amplitude_m_s2, rings), _spread(found.residue, rings))
 
 
@@ -67,10 +67,10 @@ def _hidden(
     return np.asarray(~known & near.any(axis=1))
 
 
-def _spread(values: FloatArray, kept: BoolArray) -> FloatArray:
+def _spread(values: FloatArray, chosen: BoolArray) -> FloatArray:
     """Return values (hits, points, chosen) among zeros, (hits, points, modes)."""
-    spread = np.zeros((*values.shape[:2], len(kept)))
-    spread[:, :, kept] = values
+    spread = np.zeros((*values.shape[:2], len(chosen)))
+    spread[:, :, chosen] = values
     return spread
 
 
@@ -87,10 +87,10 @@ def _ringing(measurement: Measurement, modes: Sequence[FoundMode]) -> Ringing:
         old = starts[before] * np.exp(poles * seconds) if before >= 0 else 0.0
         driven, decay = measurement.driven[index], measurement.decays[index]
         force = driven[0, : driven.shape[1] - decay.shape[1]]
-        struck = int(np.argmax(np.abs(force)))
+        peak = int(np.argmax(np.abs(force)))
         transform = (force / measurement.sampling_rate_hz) @ (1 / waves[:, : len(force)]).T
         made = (starts[index] - old) / transform
-        amplitude.append(np.abs(starts[index] * waves[:, struck]))
+        amplitude.append(np.abs(starts[index] * waves[:, peak]))
         residue.append((made * 1j * poles.imag / poles**2).real)
     return Ringing(np.array(amplitude), np.array(residue))
 
@@ -179,8 +179,8 @@ def fitted(
     where no line of the band is known.
     """
     parts = [
-        _fitted(m.frequency_response, m.window_time_constant_s, own, options)
-        for m, own in zip(measurements, modes, strict=True)
+        _fitted(m.frequency_response, m.window_time_constant_s, each, options)
+        for m, each in zip(measurements, modes, strict=True)
         if m.frequency_response is not None
     ]
     return np.vstack(parts) if parts else None

@@ -55,8 +55,8 @@ def of_seen_shapes(modes: Sequence[FoundMode], seen: Sequence[bool]) -> Product:
     They are free of what modes beyond the band leave in residues, but give no scales.
     """
     values, sds = np.zeros((2, len(modes), max(len(mode.shape) for mode in modes)))
-    for index, (mode, own) in enumerate(zip(modes, seen, strict=True)):
-        if own:
+    for index, (mode, each) in enumerate(zip(modes, seen, strict=True)):
+        if each:
             values[index] = _certainty(mode) * mode.shape
             sds[index] = _certainty(mode) * mode.shape_sd
     return Product(values, sds)
@@ -189,7 +189,7 @@ def _share(
     at_sensor: FloatArray, planes: Sequence[Plane | None], plane: Plane | None
 ) -> FloatArray:
     """Return the motion of each mode (modes,) in `plane`, with the sign of the largest."""
-    part = at_sensor[:, [own == plane for own in planes]]
+    part = at_sensor[:, [each == plane for each in planes]]
     largest = np.take_along_axis(part, np.argmax(np.abs(part), axis=1)[:, np.newaxis], axis=1)
     return np.asarray(np.sign(largest[:, 0]) * np.linalg.norm(part, axis=1))
 

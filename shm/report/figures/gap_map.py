@@ -292,8 +292,8 @@ def _alt(sheet: DiagnosisSheet) -> str:
     there = f" {places_in_words(sheet)}" if local(sheet) else ""
     count = formatting.counted(len(residuals), "residual")
     gross = ", ".join(f"{r.plane} {r.order} in {r.test}" for r in excluded(sheet))
-    set_aside = f" Set aside as a gross error: {gross}." if gross else ""
-    return f"{count} of frequencies; the largest: {wording}.{set_aside}{there}"
+    gross_words = f" Set aside as a gross error: {gross}." if gross else ""
+    return f"{count} of frequencies; the largest: {wording}.{gross_words}{there}"
 
 
 FIGURE = spec.Member("gap_map", "Where the gap lies", specify, caption, _alt)

@@ -64,7 +64,7 @@ def one_test(
         results=filled(
             modal_test_report.modes(sheet),
             modal_test_report.quality(sheet),
-            modal_test_report.set_aside(sheet),
+            modal_test_report.foreign_modes(sheet),
         ),
         charts=[(each, *_chart(view, each, chosen)) for each in view.figures()],
         points=[point_name(point) for point in points],

@@ -23,7 +23,7 @@ from shm.values import FloatArray
 _LINES_AROUND = 4  # judgement: nine lines have a median that one bad line does not move
 
 
-def finished(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
+def postprocess(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
     """Return the finding without window damping, incoherent modes and sidebands.
 
     Frequencies have their dependence on amplitude.
@@ -87,7 +87,7 @@ _SIDEBAND_SHAPE = 0.98
 _SIDEBAND_RATE = 0.3
 """Of the mode's own rate of decay: a line of a tenth of its amplitude is known to about that."""
 _SIDEBAND_SHARE = 0.4  # of the mode's amplitude: half of what makes it fall to a fifth and rise
-_SIDEBANDS_ALIKE = 1.6  # judgement: of the amplitudes of two lines that modulation makes alike
+_MAX_SIDEBAND_RATIO = 1.6  # judgement: of the amplitudes of two lines that modulation makes alike
 _SIDEBAND_TOLERANCE = 0.1
 """Of the rate of decay, in rad/s: by so much of a line's width its middle may be off."""
 
@@ -102,7 +102,7 @@ def without_sidebands(found: Finding) -> Finding:
     """
     lines: dict[int, FoundMode] = {}
     for carrier in found.modes:
-        for one, other in combinations(_weaker_beside(carrier, found.modes), 2):
+        for one, other in combinations(_weaker_neighbours(carrier, found.modes), 2):
             if _are_sidebands(carrier, one, other):
                 lines[id(one)] = lines[id(other)] = carrier
     dropped = tuple(
@@ -115,11 +115,11 @@ def without_sidebands(found: Finding) -> Finding:
         for mode in found.modes
         if id(mode) in lines
     )
-    kept = tuple(mode for mode in found.modes if id(mode) not in lines)
-    return replace(found, modes=kept, dropped=found.dropped + dropped)
+    modes = tuple(mode for mode in found.modes if id(mode) not in lines)
+    return replace(found, modes=modes, dropped=found.dropped + dropped)
 
 
-def _weaker_beside(carrier: FoundMode, modes: Sequence[FoundMode]) -> list[FoundMode]:
+def _weaker_neighbours(carrier: FoundMode, modes: Sequence[FoundMode]) -> list[FoundMode]:
     """Return weaker modes close to the carrier that share its shape and rate of decay."""
     rate = _decay_rate(carrier)
     return [
@@ -141,7 +141,7 @@ def _are_sidebands(carrier: FoundMode, one: FoundMode, other: FoundMode) -> bool
     scatter_hz = 3 * float(np.linalg.norm(sds)) if hits_known else 0.0
     tolerance_hz = max(scatter_hz, _SIDEBAND_TOLERANCE * _decay_rate(carrier) / (2 * math.pi))
     strong = sorted(mode.acceleration_m_s2 for mode in (one, other))
-    return off_hz < tolerance_hz and strong[1] < _SIDEBANDS_ALIKE * strong[0]
+    return off_hz < tolerance_hz and strong[1] < _MAX_SIDEBAND_RATIO * strong[0]
 
 
 def _decay_rate(mode: FoundMode) -> float:

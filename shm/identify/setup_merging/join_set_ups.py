@@ -48,7 +48,7 @@ class Joined:
     notes: tuple[str, ...] = ()
 
 
-def joined(
+def join_set_ups(
     measurements: Sequence[Measurement], findings: Sequence[Finding], options: IdentifyOptions
 ) -> Joined:
     """Join the modes of all set-ups over all points; those of a single one are unchanged.
@@ -60,14 +60,14 @@ def joined(
     if len(measurements) == 1:
         return _single(measurements[0], findings[0])
     groups = matched(measurements, [finding.modes for finding in findings])
-    kept, lost = _sorted_out(groups, len(measurements), bool(measurements[0].driven))
+    accepted, lost = _sorted_out(groups, len(measurements), bool(measurements[0].driven))
     dropped = _summed([d for finding in findings for d in finding.dropped]) + lost
     poles = _all_poles([finding.poles for finding in findings])
-    if not kept:
+    if not accepted:
         return Joined(measurements[0].points, Finding((), dropped, poles), ((),) * len(findings))
-    pools = [_pool(group, options.frequency_allowance) for group in kept]
-    apart = tuple(_as_seen(kept, pools, number) for number in range(len(measurements)))
-    points, modes = _over_all_points(measurements, pools, apart, kept)
+    pools = [_pool(group, options.frequency_allowance) for group in accepted]
+    apart = tuple(_as_seen(accepted, pools, number) for number in range(len(measurements)))
+    points, modes = _over_all_points(measurements, pools, apart, accepted)
     drifts = [finding.drift for finding in findings if finding.drift is not None]
     drift = max(drifts, key=lambda each: (each.sure, abs(each.change)), default=None)
     return Joined(
@@ -90,9 +90,12 @@ def _over_all_points(
 ) -> tuple[tuple[ResponsePoint, ...], tuple[FoundMode, ...]]:
     """Return the pooled modes with their shapes over all points."""
     if measurements[0].driven:
-        seen = [[any(own.set_up == n for own in g) for g in groups] for n in range(len(apart))]
+        seen = [
+            [any(is_seen.set_up == n for is_seen in g) for g in groups] for n in range(len(apart))
+        ]
         rings = [
-            ringing(m, modes, own) for m, modes, own in zip(measurements, apart, seen, strict=True)
+            ringing(m, modes, is_seen)
+            for m, modes, is_seen in zip(measurements, apart, seen, strict=True)
         ]
         products = [of_hits(ring) for ring in rings]
         if _see_the_same(measurements):
@@ -108,7 +111,7 @@ def _over_all_points(
 def _see_the_same(measurements: Sequence[Measurement]) -> bool:
     """Return whether all set-ups have equal sensors, so that none needs another's scale."""
     points = [[place_of(point) for point in m.points] for m in measurements]
-    return all(own == points[0] for own in points) and not hammer_roves(measurements)
+    return all(each == points[0] for each in points) and not hammer_roves(measurements)
 
 
 def _note(measurements: Sequence[Measurement]) -> str:
@@ -123,14 +126,14 @@ def _note(measurements: Sequence[Measurement]) -> str:
 def _sorted_out(
     groups: Sequence[list[Seen]], set_ups: int, hammered: bool
 ) -> tuple[list[list[Seen]], tuple[Dropped, ...]]:
-    kept, lost = [], []
+    accepted, lost = [], []
     for group in groups:
         reason = _doubt(group, set_ups, hammered)
         if reason:
             lost.append(Dropped(f"mode at {group[0].mode.frequency_hz:.4g} Hz", 1, reason))
         else:
-            kept.append(group)
-    return kept, tuple(lost)
+            accepted.append(group)
+    return accepted, tuple(lost)
 
 
 def _doubt(group: Sequence[Seen], set_ups: int, hammered: bool) -> str:
@@ -147,11 +150,13 @@ def _pool(group: Sequence[Seen], allowance: float) -> FoundMode:
     modes = [seen.mode for seen in group]
     damping_sds = np.array([mode.damping_sd for mode in modes])
     # Without a standard deviation of its damping, that of a mode's frequency is but a floor.
-    own = np.array([mode.frequency_sd_hz for mode in modes])
-    frequency, frequency_sd = pooled(
-        np.array([mode.frequency_hz for mode in modes]), np.where(np.isnan(damping_sds), NAN, own)
+    sds = np.array([mode.frequency_sd_hz for mode in modes])
+    frequency, frequency_sd = pool_estimates(
+        np.array([mode.frequency_hz for mode in modes]), np.where(np.isnan(damping_sds), NAN, sds)
     )
-    damping, damping_sd = pooled(np.array([mode.damping_ratio for mode in modes]), damping_sds)
+    damping, damping_sd = pool_estimates(
+        np.array([mode.damping_ratio for mode in modes]), damping_sds
+    )
     if math.isnan(frequency_sd):
         frequency_sd = FREQUENCY_FLOOR * frequency
     sd = math.hypot(frequency_sd, allowance * frequency)
@@ -194,7 +199,7 @@ def _all_poles(parts: Sequence[Poles]) -> Poles:
     )
 
 
-def pooled(values: FloatArray, sds: FloatArray) -> tuple[float, float]:
+def pool_estimates(values: FloatArray, sds: FloatArray) -> tuple[float, float]:
     """Return mean and standard deviation of `values` (set-ups,) with `sds`, NaN where unknown.
 
     Random effects: what set-ups differ by (mounting of sensors, temperature) is estimated from
@@ -210,18 +215,18 @@ def pooled(values: FloatArray, sds: FloatArray) -> tuple[float, float]:
     if np.all(np.isnan(sds)):
         scatter = float(np.std(values, ddof=1)) / np.sqrt(count) * widening(count - 1)
         return float(np.mean(values)), scatter if count >= LEAST_HITS else NAN
-    own = np.where(np.isnan(sds), np.nanmax(sds), sds) ** 2
-    own = np.maximum(own, max(float(np.nanmedian(sds**2)), np.finfo(float).tiny))
-    between = _between(values, own)
-    weights = 1 / (own + between)
-    alone = 1 / np.sum(1 / own)
+    variances = np.where(np.isnan(sds), np.nanmax(sds), sds) ** 2
+    variances = np.maximum(variances, max(float(np.nanmedian(sds**2)), np.finfo(float).tiny))
+    between = _between(values, variances)
+    weights = 1 / (variances + between)
+    alone = 1 / np.sum(1 / variances)
     variance = alone + (1 / np.sum(weights) - alone) * widening(count - 1) ** 2
     return float(values @ weights / np.sum(weights)), float(np.sqrt(variance))
 
 
-def _between(values: FloatArray, own: FloatArray) -> float:
+def _between(values: FloatArray, variances: FloatArray) -> float:
     """Return the variance between set-ups beyond their `variances` (set-ups,)."""
-    weights = 1 / own
+    weights = 1 / variances
     total = np.sum(weights)
     excess = weights @ (values - values @ weights / total) ** 2 - (len(values) - 1)
     return max(0.0, float(excess / (total - np.sum(weights**2) / total)))
