@@ -171,8 +171,8 @@ def command(
     if hits is not None:
         found = sheets[0].identification
         hits.write_text(as_csv(found.each_hit, found.test.modes), encoding="utf-8")
-    said = [as_text(modal_test_paper(sheet), readable_width()).rstrip() for sheet in sheets]
-    answer(_document(sheets), "\n".join(said))
+    papers = [as_text(modal_test_paper(sheet), readable_width()).rstrip() for sheet in sheets]
+    answer(_document(sheets), "\n".join(papers))
 
 
 def _identified(

@@ -39,7 +39,7 @@ from shm.watch.change_words import frequency_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document
-from shm_daemon.heartbeat import seconds_since_beat, told, why_turn_failed
+from shm_daemon.heartbeat import duration_words, seconds_since_beat, why_turn_failed
 from shm_daemon.spool import never_taken, scan
 
 if TYPE_CHECKING:
@@ -99,7 +99,9 @@ def _show(document: dict[str, Any]) -> None:
     recordings = ", ".join(f"{n} {stage}" for stage, n in document["recordings"].items() if n)
     daemon, deliveries, now = document["daemon"], document["deliveries"], utc_now()
     ago = (
-        f", last seen {told(now - daemon['seen_at'])} ago" if daemon["seen_at"] else ", never seen"
+        f", last seen {duration_words(now - daemon['seen_at'])} ago"
+        if daemon["seen_at"]
+        else ", never seen"
     )
     oldest = document["oldest_waiting_at"]
     since = f", the oldest since {oldest:%Y-%m-%d %H:%M}" if oldest else ""

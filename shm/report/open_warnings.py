@@ -79,15 +79,15 @@ def passed_over(hanger: Hanger, window: str) -> str:
     )
 
 
-def nearly_slack(hanger: Hanger, baseline: Summary, now: Summary, *, is_told: bool) -> str:
+def nearly_slack(hanger: Hanger, baseline: Summary, now: Summary, *, is_reported: bool) -> str:
     """Return that the latest test alone reads most of the tension lost; "" where it does not.
 
     A bar that carries next to nothing is as stiff as before, and the watch may put its frequencies
-    down to something else, or be unsure for want of tests. Where it `is_told` of the tension that
-    it is beyond its threshold, nobody need be told twice.
+    down to something else, or be unsure for want of tests. Empty where it `is_reported` that the
+    tension is beyond its threshold.
     """
     nominal_n = hanger.nominal_tension_n
-    if is_told or not nominal_n > 0 or not now.q95 < _MOST_LOST * baseline.q05:
+    if is_reported or not nominal_n > 0 or not now.q95 < _MOST_LOST * baseline.q05:
         return ""
     half = (now.q95 - now.q05) / 2 / nominal_n
     return (

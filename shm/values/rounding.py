@@ -35,7 +35,7 @@ class ForceUnit:
             return 1
         return min(MOST_DECIMALS, max(1, _DIGITS - 1 - math.floor(math.log10(size))))
 
-    def told(self, force_n: float) -> str:
+    def with_unit(self, force_n: float) -> str:
         """Return `654.1 kN` of a force in N: four significant digits, never as a power of ten."""
         value = self.of(force_n)
         digits = np.format_float_positional(

@@ -55,5 +55,5 @@ def tension_words(mean_n: float, low_n: float, high_n: float) -> str:
     if not math.isfinite(mean_n):
         return "tension not known"
     if not math.isfinite(high_n - low_n):
-        return force_unit(mean_n).told(mean_n)
+        return force_unit(mean_n).with_unit(mean_n)
     return stated(Averaged(Summary(mean_n, math.nan, low_n, math.nan, high_n), math.nan)).headline

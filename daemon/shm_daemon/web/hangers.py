@@ -253,7 +253,7 @@ def _tension(latest: StoredPoint | None) -> dict[str, Any]:
 
 def _watched(latest: StoredWatch | None) -> dict[str, Any]:
     """Return the result of the latest test compared with the current baseline."""
-    drifts = latest.watched.told if latest else ()
+    drifts = latest.watched.published_drifts if latest else ()
     creep = latest.watched.creep_per_year if latest else None
     return {
         "shifts": plain([{key: getattr(drift, key) for key in _SHIFT} for drift in drifts]),

@@ -18,7 +18,13 @@ from shm.pipeline import utc_now
 from shm.pipeline.unheard import backlog_leads, heard, leads_of, ring_leads, stream_leads
 from shm.store.stored_alerts import describe_silence
 from shm.values.messages import Lead
-from shm_daemon.heartbeat import NEARLY_FULL, patience_s, seconds_since_beat, told, why_turn_failed
+from shm_daemon.heartbeat import (
+    NEARLY_FULL,
+    duration_words,
+    patience_s,
+    seconds_since_beat,
+    why_turn_failed,
+)
 from shm_daemon.spool import never_taken, scan
 from shm_daemon.web.site import Site
 
@@ -215,7 +221,9 @@ def _silence(site: Site) -> str:
     if ago is None:
         return "The daemon has never run here."
     is_late = ago > patience_s(site.workspace)
-    return f"The daemon was last seen {told(timedelta(seconds=ago))} ago." if is_late else ""
+    return (
+        f"The daemon was last seen {duration_words(timedelta(seconds=ago))} ago." if is_late else ""
+    )
 
 
 def _daemon(site: Site) -> list[str]:

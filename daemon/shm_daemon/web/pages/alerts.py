@@ -231,9 +231,9 @@ def _delivery(row: Delivery, hook: Hook | None, message: str, now: datetime) -> 
     if hook is not None and row.state is DeliveryState.WAITING:
         until = hook.quiet_until(message, now, is_raised=row.news is News.RAISED)
     escalates = hook is not None and hook.escalation_after_seconds is not None
-    told = {name: getattr(row, name) for name in ("hook", "attempts", "last_error", "news")}
+    delivery = {name: getattr(row, name) for name in ("hook", "attempts", "last_error", "news")}
     state = {"state": row.state.value, "escalation": escalates, "waits_until": until}
-    return {**told, **state}
+    return {**delivery, **state}
 
 
 @router.post("/silences", include_in_schema=False)

@@ -23,7 +23,7 @@ from shm.report import formatting
 from shm.report.paper import Table
 from shm.store import ENDED, DeliveryState, Workspace
 from shm_daemon.doctor import Finding, Level, examine
-from shm_daemon.heartbeat import seconds_since_beat, told
+from shm_daemon.heartbeat import duration_words, seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
@@ -207,7 +207,7 @@ def _facts(state: dict[str, Any]) -> list[tuple[str, str, str]]:
             "Daemon",
             "active" if state["daemon"] else "none active",
             "never seen here" if seen_s is None
-            else f"last seen {told(timedelta(seconds=seen_s))} ago",
+            else f"last seen {duration_words(timedelta(seconds=seen_s))} ago",
         ),
         (
             "Waiting",
