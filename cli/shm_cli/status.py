@@ -358,7 +358,7 @@ _OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
 
 
 def show_stages(ctx: click.Context, which: str) -> None:
-    """Raise NothingThere where there is no such recording or test."""
+    """Print the stages of a recording or test; raises NothingThere where there is none."""
     with opened_store(ctx) as (_, store):
         recording_id, _ = store.recordings.find(which)
         recording = store.recordings.get(recording_id)
@@ -382,7 +382,8 @@ def show_stages(ctx: click.Context, which: str) -> None:
                     for event in noticed
                 ],
                 "results": [asdict(test) for test in tests],
-            }
+            },
+            "recording_stages",
         )
         return
     also = f" (also came as {', '.join(other_names)})" if other_names else ""
