@@ -36,7 +36,7 @@ class Setting:
         return f"SHM_{self.name.upper()}"
 
     def parse(self, raw: Any, source: str) -> Any:
-        """`raw` as a value of this setting's type; raises BadInput naming `source`.
+        """Return `raw` as a value of this setting's type; raises BadInput naming `source`.
 
         A list of texts is the same as these parted by commas.
         """

@@ -148,7 +148,7 @@ def silence_row(silence: Silence, now: datetime) -> dict[str, object]:
 
 
 def state_of(silence: Silence, now: datetime) -> str:
-    """`in force`, `to come` or `over`."""
+    """Return `in force`, `to come` or `over`."""
     if silence.is_over(now):
         return "over"
     return "to come" if silence.starts_at > now else "in force"
@@ -197,7 +197,7 @@ def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
 
 
 def acknowledgement_words(stored: StoredAlert) -> str:
-    """`open`, or who took note of it, when and why; that it is resolved."""
+    """Return `open`, or who acknowledged it, when and why; or that it is resolved."""
     noted, ended = stored.acknowledgement, stored.resolution
     if noted is None:
         return "open" if ended is None else f"resolved {ended.at:%Y-%m-%d}: {ended.why}"

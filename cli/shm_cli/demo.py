@@ -52,7 +52,7 @@ _WINDOWS_A_DAY = 144
 
 
 def live_description() -> str:
-    """`bridge.toml` of the bridge, its hangers and their streams."""
+    """Return `bridge.toml` of the bridge, its hangers and their streams."""
     tables = [
         '[bridge]\nname = "Bridge that lives"',
         '[[hook]]\nname = "file"\ncommand = ["tee", "-a", "alerts.jsonl"]',
@@ -283,7 +283,7 @@ def command(folder: Path, live: bool) -> None:
 
 
 def _live(folder: Path) -> None:
-    """Four days of permanent sensors; then the alert of a loss of 2 %."""
+    """Simulate four days of permanent sensors, and print the alert of a loss of 2 %."""
     workspace = _fresh_workspace(folder, live_description())
     click.echo(f"Workspace {workspace.folder}: 3 hangers with permanent sensors.", err=True)
     with workspace.store() as store, _daemon(workspace) as daemon:
@@ -358,7 +358,7 @@ def _await_alert(store: Store, daemon: subprocess.Popen[bytes]) -> Sequence[Stor
 
 
 def _conclude(workspace: Workspace, alerts: Sequence[StoredAlert]) -> None:
-    """Says what was found and where the reports are; raises ShmError without the alert."""
+    """Print the result and the paths of the reports; raises ShmError without the alert."""
     for stored in alerts:
         click.echo(f"ALERT {stored.alert.message}")
     if LOSING not in {stored.alert.hanger for stored in alerts}:

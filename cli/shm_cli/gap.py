@@ -143,7 +143,7 @@ def plan(
 def _measured(
     ctx: click.Context, file: Path | None, hanger_file: Path | None, hanger_id: int | None
 ) -> tuple[Sequence[ModalTest], Hanger]:
-    """The tests and their hanger, those of the workspace as `shm gap diagnose` takes them."""
+    """Return the tests and their hanger, as `shm gap diagnose` takes them."""
     if file is not None:
         return tests_and_hanger(ctx, file, hanger_file, hanger_id)
     hanger = one_hanger(ctx, hanger_file, hanger_id)
@@ -266,7 +266,7 @@ def _jointly(
     count: int,
     options: GapOptions,
 ) -> BridgeDiagnosisSheet:
-    """Several hangers together: of files, or all of the workspace, which keeps each one's own."""
+    """Diagnose several hangers together: of files, or all of the workspace, which stores each."""
     if (bridge and files) or any(each is not None for each in one):
         raise UsageError(
             "--bridge takes all hangers of the workspace, several files name theirs.",
@@ -294,7 +294,7 @@ def _pairs(files: tuple[Path, ...]) -> list[tuple[Path, Path]]:
 
 
 def _of_bridge(ctx: click.Context, count: int, options: GapOptions) -> BridgeDiagnosisSheet:
-    """All hangers of the workspace that have tests and that the baseline can describe."""
+    """Return all hangers of the workspace that have tests and that the baseline can describe."""
     with opened_store(ctx) as (workspace, store):
         stored = {
             hanger: tests

@@ -32,14 +32,14 @@ from shm.store import (
     Store,
     Workspace,
 )
-from shm.store.stored_alerts import said_of
+from shm.store.stored_alerts import describe_silence
 from shm.values import Summary
 from shm.values.rounding import ForceUnit, force_unit, rounded_percent
 from shm.watch.change_words import frequency_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document
-from shm_daemon.heartbeat import seconds_since_beat, told, why_turn_failed
+from shm_daemon.heartbeat import duration_words, seconds_since_beat, why_turn_failed
 from shm_daemon.spool import never_taken, scan
 
 if TYPE_CHECKING:
@@ -99,7 +99,9 @@ def _show(document: dict[str, Any]) -> None:
     recordings = ", ".join(f"{n} {stage}" for stage, n in document["recordings"].items() if n)
     daemon, deliveries, now = document["daemon"], document["deliveries"], utc_now()
     ago = (
-        f", last seen {told(now - daemon['seen_at'])} ago" if daemon["seen_at"] else ", never seen"
+        f", last seen {duration_words(now - daemon['seen_at'])} ago"
+        if daemon["seen_at"]
+        else ", never seen"
     )
     oldest = document["oldest_waiting_at"]
     since = f", the oldest since {oldest:%Y-%m-%d %H:%M}" if oldest else ""
@@ -177,7 +179,7 @@ def _structure_line(row: Mapping[str, Any]) -> str:
 
 
 def _held_lines(held: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Of each hanger how many are held, and the one whose modes say most."""
+    """Return for each hanger the number held, and the one whose modes show most."""
     of_hangers: dict[int, list[Mapping[str, Any]]] = {}
     for each in held:
         of_hangers.setdefault(each["hanger"], []).append(each)
@@ -258,7 +260,9 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
         "quiet_hours": _quiet(workspace, store, now),
-        "silences": [said_of(each) for each in store.silences.list_all() if each.is_in_force(now)],
+        "silences": [
+            describe_silence(each) for each in store.silences.list_all() if each.is_in_force(now)
+        ],
         "streams": [each.words for each in stream_leads(workspace, store, now)],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
@@ -354,7 +358,7 @@ _OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
 
 
 def show_stages(ctx: click.Context, which: str) -> None:
-    """Raise NothingThere where there is no such recording or test."""
+    """Print the stages of a recording or test; raises NothingThere where there is none."""
     with opened_store(ctx) as (_, store):
         recording_id, _ = store.recordings.find(which)
         recording = store.recordings.get(recording_id)
@@ -378,7 +382,8 @@ def show_stages(ctx: click.Context, which: str) -> None:
                     for event in noticed
                 ],
                 "results": [asdict(test) for test in tests],
-            }
+            },
+            "recording_stages",
         )
         return
     also = f" (also came as {', '.join(other_names)})" if other_names else ""

@@ -41,7 +41,7 @@ def working(workspace: Workspace) -> Iterator[Flow]:
 
 
 def finish(flow: Flow, ids: Sequence[int]) -> None:
-    """Works until nothing waits, and counts the recordings that are through."""
+    """Work until no recording waits, and print how many are done."""
     with counting_bar() as bar:
         task = bar.add_task("ingesting", total=len(ids))
 
@@ -59,7 +59,7 @@ def finish(flow: Flow, ids: Sequence[int]) -> None:
 
 
 def finish_now(workspace: Workspace, recording_id: int) -> None:
-    """Works until a recording is through, or leaves that to the daemon at work."""
+    """Work until a recording is done, or leave that to the daemon at work."""
     try:
         with working(workspace) as flow:
             finish(flow, [recording_id])
@@ -68,10 +68,10 @@ def finish_now(workspace: Workspace, recording_id: int) -> None:
 
 
 def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
-    """Supersedes what was made of it and does it again, or leaves that to the daemon at work.
+    """Supersede results and recompute them, or leave that to the daemon at work.
 
-    `which` is a recording's number or a test's name. Raises NothingThere, UsageError; then nothing
-    is superseded.
+    `which` is a recording's number or a test's name. Raises NothingThere, UsageError; then
+    nothing is superseded.
     """
     with workspace.store() as store:
         recording_id, test = store.recordings.find(which)

@@ -36,7 +36,7 @@ from shm.store.stored_alerts import silenced_until
 from shm.store.workspace import FOLDERS
 from shm_daemon import doctor_checks as of_store
 from shm_daemon.doctor_checks import Finding, Level, fault, ok, some, unknown, warning
-from shm_daemon.heartbeat import NEARLY_FULL, told
+from shm_daemon.heartbeat import NEARLY_FULL, duration_words
 from shm_daemon.hooks import HookFailed, HookNotifier
 from shm_daemon.web.other_bridges import ask_all
 
@@ -128,7 +128,7 @@ def check_deliveries(examined: of_store.Examined) -> Iterator[Finding]:
         last = lost[-1]
         yield warning(
             "deliveries",
-            f"{len(lost)} were given up in the last {told(_REMEMBERED)}; {last.hook}: "
+            f"{len(lost)} were given up in the last {duration_words(_REMEMBERED)}; {last.hook}: "
             f"{last.last_error}",
             "See `shm alerts` for what nobody was told of, and mend the hook.",
         )

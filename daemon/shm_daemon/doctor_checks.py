@@ -18,7 +18,7 @@ from shm.pipeline.unheard import REMEDIES, backlog_leads, heard, ring_leads
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
-from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
+from shm_daemon.heartbeat import duration_words, patience_s, seconds_since_beat, why_turn_failed
 from shm_daemon.spool import is_sidecar, left_alone, never_taken, scan
 
 # Judgement: a step takes seconds to minutes, so that work which stands for longer than these is
@@ -100,7 +100,11 @@ def check_daemon(examined: Examined) -> Iterator[Finding]:
     """Whether a daemon is active, and its loop goes round."""
     workspace = examined.workspace
     holder, ago_s = workspace.holder(), seconds_since_beat(workspace)
-    seen = "never seen here" if ago_s is None else f"last seen {told(timedelta(seconds=ago_s))} ago"
+    seen = (
+        "never seen here"
+        if ago_s is None
+        else f"last seen {duration_words(timedelta(seconds=ago_s))} ago"
+    )
     if holder is None:
         yield warning("daemon", f"none is active, {seen}", _BEGIN)
     elif ago_s is None or ago_s > patience_s(workspace):
@@ -122,7 +126,9 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
     if not ages:
         yield ok("spool", "empty")
     else:
-        found = f"{counted(len(ages), 'file')} in the queue, the oldest for {told(max(ages))}"
+        found = (
+            f"{counted(len(ages), 'file')} in the queue, the oldest for {duration_words(max(ages))}"
+        )
         late = max(ages) > WAITS_LONG
         remedy = "Is a daemon active, and what does its log say of these files?"
         yield warning("spool", found, remedy) if late else ok("spool", found)
@@ -168,7 +174,7 @@ def check_under_way(examined: Examined) -> Iterator[Finding]:
     waits, idle = now - oldest.since, now - newest_at
     found = (
         f"{len(standing)} on their way; {oldest.file_name} (recording {oldest.id}) has been "
-        f"{oldest.stage} for {told(waits)}"
+        f"{oldest.stage} for {duration_words(waits)}"
     )
     if waits > _STUCK_BEHIND_OTHERS or (waits > _STUCK and idle > _NOTHING_MOVES):
         remedy = f"See the daemon's log, then `shm ingest --again {oldest.id}`."
@@ -192,7 +198,8 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
         why = reasons[-1].name
     yield warning(
         "quarantine",
-        f"{counted(len(reasons), 'file')} since {told(first)}, the latest {told(last)} ago: {why}",
+        f"{counted(len(reasons), 'file')} since {duration_words(first)},"
+        f" the latest {duration_words(last)} ago: {why}",
         "Mend and drop them again, or `shm archive prune --quarantine-days 90`.",
     )
 
@@ -203,7 +210,7 @@ def check_held(examined: Examined) -> Iterator[Finding]:
     if not found:
         yield ok("held", "nothing waits for you to decide")
         return
-    since = told(max(examined.now - found[0].held_at, timedelta(0)))
+    since = duration_words(max(examined.now - found[0].held_at, timedelta(0)))
     yield warning(
         "held",
         f"{counted(len(found), 'recording')}, the first for {since}: {found[0].file_name}",
@@ -272,7 +279,7 @@ def check_backup(examined: Examined) -> Iterator[Finding]:
     if last is None:
         yield warning("backup", "never made here", remedy)
     else:
-        found = f"{last[1]}, {told(now - last[0])} ago"
+        found = f"{last[1]}, {duration_words(now - last[0])} ago"
         late = now - last[0] > timedelta(days=examined.workspace.settings.backup_days)
         yield warning("backup", found, remedy) if late else ok("backup", found)
     copied = {copy.recording_id for copy in store.upkeep.list_copies()}
@@ -287,7 +294,8 @@ def check_clock(examined: Examined) -> Iterator[Finding]:
     if newest is not None and newest - now > _CLOCK_TOLERANCE:
         yield fault(
             "clock",
-            f"it says {now:%Y-%m-%d %H:%M} UTC, {told(newest - now)} before the newest row",
+            f"it says {now:%Y-%m-%d %H:%M} UTC, "
+            f"{duration_words(newest - now)} before the newest row",
             "Set it; tests without a time of their own are dated by it.",
         )
     said = _synchronised()

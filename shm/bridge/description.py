@@ -197,7 +197,7 @@ class Bridge:
         return (*self.hangers, *self.structures)
 
     def tested(self, number: int) -> Hanger:
-        """The hanger or structure of that number; raises BadInput when there is none such."""
+        """Return the hanger or structure of that number; raises BadInput where there is none."""
         return next((each for each in self.structures if each.id == number), None) or self.hanger(
             number
         )
@@ -289,7 +289,7 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
 
 
 def load_hanger(path: Path, hanger_id: int | None = None) -> Hanger:
-    """One hanger of a file (`--hanger-file`); `hanger_id` is needed where the file has several."""
+    """Return one hanger of a file (`--hanger-file`), by `hanger_id` where it has several."""
     bridge = load_bridge(path)
     if hanger_id is not None:
         return bridge.hanger(hanger_id)

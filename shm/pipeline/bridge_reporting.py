@@ -43,7 +43,7 @@ from shm.store import (
     TrendPoint,
     Workspace,
 )
-from shm.store.stored_alerts import said_of, silenced_until
+from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
@@ -74,9 +74,9 @@ def warnings_from(
         if hanger.id not in now or watched is None:
             return ""
         level = hanger.thresholds.alert_probability
-        is_told = any(d.quantity == TENSION and d.probability >= level for d in watched.drifts)
+        is_reported = any(d.quantity == TENSION and d.probability >= level for d in watched.drifts)
         of_test = now[hanger.id].averaged.tension_n
-        return nearly_slack(hanger, tensions[hanger.id], of_test, is_told=is_told)
+        return nearly_slack(hanger, tensions[hanger.id], of_test, is_reported=is_reported)
 
     def of_works(hanger: Hanger) -> str:
         point, watched = now.get(hanger.id), latest.get(hanger.id)
@@ -85,7 +85,7 @@ def warnings_from(
         if watched is not None and watched.watched.time >= point.time:
             return ""
         windows = [each for each in works if each.covers(hanger.id, point.time)]
-        return passed_over(hanger, said_of(windows[-1])) if windows else ""
+        return passed_over(hanger, describe_silence(windows[-1])) if windows else ""
 
     return {
         hanger.id: open_warnings(
@@ -252,7 +252,7 @@ class HangersNow:
             LatestTest(point.test, point.time, point.averaged, point.model) if point else None,
             baseline.averaged if baseline else None,
             is_first=point is not None and (baseline is None or point.test in baseline.tests),
-            drifts=watched.told if watched else (),
+            drifts=watched.published_drifts if watched else (),
             called=still_detected(called, watched, hanger),
             detected="; ".join(called_words(change) for change in called),
             standing=findings(each.alert for each in standing),
@@ -303,7 +303,7 @@ def latest_drifts(store: Store, hanger: int) -> tuple[Drift, ...]:
     """
     baseline = store.watch.baseline(hanger)
     told = store.watch.list_detected(baseline.hanger, baseline.id) if baseline else ()
-    return told[-1].watched.told if told else ()
+    return told[-1].watched.published_drifts if told else ()
 
 
 def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
@@ -331,8 +331,8 @@ def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]
 
 def _known_drifts(store: Store, latest: StoredWatch) -> Sequence[Drift]:
     """Those of the latest test; of all, where its shift of the tension is not known."""
-    drifts = latest.watched.told
+    drifts = latest.watched.published_drifts
     if any(each.quantity == TENSION and math.isfinite(each.shift_mean) for each in drifts):
         return drifts
     watches = store.watch.list_all(latest.hanger, latest.baseline_id)
-    return [drift for watch in watches for drift in watch.watched.told]
+    return [drift for watch in watches for drift in watch.watched.published_drifts]

@@ -184,7 +184,7 @@ class Queue:
                 hanger,
                 LatestTest(test.test.id, test.time, tension, current.model),
                 averaged_now(baseline.posterior, compared, hanger.limits),
-                drifts=watched.told,
+                drifts=watched.published_drifts,
                 called=(*called, *([watched.change] if watched.change.called else ())),
                 standing=(alert,),
             )

@@ -15,8 +15,8 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read.assemble import assemble
-from shm.read.header import Entry
-from shm.read.logger_text import is_measured, said_of
+from shm.read.header import entries_of
+from shm.read.logger_text import is_measured, stated_entries
 from shm.read.logger_words import name_and_unit
 from shm.read.table import Column, Role, Table, describe
 from shm.values import NAN, FrequencyResponse, Recording
@@ -40,10 +40,9 @@ def from_sep005(
             file=_SOURCE,
             remedy="Cut them to one span.",
         )
-    said: dict[str, object] = {"hanger": hanger, "time": next(iter(starts), None)}
-    entries = {key: Entry(value, _SOURCE) for key, value in said.items() if value is not None}
+    entries = entries_of({"hanger": hanger, "time": next(iter(starts), None)}, _SOURCE)
     table = Table(_SOURCE, tuple(columns), entries)
-    found = assemble(table, describe(table, with_beside=False))
+    found = assemble(table, describe(table, with_sidecars=False))
     assert not isinstance(found, FrequencyResponse)
     return replace(found, source="SEP005")
 
@@ -65,9 +64,9 @@ def _columns(channel: Mapping[str, Any]) -> list[Column]:
             "its data are no single row.", file=_SOURCE, channel=name, remedy="Split its columns."
         )
     role: Role = "channel" if is_measured(name, unit[1], None) else "other"
-    said = said_of(name, unit[1], None, None, _SOURCE)
+    known = stated_entries(name, unit[1], None, None, _SOURCE)
     rate = float(channel["fs"]) if channel.get("fs") is not None else NAN
-    found = [Column(name, len(values), values.copy, unit[1], role, said, rate_hz=rate, label=name)]
+    found = [Column(name, len(values), values.copy, unit[1], role, known, rate_hz=rate, label=name)]
     if channel.get("fs") is None:
         times = np.asarray(channel["time"], float)
         found.append(Column(f"time of {name}", len(times), times.copy, "s", "times"))

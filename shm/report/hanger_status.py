@@ -303,7 +303,7 @@ def still_detected(
 
 
 def findings(alerts: Iterable[Alert]) -> tuple[Alert, ...]:
-    """Alerts but for trials of the hooks, which say nothing of a hanger."""
+    """Return alerts without trials of the hooks, which do not concern the hanger."""
     return tuple(each for each in alerts if each.kinds != ("test",))
 
 
@@ -451,7 +451,7 @@ def _off_limits(known: HangerSummary) -> Lead | None:
 
 
 def _tension(tension: Averaged | None) -> str:
-    """`654 ± 16 kN`, rounded by its interval."""
+    """Return `654 ± 16 kN`, rounded by its interval."""
     if tension is None:
         return "not known"
     interval = Interval.of_averaged(tension)

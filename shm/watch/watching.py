@@ -119,7 +119,9 @@ def kept_of(baseline: Posterior, tests: Sequence[DatedTest]) -> tuple[DatedTest,
     check = baseline.baseline_check
     if check is None:
         return tuple(tests)
-    return tuple((check.kept(test), at) for test, at in tests if not check.leaves_out(test.id))
+    return tuple(
+        (check.without_mistakes(test), at) for test, at in tests if not check.leaves_out(test.id)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +265,7 @@ def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ..
 
 def _news(standing: AlertState, test: WatchedTest, level: float) -> _News:
     call = test.change.called and not _is_known(standing, test.change)
-    drifts = test.told if call else test.drifts
+    drifts = test.published_drifts if call else test.drifts
     beyond = tuple(
         drift
         for drift in drifts

@@ -553,4 +553,4 @@ def test_of_a_called_change_all_tell_the_probability_that_its_alert_tells() -> N
     called, quiet = (
         replace(a_watched_test(evidence_years=years), drifts=faint) for years in (350.0, 1.0)
     )
-    assert [each.told[0].probability for each in (called, quiet)] == [0.7, 0.6]
+    assert [each.published_drifts[0].probability for each in (called, quiet)] == [0.7, 0.6]

@@ -31,7 +31,7 @@ def baseline(tests: int, seed: int = 0) -> list[ModalTest]:
 
 def told(tests: Sequence[ModalTest]) -> list[tuple[str, str, int]]:
     check = check_baseline(tests, MODEL)
-    kept = check.kept_of(tests)
+    kept = check.accepted_tests(tests)
     left = [len(before.modes) - len(after.modes) for before, after in zip(tests, kept, strict=True)]
     assert sum(left) == len(check.modes)
     return [(each.test, each.plane, each.order) for each in check.modes]
@@ -43,7 +43,7 @@ def test_mistakes_of_a_baseline_of_five_are_found_with_what_was_expected() -> No
     tests[3] = misnamed(tests[3], "longitudinal", 1)
 
     check = check_baseline(tests, MODEL)
-    kept, mistaken = check.kept_of(tests), check.modes
+    kept, mistaken = check.accepted_tests(tests), check.modes
 
     assert [(each.test, each.plane, each.order) for each in mistaken] == [
         ("t1", "transverse", 2),
@@ -190,7 +190,7 @@ def test_a_test_with_a_wrong_clock_is_left_out_as_a_whole_and_said(percent: floa
     said = float(str(check.tests[0]).split(" by ")[1].split()[0])
     assert said == pytest.approx(percent, abs=0.3)
     assert check.modes == ()
-    assert [test.id for test in check.kept_of(tests)] == ["t0", "t2", "t3", "t4"]
+    assert [test.id for test in check.accepted_tests(tests)] == ["t0", "t2", "t3", "t4"]
 
 
 def test_of_three_tests_none_is_left_out_as_a_whole() -> None:

@@ -74,7 +74,7 @@ _DESCRIPTION = (
 
 
 def load_pages(site: Site) -> Pages:
-    """All of the interface: pages, API and metrics."""
+    """Return all of the interface: pages, API and metrics."""
     watching_site = site.twin()  # so that a scrape need not wait for the pages' connections
     app = FastAPI(
         title="shm",

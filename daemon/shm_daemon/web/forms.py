@@ -1,6 +1,4 @@
-"""The forms of pages: their fields, what a person must have written in them, and what follows: the
-next page, or the same once more with the reason why not.
-"""
+"""Define the forms of pages, check what is entered, and answer with the next page or the reason."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class Exposition(Collector):
         self._said: dict[str, str] = {}
 
     def page(self) -> bytes:
-        """In a registry of its own, as text of Prometheus."""
+        """Return the metrics of a separate registry as text of Prometheus."""
         registry = CollectorRegistry(auto_describe=False)
         registry.register(self)
         return generate_latest(registry)
@@ -233,10 +233,12 @@ def health(site: AtSite) -> Any:
         **answers(400, 401, 403),
     },
     summary="Metrics for Prometheus",
+    description=(
+        "Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out, "
+        "and\n`shm_scrape_errors_total` counts what could not be told."
+    ),
 )
 def metrics(request: Request, _: Reader) -> Response:
-    """Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out, and
-    `shm_scrape_errors_total` counts what could not be told.
-    """
+    """Return the metrics, computed from store and spool at each scrape."""
     exposition: Exposition = request.app.state.exposition
     return Response(exposition.page(), headers={"Content-Type": CONTENT_TYPE})

@@ -77,7 +77,7 @@ def baseline_page(
 def order_baseline(
     request: Request, site: AtSite, engineer: Engineer, hanger_id: HangerNumber, form: Form
 ) -> Response:
-    """Has it made beside the interface."""
+    """Start a new baseline in the background."""
     one = described(site.workspace, hanger_id)
     since, why, kind = time_in(form, "since"), reason_in(form, "a baseline"), form.get("kind", "")
     if since is None:

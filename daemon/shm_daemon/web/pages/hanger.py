@@ -1,6 +1,4 @@
-"""The page of one hanger: how it stands, how it went, what the model misses, its tests; its report
-as a file, and its results as a table.
-"""
+"""Show the page of a hanger: state, trend, model, tests; its report and its results as files."""
 
 from __future__ import annotations
 
@@ -83,7 +81,7 @@ class Chart:
 
 @router.get("/hangers/{hanger_id}")
 def hanger(request: Request, site: AtSite, _: Reader, view: View) -> HTMLResponse:
-    """Everything known of a hanger; its figures are fetched as they come into view."""
+    """Show a hanger; its figures are fetched as they come into view."""
     one, rows = view.hanger, lines_before(view, _LATEST_TESTS + 1)
     common: dict[str, Any] = {
         "name": formatting.hanger_name(one.id, one.name),
@@ -104,7 +102,7 @@ def hanger(request: Request, site: AtSite, _: Reader, view: View) -> HTMLRespons
 
 @router.get("/hangers/{hanger_id}/tests")
 def all_tests(request: Request, _: Reader, view: View, before: Before = None) -> HTMLResponse:
-    """All tests of a hanger, the newest first, some a page."""
+    """Return all tests of a hanger, the newest first, some a page."""
     one = view.hanger
     tests, older = paged(lines_before(view, _TESTS_A_PAGE + 1, before), _TESTS_A_PAGE)
     return page(
@@ -210,7 +208,7 @@ def report(
 
 @router.get("/hangers/{hanger_id}/results.csv")
 def results(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Response:
-    """Every test with its tension averaged over the model classes, in N, the oldest first."""
+    """Return every test with its tension averaged over the classes, in N, oldest first, as CSV."""
     hanger = described(site.workspace, hanger_id)
     _refuse_untested(site.store, hanger)
     text = io.StringIO()
@@ -252,5 +250,5 @@ def _row(point: TrendPoint) -> tuple[str, ...]:
 
 
 def _cell(value: float) -> str:
-    """Empty where it is not known."""
+    """Return a value for CSV; empty where unknown."""
     return f"{value:.6g}" if math.isfinite(value) else ""

@@ -131,7 +131,7 @@ def _is_changed(key: str, form: Mapping[str, str]) -> bool:
 
 
 def _value(key: str, form: Mapping[str, str]) -> float | str | None:
-    """None of what is given back; whether quiet hours are a span, `bridge.toml` itself checks."""
+    """Return a setting's new value, None for its default; `bridge.toml` checks quiet hours."""
     if form.get(f"back.{key}") is not None:
         return None
     if not key.endswith(QUIET_HOURS):

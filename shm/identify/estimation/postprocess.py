@@ -1,7 +1,7 @@
-"""What a finding must still pass once an identifier has made it.
+"""Check a finding after identification: windows, incoherence and sidebands.
 
-Of an exponential window, incoherence, and lines that something makes beside a mode by changing the
-size of its ringing: no modes.
+An exponential window's damping is removed; incoherent modes and lines that modulation of a mode's
+ringing makes are no modes.
 """
 
 from __future__ import annotations
@@ -23,15 +23,17 @@ from shm.values import FloatArray
 _LINES_AROUND = 4  # judgement: nine lines have a median that one bad line does not move
 
 
-def finished(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
-    """The finding without the window's damping and incoherent modes, with how frequencies depend on
-    the amplitude."""
+def postprocess(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
+    """Return the finding without window damping, incoherent modes and sidebands.
+
+    Frequencies have their dependence on amplitude.
+    """
     found = coherent_only(without_window(found, measurement), measurement, options)
     return _unsure_of_damping(with_amplitude_dependence(found, measurement), measurement)
 
 
 def _unsure_of_damping(found: Finding, measurement: Measurement) -> Finding:
-    """The finding with what an analyser's window may add to its damping as an uncertainty."""
+    """Return the finding with an analyser's possible window as uncertainty of the damping."""
     rate = recorded_window_rate(measurement)
     modes = tuple(
         replace(m, damping_sd=math.hypot(m.damping_sd, rate / (2 * math.pi * m.frequency_hz)))
@@ -41,7 +43,7 @@ def _unsure_of_damping(found: Finding, measurement: Measurement) -> Finding:
 
 
 def without_window(found: Finding, measurement: Measurement) -> Finding:
-    """The finding with the damping of an exponential window taken off its damping ratios."""
+    """Return the finding with the damping of an exponential window taken off its damping ratios."""
     rate = 1 / measurement.decay_time_constant_s
     modes, doubtful = (
         tuple(
@@ -54,10 +56,10 @@ def without_window(found: Finding, measurement: Measurement) -> Finding:
 
 
 def coherent_only(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
-    """The finding without modes at which the measured coherence is low.
+    """Return the finding without modes at which the measured coherence is low.
 
-    Only for decays made from frequency responses: after hits, coherence also falls where a hit came
-    before the last had rung down, which free decays do not mind.
+    Only for decays made from frequency responses: after hits, coherence also falls where a hit
+    came before the last had rung down, which free decays do not mind.
     """
     response = measurement.frequency_response
     if measurement.hits or response is None or response.coherence is None:
@@ -74,7 +76,7 @@ def coherent_only(found: Finding, measurement: Measurement, options: IdentifyOpt
 
 
 def _coherence(mode: FoundMode, frequency_hz: FloatArray, coherence: FloatArray) -> float:
-    """Median coherence over the points and the lines around a mode."""
+    """Return the median coherence over the points and the lines around a mode."""
     line = int(np.argmin(np.abs(frequency_hz - mode.frequency_hz)))
     near = coherence[:, max(0, line - _LINES_AROUND) : line + _LINES_AROUND + 1]
     return float(np.median(near))
@@ -85,22 +87,22 @@ _SIDEBAND_SHAPE = 0.98
 _SIDEBAND_RATE = 0.3
 """Of the mode's own rate of decay: a line of a tenth of its amplitude is known to about that."""
 _SIDEBAND_SHARE = 0.4  # of the mode's amplitude: half of what makes it fall to a fifth and rise
-_SIDEBANDS_ALIKE = 1.6  # judgement: of the amplitudes of two lines that modulation makes alike
+_MAX_SIDEBAND_RATIO = 1.6  # judgement: of the amplitudes of two lines that modulation makes alike
 _SIDEBAND_TOLERANCE = 0.1
 """Of the rate of decay, in rad/s: by so much of a line's width its middle may be off."""
 
 
 def without_sidebands(found: Finding) -> Finding:
-    """The finding without pairs of lines that are sidebands of a mode between them.
+    """Return the finding without pairs of lines that are sidebands of a mode between them.
 
-    A slow machine makes them by moving the size of the mode's ringing: exp(-s t) cos(w t) (1 + m
-    cos(v t)) is the mode and two lines at w - v and w + v with its shape and its rate of decay s,
-    and m/2 of its amplitude each. Two modes of a hanger that lie so about a third do not also decay
-    as it does and are not equally strong.
+    A slow machine makes them by modulating the mode's ringing: exp(-s t) cos(w t) (1 + m cos(v
+    t)) is the mode and two lines at w - v and w + v with its shape and its rate of decay s, and
+    m/2 of its amplitude each. Two modes of a hanger at such frequencies do not also decay at
+    its rate with equal strength.
     """
     lines: dict[int, FoundMode] = {}
     for carrier in found.modes:
-        for one, other in combinations(_weaker_beside(carrier, found.modes), 2):
+        for one, other in combinations(_weaker_neighbours(carrier, found.modes), 2):
             if _are_sidebands(carrier, one, other):
                 lines[id(one)] = lines[id(other)] = carrier
     dropped = tuple(
@@ -113,12 +115,12 @@ def without_sidebands(found: Finding) -> Finding:
         for mode in found.modes
         if id(mode) in lines
     )
-    kept = tuple(mode for mode in found.modes if id(mode) not in lines)
-    return replace(found, modes=kept, dropped=found.dropped + dropped)
+    modes = tuple(mode for mode in found.modes if id(mode) not in lines)
+    return replace(found, modes=modes, dropped=found.dropped + dropped)
 
 
-def _weaker_beside(carrier: FoundMode, modes: Sequence[FoundMode]) -> list[FoundMode]:
-    """Those of its shape and rate of decay that are near to it and weaker."""
+def _weaker_neighbours(carrier: FoundMode, modes: Sequence[FoundMode]) -> list[FoundMode]:
+    """Return weaker modes close to the carrier that share its shape and rate of decay."""
     rate = _decay_rate(carrier)
     return [
         mode
@@ -132,16 +134,16 @@ def _weaker_beside(carrier: FoundMode, modes: Sequence[FoundMode]) -> list[Found
 
 
 def _are_sidebands(carrier: FoundMode, one: FoundMode, other: FoundMode) -> bool:
-    """Whether the two lie evenly about the mode and are about equally strong."""
+    """Return whether the two are symmetric about the mode and about equally strong."""
     off_hz = abs(one.frequency_hz + other.frequency_hz - 2 * carrier.frequency_hz)
     sds = [mode.frequency_sd_hz for mode in (one, other, carrier, carrier)]
     hits_known = not any(math.isnan(mode.damping_sd) for mode in (one, other, carrier))
     scatter_hz = 3 * float(np.linalg.norm(sds)) if hits_known else 0.0
     tolerance_hz = max(scatter_hz, _SIDEBAND_TOLERANCE * _decay_rate(carrier) / (2 * math.pi))
     strong = sorted(mode.acceleration_m_s2 for mode in (one, other))
-    return off_hz < tolerance_hz and strong[1] < _SIDEBANDS_ALIKE * strong[0]
+    return off_hz < tolerance_hz and strong[1] < _MAX_SIDEBAND_RATIO * strong[0]
 
 
 def _decay_rate(mode: FoundMode) -> float:
-    """Of its decay, in rad/s."""
+    """Return the rate of the mode's decay in rad/s."""
     return 2 * math.pi * mode.frequency_hz * mode.damping_ratio

@@ -48,26 +48,26 @@ class Joined:
     notes: tuple[str, ...] = ()
 
 
-def joined(
+def join_set_ups(
     measurements: Sequence[Measurement], findings: Sequence[Finding], options: IdentifyOptions
 ) -> Joined:
-    """The modes of all set-ups over all points; those of a single one as they are.
+    """Join the modes of all set-ups over all points; those of a single one are unchanged.
 
-    Frequency and damping are pooled. A mode that one set-up alone has seen is kept if three hits
-    or more prove it there. Without a force, whatever is not seen by all set-ups is dropped: its
-    shape is not known at all points. Raises BadInput where set-ups cannot be joined.
+    Frequency and damping are pooled. A mode seen by one set-up only is accepted if three hits
+    or more validate it there. Without a force, modes that not all set-ups see are dropped:
+    their shape is not known at all points. Raises BadInput where set-ups cannot be joined.
     """
     if len(measurements) == 1:
         return _single(measurements[0], findings[0])
     groups = matched(measurements, [finding.modes for finding in findings])
-    kept, lost = _sorted_out(groups, len(measurements), bool(measurements[0].driven))
+    accepted, lost = _sorted_out(groups, len(measurements), bool(measurements[0].driven))
     dropped = _summed([d for finding in findings for d in finding.dropped]) + lost
     poles = _all_poles([finding.poles for finding in findings])
-    if not kept:
+    if not accepted:
         return Joined(measurements[0].points, Finding((), dropped, poles), ((),) * len(findings))
-    pools = [_pool(group, options.frequency_allowance) for group in kept]
-    apart = tuple(_as_seen(kept, pools, number) for number in range(len(measurements)))
-    points, modes = _over_all_points(measurements, pools, apart, kept)
+    pools = [_pool(group, options.frequency_allowance) for group in accepted]
+    apart = tuple(_as_seen(accepted, pools, number) for number in range(len(measurements)))
+    points, modes = _over_all_points(measurements, pools, apart, accepted)
     drifts = [finding.drift for finding in findings if finding.drift is not None]
     drift = max(drifts, key=lambda each: (each.sure, abs(each.change)), default=None)
     return Joined(
@@ -88,11 +88,14 @@ def _over_all_points(
     apart: Sequence[Sequence[FoundMode]],
     groups: Sequence[Sequence[Seen]],
 ) -> tuple[tuple[ResponsePoint, ...], tuple[FoundMode, ...]]:
-    """The pooled modes with their shapes over all points."""
+    """Return the pooled modes with their shapes over all points."""
     if measurements[0].driven:
-        seen = [[any(own.set_up == n for own in g) for g in groups] for n in range(len(apart))]
+        seen = [
+            [any(is_seen.set_up == n for is_seen in g) for g in groups] for n in range(len(apart))
+        ]
         rings = [
-            ringing(m, modes, own) for m, modes, own in zip(measurements, apart, seen, strict=True)
+            ringing(m, modes, is_seen)
+            for m, modes, is_seen in zip(measurements, apart, seen, strict=True)
         ]
         products = [of_hits(ring) for ring in rings]
         if _see_the_same(measurements):
@@ -106,9 +109,9 @@ def _over_all_points(
 
 
 def _see_the_same(measurements: Sequence[Measurement]) -> bool:
-    """Whether all set-ups have the same sensors, so that none needs the scale of another's."""
+    """Return whether all set-ups have equal sensors, so that none needs another's scale."""
     points = [[place_of(point) for point in m.points] for m in measurements]
-    return all(own == points[0] for own in points) and not hammer_roves(measurements)
+    return all(each == points[0] for each in points) and not hammer_roves(measurements)
 
 
 def _note(measurements: Sequence[Measurement]) -> str:
@@ -123,18 +126,18 @@ def _note(measurements: Sequence[Measurement]) -> str:
 def _sorted_out(
     groups: Sequence[list[Seen]], set_ups: int, hammered: bool
 ) -> tuple[list[list[Seen]], tuple[Dropped, ...]]:
-    kept, lost = [], []
+    accepted, lost = [], []
     for group in groups:
         reason = _doubt(group, set_ups, hammered)
         if reason:
             lost.append(Dropped(f"mode at {group[0].mode.frequency_hz:.4g} Hz", 1, reason))
         else:
-            kept.append(group)
-    return kept, tuple(lost)
+            accepted.append(group)
+    return accepted, tuple(lost)
 
 
 def _doubt(group: Sequence[Seen], set_ups: int, hammered: bool) -> str:
-    """Why a mode is not kept; empty where it is."""
+    """Return the reason why a mode is not accepted; empty where it is."""
     if not hammered and len(group) < set_ups:
         return "not seen in all set-ups, so its shape is not known at all points"
     if len(group) == 1 and math.isnan(group[0].mode.damping_sd):
@@ -143,15 +146,17 @@ def _doubt(group: Sequence[Seen], set_ups: int, hammered: bool) -> str:
 
 
 def _pool(group: Sequence[Seen], allowance: float) -> FoundMode:
-    """The mode with pooled frequency and damping, still without a shape."""
+    """Return the mode with pooled frequency and damping, still without a shape."""
     modes = [seen.mode for seen in group]
     damping_sds = np.array([mode.damping_sd for mode in modes])
     # Without a standard deviation of its damping, that of a mode's frequency is but a floor.
-    own = np.array([mode.frequency_sd_hz for mode in modes])
-    frequency, frequency_sd = pooled(
-        np.array([mode.frequency_hz for mode in modes]), np.where(np.isnan(damping_sds), NAN, own)
+    sds = np.array([mode.frequency_sd_hz for mode in modes])
+    frequency, frequency_sd = pool_estimates(
+        np.array([mode.frequency_hz for mode in modes]), np.where(np.isnan(damping_sds), NAN, sds)
     )
-    damping, damping_sd = pooled(np.array([mode.damping_ratio for mode in modes]), damping_sds)
+    damping, damping_sd = pool_estimates(
+        np.array([mode.damping_ratio for mode in modes]), damping_sds
+    )
     if math.isnan(frequency_sd):
         frequency_sd = FREQUENCY_FLOOR * frequency
     sd = math.hypot(frequency_sd, allowance * frequency)
@@ -162,7 +167,7 @@ def _pool(group: Sequence[Seen], allowance: float) -> FoundMode:
 def _as_seen(
     groups: Sequence[list[Seen]], pools: Sequence[FoundMode], number: int
 ) -> tuple[FoundMode, ...]:
-    """Each mode as the set-up of this number has it, or as all have where it did not see it."""
+    """Return each mode as this set-up has it, or as all have where it does not see it."""
     return tuple(
         next((seen.mode for seen in group if seen.set_up == number), pool)
         for group, pool in zip(groups, pools, strict=True)
@@ -194,15 +199,15 @@ def _all_poles(parts: Sequence[Poles]) -> Poles:
     )
 
 
-def pooled(values: FloatArray, sds: FloatArray) -> tuple[float, float]:
-    """Mean and standard deviation of `values` (set-ups,) with their own `sds`, NaN where unknown.
+def pool_estimates(values: FloatArray, sds: FloatArray) -> tuple[float, float]:
+    """Return mean and standard deviation of `values` (set-ups,) with `sds`, NaN where unknown.
 
     Random effects: what set-ups differ by (mounting of sensors, temperature) is estimated from
-    their scatter and added to the variance of each (DerSimonian and Laird 1986, eq. 6 to 9); its
-    share of the result is widened as Student's 95 % quantile is over the normal one. An unknown
-    standard deviation counts as the largest known one, and none as smaller than the median: from a
-    few hits it may be small by chance. Where none is known, three set-ups or more tell by their
-    scatter alone; the result of fewer is NaN.
+    their scatter and added to the variance of each (DerSimonian and Laird 1986, eq. 6 to 9);
+    its share of the result is widened as Student's 95 % quantile is over the normal one. An
+    unknown standard deviation counts as the largest known one, and none as smaller than the
+    median: from a few hits it may be small by chance. Where none is known, three set-ups or
+    more tell by their scatter alone; the result of fewer is NaN.
     """
     count = len(values)
     if count == 1:
@@ -210,18 +215,18 @@ def pooled(values: FloatArray, sds: FloatArray) -> tuple[float, float]:
     if np.all(np.isnan(sds)):
         scatter = float(np.std(values, ddof=1)) / np.sqrt(count) * widening(count - 1)
         return float(np.mean(values)), scatter if count >= LEAST_HITS else NAN
-    own = np.where(np.isnan(sds), np.nanmax(sds), sds) ** 2
-    own = np.maximum(own, max(float(np.nanmedian(sds**2)), np.finfo(float).tiny))
-    between = _between(values, own)
-    weights = 1 / (own + between)
-    alone = 1 / np.sum(1 / own)
+    variances = np.where(np.isnan(sds), np.nanmax(sds), sds) ** 2
+    variances = np.maximum(variances, max(float(np.nanmedian(sds**2)), np.finfo(float).tiny))
+    between = _between(values, variances)
+    weights = 1 / (variances + between)
+    alone = 1 / np.sum(1 / variances)
     variance = alone + (1 / np.sum(weights) - alone) * widening(count - 1) ** 2
     return float(values @ weights / np.sum(weights)), float(np.sqrt(variance))
 
 
-def _between(values: FloatArray, own: FloatArray) -> float:
-    """The variance between set-ups beyond their `own` variances (set-ups,)."""
-    weights = 1 / own
+def _between(values: FloatArray, variances: FloatArray) -> float:
+    """Return the variance between set-ups beyond their `variances` (set-ups,)."""
+    weights = 1 / variances
     total = np.sum(weights)
     excess = weights @ (values - values @ weights / total) ** 2 - (len(values) - 1)
     return max(0.0, float(excess / (total - np.sum(weights**2) / total)))
@@ -248,10 +253,11 @@ class Seen:
 def matched(
     measurements: Sequence[Measurement], found: Sequence[Sequence[FoundMode]]
 ) -> list[list[Seen]]:
-    """The modes of all set-ups in groups that are one mode each, by rising frequency.
+    """Return the modes of all set-ups in groups that are one mode each, by rising frequency.
 
-    Set-ups are taken from the one with most modes on; each of its modes joins the nearest group,
-    one to one, if its frequency and its shape on common points (else its direction) allow.
+    Set-ups are taken from the one with most modes on; each of its modes joins the nearest
+    group, one to one, if its frequency and its shape on common points (else its direction)
+    allow.
     """
     seen = [
         [Seen.of(index, mode, measurement) for mode in modes]
@@ -291,7 +297,7 @@ def _cost(group: Sequence[Seen], mode: Seen) -> float:
 
 
 def _likeness(one: Seen, other: Seen) -> float:
-    """MAC on common points; without, of the directions; 1 where nothing is common."""
+    """Return the MAC on common points; else of the directions; 1 where nothing is common."""
     common = sorted(one.shape.keys() & other.shape.keys(), key=str)
     shapes = [np.array([seen.shape[place] for place in common]) for seen in (one, other)]
     if all(_tells(part, seen.shape) for part, seen in zip(shapes, (one, other), strict=True)):
