@@ -18,6 +18,10 @@ from shm.pipeline.unheard import REMEDIES, backlog_leads, heard, ring_leads
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
+from shm.store.queries.hangers import list_selected_models
+from shm.store.queries.recordings import count_stages, list_holds, list_recordings, list_under_way
+from shm.store.queries.tests import count_tests
+from shm.store.queries.upkeep import find_last_backup, find_newest_step, list_copies, list_removed
 from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
 from shm_daemon.spool import is_sidecar, left_alone, never_taken, scan
 
@@ -157,14 +161,14 @@ def check_under_way(examined: Examined) -> Iterator[Finding]:
     unready = _without_baseline(examined)
     standing = [
         each
-        for each in store.recordings.list_under_way()
+        for each in list_under_way(store)
         if each.stage is Stage.RECEIVED or each.hanger not in unready
     ]
     if not standing:
         yield ok("recordings", "none is on its way")
         return
     oldest = min(standing, key=lambda each: each.since)
-    newest_at = store.upkeep.newest_row_at() or now
+    newest_at = find_newest_step(store) or now
     waits, idle = now - oldest.since, now - newest_at
     found = (
         f"{len(standing)} on their way; {oldest.file_name} (recording {oldest.id}) has been "
@@ -199,7 +203,7 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
 
 def check_held(examined: Examined) -> Iterator[Finding]:
     """Whether recordings wait for a person to decide."""
-    found = examined.store.recordings.list_holds()
+    found = list_holds(examined.store)
     if not found:
         yield ok("held", "nothing waits for you to decide")
         return
@@ -214,8 +218,8 @@ def check_held(examined: Examined) -> Iterator[Finding]:
 def check_raw_files(examined: Examined) -> Iterator[Finding]:
     """Whether the raw files of the latest recordings are where the store says."""
     store, archive = examined.store, examined.workspace.archive
-    latest = store.recordings.list_all()[-_LOOKED_AT:]
-    away = store.upkeep.removed_to()
+    latest = list_recordings(store)[-_LOOKED_AT:]
+    away = list_removed(store)
     missing = [r.file.file_name for r in latest if not archive.holds(r.file) and r.id not in away]
     if missing:
         yield fault(
@@ -232,8 +236,8 @@ def check_raw_files(examined: Examined) -> Iterator[Finding]:
 def _without_baseline(examined: Examined) -> set[int]:
     """Hangers whose tests rightly wait until there are enough of them for a baseline."""
     wanted = examined.workspace.settings.baseline_tests
-    selected = examined.store.posteriors.selected_models()
-    latest = examined.store.tests.latest().items()
+    selected = list_selected_models(examined.store)
+    latest = count_tests(examined.store).items()
     return {id_ for id_, found in latest if id_ not in selected and found.tests < wanted}
 
 
@@ -257,7 +261,7 @@ def check_store(examined: Examined) -> Iterator[Finding]:
             "Stop the daemon, then `shm db restore FILE --replace`.",
         )
     else:
-        held = sum(store.recordings.stage_counts().values())
+        held = sum(count_stages(store).values())
         kind = store.engine.dialect.name
         yield ok(
             "store", f"{store.location} ({kind}), present schema, {counted(held, 'recording')}"
@@ -267,7 +271,7 @@ def check_store(examined: Examined) -> Iterator[Finding]:
 def check_backup(examined: Examined) -> Iterator[Finding]:
     """How old the last backup is, and how many raw files have no copy."""
     store, now = examined.store, examined.now
-    last = store.upkeep.last_backup()
+    last = find_last_backup(store)
     remedy = "`shm db backup FILE --archive DIR`, best every night."
     if last is None:
         yield warning("backup", "never made here", remedy)
@@ -275,15 +279,15 @@ def check_backup(examined: Examined) -> Iterator[Finding]:
         found = f"{last[1]}, {told(now - last[0])} ago"
         late = now - last[0] > timedelta(days=examined.workspace.settings.backup_days)
         yield warning("backup", found, remedy) if late else ok("backup", found)
-    copied = {copy.recording_id for copy in store.upkeep.list_copies()}
-    alone = sum(recording.id not in copied for recording in store.recordings.list_all())
+    copied = {copy.recording_id for copy in list_copies(store)}
+    alone = sum(recording.id not in copied for recording in list_recordings(store))
     if last is not None and alone:
         yield warning("backup", f"raw files without a copy elsewhere: {alone}", remedy)
 
 
 def check_clock(examined: Examined) -> Iterator[Finding]:
     """Whether the clock has jumped back, and whether anything sets it."""
-    newest, now = examined.store.upkeep.newest_row_at(), examined.now
+    newest, now = find_newest_step(examined.store), examined.now
     if newest is not None and newest - now > _CLOCK_TOLERANCE:
         yield fault(
             "clock",
@@ -302,8 +306,8 @@ def check_clock(examined: Examined) -> Iterator[Finding]:
 def check_hangers(examined: Examined) -> Iterator[Finding]:
     """Which hangers have no test, none lately, or no baseline."""
     store, bridge = examined.store, examined.workspace.bridge
-    settings, latest = examined.workspace.settings, store.tests.latest()
-    selected = store.posteriors.selected_models()
+    settings, latest = examined.workspace.settings, count_tests(store)
+    selected = list_selected_models(store)
     ids = [hanger.id for hanger in bridge.hangers]
     never = [str(each) for each in ids if each not in latest]
     before = examined.now - timedelta(days=settings.quiet_days)

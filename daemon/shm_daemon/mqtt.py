@@ -30,6 +30,7 @@ from shm.pipeline import utc_now
 from shm.read import FORMATS
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
+from shm.store.queries.recordings import find_by_checksum
 from shm_daemon.spool import Landed, incoming, landing_name, lay_out
 from shm_daemon.streams import take_chunks
 from shm_daemon.web.site import Description
@@ -327,7 +328,7 @@ class Listener:
             self._client.ack(message.mid, qos=1)
 
     def _is_received(self, sha256: str) -> bool:
-        return self._opened().recordings.with_checksum(sha256) is not None
+        return find_by_checksum(self._opened(), sha256) is not None
 
     def _opened(self) -> Store:
         if self._store is None:

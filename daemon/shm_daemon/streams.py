@@ -36,6 +36,7 @@ from shm.read.chunk_document import BY_TIME, chunk_document
 from shm.read.sandbox import read_test
 from shm.store import Store, Workspace
 from shm.store.archive import checksum, refuse_oversize
+from shm.store.queries.streams import list_stream_events
 from shm.store.ring import Kept, ring_of
 from shm.values import Channel, FloatArray, Recording
 from shm.values.stream import Chunk, Stream, StreamEvent
@@ -67,7 +68,7 @@ def note_refused(store: Store, stream: str, error: BadInput, now: datetime) -> N
     """Once an hour: a logger that is set up wrong sends as wrong a chunk every few seconds."""
     log.warning("stream %s: refused: %s", stream, error)
     hour = now.replace(minute=0, second=0, microsecond=0)
-    known = store.streams.list_events(stream, hour)
+    known = list_stream_events(store, stream, hour)
     if all(event.kind != "refused" or event.start < hour for event in known):
         store.streams.save_event(StreamEvent(stream[:64], "refused", now, now, str(error)[:500]))
 

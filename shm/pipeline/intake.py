@@ -35,6 +35,7 @@ from shm.store.archive import (
     safe_name,
 )
 from shm.store.files import reason_document
+from shm.store.queries.history import list_events
 
 
 class Sharing:
@@ -213,7 +214,7 @@ def _set_aside(
     """Lays what is too large in the quarantine, unread: nobody knows its checksum."""
     reason = reason_document(name, None, error.message, error.remedy, at)
     lies = workspace.quarantine.move(path, name, reason, sidecar_path(path))
-    said = {event.message for event in store.journal.list_events("refused", file_name=name)}
+    said = {event.message for event in list_events(store, "refused", file_name=name)}
     if lies != path or error.message not in said:  # what stays is met at each start
         store.recordings.refuse_unread(name, error.message, at)
 

@@ -37,6 +37,8 @@ from shm.store import (
     Workspace,
     files,
 )
+from shm.store.queries.recordings import find_discard
+from shm.store.queries.tests import list_refused_of_baselines
 from shm.values import Hanger, Posterior
 
 IDENTIFY_SETTINGS = (
@@ -209,8 +211,8 @@ def discarded_of_baselines(store: Store) -> dict[int, tuple[str, ...]]:
     A day of a stream that was replaced by the complete day measured the same, of fewer hours.
     """
     found: dict[int, tuple[str, ...]] = {}
-    for hanger, name, recording_id in store.tests.refused_of_baselines():
-        why = store.recordings.discard_in_force(recording_id)
+    for hanger, name, recording_id in list_refused_of_baselines(store):
+        why = find_discard(store, recording_id)
         if why is None or why.who != SHM:
             found[hanger] = (*found.get(hanger, ()), name)
     return found

@@ -19,6 +19,7 @@ from shm.pipeline.lineage import update_terms
 from shm.pipeline.steps import checked, options_of
 from shm.pipeline.watching import dated_tests
 from shm.store import Baseline, Stage, Store, StoredAlert, StoredTest, Workspace
+from shm.store.queries.hangers import list_detected_changes
 from shm.values import Change, Hanger
 from shm.values.rounding import force_unit
 from shm.watch.readings import Reader
@@ -212,7 +213,7 @@ def changes_within(store: Store, hanger: int, since: datetime) -> tuple[Change, 
     times = [test.time for test in store.tests.list_all(hanger) if test.time >= since]
     return tuple(
         each
-        for each in store.watch.detected_changes().get(hanger, ())
+        for each in list_detected_changes(store).get(hanger, ())
         if times and min(times) <= each.began_after and max(times) >= each.began_by
     )
 

@@ -13,6 +13,8 @@ from shm.pipeline.reconcile import SHM
 from shm.read.atomic import replace_text
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX
+from shm.store.queries.streams import find_first_window, find_pooled_range, list_window_starts
+from shm.store.queries.tests import list_test_rows
 from shm.store.ring_files import PERIOD
 from shm.values import ModalTest, Posterior
 from shm.values.stream import PERIODS, Stream, period_start
@@ -53,8 +55,8 @@ class RestOfDays:
         if self.hurry or now >= max(self.came.setdefault(name, now), end) + _REST_COMES:
             return False
         if self.lacking.get(name) != day:
-            begin = max(day, store.streams.first_window(name) or day)
-            found = sum(start < end for start in store.streams.window_starts(name, begin))
+            begin = max(day, find_first_window(store, name) or day)
+            found = sum(start < end for start in list_window_starts(store, name, begin))
             if end - begin - found * PERIOD <= _MAY_LACK:
                 return False
             self.lacking[name] = day
@@ -68,7 +70,7 @@ def baseline_of(store: Store, stream: Stream) -> Posterior | None:
     found = store.watch.baseline(stream.hanger)
     if found is None:
         return None
-    pooled = store.streams.pooled_range(stream.name)
+    pooled = find_pooled_range(store, stream.name)
     if pooled is None:
         return found.posterior
     first = period_start(pooled[0], PERIODS["day"])
@@ -85,7 +87,7 @@ def hand_on_day(workspace: Workspace, store: Store, test: ModalTest, at: datetim
     """
     if test.hanger is None:
         return
-    for row in store.tests.list_rows(test.hanger):
+    for row in list_test_rows(store, test.hanger):
         if not row.name.startswith(test.id):
             continue
         if _hz(store.tests.get(row.id).test) == _hz(test):

@@ -19,6 +19,7 @@ from shm.store.blobs import unpack
 from shm.store.columns import Document, loads
 from shm.store.copying import TableContent, Tell, contents
 from shm.store.database import Database
+from shm.store.queries.upkeep import list_removed_names
 from shm.store.schema import changed_objects
 from shm.store.store import Store
 from shm.store.tables import fingerprints, posteriors, recordings, tests
@@ -179,7 +180,7 @@ _PACKED = {posteriors.c.samples, tests.c.frequency_response, fingerprints.c.shap
 
 def check_archive(store: Store, archive: Archive, tell: Tell) -> CheckedArchive:
     """Reads every raw file that the store refers to and compares it with its name, a SHA-256."""
-    referenced, removed = archived_names(store), store.upkeep.removed_names(archive)
+    referenced, removed = archived_names(store), list_removed_names(store, archive)
     names = [name for name in referenced if name not in removed]
     missing, damaged = [], []
     for number, name in enumerate(names, start=1):

@@ -25,7 +25,6 @@ from shm.store.rows import (
     Resolution,
     StoredAlert,
     StoredTest,
-    counts_by_name,
 )
 from shm.store.tables import alerts, deliveries, journal, tests
 from shm.values import Alert
@@ -298,11 +297,6 @@ class Deliveries(Repository):
             }
             connection.execute(sa.update(deliveries).where(again).values(**waits))
         return self._deliveries(_outbox.where(deliveries.c.id.in_(ids)).order_by(deliveries.c.id))
-
-    def delivery_counts(self) -> dict[str, int]:
-        """How many deliveries stand in each state; see `counts_by_name`."""
-        query = sa.select(deliveries.c.state, sa.func.count()).group_by(deliveries.c.state)
-        return counts_by_name(DeliveryState, self.rows(query))
 
     def _end(self, delivery: Delivery, state: DeliveryState, error: str, at: datetime) -> None:
         with self.writing() as connection:

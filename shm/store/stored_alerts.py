@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from datetime import datetime
-from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Row
@@ -16,7 +15,6 @@ from sqlalchemy.engine import Row
 from shm.errors import NothingThere, UsageError
 from shm.store.database import Repository, insert
 from shm.store.journal import note
-from shm.store.list_rows import EventKind, HangerEvent
 from shm.store.outbox import (
     Deliveries,
     acknowledge,
@@ -27,16 +25,7 @@ from shm.store.outbox import (
     stored_alerts,
 )
 from shm.store.rows import Acknowledgement, Reconciled, Silence, StoredAlert
-from shm.store.tables import (
-    adoptions,
-    alerts,
-    baselines,
-    silences,
-)
-
-_is_open = alerts.c.noted_at.is_(None) & alerts.c.ended_at.is_(None)
-"""What `StoredAlert.is_open` says."""
-_closed_at = sa.func.coalesce(alerts.c.noted_at, alerts.c.ended_at)
+from shm.store.tables import alerts, silences
 
 
 class Alerts(Deliveries):
@@ -61,31 +50,6 @@ class Alerts(Deliveries):
         if baseline_id is not None:
             query = query.where(alerts.c.baseline_id == baseline_id)
         return tuple(stored_alert(row) for row in self.rows(query))
-
-    def list_page(
-        self,
-        hanger: int | None = None,
-        *,
-        is_open: bool | None = None,
-        limit: int | None = None,
-        before: int | None = None,
-    ) -> tuple[StoredAlert, ...]:
-        """Alerts, the newest first; `before` is the number of the alert to go on after.
-
-        Only those that are open, or that are acknowledged or resolved, where `is_open` tells; the
-        latter come in the order in which they were, the latest first.
-        """
-        query = stored_alerts
-        if is_open is False:
-            query = query.order_by(_closed_at.desc())
-        query = query.order_by(alerts.c.id.desc())
-        if hanger is not None:
-            query = query.where(alerts.c.hanger == hanger)
-        if is_open is not None:
-            query = query.where(_is_open if is_open else sa.not_(_is_open))
-        if before is not None:
-            query = query.where(_is_after(before, is_open=is_open))
-        return tuple(stored_alert(row) for row in self.rows(query.limit(limit)))
 
     def get(self, alert_id: int) -> StoredAlert:
         """Return one alert; raise NothingThere."""
@@ -130,71 +94,6 @@ class Alerts(Deliveries):
             acknowledge(connection, alert_id, who, why, at)
             note(connection, at, "alert acknowledged", _said_of(alert), why, who)
         return replace(alert, acknowledgement=Acknowledgement(alert_id, who, why, at))
-
-    def counts(self) -> tuple[int, int]:
-        """How many alerts are open, and how many were acknowledged."""
-        noted = self.scalar(sa.select(sa.func.count(alerts.c.noted_at)))
-        return sum(self.open_counts().values()), int(noted or 0)
-
-    def open_counts(self) -> dict[int, int]:
-        """How many alerts of each hanger are open; hangers without any are left out.
-
-        The only place where they are counted: whoever states a number of them asks here.
-        """
-        query = sa.select(alerts.c.hanger, sa.func.count())
-        rows = self.rows(query.where(_is_open).group_by(alerts.c.hanger))
-        return {row[0]: int(row[1]) for row in rows}
-
-    def list_hanger_events(
-        self, hanger: int, since: datetime | None = None
-    ) -> tuple[HangerEvent, ...]:
-        """What happened to a hanger beside its tests, by time."""
-        with self.reading() as connection:
-            found = [
-                HangerEvent(row.at, kind, row.who or "", row.why or "", row.id)
-                for kind, query in _events(hanger).items()
-                for row in connection.execute(query)
-            ]
-        late = (event for event in found if since is None or event.at >= since)
-        return tuple(sorted(late, key=lambda event: event.at))
-
-
-def _is_after(alert_id: int, *, is_open: bool | None) -> sa.ColumnElement[bool]:
-    """Which alerts stand after one in a list of `list_page`."""
-    older = alerts.c.id < alert_id
-    if is_open is not False:
-        return older
-    one = alerts.alias()
-    closed_at = sa.func.coalesce(one.c.noted_at, one.c.ended_at)
-    of_one = sa.select(closed_at).where(one.c.id == alert_id).scalar_subquery()
-    return (_closed_at < of_one) | ((_closed_at == of_one) & older)
-
-
-def _events(hanger: int) -> dict[EventKind, sa.Select[Any]]:
-    noted = _named(alerts, "noted_at", "noted_who", "noted_why")
-    undone = _named(adoptions, "undone_at", "undone_who", "undone_why")
-    raised = sa.select(
-        alerts.c.id,
-        alerts.c.time.label("at"),
-        sa.null().label("who"),
-        alerts.c.message.label("why"),
-    )
-    return {
-        EventKind.BASELINE: _of(hanger, baselines, _named(baselines, "set_at", "who", "why")),
-        EventKind.ADOPTED: _of(hanger, adoptions, _named(adoptions, "adopted_at", "who", "why")),
-        EventKind.UNDONE: _of(hanger, adoptions, undone.where(adoptions.c.undone_at.is_not(None))),
-        EventKind.ALERT: _of(hanger, alerts, raised),
-        EventKind.ACKNOWLEDGED: _of(hanger, alerts, noted.where(alerts.c.noted_at.is_not(None))),
-    }
-
-
-def _of(hanger: int, table: sa.Table, query: sa.Select[Any]) -> sa.Select[Any]:
-    return query.where(table.c.hanger == hanger).order_by(table.c.id)
-
-
-def _named(table: sa.Table, at: str, who: str, why: str) -> sa.Select[Any]:
-    named = {"at": at, "who": who, "why": why}
-    return sa.select(table.c.id, *(table.c[name].label(label) for label, name in named.items()))
 
 
 def _said_of(stored: StoredAlert) -> str:

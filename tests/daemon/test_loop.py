@@ -19,6 +19,8 @@ from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
 from shm.store import Archive, Delivery, DeliveryState, Stage, Workspace
 from shm.store.checking import check_store
+from shm.store.queries.history import list_events
+from shm.store.queries.recordings import count_stages
 from shm.store.stored_recordings import Recordings
 from shm_cli import main as cli
 from shm_daemon import Wakeup, loop, run
@@ -68,7 +70,7 @@ def run_once(workspace: Workspace, **options: object) -> None:
 
 def counts(workspace: Workspace) -> dict[Stage, int]:
     with workspace.store() as store:
-        return {stage: count for stage, count in store.recordings.stage_counts().items() if count}
+        return {stage: count for stage, count in count_stages(store).items() if count}
 
 
 def deliveries(workspace: Workspace) -> tuple[Delivery, ...]:
@@ -149,7 +151,7 @@ def test_no_name_of_a_file_holds_up_the_others(
     assert why_turn_failed(workspace) == ""
     with workspace.store() as store:
         assert check_store(store, lambda *_: None).troubles == ()
-        names = [event.file_name for event in store.journal.list_events("refused")]
+        names = [event.file_name for event in list_events(store, "refused")]
     assert len(names) == len(_ODD_NAMES)
     assert all(name.isprintable() and len(name) <= 200 for name in names)
 

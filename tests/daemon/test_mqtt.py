@@ -16,6 +16,7 @@ from shm.errors import BadInput
 from shm.pipeline import utc_now
 from shm.pipeline.intake import receive
 from shm.store import Outcome, Workspace
+from shm.store.queries.history import list_events
 from shm_daemon.mqtt import Broker as Address
 from shm_daemon.mqtt import Listener, messages, topic_of
 from shm_daemon.spool import scan
@@ -115,7 +116,7 @@ def test_what_was_received_but_not_acknowledged_is_not_taken_twice(
         time.sleep(0.5)
         assert (spooled(bridge), second.waiting) == ([], [])
     with bridge.store() as store:
-        assert store.journal.list_events() == ()
+        assert list_events(store) == ()
 
 
 @pytest.mark.slow

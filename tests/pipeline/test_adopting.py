@@ -17,6 +17,7 @@ from shm.pipeline import adopting, steps
 from shm.pipeline.adopting import GapWatch, Wish, adopt, adopted_name, gap_watch
 from shm.pipeline.reporting import hanger_report
 from shm.store import Adoption, Lineage, Store, StoredAdoption, Workspace
+from shm.store.queries.trends import list_history, list_posteriors
 from shm.values import ModalTest, Posterior, PredictedFrequency
 from tests.helpers import quick_update
 from tests.helpers.diagnoses import MASS, WARMTH, a_diagnosis
@@ -75,7 +76,7 @@ def adopted(workspace: Workspace, *effects: str, at: Sequence[str] = ()) -> Stor
 
 
 def models(store: Store) -> dict[str, str]:
-    return {test.test.id: posterior.model for test, posterior in store.posteriors.history(3)}
+    return {test.test.id: posterior.model for test, posterior in list_history(store, 3)}
 
 
 def test_the_next_test_uses_the_adopted_class_and_its_baseline(begun: Workspace) -> None:
@@ -325,7 +326,7 @@ def test_each_effect_needs_its_place(begun: Workspace) -> None:
 def test_an_adoption_says_from_what_it_was_made(begun: Workspace) -> None:
     adopted(begun, "bending_stiffness", at=["everywhere"])
     with begun.store() as store:
-        posteriors = {each.posterior.model: each for each in store.posteriors.list_all(3)}
+        posteriors = {each.posterior.model: each for each in list_posteriors(store, 3)}
         test = store.tests.list_all(3)[0]
     assert posteriors.keys() == {STIFFNESS}
     lineage = posteriors[STIFFNESS].lineage

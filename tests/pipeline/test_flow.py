@@ -27,6 +27,10 @@ from shm.pipeline import Flow, steps
 from shm.read import Limits
 from shm.store import DeliveryState, Stage, Workspace
 from shm.store.archive import Quarantine
+from shm.store.queries.hangers import find_latest_watches, list_selected_models
+from shm.store.queries.history import list_events
+from shm.store.queries.recordings import count_deaths, list_recordings
+from shm.store.queries.trends import list_history, list_posteriors
 from shm.store.stored_tests import Tests
 from shm.values import AddedMass, ModalTest, Posterior
 from tests.helpers import quick_update
@@ -48,9 +52,7 @@ def spool(workspace: Workspace, name: str, **values: float) -> None:
 
 def stages(workspace: Workspace) -> dict[str, Stage]:
     with workspace.store() as store:
-        return {
-            recording.file.file_name: recording.stage for recording in store.recordings.list_all()
-        }
+        return {recording.file.file_name: recording.stage for recording in list_recordings(store)}
 
 
 @pytest.mark.usefixtures("real_sampler")
@@ -160,7 +162,7 @@ def test_each_hanger_has_its_own_baseline_and_selected_class(tmp_path: Path) -> 
     spool(workspace, "four", hanger=4, tension=0.9)
     ingest(workspace)
     with workspace.store() as store:
-        assert set(store.posteriors.selected_models()) == {3, 4}
+        assert set(list_selected_models(store)) == {3, 4}
         for hanger in (3, 4):
             selection = store.posteriors.selection(hanger)
             assert selection is not None
@@ -287,7 +289,7 @@ def test_the_same_file_twice_is_one_recording_and_leaves_the_spool(workspace: Wo
     assert len(stages(workspace)) == 1
     with workspace.store() as store:
         assert len(store.tests.list_all()) == 1
-        assert [event.kind for event in store.journal.list_events()] == [
+        assert [event.kind for event in list_events(store)] == [
             "duplicate",
             "duplicate",
         ]
@@ -327,7 +329,7 @@ def test_results_do_not_depend_on_order_or_executor(tmp_path: Path) -> None:
                 if lanes == 1:
                     flow.drain()
             flow.drain()
-            history = flow.store.posteriors.history(3)
+            history = list_history(flow.store, 3)
             found.append({test.test.id: posterior.samples for test, posterior in history})
     assert found[0].keys() == found[1].keys() == {"0", "a", "b", "c"}
     for name, samples in found[0].items():
@@ -379,7 +381,7 @@ def test_a_fault_of_ours_refuses_the_file_and_the_rest_goes_on(
     assert any(record.exc_info for record in caplog.records)
     with workspace.store() as store:
         assert list(tension_kn(store)) == ["t1", "t3"]
-        (refused,) = store.recordings.list_all(Stage.REFUSED)
+        (refused,) = list_recordings(store, Stage.REFUSED)
         assert workspace.archive.holds(refused.file)
 
 
@@ -547,8 +549,8 @@ def test_a_recording_that_moves_on_is_no_suspect_any_more(workspace: Workspace) 
         drain_patiently(flow, clock)
         clock.pass_by(1.0)
         assert set(stages(workspace).values()) == {Stage.DONE}
-        assert flow.store.recordings.deaths() == {}
-        assert [event.kind for event in flow.store.journal.list_events()] == ["worker died"] * 4
+        assert count_deaths(flow.store) == {}
+        assert [event.kind for event in list_events(flow.store)] == ["worker died"] * 4
 
 
 def test_a_file_that_needs_more_memory_than_there_is_is_refused_and_says_so(
@@ -563,7 +565,7 @@ def test_a_file_that_needs_more_memory_than_there_is_is_refused_and_says_so(
     with a_flow(workspace, clock=clock) as flow:
         receive_all(flow)
         assert sum(drain_patiently(flow, clock)) < 60
-        (refused,) = flow.store.recordings.list_all(Stage.REFUSED)
+        (refused,) = list_recordings(flow.store, Stage.REFUSED)
     assert refused.reason is not None
     assert "needs more memory than one step is given" in refused.reason["message"]
 
@@ -740,7 +742,7 @@ def test_a_test_with_a_mass_beyond_the_hanger_is_refused_with_its_file(
     assert stages(workspace) == {"good.modes.json": Stage.DONE, "x.modes.json": Stage.REFUSED}
     with workspace.store() as store:
         assert [test.test.id for test in store.tests.list_all()] == ["good"]
-        (refused,) = store.recordings.list_all(Stage.REFUSED)
+        (refused,) = list_recordings(store, Stage.REFUSED)
         assert refused.reason is not None
         assert "heavy" in refused.reason["message"]
 
@@ -808,9 +810,7 @@ def test_a_result_says_from_what_and_how_it_was_made(
         spool(workspace, "t1")
         ingest(workspace)
         with workspace.store() as store:
-            found.append(
-                (store.tests.list_all(3)[0].lineage, store.posteriors.list_all(3)[0].lineage)
-            )
+            found.append((store.tests.list_all(3)[0].lineage, list_posteriors(store, 3)[0].lineage))
     (test, posterior), (other_test, other_posterior) = found
     assert (test.input_sha256 == other_test.input_sha256) is same_input
     assert (test.settings_sha256 == other_test.settings_sha256) is same_settings
@@ -843,5 +843,5 @@ def test_documents_that_cannot_be_read_stop_their_hanger_and_not_the_beginning(
         receive_all(flow)
         flow.drain()
         assert flow.store.tests.named(4, "h4-90").stage is Stage.WATCHED
-        assert flow.store.watch.latest([bridge.bridge.hanger(4)])[4].watched.test == "h4-90"
+        assert find_latest_watches(flow.store, [bridge.bridge.hanger(4)])[4].watched.test == "h4-90"
     assert "hanger 3 cannot be judged again" in caplog.text

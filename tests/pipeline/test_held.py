@@ -16,6 +16,15 @@ from shm.modes_document import modes_document
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Decision, Outcome, Stage, Store, StoredAlert, Workspace
 from shm.store.checking import check_store
+from shm.store.queries.history import list_former_tests
+from shm.store.queries.recordings import (
+    count_stages,
+    find_latest_hold,
+    find_oldest_waiting,
+    list_holds,
+)
+from shm.store.queries.tests import count_tests, list_test_rows, list_waiting_tests
+from shm.store.queries.trends import list_history, list_posteriors, list_trend
 from shm.values import ModalTest, Recording
 from tests.helpers.contents import quiet
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all
@@ -77,17 +86,17 @@ def test_two_tests_of_1970_with_a_loss_tell_of_it(held: Workspace) -> None:
 def test_what_is_held_counts_in_nothing(held: Workspace) -> None:
     with held.store() as store:
         assert counted(store) == ["good"]
-        assert store.recordings.stage_counts()[Stage.HELD] == 1
+        assert count_stages(store)[Stage.HELD] == 1
         assert store.watch.list_drifts(3) == ()
-        assert [test.test.id for test, _ in store.posteriors.history(3)] == ["good"]
-        assert [row.name for row in store.tests.list_rows(3)] == ["good"]
-        assert store.tests.latest()[3].tests == 1
-        assert len(store.posteriors.trend(held.bridge.hanger(3))) == 1
-        assert store.recordings.oldest_waiting() is None
-        assert store.tests.list_waiting() == ()
+        assert [test.test.id for test, _ in list_history(store, 3)] == ["good"]
+        assert [row.name for row in list_test_rows(store, 3)] == ["good"]
+        assert count_tests(store)[3].tests == 1
+        assert len(list_trend(store, held.bridge.hanger(3))) == 1
+        assert find_oldest_waiting(store) is None
+        assert list_waiting_tests(store) == ()
         with pytest.raises(NothingThere):
             store.tests.named(3, "lost")
-        (hold,) = store.recordings.list_holds()
+        (hold,) = list_holds(store)
         assert (hold.recording_id, hold.hanger, hold.decision) == (2, 3, None)
         assert [doubt.check for doubt in hold.doubts] == ["clock before the bridge"]
 
@@ -97,7 +106,7 @@ def test_a_first_test_that_is_held_makes_no_baseline(workspace: Workspace) -> No
     ingest(workspace)
     with workspace.store() as store:
         assert store.watch.baseline(3) is None
-        assert store.recordings.stage_counts()[Stage.HELD] == 1
+        assert count_stages(store)[Stage.HELD] == 1
 
 
 def test_what_is_confirmed_counts_from_its_receipt_where_its_time_is_wrong(
@@ -114,7 +123,7 @@ def test_what_is_confirmed_counts_from_its_receipt_where_its_time_is_wrong(
         assert test.test.time is None
         assert "confirmed by Ann" in test.notes[-1]
         assert [drift.test for drift in flow.store.watch.list_drifts(3)] == ["lost"]
-        assert flow.store.recordings.list_holds() == ()
+        assert list_holds(flow.store) == ()
         (notice,) = alerts_but_notices(flow.store)
         assert notice.acknowledgement is not None
         assert notice.acknowledgement.who == "Ann"
@@ -128,7 +137,7 @@ def test_a_confirmed_test_has_the_time_that_a_person_gave_it(held: Workspace) ->
         flow.store.recordings.rerun(2, Stage.IDENTIFIED, flow.clock())
         flow.drain()
         assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
-        assert flow.store.recordings.stage_counts()[Stage.HELD] == 0
+        assert count_stages(flow.store)[Stage.HELD] == 0
         with pytest.raises(UsageError, match="not held: it was confirmed by Ann"):
             flow.store.recordings.accept(2, "Bob", "", flow.clock())
 
@@ -151,7 +160,7 @@ def test_what_is_discarded_ends_and_its_raw_file_stays(held: Workspace) -> None:
         assert "`shm ingest --confirm 2 --why TEXT`" in recording.reason["remedy"]
         assert held.archive.holds(recording.file)
         assert counted(flow.store) == ["good"]
-        assert flow.store.recordings.list_holds() == ()
+        assert list_holds(flow.store) == ()
 
 
 def test_what_was_discarded_and_comes_again_stays_discarded(held: Workspace) -> None:
@@ -227,11 +236,9 @@ def test_what_counts_is_taken_out_and_back_again(counting: Workspace) -> None:
         assert [watch.watched.test for watch in store.watch.list_all(3)] == ["t1", "t2", "t4"]
         assert [watch.watched.change.called for watch in store.watch.list_all(3)] == [False] * 3
         assert {drift.test for drift in store.watch.list_drifts(3)} == {"t1", "t2", "t4"}
-        assert [test.test.id for test, _ in store.posteriors.history(3)] == ["t0", "t1", "t2", "t4"]
+        assert [test.test.id for test, _ in list_history(store, 3)] == ["t0", "t1", "t2", "t4"]
         assert (
-            len(store.posteriors.list_all(3))
-            == len(store.posteriors.trend(counting.bridge.hanger(3)))
-            == 4
+            len(list_posteriors(store, 3)) == len(list_trend(store, counting.bridge.hanger(3))) == 4
         )
         with pytest.raises(NothingThere):
             store.posteriors.get(3, "t3")
@@ -261,7 +268,7 @@ def test_the_baseline_of_what_is_taken_out_is_told_of_and_its_posterior_not_show
         made = store.recordings.exclude(1, "Ann", "a part", START)
         assert (made.of_baseline, made.since, made.watched_again) == (("t0",), day(0), 4)
         assert store.watch.baseline(3) is not None
-        assert len(store.posteriors.list_all(3)) == 4
+        assert len(list_posteriors(store, 3)) == 4
 
 
 def test_one_test_of_a_campaign_is_taken_out_and_stays_out(workspace: Workspace) -> None:
@@ -294,7 +301,7 @@ def test_the_whole_counts_in_place_of_its_part(workspace: Workspace) -> None:
     write(whole, workspace.spool / "whole.npz")
     ingest(workspace)
     with a_flow(workspace) as flow:
-        (hold,) = flow.store.recordings.list_holds()
+        (hold,) = list_holds(flow.store)
         assert "it holds all of part.npz (recording 1), 67 % of its own samples" in hold.message
         assert (
             "`shm ingest --discard 1 --why TEXT`, then `shm ingest --confirm 2 --why TEXT`"
@@ -308,7 +315,7 @@ def test_the_whole_counts_in_place_of_its_part(workspace: Workspace) -> None:
         write(replace(whole, channels=tuple(cut[::-1])), workspace.spool / "again.npz")
         receive_all(flow)
         flow.drain()
-        (hold,) = flow.store.recordings.list_holds()
+        (hold,) = list_holds(flow.store)
         assert "a part of whole.npz (recording 2), 67 % of that one, sent again" in hold.message
 
 
@@ -337,7 +344,7 @@ def test_a_held_test_that_is_killed_on_the_way_is_told_of_once(workspace: Worksp
     for _ in range(3):  # each time a process of its own
         ingest(workspace)
     with workspace.store() as store:
-        assert len(store.alerts.list_all()) == len(store.recordings.list_holds()) == 1
+        assert len(store.alerts.list_all()) == len(list_holds(store)) == 1
 
 
 @pytest.mark.parametrize(
@@ -354,7 +361,7 @@ def test_a_time_that_cannot_be_is_held(workspace: Workspace, time: datetime, che
     spool(workspace, "first", time)
     ingest(workspace)
     with workspace.store() as store:
-        (hold,) = store.recordings.list_holds()
+        (hold,) = list_holds(store)
         assert [doubt.check for doubt in hold.doubts] == [check]
         assert hold.time_unknown
 
@@ -372,7 +379,7 @@ def test_what_may_be_passes(workspace: Workspace, time: datetime | None) -> None
     spool(workspace, "other", time)
     ingest(workspace)
     with workspace.store() as store:
-        assert store.recordings.stage_counts()[Stage.DONE] == 2
+        assert count_stages(store)[Stage.DONE] == 2
 
 
 def test_a_time_before_the_bridge_was_built_is_held(workspace: Workspace) -> None:
@@ -384,7 +391,7 @@ def test_a_time_before_the_bridge_was_built_is_held(workspace: Workspace) -> Non
     ingest(workspace.reopened())
     with workspace.store() as store:
         assert counted(store) == ["after"]
-        assert "The bridge was built on 1998-06-01." in store.recordings.list_holds()[0].message
+        assert "The bridge was built on 1998-06-01." in list_holds(store)[0].message
 
 
 def test_a_stuck_clock_is_held_and_a_mere_date_is_not(workspace: Workspace) -> None:
@@ -399,7 +406,7 @@ def test_a_stuck_clock_is_held_and_a_mere_date_is_not(workspace: Workspace) -> N
         ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["a", "c", "d"]
-        (hold,) = store.recordings.list_holds()
+        (hold,) = list_holds(store)
         assert [doubt.check for doubt in hold.doubts] == [
             "clock stuck",
             "clock before the baseline",
@@ -416,7 +423,7 @@ def test_a_loss_dated_before_the_baseline_is_held_and_an_old_test_is_not(
         ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["old", "a"]
-        (hold,) = store.recordings.list_holds()
+        (hold,) = list_holds(store)
         assert [doubt.check for doubt in hold.doubts] == ["clock before the baseline"]
 
 
@@ -428,14 +435,14 @@ def test_the_same_modes_at_the_same_time_are_a_copy(workspace: Workspace) -> Non
     ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["a"]
-        assert "copy" in [doubt.check for doubt in store.recordings.list_holds()[0].doubts]
+        assert "copy" in [doubt.check for doubt in list_holds(store)[0].doubts]
 
 
 def test_a_held_recording_that_is_done_again_waits_for_nobody_twice(held: Workspace) -> None:
     with a_flow(held) as flow:
         flow.store.recordings.rerun(2, Stage.IDENTIFIED, flow.clock())
         flow.drain()
-        assert len(flow.store.recordings.list_holds()) == 1
+        assert len(list_holds(flow.store)) == 1
         former, _ = flow.store.alerts.list_all()
         assert former.acknowledgement is not None
 
@@ -478,12 +485,12 @@ def test_one_impact_counts_once_in_whatever_format_it_comes_again(workspace: Wor
     ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["a", "e"]
-        assert [hold.file_name for hold in store.recordings.list_holds()] == [
+        assert [hold.file_name for hold in list_holds(store)] == [
             "b.uff",
             "c.csv",
             "d.h5",
         ]
-        for hold in store.recordings.list_holds():
+        for hold in list_holds(store):
             assert "copy" in [doubt.check for doubt in hold.doubts]
             assert "again" in hold.message
 
@@ -505,7 +512,7 @@ def test_a_corrected_sidecar_beside_the_same_bytes_is_taken(workspace: Workspace
         (after,) = flow.store.tests.list_all(3)
         assert after.time == before.time + timedelta(days=8)
         assert after.lineage.input_sha256 != before.lineage.input_sha256
-        former, _ = flow.store.tests.list_former(1)
+        former, _ = list_former_tests(flow.store, 1)
         assert former.superseded_at is not None
         assert list(workspace.spool.iterdir()) == []
 
@@ -528,12 +535,12 @@ def test_a_corrected_sidecar_ends_a_hold(workspace: Workspace) -> None:
     sidecar = (workspace.spool / "a.toml").read_text()
     ingest(workspace)
     with workspace.store() as store:
-        assert store.recordings.stage_counts()[Stage.HELD] == 1
+        assert count_stages(store)[Stage.HELD] == 1
     put(workspace.spool / "a.toml", sidecar.replace("1970-01-01", "2026-05-09"))
     put(workspace.spool / "a.uff", raw)
     ingest(workspace)
     with workspace.store() as store:
-        assert store.recordings.list_holds() == ()
+        assert list_holds(store) == ()
         assert store.recordings.get(1).stage is Stage.DONE
         (notice,) = store.alerts.list_all()
         assert notice.acknowledgement is not None
@@ -616,4 +623,4 @@ def test_a_copy_of_a_loss_confirms_no_loss(workspace: Workspace) -> None:
         assert "--confirm 3" in notice.message
         assert [test.test.id for test in store.tests.list_all(3)] == ["a", "b"]
         store.recordings.accept(3, "Ann", "another hit", day(61))
-        assert store.recordings.latest_hold(3).decision is Decision.CONFIRMED  # type: ignore[union-attr]
+        assert find_latest_hold(store, 3).decision is Decision.CONFIRMED  # type: ignore[union-attr]

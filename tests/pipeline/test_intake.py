@@ -12,6 +12,8 @@ from shm.errors import BadInput, ShmError
 from shm.pipeline import intake
 from shm.pipeline.intake import Sharing, receive
 from shm.store import Outcome, Receipt, Stage, Workspace
+from shm.store.queries.history import list_events
+from shm.store.queries.recordings import list_recordings
 from shm.store.stored_recordings import Recordings
 from tests.helpers.workspaces import START, put
 
@@ -122,8 +124,8 @@ def test_a_receipt_cut_short_anywhere_is_finished_by_the_next(
     assert files_in(workspace.spool) == []
     assert len(files_in(workspace.archive.folder)) == 2
     with workspace.store() as store:
-        assert len(store.recordings.list_all()) == 1
-        assert store.journal.list_events() == ()
+        assert len(list_recordings(store)) == 1
+        assert list_events(store) == ()
 
 
 def test_a_receipt_cut_short_between_the_two_removals_is_finished(
@@ -152,7 +154,7 @@ def test_a_file_that_vanishes_is_left_for_later(workspace: Workspace) -> None:
     with pytest.raises((ShmError, FileNotFoundError)):
         take(workspace, "gone.csv")
     with workspace.store() as store:
-        assert store.recordings.list_all() == ()
+        assert list_recordings(store) == ()
 
 
 def test_a_file_swapped_for_a_link_after_the_scan_sends_nothing_in(

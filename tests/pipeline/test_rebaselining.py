@@ -14,6 +14,7 @@ from shm.models import Model
 from shm.pipeline import rebaselining
 from shm.pipeline.rebaselining import Order, changes_within, rebaseline
 from shm.store import Baseline, Stage, Workspace
+from shm.store.queries.recordings import count_stages
 from shm.values import ModalTest, Posterior
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, a_flow, ingest, receive_all
@@ -102,7 +103,7 @@ def test_a_test_still_on_its_way_is_a_later_one(history: Workspace, hints: list[
     with a_flow(history, clock=Clock()) as flow:
         receive_all(flow)
     with history.store() as store:
-        assert store.recordings.stage_counts()[Stage.RECEIVED] == 1
+        assert count_stages(store)[Stage.RECEIVED] == 1
     assert anew(history, 31).posterior.tests == ("t31", "t32")
 
 

@@ -23,6 +23,7 @@ from shm.pipeline.unheard import (
 )
 from shm.read.chunk_document import chunk_document
 from shm.report.hanger_status import Status
+from shm.store.queries.streams import list_stream_events
 from shm.store.ring import ring_of
 from shm.values.stream import StreamEvent
 from tests.helpers.live_streams import send, with_live_streams
@@ -182,7 +183,7 @@ def test_a_thermometer_unlike_that_of_another_stream_is_noted(tmp_path: Path) ->
                     replace(reading, temperature_c=reading.temperature_c + off_k)
                 )
         compare_thermometers(workspace, store, NOW + 24 * HOUR)
-        told = {each.stream: each.detail for each in store.streams.list_events(None, NOW)}
+        told = {each.stream: each.detail for each in list_stream_events(store, None, NOW)}
     assert set(told) == {one, other}
     assert told[other].startswith("temperature_c is -8.0 K off that of another stream over a day")
 
@@ -198,7 +199,7 @@ def test_a_stream_of_noise_is_noted_by_its_windows_and_said_to_see_nothing(tmp_p
             )
         for n in (40, 41):
             note_blindness(store, STREAM, a_window(10 * n).window.start)
-        (event,) = store.streams.list_events("h3", NOW)
+        (event,) = list_stream_events(store, "h3", NOW)
         ring_of(workspace).append(chunk_document(a_chunk(0, event.end - timedelta(seconds=5))))
         (found,) = heard(workspace, store, event.end)
         assert found.state == "sees nothing"

@@ -20,6 +20,7 @@ from shm.store import (
     Store,
     StoredTest,
 )
+from shm.store.queries.trends import list_history, list_posteriors
 from shm.store.tables import baselines, posteriors
 from shm.values import Selection
 from tests.helpers.nouns import NOW, a_file, a_posterior, a_test, a_watched_test, an_alert
@@ -137,15 +138,15 @@ def test_what_was_compared_with_the_old_baseline_stays(
 def test_the_tests_of_a_baseline_set_anew_keep_their_own_posteriors(
     store: Store, watched: list[StoredTest]
 ) -> None:
-    before = [posterior.tests for _, posterior in store.posteriors.history(3)]
+    before = [posterior.tests for _, posterior in list_history(store, 3)]
     anew(store, watched[2:])
-    assert [posterior.tests for _, posterior in store.posteriors.history(3)] == before
+    assert [posterior.tests for _, posterior in list_history(store, 3)] == before
     assert (
         store.posteriors.get(3).tests
         == store.posteriors.get(3, watched[3].test.id).tests
         == ("t3",)
     )
-    assert len(store.posteriors.list_all(3)) == 4
+    assert len(list_posteriors(store, 3)) == 4
 
 
 def test_a_test_of_before_that_day_belongs_to_the_baseline_before(

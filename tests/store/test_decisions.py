@@ -10,6 +10,9 @@ import pytest
 from shm.errors import NothingThere, UsageError
 from shm.store import Stage, Store
 from shm.store.list_rows import Decision
+from shm.store.queries.history import list_changes
+from shm.store.queries.judging import list_decisions
+from shm.store.queries.recordings import find_discard, find_latest_hold, list_holds
 from tests.helpers.nouns import NOW, a_watched_test
 
 DAY = timedelta(days=1)
@@ -39,13 +42,13 @@ def counting(store: Store, hanger: int) -> list[str]:
 
 
 def test_what_waits_for_a_decision_is_listed_by_hanger(store: Store) -> None:
-    (hold,) = store.recordings.list_holds()
+    (hold,) = list_holds(store)
     assert (hold.recording_id, hold.decision) == (HELD, None)
     assert [(each.name, each.position) for each in hold.tests] == [("t6", 0)]
-    assert store.recordings.list_holds(3) == ()
-    assert store.recordings.latest_hold(HELD) == hold
-    assert store.recordings.latest_hold(1) is None
-    confirmed = store.recordings.latest_hold(CONFIRMED)
+    assert list_holds(store, 3) == ()
+    assert find_latest_hold(store, HELD) == hold
+    assert find_latest_hold(store, 1) is None
+    confirmed = find_latest_hold(store, CONFIRMED)
     assert confirmed is not None
     assert (confirmed.decision, confirmed.who, confirmed.why) == (
         Decision.CONFIRMED,
@@ -53,7 +56,7 @@ def test_what_waits_for_a_decision_is_listed_by_hanger(store: Store) -> None:
         "battery was flat",
     )
     assert (confirmed.is_in, confirmed.is_out) == (True, False)
-    assert store.recordings.discard_in_force(CONFIRMED) is None
+    assert find_discard(store, CONFIRMED) is None
 
 
 def test_a_held_test_that_is_confirmed_counts_at_the_time_that_is_given(store: Store) -> None:
@@ -62,7 +65,7 @@ def test_a_held_test_that_is_confirmed_counts_at_the_time_that_is_given(store: S
         Decision.CONFIRMED, "Ada", "it was there", NOW + DAY, LATER,
     )  # fmt: skip
     assert stage(store, HELD) == Stage.IDENTIFIED
-    assert store.recordings.list_holds() == ()
+    assert list_holds(store) == ()
     (test,) = [each for each in store.tests.list_all(5) if each.test.id == "t6"]
     assert test.test.time == test.time == NOW + DAY
     with pytest.raises(UsageError, match="is not held: it was confirmed by Ada"):
@@ -98,7 +101,7 @@ def test_what_counts_is_not_accepted(store: Store) -> None:
 
 def test_what_is_discarded_says_who_and_why_and_how_to_take_it_back(store: Store) -> None:
     hold = store.recordings.exclude(HELD, "Ada", "a copy", LATER).hold
-    assert hold == store.recordings.discard_in_force(HELD)
+    assert hold == find_discard(store, HELD)
     assert (hold.decision, hold.is_in, hold.is_out) == (Decision.DISCARDED, False, True)
     recording = store.recordings.get(HELD)
     assert recording.stage == Stage.REFUSED
@@ -106,10 +109,10 @@ def test_what_is_discarded_says_who_and_why_and_how_to_take_it_back(store: Store
     assert recording.reason["message"] == "discarded on 2026-05-21 by Ada, because: a copy."
     assert "shm ingest --confirm 6 --why TEXT" in recording.reason["remedy"]
     assert counting(store, 5) == ["t5"]
-    assert store.recordings.list_holds() == ()
-    assert store.recordings.decisions(HELD, None) == {0: hold}
-    assert store.recordings.decisions(HELD, "other.toml") == {}
-    assert store.recordings.decisions(WATCHED, None) == {}
+    assert list_holds(store) == ()
+    assert list_decisions(store, HELD, None) == {0: hold}
+    assert list_decisions(store, HELD, "other.toml") == {}
+    assert list_decisions(store, WATCHED, None) == {}
 
 
 def test_what_was_discarded_is_reinstated_as_it_would_have_been(store: Store) -> None:
@@ -121,7 +124,7 @@ def test_what_was_discarded_is_reinstated_as_it_would_have_been(store: Store) ->
     recording = store.recordings.get(HELD)
     assert (recording.stage, recording.reason) == (Stage.IDENTIFIED, None)
     assert counting(store, 5) == ["t6", "t5"]  # in the order of their times
-    assert store.recordings.discard_in_force(HELD) is None
+    assert find_discard(store, HELD) is None
     with pytest.raises(UsageError, match="nothing of recording 6 is held or discarded"):
         store.recordings.accept(HELD, "Ben", "", LATER)
     with pytest.raises(UsageError, match="nothing of recording 3 is held or discarded"):
@@ -159,7 +162,7 @@ def test_a_withdrawal_is_taken_back(store: Store) -> None:
     assert [each.name for each in hold.tests] == ["t2"]
     assert counting(store, 3) == ["t1", "t2", "t4"]
     assert stage(store, WATCHED) == Stage.IDENTIFIED
-    assert [each.decision for each in (hold, store.recordings.latest_hold(WATCHED)) if each] == [
+    assert [each.decision for each in (hold, find_latest_hold(store, WATCHED)) if each] == [
         Decision.REINSTATED
     ] * 2
 
@@ -176,7 +179,7 @@ def test_a_test_of_another_name_is_not_withdrawn(store: Store) -> None:
 def test_each_decision_is_noted_with_its_reason(store: Store) -> None:
     store.recordings.exclude(WATCHED, "Ada", "the wrong hanger", LATER)
     store.recordings.exclude(HELD, "Ada", "a copy", LATER)
-    newest = [(row.who, row.action, row.detail) for row in store.journal.list_changes(2)]
+    newest = [(row.who, row.action, row.detail) for row in list_changes(store, 2)]
     assert newest == [
         ("Ada", "recording discarded", "a copy"),
         ("Ada", "recording withdrawn", "t2: the wrong hanger"),

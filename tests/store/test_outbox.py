@@ -9,6 +9,8 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import DeliveryState, Reconciled, Store
+from shm.store.queries.alerts import count_alerts, count_deliveries
+from shm.store.queries.history import list_changes, list_steps
 from shm.store.rows import News
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import a_reading
@@ -59,7 +61,7 @@ def test_messages_keep_the_deliveries_that_they_were_made_of(file_store: Store) 
     ]  # fmt: skip
     alerts.save_delivery(alerts.list_deliveries(messages=[1])[0], NOW + 7 * HOUR)
     assert [each[2] for each in states(file_store)] == [DELIVERED, DELIVERED, NOT_NEEDED]
-    counts = {state: n for state, n in alerts.delivery_counts().items() if n}
+    counts = {state: n for state, n in count_deliveries(file_store).items() if n}
     assert counts == {DELIVERED: 2, NOT_NEEDED: 1}
 
 
@@ -137,8 +139,8 @@ def test_an_alert_that_was_acknowledged_keeps_who_did(file_store: Store) -> None
     ended = alerts.resolve(first, "Ben", "over", NOW + HOUR)
     assert ended.acknowledgement is not None
     assert (ended.acknowledgement.who, ended.acknowledgement.why) == ("Ada", "seen")
-    assert alerts.counts() == (0, 1)
-    noted = [(row.who, row.action, row.detail) for row in file_store.journal.list_changes()]
+    assert count_alerts(file_store) == (0, 1)
+    noted = [(row.who, row.action, row.detail) for row in list_changes(file_store)]
     assert noted == [("Ben", "alert resolved", "over"), ("Ada", "alert acknowledged", "seen")]
 
 
@@ -146,9 +148,9 @@ def test_a_test_is_through_when_no_hook_is_owed_its_alert(filled_copy: Store) ->
     """Once, however many hooks there are."""
     store = filled_copy
     (first,) = (e for e in store.alerts.list_deliveries() if e.stored.alert.test == "t2")
-    before = [step.stage for step in store.journal.list_steps(2)]
+    before = [step.stage for step in list_steps(store, 2)]
     store.alerts.save_delivery(first, NOW + HOUR)
-    after = [step.stage for step in store.journal.list_steps(2)]
+    after = [step.stage for step in list_steps(store, 2)]
     assert after == [*before, "notified"]
 
 
@@ -174,7 +176,7 @@ def test_a_changed_setting_holds_until_it_is_given_back(file_store: Store) -> No
     assert current["settings.samples"].is_of(4)
     settings.change("settings.samples", None, "Ada", NOW)
     assert list(settings.list_current()) == ["hanger.3.thresholds.alert_probability"]
-    told = [(row.subject, row.detail) for row in file_store.journal.list_changes(2)]
+    told = [(row.subject, row.detail) for row in list_changes(file_store, 2)]
     assert told == [
         ("settings samples", "from 2000 to not set, back to bridge.toml"),
         ("settings samples", "from 4000 to 2000"),

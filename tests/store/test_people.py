@@ -10,6 +10,7 @@ from shm.errors import NothingThere, UsageError
 from shm.store import Store
 from shm.store.journal import Actor, AuditRow
 from shm.store.people import SIGNED_IN_FOR, Role, Scope
+from shm.store.queries.history import list_changes
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
 SECOND, DAY = timedelta(seconds=1), timedelta(days=1)
@@ -30,7 +31,7 @@ def people(store: Store) -> Store:
 
 
 def said(store: Store) -> list[tuple[str, str, str, str]]:
-    rows = reversed(store.journal.list_changes())
+    rows = reversed(list_changes(store))
     return [(row.who, row.action, row.subject, row.detail) for row in rows]
 
 
@@ -147,10 +148,10 @@ def test_each_change_of_people_and_tokens_is_noted_as_the_actors(store: Store) -
         ("Ada", "token revoked", "token logger", ""),
         ("Ada", "file uploaded", "a.csv", "5 kB"),
     ]
-    newest, before = store.journal.list_changes(2)
+    newest, before = list_changes(store, 2)
     assert newest == AuditRow(newest.id, NOW, "Ada", "dashboard", "file uploaded", "a.csv", "5 kB")
-    assert store.journal.list_changes(1, newest.id) == (before,)
-    assert len(store.journal.list_changes(before=newest.id)) == 7
+    assert list_changes(store, 1, newest.id) == (before,)
+    assert len(list_changes(store, before=newest.id)) == 7
 
 
 def test_a_token_is_good_for_what_it_was_made_for_until_it_is_revoked(store: Store) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import Store
+from shm.store.queries.history import list_changes
 from shm.store.rows import Silence
 from shm.store.stored_alerts import silenced_until
 
@@ -36,7 +37,7 @@ def test_a_silence_is_kept_as_it_was_made_and_ended(file_store: Store) -> None:
     assert [ended.is_over(at) for at in (NOW, half)] == [False, True]
     assert [ended.is_in_force(at) for at in (NOW, half)] == [True, False]
     assert later.is_in_force(later.starts_at)
-    rows = file_store.journal.list_changes()
+    rows = list_changes(file_store)
     said = [(row.who, row.action, row.subject, row.detail) for row in rows]
     assert said == [
         ("Ben", "maintenance window ended", f"maintenance window {made.id}, hanger 3", ""),

@@ -18,6 +18,7 @@ from shm.store import (
     StoredAlert,
     StoredTest,
 )
+from shm.store.queries.history import list_steps
 from shm.values import Alert, Drift, Selection
 from tests.helpers.comparing import assert_same
 from tests.helpers.nouns import (
@@ -167,7 +168,7 @@ def test_a_delivery_that_two_have_made_is_ended_once(
     store.alerts.save_failure(owed, "no answer", NOW, NOW)
     (ended,) = store.alerts.list_deliveries()
     assert (ended.state, ended.attempts, ended.last_error) == (DeliveryState.DELIVERED, 1, "")
-    reached = [step.stage for step in store.journal.list_steps(updated[0].recording_id)]
+    reached = [step.stage for step in list_steps(store, updated[0].recording_id)]
     assert reached.count("notified") == 1
 
 

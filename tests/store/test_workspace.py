@@ -15,6 +15,7 @@ from shm.pipeline import utc_now
 from shm.resources import default_config
 from shm.settings import TABLE, load_settings
 from shm.store import Workspace
+from shm.store.queries.recordings import list_recordings
 
 
 def test_a_new_workspace_has_everything_and_opens(tmp_path: Path) -> None:
@@ -24,7 +25,7 @@ def test_a_new_workspace_has_everything_and_opens(tmp_path: Path) -> None:
     assert names == ["archive", "bridge.toml", "quarantine", "shm.db", "spool"]
     assert [hanger.id for hanger in workspace.bridge.hangers] == [3]
     with workspace.store() as store:
-        assert store.recordings.list_all() == ()
+        assert list_recordings(store) == ()
 
 
 def test_a_workspace_is_not_made_twice(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from sqlalchemy.engine import Connection, Row
 from shm.documents import posterior_document, value_of
 from shm.store.blobs import pack_samples, posterior_from, test_from_document
 from shm.store.columns import loads
-from shm.store.database import insert
+from shm.store.database import Repository, insert
 from shm.store.files import counts, in_force
 from shm.store.list_rows import TestRow
 from shm.store.rows import DESCRIBED, Baseline, Lineage, Stage, StoredSelection, StoredTest
@@ -99,6 +99,12 @@ def compared_with(baseline: Baseline, *, or_of_works: bool = False) -> list[sa.C
 def read_tests(connection: Connection, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
     """The tests of a query on `plain_tests`."""
     return tuple(_test(row) for row in connection.execute(query))
+
+
+def load_tests(store: Repository, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
+    """Read the tests of a query on `plain_tests`."""
+    with store.reading() as connection:
+        return read_tests(connection, query)
 
 
 def _test(row: Row[Any]) -> StoredTest:
