@@ -12,8 +12,8 @@ from math import isclose, isfinite, isnan
 
 from shm.pipeline.reconcile import SHM, Condition, reconcile
 from shm.store import Store, StoredAlert, Workspace
-from shm.store.list_rows import TrendPoint
 from shm.store.queries.trends import find_latest_trends, list_trend
+from shm.store.rows import TrendPoint
 from shm.values import Alert, AlertKind, Averaged, CrossedLimit, Hanger
 
 _KIND: AlertKind = "limit"

@@ -25,7 +25,7 @@ from typing import Any, BinaryIO
 from shm.documents import dump
 from shm.errors import DISK_FULL, BadInput, ShmError, StoreError, TooLarge
 from shm.read import sidecar_path
-from shm.store.list_rows import ReceivedFile
+from shm.store.rows import ReceivedFile
 from shm.values import printable
 
 log = logging.getLogger(__name__)

@@ -29,10 +29,9 @@ from shm.store.holding import (
     taking_back,
 )
 from shm.store.journal import write
-from shm.store.list_rows import Decision, HeldTest, Hold, Rerun
 from shm.store.outbox import resolve
 from shm.store.rerun import of_baselines, rerun_recording, rerun_watched, supersede_results
-from shm.store.rows import Stage
+from shm.store.rows import Decision, HeldTest, Hold, Rerun, Stage
 from shm.store.selects import WEIGHED
 from shm.store.tables import alerts, recordings, tests, watches
 

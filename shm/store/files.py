@@ -20,8 +20,7 @@ from shm.store.archive import suffix_of
 from shm.store.blobs import pack_response
 from shm.store.columns import loads
 from shm.store.journal import RENAMED, write
-from shm.store.list_rows import ReceivedFile, StoredRecording
-from shm.store.rows import IdentifiedTest, Stage, StoredTest
+from shm.store.rows import IdentifiedTest, ReceivedFile, Stage, StoredRecording, StoredTest
 from shm.store.tables import journal, recordings, tests
 
 

@@ -18,9 +18,8 @@ from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.files import in_force, reason_document
 from shm.store.journal import REFUSED, write
-from shm.store.list_rows import Decision, HeldTest, Hold
 from shm.store.outbox import acknowledge, raise_alert, resolve
-from shm.store.rows import Stage, StoredAlert
+from shm.store.rows import Decision, HeldTest, Hold, Stage, StoredAlert
 from shm.store.tables import (
     alerts,
     fingerprints,

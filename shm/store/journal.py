@@ -13,8 +13,7 @@ from sqlalchemy.engine import Connection, Engine
 
 import shm
 from shm.store.database import Repository, insert
-from shm.store.list_rows import Decision, Outcome
-from shm.store.rows import Stage
+from shm.store.rows import Decision, Outcome, Stage
 from shm.store.tables import journal
 
 COMMAND_LINE = "command line"
@@ -53,19 +52,6 @@ class Actor:
 
     name: str
     via: str
-
-
-@dataclass(frozen=True)
-class AuditRow:
-    """One change: `who` did `action` on `subject` by `via`; `detail` is the reason or the value."""
-
-    id: int
-    at: datetime
-    who: str
-    via: str
-    action: str
-    subject: str
-    detail: str
 
 
 def write(

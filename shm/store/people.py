@@ -8,9 +8,7 @@ import re
 import secrets
 import unicodedata
 from collections.abc import Collection
-from dataclasses import dataclass
 from datetime import datetime, timedelta
-from enum import StrEnum
 from functools import cache
 from typing import Any
 
@@ -22,6 +20,7 @@ from shm.errors import NothingThere, UsageError
 from shm.store.database import Repository, insert
 from shm.store.journal import note
 from shm.store.people_and_stream_tables import sessions, users
+from shm.store.rows import Role, Scope, StoredToken, User
 from shm.store.tables import tokens
 
 SIGNED_IN_FOR = timedelta(days=30)  # judgement: a month; removing the user ends it at once
@@ -42,32 +41,6 @@ the empty pattern of Braille."""
 _CHINESE = {"CJK", "IDEOGRAPHIC"}
 _TOGETHER = (_CHINESE | {"HIRAGANA", "KATAKANA"}, _CHINESE | {"HANGUL"}, _CHINESE | {"BOPOMOFO"})
 """Scripts in which one name is written: Unicode technical standard 39, 5.2, but without Latin."""
-
-
-class Role(StrEnum):
-    """What a person may do; each may what the one before may."""
-
-    READER = "reader"
-    OPERATOR = "operator"
-    ENGINEER = "engineer"
-
-    def may(self, needed: Role) -> bool:
-        """Whether this role may do what `needed` may."""
-        order = list(Role)
-        return order.index(self) >= order.index(needed)
-
-
-@dataclass(frozen=True)
-class User:
-    """A person who may sign in, or once might."""
-
-    id: int
-    name: str
-    role: Role
-    made_at: datetime
-    removed_at: datetime | None = None
-    single_sign_on: bool = False
-    """Whether a provider alone lets in, which says who it is; else a password alone does."""
 
 
 class People(Repository):
@@ -293,25 +266,6 @@ def _checksum(secret: str) -> str:
 def _user(row: sa.Row[Any]) -> User:
     by_provider = row.password_hash == _NO_PASSWORD
     return User(row.id, row.name, Role(row.role), row.made_at, row.removed_at, by_provider)
-
-
-class Scope(StrEnum):
-    """What a token allows; one that may write may read."""
-
-    READ = "read"
-    WRITE = "write"
-
-
-@dataclass(frozen=True)
-class StoredToken:
-    """A token without its secret."""
-
-    id: int
-    name: str
-    scopes: frozenset[Scope]
-    created_at: datetime
-    revoked_at: datetime | None = None
-    last_used_at: datetime | None = None
 
 
 class Tokens(Repository):

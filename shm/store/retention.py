@@ -19,10 +19,9 @@ from shm.read import sidecar_path
 from shm.store.archive import Archive, checksum, is_whole
 from shm.store.checking import file_troubles
 from shm.store.copying import Tell
-from shm.store.list_rows import StoredRecording
 from shm.store.queries.recordings import find_by_checksum, list_recordings
 from shm.store.queries.upkeep import list_copies
-from shm.store.rows import Stage
+from shm.store.rows import Stage, StoredRecording
 from shm.store.store import Store
 
 REASON_SUFFIX = ".reason.json"

@@ -14,8 +14,7 @@ from shm.store.blobs import pack_samples, posterior_from, test_from_document
 from shm.store.columns import loads
 from shm.store.database import Repository, insert
 from shm.store.files import counts, in_force
-from shm.store.list_rows import TestRow
-from shm.store.rows import DESCRIBED, Baseline, Lineage, Stage, StoredSelection, StoredTest
+from shm.store.rows import DESCRIBED, Baseline, Lineage, Stage, StoredSelection, StoredTest, TestRow
 from shm.store.tables import (
     adoptions,
     baselines,

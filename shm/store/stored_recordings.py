@@ -22,9 +22,8 @@ from shm.store.files import (
 )
 from shm.store.holding import standing_discard
 from shm.store.journal import ARCHIVED, DIED, REFUSED, write
-from shm.store.list_rows import Outcome, Receipt, ReceivedFile, StoredRecording
 from shm.store.rerun import redescribe, reopen
-from shm.store.rows import Stage
+from shm.store.rows import Outcome, Receipt, ReceivedFile, Stage, StoredRecording
 from shm.store.tables import recordings, tests
 
 

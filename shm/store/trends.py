@@ -26,8 +26,7 @@ from shm.errors import UsageError
 from shm.store.columns import loads
 from shm.store.database import Repository
 from shm.store.files import in_force
-from shm.store.list_rows import BaselineGlance, Numbers, TrendPoint
-from shm.store.rows import DESCRIBED
+from shm.store.rows import DESCRIBED, BaselineGlance, Numbers, TrendPoint
 from shm.store.selects import (
     baselines_now,
     hidden,

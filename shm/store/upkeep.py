@@ -9,8 +9,8 @@ import sqlalchemy as sa
 
 from shm.store.archive import Archive
 from shm.store.journal import BACKUP, REMOVED, write
-from shm.store.list_rows import StoredRecording
 from shm.store.people import Tokens
+from shm.store.rows import StoredRecording
 from shm.store.tables import archive_copies, recordings
 
 

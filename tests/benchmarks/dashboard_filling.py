@@ -26,7 +26,7 @@ from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Archive, IdentifiedTest, Lineage, Outcome, Store, Workspace
 from shm.store.archive import Kept
 from shm.store.columns import Document
-from shm.store.people import Role
+from shm.store.rows import Role
 from shm.store.tables import alerts, metadata, recordings, summaries
 from shm.store.trends import key_of
 from shm.values import (

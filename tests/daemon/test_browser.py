@@ -23,8 +23,8 @@ from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
 from shm.store.journal import Actor
-from shm.store.people import Role
 from shm.store.queries.recordings import list_recordings
+from shm.store.rows import Role
 from shm_daemon.web.address import test_page as page_of
 from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.frame import FOR_ENGINEERS, NAVIGATION

@@ -12,8 +12,8 @@ from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.store import Scope, Workspace
 from shm.store.journal import Actor
-from shm.store.people import Role
 from shm.store.queries.history import list_changes
+from shm.store.rows import Role
 from shm_cli.main import run
 from tests.daemon.test_web_people import PASSWORD, UPLOAD, sign_in
 from tests.helpers.web_servers import Served, served

@@ -8,9 +8,10 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import Store
-from shm.store.journal import Actor, AuditRow
-from shm.store.people import SIGNED_IN_FOR, Role, Scope
+from shm.store.journal import Actor
+from shm.store.people import SIGNED_IN_FOR
 from shm.store.queries.history import list_changes
+from shm.store.rows import AuditRow, Role, Scope
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
 SECOND, DAY = timedelta(seconds=1), timedelta(days=1)

@@ -12,8 +12,8 @@ import pytest
 from shm.errors import NothingThere
 from shm.store import IdentifiedTest, Judged, Lineage, Stage, Store, StoredTest
 from shm.store.blobs import unpack
-from shm.store.queries.hangers import list_selected_models
 from shm.store.queries import judging
+from shm.store.queries.hangers import list_selected_models
 from shm.store.queries.judging import list_known_samples
 from shm.store.queries.tests import list_waiting_tests, load_frequency_response
 from shm.store.queries.trends import list_history, list_posteriors

@@ -29,10 +29,10 @@ from prometheus_client.registry import Collector
 from shm.pipeline import utc_now
 from shm.pipeline.stream_state import StreamCondition, stream_states
 from shm.store import Workspace
-from shm.store.list_rows import ON_THE_WAY
 from shm.store.queries.alerts import count_alerts, count_deliveries
 from shm.store.queries.recordings import count_stages, find_oldest_waiting, list_stage_seconds
 from shm.store.ring import ring_of
+from shm.store.rows import ON_THE_WAY
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader

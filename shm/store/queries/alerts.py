@@ -8,9 +8,8 @@ from typing import Any
 import sqlalchemy as sa
 
 from shm.store.database import Repository
-from shm.store.list_rows import EventKind, HangerEvent
 from shm.store.outbox import stored_alert, stored_alerts
-from shm.store.rows import DeliveryState, StoredAlert, counts_by_name
+from shm.store.rows import DeliveryState, EventKind, HangerEvent, StoredAlert, counts_by_name
 from shm.store.tables import adoptions, alerts, baselines, deliveries
 
 _is_open = alerts.c.noted_at.is_(None) & alerts.c.ended_at.is_(None)

@@ -14,8 +14,7 @@ from shm.store.blobs import change_in
 from shm.store.columns import Number, loads
 from shm.store.database import Repository
 from shm.store.files import in_force
-from shm.store.list_rows import BaselineGlance
-from shm.store.rows import StoredAdoption, StoredDiagnosis, StoredWatch
+from shm.store.rows import BaselineGlance, StoredAdoption, StoredDiagnosis, StoredWatch
 from shm.store.selects import among, baselines_now, lineage_from, selected_classes
 from shm.store.stored_posteriors import adoption_from
 from shm.store.stored_watch import load_watches

@@ -10,9 +10,17 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Row
 
 from shm.store.database import Repository
-from shm.store.journal import ACTIONS, AuditRow, is_event, is_step
-from shm.store.list_rows import Decision, Event, Outcome, Step
-from shm.store.rows import FormerPosterior, FormerTest, Stage
+from shm.store.journal import ACTIONS, is_event, is_step
+from shm.store.rows import (
+    AuditRow,
+    Decision,
+    Event,
+    FormerPosterior,
+    FormerTest,
+    Outcome,
+    Stage,
+    Step,
+)
 from shm.store.selects import lineage_from
 from shm.store.tables import journal, posterior_tests, posteriors, tests
 

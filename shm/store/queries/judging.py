@@ -11,8 +11,7 @@ from shm.store.database import Repository
 from shm.store.disposition import decided_with
 from shm.store.files import counts, in_force
 from shm.store.holding import fingerprint_from
-from shm.store.list_rows import Hold
-from shm.store.rows import Stage, StoredTest
+from shm.store.rows import Hold, Stage, StoredTest
 from shm.store.selects import load_tests, plain_tests
 from shm.store.tables import fingerprints, recordings, tests
 from shm.values import Fingerprint, KnownSamples

@@ -14,8 +14,16 @@ from shm.store.database import Repository
 from shm.store.files import by_checksum, by_former_names, by_id, in_force, recording_from
 from shm.store.holding import latest_hold, open_holds, standing_discard
 from shm.store.journal import DIED, is_step
-from shm.store.list_rows import ON_THE_WAY, Deaths, Hold, Standing, StoredRecording
-from shm.store.rows import ENDED, Stage, counts_by_name
+from shm.store.rows import (
+    ENDED,
+    ON_THE_WAY,
+    Deaths,
+    Hold,
+    Stage,
+    Standing,
+    StoredRecording,
+    counts_by_name,
+)
 from shm.store.stored_recordings import waits_at
 from shm.store.tables import journal, recordings, tests
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, TypeVar
 
@@ -21,6 +20,7 @@ from shm.store.people_and_stream_tables import (
     stream_watch_days,
     stream_windows,
 )
+from shm.store.rows import KeptStreamWatch
 from shm.store.stored_streams import EVENT_COLUMNS
 from shm.values import NAN, ShapePoint
 from shm.values.modes import Mode
@@ -185,14 +185,6 @@ def find_progress(store: Repository, stream: str) -> datetime | None:
         sa.select(progress.c.done_until).where(progress.c.stream == stream)
     )
     return found
-
-
-@dataclass(frozen=True)
-class KeptStreamWatch:
-    """State of the watch of a hanger's sensors, and up to when it has seen readings."""
-
-    time: datetime
-    content: bytes
 
 
 def _event(row: Row[Any]) -> StreamEvent:

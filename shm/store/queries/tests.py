@@ -9,8 +9,7 @@ import sqlalchemy as sa
 from shm.store.blobs import unpack_response
 from shm.store.database import Repository
 from shm.store.files import counts, in_force
-from shm.store.list_rows import LatestTest, TestRow
-from shm.store.rows import Baseline, Stage, StoredTest
+from shm.store.rows import Baseline, LatestTest, Stage, StoredTest, TestRow
 from shm.store.selects import baselines_now, load_tests, plain_tests, test_columns, test_row
 from shm.store.stored_tests import shown_tests
 from shm.store.tables import baselines, posterior_tests, recordings, tests

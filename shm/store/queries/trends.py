@@ -10,8 +10,7 @@ import sqlalchemy as sa
 
 from shm.store.database import Repository
 from shm.store.files import counts, in_force
-from shm.store.list_rows import TrendPoint
-from shm.store.rows import StoredPosterior, StoredTest
+from shm.store.rows import StoredPosterior, StoredTest, TrendPoint
 from shm.store.selects import counted_tests, lineage_from, posterior_of_row, read_tests
 from shm.store.stored_posteriors import posteriors_of
 from shm.store.tables import posterior_tests, posteriors, tests

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import datetime
 
 import sqlalchemy as sa
@@ -10,16 +9,8 @@ import sqlalchemy as sa
 from shm.store.archive import Archive
 from shm.store.database import Repository
 from shm.store.journal import BACKUP, REMOVED, is_step
+from shm.store.rows import ArchiveCopy
 from shm.store.tables import archive_copies, journal, recordings
-
-
-@dataclass(frozen=True)
-class ArchiveCopy:
-    """A recording whose file, and sidecar if it has one, were copied whole into a folder."""
-
-    recording_id: int
-    folder: str
-    at: datetime
 
 
 def list_copies(store: Repository) -> tuple[ArchiveCopy, ...]:

@@ -10,8 +10,7 @@ import sqlalchemy as sa
 
 from shm.store.database import Repository
 from shm.store.files import counts, in_force
-from shm.store.list_rows import TestRow
-from shm.store.rows import Baseline, KeptWatch, Stage, StoredTest
+from shm.store.rows import Baseline, KeptWatch, Stage, StoredTest, TestRow
 from shm.store.selects import (
     WEIGHED,
     compared_with,

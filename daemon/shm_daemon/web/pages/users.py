@@ -10,8 +10,8 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.report import formatting
 from shm.report.paper import Table
-from shm.store.people import Role
 from shm.store.queries.history import list_changes
+from shm.store.rows import Role
 from shm_daemon.web.access import AtSite, Engineer, with_passwords
 from shm_daemon.web.forms import Form, done_or_again
 from shm_daemon.web.frame import page
