@@ -231,11 +231,13 @@ class Streaming:
         starts = {each: period_start(changed, length) for each, length in PERIODS.items()}
         newest = load_stream_watch(self.store, stream.hanger)
         before = load_stream_watch(self.store, stream.hanger, starts["hour"])
-        if newest and before and starts["hour"] < newest.time:
+        if newest and before and starts["hour"] < newest.reading_time:
             content = gone_back(before.content, newest.content)
-            streams.go_back(stream.hanger, before.time, content)
-            starts["hour"] = before.time
-            self._settled[name] = max(newest.time, self._settled.get(name, newest.time))
+            streams.go_back(stream.hanger, before.reading_time, content)
+            starts["hour"] = before.reading_time
+            self._settled[name] = max(
+                newest.reading_time, self._settled.get(name, newest.reading_time)
+            )
         for period, start in starts.items():
             former = self._pooled.get((name, period), start)
             self._pooled[name, period] = min(former, start)

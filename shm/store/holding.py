@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import Any
@@ -18,6 +18,7 @@ from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.files import in_force, reason_document
 from shm.store.journal import REFUSED, write
+from shm.store.mapping import value_in
 from shm.store.outbox import acknowledge, raise_alert, resolve
 from shm.store.rows import Decision, HeldTest, Hold, Stage, StoredAlert
 from shm.store.tables import (
@@ -93,11 +94,6 @@ def fingerprint_from(row: Row[Any]) -> Fingerprint:
     """Return the stored fingerprint; older ones lack marks, or have arrays that nothing reads."""
     arrays = unpack(row.shapes)
     return Fingerprint(row.digest, **{name: arrays[name] for name in _ARRAYS if name in arrays})
-
-
-def held_tests_from(document: Mapping[str, Any]) -> tuple[HeldTest, ...]:
-    """The tests of a hold back from its document."""
-    return value_of(tuple[HeldTest, ...], document["tests"])
 
 
 def _keep_fingerprint(connection: Connection, recording_id: int, found: Fingerprint) -> None:
@@ -230,7 +226,7 @@ def confirmed_values(
         "document": test_document(test),
         "taken_at": time,
         "time": time or row.received_at,
-        "notes": [*loads(row.notes), time_note(hold, time, who)],
+        "notes": (*row.notes, time_note(hold, time, who)),
     }
 
 
@@ -263,18 +259,5 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
 
 def _hold(row: Row[Any]) -> Hold:
     document = loads(row.document)
-    return Hold(
-        id=row.id,
-        recording_id=row.recording_id,
-        file_name=row.file_name,
-        hanger=row.hanger,
-        held_at=row.held_at,
-        message=document["message"],
-        tests=held_tests_from(document),
-        sidecar_as=document["sidecar_as"],
-        decision=None if row.decision is None else Decision(row.decision),
-        decided_at=row.decided_at,
-        who=row.who or "",
-        why=row.why or "",
-        time=row.time,
-    )
+    tests = value_of(tuple[HeldTest, ...], document.pop("tests"))
+    return value_in(row, Hold, tests=tests, **document)

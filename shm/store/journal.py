@@ -13,7 +13,8 @@ from sqlalchemy.engine import Connection, Engine
 
 import shm
 from shm.store.database import Repository, insert
-from shm.store.rows import Decision, Outcome, Stage
+from shm.store.mapping import row_of
+from shm.store.rows import Decision, Entry, Outcome, Stage
 from shm.store.tables import journal
 
 COMMAND_LINE = "command line"
@@ -74,9 +75,9 @@ def write(
     if who is not None and actor is not None:
         detail = f"{detail} (for {who})".strip() if who and actor.name not in who else detail
         who, via = actor.name, actor.via
-    about = {"recording_id": recording_id, "test_id": test_id, "subject": subject}
-    by = {"who": who or None, "via": via, "version": shm.__version__}
-    insert(connection, journal, {"at": at, "kind": kind, "detail": detail, **about, **by})
+    by = who or None, via, shm.__version__
+    entry = Entry(at, kind, recording_id, test_id, subject, detail, *by)
+    insert(connection, journal, row_of(entry, journal))
 
 
 def note(

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from datetime import datetime, timedelta
-from functools import lru_cache
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import alert_document, value_of
+from shm.documents import alert_document
 from shm.errors import NothingThere, UsageError
-from shm.store.columns import loads
 from shm.store.database import Repository, insert
 from shm.store.journal import NOTIFIED, write
 from shm.store.rows import (
@@ -28,8 +26,6 @@ from shm.store.rows import (
 )
 from shm.store.tables import alerts, deliveries, journal, tests
 from shm.values import Alert
-
-_HELD = 1024  # technical: those that stand on a large bridge, of some kilobytes each
 
 stored_alerts = sa.select(alerts)
 
@@ -146,18 +142,12 @@ def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert and its acknowledgement, of a row of `stored_alerts`."""
     return StoredAlert(
         row.id,
-        alert_from(row.document),
+        row.document,
         row.raised_at,
         acknowledgement_of(row),
         resolution_of(row),
         row.baseline_id,
     )
-
-
-@lru_cache(_HELD)
-def alert_from(text: str) -> Alert:
-    """An alert as it was raised; those that stand are asked for again and again."""
-    return value_of(Alert, loads(text))
 
 
 def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
@@ -370,5 +360,4 @@ def _told_alerts(connection: Connection, test_id: int) -> int:
 
 def _delivery(row: Row[Any]) -> Delivery:
     owed = {name: getattr(row, f"owed_{name}") for name in _OWED}
-    as_named = {"state": DeliveryState(row.owed_state), "news": News(row.owed_news)}
-    return Delivery(stored=stored_alert(row), **{**owed, **as_named})
+    return Delivery(stored=stored_alert(row), **owed)

@@ -19,9 +19,9 @@ from sqlalchemy.engine import Connection, Row
 from shm.errors import NothingThere, UsageError
 from shm.store.database import Repository, insert
 from shm.store.journal import note
-from shm.store.people_and_stream_tables import sessions, users
+from shm.store.mapping import value_in
 from shm.store.rows import Role, Scope, StoredToken, User
-from shm.store.tables import tokens
+from shm.store.tables import sessions, tokens, users
 
 SIGNED_IN_FOR = timedelta(days=30)  # judgement: a month; removing the user ends it at once
 SESSION = "session_"
@@ -263,11 +263,6 @@ def _checksum(secret: str) -> str:
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _user(row: sa.Row[Any]) -> User:
-    by_provider = row.password_hash == _NO_PASSWORD
-    return User(row.id, row.name, Role(row.role), row.made_at, row.removed_at, by_provider)
-
-
 class Tokens(Repository):
     """The tokens of programs; a part of the repository of upkeep."""
 
@@ -289,13 +284,15 @@ class Tokens(Repository):
                     remedy=f"Take another name, or revoke it: `shm token revoke {name}`.",
                 )
             values = {"name": name, "token_sha256": _checksum(secret), "created_at": at}
-            insert(connection, tokens, {**values, "scopes": ",".join(scopes)})
+            insert(connection, tokens, {**values, "scopes": scopes})
             note(connection, at, "token made", f"token {name}", f"may {scope}")
         return secret
 
     def list_tokens(self) -> tuple[StoredToken, ...]:
         """All tokens, those revoked too, as they were made."""
-        return tuple(_token(row) for row in self.rows(sa.select(tokens).order_by(tokens.c.id)))
+        return tuple(
+            value_in(row, StoredToken) for row in self.rows(sa.select(tokens).order_by(tokens.c.id))
+        )
 
     def revoke_token(self, name: str, at: datetime) -> None:
         """Ends a token from now on; raises NothingThere where none of that name is in force."""
@@ -324,7 +321,7 @@ class Tokens(Repository):
             with self.writing() as connection:
                 noted = sa.update(tokens).where(tokens.c.id == found.id)
                 connection.execute(noted.values(last_used_at=at))
-        return _token(found)
+        return value_in(found, StoredToken)
 
 
 _valid_tokens = sa.select(tokens).where(tokens.c.revoked_at.is_(None))
@@ -338,6 +335,5 @@ def _matching(rows: Collection[Row[Any]], hashed: str) -> Row[Any] | None:
     return found
 
 
-def _token(row: Row[Any]) -> StoredToken:
-    scopes = frozenset(Scope(scope) for scope in row.scopes.split(","))
-    return StoredToken(row.id, row.name, scopes, row.created_at, row.revoked_at, row.last_used_at)
+def _user(row: Row[Any]) -> User:
+    return value_in(row, User, single_sign_on=row.password_hash == _NO_PASSWORD)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -95,7 +96,9 @@ class Lineage:
     input_sha256: str
     settings_sha256: str
     version: str
-    described: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
+    described: Mapping[str, Any] | None = field(
+        default=None, compare=False, repr=False, metadata={"stored": False}
+    )
 
     @classmethod
     def of(
@@ -751,7 +754,7 @@ class ArchiveCopy:
 class KeptStreamWatch:
     """State of the watch of a hanger's sensors, and up to when it has seen readings."""
 
-    time: datetime
+    reading_time: datetime
     content: bytes
 
 
@@ -766,3 +769,44 @@ class AuditRow:
     action: str
     subject: str
     detail: str
+
+
+@dataclass(frozen=True)
+class ChangedSetting:
+    """The value of a key of `bridge.toml` that holds instead of what the file says."""
+
+    key: str
+    value: float | str
+    at: datetime
+    who: str
+    id: int = 0
+
+    def __str__(self) -> str:
+        setting, by = self.key.replace(".", " "), f"{self.who} on {self.at:%Y-%m-%d}"
+        return f"{setting} = {said(self.value)} instead of what bridge.toml says, by {by}"
+
+    def is_of(self, hanger: int) -> bool:
+        """Whether it changes a hanger, or all of them."""
+        return self.key.startswith(("settings.", f"hanger.{hanger}."))
+
+
+def said(value: float | str | None) -> str:
+    """A value as people read it."""
+    if isinstance(value, str):
+        return value or "none"
+    return "not set" if value is None or math.isnan(value) else f"{value:.10g}"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What happened to what, when, by whom, by which way, why, and with which shm."""
+
+    at: datetime
+    kind: str
+    recording_id: int | None
+    test_id: int | None
+    subject: str
+    detail: str
+    who: str | None
+    via: str | None
+    version: str | None

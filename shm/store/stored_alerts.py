@@ -6,15 +6,15 @@ Silences and maintenance windows: who wants which hooks' messages held back, whe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from datetime import datetime
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Row
 
 from shm.errors import NothingThere, UsageError
-from shm.store.database import Repository, insert
+from shm.store.database import Repository
 from shm.store.journal import note
+from shm.store.mapping import insert_value, value_in
 from shm.store.outbox import (
     Deliveries,
     acknowledge,
@@ -100,9 +100,6 @@ def _said_of(stored: StoredAlert) -> str:
     return f"alert {stored.id}, hanger {stored.alert.hanger}"
 
 
-_COLUMNS = tuple(silences.c[field.name] for field in fields(Silence))
-
-
 class Silences(Repository):
     """Silences, made and ended by people."""
 
@@ -127,29 +124,21 @@ class Silences(Repository):
                 remedy="Give a later --until.",
             )
         made = Silence(0, hanger, starts_at, ends_at, is_maintenance, who, why, at)
-        values = {name: value for name, value in vars(made).items() if name != "id"}
         with self.writing() as connection:
-            number = insert(connection, silences, {**values, "ended_who": None})
-            found = replace(made, id=number)
-            told = f"{starts_at:%Y-%m-%d %H:%M} to {ends_at:%Y-%m-%d %H:%M} UTC"
-            note(
-                connection,
-                at,
-                f"{kind_of(found)} made",
-                f"{_silence_named(found)}, {told}",
-                why,
-                who,
-            )
-            return found
+            made = insert_value(connection, silences, made)
+            period_text = f"{starts_at:%Y-%m-%d %H:%M} to {ends_at:%Y-%m-%d %H:%M} UTC"
+            subject = f"{_silence_named(made)}, {period_text}"
+            note(connection, at, f"{kind_of(made)} made", subject, why, who)
+            return made
 
     def end(self, silence_id: int, who: str, at: datetime) -> Silence:
         """Ends a silence before its time; raises NothingThere, or UsageError where it is over."""
         with self.writing() as connection:
-            query = sa.select(*_COLUMNS).where(silences.c.id == silence_id)
+            query = sa.select(silences).where(silences.c.id == silence_id)
             row = connection.execute(query).one_or_none()
             if row is None:
                 raise NothingThere(f"no silence {silence_id}.", remedy="See `shm alerts silences`.")
-            found = _silence(row)
+            found = value_in(row, Silence)
             if found.until <= at or found.ended_at is not None:
                 raise UsageError(
                     f"silence {silence_id} is over.", remedy="See `shm alerts silences`."
@@ -162,7 +151,8 @@ class Silences(Repository):
 
     def list_all(self) -> tuple[Silence, ...]:
         """All that were ever made, the oldest first."""
-        return tuple(map(_silence, self.rows(sa.select(*_COLUMNS).order_by(silences.c.id))))
+        query = sa.select(silences).order_by(silences.c.id)
+        return tuple(value_in(row, Silence) for row in self.rows(query))
 
 
 def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> datetime | None:
@@ -197,8 +187,3 @@ def hangers_of(hanger: int | None) -> str:
 
 def _silence_named(silence: Silence) -> str:
     return f"{kind_of(silence)} {silence.id}, {hangers_of(silence.hanger)}"
-
-
-def _silence(row: Row[tuple[object, ...]]) -> Silence:
-    values = dict(row._mapping)
-    return Silence(**{**values, "ended_who": values["ended_who"] or ""})

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection, Row
+from sqlalchemy.engine import Connection
 
 from shm.diagnosis_document import diagnosis_document
 from shm.errors import NothingThere, StoreBusy, UsageError
 from shm.store.database import insert
 from shm.store.files import all_at, in_force, move
 from shm.store.journal import note
+from shm.store.mapping import row_of, value_in
 from shm.store.rows import (
     Adoption,
     Lineage,
@@ -45,7 +45,6 @@ from shm.store.tables import (
 from shm.store.trends import Trends
 from shm.values import Diagnosis, Posterior, Selection
 
-_ADOPTION = tuple(field.name for field in fields(Adoption))
 _in_force = adoptions.c.undone_at.is_(None)
 
 
@@ -158,7 +157,7 @@ class Posteriors(Trends):
                 ),
                 "adopted_at": at,
             }
-            id_ = insert(connection, adoptions, {**vars(adoption), **kept})
+            id_ = insert(connection, adoptions, row_of(adoption, adoptions) | kept)
             subject, who = f"hanger {hanger}, {model}", adoption.who
             note(connection, at, "class adopted", subject, adoption.why, who)
         return StoredAdoption(id_, adoption, at)
@@ -182,7 +181,7 @@ class Posteriors(Trends):
             connection.execute(changed.values(**undoing))
             subject = f"hanger {row.hanger}, {row.model}"
             note(connection, at, "adoption dropped", subject, why, who)
-            return adoption_from(connection.execute(by_id).one())
+            return value_in(connection.execute(by_id).one(), StoredAdoption)
 
 
 def _has(connection: Connection, hanger: int) -> bool:
@@ -230,14 +229,3 @@ def _entries(connection: Connection, selection_id: int) -> dict[str, int]:
     query = sa.select(posteriors.c.model, posteriors.c.id).join(selection_entries)
     rows = connection.execute(query.where(selection_entries.c.selection_id == selection_id))
     return {row.model: row.id for row in rows}
-
-
-def adoption_from(row: Row[Any]) -> StoredAdoption:
-    return StoredAdoption(
-        id=row.id,
-        adoption=Adoption(**{name: getattr(row, name) for name in _ADOPTION}),
-        adopted_at=row.adopted_at,
-        undone_at=row.undone_at,
-        undone_why=row.undone_why or "",
-        undone_who=row.undone_who or "",
-    )

@@ -12,8 +12,10 @@ from sqlalchemy.engine import Connection
 
 from shm.documents import compact
 from shm.store.database import Repository, insert
+from shm.store.mapping import row_of
 from shm.store.outbox import settle
-from shm.store.people_and_stream_tables import (
+from shm.store.rows import Reconciled, StoredAlert
+from shm.store.tables import (
     pooled_readings,
     stream_events,
     stream_progress,
@@ -21,7 +23,6 @@ from shm.store.people_and_stream_tables import (
     stream_watch_days,
     stream_windows,
 )
-from shm.store.rows import Reconciled, StoredAlert
 from shm.values import ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import (
@@ -38,7 +39,6 @@ HOURS_KEPT = timedelta(days=800)
 
 _DAYS_BACK = 10
 """States of the watch, a day apart: twice the default of `late_hours`. Judgement."""
-EVENT_COLUMNS = tuple(field.name for field in fields(StreamEvent))
 _NO_CHANGE = Reconciled()
 _T = TypeVar("_T", WindowReading, PooledReading)
 
@@ -95,8 +95,8 @@ class Streams(Repository):
 
     def save_event(self, event: StreamEvent) -> None:
         """Notes something once; what was noted already is not noted again."""
-        row = vars(event)
-        same = (stream_events.c[name] == row[name] for name in EVENT_COLUMNS)
+        row = row_of(event, stream_events)
+        same = (stream_events.c[name] == value for name, value in row.items())
         with self.writing() as connection:
             if connection.execute(sa.select(stream_events.c.id).where(*same)).first() is None:
                 insert(connection, stream_events, row)

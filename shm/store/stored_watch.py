@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
@@ -17,6 +17,7 @@ from shm.store.blobs import watch_document, watch_in
 from shm.store.database import Repository, insert
 from shm.store.files import all_at, in_force, move
 from shm.store.journal import note
+from shm.store.mapping import row_of, value_in
 from shm.store.outbox import acknowledge, resolve, settle
 from shm.store.rerun import rerun_watched
 from shm.store.rows import (
@@ -32,8 +33,6 @@ from shm.store.rows import (
 from shm.store.selects import baseline_in_force, insert_baseline, insert_posterior, read_baseline
 from shm.store.tables import alerts, drifts, tests, watch_states, watches
 from shm.values import NAN, Alert, Drift, Posterior, WatchedTest
-
-_DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")
 
 
 class Watch(Repository):
@@ -62,8 +61,9 @@ class Watch(Repository):
         with self.writing() as connection:
             if not all_at(connection, [test], Stage.UPDATED):
                 return ()
+            against = {"test_id": test.id, "baseline_id": baseline.id}
             for drift in found.drifts:
-                insert(connection, drifts, _drift_values(drift, test, baseline))
+                insert(connection, drifts, row_of(drift, drifts) | against)
             insert(connection, watches, _watch_values(found, test, baseline, alert, level))
             raised = settle(connection, changes, hooks, at, test, baseline.id)
             if state is not None:
@@ -150,7 +150,9 @@ class Watch(Repository):
         query = sa.select(drifts, tests.c.name.label("test")).join(tests).where(in_force(drifts))
         if hanger is not None:
             query = query.where(drifts.c.hanger == hanger)
-        return tuple(_drift(row) for row in self.rows(query.order_by(drifts.c.time, drifts.c.id)))
+        return tuple(
+            value_in(row, Drift) for row in self.rows(query.order_by(drifts.c.time, drifts.c.id))
+        )
 
     def list_all(
         self, hanger: int | None = None, baseline_id: int | None = None, *, last: int | None = None
@@ -177,9 +179,8 @@ def load_watches(
     query = query.where(watches.c.id.in_(chosen))
     same_test = watches.c.test_id == drifts.c.test_id
     together = same_test & (watches.c.baseline_id == drifts.c.baseline_id)
-    of_shift = (drifts.c[name] for name in _DRIFT_COLUMNS)
     shifts: sa.Select[Any] = (
-        sa.select(drifts.c.test_id, drifts.c.baseline_id, name, *of_shift)
+        sa.select(drifts, name)
         .select_from(drifts.join(tests).join(watches, together))
         .where(watches.c.id.in_(chosen), in_force(drifts))
         .order_by(drifts.c.id)
@@ -188,9 +189,7 @@ def load_watches(
         rows = connection.execute(query.order_by(watches.c.time, watches.c.id)).all()
         found: defaultdict[tuple[int, int], list[Drift]] = defaultdict(list)
         for row in connection.execute(shifts):
-            test_id, baseline_id, test, *values = row
-            named = dict(zip(_DRIFT_COLUMNS, values, strict=True))
-            found[test_id, baseline_id].append(Drift(test=test, **named))
+            found[row.test_id, row.baseline_id].append(value_in(row, Drift))
     return tuple(_stored_watch(row, found[row.test_id, row.baseline_id]) for row in rows)
 
 
@@ -206,22 +205,13 @@ def _refuse_late(connection: Connection, before: Baseline) -> None:
 
 def _keep_state(connection: Connection, baseline: Baseline, state: KeptWatch) -> None:
     _drop_state(connection, baseline)
-    row = {**vars(state), "hanger": baseline.hanger, "baseline_id": baseline.id}
-    insert(connection, watch_states, row)
+    own = {"hanger": baseline.hanger, "baseline_id": baseline.id}
+    insert(connection, watch_states, row_of(state, watch_states) | own)
 
 
 def _drop_state(connection: Connection, baseline: Baseline) -> None:
     former = watch_states.c.baseline_id == baseline.id
     connection.execute(sa.delete(watch_states).where(former))
-
-
-def _drift_values(drift: Drift, test: StoredTest, baseline: Baseline) -> dict[str, Any]:
-    values = {name: getattr(drift, name) for name in _DRIFT_COLUMNS}
-    return {**values, "test_id": test.id, "baseline_id": baseline.id}
-
-
-def _drift(row: Row[Any]) -> Drift:
-    return Drift(test=row.test, **{name: getattr(row, name) for name in _DRIFT_COLUMNS})
 
 
 def _watch_values(

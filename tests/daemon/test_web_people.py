@@ -18,9 +18,9 @@ from fastapi.routing import APIRoute
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Workspace
-from shm.store.people_and_stream_tables import users
 from shm.store.queries.history import list_changes
 from shm.store.rows import Role
+from shm.store.tables import users
 from shm_daemon.web.access import engineering, reading, signed_in_person, writing
 from shm_daemon.web.address import Address
 from shm_daemon.web.app import load_pages

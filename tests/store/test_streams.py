@@ -11,7 +11,6 @@ import sqlalchemy as sa
 from shm.errors import StoreError
 from shm.pipeline.streaming import last_modes
 from shm.store import DeliveryState, Reconciled, Store
-from shm.store.people_and_stream_tables import stream_windows
 from shm.store.queries.alerts import list_alert_page
 from shm.store.queries.streams import (
     KeptStreamWatch,
@@ -27,6 +26,7 @@ from shm.store.queries.streams import (
     list_windows,
     load_stream_watch,
 )
+from shm.store.tables import stream_windows
 from tests.helpers.comparing import assert_same
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import MODES, a_reading, a_window, an_event

@@ -74,7 +74,9 @@ def list_hanger_events(
 
 def count_deliveries(store: Repository) -> dict[str, int]:
     """Count the deliveries in each state; see `counts_by_name`."""
-    query = sa.select(deliveries.c.state, sa.func.count()).group_by(deliveries.c.state)
+    query = sa.select(sa.type_coerce(deliveries.c.state, sa.Text), sa.func.count()).group_by(
+        deliveries.c.state
+    )
     return counts_by_name(DeliveryState, store.rows(query))
 
 

@@ -14,9 +14,9 @@ from shm.store.blobs import change_in
 from shm.store.columns import Number, loads
 from shm.store.database import Repository
 from shm.store.files import in_force
+from shm.store.mapping import value_in
 from shm.store.rows import BaselineGlance, StoredAdoption, StoredDiagnosis, StoredWatch
-from shm.store.selects import among, baselines_now, lineage_from, selected_classes
-from shm.store.stored_posteriors import adoption_from
+from shm.store.selects import among, baselines_now, selected_classes
 from shm.store.stored_watch import load_watches
 from shm.store.tables import adoptions, baselines, diagnoses, posterior_tests, tests, watches
 from shm.store.trends import baselines_in_numbers
@@ -42,7 +42,7 @@ def find_latest_diagnosis(store: Repository, hanger: int) -> StoredDiagnosis | N
     except (KeyError, TypeError, ValueError):
         log.warning("the diagnosis of hanger %d is of a former version: make it again", hanger)
         return None
-    return StoredDiagnosis(row.id, row.hanger, found, row.diagnosed_at, lineage_from(row))
+    return value_in(row, StoredDiagnosis, diagnosis=found)
 
 
 def list_adoptions(
@@ -57,7 +57,7 @@ def list_adoptions(
         query = query.where(adoptions.c.hanger == hanger)
     if not undone:
         query = query.where(adoptions.c.undone_at.is_(None))
-    return tuple(adoption_from(row) for row in store.rows(query))
+    return tuple(value_in(row, StoredAdoption) for row in store.rows(query))
 
 
 def list_baselines_in_force(

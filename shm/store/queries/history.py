@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Row
 
 from shm.store.database import Repository
 from shm.store.journal import ACTIONS, is_event, is_step
+from shm.store.mapping import value_in
 from shm.store.rows import (
     AuditRow,
     Decision,
@@ -21,7 +20,6 @@ from shm.store.rows import (
     Stage,
     Step,
 )
-from shm.store.selects import lineage_from
 from shm.store.tables import journal, posterior_tests, posteriors, tests
 
 _LINEAGE = ("input_sha256", "settings_sha256", "version")
@@ -84,8 +82,8 @@ def list_former_tests(store: Repository, recording_id: int) -> tuple[FormerTest,
         rows = connection.execute(found).all()
         by_test: defaultdict[int, list[FormerPosterior]] = defaultdict(list)
         for row in connection.execute(made):
-            by_test[row.test_id].append(_former_posterior(row))
-    return tuple(_former_test(row, by_test[row.id]) for row in rows)
+            by_test[row.test_id].append(value_in(row, FormerPosterior))
+    return tuple(value_in(row, FormerTest, posteriors=tuple(by_test[row.id])) for row in rows)
 
 
 def _change(row: sa.Row[Any]) -> AuditRow:
@@ -101,20 +99,3 @@ def _event(row: sa.Row[Any]) -> Event:
     if row.kind in (*Decision,) and row.who:
         message = f"{row.kind} by {row.who}" + (f": {row.detail}" if row.detail else "")
     return Event(row.at, row.kind, row.subject, message, row.recording_id)
-
-
-def _former_posterior(row: Row[Any]) -> FormerPosterior:
-    return FormerPosterior(row.id, row.model, row.updated_at, row.superseded_at, lineage_from(row))
-
-
-def _former_test(row: Row[Any], made: Sequence[FormerPosterior]) -> FormerTest:
-    return FormerTest(
-        id=row.id,
-        recording_id=row.recording_id,
-        name=row.name,
-        stage=Stage(row.stage),
-        identified_at=row.identified_at,
-        superseded_at=row.superseded_at,
-        lineage=lineage_from(row),
-        posteriors=tuple(made),
-    )

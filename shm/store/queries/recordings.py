@@ -96,7 +96,7 @@ def list_under_way(store: Repository) -> tuple[Standing, ...]:
         Standing(
             row.id,
             row.file_name,
-            Stage(row.stage),
+            row.stage,
             row.hanger,
             row.reached_at or row.received_at,
         )
@@ -113,7 +113,9 @@ def find_oldest_waiting(store: Repository) -> datetime | None:
 
 def count_stages(store: Repository) -> dict[str, int]:
     """Count the recordings at each stage; see `counts_by_name`."""
-    query = sa.select(recordings.c.stage, sa.func.count()).group_by(recordings.c.stage)
+    query = sa.select(sa.type_coerce(recordings.c.stage, sa.Text), sa.func.count()).group_by(
+        recordings.c.stage
+    )
     return counts_by_name(Stage, store.rows(query))
 
 

@@ -8,11 +8,12 @@ from datetime import datetime, timedelta
 from typing import Any, TypeVar
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Row
 
 from shm.documents import parse_time
 from shm.store.database import Repository
-from shm.store.people_and_stream_tables import (
+from shm.store.mapping import value_in
+from shm.store.rows import KeptStreamWatch
+from shm.store.tables import (
     pooled_readings,
     stream_events,
     stream_progress,
@@ -20,8 +21,6 @@ from shm.store.people_and_stream_tables import (
     stream_watch_days,
     stream_windows,
 )
-from shm.store.rows import KeptStreamWatch
-from shm.store.stored_streams import EVENT_COLUMNS
 from shm.values import NAN, ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import (
@@ -175,7 +174,7 @@ def list_stream_events(
     if stream is not None:
         query = query.where(stream_events.c.stream == stream)
     rows = store.rows(query.order_by(stream_events.c.start, stream_events.c.id))
-    return tuple(map(_event, rows))
+    return tuple(value_in(row, StreamEvent) for row in rows)
 
 
 def find_progress(store: Repository, stream: str) -> datetime | None:
@@ -185,10 +184,6 @@ def find_progress(store: Repository, stream: str) -> datetime | None:
         sa.select(progress.c.done_until).where(progress.c.stream == stream)
     )
     return found
-
-
-def _event(row: Row[Any]) -> StreamEvent:
-    return StreamEvent(**{name: getattr(row, name) for name in EVENT_COLUMNS})
 
 
 def _values(store: Repository, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:

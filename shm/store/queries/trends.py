@@ -10,8 +10,9 @@ import sqlalchemy as sa
 
 from shm.store.database import Repository
 from shm.store.files import counts, in_force
+from shm.store.mapping import value_in
 from shm.store.rows import StoredPosterior, StoredTest, TrendPoint
-from shm.store.selects import counted_tests, lineage_from, posterior_of_row, read_tests
+from shm.store.selects import counted_tests, posterior_of_row, read_tests
 from shm.store.stored_posteriors import posteriors_of
 from shm.store.tables import posterior_tests, posteriors, tests
 from shm.store.trends import load_points, shown_posteriors
@@ -22,7 +23,7 @@ def list_posteriors(store: Repository, hanger: int) -> tuple[StoredPosterior, ..
     """Return the posteriors of a hanger in its selected class, by time."""
     query = posteriors_of(hanger)
     return tuple(
-        StoredPosterior(row.id, posterior_of_row(row), row.time, lineage_from(row))
+        value_in(row, StoredPosterior, posterior=posterior_of_row(row))
         for row in store.rows(query.order_by(posteriors.c.time, posteriors.c.id))
     )
 

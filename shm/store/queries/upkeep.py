@@ -9,6 +9,7 @@ import sqlalchemy as sa
 from shm.store.archive import Archive
 from shm.store.database import Repository
 from shm.store.journal import BACKUP, REMOVED, is_step
+from shm.store.mapping import value_in
 from shm.store.rows import ArchiveCopy
 from shm.store.tables import archive_copies, journal, recordings
 
@@ -16,7 +17,7 @@ from shm.store.tables import archive_copies, journal, recordings
 def list_copies(store: Repository) -> tuple[ArchiveCopy, ...]:
     """List all copies that were noted, as they were made."""
     query = sa.select(archive_copies).order_by(archive_copies.c.id)
-    return tuple(ArchiveCopy(row.recording_id, row.folder, row.at) for row in store.rows(query))
+    return tuple(value_in(row, ArchiveCopy) for row in store.rows(query))
 
 
 def list_removed(store: Repository) -> dict[int, str]:

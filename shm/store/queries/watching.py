@@ -10,6 +10,7 @@ import sqlalchemy as sa
 
 from shm.store.database import Repository
 from shm.store.files import counts, in_force
+from shm.store.mapping import value_in
 from shm.store.rows import Baseline, KeptWatch, Stage, StoredTest, TestRow
 from shm.store.selects import (
     WEIGHED,
@@ -85,7 +86,7 @@ def find_watch_state(store: Repository, baseline: Baseline) -> KeptWatch | None:
     """Return what the watch goes on from at the next test compared with a baseline."""
     query = sa.select(watch_states).where(watch_states.c.baseline_id == baseline.id)
     row = store.first(query)
-    return None if row is None else KeptWatch(row.key, row.last_test_time, row.content)
+    return None if row is None else value_in(row, KeptWatch)
 
 
 def list_watched_tests(
