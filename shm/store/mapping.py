@@ -51,10 +51,9 @@ def mapped(
             column.primary_key, column.nullable = True, False
         columns.append(column)
     assert not given, f"no such field of {values.__name__}: {', '.join(given)}"
-    keys_first = sorted(
-        [*columns, *others], key=lambda each: not getattr(each, "primary_key", False)
-    )
-    return sa.Table(table, metadata, *keys_first)
+    keys = [each for each in (*others, *columns) if getattr(each, "primary_key", False)]
+    rest = [each for each in (*columns, *others) if not getattr(each, "primary_key", False)]
+    return sa.Table(table, metadata, *keys, *rest)
 
 
 def value_in(row: Row[Any], kind: type[T], **given: Any) -> T:
