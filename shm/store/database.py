@@ -292,8 +292,8 @@ def reading(engine: Engine) -> Iterator[Connection]:
 
 
 def insert(connection: Connection, table: sa.Table, values: Mapping[str, Any]) -> int:
-    """Inserts one row; its number."""
-    result = connection.execute(sa.insert(table).values(values))
+    """Insert one row of plain values; return its number."""
+    result = connection.execute(sa.insert(table), dict(values))
     return int((result.inserted_primary_key or (0,))[0])
 
 

@@ -111,7 +111,7 @@ def _note_on(
 ) -> bool:
     once = (alerts.c.id == alert_id) & alerts.c[f"{prefix}_at"].is_(None)
     note = {f"{prefix}_at": at, f"{prefix}_who": who, f"{prefix}_why": why}
-    return bool(connection.execute(sa.update(alerts).where(once).values(**note)).rowcount)
+    return bool(connection.execute(sa.update(alerts).where(once), note).rowcount)
 
 
 def owe_resolution(connection: Connection, alert_id: int, hook: str, at: datetime) -> None:
