@@ -218,20 +218,6 @@ def test_a_part_that_fails_is_absent_and_counted_and_the_others_answer(
     assert errors(client)[part] == before + 1
 
 
-def test_a_time_that_nobody_can_read_costs_its_part_alone(
-    client: httpx.Client, bridge: Workspace
-) -> None:
-    with sqlite3.connect(bridge.database, isolation_level=None) as connection:
-        kept = connection.execute("SELECT id, at FROM journal").fetchall()
-        connection.execute("UPDATE journal SET at = 'yesterday'")
-        seen = said(client)
-        for row, value in kept:
-            connection.execute("UPDATE journal SET at = ? WHERE id = ?", (value, row))
-    connection.close()
-    assert ("shm_recordings", "done") in seen
-    assert seen["shm_scrape_errors_total", "stages"] >= 1
-
-
 def test_a_spool_that_is_away_takes_nothing_else_with_it(tmp_path: Path) -> None:
     workspace = make_workspace(tmp_path / "bridge")
     with served(workspace) as site, site.client() as client:

@@ -30,7 +30,7 @@ from tests.helpers.contents import quiet
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.taken_in import copied
-from tests.helpers.workspaces import START, make_workspace, modelled_test, put, write_test
+from tests.helpers.workspaces import START, make_workspace, modelled_test, put
 from tests.helpers.written import write
 
 EPOCH = datetime(1970, 1, 1, 0, 3, tzinfo=UTC)
@@ -142,11 +142,6 @@ def test_a_confirmed_test_has_the_time_that_a_person_gave_it(held: Workspace) ->
             flow.store.recordings.accept(2, "Bob", "", flow.clock())
 
 
-def test_a_time_yet_to_come_is_given_to_no_test(held: Workspace) -> None:
-    with a_flow(held) as flow, pytest.raises(UsageError, match="yet to come"):
-        flow.store.recordings.accept(2, "Ann", "", flow.clock(), day(9000))
-
-
 def test_what_is_discarded_ends_and_its_raw_file_stays(held: Workspace) -> None:
     with a_flow(held) as flow:
         flow.store.recordings.exclude(2, "Ann", "wrong hanger", flow.clock())
@@ -186,14 +181,6 @@ def test_a_discarded_file_with_another_sidecar_is_judged_again(held: Workspace) 
         assert flow.receive(held.spool / "lost.modes.json").outcome is Outcome.REOPENED
         flow.drain()
         assert flow.store.recordings.get(2).stage is Stage.HELD
-
-
-def test_what_failed_after_a_discard_is_tried_again(held: Workspace) -> None:
-    with a_flow(held) as flow:
-        flow.store.recordings.exclude(2, "Ann", "", flow.clock())
-        flow.store.recordings.refuse(2, {"message": "no rate."}, flow.clock())
-        spool(held, "lost", EPOCH, tension=0.9)
-        assert flow.receive(held.spool / "lost.modes.json").outcome is Outcome.REOPENED
 
 
 def test_what_was_discarded_is_taken_back_with_its_true_time(held: Workspace) -> None:
@@ -447,22 +434,6 @@ def test_a_held_recording_that_is_done_again_waits_for_nobody_twice(held: Worksp
         assert former.acknowledgement is not None
 
 
-def test_what_is_not_there_cannot_be_confirmed(held: Workspace) -> None:
-    with held.store() as store:
-        with pytest.raises(NothingThere, match="no recording 9"):
-            store.recordings.accept(9, "Ann", "", START)
-        with pytest.raises(UsageError, match="nothing of recording 1 is held"):
-            store.recordings.accept(1, "Ann", "", START)
-
-
-def test_the_same_bytes_are_a_duplicate_while_they_are_held(held: Workspace) -> None:
-    spool(held, "lost", EPOCH, tension=0.9)
-    with a_flow(held) as flow:
-        receipt = flow.receive(held.spool / "lost.modes.json")
-        assert receipt.outcome is Outcome.DUPLICATE
-        assert flow.store.recordings.get(2).stage is Stage.HELD
-
-
 @cache
 def a_recording(seed: int = 1) -> Recording:
     state = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
@@ -517,18 +488,6 @@ def test_a_corrected_sidecar_beside_the_same_bytes_is_taken(workspace: Workspace
         assert list(workspace.spool.iterdir()) == []
 
 
-def test_a_broken_sidecar_says_that_the_test_counts_no_more(workspace: Workspace) -> None:
-    write_test(workspace.spool / "a.modes.json", workspace)
-    ingest(workspace)
-    put(workspace.spool / "a.modes.toml", 'hanger = "two"')
-    write_test(workspace.spool / "a.modes.json", workspace)
-    ingest(workspace)
-    with workspace.store() as store:
-        recording = store.recordings.get(1)
-        assert (recording.stage, store.tests.list_all(3)) == (Stage.REFUSED, ())
-        assert "counts no more" in recording.reason["remedy"]
-
-
 def test_a_corrected_sidecar_ends_a_hold(workspace: Workspace) -> None:
     write(replace(a_recording(), time=EPOCH), workspace.spool / "a.uff")
     raw = (workspace.spool / "a.uff").read_bytes()
@@ -579,18 +538,6 @@ def test_a_counted_test_that_agrees_with_a_held_one_raises_an_alert(held: Worksp
         assert "Tests lost (held for its clock) and counted both read beyond" in alert.message
         assert [test.test.id for test in store.tests.list_all(3)] == ["good", "counted"]
         assert check_store(store, quiet).troubles == ()
-
-
-def test_a_loss_that_is_told_by_two_tests_is_not_told_by_the_third(workspace: Workspace) -> None:
-    for number, seconds in enumerate((0, 1, 2, 3)):
-        time = day(0) + timedelta(seconds=seconds)
-        spool(workspace, f"t{number}", time, tension=0.85 if number else 1.0)
-        ingest(workspace)
-    with workspace.store() as store:
-        (loss,) = alerts_but_notices(store)
-        assert loss.alert.test == "t2"
-        # The watch had no time for a change: its low probability is no sign that the loss ended.
-        assert loss.resolution is None
 
 
 def test_two_tests_of_a_loss_in_the_wrong_order_raise_an_alert(workspace: Workspace) -> None:

@@ -193,25 +193,6 @@ def test_advance_storing_raises(
         assert len(hours_of(store)) == 1 - (given_up and place == "save_pooled")
 
 
-def test_advance_without_memory(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ten minutes that could not be read for want of memory are read a minute later."""
-    read, failures = stream_steps.read_stream_window, [MemoryError()]
-
-    def fail_once(*args: Any) -> Any:
-        if failures:
-            raise failures.pop()
-        return read(*args)
-
-    monkeypatch.setattr(stream_steps, "read_stream_window", fail_once)
-    send(workspace, 1)
-    clock = Clock(FIRST + timedelta(days=1))
-    with at_work(workspace, clock) as (streaming, store):
-        drain(streaming, clock)
-        clock.pass_by(61)
-        drain(streaming, clock)
-        assert len(list_windows(store, 3, FIRST, FIRST + HOUR)) == 6
-
-
 def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -17,7 +16,6 @@ from shm.pipeline.unheard import (
     compare_thermometers,
     heard,
     heed_silences,
-    leads_of,
     note_blindness,
     word_of,
 )
@@ -51,35 +49,6 @@ def an_event(kind: str, end: datetime) -> StreamEvent:
 )
 def test_a_stream_is_in_one_state(ago: timedelta, kind: str, state: State) -> None:
     assert word_of(NOW - ago, [an_event(kind, NOW - ago)], NOW) == state
-
-
-def test_word_of_channel_without_modes() -> None:
-    event = replace(an_event("lost modes", NOW), channel="acc_1")
-    assert word_of(NOW, [event], NOW) == "sensor at fault"
-    assert word_of(NOW, [event, an_event("lost modes", NOW)], NOW) == "sees nothing"
-
-
-def test_each_state_that_asks_for_a_person_is_told_once_with_its_remedy() -> None:
-    found = [
-        Heard(STREAM, "silent", NOW),
-        Heard(replace(STREAM, name="h4"), "silent", NOW - HOUR),
-        Heard(replace(STREAM, name="h5"), "never sent", None),
-        Heard(replace(STREAM, name="h6"), "late", NOW),
-    ]
-    never, silent = leads_of(found)
-    assert never.words == "Stream h5: never sent. Connect the logger: docs/permanent_sensors.md."
-    assert silent.state == (
-        "Streams h3 (last sample 2026-05-01 12:00 UTC) and h4 (last sample 2026-05-01 11:00 UTC): "
-        "silent."
-    )
-
-
-@pytest.mark.parametrize(
-    ("state", "said"),
-    [("silent", True), ("sees nothing", True), ("late", False), ("clock ahead", False)],
-)
-def test_a_hanger_is_blind_whose_stream_says_nothing(state: State, said: bool) -> None:
-    assert (3 in blind_hangers([Heard(STREAM, state, NOW)])) is said
 
 
 def test_of_a_hanger_whose_stream_is_silent_nobody_says_that_nothing_needs_doing(
@@ -119,20 +88,6 @@ def test_a_silence_of_a_day_is_one_alert_which_ends_with_it(tmp_path: Path) -> N
         (over,) = store.alerts.list_all()
         assert over.resolution is not None
         assert over.resolution.why == "stream hanger03 sends again"
-
-
-def test_heed_silences_after_ring_is_empty(tmp_path: Path) -> None:
-    """Whether a sweep or a restore emptied it: the stream did not send again."""
-    workspace = with_live_streams(make_workspace(tmp_path / "bridge"))
-    send(workspace, hours=1 / 6, first=NOW)
-    with workspace.store() as store:
-        window = replace(a_window().window, stream="hanger03")
-        store.streams.save_window(replace(a_window(), window=window))
-        for later in (2, 40):
-            heed_silences(workspace, store, NOW + timedelta(days=later))
-            (raised,) = store.alerts.list_all()
-            assert raised.resolution is None
-            shutil.rmtree(workspace.folder / "ring", ignore_errors=True)
 
 
 def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import sqlite3
 from dataclasses import replace
-from datetime import timedelta
 
 import pytest
 import sqlalchemy as sa
 
-from shm.errors import NothingThere, StoreBusy, UsageError
-from shm.store import Adoption, Baseline, IdentifiedTest, Lineage, Stage, Store, StoredAdoption
-from shm.store.queries.hangers import find_latest_diagnosis, list_adoptions, list_selected_models
+from shm.errors import StoreBusy
+from shm.store import Adoption, Baseline, IdentifiedTest, Lineage, Store, StoredAdoption
+from shm.store.queries.hangers import list_adoptions, list_selected_models
 from shm.store.queries.trends import list_history
 from shm.store.tables import adoptions, baselines, posteriors, selections
 from shm.values import Selection
-from tests.helpers.comparing import assert_same
-from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.nouns import NOW, a_file, a_posterior, a_test
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
@@ -67,48 +64,6 @@ def rows(store: Store) -> list[int]:
         ]
 
 
-def test_a_diagnosis_comes_back_as_it_was_and_the_newest_holds(store: Store) -> None:
-    assert find_latest_diagnosis(store, 3) is None
-    store.posteriors.save_diagnosis(3, a_diagnosis(("t0",)), LINEAGE, NOW)
-    later = NOW + timedelta(days=1)
-    made = store.posteriors.save_diagnosis(3, a_diagnosis(), LINEAGE, later)
-    found = find_latest_diagnosis(store, 3)
-    assert found is not None
-    assert_same(found.diagnosis, a_diagnosis())
-    assert (found.id, found.diagnosed_at, found.lineage) == (made.id, later, LINEAGE)
-    assert find_latest_diagnosis(store, 4) is None
-
-
-def test_an_adopted_class_is_in_force_with_a_baseline_of_the_same_tests(filled: Store) -> None:
-    made = adopted(filled)
-    assert list_selected_models(filled) == {3: MASS}
-    found = baseline(filled)
-    assert (found.posterior.model, found.posterior.tests, found.who) == (MASS, ("t1",), "engineer")
-    assert found.why == f"adopted {MASS}: a lamp at 3.4 m"
-    assert list_adoptions(filled, 3) == (made,)
-    assert made.adoption.gap_percent == 0.6
-    assert history(filled) == [("t1", MASS), ("t2", "beam2")]
-
-
-def test_the_selection_on_record_stays_in_the_order_of_probability(filled: Store) -> None:
-    adopted(filled)
-    selection = filled.posteriors.selection(3)
-    assert selection is not None
-    assert selection.model == MASS
-    assert [each.model for each in selection.selection.posteriors] == ["beam2", MASS, "beam1"]
-    assert selection.selection.probabilities == (0.5, 0.3, 0.2)
-
-
-def test_a_test_updated_in_the_class_before_finds_the_baseline_of_that_class(
-    filled: Store,
-) -> None:
-    adopted(filled)
-    second = filled.tests.list_all(3)[1]
-    assert second.stage is Stage.UPDATED
-    assert filled.posteriors.get(3, second.test.id).model == "beam2"
-    assert baseline(filled, "beam2").posterior.model == "beam2"
-
-
 def test_dropping_an_adoption_restores_what_was_in_force(filled: Store) -> None:
     before = filled.posteriors.selection(3)
     made = adopted(filled)
@@ -124,29 +79,6 @@ def test_dropping_an_adoption_restores_what_was_in_force(filled: Store) -> None:
     assert history(filled) == [("t1", "beam2"), ("t2", "beam2")]
     assert list_adoptions(filled) == ()
     assert list_adoptions(filled, undone=True) == (dropped,)
-
-
-def test_of_two_adoptions_the_last_in_force_counts(filled: Store) -> None:
-    first, second = adopted(filled), adopted(filled, STIFF)
-    assert list_selected_models(filled) == {3: STIFF}
-    filled.posteriors.drop_adoption(first.id, "no", "engineer", NOW)
-    assert list_selected_models(filled) == {3: STIFF}
-    filled.posteriors.drop_adoption(second.id, "no", "engineer", NOW)
-    assert list_selected_models(filled) == {3: "beam2"}
-    assert history(filled) == [("t1", "beam2"), ("t2", "beam2")]
-
-
-def test_what_was_dropped_can_be_adopted_again(filled: Store) -> None:
-    filled.posteriors.drop_adoption(adopted(filled).id, "no", "engineer", NOW)
-    again = adopted(filled, why="it is back")
-    assert list_adoptions(filled) == (again,)
-    assert baseline(filled).why.endswith("it is back")
-
-
-def test_adopting_twice_is_refused(filled: Store) -> None:
-    adopted(filled)
-    with pytest.raises(UsageError, match="already"):
-        adopted(filled)
 
 
 def test_an_adoption_computed_from_a_selection_no_longer_in_force_is_refused_whole(
@@ -183,15 +115,6 @@ def test_an_adoption_cut_short_leaves_nothing_behind(
                 adopted(filled)
         assert rows(filled) == held
         assert list_selected_models(filled) == {3: "beam2"}
-
-
-def test_dropping_what_is_not_there_says_so(filled: Store) -> None:
-    with pytest.raises(NothingThere, match="no adoption 7"):
-        filled.posteriors.drop_adoption(7, "no", "engineer", NOW)
-    made = adopted(filled)
-    filled.posteriors.drop_adoption(made.id, "no", "engineer", NOW)
-    with pytest.raises(UsageError, match="already"):
-        filled.posteriors.drop_adoption(made.id, "no", "engineer", NOW)
 
 
 def test_a_name_of_two_effects_with_ranges_fits(filled: Store) -> None:

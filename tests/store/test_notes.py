@@ -32,23 +32,6 @@ def a_photo(kind: str, width: int = 40, height: int = 20) -> bytes:
     return made.getvalue()
 
 
-def test_notes_of_a_hanger_and_the_bridge_are_listed_the_latest_event_first(store: Store) -> None:
-    store.notes.add(3, NOW - DAY, NoteKind.REPAIR, " new\0 pin\n ", "anna", NOW)
-    store.notes.add(None, NOW, NoteKind.INSPECTION, "storm", "ben", NOW)
-    store.notes.add(4, NOW, NoteKind.NOTE, "nest\udcff", "ben", NOW)
-    assert [each.text for each in store.notes.list_all(3)] == ["storm", "new pin"]
-    assert [each.of for each in store.notes.list_all()] == ["hanger 4", "the bridge", "hanger 3"]
-    assert [each.text for each in store.notes.list_all(4)] == ["nest?", "storm"]
-    pin = store.notes.list_all()[-1]
-    assert (pin.id, pin.at, pin.kind, pin.who) == (1, NOW - DAY, NoteKind.REPAIR, "anna")
-    (newest, *_) = list_changes(store)
-    assert (newest.who, newest.action, newest.subject) == (
-        "ben",
-        "note written",
-        "note 3, hanger 4",
-    )
-
-
 @pytest.mark.parametrize("kind", ["JPEG", "PNG"])
 def test_of_a_photo_the_picture_alone_is_kept_upright_and_no_larger_than_a_screen(
     file_store: Store, kind: str

@@ -8,13 +8,13 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import Baseline, IdentifiedTest, KeptWatch, Lineage, Stage, Store, StoredTest
-from shm.store.queries.history import list_events, list_former_tests, list_steps
-from shm.store.queries.recordings import find_recording, list_waiting_recordings
+from shm.store.queries.history import list_events, list_former_tests
+from shm.store.queries.recordings import find_recording
 from shm.store.queries.tests import list_baseline_tests, list_waiting_tests
 from shm.store.queries.trends import list_history, list_posteriors
 from shm.store.queries.watching import find_watch_state
 from shm.values import Selection
-from tests.helpers.nouns import NOW, a_file, a_posterior, a_test, a_watched_test, an_alert
+from tests.helpers.nouns import NOW, a_file, a_posterior, a_test, a_watched_test
 
 OLD, NEW = Lineage("0" * 64, "1" * 64, "0.1.0"), Lineage("0" * 64, "1" * 64, "0.2.0")
 LATER = NOW + timedelta(days=400)
@@ -107,13 +107,6 @@ def test_the_baseline_stays_when_its_own_test_is_identified_again(store: Store) 
     assert [posterior.seed for _, posterior in list_history(store, 3)] == [2]
 
 
-def test_a_test_of_a_changed_name_keeps_it(store: Store) -> None:
-    identified(store, 1, name="t")
-    second = identified(store, 2, name="t")
-    store.recordings.rerun(second.recording_id, Stage.IDENTIFIED, LATER)
-    assert identified(store, 2, name="t").test.id == second.test.id != "t"
-
-
 def test_what_the_watch_kept_is_dropped_with_a_test_that_is_done_again(store: Store) -> None:
     baseline = with_baseline(store)
     second = identified(store, 2)
@@ -123,31 +116,12 @@ def test_what_the_watch_kept_is_dropped_with_a_test_that_is_done_again(store: St
     assert find_watch_state(store, baseline) is None
 
 
-def test_a_refused_file_may_be_tried_again(store: Store) -> None:
-    recording = store.recordings.receive(a_file(1), NOW).recording
-    store.recordings.refuse(recording.id, {"message": "no rate."}, NOW)
-    assert store.recordings.rerun(recording.id, Stage.IDENTIFIED, LATER).recording.reason is None
-    assert [each.id for each in list_waiting_recordings(store, 5)] == [recording.id]
-
-
 @pytest.mark.parametrize("stage", [Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED])
 def test_what_has_not_come_so_far_cannot_be_done_again(store: Store, stage: Stage) -> None:
     recording = store.recordings.receive(a_file(1), NOW).recording
     with pytest.raises(UsageError, match="not come so far"):
         store.recordings.rerun(recording.id, stage, LATER)
     assert list_events(store) == ()
-
-
-def test_a_recording_is_found_by_its_number_or_by_the_name_of_a_test(store: Store) -> None:
-    test = identified(store, 1)
-    assert find_recording(store, "1") == (test.recording_id, None)
-    assert find_recording(store, "t1") == (test.recording_id, "t1")
-    with pytest.raises(NothingThere, match="no recording and no test 't9'"):
-        find_recording(store, "t9")
-    recording = store.recordings.receive(a_file(2), NOW).recording
-    store.tests.save(recording.id, [IdentifiedTest(a_test("t1", hanger=4))], OLD, NOW)
-    with pytest.raises(UsageError, match="2 hangers"):
-        find_recording(store, "t1")
 
 
 def test_a_renamed_file_is_found_by_both_names(store: Store) -> None:
@@ -169,34 +143,3 @@ def test_a_renamed_file_is_found_by_both_names(store: Store) -> None:
     store.recordings.refuse(refused.id, {"message": "no rate."}, NOW)
     store.recordings.receive(a_file(2, file_name="retry.csv", arrival="again"), LATER)
     assert find_recording(store, "h3-2") == find_recording(store, "retry") == (refused.id, None)
-
-
-def test_a_name_that_several_files_had_is_told_with_their_numbers(store: Store) -> None:
-    for number in (1, 2):
-        store.recordings.receive(a_file(number, file_name="same.csv"), NOW)
-    with pytest.raises(UsageError, match="2 recordings were called 'same'") as caught:
-        find_recording(store, "same")
-    assert "1, 2" in caught.value.remedy
-
-
-def test_each_stage_that_was_reached_is_a_row(store: Store) -> None:
-    baseline = with_baseline(store)
-    second = identified(store, 2)
-    store.posteriors.save(second, a_posterior("beam1", ("t2",)), OLD, NOW)
-    store.watch.save(second, baseline, a_watched_test(), an_alert(), ["mail", "sms"], NOW)
-    for delivery in store.alerts.list_deliveries():
-        store.alerts.save_delivery(delivery, LATER)
-    steps = list_steps(store, second.recording_id)
-    assert [step.stage for step in steps if step.test is None] == [
-        "archived", "received", "identified", "updated", "done"
-    ]  # fmt: skip
-    assert [(step.stage, step.at) for step in steps if step.test == "t2"] == [
-        ("identified", NOW), ("updated", NOW), ("watched", NOW), ("notified", LATER)
-    ]  # fmt: skip
-
-
-def test_a_refusal_is_a_step_of_the_file_and_of_its_tests(store: Store) -> None:
-    test = identified(store, 1)
-    store.recordings.refuse(test.recording_id, {"message": "no."}, LATER, [test.id])
-    refused = [s.test for s in list_steps(store, test.recording_id) if s.stage == Stage.REFUSED]
-    assert refused == [None, "t1"]

@@ -6,27 +6,17 @@ from dataclasses import replace
 from datetime import timedelta
 
 import pytest
-import sqlalchemy as sa
 
 from shm.errors import StoreError
-from shm.pipeline.streaming import last_modes
-from shm.store import DeliveryState, Reconciled, Store
-from shm.store.queries.alerts import list_alert_page
+from shm.store import Reconciled, Store
 from shm.store.queries.streams import (
     KeptStreamWatch,
     find_first_unpooled,
-    find_first_window,
-    find_last_window,
-    find_pooled_range,
-    find_progress,
-    list_latest_with_modes,
     list_pooled,
     list_stream_events,
-    list_window_starts,
     list_windows,
     load_stream_watch,
 )
-from shm.store.tables import stream_windows
 from tests.helpers.comparing import assert_same
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import MODES, a_reading, a_window, an_event
@@ -42,36 +32,6 @@ def test_a_window_comes_back_and_is_replaced_where_it_is_done_anew(store: Store)
     assert_same(found, (a_window(0), a_window(10)))
     assert list_windows(store, 4, *EVER) == ()
     assert len(list_windows(store, 3, NOW, NOW + timedelta(minutes=10))) == 1
-
-
-def test_progress_never_goes_back(store: Store) -> None:
-    assert find_progress(store, "h3") is None
-    for minutes in (10, 0):
-        store.streams.save_window(a_window(minutes))
-        assert find_progress(store, "h3") == NOW + timedelta(minutes=20)
-
-
-def test_the_last_modes_are_those_of_the_latest_windows_each_as_it_was_seen_last(
-    store: Store,
-) -> None:
-    assert list_latest_with_modes(store, "h3") == ()
-    moved = replace(MODES[0], frequency_hz=MODES[0].frequency_hz * 1.01)
-    store.streams.save_window(a_window(10, (moved,)))
-    store.streams.save_window(a_window(20, ()))
-    store.streams.save_window(a_window(0))
-    latest = list_latest_with_modes(store, "h3")
-    assert [each.window.start for each in latest] == [NOW + timedelta(minutes=m) for m in (10, 0)]
-    assert_same(last_modes(latest), (moved, *MODES[1:]))
-    assert_same(find_last_window(store, "h3"), a_window(20, ()))
-    assert find_last_window(store, "h4") is None
-
-
-def test_modes_are_kept_without_what_is_not_known(store: Store) -> None:
-    store.streams.save_window(a_window())
-    with store.reading() as connection:
-        text = connection.scalar(sa.select(stream_windows.c.document))
-    assert "null" not in text.split('"modes"')[1]
-    assert len(text) < 600
 
 
 def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) -> None:
@@ -96,30 +56,12 @@ def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) ->
     assert over.resolution.at == NOW + timedelta(hours=3)
 
 
-def test_an_alert_of_a_stream_is_delivered_though_no_test_raised_it(store: Store) -> None:
-    alert = replace(an_alert(), key="hanger-3:stream", test="", drifts=())
-    store.streams.save_pooled(a_reading(), None, Reconciled((alert,)), ["mail"], NOW)
-    assert [row.alert.hanger for row in list_alert_page(store)] == [3]
-    (owed,) = store.alerts.list_due_deliveries(NOW, 10)
-    store.alerts.save_delivery(owed, NOW)
-    (told,) = store.alerts.list_deliveries()
-    assert (told.state, told.stored.alert.key) == (DeliveryState.DELIVERED, "hanger-3:stream")
-
-
 def test_nothing_of_a_reading_is_kept_where_its_alert_cannot_be(store: Store) -> None:
     alert = replace(an_alert(), key=None)  # type: ignore[arg-type]
     with pytest.raises(StoreError):
         store.streams.save_pooled(a_reading(), b"state", Reconciled((alert,)))
     assert load_stream_watch(store, 3) is None
     assert list_pooled(store, 3, "hour", *EVER) == ()
-
-
-def test_an_event_is_noted_once(store: Store) -> None:
-    for event in (an_event(10), an_event(), an_event()):
-        store.streams.save_event(event)
-    assert list_stream_events(store, None, NOW) == (an_event(), an_event(10))
-    assert list_stream_events(store, "h4", NOW) == ()
-    assert list_stream_events(store, "h3", NOW + timedelta(minutes=5)) == (an_event(10),)
 
 
 def test_what_is_old_goes_but_days_stay(store: Store) -> None:
@@ -134,31 +76,6 @@ def test_what_is_old_goes_but_days_stay(store: Store) -> None:
     periods = ("hour", "six hours", "day")
     counts = [len(list_pooled(store, 3, each, *EVER)) for each in periods]  # type: ignore[arg-type]
     assert counts == [3, 3, 4]
-
-
-def test_a_stream_says_how_far_it_has_come(file_store: Store) -> None:
-    """Of its windows, its hours and days, each by its own start."""
-    streams = file_store.streams
-    assert find_first_window(file_store, "h3") is None
-    assert (
-        find_pooled_range(file_store, "h3") is find_pooled_range(file_store, "h3", "hour") is None
-    )
-    for minutes in (20, 0, 10):
-        streams.save_window(a_window(minutes))
-    for hours, period in ((1, "hour"), (2, "hour"), (-12, "day")):
-        streams.save_pooled(a_reading(hours, period))
-    assert find_first_window(file_store, "h3") == NOW
-    assert find_first_window(file_store, "h4") is None
-    starts = {NOW + timedelta(minutes=m) for m in (10, 20)}
-    assert list_window_starts(file_store, "h3", NOW + timedelta(minutes=10)) == starts
-    assert list_window_starts(file_store, "h4", NOW) == frozenset()
-    hours = NOW + timedelta(hours=1), NOW + timedelta(hours=2)
-    assert find_pooled_range(file_store, "h3", "hour") == hours
-    assert find_pooled_range(file_store, "h3") == (NOW - timedelta(hours=12), hours[1])
-    assert find_pooled_range(file_store, "h3", "six hours") is None
-    listed = list_pooled(file_store, 3, "hour", NOW + timedelta(hours=1), NOW + timedelta(hours=2))
-    assert listed == (a_reading(1),)
-    assert list_pooled(file_store, 4, "hour", NOW, NOW + timedelta(days=1)) == ()
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable
 from dataclasses import fields, replace
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -26,7 +26,7 @@ from shm.store import (
 from shm.store.queries.hangers import find_baseline_temperatures, list_baselines_in_force
 from shm.store.queries.trends import find_latest_trends, list_history, list_trend
 from shm.store.tables import posteriors
-from shm.values import EndPlate, Hanger, Limits, Posterior, Selection, Summary
+from shm.values import Hanger, Limits, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import posterior as modelled
@@ -235,26 +235,6 @@ def test_the_tension_over_all_classes_follows_the_selected_one(file_store: Store
     )
 
 
-def test_another_description_of_the_hanger_gives_another_stiffness(file_store: Store) -> None:
-    plate = EndPlate(1.0915, 0.04, 1.0644, 0.241, 0.562, 0.0425)
-    narrow, wide = (
-        replace(HANGER_3, plate=replace(plate, end_width_m=width)) for width in (0.9, 1.1)
-    )
-    prior = described("solid2", narrow).prior
-    posterior = modelled(list((prior.lower + prior.upper) / 2), "solid2", narrow)
-    first = identified(file_store, 1)
-    chosen = Selection((replace(posterior, tests=("t1",)),), (1.0,))
-    file_store.posteriors.save_selection(3, [first], chosen, LINEAGE, NOW)
-    file_store.posteriors.save_summaries(narrow)
-    for hanger in (wide, narrow):
-        assert from_trend(file_store, hanger) == from_history(file_store, hanger)
-    (before,), (after,) = list_trend(file_store, narrow), list_trend(file_store, wide)
-    assert before.tension_n == after.tension_n
-    name = "longitudinal_end_stiffness"
-    assert after.stiffness[name].mean - before.stiffness[name].mean > 0.05
-    assert file_store.posteriors.save_summaries(wide) == 1
-
-
 def test_summaries_are_kept_some_at_a_time_and_what_was_kept_is_not_done_again(
     file_store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -273,22 +253,6 @@ def test_summaries_are_kept_some_at_a_time_and_what_was_kept_is_not_done_again(
         file_store.posteriors.save_summaries(HANGER_3, killed)
     assert heard == pytest.approx([2 / 6, 4 / 6])
     assert file_store.posteriors.save_summaries(HANGER_3) == 2
-
-
-def test_a_trend_begins_where_it_is_asked_to(file_store: Store) -> None:
-    begun(file_store)
-    for number in (2, 3):
-        updated(file_store, number, 0.9)
-    since = NOW + timedelta(days=2)
-    assert [point.test for point in list_trend(file_store, HANGER_3, since)] == ["t2", "t3"]
-
-
-def test_clamped_ends_have_no_stiffness(file_store: Store) -> None:
-    first = identified(file_store, 1)
-    chosen = Selection((a_posterior("beam1", ("t1",)),), (1.0,))
-    file_store.posteriors.save_selection(3, [first], chosen, LINEAGE, NOW)
-    file_store.posteriors.save_summaries(HANGER_3)
-    assert list_trend(file_store, HANGER_3)[0].stiffness == {}
 
 
 def test_a_database_of_before_the_summaries_answers_the_same(tmp_path: Path) -> None:
