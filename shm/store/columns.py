@@ -94,20 +94,20 @@ _cached_value = lru_cache(1024)(_value)  # technical: what is shown again, some 
 
 
 class Name(sa.types.TypeDecorator[Any]):
-    """A member of an enumeration by its value."""
+    """A member of an enumeration by its value; a name of a newer version stays a text."""
 
     impl = sa.String
     cache_ok = True
 
     def __init__(self, kind: type[StrEnum], length: int = 16):
         super().__init__(length)
-        self.kind = kind
+        self.kind, self._names = kind, frozenset(map(str, kind))
 
     def process_bind_param(self, value: Any, dialect: Dialect) -> str | None:
         return None if value is None else str(value)
 
     def process_result_value(self, value: str | None, dialect: Dialect) -> Any:
-        return None if value is None else self.kind(value)
+        return self.kind(value) if value in self._names else value
 
 
 class Names(Name):

@@ -16,7 +16,7 @@ import sqlalchemy as sa
 from prometheus_client.parser import text_string_to_metric_families
 
 from shm.pipeline import utc_now
-from shm.store import Workspace, list_rows, rows
+from shm.store import Workspace, rows
 from shm.store.columns import Number, UtcTime
 from shm.store.journal import NOTIFIED, STEPS
 from shm.store.tables import metadata
@@ -51,10 +51,7 @@ METRICS = {
 def names() -> set[str]:
     """Every name that a row may say: of all enumerations of the store, and one of the future."""
     kinds = {
-        kind
-        for module in (rows, list_rows, list_rows)
-        for _, kind in inspect.getmembers(module, inspect.isclass)
-        if issubclass(kind, StrEnum)
+        kind for _, kind in inspect.getmembers(rows, inspect.isclass) if issubclass(kind, StrEnum)
     }
     said = {str(member) for kind in kinds for member in kind}
     return said | STEPS | {"made by a newer version", "", 'a "quoted"\nname'}
