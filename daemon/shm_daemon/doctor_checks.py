@@ -1,5 +1,6 @@
-"""What a check finds: whether the work flows (daemon, spool, what is under way, quarantine, raw
-files), and whether store, backups, clock, hangers, streams and settings are in order.
+"""Check the work (daemon, spool, recordings, quarantine, raw files) and its store.
+
+Also backups, clock, hangers, streams and settings.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ _SYNCHRONISED = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]
 
 
 class Level(StrEnum):
-    """How a finding is to be taken; `unknown` is what could not be looked at."""
+    """Level of a finding; `unknown` is what could not be looked at."""
 
     OK = "ok"
     UNKNOWN = "unknown"
@@ -53,7 +54,7 @@ class Level(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What one check found, and what to do where that is not well."""
+    """Finding of one check, and what to do where that is not well."""
 
     check: str
     level: Level
@@ -63,7 +64,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Examined:
-    """What the checks look at: an open workspace with its open store, and the time."""
+    """Subject of the checks: an open workspace with its open store, and the time."""
 
     workspace: Workspace
     store: Store
@@ -101,7 +102,7 @@ def some(names: list[str], most: int = 5) -> str:
 
 
 def check_daemon(examined: Examined) -> Iterator[Finding]:
-    """Whether a daemon is active, and its loop goes round."""
+    """Check whether a daemon is active, and its loop goes round."""
     workspace = examined.workspace
     holder, ago_s = workspace.holder(), seconds_since_beat(workspace)
     seen = "never seen here" if ago_s is None else f"last seen {told(timedelta(seconds=ago_s))} ago"
@@ -120,7 +121,7 @@ def check_daemon(examined: Examined) -> Iterator[Finding]:
 
 
 def check_spool(examined: Examined) -> Iterator[Finding]:
-    """Whether files wait in the spool, or lie there for ever."""
+    """Check whether files wait in the spool, or lie there for ever."""
     spool = examined.workspace.spool
     ages = [_age(path, examined.now) for path in scan(spool)]
     if not ages:
@@ -156,7 +157,7 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
 
 
 def check_under_way(examined: Examined) -> Iterator[Finding]:
-    """Whether a recording has been standing still."""
+    """Check whether a recording has been standing still."""
     store, now = examined.store, examined.now
     unready = _without_baseline(examined)
     standing = [
@@ -182,7 +183,7 @@ def check_under_way(examined: Examined) -> Iterator[Finding]:
 
 
 def check_quarantine(examined: Examined) -> Iterator[Finding]:
-    """Which files were refused, and since when."""
+    """Check which files were refused, and since when."""
     folder = examined.workspace.quarantine.folder
     reasons = sorted(folder.glob("*.reason.json"), key=lambda path: path.stat().st_mtime)
     if not reasons:
@@ -202,7 +203,7 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
 
 
 def check_held(examined: Examined) -> Iterator[Finding]:
-    """Whether recordings wait for a person to decide."""
+    """Check whether recordings wait for a person to decide."""
     found = list_holds(examined.store)
     if not found:
         yield ok("held", "nothing waits for you to decide")
@@ -216,7 +217,7 @@ def check_held(examined: Examined) -> Iterator[Finding]:
 
 
 def check_raw_files(examined: Examined) -> Iterator[Finding]:
-    """Whether the raw files of the latest recordings are where the store says."""
+    """Check whether the raw files of the latest recordings are where the store says."""
     store, archive = examined.store, examined.workspace.archive
     latest = list_recordings(store)[-_LOOKED_AT:]
     away = list_removed(store)
@@ -242,7 +243,7 @@ def _without_baseline(examined: Examined) -> set[int]:
 
 
 def _age(path: Path, now: datetime) -> timedelta:
-    """How long a file has been where it is; its own times come from wherever it was made."""
+    """Return how long a file has been where it is; its own times come from wherever it was made."""
     try:
         since = datetime.fromtimestamp(path.lstat().st_ctime, UTC)
     except FileNotFoundError:
@@ -251,7 +252,7 @@ def _age(path: Path, now: datetime) -> timedelta:
 
 
 def check_store(examined: Examined) -> Iterator[Finding]:
-    """Whether the store is whole, as far as a quick look tells."""
+    """Check whether the store is whole, as far as a quick look tells."""
     store = examined.store
     troubles = quick_troubles(store)
     if troubles:
@@ -269,7 +270,7 @@ def check_store(examined: Examined) -> Iterator[Finding]:
 
 
 def check_backup(examined: Examined) -> Iterator[Finding]:
-    """How old the last backup is, and how many raw files have no copy."""
+    """Check how old the last backup is, and how many raw files have no copy."""
     store, now = examined.store, examined.now
     last = find_last_backup(store)
     remedy = "`shm db backup FILE --archive DIR`, best every night."
@@ -286,7 +287,7 @@ def check_backup(examined: Examined) -> Iterator[Finding]:
 
 
 def check_clock(examined: Examined) -> Iterator[Finding]:
-    """Whether the clock has jumped back, and whether anything sets it."""
+    """Check whether the clock has jumped back, and whether anything sets it."""
     newest, now = find_newest_step(examined.store), examined.now
     if newest is not None and newest - now > _CLOCK_TOLERANCE:
         yield fault(
@@ -304,7 +305,7 @@ def check_clock(examined: Examined) -> Iterator[Finding]:
 
 
 def check_hangers(examined: Examined) -> Iterator[Finding]:
-    """Which hangers have no test, none lately, or no baseline."""
+    """Check which hangers have no test, none lately, or no baseline."""
     store, bridge = examined.store, examined.workspace.bridge
     settings, latest = examined.workspace.settings, count_tests(store)
     selected = list_selected_models(store)
@@ -374,13 +375,13 @@ def check_streams(examined: Examined) -> Iterator[Finding]:
 
 
 def check_changed_settings(examined: Examined) -> Iterator[Finding]:
-    """Who reads `bridge.toml` must learn what holds instead of it."""
+    """List settings that hold instead of `bridge.toml`: who reads it must learn of them."""
     changed = examined.store.settings.list_current().values()
     yield ok("settings", "; ".join(map(str, changed)) or "all as bridge.toml says")
 
 
 def _synchronised() -> bool | None:
-    """Whether a service keeps the clock right; None where nobody can tell."""
+    """Return True if a service keeps the clock right; None where nobody can tell."""
     if shutil.which(_SYNCHRONISED[0]) is None:
         return None
     try:

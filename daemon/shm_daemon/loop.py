@@ -80,7 +80,7 @@ class Patience:
         self._wakeup, self._standby, self._said = wakeup, standby, ""
 
     def __call__(self, error: StoreError) -> bool:
-        """Whether to try again, after a while: not where it is another's and we do not stand by."""
+        """Wait a while; return True to try again, not where the store is another's."""
         if isinstance(error, StoreBusy) and not self._standby:
             return False
         if self._said != error.message:
@@ -196,8 +196,9 @@ class Daemon:
         self._flow.executor.shutdown(wait=False, cancel_futures=True)
 
     def _turn(self) -> bool:
-        """Whether anything is left to do; errors that pass are waited for, and shown until a turn
-        with a scan went well.
+        """Take a turn; return True if anything is left to do.
+
+        Errors that pass are waited for, and shown until a turn with a scan went well.
         """
         is_whole = time.monotonic() >= self._scan_at
         try:
@@ -251,7 +252,7 @@ class Daemon:
         return "".join(delays[:1]) + more
 
     def _is_fatal(self, error: ShmError) -> bool:
-        """Whether the service ends: not by what a damaged store answers, unless once is enough."""
+        """Return True if the service ends by an error: not by a damaged store, but with once."""
         if isinstance(error, StoreDamaged):
             return self._once
         mends = isinstance(error, StoreError) and not isinstance(error, SchemaOutdated)

@@ -51,7 +51,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Broker:
-    """Where the broker is and who we are there."""
+    """Address of the broker and our user there."""
 
     host: str
     port: int
@@ -141,7 +141,7 @@ class Listener:
         self._client.loop_start()
 
     def end(self) -> None:
-        """What is not acknowledged by now the broker sends again."""
+        """End; the broker sends again what is not acknowledged by now."""
         self._ended.set()
         self._queue.put(None)
         self._client.disconnect()
@@ -150,7 +150,7 @@ class Listener:
 
     @property
     def connected(self) -> bool:
-        """Whether the broker has accepted our subscription."""
+        """Return True if the broker has accepted our subscription."""
         return self._subscribed
 
     @property

@@ -1,4 +1,4 @@
-"""What lies in the spool, and which of it is whole.
+"""Look through the spool, and decide which of its files are whole.
 
 The spool is looked through with all its subfolders but `streams/`, where loggers roll their files:
 see `streams`. Left alone are names that begin with a dot,
@@ -50,7 +50,7 @@ _PATIENCE_WITH_EMPTY = 10.0  # judgement: times as long: some loggers open a fil
 
 @dataclass(frozen=True, order=True)
 class Look:
-    """What a file looks like from outside: when and how large, it and its sidecar."""
+    """State of a file and its sidecar from outside: when changed and how large."""
 
     modified_ns: int
     size_bytes: int
@@ -71,7 +71,7 @@ def scan(spool: Path, meanwhile: Callable[[], object] = lambda: None) -> dict[Pa
 
 
 def is_sidecar(path: Path) -> bool:
-    """Whether a name is that of a sidecar, which waits for its file."""
+    """Return True if a name is that of a sidecar, which waits for its file."""
     return path.name.lower().endswith(SIDECAR_SUFFIX)
 
 
@@ -87,7 +87,7 @@ def left_alone(spool: Path) -> list[Path]:
 
 
 def never_taken(spool: Path) -> dict[Path, str]:
-    """What lies in the spool and will never be taken, by what it is."""
+    """Return the entries of the spool that will never be taken, by what they are."""
     unlisted: dict[Path, str] = {}
 
     def note(error: OSError) -> None:
@@ -158,7 +158,7 @@ class FileStabilityTracker:
         self._left: dict[Path, Look] = {}
 
     def whole(self, looks: Mapping[Path, Look]) -> list[Path]:
-        """Those of the files that are whole, the oldest first."""
+        """Return those of the files that are whole, the oldest first."""
         now = self._clock()
         known, self._seen = self._seen, {}
         self._left = {path: look for path, look in self._left.items() if looks.get(path) == look}
@@ -184,11 +184,11 @@ class FileStabilityTracker:
 
     @property
     def watching(self) -> bool:
-        """Whether any file is yet to be taken."""
+        """Return True if any file is yet to be taken."""
         return bool(self._seen)
 
     def seconds_to_next(self) -> float:
-        """How long until the next file may be whole; infinite without files."""
+        """Return how long until the next file may be whole; infinite without files."""
         if not self._seen:
             return float("inf")
         return max(0.0, min(map(self._whole_at, self._seen)) - self._clock())
@@ -254,7 +254,7 @@ class Incoming:
         self.size_bytes += len(piece)
 
     def whole(self) -> Path:
-        """Where the file lies, forced to disk, until it lands or is closed."""
+        """Return where the file lies, forced to disk, until it lands or is closed."""
         self._file.flush()
         os.fsync(self._file.fileno())
         return self._path
@@ -292,7 +292,7 @@ class Incoming:
         return path
 
     def _lies_there(self, target: Path, sidecar: Path | None) -> bool:
-        """Whether the same bytes wait already under that name, with the same sidecar."""
+        """Return True if the same bytes wait already under that name, with the same sidecar."""
         beside = sidecar_path(target)
         try:
             if target.stat().st_size != self.size_bytes:
@@ -304,7 +304,7 @@ class Incoming:
             return False
 
     def _placed(self, target: Path, sidecar: Path | None) -> bool:
-        """Whether the place was free, of the file and of its sidecar, and is ours now."""
+        """Return True if the place was free, of the file and of its sidecar, and is ours now."""
         beside = sidecar_path(target)
         if target.exists() or beside.exists():
             return False

@@ -80,7 +80,7 @@ _MINUTE_S = 60
 
 
 class RollingFiles:
-    """What lies in the folders of the streams, and which of it is whole."""
+    """Files in the folders of the streams, of which the whole ones are taken."""
 
     def __init__(self, workspace: Workspace, store: Store, clock: Callable[[], datetime]):
         self._store, self._clock = store, clock

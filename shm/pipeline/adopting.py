@@ -49,7 +49,7 @@ from shm.watch.options import reference_of
 
 @dataclass(frozen=True)
 class Wish:
-    """What is to be adopted: `effects` and, unless the diagnosis tells, where each acts (`at`).
+    """Request to adopt `effects`, each at a place (`at`) unless the diagnosis tells it.
 
     `baseline` is the class to which they are added; empty: that of the latest diagnosis, or beam1.
     """
@@ -63,7 +63,7 @@ class Wish:
 
 @dataclass(frozen=True)
 class GapWatch:
-    """What became of the gap since an adoption: `now_percent` is NaN before the next test."""
+    """Gap since an adoption: `now_percent` is NaN before the next test."""
 
     adopted: StoredAdoption
     now_percent: float
@@ -280,7 +280,7 @@ def _place_in(cause: Cause, effect: str) -> str:
 
 
 def _estimates(effect: str, cause: Cause) -> dict[str, EffectEstimate]:
-    """What the diagnosis found; of a pair, names that both have stand behind their effect's."""
+    """Return the diagnosis's estimates; of a pair, shared names are those of their effect."""
     return {each.name.removeprefix(f"{effect}."): each for each in cause.parameters}
 
 

@@ -186,7 +186,7 @@ def unwatched(
 def notes_of(
     standing: Sequence[StoredAlert], silences: tuple[Silence, ...], hanger: int, now: datetime
 ) -> tuple[str, ...]:
-    """What people did about the alerts of a hanger that stand."""
+    """Return what people did about the alerts of a hanger that stand."""
     noted = [(each.id, each.acknowledgement) for each in standing if each.alert.kinds != ("test",)]
     until = silenced_until(silences, hanger, now) if noted else None
     return (
@@ -201,7 +201,7 @@ def notes_of(
 
 @dataclass(frozen=True)
 class HangersNow:
-    """What the store says of all hangers, asked in a few queries without any samples."""
+    """State of all hangers by the store, asked in a few queries without any samples."""
 
     workspace: Workspace
     now: datetime
@@ -277,7 +277,7 @@ def _only(hangers: Sequence[Hanger]) -> int | None:
 
 
 def _courses(store: Store, hangers: Sequence[Hanger], period: Period) -> dict[int, Course]:
-    """What became of each hanger in the period."""
+    """Return what became of each hanger in the period."""
     raised = Counter(
         each.alert.hanger for each in store.alerts.list_all() if period.holds(each.alert.time)
     )
@@ -335,7 +335,7 @@ def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]
 
 
 def _known_drifts(store: Store, latest: StoredWatch) -> Sequence[Drift]:
-    """Those of the latest test; of all, where its shift of the tension is not known."""
+    """Return those of the latest test; of all, where its shift of the tension is not known."""
     drifts = latest.watched.told
     if any(each.quantity == TENSION and math.isfinite(each.shift_mean) for each in drifts):
         return drifts

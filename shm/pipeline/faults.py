@@ -1,4 +1,4 @@
-"""What one hanger's rows hold stops that hanger, and neither the others nor the daemon."""
+"""Contain a fault: rows of one hanger stop that hanger, not the others nor the daemon."""
 
 from __future__ import annotations
 

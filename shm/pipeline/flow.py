@@ -148,7 +148,10 @@ class Flow:
         return bool(self.under_way)
 
     def suspects_due_s(self) -> float | None:
-        """How long until a recording is tried again whose process died; None without such."""
+        """Return the seconds until a recording whose process died is tried again.
+
+        None without one.
+        """
         times = [self._postponed[key] for key in self._suspects if key in self._postponed]
         return max(0.0, (min(times) - self.clock()).total_seconds()) if times else None
 

@@ -39,7 +39,7 @@ from shm.store.queries.history import list_events
 
 
 class Sharing:
-    """How many files wait for the same sidecar; each folder is listed once.
+    """Count of files that wait for the same sidecar; each folder is listed once.
 
     One for each look into the spool: with one for each file, ten thousand files would be listed
     ten thousand times.
@@ -50,7 +50,7 @@ class Sharing:
         self._waiting: dict[Path, Counter[Path]] = {}
 
     def others_need(self, sidecar: Path) -> bool:
-        """Whether more than one file of the folder waits for a sidecar."""
+        """Return True if more than one file of the folder waits for a sidecar."""
         return self._of(sidecar.parent)[sidecar] > 1
 
     def taken(self, sidecar: Path) -> None:
@@ -108,7 +108,7 @@ def receive(
 
 
 def _modified(path: Path) -> datetime | None:
-    """When the file was last written; None where its folder says something impossible."""
+    """Return when the file was last written; None where its folder says something impossible."""
     try:
         return datetime.fromtimestamp(path.stat().st_mtime, UTC)
     except (OSError, OverflowError, ValueError):

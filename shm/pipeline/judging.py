@@ -165,7 +165,7 @@ def _notice(
     held: Sequence[HeldTest],
     candidates: Mapping[int, Candidate],
 ) -> Alert:
-    """What to tell of a recording, once: of the test whose modes say most."""
+    """Return what to tell of a recording, once: of the test whose modes say most."""
     leading = max(held, key=lambda each: np.nan_to_num(abs(each.tension_shift)))
     candidate = candidates[leading.position]
     hanger = candidate.hanger.id

@@ -1,4 +1,4 @@
-"""What the steps agree on: classes, seeds, refusals, what results depend on and what of it changed.
+"""Settings shared by the steps: classes, seeds, refusals, lineage of results and its changes.
 
 Nothing here imports what computes, so that the daemon itself begins quickly and stays small.
 
@@ -57,7 +57,7 @@ class Taught:
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """How an update is made: samples, seed, priors, and what a measured tension has taught."""
+    """Options of an update: samples, seed, priors, and what a measured tension has taught."""
 
     samples: int
     seed: int
@@ -82,14 +82,14 @@ def identify_settings(settings: Settings) -> dict[str, Any]:
 
 
 def read_limits(settings: Settings) -> Limits:
-    """What one file may hold and what reading it may cost."""
+    """Return what one file may hold and what reading it may cost."""
     return Limits(**{each.name: getattr(settings, each.name) for each in fields(Limits)})
 
 
 def identify_lineage(
     recording: StoredRecording, hanger_id: int | None, workspace: Workspace
 ) -> Lineage:
-    """What the tests of a recording depend on: file, sidecar, settings, description, version."""
+    """Return the lineage of tests: file, sidecar, settings, description, version."""
     bridge = workspace.bridge
     inputs = [recording.file.sha256, recording.file.sidecar_as]
     terms = {
@@ -108,7 +108,7 @@ def _described(hanger: Hanger) -> dict[str, Any]:
 def diagnosis_lineage(
     tests: Sequence[StoredTest], hanger: Hanger, terms: Mapping[str, Any]
 ) -> Lineage:
-    """What a diagnosis depends on: tests, description, options, version."""
+    """Return what a diagnosis depends on: tests, description, options, version."""
     inputs = [[test.key, test.lineage.columns] for test in tests]
     return Lineage.of(inputs, {**terms, "hanger": _described(hanger)})
 
@@ -142,7 +142,7 @@ def seed_of(seed: int, keys: Sequence[str]) -> int:
 def reason_document(
     error: BaseException, recording: StoredRecording, time: datetime
 ) -> dict[str, Any]:
-    """Why a file is refused: which file, line and channel, what is wrong, what to do."""
+    """Return why a file is refused: which file, line and channel, what is wrong, what to do."""
     message = f"internal error: {error!r}."
     remedy = "Report this with the log, then drop the file again."
     if isinstance(error, ShmError):

@@ -165,7 +165,7 @@ def hanger_now(
 
 
 def _changed(store: Store, hanger: Hanger) -> dict[str, str]:
-    """What holds of a hanger instead of what `bridge.toml` says."""
+    """Return what holds of a hanger instead of what `bridge.toml` says."""
     current = store.settings.list_current().values()
     return {f"changed: {each.key}": str(each) for each in current if each.is_of(hanger.id)}
 
@@ -214,7 +214,7 @@ def _baseline_words(baseline: Baseline | None) -> dict[str, str]:
 
 
 def _acknowledged(alerts: Sequence[StoredAlert]) -> dict[str, str]:
-    """Who took note of an alert, or that it ended, when and why, by its key."""
+    """Return who took note of an alert, or that it ended, when and why, by its key."""
     noted = {each.alert.key: each.acknowledgement or each.resolution for each in alerts}
     ended = {each.alert.key for each in alerts if each.resolution and not each.acknowledgement}
     return {
@@ -231,7 +231,7 @@ def _watched_against(store: Store, baseline: Baseline | None) -> tuple[WatchedTe
 
 
 def _neighbours(workspace: Workspace, store: Store) -> BridgePattern | None:
-    """What moved over the bridge; None where fewer than three hangers can be compared."""
+    """Return what moved over the bridge; None where fewer than three hangers can be compared."""
     try:
         return stored_pattern(store, [hanger.id for hanger in workspace.bridge.hangers])
     except NothingThere:
@@ -257,7 +257,7 @@ def hanger_states(
 def modal_test_report(
     workspace: Workspace, store: Store, hanger_id: int, name: str
 ) -> ModalTestReport:
-    """How a stored test came to its modes: its raw file is identified once more.
+    """Return how a stored test came to its modes: its raw file is identified once more.
 
     Raises NothingThere for an unknown test and for one whose modes a file gave.
     """

@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 @dataclass
 class RestOfDays:
-    """Whether what a day lacks may still come: a part of a day, as its night, is no test of it.
+    """Days whose rest may still come: a part of a day, as its night, is no test of it.
 
     A logger that was offline sends what it stored after what is new, or before it, in any order.
     `came` is when each stream last brought anything out of its turn, or was back after hours; what
@@ -50,7 +50,7 @@ class RestOfDays:
             self.lacking.pop(name, None)
 
     def is_awaited(self, store: Store, name: str, day: datetime) -> bool:
-        """Whether a day that is over lacks windows, and is not old enough to be judged without."""
+        """Return True if a day that is over lacks windows, and is too young to be judged without."""
         end, now = day + PERIODS["day"], self.clock()
         if self.hurry or now >= max(self.came.setdefault(name, now), end) + _REST_COMES:
             return False

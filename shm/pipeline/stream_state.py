@@ -1,4 +1,4 @@
-"""How each stream is, and what it has shown over the last days."""
+"""State of each stream, and its readings over the last days."""
 
 from __future__ import annotations
 
@@ -132,10 +132,10 @@ def _as_one(run: Sequence[StreamEvent]) -> StreamEvent:
 
 
 def _received(state: RingState, now: datetime) -> tuple[float, float]:
-    """Which share of the last ten minutes that are sealed came, and which share of a day did not,
-    from the first sample on up to the last one.
+    """Return the received fraction of the last ten minutes, and the lost fraction of a day.
 
-    Ten minutes are those of the chunks that begin in them: what these have beyond the edges counts.
+    Of samples from the first one on up to the last one. Ten minutes are those of the chunks that
+    begin in them: what these have beyond the edges counts.
     """
     came_s = {parse_time(start): seconds for start, seconds in state.received_s.items()}
     spans = {parse_time(start): span for start, span in state.spans.items()}
@@ -167,9 +167,7 @@ def _last_hour(store: Store, stream: Stream) -> PooledReading | None:
 
 
 def against_hammer(store: Store, stream: Stream) -> AmbientBias:
-    """What a stream's frequencies differ by from those of the latest hammer tests made while it
-    ran.
-    """
+    """Compare a stream's frequencies with those of hammer tests made while it ran."""
     hours = find_pooled_range(store, stream.name, "hour")
     if hours is None:
         return ambient_bias(stream.hanger, (), ())

@@ -139,7 +139,7 @@ class Streaming:
 
     @property
     def under_way(self) -> tuple[Future[Any], ...]:
-        """What is being computed now."""
+        """Return what is being computed now."""
         return tuple(running.future for running in self._running.values())
 
     def advance(self, *, hurry: bool = False) -> bool:
@@ -203,7 +203,7 @@ class Streaming:
             self._begin_window(stream, start)
 
     def _recall(self, stream: Stream) -> None:
-        """How far the stream had come, what was sealed since, and what came late."""
+        """Return how far the stream had come, what was sealed since, and what came late."""
         name = stream.name
         self._known.add(name)
         done = find_progress(self.store, name)
@@ -222,7 +222,7 @@ class Streaming:
             self._note(name, start)
 
     def _go_back(self, stream: Stream, changed: datetime) -> None:
-        """What windows that came late belong to is pooled next, from the earliest of them on.
+        """Pool again from the earliest window on that came late.
 
         The watch goes on from how it was before them; further back than its states are kept, they
         are pooled and not watched.
@@ -299,7 +299,7 @@ class Streaming:
         return start if start is not None and start + length <= done else None
 
     def _is_due(self, stream: Stream, period: Period, start: datetime) -> bool:
-        """Whether it has windows and is not pooled, or is an hour yet to be watched."""
+        """Return True if it has windows and is not pooled, or is an hour yet to be watched."""
         end = start + PERIODS[period]
         known = list_pooled(self.store, stream.hanger, period, start, end)
         if any(each.stream == stream.name for each in known):

@@ -1,4 +1,4 @@
-"""Which permanent sensors say nothing, or something else than the others.
+"""Find permanent sensors that are silent or disagree with the others.
 
 What `shm doctor`, the pages and the messages tell alike. An event of each stream that begins to see
 nothing, an alert of what lasts for a day, over once it ends; thermometers against each other.
@@ -105,7 +105,7 @@ def last_samples(workspace: Workspace, ring: Ring, store: Store) -> dict[str, da
 
 
 def word_of(last: datetime | None, events: Sequence[StreamEvent], now: datetime) -> State:
-    """How a stream is by its last sample and the `events` of a day."""
+    """Return how a stream is by its last sample and the `events` of a day."""
     if last is None:
         return "never sent"
     if last - now > _AHEAD:  # whether it still sends cannot be told by its stamps
@@ -225,7 +225,7 @@ def _gigabytes(size: int) -> str:
 
 
 def blind_hangers(found: Sequence[Heard]) -> dict[int, Lead]:
-    """What is said first of each hanger whose stream says nothing."""
+    """Return what is said first of each hanger whose stream says nothing."""
     leads = {}
     for each in found:
         if each.state in _BLIND:

@@ -1,4 +1,4 @@
-"""Which tests the watch goes over, which are judged again, and the alerts that follow.
+"""Choose the tests that the watch goes over or judges again; reconcile the alerts.
 
 A threshold judges the stored tests too: at once they are compared with their baseline again. A loss
 that only the new one calls is raised; an alert that no test is beyond any more is closed, and says
@@ -57,7 +57,7 @@ _BESIDE = 2  # of which two that agree have been told before
 
 @dataclass(frozen=True)
 class ToWatch:
-    """What a watch needs: the tests of the baseline and those to go over, the newest last.
+    """Input of a watch: the tests of the baseline and those to go over, the newest last.
 
     With something `kept` the newest goes alone. `key` tells what is kept after it from what was
     kept after other tests, or by another shm.
@@ -70,7 +70,10 @@ class ToWatch:
 
 
 def to_watch(store: Store, baseline: Baseline, newest: StoredTest) -> ToWatch:
-    """What the watch of a test needs; how many tests there were before costs next to nothing."""
+    """Return what the watch of a test needs.
+
+    How many tests there were before costs next to nothing.
+    """
     before, kept = list_watched_tests(store, baseline, newest), find_watch_state(store, baseline)
     key = _key(before, newest)
     if kept is None or kept.key != _key(before):
@@ -185,7 +188,7 @@ class JudgedAgain:
 
 
 def differences(judged: StoredWatch, hanger: Hanger, settings: Settings) -> Iterator[str]:
-    """Which thresholds in force are others than those that a test was judged with."""
+    """Return which thresholds in force are others than those that a test was judged with."""
     limits, watched = hanger.thresholds, judged.watched
     own = limits.false_call_years
     pairs = {

@@ -123,7 +123,7 @@ def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
 
 
 def watch_document(watched: WatchedTest) -> dict[str, Any]:
-    """What the sequential test says after a test; its drifts are kept by themselves."""
+    """Return the document of a watched test without its drifts, which have rows."""
     creep = watched.creep_per_year
     return {
         "temperature_c": watched.temperature_c,
@@ -152,5 +152,5 @@ def watch_in(text: str) -> tuple[WatchedTest, float, Alert | None]:
 
 @lru_cache(_HELD)
 def change_in(text: str) -> Change:
-    """What the sequential test says after a test back from the document of its watch."""
+    """Return the change from the document of a watch."""
     return value_of(Change, loads(text)["change"])

@@ -51,7 +51,7 @@ class ChangedSettings(Repository):
         return self.scalar(sa.select(sa.func.max(changed_settings.c.id))) or 0
 
     def list_current(self) -> Mapping[str, ChangedSetting]:
-        """What holds instead of `bridge.toml`, by its key."""
+        """Return what holds instead of `bridge.toml`, by its key."""
         with self.reading() as connection:
             return _current(connection)
 

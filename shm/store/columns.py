@@ -168,17 +168,8 @@ def reference(table: str, *, nullable: bool = False) -> sa.Column[int]:
     return sa.Column(f"{table[:-1]}_id", sa.ForeignKey(f"{table}.id"), nullable=nullable)
 
 
-def lineage() -> tuple[sa.Column[str], ...]:
-    """Where a result comes from."""
-    return (
-        sa.Column("input_sha256", sa.String(64), nullable=False),
-        sa.Column("settings_sha256", sa.String(64), nullable=False),
-        sa.Column("version", sa.String(32), nullable=False),
-    )
-
-
 def note_on_alert(prefix: str) -> tuple[sa.Column[Any], ...]:
-    """What is noted on an alert once: when, by whom and why."""
+    """Return the columns of a note on an alert: when, by whom and why."""
     names = ("at", "who", "why")
     return tuple(sa.Column(f"{prefix}_{n}", UtcTime if n == "at" else sa.Text) for n in names)
 
@@ -190,7 +181,7 @@ def model() -> sa.Column[str]:
 
 
 def superseded_at() -> sa.Column[Any]:
-    """When a later run replaced it."""
+    """Return the column for when a later run replaced a row."""
     # What a later run has replaced stays with its lineage; empty of what is in force.
     return sa.Column("superseded_at", UtcTime)
 

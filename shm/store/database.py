@@ -46,12 +46,12 @@ def url_of(location: str | Path) -> sa.URL:
 
 
 def is_server(location: str | Path) -> bool:
-    """Whether the store is a PostgreSQL database rather than a file."""
+    """Return True if the store is a PostgreSQL database rather than a file."""
     return url_of(location).get_backend_name() == "postgresql"
 
 
 def has_password(location: str) -> bool:
-    """Whether the URL itself holds a password, which then stands wherever the URL stands."""
+    """Return True if the URL itself holds a password, which then stands wherever the URL stands."""
     url = url_of(location)
     return bool(url.password) or "password" in url.query
 

@@ -43,12 +43,12 @@ def recording_from(row: Row[Any]) -> StoredRecording:
 
 
 def counts(table: sa.Table) -> sa.ColumnElement[bool]:
-    """What is neither refused nor held: all that is shown and computed with."""
+    """Select what is neither refused nor held: all that is shown and computed with."""
     return table.c.stage.not_in([Stage.REFUSED, Stage.HELD])
 
 
 def in_force(table: sa.Table) -> sa.ColumnElement[bool]:
-    """What no later run has replaced."""
+    """Select what no later run has replaced."""
     return table.c.superseded_at.is_(None)
 
 
@@ -76,7 +76,7 @@ def end_recording(
 def reason_document(
     file_name: str, sha256: str | None, message: str, remedy: str, at: datetime
 ) -> dict[str, Any]:
-    """Why a file is held or refused, no `line` and no `channel` of it being at fault."""
+    """Return why a file is held or refused, no `line` and no `channel` of it being at fault."""
     return {
         "schema": "shm.reason/1",
         "file": file_name,
@@ -131,7 +131,10 @@ _PROGRESS = (Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
 
 
 def all_at(connection: Connection, chosen: Iterable[StoredTest], stage: Stage) -> bool:
-    """Whether tests are in force and still at a stage: another process may have been first."""
+    """Return True if tests are in force and still at a stage.
+
+    Another process may have been first.
+    """
     query = sa.select(tests.c.stage, tests.c.superseded_at).where(
         tests.c.id.in_([test.id for test in chosen])
     )
@@ -180,7 +183,7 @@ def _why_held(connection: Connection, recording_id: int) -> tuple[str, str]:
 
 
 def test_contents(item: IdentifiedTest, name: str) -> dict[str, Any]:
-    """What an identification gave, by column."""
+    """Return the result of an identification, by column."""
     response = item.frequency_response
     return {
         "hanger": item.test.hanger,

@@ -49,7 +49,7 @@ is_event = (
 
 @dataclass(frozen=True)
 class Actor:
-    """Who works with a store: a user, `token NAME`, a user of the computer; and by which way."""
+    """Person or program that works with a store, and by which way."""
 
     name: str
     via: str
@@ -94,7 +94,7 @@ def acting_as(engine: Engine, actor: Actor) -> Engine:
 
 
 class Journal(Repository):
-    """What happened; `shm.store.queries.history` reads it back."""
+    """Journal of events; `shm.store.queries.history` reads it back."""
 
     def note(self, at: datetime, action: str, subject: str, detail: str = "") -> None:
         """Note what changed outside the store, as a file that was uploaded."""

@@ -151,14 +151,14 @@ def stored_alert(row: Row[Any]) -> StoredAlert:
 
 
 def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
-    """Who took note of an alert, of a row of `stored_alerts`; None while it is open."""
+    """Return the acknowledgement in a row of `stored_alerts`; None while it is open."""
     if row.noted_at is None:
         return None
     return Acknowledgement(row.id, row.noted_who, row.noted_why, row.noted_at)
 
 
 def resolution_of(row: Row[Any]) -> Resolution | None:
-    """How the condition of an alert ended, of a row of `stored_alerts`; None while it stands."""
+    """Return the resolution in a row of `stored_alerts`; None while its condition holds."""
     if row.ended_at is None:
         return None
     return Resolution(row.id, row.ended_who, row.ended_why, row.ended_at)
@@ -172,7 +172,7 @@ _any_waits = sa.select(sa.exists().where(deliveries.c.state == DeliveryState.WAI
 
 
 class Deliveries(Repository):
-    """What hooks are owed; a part of the repository of alerts."""
+    """Messages owed to hooks; a part of the repository of alerts."""
 
     def list_deliveries(
         self,
@@ -310,7 +310,7 @@ def alert_in(connection: Connection, alert_id: int) -> StoredAlert:
 
 
 def _note(connection: Connection, delivery: Delivery, values: dict[str, Any]) -> Sequence[Row[Any]]:
-    """Those of the message that were still owed: another process may have had an answer before.
+    """Update the deliveries of a message that are still owed; return these.
 
     What is tried is a message, if only of one alert.
     """

@@ -1,4 +1,4 @@
-"""Who may come in: people who sign in by name, their roles, passwords and browsers; tokens."""
+"""Users, roles, passwords and sessions of people; tokens of programs."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ class People(Repository):
         return self._begin(row.id, at)
 
     def user_of(self, secret: str, at: datetime) -> User | None:
-        """Whose session this is; None where it has ended or never was."""
+        """Return the user of a session; None where it has ended or never was."""
         query = _in_force.join(sessions, sessions.c.user_id == users.c.id).where(
             sessions.c.secret_sha256 == _checksum(secret),
             sessions.c.ended_at.is_(None),
@@ -182,7 +182,7 @@ _in_force = sa.select(users).where(users.c.removed_at.is_(None))
 
 
 def same_name(name: str) -> str:
-    """What names have in common that read alike: Unicode form, spaces and case are left out."""
+    """Return a name without Unicode form, spaces and case, in which names that read alike agree."""
     return _in_one_form(name).casefold()
 
 

@@ -35,7 +35,7 @@ _UNDER_WAY = "not through yet"
 
 @dataclass(frozen=True)
 class CopiedArchive:
-    """What came of copying an archive: files copied now and before, and what could not be."""
+    """Outcome of copying an archive: files copied now and before, and those that failed."""
 
     copied: int
     present: int
@@ -59,7 +59,7 @@ class Removal:
 
 @dataclass(frozen=True)
 class Retention:
-    """What may go, and of those old enough how many stay for which reason."""
+    """Files that may go, and of those old enough how many stay for which reason."""
 
     removals: tuple[Removal, ...]
     kept: Mapping[str, int]
@@ -209,7 +209,7 @@ def _has(target: Archive, source: Archive, name: str) -> bool:
 
 
 def _folders(store: Store) -> defaultdict[int, list[str]]:
-    """Where copies of each recording were noted, the newest first."""
+    """Return where copies of each recording were noted, the newest first."""
     found: defaultdict[int, list[str]] = defaultdict(list)
     for copy in reversed(list_copies(store)):
         found[copy.recording_id].append(copy.folder)
@@ -231,7 +231,7 @@ def _copy(archive: Archive, recording: StoredRecording, folders: Iterable[str]) 
 
 
 def _is_copy(copy: Path, original: Path) -> bool:
-    """Whether a file has the SHA-256 that it is named by, and is not `original` itself."""
+    """Return True if a file has the SHA-256 that it is named by, and is not `original` itself."""
     try:
         if original.exists() and copy.samefile(original):
             return False  # a link to what would be deleted is no copy of it

@@ -32,7 +32,7 @@ from shm.values import (
 
 
 class Stage(StrEnum):
-    """How far a recording or a test has come. A recording stands where its last test stands."""
+    """Progress of a recording or a test. A recording is where its least advanced test is."""
 
     RECEIVED = "received"
     IDENTIFIED = "identified"
@@ -48,7 +48,7 @@ ENDED = (Stage.DONE, Stage.REFUSED, Stage.HELD)
 
 
 class DeliveryState(StrEnum):
-    """What has become of a delivery."""
+    """State of a delivery."""
 
     WAITING = "waiting"
     DELIVERED = "delivered"
@@ -69,10 +69,9 @@ OTHER = "other"
 
 
 def counts_by_name(known: type[StrEnum], rows: Iterable[Sequence[Any]]) -> dict[str, int]:
-    """How many rows say what: each name of `known`, 0 where there is none, and `OTHER` where a row
-    says something else, as one of a newer version may.
+    """Sum the counts in pairs of a name and a count; unknown names are summed under `OTHER`.
 
-    `rows` are pairs of what is said and how often. Counting never fails for what a row says.
+    Each name of `known` is counted, 0 where there is none.
     """
     counted: dict[str, int] = {str(name): 0 for name in known}
     for said, times in rows:
@@ -87,7 +86,7 @@ DESCRIBED = "described"
 
 @dataclass(frozen=True)
 class Lineage:
-    """Where a result comes from: checksums of its input and settings, and the version.
+    """Origin of a result: checksums of its input and settings, and the version.
 
     `described` is the description of the hanger among those settings, where it is known: kept
     beside a posterior, so that a later description can be compared with it.
@@ -109,7 +108,7 @@ class Lineage:
 
     @property
     def columns(self) -> dict[str, str]:
-        """What stands in columns of its own, and in the lineage of what is made from it."""
+        """Return the part that has columns, and is in the lineage of what is made from it."""
         return {
             name: getattr(self, name) for name in ("input_sha256", "settings_sha256", "version")
         }
@@ -251,7 +250,7 @@ class StoredAdoption:
 
 @dataclass(frozen=True, eq=False)
 class StoredWatch:
-    """What the watch said after a test, and the baseline it was compared with.
+    """Result of the watch after a test, and the baseline it was compared with.
 
     `alert_probability` is by how much its alert was judged; NaN of a former version. `called` is
     the alert that it called for, raised or not; None of a former version, too.
@@ -267,7 +266,7 @@ class StoredWatch:
 
 @dataclass(frozen=True)
 class KeptWatch:
-    """What a watch goes on from: bytes of its own, made with what `key` tells."""
+    """Stored state of a watch, made with what `key` tells."""
 
     key: str
     last_test_time: datetime
@@ -276,7 +275,7 @@ class KeptWatch:
 
 @dataclass(frozen=True)
 class Note:
-    """What somebody notes on an alert, once."""
+    """Note of somebody on an alert, made once."""
 
     alert_id: int
     who: str
@@ -285,16 +284,16 @@ class Note:
 
     @property
     def said(self) -> dict[str, object]:
-        """Who, why and when, as documents tell it."""
+        """Return who, why and when, for documents."""
         return {"who": self.who, "why": self.why, "at": self.at}
 
 
 class Acknowledgement(Note):
-    """Who has taken note of an alert, when, and what they say to it."""
+    """Person who has taken note of an alert, when, and what they say to it."""
 
 
 class Resolution(Note):
-    """When the condition that an alert tells of ended, who found that (`shm` or a person), why."""
+    """End of the condition of an alert: when, found by whom (`shm` or a person), why."""
 
 
 @dataclass(frozen=True)
@@ -314,7 +313,7 @@ class StoredAlert:
 
     @property
     def is_open(self) -> bool:
-        """Whether it waits for somebody: it stands, and nobody has acknowledged it."""
+        """Return True while its condition holds and nobody has acknowledged it."""
         return self.acknowledgement is None and self.resolution is None
 
 
@@ -347,11 +346,11 @@ class Silence:
 
     @property
     def until(self) -> datetime:
-        """When it ends, or ended."""
+        """Return its end, planned or made earlier by a person."""
         return self.ends_at if self.ended_at is None else min(self.ended_at, self.ends_at)
 
     def is_over(self, at: datetime) -> bool:
-        """Whether it is not in force and will not be: one may end before it begins."""
+        """Return True if it is not in force and will not be: one may end before it begins."""
         return self.until <= max(at, self.starts_at)
 
     def is_in_force(self, at: datetime) -> bool:
@@ -359,7 +358,7 @@ class Silence:
         return self.starts_at <= at < self.until
 
     def covers(self, hanger: int, at: datetime) -> bool:
-        """Whether it is in force for a hanger at a time; its end is not part of it."""
+        """Return True if it is in force for a hanger at a time; its end is not part of it."""
         return self.hanger in (None, hanger) and self.is_in_force(at)
 
 
@@ -416,7 +415,7 @@ ON_THE_WAY = (Stage.RECEIVED, Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
 
 
 class Outcome(StrEnum):
-    """What came of receiving a file."""
+    """Outcome of receiving a file."""
 
     NEW = "new"
     RESUMED = "resumed"  # the same spool entry, after a crash before it was removed
@@ -456,7 +455,7 @@ class StoredRecording:
 
 @dataclass(frozen=True)
 class Receipt:
-    """What came of taking a file in."""
+    """Outcome of taking a file in, with its recording."""
 
     outcome: Outcome
     recording: StoredRecording
@@ -478,7 +477,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Rerun:
-    """What was sent back to be done again, and what that has superseded.
+    """Tests that were sent back to be done again, and the results that this has superseded.
 
     `of_baseline` are those of the tests from which the hanger's baseline was made: they are not
     watched, and the baseline stays as it was made until it is set anew.
@@ -522,7 +521,7 @@ class Deaths:
 
 
 class Decision(StrEnum):
-    """What a person made of a held recording; `REPLACED`: it was done again before one had.
+    """Decision of a person on a recording; `REPLACED`: it was done again before one was made.
 
     `WITHDRAWN`: it counted, and was discarded then; `REINSTATED`: what was discarded counts again.
     Of these two nothing was held, and no alert told.
@@ -570,7 +569,7 @@ class Hold:
 
     @property
     def is_for_its_clock(self) -> bool:
-        """Whether nothing but the time of its tests is in doubt: what they measured is not."""
+        """Return True if only the time of its tests is in doubt, not what they measured."""
         return bool(self.doubts) and all(each.check.startswith("clock") for each in self.doubts)
 
     @property
@@ -580,17 +579,17 @@ class Hold:
 
     @property
     def time_unknown(self) -> bool:
-        """Whether the time that its test claims is certainly wrong."""
+        """Return True if the time that its test claims is certainly wrong."""
         return any(doubt.time_unknown for doubt in self.doubts)
 
     @property
     def is_in(self) -> bool:
-        """Whether a person said that it counts."""
+        """Return True if a person said that it counts."""
         return self.decision in (Decision.CONFIRMED, Decision.REINSTATED)
 
     @property
     def is_out(self) -> bool:
-        """Whether a person said that it does not."""
+        """Return True if a person said that it does not."""
         return self.decision in (Decision.DISCARDED, Decision.WITHDRAWN)
 
 
@@ -673,7 +672,7 @@ class BaselineGlance(Numbers):
 
 
 class EventKind(StrEnum):
-    """What happened to a hanger beside its tests."""
+    """Kind of an event of a hanger other than a test."""
 
     BASELINE = "baseline"
     ADOPTED = "adopted"
@@ -697,14 +696,14 @@ class HangerEvent:
 
 
 class Role(StrEnum):
-    """What a person may do; each may what the one before may."""
+    """Role of a person; each may what the one before may."""
 
     READER = "reader"
     OPERATOR = "operator"
     ENGINEER = "engineer"
 
     def may(self, needed: Role) -> bool:
-        """Whether this role may do what `needed` may."""
+        """Return True if this role may do what `needed` may."""
         order = list(Role)
         return order.index(self) >= order.index(needed)
 
@@ -723,7 +722,7 @@ class User:
 
 
 class Scope(StrEnum):
-    """What a token allows; one that may write may read."""
+    """Right of a token; one that may write may read."""
 
     READ = "read"
     WRITE = "write"
@@ -786,7 +785,7 @@ class ChangedSetting:
         return f"{setting} = {said(self.value)} instead of what bridge.toml says, by {by}"
 
     def is_of(self, hanger: int) -> bool:
-        """Whether it changes a hanger, or all of them."""
+        """Return True if it changes a hanger, or all of them."""
         return self.key.startswith(("settings.", f"hanger.{hanger}."))
 
 
@@ -799,7 +798,7 @@ def said(value: float | str | None) -> str:
 
 @dataclass(frozen=True)
 class Entry:
-    """What happened to what, when, by whom, by which way, why, and with which shm."""
+    """Entry of the journal: the event, its subject, when, by whom, by which way, why, which shm."""
 
     at: datetime
     kind: str

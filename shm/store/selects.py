@@ -190,7 +190,7 @@ def selection_in_force(hanger: int) -> sa.Select[Any]:
 
 
 def _in_force(hanger: int) -> sa.ColumnElement[bool]:
-    """Which baselines count: those of the class in force, unless their adoption was undone."""
+    """Select the baselines of the class in force, unless their adoption was undone."""
     model = sa.select(selection_in_force(hanger).subquery().c.model).scalar_subquery()
     return baselines.c.id.not_in(_undone_baselines) & (posteriors.c.model == model)
 

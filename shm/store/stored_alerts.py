@@ -156,7 +156,10 @@ class Silences(Repository):
 
 
 def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> datetime | None:
-    """When hooks are told of a hanger again, silences one after the other; None where they are."""
+    """Return when hooks are told of a hanger again, silences one after the other.
+
+    None where they are.
+    """
     until = at
     while ends := [each.until for each in silences if each.covers(hanger, until)]:
         until = max(ends)
@@ -176,7 +179,7 @@ def said_of(silence: Silence) -> str:
 
 
 def kind_of(silence: Silence) -> str:
-    """What it is called."""
+    """Return the name of its kind."""
     return "maintenance window" if silence.is_maintenance else "silence"
 
 

@@ -133,6 +133,6 @@ def waits_at(
 
 
 def _own(connection: Connection, recording_id: int, test_ids: Collection[int]) -> Collection[int]:
-    """Those of the tests that are of one recording."""
+    """Return those of the tests that are of one recording."""
     own = sa.select(tests.c.id).where(tests.c.recording_id == recording_id)
     return connection.scalars(own.where(tests.c.id.in_(test_ids)).order_by(tests.c.id)).all()

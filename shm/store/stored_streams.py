@@ -44,7 +44,7 @@ _T = TypeVar("_T", WindowReading, PooledReading)
 
 
 class Streams(Repository):
-    """What permanent sensors said."""
+    """Windows, pooled readings and events of permanent sensors."""
 
     def save_window(self, reading: WindowReading) -> None:
         """Keeps what a window said, in the place of what it said before, and that it is done.

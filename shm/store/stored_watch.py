@@ -36,7 +36,7 @@ from shm.values import NAN, Alert, Drift, Posterior, WatchedTest
 
 
 class Watch(Repository):
-    """What the watch said, and the baselines it compares with."""
+    """Results of the watch, and the baselines it compares with."""
 
     def save(
         self,

@@ -75,7 +75,7 @@ class Trends(Repository):
         return len(missing)
 
     def _missing(self, hanger: Hanger, key: str) -> list[int]:
-        """What is shown of a hanger and has no summary under its present description."""
+        """Return what is shown of a hanger and has no summary under its present description."""
         up_to_date = sa.exists().where(
             summaries.c.posterior_id == posteriors.c.id, summaries.c.key == key
         )
