@@ -11,7 +11,15 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
-from shm.errors import SchemaOutdated, ShmError, StoreBusy, StoreDamaged, StoreError, TooLarge
+from shm.errors import (
+    SchemaOutdated,
+    ShmError,
+    StoreBusy,
+    StoreDamaged,
+    StoreError,
+    TooLarge,
+    retry_pause_s,
+)
 from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
@@ -219,7 +227,7 @@ class Daemon:
             log.warning("%s", error)
             if not isinstance(error, StoreBusy):
                 self._tell_failure(str(error))
-            self._scan_at = time.monotonic() + (error.retry_after_s or _UNREADABLE_S)
+            self._scan_at = time.monotonic() + retry_pause_s(error, _UNREADABLE_S)
         except Exception as error:
             if self._once:
                 raise
@@ -288,8 +296,7 @@ class Daemon:
                 self._tracker.forget(path)
         except (ShmError, OSError) as error:
             log.warning("%s is left for now: %s", path.name, error)
-            wait_s = error.retry_after_s if isinstance(error, ShmError) else None
-            self._put_off(path, str(error), wait_s or _UNREADABLE_S)
+            self._put_off(path, str(error), retry_pause_s(error, _UNREADABLE_S))
         except Exception as error:
             log.exception("%s is left for now", path.name)
             self._put_off(path, f"{type(error).__name__}: {error}", _UNREADABLE_S)

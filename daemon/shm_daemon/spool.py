@@ -24,13 +24,11 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path, PurePosixPath
 
 from shm.errors import BadInput
 from shm.read import sidecar_path
 from shm.read.sidecar import SIDECAR_SUFFIX, Described, sidecar_text
-from shm.store import Workspace
 from shm.store.archive import (
     MODES_SUFFIX,
     checksum,
@@ -320,23 +318,6 @@ class Incoming:
 def incoming(spool: Path, max_bytes: int) -> closing[Incoming]:
     """A file under way that leaves nothing behind where it does not land."""
     return closing(Incoming(spool, max_bytes))
-
-
-def lay_out(
-    workspace: Workspace, path: Path, name: str, error: BadInput, at: datetime, sha256: str
-) -> None:
-    """Moves a refused file and its sidecar into the quarantine, with the reason."""
-    reason = {
-        "schema": "shm.reason/1",
-        "file": name,
-        "line": error.line,
-        "channel": error.channel or None,
-        "message": error.message,
-        "remedy": error.remedy,
-        "time": at,
-        "sha256": sha256,
-    }
-    workspace.quarantine.move(path, name, reason, sidecar_path(path))
 
 
 def _places(spool: Path, name: str, sha256: str) -> Iterator[Path]:

@@ -19,10 +19,10 @@ from typing import Any
 from shm.errors import DISK_FULL, ShmError, StoreDamaged, StoreError, WorkerDied
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.courier import Courier, Notifier, alert_fields
-from shm.pipeline.faults import contained
+from shm.pipeline.faults import contained, explain_refusal
 from shm.pipeline.intake import Sharing, receive
 from shm.pipeline.limits import heed_limits
-from shm.pipeline.lineage import competing, reason_document
+from shm.pipeline.lineage import competing
 from shm.pipeline.watching import JudgedAgain
 from shm.pipeline.work import Queue, Task, Work
 from shm.read import sidecar_path
@@ -296,7 +296,8 @@ class Flow:
     def _refuse_recording(self, task: Task, recording_id: int, error: BaseException) -> None:
         recordings, now = self.store.recordings, self.clock()
         recording = recordings.get(recording_id)
-        name, reason = recording.file.file_name, reason_document(error, recording, now)
+        name = recording.file.file_name
+        reason = explain_refusal(error, name, recording.file.sha256, now)
         if list_events(self.store, Outcome.REDESCRIBED, recording_id=recording_id):
             reason["remedy"] += (
                 " What it gave with its former sidecar counts no more: correct the sidecar and "

@@ -17,6 +17,7 @@ from datetime import UTC, datetime, tzinfo
 from pathlib import Path
 
 from shm.errors import BadInput, TooLarge
+from shm.pipeline.faults import move_to_quarantine
 from shm.pipeline.lineage import read_limits
 from shm.read import sidecar_path
 from shm.read.base import Layout
@@ -34,7 +35,6 @@ from shm.store.archive import (
     refuse_oversize,
     safe_name,
 )
-from shm.store.files import reason_document
 from shm.store.queries.history import list_events
 
 
@@ -212,8 +212,7 @@ def _set_aside(
     path: Path, name: str, error: TooLarge, workspace: Workspace, store: Store, at: datetime
 ) -> None:
     """Lays what is too large in the quarantine, unread: nobody knows its checksum."""
-    reason = reason_document(name, None, error.message, error.remedy, at)
-    lies = workspace.quarantine.move(path, name, reason, sidecar_path(path))
+    lies = move_to_quarantine(workspace, path, name, error, at, None)
     said = {event.message for event in list_events(store, "refused", file_name=name)}
     if lies != path or error.message not in said:  # what stays is met at each start
         store.recordings.refuse_unread(name, error.message, at)

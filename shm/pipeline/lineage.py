@@ -14,15 +14,12 @@ import math
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass, replace
-from datetime import datetime
 from functools import cache
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 from shm.assumptions import DEFAULTS, number_text
 from shm.documents import dump
-from shm.errors import BadInput, ShmError
 from shm.models import Model, build, competing_names
 from shm.pipeline.reconcile import SHM
 from shm.read import Limits
@@ -35,7 +32,6 @@ from shm.store import (
     StoredRecording,
     StoredTest,
     Workspace,
-    files,
 )
 from shm.store.queries.recordings import find_discard
 from shm.store.queries.tests import list_refused_of_baselines
@@ -137,22 +133,6 @@ def seed_of(seed: int, keys: Sequence[str]) -> int:
     """The seed of one result: the same in whatever order and wherever it is computed."""
     text = "\n".join([str(seed), *sorted(keys)])
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4])
-
-
-def reason_document(
-    error: BaseException, recording: StoredRecording, time: datetime
-) -> dict[str, Any]:
-    """Return why a file is refused: which file, line and channel, what is wrong, what to do."""
-    message = f"internal error: {error!r}."
-    remedy = "Report this with the log, then drop the file again."
-    if isinstance(error, ShmError):
-        message, remedy = error.message, error.remedy
-    name, sha256 = recording.file.file_name, recording.file.sha256
-    reason = files.reason_document(name, sha256, message, remedy, time)
-    if isinstance(error, BadInput):
-        file = Path(error.file).name or recording.file.file_name
-        reason |= {"file": file, "line": error.line, "channel": error.channel or None}
-    return reason
 
 
 _ALL = (*IDENTIFY_SETTINGS, "models", "samples", "seed", "baseline_tests", "false_call_years")

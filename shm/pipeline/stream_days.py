@@ -50,7 +50,7 @@ class RestOfDays:
             self.lacking.pop(name, None)
 
     def is_awaited(self, store: Store, name: str, day: datetime) -> bool:
-        """Return True if a day that is over lacks windows, and is too young to be judged without."""
+        """Return True if a day that is over lacks windows that may still come."""
         end, now = day + PERIODS["day"], self.clock()
         if self.hurry or now >= max(self.came.setdefault(name, now), end) + _REST_COMES:
             return False

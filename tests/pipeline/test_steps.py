@@ -13,7 +13,7 @@ import pytest
 
 from shm.errors import BadInput, ShmError
 from shm.pipeline import steps
-from shm.pipeline.lineage import reason_document
+from shm.pipeline.faults import explain_refusal
 from shm.pipeline.steps import identify_file
 from shm.read import Limits
 from shm.store import IdentifiedTest, ReceivedFile, Stage, StoredRecording, Workspace
@@ -108,10 +108,9 @@ def test_two_tests_of_one_name_in_a_file_are_refused(identify: Identify) -> None
 
 
 def test_a_reason_names_file_line_channel_and_remedy() -> None:
-    file = ReceivedFile("a" * 64, "logger/h3.csv", 1, "entry")
-    recording = StoredRecording(1, file, NOW, Stage.RECEIVED)
+    of_file = ("logger/h3.csv", "a" * 64, NOW)
     error = BadInput("NaN.", file="/x/h3.csv", channel="acc_2", line=7, remedy="Mend it.")
-    assert reason_document(error, recording, NOW) == {
+    assert explain_refusal(error, *of_file) == {
         "schema": "shm.reason/1",
         "file": "h3.csv",
         "line": 7,
@@ -121,6 +120,6 @@ def test_a_reason_names_file_line_channel_and_remedy() -> None:
         "time": NOW,
         "sha256": "a" * 64,
     }
-    assert reason_document(BadInput("x"), recording, NOW)["file"] == "logger/h3.csv"
-    assert reason_document(ShmError("x", remedy="y"), recording, NOW)["remedy"] == "y"
-    assert "internal error: KeyError" in reason_document(KeyError(1), recording, NOW)["message"]
+    assert explain_refusal(BadInput("x"), *of_file)["file"] == "logger/h3.csv"
+    assert explain_refusal(ShmError("x", remedy="y"), *of_file)["remedy"] == "y"
+    assert "internal error: KeyError" in explain_refusal(KeyError(1), *of_file)["message"]
