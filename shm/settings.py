@@ -51,7 +51,7 @@ class Setting:
             raise self._refusal(raw, source) from None
         if self.choices and value not in self.choices:
             raise self._not_chosen(raw, source)
-        if self.beginnings and value and not value.startswith(self.beginnings):
+        if self.beginnings and value and not str(value).startswith(self.beginnings):
             raise BadInput(
                 f"setting {self.name} = {raw!r} begins with none of {', '.join(self.beginnings)}.",
                 file=source,

@@ -31,6 +31,7 @@ from shm.report.figures.every_figure import bridge_diagnosis_figures, diagnosis_
 from shm.report.figures.specification import Illustration
 from shm.report.paper import Paper
 from shm.store import Store, StoredTest
+from shm.store.queries.tests import load_frequency_response
 from shm.values import Diagnosis, Hanger, ModalTest, ResponsePoint
 from shm.values.bar_description import describe_bar, list_sensors
 from shm_cli import completion, flags
@@ -249,7 +250,7 @@ def _sensors(tests: Sequence[ModalTest]) -> tuple[ResponsePoint, ...]:
 
 def _stored_sensors(store: Store, tests: Sequence[StoredTest]) -> tuple[ResponsePoint, ...]:
     """Return the sensors of all tests as their recordings had them, each once."""
-    responses = ((each.test, store.tests.frequency_response(each)) for each in tests)
+    responses = ((each.test, load_frequency_response(store, each)) for each in tests)
     return tuple(dict.fromkeys(p for test, found in responses for p in list_sensors(test, found)))
 
 

@@ -16,6 +16,7 @@ from shm.models import Model, applicable, build, competing_names
 from shm.modes_document import load_modes
 from shm.report.assumed import assumptions_line, with_assumptions
 from shm.settings import load_settings
+from shm.store.queries.hangers import list_adoptions
 from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior, Selection
 from shm.values.rounding import force_unit
 from shm.values.stated_tension import averaged_now, stated
@@ -252,7 +253,7 @@ def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tup
     if hanger_id is None:
         return load_settings().model_names
     with opened_store(ctx) as (workspace, store):
-        adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger_id)]
+        adopted = [each.adoption.model for each in list_adoptions(store, hanger_id)]
     return tuple(dict.fromkeys([*workspace.settings.model_names, *adopted]))
 
 

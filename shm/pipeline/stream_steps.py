@@ -1,4 +1,4 @@
-"""What is computed of streams: functions of plain values, run wherever the executor puts them."""
+"""Computations of streams: functions of plain values, run wherever the executor puts them."""
 
 from __future__ import annotations
 

@@ -25,6 +25,9 @@ from datetime import UTC, datetime, timedelta
 from itertools import groupby
 from pathlib import Path
 
+from shm.store.queries.streams import find_progress, list_pooled, list_stream_events
+from shm.store.queries.tests import list_test_rows
+
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -138,7 +141,7 @@ def main() -> None:
                 lag_h = AHEAD_H + 1.0
                 while lag_h > AHEAD_H:
                     time.sleep(1.0)
-                    done = [store.streams.progress(stream.name) for _, stream in sites]
+                    done = [find_progress(store, stream.name) for _, stream in sites]
                     lag_h = max((now() - (each or START)) / HOUR for each in done)
                     if not daemon.is_alive():
                         raise SystemExit("the daemon has ended")
@@ -150,9 +153,9 @@ def main() -> None:
             clock.value += 7200
             time.sleep(60.0)
             alerts = store.alerts.list_all()
-            read = {h.id: store.streams.list_pooled(h.id, "hour", START, now()) for h, _ in sites}
-            tests = {h.id: len(store.tests.list_rows(h.id)) for h, _ in sites}
-            events = store.streams.list_events(None, START)
+            read = {h.id: list_pooled(store, h.id, "hour", START, now()) for h, _ in sites}
+            tests = {h.id: len(list_test_rows(store, h.id)) for h, _ in sites}
+            events = list_stream_events(store, None, START)
             daemon.terminate()
             daemon.join(30)
     days = (hour + 1) / 24

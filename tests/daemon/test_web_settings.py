@@ -11,6 +11,7 @@ import pytest
 from shm.bridge.changes import overlaid
 from shm.pipeline import utc_now
 from shm.store import Workspace
+from shm.store.queries.history import list_changes
 from shm_cli.main import run
 from shm_daemon.doctor import examine
 from tests.daemon.test_web_people import PASSWORD, add_a_user_of_each_role, sign_in
@@ -63,7 +64,7 @@ def test_a_threshold_holds_from_now_on_and_goes_back_to_the_file(
     assert run(["--workspace", str(workspace.folder), "status"]) == 0
     assert told in " ".join(capsys.readouterr().out.split())
     with workspace.store() as store:
-        (row,) = store.journal.list_changes(limit=1)
+        (row,) = list_changes(store, limit=1)
     assert (row.who, row.via, row.action, row.detail) == (
         "engineer", "page", "setting changed", f"from {in_file:g} to 0.9",
     )  # fmt: skip
@@ -83,7 +84,7 @@ def test_who_saves_on_what_another_has_changed_meanwhile_is_shown_it_and_overwri
     assert level(workspace) == 0.9
     assert put(browser, LEVEL, "0.7").status_code == 303
     with workspace.store() as store:
-        assert store.journal.list_changes(limit=1)[0].detail == "from 0.9 to 0.7"
+        assert list_changes(store, limit=1)[0].detail == "from 0.9 to 0.7"
 
 
 def test_what_nobody_changed_is_not_set_though_all_is_one_form(
@@ -171,7 +172,7 @@ def test_quiet_hours_of_a_hook_are_set_taken_away_and_given_back_to_the_file(
             assert any(told in each.found for each in examine(workspace.folder, utc_now()))
     assert found == ["22:00-06:00", "20:30-07:00", "none", "22:00-06:00"]
     with workspace.store() as store:
-        rows = store.journal.list_changes(limit=3)
+        rows = list_changes(store, limit=3)
     assert {(row.who, row.subject) for row in rows} == {("engineer", HOURS.replace(".", " "))}
     assert [row.detail for row in rows] == [
         "from none to 22:00-06:00, back to bridge.toml",
@@ -250,7 +251,7 @@ def test_an_engineer_lets_people_in_and_out_but_never_ends_the_last_engineer(
     assert ask("remove", "operator").status_code == 303
     with workspace.store() as store:
         found = {each.name: each.role for each in store.people.list_all() if not each.removed_at}
-        rows = store.journal.list_changes(limit=4)
+        rows = list_changes(store, limit=4)
     assert found == {"reader": "operator", "engineer": "engineer", "eva": "engineer"}
     assert [row.action for row in rows] == [
         "user removed", "password set", "role changed", "user added",

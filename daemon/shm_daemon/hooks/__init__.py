@@ -42,7 +42,7 @@ class HookNotifier:
         return self._deliverers[type(hook)](hook, alert)
 
     def ready(self, hook: Hook) -> str:
-        """Where its alerts would go; raises HookFailed where none could be delivered."""
+        """Return where its alerts would go; raises HookFailed where none could be delivered."""
         return self._deliverers[type(hook)].ready(hook)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""What every kind of hook is given and owes."""
+"""Contract of every kind of hook."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Deliverer(Protocol):
         """
 
     def ready(self, hook: object) -> str:
-        """Where alerts would go, told without secrets, nothing being sent.
+        """Return where alerts would go, told without secrets, nothing being sent.
 
         Raises HookFailed where none could be delivered as things are.
         """

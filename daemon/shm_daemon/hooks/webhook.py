@@ -107,7 +107,7 @@ class WebhookDeliverer:
 
 
 def signature(secret: bytes, timestamp: str, body: bytes) -> str:
-    """What stands in X-Shm-Signature: who listens makes it again and compares."""
+    """Return what stands in X-Shm-Signature: who listens makes it again and compares."""
     made = hmac.new(secret, timestamp.encode() + b"." + body, hashlib.sha256)
     return f"sha256={made.hexdigest()}"
 
@@ -123,7 +123,10 @@ def _headers(alert: Alert, body: bytes, secret: bytes, unix_s: int) -> dict[str,
 
 
 def _judged(response: requests.Response) -> str:
-    """What the server answered, if it took the alert; raises HookFailed or DeliveryRefused."""
+    """Return what the server answered, if it took the alert.
+
+    Raises HookFailed or DeliveryRefused.
+    """
     status = response.status_code
     if 200 <= status < 300:
         return f"{status} {one_line(response.reason or '')}".strip()

@@ -27,6 +27,7 @@ from shm.report.hanger_sentences import details
 from shm.report.paper import Table
 from shm.report.states import called_words, temperature_table
 from shm.store import EventKind, Store, TrendPoint, Workspace
+from shm.store.queries.trends import find_latest_trends, list_trend
 from shm.values import Hanger
 from shm.values.bar_description import describe_bar
 from shm_daemon.web.access import AtSite, Reader
@@ -214,12 +215,12 @@ def results(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Response:
     text = io.StringIO()
     writer = csv.writer(text)
     writer.writerow(_COLUMNS)
-    writer.writerows(_row(point) for point in site.store.posteriors.trend(hanger))
+    writer.writerows(_row(point) for point in list_trend(site.store, hanger))
     return _file(text.getvalue().encode(), f"hanger{hanger_id}.csv", "text/csv; charset=utf-8")
 
 
 def _refuse_untested(store: Store, hanger: Hanger) -> None:
-    if not store.posteriors.latest_trends([hanger]):
+    if not find_latest_trends(store, [hanger]):
         raise NothingThere(
             f"hanger {hanger.id} has no test to report.", remedy="Upload a recording of it."
         )

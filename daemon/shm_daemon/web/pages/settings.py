@@ -19,7 +19,9 @@ from shm.pipeline.watching import differences
 from shm.report import formatting
 from shm.settings import TABLE, Settings, load_settings
 from shm.store import Stage
-from shm.store.changed_settings import ChangedSetting, said
+from shm.store.queries.hangers import find_latest_watches
+from shm.store.queries.tests import list_waiting_tests
+from shm.store.rows import ChangedSetting, said
 from shm.values import Hanger
 from shm_daemon.hooks.trial import send_test_alert
 from shm_daemon.web.access import AtSite, Engineer
@@ -181,10 +183,10 @@ def _page(
 
 def _judged(site: Site, hanger: Hanger) -> str:
     """Return a sentence if stored tests of a hanger were judged with other settings."""
-    waiting = [each for each in site.store.tests.list_waiting() if each.hanger == hanger.id]
+    waiting = [each for each in list_waiting_tests(site.store) if each.hanger == hanger.id]
     if any(each.stage is Stage.UPDATED for each in waiting):
         return f"Yet to be judged: {formatting.counted(len(waiting), 'stored test')} of it."
-    latest = site.store.watch.latest(hangers=[hanger]).get(hanger.id)
+    latest = find_latest_watches(site.store, hangers=[hanger]).get(hanger.id)
     if latest is None:
         return ""
     if others := "; ".join(differences(latest, hanger, site.workspace.settings)):

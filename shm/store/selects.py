@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import posterior_document, value_of
+from shm.documents import posterior_document
 from shm.store.blobs import pack_samples, posterior_from, test_from_document
 from shm.store.columns import loads
-from shm.store.database import insert
+from shm.store.database import Repository, insert
 from shm.store.files import counts, in_force
-from shm.store.list_rows import TestRow
-from shm.store.rows import DESCRIBED, Baseline, Lineage, Stage, StoredSelection, StoredTest
+from shm.store.mapping import value_in
+from shm.store.rows import DESCRIBED, Baseline, Lineage, Stage, StoredSelection, StoredTest, TestRow
 from shm.store.tables import (
     adoptions,
     baselines,
@@ -28,7 +29,7 @@ from shm.store.tables import (
     tests,
     watches,
 )
-from shm.values import ForeignMode, Hanger, Posterior, QualityCheck, Selection
+from shm.values import Hanger, Posterior, Selection
 
 # All but the frequency response, which may be as large as all else together a hundredfold.
 _columns = (column for column in tests.columns if column is not tests.c.frequency_response)
@@ -61,18 +62,12 @@ _OF_WORKS = (
 ) & ~sa.exists().where(watches.c.test_id == tests.c.id, in_force(watches)).correlate(tests)
 
 
-test_columns = tuple(
-    tests.c[name] for name in ("id", "recording_id", "hanger", "name", "time", "stage")
-)
+test_columns = tuple(tests.c[field.name] for field in fields(TestRow))
 
 
 def test_row(row: Row[Any]) -> TestRow:
-    """A test by its `test_columns`."""
-    return TestRow(row.id, row.recording_id, row.hanger, row.name, row.time, Stage(row.stage))
-
-
-def lineage_from(row: Row[Any]) -> Lineage:
-    return Lineage(row.input_sha256, row.settings_sha256, row.version)
+    """Return a test by its `test_columns`."""
+    return value_in(row, TestRow)
 
 
 def counted_tests(hanger: int | None = None) -> sa.Select[Any]:
@@ -101,20 +96,15 @@ def read_tests(connection: Connection, query: sa.Select[Any]) -> tuple[StoredTes
     return tuple(_test(row) for row in connection.execute(query))
 
 
+def load_tests(store: Repository, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
+    """Read the tests of a query on `plain_tests`."""
+    with store.reading() as connection:
+        return read_tests(connection, query)
+
+
 def _test(row: Row[Any]) -> StoredTest:
-    return StoredTest(
-        id=row.id,
-        recording_id=row.recording_id,
-        key=f"{row.sha256}/{row.position}",
-        hanger=row.hanger,
-        time=row.time,
-        stage=Stage(row.stage),
-        test=test_from_document(loads(row.document), row.hanger),
-        notes=tuple(loads(row.notes)),
-        lineage=lineage_from(row),
-        quality=value_of(tuple[QualityCheck, ...], loads(row.quality) or ()),
-        set_aside=value_of(tuple[ForeignMode, ...], loads(row.set_aside) or ()),
-    )
+    test = test_from_document(loads(row.document), row.hanger)
+    return value_in(row, StoredTest, key=f"{row.sha256}/{row.position}", test=test)
 
 
 def posterior_of_row(row: Row[Any]) -> Posterior:
@@ -200,7 +190,7 @@ def selection_in_force(hanger: int) -> sa.Select[Any]:
 
 
 def _in_force(hanger: int) -> sa.ColumnElement[bool]:
-    """Which baselines count: those of the class in force, unless their adoption was undone."""
+    """Select the baselines of the class in force, unless their adoption was undone."""
     model = sa.select(selection_in_force(hanger).subquery().c.model).scalar_subquery()
     return baselines.c.id.not_in(_undone_baselines) & (posteriors.c.model == model)
 
