@@ -14,6 +14,7 @@ import logging
 from collections import defaultdict, deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
@@ -21,7 +22,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from shm.documents import format_time
-from shm.errors import ShmError, StoreError
+from shm.errors import BadInput, ShmError, StoreError
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.reconcile import Condition, is_same_event, reconcile
 from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day
@@ -221,10 +222,11 @@ class Streaming:
         newest = streams.watch(stream.hanger)
         before = streams.watch(stream.hanger, starts["hour"])
         if newest and before and starts["hour"] < newest.time:
-            content = gone_back(before.content, newest.content)
-            streams.go_back(stream.hanger, before.time, content)
-            starts["hour"] = before.time
-            self._settled[name] = max(newest.time, self._settled.get(name, newest.time))
+            with suppress(BadInput):  # states of before an upgrade cannot be read
+                content = gone_back(before.content, newest.content)
+                streams.go_back(stream.hanger, before.time, content)
+                starts["hour"] = before.time
+                self._settled[name] = max(newest.time, self._settled.get(name, newest.time))
         for period, start in starts.items():
             former = self._pooled.get((name, period), start)
             self._pooled[name, period] = min(former, start)

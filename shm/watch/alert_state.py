@@ -1,14 +1,11 @@
-"""What was told of a hanger and still stands, kept as text."""
+"""The conditions of a hanger that were reported and still apply."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
-from shm.documents import value_of
-from shm.errors import BadInput
 from shm.values import Change, Drift, Plane, RepeatedMistake, WatchedTest
 from shm.values.drift import OF_ONE_VISIT
 from shm.watch.agreement import Way, way_of
@@ -35,56 +32,6 @@ class AlertState:
     alone: bool = False
     agreed: frozenset[tuple[str, Way]] = frozenset()
     fading: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
-
-    def to_text(self) -> str:
-        """JSON, from which `from_text` makes an equal one."""
-        return json.dumps(
-            {
-                "beyond": [[*condition, at] for condition, at in self.beyond.items()],
-                "call": self.call,
-                "called": [asdict(change) for change in self.called],
-                "odd": self.odd,
-                "mistaken": [asdict(each) for each in self.mistaken],
-                "noted": sorted(self.noted),
-                "alone": self.alone,
-                "agreed": sorted(self.agreed),
-                "fading": [[*condition, since] for condition, since in self.fading.items()],
-            },
-            default=datetime.isoformat,
-        )
-
-    @classmethod
-    def from_text(cls, text: str) -> AlertState:
-        """What `to_text` wrote, nothing where the text is empty; raises BadInput for another."""
-        if not text:
-            return cls()
-        try:
-            kept = json.loads(text)
-            beyond, fading = (
-                {
-                    (quantity, way): at
-                    for quantity, way, at in value_of(
-                        tuple[tuple[str, Way, datetime], ...], kept[name]
-                    )
-                }
-                for name in ("beyond", "fading")
-            )
-            return cls(
-                beyond,
-                kept["call"] and value_of(datetime, kept["call"]),
-                value_of(tuple[Change, ...], kept["called"]),
-                int(kept["odd"]),
-                value_of(tuple[RepeatedMistake, ...], kept["mistaken"]),
-                frozenset(value_of(tuple[tuple[Plane, int], ...], kept["noted"])),
-                bool(kept["alone"]),
-                frozenset(value_of(tuple[tuple[str, Way], ...], kept["agreed"])),
-                fading,
-            )
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise BadInput(
-                f"what was told of a hanger cannot be read: {error!r}.",
-                remedy="Go over the hanger's tests from its baseline on.",
-            ) from error
 
 
 def still(told: AlertState, test: WatchedTest, end: float) -> AlertState:

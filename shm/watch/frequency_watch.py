@@ -7,19 +7,17 @@ structure that is tested once a month waits for nothing. Tests between decide no
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 import numpy as np
 
-from shm.documents import dump, value_of
 from shm.errors import BadInput
-from shm.modes_document import modes_document, parse_modes
 from shm.values import NAN, WITHOUT_MODEL, Alert, Hanger, ModalTest, Posterior, Reading, WatchedTest
 from shm.watch.alert_state import AlertState
 from shm.watch.frequencies import POOLED_DAYS, FrequencyReader, FrequencyWatcher
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.options import WatchOptions
 from shm.watch.state_sums import WatchState
 from shm.watch.watching import DatedTest, Newest, after, options_of
@@ -64,6 +62,7 @@ class FrequencyWatch:
             hanger,
             options_of(hanger, len(self._pools), options),
         )
+        self.key = self._watcher.key
 
     def begin(self) -> _Watching:
         """After the baseline."""
@@ -106,39 +105,6 @@ class FrequencyWatch:
                     state, pool = with_it, _Pool()
         return _Watching(state, told, pool, _as_of(found, test, time)), alert
 
-    def keep(self, now: _Watching) -> bytes:
-        """From which `resume` goes on."""
-        beside = {
-            "told": now.told.to_text(),
-            "pool": json.loads(dump(modes_document([test for test, _ in now.pool.tests]))),
-            "times": [time for _, time in now.pool.tests],
-            "seen": now.pool.seen,
-            "last": asdict(now.last),
-        }
-        text = json.dumps(beside, default=datetime.isoformat)
-        return replace(now.state, told=text).to_bytes()
-
-    def resume(self, kept: bytes) -> _Watching | None:
-        """None where it was another watch that kept it."""
-        state = WatchState.from_bytes(kept)
-        if state.key != self._watcher.key:
-            return None
-        try:
-            beside = json.loads(state.told)
-            tests = parse_modes(beside["pool"]) if beside["times"] else ()
-            times = value_of(tuple[datetime, ...], beside["times"])
-            return _Watching(
-                state,
-                AlertState.from_text(beside["told"]),
-                _Pool(tuple(zip(tests, times, strict=True)), int(beside["seen"])),
-                value_of(WatchedTest, beside["last"]),
-            )
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise BadInput(
-                f"A kept state of the watch cannot be read: {error!r}.",
-                remedy="Drop it: the watch then goes over all tests again.",
-            ) from error
-
     def _reading(self, pool: Sequence[DatedTest]) -> Reading:
         return self._reader.reading([test for test, _ in pool], pool[-1][1])
 
@@ -152,13 +118,13 @@ def watch_newest_frequencies(
 ) -> Newest | None:
     """Return what `watch_newest` says of a hanger, of a structure without a model."""
     watch = FrequencyWatch(baseline, hanger, options)
-    now = watch.begin() if kept is None else watch.resume(kept)
-    if now is None:
+    now = watch.begin() if kept is None else from_bytes(_Watching, kept)
+    if now.state.key != watch.key:
         return None
     alert = None
     for dated in later:
         now, alert = watch.after(now, dated)
-    return Newest(now.last, alert, watch.keep(now))
+    return Newest(now.last, alert, to_bytes(now))
 
 
 def measured_levels(tests: Sequence[ModalTest], seed: int) -> Posterior:

@@ -6,13 +6,11 @@ first, and the modes of the last day, by which a change is told apart.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +19,7 @@ from shm.errors import BadInput
 from shm.values import NAN, FloatArray, Mode
 from shm.values.stream import PooledReading, WindowReading
 from shm.watch.alert_state import AlertState
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.stream_filter import FEATURES, Bank
 from shm.watch.stream_reading import ModeTable, SeenReading, exchanged
 from shm.watch.stream_thermometer import Believed, Thermometer, believed
@@ -111,91 +110,16 @@ class StreamState:
             old=np.full(n, NAN),
         )
 
-    def to_bytes(self) -> bytes:
-        """Return the state as a line of JSON, and the bytes of all arrays after it."""
-        arrays = {
-            f"{name}.{each.name}": value
-            for name, part in (
-                ("state", self),
-                ("table", self.table),
-                ("bank", self.bank),
-                ("contrast", self.contrast),
-            )
-            for each in fields(part)
-            if isinstance(value := getattr(part, each.name), np.ndarray)
-        }
-        head = {name: getattr(self, name) for name in _SCALARS} | {
-            "start": self.start.isoformat(),
-            "day": self.bank.day,
-            "watched": self.bank.watched,
-            "contrast_day": self.contrast.day,
-            "contrast_watched": self.contrast.watched,
-            "tension_n": self.table.tension_n,
-            "modes": self.table.modes,
-            "told": self.told.to_text(),
-            "thermometer": asdict(self.thermometer),
-            "arrays": [(name, each.dtype.str, each.shape) for name, each in arrays.items()],
-        }
-        return b"\n".join(
-            [json.dumps(head).encode(), b"".join(map(np.ndarray.tobytes, arrays.values()))]
-        )
-
-    @classmethod
-    def from_bytes(cls, content: bytes) -> StreamState:
-        """Return the state back; raises BadInput where the content is no such state."""
-        try:
-            line, _, rest = content.partition(b"\n")
-            head = json.loads(line)
-            parts: dict[str, dict[str, Any]] = {
-                name: {} for name in ("state", "table", "bank", "contrast")
-            }
-            at = 0
-            for name, kind, shape in head["arrays"]:
-                part, _, own = name.partition(".")
-                count = math.prod(shape)
-                parts[part][own] = np.frombuffer(rest, kind, count, at).reshape(shape)
-                at += parts[part][own].nbytes
-            modes = tuple((plane, order) for plane, order in head["modes"])
-            return cls(
-                start=datetime.fromisoformat(head["start"]),
-                table=ModeTable(modes=modes, tension_n=head["tension_n"], **parts["table"]),
-                bank=Bank(day=head["day"], watched=head["watched"], **parts["bank"]),
-                contrast=_read_contrast(head, parts["contrast"]),
-                told=AlertState.from_text(head["told"]),
-                thermometer=Thermometer(**head.get("thermometer", {})),
-                **{name: head[name] for name in _SCALARS if name in head},
-                **parts["state"],
-            )
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise BadInput(
-                f"A kept state of a stream's watch cannot be read: {error!r}.",
-                remedy="Drop it: the watch then learns the stream's baseline anew.",
-            ) from error
-
-
-_SCALARS = (
-    "key", "known_day", "zero", "compensated_zero", "readings", "is_learning", "called_from",
-    "called_shift", "apart_from", "apart_shift", "absorbed", "standing", "exchanged_hours",
-    "settled_day", "unknown_sd",
-)  # fmt: skip
-
-
-def _read_contrast(head: dict[str, Any], arrays: dict[str, Any]) -> Bank:
-    """Return the filters of the contrast; a state of before there were any begins to learn it."""
-    if not arrays:
-        return Bank.begun(head["day"], NO_CONDITIONS)
-    return Bank(day=head["contrast_day"], watched=head["contrast_watched"], **arrays)
-
 
 def gone_back(earlier: bytes, newest: bytes) -> bytes:
     """An earlier state, from which to go over the readings up to the newest again, with those that
     came late. What stands by now stands until then: it is not told and not ended twice.
     """
-    state, last = StreamState.from_bytes(earlier), StreamState.from_bytes(newest)
+    state, last = from_bytes(StreamState, earlier), from_bytes(StreamState, newest)
     ahead = (last.start - state.start).total_seconds() / 86400
     settled = max(state.settled_day, ahead + last.bank.day, ahead + last.settled_day)
     standing = tuple(dict.fromkeys((*state.standing, *last.standing)))
-    return replace(state, settled_day=settled, standing=standing).to_bytes()
+    return to_bytes(replace(state, settled_day=settled, standing=standing))
 
 
 def as_mounted(state: StreamState, modes: tuple[Mode, ...]) -> tuple[StreamState, tuple[Mode, ...]]:
@@ -212,19 +136,25 @@ def as_mounted(state: StreamState, modes: tuple[Mode, ...]) -> tuple[StreamState
 def with_believed(
     kept: bytes | None, readings: Sequence[WindowReading]
 ) -> tuple[bytes | None, Believed]:
-    """The windows with the temperatures that are believed, and the state that goes on from them."""
-    if kept is None:
+    """Return windows with the temperatures that are believed, and the state that goes on.
+
+    None where nothing was kept, or what cannot be read: the stream is then learnt again.
+    """
+    try:
+        state = None if kept is None else from_bytes(StreamState, kept)
+    except BadInput:
+        state = None
+    if state is None:
         return None, believed(Thermometer(), readings, learning=True)
-    state = StreamState.from_bytes(kept)
     found = believed(state.thermometer, readings, learning=state.is_learning)
-    return replace(state, thermometer=found.thermometer).to_bytes(), found
+    return to_bytes(replace(state, thermometer=found.thermometer)), found
 
 
 def windows_as_mounted(
     kept: bytes | None, readings: Sequence[WindowReading]
 ) -> Sequence[WindowReading]:
     """The windows with each mode in the plane that was always its own, by what the watch knows."""
-    state = None if kept is None else StreamState.from_bytes(kept)
+    state = None if kept is None else from_bytes(StreamState, kept)
     if state is None or state.is_learning:
         return readings
     return [

@@ -39,6 +39,7 @@ from shm.values import (
 )
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PERIODS, PooledReading, StreamEvent, StreamEventKind
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.stream_cause import EXCHANGED, MODEL_OFF, SWAPPED, TIME_BASE, Cause, cause_of
 from shm.watch.stream_filter import CLIP, FAST, LEVEL, NOTHING, SLOW, Bank, Evidence
 from shm.watch.stream_reading import ModeTable, SeenReading, exchanged, planes_of, usable
@@ -123,10 +124,10 @@ def watch_reading(
             remedy="Watch its daily tests (`watch_frequencies`).",
         )
     key = _key(baseline, hanger, reading.stream)
-    state = None if kept is None else StreamState.from_bytes(kept)
+    state = None if kept is None else from_bytes(StreamState, kept)
     watch = StreamWatch(baseline, hanger, options or StreamOptions())
     found, state = watch.after(state if state and state.key == key else None, reading, key)
-    return replace(found, kept=state.to_bytes() if state else b"")
+    return replace(found, kept=to_bytes(state) if state else b"")
 
 
 def _key(baseline: Posterior | None, hanger: Hanger, stream: str) -> str:
@@ -373,7 +374,7 @@ def daily_shift(kept: bytes, hours: Sequence[PooledReading]) -> tuple[float, flo
     The mean of what each hour says: the tension goes through the day by more than its mean is
     known to, and not all hours have all modes. Without thermometer's or watch's corrections.
     """
-    state = StreamState.from_bytes(kept)
+    state = from_bytes(StreamState, kept)
     seen, between = [], state.contrast.along(_compensated(state.contrast))
     for reading in hours:
         modes = usable(reading)

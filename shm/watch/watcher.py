@@ -108,13 +108,21 @@ class Watcher:
                 f"{self.options.baseline_tests}."
             )
         time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
-        state = WatchState.before_any(
-            self.key,
-            time,
-            reference_of([reading.temperature_c for reading in readings]),
-            (n, q),
-            self.structure.layout.prior_sd[n + q :][: q * self.structure.thermal_laws],
-            self.structure.scatter_variance,
+        coefficients = q * self.structure.thermal_laws
+        state = WatchState(
+            key=self.key,
+            start=time,
+            last_time=time,
+            reference_c=reference_of([reading.temperature_c for reading in readings]),
+            slopes=np.zeros((0, n, q)),
+            **dict.fromkeys(("values", "variances", "per_kelvin"), np.zeros((0, n))),
+            **dict.fromkeys(("years", "temperature_c", "log_amplitude", "weight"), np.zeros(0)),
+            counted=np.zeros(0, bool),
+            coefficients=np.zeros(coefficients),
+            coefficient_sd=self.structure.layout.prior_sd[n + q :][:coefficients],
+            scatter_variance=self.structure.scatter_variance,
+            called=np.zeros((0, 3)),
+            called_precision=np.zeros((0, n + q, n + q)),
         )
         tests = []
         for reading in readings:

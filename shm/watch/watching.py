@@ -39,6 +39,7 @@ from shm.watch.agreement import agreement, way_of
 from shm.watch.alert_state import AlertState, conditions, still, with_beyond
 from shm.watch.alert_text import alert_of, message_of
 from shm.watch.change_words import CAUSES, suspects
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.odd_test_alerts import (
     alert_of_baseline,
     message_of_odd,
@@ -158,10 +159,9 @@ def watch_newest(
         for found in watch.tests:
             told, alert = after(told, found, hanger)
     else:
-        state = WatchState.from_bytes(kept)
+        state, told = from_bytes(tuple[WatchState, AlertState], kept)
         if state.key != watcher.key:
             return None
-        told = AlertState.from_text(state.told)
     since = max(time for _, time in baseline_tests)
     for test, time in later:
         reading = reader.reading(test, max(time, since))
@@ -175,8 +175,7 @@ def watch_newest(
             two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
             alert, told = agreed, with_beyond(told, agreed.drifts, agreed.time)
             told = replace(told, agreed=told.agreed | two_told)
-    kept = replace(state, told=told.to_text()).to_bytes()
-    return Newest(found, alert, kept)
+    return Newest(found, alert, to_bytes((state, told)))
 
 
 def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:

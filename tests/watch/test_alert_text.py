@@ -8,7 +8,6 @@ from typing import Literal
 
 import pytest
 
-from shm.errors import BadInput
 from shm.values import (
     PLANES,
     Alert,
@@ -23,6 +22,7 @@ from shm.values import (
 from shm.values.messages import Lead
 from shm.watch.alert_state import AlertState
 from shm.watch.change_words import shift_words
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.odd_test_alerts import message_of_odd
 from shm.watch.watching import after, alerts_of, new_alert
 from tests.helpers.hangers import HANGER_3
@@ -520,32 +520,16 @@ def test_one_and_several_that_explain_the_data_alike_are_told_as_alternatives() 
 # ---------------------------------------------------------------- kept between tests
 
 
-def test_what_was_told_comes_back_from_its_text() -> None:
-    stands = AlertState()
-    assert AlertState.from_text("") == AlertState.from_text(stands.to_text()) == stands
+def test_kept_alert_state_gives_the_alerts_of_the_history() -> None:
     joint = change(called=True, moved=_joint("log10_k1", "log10_k2"))
-    for test in (day(1), day(2, joint), day(3, change(called=True, began=2), probability=0.99)):
-        stands, _ = after(stands, test, HANGER_3)
-    assert stands.beyond
-    assert len(stands.called) == 2
-    assert AlertState.from_text(stands.to_text()) == stands
-
-
-def test_going_on_from_the_text_gives_the_alerts_of_the_history() -> None:
-    history = [day(1), day(2, change(called=True)), day(3, probability=0.99), day(4), day(5)]
-    text, alerts = "", []
+    history = [day(1), day(2, joint), day(3, probability=0.99), day(4), day(5)]
+    told, alerts = AlertState(), []
     for test in history:
-        stands, alert = after(AlertState.from_text(text), test, HANGER_3)
-        text = stands.to_text()
+        told, alert = after(from_bytes(AlertState, to_bytes(told)), test, HANGER_3)
         alerts += [alert] if alert else []
+        assert from_bytes(AlertState, to_bytes(told)) == told
     assert tuple(alerts) == alerts_of(history, HANGER_3)
     assert len(alerts) == 2
-
-
-@pytest.mark.parametrize("text", ["{", "{}", "[]", '{"beyond": [1], "call": null, "called": []}'])
-def test_a_text_that_tells_nothing_is_refused(text: str) -> None:
-    with pytest.raises(BadInput, match="cannot be read"):
-        AlertState.from_text(text)
 
 
 def test_of_a_called_change_all_tell_the_probability_that_its_alert_tells() -> None:

@@ -11,6 +11,7 @@ import pytest
 from shm.pipeline.conditions import Evidence, why_over
 from shm.values import ModeReading, Reading, RepeatedMistake, WatchedTest
 from shm.watch.alert_state import AlertState
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.quantities import MeasuredMode
 from shm.watch.repeated_mistakes import repeated_mistakes
 from shm.watch.watching import after
@@ -98,7 +99,7 @@ def rung(wrong: str) -> list[int]:
         mistaken = repeated_mistakes(mistaken, reading(number, f".{each}."), MODES)
         test = replace(watched(number, 0), mistaken=mistaken)
         told, alert = after(told, test, HANGER_3)
-        told = AlertState.from_text(told.to_text())
+        told = from_bytes(AlertState, to_bytes(told))
         rings += [number] if alert else []
     return rings
 

@@ -12,6 +12,7 @@ import pytest
 from shm.pipeline.stream_steps import Pooled, pool_stream
 from shm.values import outdoor_c
 from shm.values.stream import PooledReading, Window, WindowReading
+from shm.watch.kept_state import from_bytes
 from shm.watch.stream_state import StreamState
 from shm.watch.stream_thermometer import FASTEST_K_PER_H, Thermometer, believed, disagreeing
 from tests.watch.test_stream_watch import HANGER, START, from_hour, hours
@@ -121,7 +122,7 @@ def test_while_it_learns_a_jump_is_what_it_learns_from() -> None:
     found = watched(hours(60), from_on(30, lambda true_c: true_c - 15))
 
     assert not any(each.events for each in found)
-    assert StreamState.from_bytes(found[-1].kept).thermometer.off_k == 0
+    assert from_bytes(StreamState, found[-1].kept).thermometer.off_k == 0
 
 
 def test_only_what_no_steel_can_do_is_a_jump() -> None:

@@ -16,6 +16,7 @@ from shm.values import FloatArray, Hanger, ModalTest, Mode, Thresholds
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, StreamEvent, Window, WindowReading
 from shm.watch.ambient_hammer import ambient_bias
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.stream_cause import cause_of, led_by
 from shm.watch.stream_reading import ModeTable, exchanged, sensitivities
 from shm.watch.stream_state import windows_as_mounted
@@ -193,10 +194,10 @@ def test_planes_that_are_exchanged_are_told_as_such_within_hours(lacking: int) -
     assert abs(found[-1].compensated_shift) < 0.002
     window = Window("north", 7, START, 600.0, "wind", 0.02)
     (right,) = windows_as_mounted(
-        state.to_bytes(), [WindowReading(window, off[-1].modes, "tracked")]
+        to_bytes(state), [WindowReading(window, off[-1].modes, "tracked")]
     )
     assert right.modes == exchanged(off[-1].modes)
-    shift, sd = daily_shift(state.to_bytes(), off[6:])
+    shift, sd = daily_shift(to_bytes(state), off[6:])
     assert abs(shift) < 4 * sd < 0.01
 
 
@@ -317,7 +318,7 @@ def test_it_goes_on_from_bytes_as_it_would_have() -> None:
         assert not last.alert or last.alert == found[readings.index(each)].alert
 
     assert last.compensated_shift == found[-1].compensated_shift
-    assert StreamState.from_bytes(last.kept).bank.day == state.bank.day
+    assert from_bytes(StreamState, last.kept).bank.day == state.bank.day
 
 
 @pytest.mark.slow
@@ -326,7 +327,7 @@ def test_what_is_kept_does_not_grow() -> None:
     for each in hours(24 * 50):
         _, state = watch.after(state, each)
         assert state is not None
-        sizes.append(len(state.to_bytes()))
+        sizes.append(len(to_bytes(state)))
 
     assert max(sizes[600:]) < 1.02 * max(sizes[300:600]) < 100_000
 
@@ -347,7 +348,7 @@ def test_another_description_learns_anew() -> None:
 
 def test_what_it_cannot_read_or_watch_is_said() -> None:
     reading = hours(1)[0]
-    with pytest.raises(BadInput, match="learns the stream's baseline anew"):
+    with pytest.raises(BadInput, match="the watch then begins anew"):
         watch_reading(None, reading, HANGER, b"{}\n")
     with pytest.raises(BadInput, match="no model"):
         watch_reading(None, reading, Hanger.without_model(7), None)
@@ -390,7 +391,7 @@ def test_modes_levels_do_not_take_up_the_tension() -> None:
 def test_a_days_tension_repeats_within_a_thousandth() -> None:
     readings = hours(24 * 20, seed=9)
     _, state = watched(readings[: 24 * 10])
-    kept = state.to_bytes()
+    kept = to_bytes(state)
     for day in range(10, 20):
         of_day = readings[24 * day : 24 * (day + 1)]
         shift, sd = daily_shift(kept, of_day)
