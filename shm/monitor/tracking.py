@@ -45,10 +45,8 @@ places to look make 10 by chance."""
 _NARROWER = 10.0
 """judgement: than the mode as it was known, or than a line: a tone, of trains or machines, near it.
 Two close modes that were taken for one had up to seven times the damping of each."""
-_LEAK = 0.01  # judgement: of the power; sensors that are 6 degrees off
 _FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
 _STEPS_WITHOUT = 6  # technical: from the fit with the mode; what is gained later is small
-_SAME = 3.0  # standard deviations
 _REVIEW_S, _REVIEW_FEW_S, _FEW = 12 * 3600, 3600, 2
 """judgement: how often modes are sought that were missed at first, by day and by night; each hour
 where so few are known, or most are lost. From scratch costs as much as twenty windows that are
@@ -350,7 +348,7 @@ class _Group:
             mode = self._mode(fit, place, self.group[index])
             if mode is not None:
                 made[self.group[index]] = mode
-        return self._at_home(made)
+        return made
 
     def _proven(self) -> tuple[BandFit, list[int]] | None:
         """Return the fit of the modes without each of which the lines are far less likely."""
@@ -403,8 +401,7 @@ class _Group:
         options = replace(self.options, ambient_s=sum(s.seconds for s in self.found.stretches))
         best = options.ambient_width * options.at_best(hz, damping)[0]
         if (
-            _is_leak(modes, place)
-            or damping < self.peaks.damping[index] / _NARROWER
+            damping < self.peaks.damping[index] / _NARROWER
             or decay * max(each.seconds for each in self.found.stretches) < 1.0
             or damping > self.options.max_damping_ratio
             or sd_hz > hz * max(2 * self.options.max_frequency_sd, best)
@@ -439,33 +436,6 @@ class _Group:
         seen = [weight @ each.values[:, each.between(*band)] for each in self.found.stretches]
         strength = np.concatenate([np.abs(np.fft.ifft(each)) ** 2 * len(each) for each in seen])
         return max(1.0, float(np.mean(strength**2) / np.mean(strength) ** 2) / 2)
-
-    def _at_home(self, made: dict[int, Mode]) -> dict[int, Mode]:
-        """Those that are not in the place of another mode, unless that one is there, too.
-
-        Planes do not exchange their modes between two windows; sensors that see both planes let
-        one pass for the other where that one is faint.
-        """
-        expected = self.peaks.expected_hz
-        kept = {}
-        for index, mode in made.items():
-            away = np.abs(expected - mode.frequency_hz)
-            place = int(np.argmin(away))
-            nearest = away[index] <= away[place]
-            stayed = away[index] < _SAME * mode.frequency_sd_hz
-            there = place in made and bool(
-                abs(made[place].frequency_hz - expected[place]) < away[place]
-            )
-            if nearest or stayed or there:
-                kept[index] = mode
-        return kept
-
-
-def _is_leak(modes: CloseModes, place: int) -> bool:
-    """Whether a mode is what sensors that are not quite straight see of a stronger one."""
-    away = np.abs(modes.radians_s - modes.radians_s[place])
-    near = away < 2 * (modes.decay_1_s + modes.decay_1_s[place])
-    return bool(np.any(near & (modes.power[place] < _LEAK * modes.power)))
 
 
 def _bands(hz: FloatArray, half_hz: FloatArray, group: list[int]) -> list[tuple[float, float]]:

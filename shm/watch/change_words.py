@@ -210,22 +210,6 @@ def each_frequency(test: WatchedTest) -> str:
     return ", ".join(told)
 
 
-def odd_frequencies(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
-    """Return what `message_of_odd` says of such a structure."""
-    name = structure_words(hanger)
-    if in_a_row == 1:
-        return (
-            f"The frequencies of {name} in test {test.test} agree with no test before. Test again "
-            "within a week; this one does not count until another agrees with it. A mode may be "
-            "mistaken, a clock or a sensor wrong; or the structure has changed."
-        )
-    return (
-        f"The frequencies of {name} agreed {in_a_row} times in a row neither with those before nor "
-        "with each other. Look at sensors and clock within a week. Until then its state rests on "
-        "older tests."
-    )
-
-
 def _have(verb: str, mean: float, sd: float) -> str:
     half = NINETY_PERCENT * sd
     return f"{verb} {'dropped' if mean < 0 else 'risen'} by {rounded_percent(abs(mean), half)}"

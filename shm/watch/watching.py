@@ -40,13 +40,15 @@ from shm.watch.alert_state import AlertState, conditions, still, with_beyond
 from shm.watch.alert_text import alert_of, message_of
 from shm.watch.change_words import CAUSES, suspects
 from shm.watch.kept_state import from_bytes, to_bytes
-from shm.watch.odd_test_alerts import (
+from shm.watch.notices import (
     alert_of_baseline,
     message_of_odd,
+    news_of,
+    notice_of,
+    repeated_mistakes,
 )
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
-from shm.watch.repeated_mistakes import news_of, notice_of, repeated_mistakes
 from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watch, Watcher, watch_of, watched
 
@@ -179,8 +181,11 @@ def watch_newest(
 
 
 def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:
-    """How many tests precede every change, and how often this hanger may be called falsely."""
+    """Return the options with a hanger's own: its baseline, its false calls, wires that slip."""
     own = hanger.thresholds.false_call_years
+    if hanger.kind == "strand":
+        slip = hanger.assumptions.strand_bending_per_amplitude_sd.value
+        options = replace(options, bending_per_amplitude_sd=slip)
     limit_years = options.limit_years if own is None else own
     return replace(options, baseline_tests=baseline_tests, limit_years=limit_years)
 

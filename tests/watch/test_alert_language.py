@@ -26,7 +26,7 @@ from shm.watch.causes import (
     TIMEBASE,
     UNEXPLAINED,
 )
-from shm.watch.odd_test_alerts import message_of_odd
+from shm.watch.notices import message_of_odd
 from tests.helpers.hangers import HANGER_3
 
 START = datetime(2026, 5, 1, tzinfo=UTC)

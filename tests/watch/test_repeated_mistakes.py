@@ -12,8 +12,8 @@ from shm.pipeline.conditions import Evidence, why_over
 from shm.values import ModeReading, Reading, RepeatedMistake, WatchedTest
 from shm.watch.alert_state import AlertState
 from shm.watch.kept_state import from_bytes, to_bytes
+from shm.watch.notices import repeated_mistakes
 from shm.watch.quantities import MeasuredMode
-from shm.watch.repeated_mistakes import repeated_mistakes
 from shm.watch.watching import after
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_change
