@@ -21,7 +21,7 @@ import numpy as np
 from shm.values import TENSION, Alert, Drift, Hanger, ModalTest
 from shm.values.rounding import NINETY_PERCENT
 from shm.watch.agreement import drifts_of
-from shm.watch.baseline_state import known_modes
+from shm.watch.baseline_check import known_modes
 from shm.watch.change_words import is_stiffness, probable_groups, quantity_words, size_words
 from shm.watch.readings import Reader
 
