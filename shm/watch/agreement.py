@@ -29,9 +29,9 @@ from shm.values.drift import threshold_of
 from shm.watch.alert_text import alert_of, message_of_agreeing
 from shm.watch.options import WatchOptions
 from shm.watch.persistence import LARGE
-from shm.watch.quantities import shift_of, value_at
+from shm.watch.posterior_summary import beyond, drift_of, shift_of_mixture
+from shm.watch.quantities import shift_of
 from shm.watch.readings import Reader
-from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
 
 CLEAR = 3.0
 """Standard deviations from the baseline, temperature and scatter included: one good test in 740
@@ -235,30 +235,10 @@ def _drift(
     alike: Sequence[Shown],
     hanger: Hanger,
 ) -> Drift:
-    """Of tests that agree, as if what they share in error were of each alone: the larger."""
+    """Return what tests that agree show, as if their errors were all of each alone: the larger."""
     weights = [1 / each.variance for each in alike]
-    x = float(np.average([each.mean for each in alike], weights=weights))
-    sd = math.sqrt(max(each.variance for each in alike))
-    return drift_of(quantity, newest, Shift(x, sd), hanger)
-
-
-def drift_of(
-    quantity: WatchedQuantity, newest: tuple[ModalTest, datetime], read: Shift, hanger: Hanger
-) -> Drift:
-    """Return what tests `read` of a quantity, in the coordinate, as a shift from the baseline."""
-    alone = np.ones(1)
-    at = alone * read.mean, alone * read.sd
-    shift = shift_of_mixture(quantity, alone, *at)
-    threshold = threshold_of(quantity.name, hanger)
-    return Drift(
-        hanger=hanger.id,
-        test=newest[0].id,
-        time=newest[1],
-        quantity=quantity.name,
-        baseline=quantity.baseline,
-        value=value_at(quantity, read.mean),
-        shift_mean=shift.mean,
-        shift_sd=shift.sd,
-        threshold=threshold,
-        probability=beyond(quantity, alone, *at, threshold),
-    )
+    mean, alone = np.average([each.mean for each in alike], weights=weights), np.ones(1)
+    at = alone * mean, alone * math.sqrt(max(each.variance for each in alike))
+    chance = beyond(quantity, alone, *at, threshold_of(quantity.name, hanger))
+    of_test = newest[0].id, newest[1]
+    return drift_of(quantity, hanger, of_test, shift_of_mixture(quantity, alone, *at), chance)

@@ -28,8 +28,7 @@ from shm.values import (
 from shm.values.drift import threshold_of
 from shm.watch.change_point import LOG_SHARES, SIZES, STEP, Evidence
 from shm.watch.options import DAYS_PER_YEAR, WatchOptions
-from shm.watch.quantities import value_at
-from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
+from shm.watch.quantities import coordinate_of, shift_of, value_at
 
 _ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
 _TAIL = 0.05  # 90 % lie between
@@ -37,6 +36,10 @@ _DIGITS = 3  # probabilities that read alike are ordered by tension first
 _TRADED = 0.25  # judgement: of what an end does, that looks like another tension
 _BEYOND_DOUBT = 1e4  # judgement: times what a detection takes
 _MOST = 24  # technical: changes that a mixture is made of, the likeliest
+# Technical: exact for polynomials of degree 13.
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
+_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+_NEGLIGIBLE = 1e-7  # technical: less than the least probability that is told
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,12 +212,12 @@ def _as_changed(
         square = np.array([float((each[1][:n].mean(axis=0) ** 2).sum()) for each in found])
         mean_all = float(weights @ means)
         spread = float(weights @ (square + (means - mean_all) ** 2))
-        shift, end, plane = Shift(mean_all, math.sqrt(max(spread, 0.0))), None, None
+        shift, end, plane = (mean_all, math.sqrt(max(spread, 0.0))), None, None
     return Moved(
         quantity=names[j],
         probability=probability,
-        shift_mean=shift.mean,
-        shift_sd=shift.sd,
+        shift_mean=shift[0],
+        shift_sd=shift[1],
         end=end,
         plane=plane,
         alike=alike,
@@ -332,7 +335,8 @@ def summarize_drifts(
             threshold,
             subject.options.least_frequency_shift,
         )
-        found.append(_drift(subject, quantity, reading, shift, threshold, chance))
+        at = reading.test, reading.time
+        found.append(drift_of(quantity, subject.hanger, at, shift, chance))
     return tuple(found)
 
 
@@ -371,24 +375,74 @@ def _shifts(
     return weights, means, np.sqrt(np.maximum(variance, 0)), changes
 
 
-def _drift(
-    subject: SummaryContext,
+def drift_of(
     quantity: WatchedQuantity,
-    reading: Reading,
-    shift: Shift,
-    threshold: float,
+    hanger: Hanger,
+    at: tuple[str, datetime],
+    shift: tuple[float, float],
     probability: float,
 ) -> Drift:
-    at_rest = value_at(quantity, 0.0)
+    """Return a shift (mean, sd) by a test, its name and time, with that of being beyond."""
+    still, mean = value_at(quantity, 0.0), shift[0]
     return Drift(
-        hanger=subject.hanger.id,
-        test=reading.test,
-        time=reading.time,
+        hanger=hanger.id,
+        test=at[0],
+        time=at[1],
         quantity=quantity.name,
         baseline=quantity.baseline,
-        value=at_rest * (1 + shift.mean) if is_ratio(quantity.name) else at_rest + shift.mean,
-        shift_mean=shift.mean,
-        shift_sd=shift.sd,
-        threshold=threshold,
+        value=still * (1 + mean) if is_ratio(quantity.name) else still + mean,
+        shift_mean=mean,
+        shift_sd=shift[1],
+        threshold=threshold_of(quantity.name, hanger),
         probability=probability,
     )
+
+
+def shift_of_mixture(
+    quantity: WatchedQuantity, weights: FloatArray, mean: FloatArray, sd: FloatArray
+) -> tuple[float, float]:
+    """Return mean and sd of a shift: of normal distributions (B,) in the coordinate.
+
+    There is none with what `weights` leave. By Gauss-Hermite quadrature of seven nodes in each.
+    """
+    kept = weights > _NEGLIGIBLE
+    weights = weights[kept]
+    mean, sd = mean[kept], sd[kept]
+    shifts = shift_of(quantity, mean[:, None] + sd[:, None] * _NODES)
+    first = float(weights @ shifts @ _WEIGHTS)
+    second = float(weights @ (shifts - first) ** 2 @ _WEIGHTS)
+    second += (1 - float(weights.sum())) * first**2
+    return first, math.sqrt(max(second, 0.0))
+
+
+def beyond(
+    quantity: WatchedQuantity,
+    weights: FloatArray,
+    mean: FloatArray,
+    sd: FloatArray,
+    threshold: float,
+    least: float = 0.0,
+) -> float:
+    """Return the probability of a shift beyond a threshold, the likelier way, by the mixture.
+
+    Decades of an end that is as good as clamped move nothing: what moves the frequencies' mean by
+    less than `least`, a spring's coordinate, is not beyond.
+    """
+    kept = weights > _NEGLIGIBLE
+    weights, mean = weights[kept], mean[kept]
+    sd = np.maximum(sd[kept], 1e-12)
+    low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
+    if not is_ratio(quantity.name):
+        low, high = min(low, -least), max(high, least)
+    down = float(weights @ scipy.special.ndtr((low - mean) / sd))
+    up = float(weights @ scipy.special.ndtr((mean - high) / sd))
+    return min(max(down, up), 1.0)
+
+
+def _coordinate(quantity: WatchedQuantity, shift: float) -> float:
+    """Return the coordinate of a shift; infinite where the quantity's table ends before it."""
+    is_fraction = is_ratio(quantity.name)
+    value = quantity.baseline * (1 + shift) if is_fraction else quantity.baseline + shift
+    if not min(quantity.values) < value < max(quantity.values):
+        return math.copysign(math.inf, shift)
+    return coordinate_of(quantity, value)
