@@ -134,16 +134,40 @@ class StateSums:
         return np.asarray(state.values - swing)
 
     def scatter(self, state: WatchState) -> FloatArray:
-        """What the counted tests so far say of the scatter (q + c,); of a day one alone does."""
+        """Return the variances (q + c,) along each factor by the counted tests, one of each day.
+
+        Of one test, half of those of a difference; a mode that one of two lacks says nothing.
+        """
         rows = np.flatnonzero(state.counted)
         rows = rows[np.diff(state.years[rows], prepend=-1.0) > OF_ONE_VISIT_YEARS]
-        found = differences(
-            self._at_rest(state)[rows],
-            state.variances[rows],
-            self._factors(state)[rows],
-            self._doubt(state)[rows],
-        )
-        return learnt(found, self.structure.scatter_variance, state.scatter_variance)
+        prior = self.structure.scatter_variance
+        if len(rows) < 2:
+            return prior
+        variances, doubt = state.variances[rows], self._doubt(state)[rows]
+        spread = variances[1:] + variances[:-1]
+        known = np.isfinite(spread)[:, :, None]
+        values = np.where(known, np.diff(self._at_rest(state)[rows], axis=0)[:, :, None], 0.0)
+        factors = np.where(known, self._factors(state)[rows[1:]], 0.0)
+        open_left = np.concatenate([doubt[1:], doubt[:-1]], axis=2) * known
+        own = np.where(np.isfinite(spread), spread, _ABSENT)[:, :, None] * np.eye(len(spread.T))
+        covariance = own + open_left @ np.swapaxes(open_left, 1, 2)
+        there = np.abs(factors).max(axis=1) > 0
+        variance = np.maximum(state.scatter_variance, 1e-12)
+        for _ in range(_ROUNDS):
+            scaled = factors * np.sqrt(2 * variance)
+            weight = np.linalg.inv(scaled @ np.swapaxes(scaled, 1, 2) + covariance)
+            weighted = weight @ scaled
+            # Of a unit normal along each factor: its mean given the difference, what that explains.
+            along = (weighted * values).sum(axis=1)
+            explained = (scaled * weighted).sum(axis=1)
+            far = np.abs(along) / np.sqrt(np.maximum(explained, 1e-12))
+            left = np.clip((_CHANGE_FROM - far) / (_CHANGE_FROM - _SCATTER_UP_TO), 0.0, 1.0)
+            square = explained * np.minimum(far, _SCATTER_UP_TO) ** 2
+            expected = there * (left * square + (1 - left) * explained + 1 - explained)
+            variance = (_PRIOR_TESTS * prior + variance * expected.sum(axis=0)) / (
+                _PRIOR_TESTS + there.sum(axis=0)
+            )
+        return np.asarray(variance)
 
     def _columns(self, state: WatchState, rows: IntArray) -> FloatArray:
         """Of the tests `rows` (T, n, columns): modes, quantities, covariates."""
@@ -256,54 +280,3 @@ def size_of(evidence: Evidence) -> FloatArray:
         for share, size in zip(by_size, SIZES, strict=True):
             covariance += share * size**2 * direction.factor @ direction.factor.T
     return np.asarray(np.linalg.inv(covariance))
-
-
-@dataclass(frozen=True, eq=False)
-class Differences:
-    """Of tests that follow each other: `values` (d, n), `factors` (d, n, c), along which they
-    scatter, and `covariance` (d, n, n) of what is known to differ beside that."""
-
-    values: FloatArray
-    covariance: FloatArray
-    factors: FloatArray
-
-
-def differences(
-    values: FloatArray, variances: FloatArray, factors: FloatArray, doubt: FloatArray
-) -> Differences:
-    """Of tests (T, n) with `factors` (T, n, c); a mode that one of two lacks says nothing.
-
-    `doubt` (T, n, m) are the factors of what conditions leave open, unit normals a test.
-    """
-    spread = variances[1:] + variances[:-1]
-    known = np.isfinite(spread)
-    of_both = np.concatenate([doubt[1:], doubt[:-1]], axis=2) * known[:, :, None]
-    own = np.where(known, spread, _ABSENT)
-    return Differences(
-        np.where(known, np.diff(values, axis=0), 0.0),
-        own[:, :, None] * np.eye(values.shape[1]) + of_both @ np.swapaxes(of_both, 1, 2),
-        np.where(known[:, :, None], factors[1:], 0.0),
-    )
-
-
-def learnt(found: Differences, prior_variance: FloatArray, begun: FloatArray) -> FloatArray:
-    """Variance (c,) along each factor: of one test, half of that of a difference."""
-    variance = np.maximum(begun, 1e-12)
-    if not len(found.values):
-        return prior_variance
-    there = np.abs(found.factors).max(axis=1) > 0
-    for _ in range(_ROUNDS):
-        scaled = found.factors * np.sqrt(2 * variance)
-        weight = np.linalg.inv(scaled @ np.swapaxes(scaled, 1, 2) + found.covariance)
-        weighted = weight @ scaled
-        # Of a unit normal along each factor: its mean given the difference, and what that explains.
-        along = np.einsum("dic,di->dc", weighted, found.values)
-        explained = np.einsum("dic,dic->dc", scaled, weighted)
-        far = np.abs(along) / np.sqrt(np.maximum(explained, 1e-12))
-        left = np.clip((_CHANGE_FROM - far) / (_CHANGE_FROM - _SCATTER_UP_TO), 0.0, 1.0)
-        square = explained * np.minimum(far, _SCATTER_UP_TO) ** 2
-        expected = there * (left * square + (1 - left) * explained + 1 - explained)
-        variance = (_PRIOR_TESTS * prior_variance + variance * expected.sum(axis=0)) / (
-            _PRIOR_TESTS + there.sum(axis=0)
-        )
-    return np.asarray(variance)
