@@ -32,12 +32,13 @@ from shm.plausibility.bar_evidence import (
     ORDINARY,
     OTHER_CLOCK,
     TIGHTER,
-    Bars,
+    Bar,
     Evidence,
     Origin,
     OriginKind,
     Seen,
     changes_of,
+    fit_bars,
     log_sum,
     seen_in,
 )
@@ -184,32 +185,32 @@ def _candidates(
     test: ModalTest, own: Known, others: Sequence[Known]
 ) -> tuple[Evidence, dict[Origin, tuple[float, Evidence]]]:
     """Return the hanger of that number, and what else the test may come from with its prior."""
-    rows = Bars()
-    now = {each.hanger.id: seen_in([test], each.hanger) for each in (own, *others)}
+    every = (own, *others)
+    now = {each.hanger.id: seen_in([test], each.hanger) for each in every}
     before = {
-        each.hanger.id: seen_in(each.tests[-LATEST:], each.hanger)
-        for each in (own, *others)
-        if each.tests
+        each.hanger.id: seen_in(each.tests[-LATEST:], each.hanger) for each in every if each.tests
     }
-    for each in (own, *others):
-        id_ = each.hanger.id
-        rows.add(Origin("hanger", id_), each.hanger, before.get(id_, now[id_]))
-    seen, id_ = now[own.hanger.id], own.hanger.id
-    rows.add(Origin("unknown bar"), own.hanger, seen, any_bar=True)
-    if not own.tests:
-        for factor in COARSE_FACTORS:
-            origin = Origin("time base", factor=factor)
-            rows.add(origin, own.hanger, seen.times(1 / factor))
-    fits = rows.fitted()
-    mine = Origin("hanger", id_)
-    rivals = {origin: fits.described(origin) for origin in rows.origins if origin != mine}
-    for each in others:
-        origin, at = Origin("hanger", each.hanger.id), each.hanger.id
-        if at in before:
-            rivals[origin] = _as_before(now[at].over(before[at]), fits.sensitivity(origin))
+    bars = {
+        Origin("hanger", each.hanger.id): Bar.described(
+            each.hanger, before.get(each.hanger.id, now[each.hanger.id])
+        )
+        for each in every
+    }
+    id_ = own.hanger.id
+    seen = now[id_]
+    bars[Origin("unknown bar")] = Bar.described(own.hanger, seen, any_bar=True)
+    for factor in COARSE_FACTORS if not own.tests else ():
+        origin = Origin("time base", factor=factor)
+        bars[origin] = Bar.described(own.hanger, seen.times(1 / factor))
+    fits = dict(zip(bars, fit_bars(list(bars.values())), strict=True))
+    mine = fits.pop(Origin("hanger", id_))
+    rivals = {origin: fit.described() for origin, fit in fits.items()}
+    for origin, fit in fits.items():
+        if origin.kind == "hanger" and (at := origin.hanger) in before:
+            rivals[origin] = _as_before(now[at].over(before[at]), fit.way)
     if id_ not in before:
-        return replace(fits.described(mine), masses=True), _with_priors(rivals, len(others))
-    shift, way = seen.over(before[id_]), fits.sensitivity(mine)
+        return replace(mine.described(), masses=True), _with_priors(rivals, len(others))
+    shift, way = seen.over(before[id_]), mine.way
     for factor in FACTORS:
         rivals[Origin("time base", factor=factor)] = _as_before(shift.times(1 / factor), way)
     if shift.mask.any():
@@ -217,7 +218,7 @@ def _candidates(
         rivals[Origin("time base", factor=factor)] = _as_before(shift, way, OTHER_CLOCK)
     crossed = seen.over(before[id_].exchanged())
     rivals[Origin("planes")] = _as_before(crossed, way[::-1])
-    return fits.changed(mine, shift), _with_priors(rivals, len(others))
+    return mine.changed(shift), _with_priors(rivals, len(others))
 
 
 def _with_priors(
