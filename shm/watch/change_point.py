@@ -285,7 +285,8 @@ class _NullSums:
 
     def fitted(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return mean (K, p), covariance (K, p, p), log evidence (K,) of no (further) change."""
-        joint, vector = self.square.sum(axis=0) + self.prior, self.cross.sum(axis=0)
+        joint, vector = self.square.sum(axis=0), self.cross.sum(axis=0)
+        joint = (joint + np.swapaxes(joint, 1, 2)) / 2 + self.prior
         covariance = np.linalg.inv(joint)
         mean = np.einsum("kij,kj->ki", covariance, vector)
         log_evidence = self.constant.sum(axis=0) + (vector * mean).sum(axis=1) / 2

@@ -63,17 +63,14 @@ class Course:
     baseline: int
 
 
-@dataclass(frozen=True)
-class RecurrenceBound:
-    """What stays: `log_years` that it has for a change, of each no more than it has anyway and the
-    most of all; and how many tests agree with each other against a baseline that stands alone."""
+def bound_by_recurrence(
+    evidence: Evidence, course: Course, limit_years: float
+) -> tuple[float, int]:
+    """Return log of the years that stay for a change, and the tests against a lone baseline.
 
-    log_years: float
-    against_baseline: int = 0
-
-
-def bound_by_recurrence(evidence: Evidence, course: Course, limit_years: float) -> RecurrenceBound:
-    """Of the likeliest changes; a baseline stands alone only where a normal law would call it."""
+    Of the most probable changes each has no more than it has anyway, and the most of all counts. A
+    baseline stands alone only where a normal law would call the change.
+    """
     is_clear = evidence.log_evidence > math.log(limit_years)
     found, against = -math.inf, 0
     leading = float(evidence.log_mass.max(initial=-math.inf))
@@ -86,7 +83,7 @@ def bound_by_recurrence(evidence: Evidence, course: Course, limit_years: float) 
         first = int(evidence.beginnings[index[0]])
         if n == 0 and first == course.baseline and is_of_those_before and is_clear:
             against = showing
-    return RecurrenceBound(found, against)
+    return found, against
 
 
 def _likeliest(evidence: Evidence) -> list[tuple[int, ...]]:

@@ -43,19 +43,13 @@ _N_SPRINGS, _N_SHARES = 10, 4
 _NOMINAL = 0.003 * 3 / 0.15
 
 
-@dataclass(frozen=True, eq=False)
-class Sensitivities:
-    """Of n modes: d ln f / d ln T, and by a decade of all end springs; `tension_n` they are at."""
-
-    tension: FloatArray
-    ends: FloatArray
-    tension_n: float
-
-
 def sensitivities(
     baseline: Posterior | None, hanger: Hanger, modes: Sequence[Mode]
-) -> Sensitivities:
-    """By the baseline's model class; without one, by the beam on springs that fits `modes` best."""
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return d ln f / d ln T of the modes (n,), that by a decade of all end springs, the tension.
+
+    By the baseline's model class; without one, by the beam on springs that fits `modes` best.
+    """
     keys = [(mode.plane, mode.order) for mode in modes]
     if baseline is not None:
         return _of_baseline(baseline, hanger, keys)
@@ -64,7 +58,7 @@ def sensitivities(
 
 def _of_baseline(
     baseline: Posterior, hanger: Hanger, keys: Sequence[MeasuredMode]
-) -> Sensitivities:
+) -> tuple[FloatArray, FloatArray, float]:
     model = class_of(baseline, hanger)
     base = base_point(baseline, model)
     theta = np.tile(base, (2, 1))
@@ -73,12 +67,16 @@ def _of_baseline(
     springs = [i for i, each in enumerate(model.parameter_names) if each.startswith("log10_k")]
     ends = np.array([_DECADES, -_DECADES])
     stiff, soft = log_frequencies(model, moved(model, base, springs, ends), keys)
-    return Sensitivities(
-        (up - down) / (2 * _STEP), (stiff - soft) / (2 * _DECADES), float(baseline.tension_n.mean())
+    return (
+        (up - down) / (2 * _STEP),
+        (stiff - soft) / (2 * _DECADES),
+        float(baseline.tension_n.mean()),
     )
 
 
-def _of_beam(hanger: Hanger, keys: Sequence[MeasuredMode], log_hz: FloatArray) -> Sensitivities:
+def _of_beam(
+    hanger: Hanger, keys: Sequence[MeasuredMode], log_hz: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
     """By the least sum of absolute misfits, springs by plane: a mode with a wrong order counts for
     little. The nominal tension tells a slack bar on stiff springs from a taut one on soft ones."""
     order = np.array([each for _, each in keys]) - 1
@@ -113,9 +111,7 @@ def _of_beam(hanger: Hanger, keys: Sequence[MeasuredMode], log_hz: FloatArray) -
 
     up, down = (each_mode(math.exp(way * _STEP / 2), 1.0) for way in (1, -1))
     stiff, soft = (each_mode(1.0, 10 ** (way * _DECADES)) for way in (1, -1))
-    return Sensitivities(
-        (up - down) / (2 * _STEP), (stiff - soft) / (2 * _DECADES), float(tension_n[at, 0, of])
-    )
+    return ((up - down) / (2 * _STEP), (stiff - soft) / (2 * _DECADES), float(tension_n[at, 0, of]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,11 +131,11 @@ class ModeTable:
 
     @classmethod
     def of(cls, baseline: Posterior | None, hanger: Hanger, modes: Sequence[Mode]) -> ModeTable:
-        found = sensitivities(baseline, hanger, modes)
+        tension, ends, tension_n = sensitivities(baseline, hanger, modes)
         keys = tuple((mode.plane, mode.order) for mode in modes)
         level, sd = _measured(modes, hanger.assumptions)
         zero = np.zeros(len(keys))
-        return cls(keys, found.tension, found.ends, level, sd**2, zero, found.tension_n)
+        return cls(keys, tension, ends, level, sd**2, zero, tension_n)
 
     def with_new(
         self,

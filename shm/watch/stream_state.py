@@ -49,6 +49,21 @@ def condition_sd(assumed: Assumptions) -> FloatArray:
     return np.array([kelvin] * 4 + [2e-5, e_fold, 2e-4] + [1e-3] * 6)
 
 
+@dataclass(frozen=True)
+class Reported:
+    """A change that was told: by how much, and from where on; 0 where none is in force."""
+
+    shift: float = 0.0
+    since: float = 0.0
+
+    def after(self, before: float, now: float) -> Reported:
+        """Return what is in force after a change; what was told is until half of it is back."""
+        if self.shift and (now - self.since) / self.shift < 0.5:
+            return self
+        since = self.since if self.shift else before
+        return Reported(now - since, since)
+
+
 @dataclass(frozen=True, eq=False)
 class StreamState:
     """What goes from reading to reading. Days count from `start`.
@@ -57,9 +72,8 @@ class StreamState:
     log level and of the wind; `known_day` is the last with a temperature. `ring` (24, n) are the
     newest readings' modes with the conditions taken off, `ring_day` their days, `old` (n,) the mean
     of those before. Shifts count from `zero`, compensated ones from `compensated_zero`; a change
-    that was told moved the tension by `called_shift` from `called_from` on, 0 where none stands;
-    likewise `apart_shift` and `apart_from` of one plane. `contrast` are the filters of what one
-    plane says more than the other, less what was `absorbed` into the modes' levels.
+    that was told of the tension is `called`, of one plane `apart`. `contrast` are the filters of
+    what one plane says more than the other, less what was `absorbed` into the modes' levels.
     So many hours the planes were exchanged. `unknown_sd` of ln T is what an unknown temperature may
     do, 0 where it is known. Up to `settled_day` readings are gone over again: no
     alert ends before.
@@ -80,10 +94,8 @@ class StreamState:
     compensated_zero: float = 0.0
     readings: int = 0
     is_learning: bool = True
-    called_from: float = 0.0
-    called_shift: float = 0.0
-    apart_from: float = 0.0
-    apart_shift: float = 0.0
+    called: Reported = Reported()
+    apart: Reported = Reported()
     absorbed: float = 0.0
     told: AlertState = field(default_factory=AlertState)
     standing: tuple[str, ...] = ()

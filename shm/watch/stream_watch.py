@@ -49,6 +49,7 @@ from shm.watch.stream_state import (
     NO_CONDITIONS,
     OLD_READINGS,
     TOGETHER,
+    Reported,
     StreamState,
     as_mounted,
     condition_sd,
@@ -226,14 +227,14 @@ class StreamWatch:
                     state = _absorbed(state, cause)
                 evidence, unlike = NOTHING, 0.0
             elif cause.plane:
-                before = state
+                before = _contrast(state)[0]
                 state = _absorb_plane(state, cause, apart, None if is_apart else evidence)
-                state = _stand_apart(before, state)
+                state = replace(state, apart=state.apart.after(before, _contrast(state)[0]))
                 moved, unlike, is_apart = cause.moved, 0.0, True
             elif is_apart:
-                before = state
+                before = _contrast(state)[0]
                 state = replace(state, contrast=state.contrast.changed(apart))
-                state = _stand_apart(before, state)
+                state = replace(state, apart=state.apart.after(before, _contrast(state)[0]))
                 moved, unlike = cause.moved, 0.0
             else:
                 evidence = _sized(evidence, cause, state)
@@ -243,7 +244,9 @@ class StreamWatch:
                     else each
                     for each in cause.moved
                 )
-                state, unlike = _changed(state, evidence), 0.0
+                state, unlike = replace(state, bank=state.bank.changed(evidence)), 0.0
+                now = _shift(state)[0]
+                state = replace(state, called=state.called.after(now - evidence.shift, now))
         test = self._watched_test(state, evidence, moved, is_apart, unlike, reading, end)
         told, alert = after(state.told, test, self.hanger)
         told = replace(told, called=told.called[-_CALLS_KEPT:])
@@ -252,7 +255,7 @@ class StreamWatch:
         ended = () if stands else standing
         state = replace(state, told=told, standing=() if ended else standing)
         if ended:
-            state = replace(state, called_shift=0.0, apart_shift=0.0)
+            state = replace(state, called=Reported(), apart=Reported())
         shift, sd = test.drifts[0].shift_mean, test.drifts[0].shift_sd
         own, own_sd = shift_of_reading(state, seen)
         return StreamWatched(b"", own, own_sd, shift, sd, test, alert, events, ended, ""), state
@@ -293,9 +296,9 @@ class StreamWatch:
         sd = math.hypot(sd, unlike / NINETY_PERCENT)
         limits, table = self.hanger.thresholds, state.table
         chance = rate / (1 + rate)
-        of_tension = (mean - state.called_from, sd, state.called_shift)
+        of_tension = (mean - state.called.since, sd, state.called.shift)
         between, between_sd = _contrast(state)
-        of_plane = (between - state.apart_from, between_sd, state.apart_shift)
+        of_plane = (between - state.apart.since, between_sd, state.apart.shift)
         standing = [each for each in (of_tension, of_plane) if each[2]]
         if standing:
             left = max(_beyond(now / size - 0.5, own / abs(size)) for now, own, size in standing)
@@ -437,25 +440,6 @@ def _sized(evidence: Evidence, cause: Cause, state: StreamState) -> Evidence:
     own = cause.moved[0]
     sd = math.hypot(own.shift_sd, state.bank.wander_sd / math.sqrt(later), state.unknown_sd)
     return replace(evidence, shift=own.shift_mean, shift_sd=sd)
-
-
-def _changed(state: StreamState, evidence: Evidence) -> StreamState:
-    """With a change of the hanger in the filters. What was told stands until half of it is back."""
-    state = replace(state, bank=state.bank.changed(evidence))
-    now = _shift(state)[0]
-    since = state.called_from if state.called_shift else now - evidence.shift
-    if state.called_shift and (now - since) / state.called_shift < 0.5:
-        return state
-    return replace(state, called_from=since, called_shift=now - since)
-
-
-def _stand_apart(before: StreamState, state: StreamState) -> StreamState:
-    """With a change of one plane that was told: it stands until half of it is back."""
-    now, then = _contrast(state)[0], _contrast(before)[0]
-    if before.apart_shift and (now - before.apart_from) / before.apart_shift < 0.5:
-        return state
-    since = before.apart_from if before.apart_shift else then
-    return replace(state, apart_from=since, apart_shift=now - since)
 
 
 def _absorb_plane(

@@ -49,19 +49,16 @@ _CLEARLY_NATS = 3.0  # 20 to 1
 
 
 @dataclass(frozen=True, eq=False)
-class Call:
-    """A change that was called after the test at `index` of the watch; `change` as it was then."""
-
-    index: int
-    change: Change
-
-
-@dataclass(frozen=True, eq=False)
 class Watch:
-    """The result after each reading, and the changes called on the way, in the order of time."""
+    """The result after each reading, in the order of time."""
 
     tests: tuple[WatchedTest, ...]
-    calls: tuple[Call, ...]
+
+    @property
+    def calls(self) -> tuple[tuple[int, Change], ...]:
+        """The changes that were called on the way, each with the index of its test."""
+        called = ((n, test.change) for n, test in enumerate(self.tests))
+        return tuple((n, change) for n, change in called if change.called)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +125,7 @@ class Watcher:
         for reading in readings:
             state, found = self._advance(state, reading)
             tests.append(found)
-        return state, Watch(tuple(tests), ())
+        return state, Watch(tuple(tests))
 
     def after(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
         """Return the state after one more reading, and the result.
@@ -192,9 +189,8 @@ class Watcher:
         if (state.weight[rows] != 1).any():
             causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
         course = self.sums.course(state, rows, causes.called)
-        stays = bound_by_recurrence(causes, course, self.options.limit_years)
-        bounded = replace(evidence, log_most=stays.log_years)
-        return bounded, causes, 0 if causes.called else stays.against_baseline
+        log_years, against = bound_by_recurrence(causes, course, self.options.limit_years)
+        return replace(evidence, log_most=log_years), causes, 0 if causes.called else against
 
     def _without_baseline(self, state: WatchState) -> WatchState:
         """Return the state in which a baseline that stands alone does not count."""
@@ -257,7 +253,7 @@ class Watcher:
         evidence = self._evidence(state, rows)
         for _ in range(_MOST_REPEATS):
             factor, mass = evidence.of_last_visit
-            if mass <= most + _NEARLY:
+            if mass <= most + _NEARLY or factor <= 0:  # the latter at a limit of days
                 break
             weight = state.weight.copy()
             weight[visit] *= max(factor - (mass - most), _NEARLY) / factor
@@ -369,20 +365,14 @@ def watched(
     """
     watcher = Watcher(quantities, columns, hanger, options or WatchOptions.of(hanger.assumptions))
     if not readings:
-        return Watch((), ())
+        return Watch(())
     count = watcher.options.baseline_tests
     state, begun = watcher.begin(readings[:count])
     tests = list(begun.tests)
     for reading in readings[count:]:
         state, found = watcher.after(state, reading)
         tests.append(found)
-    return watch_of(tests)
-
-
-def watch_of(tests: Sequence[WatchedTest]) -> Watch:
-    """Return the results of a watch, with the changes that they call."""
-    calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
-    return Watch(tuple(tests), tuple(calls))
+    return Watch(tuple(tests))
 
 
 def _counting(state: WatchState) -> IntArray:

@@ -50,7 +50,7 @@ from shm.watch.notices import (
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.state_sums import WatchState
-from shm.watch.watcher import Watch, Watcher, watch_of, watched
+from shm.watch.watcher import Watch, Watcher, watched
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
@@ -108,7 +108,7 @@ def watch_hanger(
     begin = readings if len(said) < len(later) else readings[: len(baseline_tests)]
     watch = watched(begin, reader.quantities, reader.columns, hanger, options)
     if begin is not readings:
-        watch = watch_of([*watch.tests, *said])
+        watch = Watch((*watch.tests, *said))
     tests = list(watch.tests)
     mistaken: tuple[RepeatedMistake, ...] = ()
     for n in range(len(baseline_tests), len(tests)):
@@ -190,14 +190,6 @@ def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> Wa
     return replace(options, baseline_tests=baseline_tests, limit_years=limit_years)
 
 
-@dataclass(frozen=True)
-class _News:
-    """What a test adds: shifts that are beyond their threshold by now, and whether it is a call."""
-
-    beyond: tuple[Drift, ...]
-    call: bool
-
-
 def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
     """The alert that the newest of the tests of a hanger calls for, beyond those told before.
 
@@ -214,13 +206,12 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     """Return what stands after one more test, and the alert that it calls for, if any."""
     level = hanger.thresholds.alert_probability
     standing = still(told, test, hanger.thresholds.end_probability)
-    news = _news(standing, test, level)
-    call = test.time if news.call else standing.call
+    beyond, is_call = _news(standing, test, level)
+    call = test.time if is_call else standing.call
     called = (*standing.called, test.change) if test.change.called else standing.called
     odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
-    change = test.change if news.call else _explaining(news.beyond, called, test.change)
-    is_further = news.call and bool(standing.called)
-    alert = _alert(news, change, test, hanger, standing, is_further=is_further)
+    change = test.change if is_call else _explaining(beyond, called, test.change)
+    alert = _alert(beyond, is_call, change, test, hanger, standing)
     alone = told.alone
     since_baseline: tuple[Drift, ...] = ()
     if alert is None and test.change.is_baseline_alone and not (alone or standing.beyond):
@@ -234,7 +225,7 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
         # It waits while there is worse to tell; a mass or lost section is why modes go astray.
         alert, noted = notice_of(test, hanger, new), wrong
     stands = replace(
-        with_beyond(standing, (*news.beyond, *since_baseline), test.time),
+        with_beyond(standing, (*beyond, *since_baseline), test.time),
         call=call,
         called=called,
         odd=odd,
@@ -265,7 +256,8 @@ def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ..
     return tuple(alerts)
 
 
-def _news(standing: AlertState, test: WatchedTest, level: float) -> _News:
+def _news(standing: AlertState, test: WatchedTest, level: float) -> tuple[tuple[Drift, ...], bool]:
+    """Return the shifts that are beyond their threshold by now, and if a change is called."""
     call = test.change.called and not _is_known(standing, test.change)
     drifts = test.told if call else test.drifts
     beyond = tuple(
@@ -274,7 +266,7 @@ def _news(standing: AlertState, test: WatchedTest, level: float) -> _News:
         if drift.probability >= level
         and (drift.quantity, way_of(drift.shift_mean)) not in standing.beyond
     )
-    return _News(beyond, call)
+    return beyond, call
 
 
 def _is_known(standing: AlertState, change: Change) -> bool:
@@ -308,31 +300,35 @@ def _explaining(beyond: Sequence[Drift], called: Sequence[Change], now: Change) 
 
 
 def _alert(
-    news: _News,
+    beyond: tuple[Drift, ...],
+    is_call: bool,
     change: Change | None,
     test: WatchedTest,
     hanger: Hanger,
     standing: AlertState,
-    *,
-    is_further: bool,
 ) -> Alert | None:
-    kinds: tuple[AlertKind, ...] = ((_BEYOND,) if news.beyond else ()) + (
-        (_kind(test.change),) if news.call else ()
-    )
+    """Return the alert of what a test adds; None where it adds nothing."""
+    kinds: list[AlertKind] = [_BEYOND] if beyond else []
+    if is_call:
+        kinds.append("sudden change" if test.change.sudden >= 0.5 else "slow drift")
     if not kinds:
         return None
     said = message_of(
         test,
         hanger,
         change,
-        news.beyond,
-        is_call=news.call,
-        is_further=is_further,
+        beyond,
+        is_call=is_call,
+        is_further=is_call and bool(standing.called),
         standing=_standing(test, standing, hanger),
     )
-    what = f"{'+'.join(kinds).replace(' ', '-')}:{_first_moved(news, test).replace(' ', '-')}"
-    drifts = news.beyond or _suspected(test)
-    return alert_of(hanger, (test.test, test.time), what, said, kinds, drifts, change)
+    first = beyond[0] if beyond else test.change.moved[0] if test.change.moved else None
+    what = f"{first.quantity}-{way_of(first.shift_mean)}" if first else "unknown"
+    key = f"{'+'.join(kinds)}:{what}".replace(" ", "-")
+    by_name = {drift.quantity: drift for drift in test.drifts}
+    suspected = tuple(by_name[name] for name in _suspects(test.change) if name in by_name)
+    of_test = test.test, test.time
+    return alert_of(hanger, of_test, key, said, tuple(kinds), beyond or suspected, change)
 
 
 def _standing(test: WatchedTest, standing: AlertState, hanger: Hanger) -> list[Drift]:
@@ -343,23 +339,3 @@ def _standing(test: WatchedTest, standing: AlertState, hanger: Hanger) -> list[D
         for each in test.drifts
         if (each.quantity, way_of(each.shift_mean)) in standing.beyond.keys() - standing.agreed
     ]
-
-
-def _kind(change: Change) -> AlertKind:
-    return "sudden change" if change.sudden >= 0.5 else "slow drift"
-
-
-def _suspected(test: WatchedTest) -> tuple[Drift, ...]:
-    """Return the shifts of what may have changed."""
-    by_name = {drift.quantity: drift for drift in test.drifts}
-    return tuple(by_name[name] for name in _suspects(test.change) if name in by_name)
-
-
-def _first_moved(news: _News, test: WatchedTest) -> str:
-    """Return the quantity that is told first, and its way."""
-    if news.beyond:
-        return f"{news.beyond[0].quantity}-{way_of(news.beyond[0].shift_mean)}"
-    if test.change.moved:
-        first = test.change.moved[0]
-        return f"{first.quantity}-{way_of(first.shift_mean)}"
-    return "unknown"
