@@ -104,7 +104,7 @@ def _is(mode: Mode, known: Mode) -> bool:
 
 
 def _is_reviewed(known: Sequence[Mode], window: Window) -> bool:
-    """Where an order lacks in a plane, each stream at ten minutes of its own."""
+    """Return where an order lacks in a plane, each stream at ten minutes of its own."""
     orders = [{m.order for m in known if m.plane == plane} for plane in PLANES]
     highest = max(mode.order for mode in known)
     if all(len(each) == highest for each in orders):
@@ -191,13 +191,13 @@ def _missed(
     """
 
     def is_between(mode: Mode) -> bool:
-        own = [each for each in known if each.plane == mode.plane]
-        if own and 2 * sum(_has(modes, each) for each in own) <= len(own):
+        its = [each for each in known if each.plane == mode.plane]
+        if its and 2 * sum(_has(modes, each) for each in its) <= len(its):
             return False
         return all(
             (each.frequency_hz - mode.frequency_hz) * (each.order - mode.order) > 0
             and abs(each.frequency_hz / mode.frequency_hz - 1) > _OTHER_PLANE
-            for each in own
+            for each in its
         )
 
     return tuple(mode for mode in fresh if not _has(known, mode) and is_between(mode))
@@ -238,14 +238,14 @@ def tracked(found: Judged, known: Sequence[Mode], options: IdentifyOptions) -> t
         return ()
     modes = _prove(found, found.peaks, known, options)
     for plane in PLANES:
-        own = [index for index, mode in enumerate(known) if mode.plane == plane]
-        lost = 2 * sum(_has(modes, known[index]) for index in own) <= len(own)
+        its = [index for index, mode in enumerate(known) if mode.plane == plane]
+        lost = 2 * sum(_has(modes, known[index]) for index in its) <= len(its)
         stays = any(mode.plane != plane for mode in modes)
         if lost and stays:
-            moved = _move_plane(found, found.peaks, known, own)
+            moved = _move_plane(found, found.peaks, known, its)
             apart = _prove(found, moved, known, options)
             if len(apart) > len(modes) and _are_moved_alike(
-                [(known[index], mode) for index in own for mode in apart if _is(mode, known[index])]
+                [(known[index], mode) for index in its for mode in apart if _is(mode, known[index])]
             ):
                 modes = apart
     return modes
@@ -338,13 +338,13 @@ class _Group:
         self.start = self._start(hz[group], peaks.damping[group])
 
     def modes(self) -> dict[int, Mode]:
-        """Those that are proven, by their place among the known ones."""
+        """Return those that are proven, by their place among the known ones."""
         proven = self._proven()
         if proven is None:
             return {}
-        fit, kept = proven
+        fit, chosen = proven
         made = {}
-        for place, index in enumerate(kept):
+        for place, index in enumerate(chosen):
             mode = self._mode(fit, place, self.group[index])
             if mode is not None:
                 made[self.group[index]] = mode
@@ -352,21 +352,21 @@ class _Group:
 
     def _proven(self) -> tuple[BandFit, list[int]] | None:
         """Return the fit of the modes without each of which the lines are far less likely."""
-        kept = list(range(len(self.group)))
+        chosen = list(range(len(self.group)))
         start = self.start
-        while kept:
-            shapes = self.shapes[:, kept]
-            band = Band(self.lines, directions(shapes), shapes, self.start.only(kept))
+        while chosen:
+            shapes = self.shapes[:, chosen]
+            band = Band(self.lines, directions(shapes), shapes, self.start.only(chosen))
             fit = band.fitted(start)
             gains = []
-            for place in range(len(kept)):
-                rest = [other for other in range(len(kept)) if other != place]
+            for place in range(len(chosen)):
+                rest = [other for other in range(len(chosen)) if other != place]
                 without = band.only(rest).fitted(fit.modes.only(rest), _STEPS_WITHOUT)
                 gains.append(fit.log_likelihood - without.log_likelihood)
             weakest = int(np.argmin(gains))
             if gains[weakest] >= _LEAST_GAIN:
-                return fit, kept
-            del kept[weakest]
+                return fit, chosen
+            del chosen[weakest]
             start = fit.modes.only([p for p in range(len(gains)) if p != weakest])
         return None
 

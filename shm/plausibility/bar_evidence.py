@@ -1,4 +1,4 @@
-"""What modes say of a bar: its fit to them, and how probable a shift of them is.
+"""Fit bars to modes, and weigh shifts of them.
 
 Each hanger that a test may come from is fitted to its modes (`shm.plausibility.bars`), and misfits
 are weighed with what may have changed and with what tests and bars err by.
@@ -84,7 +84,7 @@ _MASS_PLACES = np.linspace(0.05, 0.5, 10)
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a test may come from; the hanger it is filed under where `kind` is empty."""
+    """An origin of a test; the hanger it is filed under where `kind` is empty."""
 
     kind: OriginKind | Literal[""] = ""
     hanger: int | None = None
@@ -133,12 +133,12 @@ def seen_in(tests: Sequence[ModalTest], hanger: Hanger) -> Seen:
     count = np.isfinite(log_f).sum(axis=0)
     some = np.maximum(count, 1)
     mean = np.where(count, np.nansum(log_f, axis=0) / some, NAN)
-    own = np.where(np.isfinite(log_f), variance, 0.0).sum(axis=0)
-    return Seen(mean, own / some**2)
+    its = np.where(np.isfinite(log_f), variance, 0.0).sum(axis=0)
+    return Seen(mean, its / some**2)
 
 
 def _by_mass(share: FloatArray, place: FloatArray) -> FloatArray:
-    """What a mass, as a share of the bar's, at a share of its length does to ln f (..., orders)."""
+    """Return what a mass, as a share of the bar's, at a place does to ln f (..., orders)."""
     moves = np.sin(np.pi * np.arange(1, _MOST_ORDER + 1) * place[..., None]) ** 2
     return np.asarray(-0.5 * np.log1p(2 * share[..., None] * moves))
 
@@ -177,14 +177,14 @@ class Evidence:
 
     def _alike(self, mask: BoolArray) -> FloatArray:
         """Correlation (modes, modes) of the errors: what a bar model lacks is of no mode alone."""
-        own = np.eye(int(mask.sum()))
+        its = np.eye(int(mask.sum()))
         if self.errors is _TEST_ERRORS:
-            return own
+            return its
         plane, order = mask.nonzero()
         log = np.log(order + 1.0)
         along = np.exp(-0.5 * (np.subtract.outer(log, log) / _ALONG_ORDERS) ** 2)
         across = np.where(np.equal.outer(plane, plane), 1.0, 0.5)
-        return np.asarray((1 - _TOGETHER) * own + _TOGETHER * along * across)
+        return np.asarray((1 - _TOGETHER) * its + _TOGETHER * along * across)
 
     def _with_mass(self, mask: BoolArray) -> float:
         """With something of any mass at any place hung on it."""
@@ -393,20 +393,20 @@ def _prior(hanger: Hanger) -> tuple[FloatArray, FloatArray]:
     sd = np.array([_TENSION[1], _MODEL_C, *(end_sd,) * 4, shear_sd])
     if math.isfinite(scatter.tension):
         mean[0], sd[0] = 0.0, math.hypot(scatter.tension, scatter.section)
-    own = [scatter.section / 2, scatter.density / 2, scatter.modulus / 2, 2 * scatter.length]
+    its = [scatter.section / 2, scatter.density / 2, scatter.modulus / 2, 2 * scatter.length]
     plates_m = 2 * hanger.plate.length_m if hanger.plate is not None else 0.0
     # The length that swings lies anywhere between the taped one and that without fittings.
     open_share = (sum(hanger.fittings_m) + plates_m) / hanger.length_m
     mean[1] += open_share
-    own.append(2 * open_share / math.sqrt(12))
+    its.append(2 * open_share / math.sqrt(12))
     if math.isfinite(scatter.effective_length):
-        own.append(2 * scatter.effective_length)
+        its.append(2 * scatter.effective_length)
     if hanger.kind == "strand":
         if math.isfinite(scatter.bending_factor):
-            own.append(scatter.bending_factor / 2)
+            its.append(scatter.bending_factor / 2)
         else:
             slip, slip_sd = _uniform(*map(math.log, assumed.strand_bending_factor.bounds))
             mean[1] += (slip - math.log(hanger.bending_stiffness_factor)) / 2
-            own.append(slip_sd / 2)
-    sd[1] = math.hypot(sd[1], *own)
+            its.append(slip_sd / 2)
+    sd[1] = math.hypot(sd[1], *its)
     return mean, sd

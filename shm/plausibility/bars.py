@@ -1,4 +1,4 @@
-"""Whether a test is of the hanger whose number it bears: "right hanger?", "right sampling rate?".
+"""Check that a test is of its hanger: "right hanger?", "right sampling rate?".
 
 Bayes' rule over what may be behind the modes of a test that is filed under one hanger:
 
@@ -91,7 +91,7 @@ OWN = Origin()
 
 
 def doubt_of(test: ModalTest, own: Known, others: Sequence[Known]) -> OtherOrigin | None:
-    """Why `test`, filed under hanger `own`, is probably not of it; None where it well may be.
+    """Say why `test`, filed under hanger `own`, is probably not of it; None where it well may be.
 
     `own.tests` are its earlier accepted tests, `others` the other hangers of the bridge. None also
     where nothing can be said: fewer than three modes, or a description that is no hanger's (free or
@@ -165,7 +165,7 @@ def _said(origin: Origin, probability: float, own: Hanger) -> OtherOrigin:
 
 
 def _twins(one: Hanger, other: Hanger) -> bool:
-    """Whether two descriptions differ by less than tape and mill do."""
+    """Return True if two descriptions differ by less than tape and mill do."""
     near = 2 * math.sqrt(2) * one.scatter.length
     stiffness = one.bending_stiffness_n_m2 / other.bending_stiffness_n_m2
     mass = one.mass_per_length_kg_m / other.mass_per_length_kg_m
@@ -242,9 +242,9 @@ _ACTIONS = {
 
 def of_another_bar(candidate: Candidate) -> Doubt | None:
     """Modes of another hanger, of a wrong time base or of exchanged planes."""
-    own = Known(candidate.hanger, tuple(candidate.earlier))
+    its = Known(candidate.hanger, tuple(candidate.earlier))
     others = [Known(hanger, tuple(tests)) for hanger, tests in candidate.others]
-    found = doubt_of(candidate.test, own, others)
+    found = doubt_of(candidate.test, its, others)
     if found is None or found.kind == "unknown bar":
         return None  # of such a bar the first line of its posterior says that it does not fit
     why = f"The probability that it is not what it is filed as is {found.probability:.2f}."

@@ -13,7 +13,7 @@ from shm.watch.agreement import Way, way_of
 
 @dataclass(frozen=True)
 class AlertState:
-    """What stands: when each quantity was told to be beyond its threshold, and when a call was.
+    """The conditions in force: when each quantity was reported beyond its threshold, and a call.
 
     `called` are the changes that were called, told or not: after a call the sequential test speaks
     of a further change, no longer of that one. `mistaken` are the modes that the last tests have

@@ -1,4 +1,4 @@
-"""What an alert says: the state in a sentence, what to do and how soon, why; details last.
+"""Messages of alerts: the state in a sentence, what to do and how soon, why; details last.
 
 An owner reads the first two sentences on a phone: one number with its interval, one urgency. Each
 probability is given once, at the end. Traffic is named for lost tension and loosened ends alone.
@@ -67,8 +67,8 @@ def message_of(
         details = _of_hanger(test, change, beyond, sizes, is_call=is_call)
     else:
         details = _of_frequencies(test, change, is_call=is_call)
-    said = (lead.words, _new(beyond) if is_new else "", _when(change), *details)
-    return " ".join(part for part in said if part)
+    words = (lead.words, _new(beyond) if is_new else "", _when(change), *details)
+    return " ".join(part for part in words if part)
 
 
 def lead_of(
@@ -130,13 +130,13 @@ def message_of_agreeing(
     """
     first = f"{tests[0]} (held for its clock)" if is_held else tests[0]
     words = f"{quantity_words(drift.quantity)} {size_words(drift)}"
-    said = [(drift.probability, f"that {beyond_words(drift)}")]
+    text = [(drift.probability, f"that {beyond_words(drift)}")]
     parts = [
         f"Hanger {hanger.id}: {words}, beyond its threshold.",
         action_words(hanger, None, [drift]),
         f"Tests {first} and {tests[1]} both read beyond its threshold of {threshold_words(drift)}.",
         "Check the logger's clock: if it is wrong, the date of the change is not known.",
-        _details(_sizes(None, [drift]) or _HALF_WIDTH, _merged(said)),
+        _details(_sizes(None, [drift]) or _HALF_WIDTH, _merged(text)),
     ]
     return " ".join(part for part in parts if part)
 
@@ -173,7 +173,7 @@ def alert_of(
 
 
 def watch_words(watched: Sequence[WatchedTest]) -> str:
-    """What was detected since the baseline, or how near the evidence is to a detection; creep."""
+    """Return what was detected since the baseline, or how near the evidence is; and creep."""
     if not watched:
         return ""
     creep = watched[-1].creep_per_year
@@ -211,7 +211,7 @@ def _state(
 
 
 def _changed(change: Change) -> str:
-    """What changed and by how much; what it may be instead, where the tests fit that as well."""
+    """Return what changed and by how much, and what fits the tests as well."""
     groups = probable_groups(change)
     if not groups:
         return "the tests do not show what changed"
@@ -266,7 +266,7 @@ def _is_mixed(group: Sequence[Moved]) -> bool:
 
 
 def _way(group: Sequence[Moved]) -> str:
-    """Which way a group went, the tension of a mixed one aside."""
+    """Return which way a group went, the tension of a mixed one aside."""
     springs = [each for each in group if len(group) == 1 or each.quantity != TENSION]
     ways = {each.shift_mean > 0 for each in springs}
     return "changed" if len(ways) > 1 else "rose" if ways.pop() else "fell"
@@ -325,24 +325,24 @@ def _interval(name: str, each: Moved | Drift) -> str:
 
 def _probabilities(test: WatchedTest, change: Change | None, beyond: Sequence[Drift]) -> str:
     """Each probability once."""
-    said = [(each.probability, f"that {beyond_words(each)}") for each in beyond]
+    words = [(each.probability, f"that {beyond_words(each)}") for each in beyond]
     if change is not None:
         groups = probable_groups(change)
-        said += [(each[0].probability, _that(each)) for each in groups[:_LISTED]]
+        words += [(each[0].probability, _that(each)) for each in groups[:_LISTED]]
         others = [each for each in change.moved if each not in groups[0]]
         if len(groups) == 1 and groups[0][0].probability < _SURE and others:
-            said.append((others[0].probability, _that([others[0]])))
+            words.append((others[0].probability, _that([others[0]])))
         # What is beyond its threshold has changed, whatever the newest tests add.
         anything = max([change.probability, *(each.probability for each in beyond)])
-        said.append((anything, "that anything changed"))
+        words.append((anything, "that anything changed"))
         is_sudden = change.sudden >= 0.5
         way = "suddenly" if is_sudden else "slowly"
-        said.append((max(change.sudden, 1 - change.sudden), f"that it came {way}"))
+        words.append((max(change.sudden, 1 - change.sudden), f"that it came {way}"))
         if not beyond and (nearest := _nearest(test, change)):
-            said.append((nearest.probability, f"that {beyond_words(nearest)}"))
+            words.append((nearest.probability, f"that {beyond_words(nearest)}"))
     if test.change.outlier_probability > 0.5:
-        said.append((test.change.outlier_probability, "that this test is an outlier"))
-    return _merged(said)
+        words.append((test.change.outlier_probability, "that this test is an outlier"))
+    return _merged(words)
 
 
 def _that(group: Sequence[Moved]) -> str:
@@ -356,8 +356,8 @@ def _merged(said: Sequence[tuple[float, str]]) -> str:
     for value, words in said:
         if not math.isnan(value):
             by_value.setdefault(_probability(value), []).append(words)
-    told = (f"{value} {listed(words)}" for value, words in by_value.items())
-    return f"probability {', '.join(told)}" if by_value else ""
+    reported = (f"{value} {listed(words)}" for value, words in by_value.items())
+    return f"probability {', '.join(reported)}" if by_value else ""
 
 
 def _probability(value: float) -> str:

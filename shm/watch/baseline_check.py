@@ -392,7 +392,7 @@ class _Modes:
 
 
 class _Bar:
-    """What tests of one hanger may differ by (q,), and the log frequencies (keys,) that follow."""
+    """The state (q,) by which tests of a hanger may differ, and its log frequencies (keys,)."""
 
     def __init__(self, at: _Modes, base: FloatArray):
         self._at, self._base = at, base

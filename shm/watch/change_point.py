@@ -53,9 +53,9 @@ def sums_of(
 ) -> Sums:
     """Of tests with `columns` (T, n, z), `values` and `variances` (T, n), infinite where a mode was
     not measured, and the `covariance` (T, K, n, n) of their scatter beside that."""
-    own = np.where(np.isfinite(variances), variances, _ABSENT)
+    its = np.where(np.isfinite(variances), variances, _ABSENT)
     n = values.shape[1]
-    joint = covariance + own[:, None, :, None] * np.eye(n)
+    joint = covariance + its[:, None, :, None] * np.eye(n)
     weight = np.linalg.inv(joint)
     weighted = weight @ columns[:, None]
     of_values = np.einsum("tkij,tj->tki", weight, values)
@@ -69,7 +69,7 @@ def sums_of(
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What all tests say: of each change (beginnings, K, kinds, D, sizes) its log mass in years.
+    """The evidence of all tests: log masses (beginnings, K, kinds, D, sizes) of changes, in years.
 
     `log_most` bounds what all masses together are worth (`persistence`).
     `log_null` (K,) is the log probability of each scatter without change. `beginnings` are numbers
@@ -121,8 +121,10 @@ class Evidence:
 
     @property
     def of_last_visit(self) -> tuple[float, float]:
-        """What the last visit alone speaks for: the largest log Bayes factor of any change, and the
-        log mass in years of all. Visits in haste count as a week apart, as far as this goes."""
+        """Return the last visit's largest log Bayes factor of any change, and the log mass of all.
+
+        In years. Visits in haste count as a week apart, as far as this goes.
+        """
         at = int(np.searchsorted(self.years[self.beginnings], self.years[-1] - OF_ONE_VISIT_YEARS))
         if at == len(self.beginnings):
             return 0.0, -math.inf
@@ -166,7 +168,7 @@ class Evidence:
 
     @cached_property
     def _factors(self) -> FloatArray:
-        """Those of all directions (D, n + q, r), with zeros where one has fewer columns."""
+        """Return those of all directions (D, n + q, r), with zeros where one has fewer columns."""
         columns = max(each.factor.shape[1] for each in self.directions)
         return np.stack(
             [
@@ -185,7 +187,8 @@ class Evidence:
     def of_null(
         self, indices: Sequence[tuple[int, ...]], loadings: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """What `loadings` (rows, null) of the null's parameters are, given each of some changes.
+        """Return what `loadings` (rows, null) of the null's parameters are, given each of some
+        changes.
 
         Means and variances, both (changes, rows).
         """
@@ -315,8 +318,8 @@ class _NullSums:
         parts = []
         for kind in (STEP, RAMP):
             response = from_on(self.response, kind)
-            own = from_on(self.own, 2 * kind)
-            information = own - np.swapaxes(response, 2, 3) @ (covariance @ response)
+            its = from_on(self.own, 2 * kind)
+            information = its - np.swapaxes(response, 2, 3) @ (covariance @ response)
             pull = from_on(self.pull, kind) - np.einsum("bkpc,kp->bkc", response, mean)
             parts.append((information, pull, response))
         information, pull, response = (np.array(each) for each in zip(*parts, strict=True))
@@ -344,7 +347,7 @@ def _log_factors(
 
 
 def _ramp_from(years: FloatArray, beginnings: IntArray) -> FloatArray:
-    """When a ramp began (beginnings,): at the test before the first that shows it."""
+    """Return when a ramp began (beginnings,): at the test before the first that shows it."""
     return np.asarray(years[beginnings - 1])
 
 

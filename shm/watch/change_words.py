@@ -1,4 +1,4 @@
-"""What may have changed, in words, and what its owner should do about it, how soon.
+"""Words for a change, and for what its owner should do about it, how soon.
 
 The words of a cause are those of the catalogue of effects.
 Of a structure that no model class describes it is its frequencies, and by how much.
@@ -127,7 +127,7 @@ def _factor_words(decades: float) -> str:
 
 
 def factor(decades: float) -> str:
-    """How many times what it was: `0.50`, `1.06`, `3.2`."""
+    """Return how many times what it was: `0.50`, `1.06`, `3.2`."""
     times = 10 ** min(decades, 10.0)
     if times > _LARGEST_FACTOR:
         return "more than 1000"
@@ -152,7 +152,7 @@ def beyond_words(drift: Drift) -> str:
 
 
 def undetected_words(latest: Change) -> str:
-    """How near the evidence for a change is to a detection, or that it is too small to be told."""
+    """Return how near the evidence is to a detection, or that the change is too small."""
     if latest.evidence_years > latest.limit_years:
         return (
             "Something changed since the baseline, by less than the watch is to tell: no first "
@@ -186,8 +186,8 @@ def frequencies_state(
     first, since = groups[0][0], f"since {change.began_by:%Y-%m-%d}"
     size = first.shift_mean, first.shift_sd
     if first.quantity in CAUSES:
-        said = f"have{again} moved by different amounts {since}, on average by"
-        return f"The frequencies of {name} {said} {_signed(*size)}."
+        text = f"have{again} moved by different amounts {since}, on average by"
+        return f"The frequencies of {name} {text} {_signed(*size)}."
     if first.together:
         return f"The frequencies of {name} {_have(f'have{again}', *size)} {since}."
     return f"The {first.quantity} of {name} {_have(f'has{again}', *size)} {since}."
@@ -198,16 +198,18 @@ def frequency_words(watched: Sequence[WatchedTest], hanger: Hanger) -> str:
     detected = [each.change for each in watched if each.change.called]
     if not detected:
         return undetected_words(watched[-1].change) if watched else ""
-    told = (
+    reported = (
         frequencies_state(hanger, each, (), is_further=n > 0) for n, each in enumerate(detected)
     )
-    return " ".join(told)
+    return " ".join(reported)
 
 
 def each_frequency(test: WatchedTest) -> str:
     """Return the shift of each, as it is if it changed."""
-    told = (f"{each.quantity} {_signed(each.shift_mean, each.shift_sd)}" for each in test.drifts)
-    return ", ".join(told)
+    reported = (
+        f"{each.quantity} {_signed(each.shift_mean, each.shift_sd)}" for each in test.drifts
+    )
+    return ", ".join(reported)
 
 
 def _have(verb: str, mean: float, sd: float) -> str:
@@ -226,7 +228,9 @@ _LOOK_AT = "bearings, joints, cracks, new loads and the sensors"
 def urgency_of(
     hanger: Hanger, change: Change | None, beyond: Sequence[Drift], drifts: Sequence[Drift] = ()
 ) -> Urgency:
-    """How soon: today for a loss beyond its threshold as surely as the owner asked to be told.
+    """Return how soon to act.
+
+    Today for a loss beyond its threshold as surely as the owner asked to be told.
 
     A change came slowly and stays below its threshold, as far as `drifts` of all quantities show:
     then the next planned test is soon enough to see where it goes.
@@ -268,7 +272,7 @@ def action_words(
 
 
 def look_again(hanger: Hanger) -> str:
-    """How its owner makes sure: sensors that stay test it again by themselves."""
+    """Return how its owner makes sure: sensors that stay test it again by themselves."""
     return "Check the hanger and its sensors" if hanger.has_sensors else "Repeat the hammer test"
 
 
@@ -289,15 +293,15 @@ def _tell_apart(groups: Sequence[Sequence[Moved]], urgency: Urgency, hanger: Han
 
 
 def _look(lead: Moved | Drift, change: Change | None) -> str:
-    """Where to look if a change of tension or of an end stays."""
+    """Return where to look if a change of tension or of an end stays."""
     lost = lead.shift_mean < 0
     if lead.quantity == TENSION:
-        beside = "compare the hangers beside it (`shm drift bridge`)"
-        look = f"inspect its anchorages and the rod, and {beside}" if lost else beside
+        nearby = "compare the hangers beside it (`shm drift bridge`)"
+        look = f"inspect its anchorages and the rod, and {nearby}" if lost else nearby
         return f"if the {'loss' if lost else 'gain'} stays, {look}"
     moved = {each.quantity: each for each in (change.moved if change else ())}
-    own = moved.get(lead.quantity)
-    ends = {moved[n].end for n in (lead.quantity, *own.together) if n in moved} if own else {None}
+    its = moved.get(lead.quantity)
+    ends = {moved[n].end for n in (lead.quantity, *its.together) if n in moved} if its else {None}
     end = "both ends" if None in ends else ends_words(ends)
     found = "a worn pin, a cracked plate or loose bolts" if lost else "a pin seized by rust or dirt"
     return f"if the change stays, inspect {end} for {found}"

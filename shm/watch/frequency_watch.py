@@ -67,10 +67,10 @@ class FrequencyWatch:
     def begin(self) -> _Watching:
         """After the baseline."""
         state, watch = self._watcher.begin([self._reading(each) for each in self._pools])
-        told = AlertState()
+        reported = AlertState()
         for found in watch.tests:
-            told, _ = after(told, found, self._hanger)
-        return _Watching(state, told, _Pool(), watch.tests[-1])
+            reported, _ = after(reported, found, self._hanger)
+        return _Watching(state, reported, _Pool(), watch.tests[-1])
 
     def after(self, now: _Watching, dated: DatedTest) -> tuple[_Watching, Alert | None]:
         """After one more test, and the alert that it calls for.
@@ -79,7 +79,7 @@ class FrequencyWatch:
         is older than another.
         """
         test, time = dated[0], max(dated[1], self._since)
-        state, told, pool, alert = now.state, now.told, now.pool, None
+        state, reported, pool, alert = now.state, now.told, now.pool, None
         if pool.tests and time < pool.tests[-1][1]:
             raise BadInput(
                 f"The watch was given test {test.id} after one that is later.",
@@ -95,15 +95,15 @@ class FrequencyWatch:
                 state, complete = self._watcher.after(state, self._reading(pool.tests))
                 if not is_looked_at:
                     found = complete
-                    told, alert = after(told, _as_of(found, test, time), self._hanger)
+                    reported, alert = after(reported, _as_of(found, test, time), self._hanger)
             pool = _Pool(((test, time),))
             if is_looked_at or not is_dense:
                 with_it, found = self._watcher.after(state, self._reading(pool.tests))
-                told, later = after(told, _as_of(found, test, time), self._hanger)
+                reported, later = after(reported, _as_of(found, test, time), self._hanger)
                 pool, alert = replace(pool, seen=1), later or alert
                 if found.change.called:  # once: the pool ends with the test that called it
                     state, pool = with_it, _Pool()
-        return _Watching(state, told, pool, _as_of(found, test, time)), alert
+        return _Watching(state, reported, pool, _as_of(found, test, time)), alert
 
     def _reading(self, pool: Sequence[DatedTest]) -> Reading:
         return self._reader.reading([test for test, _ in pool], pool[-1][1])
@@ -128,8 +128,10 @@ def watch_newest_frequencies(
 
 
 def measured_levels(tests: Sequence[ModalTest], seed: int) -> Posterior:
-    """What the store keeps of tests of a structure without a model in place of a posterior: the
-    median frequency (Hz) of each mode, as two equal draws. Nothing is sampled."""
+    """Return what stands for a posterior of a structure without a model.
+
+    The median frequency (Hz) of each mode, as two equal draws. Nothing is sampled.
+    """
     levels = FrequencyReader(tests).levels_hz
     values = np.array([list(levels.values())] * 2)
     return Posterior(
@@ -156,7 +158,7 @@ def measured_levels(tests: Sequence[ModalTest], seed: int) -> Posterior:
 
 @dataclass(frozen=True, eq=False)
 class WatchedFrequencies:
-    """What the watch says after each test since the baseline's, and the alerts it calls for."""
+    """Results of the watch after each test since the baseline's, and the alerts it calls for."""
 
     tests: tuple[WatchedTest, ...]
     alerts: tuple[Alert, ...]

@@ -93,10 +93,10 @@ def _has_outlying_mode(seen: Seen, found: BoolArray, test: int, near: Sequence[i
     for mode in np.flatnonzero(np.isfinite(seen.variances[test])):
         measured = np.isfinite(seen.variances[:, mode])
         before = np.flatnonzero(found[:test] & measured[:test])[-_BEFORE:]
-        own, others = seen.values[test, mode], seen.values[:, mode]
-        if not len(before) or abs(own - np.median(others[before])) <= _STRAYS:
+        its, others = seen.values[test, mode], seen.values[:, mode]
+        if not len(before) or abs(its - np.median(others[before])) <= _STRAYS:
             continue
-        if not any(measured[each] and abs(own - others[each]) < _SAME for each in near):
+        if not any(measured[each] and abs(its - others[each]) < _SAME for each in near):
             return True
     return False
 

@@ -66,7 +66,7 @@ class LinearReading:
 
     @property
     def cost(self) -> float:
-        """What is made small: the misfit and the pull to the baseline."""
+        """Return the cost that is minimised: the misfit and the pull to the baseline."""
         return float(self.residual @ self.residual + self.x @ (self.pull * self.x))
 
     @property
@@ -119,8 +119,7 @@ class Likelihood:
         return np.clip(x, self._lowest - _BEYOND, self._highest + _BEYOND)
 
     def far_start(self, seen: SeenModes) -> FloatArray:
-        """Where the tension alone fits best, over all that its table holds: half of the modes may
-        be anywhere."""
+        """Return where the tension alone fits best: half of the modes may be anywhere."""
         first = np.linspace(self._lowest[0], self._highest[0], _STARTS)
         places = np.zeros((_STARTS, len(self._quantities)))
         places[:, 0] = first
@@ -182,10 +181,12 @@ class Likelihood:
         seen = shares > _UNSEEN
         steps = (off @ slopes @ axes)[:, seen] / shares[seen]
         share = _credible_share(linear.residual, int(seen.sum()))
-        kept = shares[seen] * share > _UNSEEN
-        shares, axes = shares[seen][kept] * share, axes[:, seen][:, kept]
+        chosen = shares[seen] * share > _UNSEEN
+        shares, axes = shares[seen][chosen] * share, axes[:, seen][:, chosen]
         information = (axes * shares) @ axes.T / np.outer(self._scale, self._scale)
-        return self._scale * (steps[:, kept] @ axes.T), np.asarray(information + information.T) / 2
+        return self._scale * (steps[:, chosen] @ axes.T), np.asarray(
+            information + information.T
+        ) / 2
 
     def predicted(self, x: FloatArray, seen: SeenModes) -> FloatArray:
         """Log frequencies (n, modes) of the model at coordinates (n, q) within the tables."""

@@ -138,8 +138,10 @@ def _of_change(
 def _shown(
     evidence: Evidence, course: Course, index: tuple[int, ...]
 ) -> tuple[FloatArray, FloatArray, float]:
-    """How much of a change each test (T,) shows by itself, 1 all of it, the sd of that, and the
-    largest that it does to a log frequency."""
+    """Return the fraction of a change that each test (T,) shows, its sd, and the largest move.
+
+    The latter is that of any log frequency.
+    """
     ((change, _),) = evidence.changes_at([index])
     ((null,), _) = evidence.of_null([index], np.eye(evidence.null_mean.shape[1]))
     measured = np.isfinite(course.variances)

@@ -1,4 +1,4 @@
-"""What is watched of a hanger, and the coordinates in which frequencies follow it nearly linearly.
+"""Watched quantities of a hanger, and coordinates that frequencies follow nearly linearly.
 
 Base point of all is the baseline's most probable parameter set: the parameters of a posterior go
 together along curved valleys, in which a mean of each by itself need not lie. The tension that
@@ -211,8 +211,8 @@ def log_frequencies(model: Model, theta: FloatArray, modes: Sequence[MeasuredMod
 
 def _springs(model: Model) -> list[str]:
     """Return the springs of the class, or of the baseline of an adopted one."""
-    own = MODELS[_baseline_class(model)].bounds
-    return [each for each in model.parameter_names if each in own and each.startswith(_STIFFNESS)]
+    its = MODELS[_baseline_class(model)].bounds
+    return [each for each in model.parameter_names if each in its and each.startswith(_STIFFNESS)]
 
 
 def _baseline_class(model: Model) -> str:
@@ -253,15 +253,15 @@ def _spring(
 
     samples = step_at(common_stiffness(np.column_stack([baseline.parameter(n) for n in names])))
     at_base = step_at(np.array([centre]))
-    kept = _rising(mean, at * _FINER)
+    chosen = _rising(mean, at * _FINER)
     planes = _PLANES | _PLANES_OF_BEAMS if _is_beam(model) else _PLANES
     bare, alone = names[0].removeprefix("log10_"), len(names) == 1
     plane = planes.get(bare)
     return WatchedQuantity(
         name=names[0] if alone else f"{plane}_end_stiffness",
         baseline=centre,
-        coordinates=mean[kept],
-        values=log10_k[kept],
+        coordinates=mean[chosen],
+        values=log10_k[chosen],
         step_sd=float(max(at_base[0], np.sqrt(np.mean(samples**2)))),
         end=_ENDS.get(bare) if alone else None,
         plane=plane,

@@ -1,4 +1,4 @@
-"""What a reading is corrected for: warm steel is softer, large motions slip, ends loosen.
+"""Corrections of a reading: warm steel is softer, large motions slip, ends loosen.
 
 Amplitude: what the swing does to a hanger's frequencies where its joints slip or it stretches.
 
@@ -102,8 +102,10 @@ class AmplitudeSlopes:
     def at(
         self, test: ModalTest, modes: Sequence[Mode], own: IntArray
     ) -> tuple[FloatArray, FloatArray]:
-        """How far the log frequencies (n,) of a test's `modes` are off those of small amplitude,
-        and the sds; `own` (n,) are their columns. An amplitude not known is the baseline's."""
+        """Return the shifts of log frequencies (n,) from those of small amplitude, and the sds.
+
+        `own` (n,) are the columns of the test's `modes`. An amplitude not known is the baseline's.
+        """
         level = test.amplitude if test.amplitude > 0 else self.usual[own]
         level = np.where([mode.depends_on_amplitude for mode in modes], 0.0, level)
         slope, sd = level * self.slope[own], level * self.sd[own]
@@ -150,8 +152,8 @@ def _patterns(
     columns = [model.parameter_names.index(name) for name in quantity.parameters]
     before, after = [], []
     for each in (columns, *([column] for column in columns)):
-        own = float(base[each].min())
-        for level in (own, *(level for level in levels if level < own)):
+        its = float(base[each].min())
+        for level in (its, *(level for level in levels if level < its)):
             start = base.copy()
             start[each] = np.minimum(start[each], level)
             before.append(start)
@@ -165,5 +167,5 @@ def _patterns(
     like = quantity.step_sd * shifts[is_seen] / mean[is_seen]
     _, strength, axes = np.linalg.svd(like[1:] - like[0], full_matrices=False)
     strength = strength / math.sqrt(max(len(like) - 1, 1))
-    kept = strength > _OF_A_STEP * np.linalg.norm(like[0])
-    return np.asarray(strength[kept, None] * axes[kept])
+    chosen = strength > _OF_A_STEP * np.linalg.norm(like[0])
+    return np.asarray(strength[chosen, None] * axes[chosen])

@@ -1,4 +1,4 @@
-"""What one test says of the watched quantities: Gauss-Newton of the model class, without a prior.
+"""Read the watched quantities from one test: Gauss-Newton of the model class, without a prior.
 
 The model's error, 0.1 to 1 % of a frequency, is the same in every test of a hanger, and so are the
 deviations of the bar as made. Each mode's own residual at the baseline is therefore taken off
@@ -218,13 +218,13 @@ class Reader:
         The weighted mean; of three tests or more the median of what is left of each once its own
         state is taken off, so that a mistaken mode of one of them moves nothing.
         """
-        own = np.concatenate([seen.own for seen in tests])
+        its = np.concatenate([seen.own for seen in tests])
         base = np.zeros((1, len(self.quantities)))
         off = [seen.log_frequency - self._likelihood.predicted(base, seen)[0] for seen in tests]
         if len(tests) < _ROUNDS:
             weight = 1 / np.concatenate([seen.variance for seen in tests])
-            total = np.bincount(own, weight * np.concatenate(off), len(self.modes))
-            return np.asarray(total / np.bincount(own, weight, len(self.modes)))
+            total = np.bincount(its, weight * np.concatenate(off), len(self.modes))
+            return np.asarray(total / np.bincount(its, weight, len(self.modes)))
         table = np.full((len(tests), len(self.modes)), np.nan)
         for row, seen, each in zip(table, tests, off, strict=True):
             row[seen.own] = each
@@ -237,22 +237,22 @@ class Reader:
     def _seen(self, test: ModalTest) -> SeenModes:
         read = (mode for mode in test.regular_modes if _is_measured(mode))
         modes = [mode for mode in read if _key(mode) in self.modes]
-        own = np.array([self.modes.index(_key(mode)) for mode in modes], dtype=int)
+        its = np.array([self.modes.index(_key(mode)) for mode in modes], dtype=int)
         frequency_hz = np.array([mode.frequency_hz for mode in modes], dtype=float)
         sd_hz = np.array([mode.frequency_sd_hz for mode in modes], dtype=float)
         sd = np.where(sd_hz > 0, sd_hz / frequency_hz, self._unstated_sd)
-        swing = (
-            (test.temperature_c - self.reference_temperature_c) * self._per_kelvin[own]
+        variation = (
+            (test.temperature_c - self.reference_temperature_c) * self._per_kelvin[its]
             if self._is_warmth_known(test)
             else 0.0
         )
-        slip, slip_sd = self._per_amplitude.at(test, modes, own)
+        slip, slip_sd = self._per_amplitude.at(test, modes, its)
         return SeenModes(
             conditions=self._model.conditions(test),
             plane=np.array([PLANES.index(mode.plane) for mode in modes], dtype=int),
             order=np.array([mode.order - 1 for mode in modes], dtype=int),
-            own=own,
-            log_frequency=np.log(frequency_hz) - self._residual[own] - swing - slip,
+            own=its,
+            log_frequency=np.log(frequency_hz) - self._residual[its] - variation - slip,
             variance=sd**2 + slip_sd**2 + self._allowance**2,
         )
 
@@ -268,7 +268,7 @@ def _key(mode: Mode) -> MeasuredMode:
 
 
 def _is_measured(mode: Mode) -> bool:
-    """Whether the mode has a frequency whose error is not endless."""
+    """Return True if the mode has a frequency whose error is not endless."""
     return (
         bool(np.isfinite(mode.frequency_hz))
         and mode.frequency_hz > 0
@@ -277,7 +277,7 @@ def _is_measured(mode: Mode) -> bool:
 
 
 def _is_described(test: ModalTest, model: Model) -> bool:
-    """Whether the class can describe the conditions of a test."""
+    """Return True if the class can describe the conditions of a test."""
     try:
         model.refuse(test)
     except BadInput:

@@ -1,4 +1,4 @@
-"""What the watch of one hanger goes on from, and what its tests are to the evidence.
+"""The state of the watch of one hanger, and the sums of its tests for the evidence.
 
 By how much tests of one state differ, and along what: a joint that gives in the wind, wires that
 slip, sensors put elsewhere. What differs from test to test goes along a few known columns, each by
@@ -91,8 +91,7 @@ class StateSums:
         )
 
     def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
-        """What quantities go with, each by a coefficient of its own: kelvin, and as many further
-        laws as the structure has."""
+        """Return the kelvin that quantities go with, and as many further laws as there are."""
         return (self._warmth(state),)
 
     def _by_law(self, values: FloatArray) -> FloatArray:
@@ -103,9 +102,9 @@ class StateSums:
         """Factors (T, n, laws (1 + q)) of what a temperature that is not known, or not well, leaves
         open: what a kelvin does as far as that is known, and as far as it is not. Tests `of_season`
         share what they miss."""
-        own, sds = self._by_law(state.coefficients), self._by_law(state.coefficient_sd)
+        its, sds = self._by_law(state.coefficients), self._by_law(state.coefficient_sd)
         softening, parts = state.per_kelvin, []
-        for law, mean, sd in zip(self._thermal(state), own, sds, strict=True):
+        for law, mean, sd in zip(self._thermal(state), its, sds, strict=True):
             known = softening + state.slopes @ mean
             per_kelvin = np.concatenate([known[:, :, None], state.slopes * sd], axis=2)
             off = law.sd * np.sqrt(law.shared) if of_season else law.sd
@@ -127,11 +126,11 @@ class StateSums:
         )
 
     def _at_rest(self, state: WatchState) -> FloatArray:
-        laws, own = self._thermal(state), self._by_law(state.coefficients)
-        swing = laws[0].kelvin[:, None] * state.per_kelvin
-        for law, mean in zip(laws, own, strict=True):
-            swing = swing + law.kelvin[:, None] * (state.slopes @ mean)
-        return np.asarray(state.values - swing)
+        laws, its = self._thermal(state), self._by_law(state.coefficients)
+        variation = laws[0].kelvin[:, None] * state.per_kelvin
+        for law, mean in zip(laws, its, strict=True):
+            variation = variation + law.kelvin[:, None] * (state.slopes @ mean)
+        return np.asarray(state.values - variation)
 
     def scatter(self, state: WatchState) -> FloatArray:
         """Return the variances (q + c,) along each factor by the counted tests, one of each day.
@@ -149,8 +148,8 @@ class StateSums:
         values = np.where(known, np.diff(self._at_rest(state)[rows], axis=0)[:, :, None], 0.0)
         factors = np.where(known, self._factors(state)[rows[1:]], 0.0)
         open_left = np.concatenate([doubt[1:], doubt[:-1]], axis=2) * known
-        own = np.where(np.isfinite(spread), spread, _ABSENT)[:, :, None] * np.eye(len(spread.T))
-        covariance = own + open_left @ np.swapaxes(open_left, 1, 2)
+        its = np.where(np.isfinite(spread), spread, _ABSENT)[:, :, None] * np.eye(len(spread.T))
+        covariance = its + open_left @ np.swapaxes(open_left, 1, 2)
         there = np.abs(factors).max(axis=1) > 0
         variance = np.maximum(state.scatter_variance, 1e-12)
         for _ in range(_ROUNDS):
@@ -232,25 +231,27 @@ class StateSums:
             for _ in range(2 if each.is_ramp else 1):
                 parts.append(changing * since[:, None, None])
                 since = since * (years - each.years)
-        own = self.options.mode_scatter**2
+        its = self.options.mode_scatter**2
         return Course(
             np.concatenate(parts, axis=2),
             changing,
             self._softened(state, rows),
-            state.variances[rows] + own,
+            state.variances[rows] + its,
             int((rows < self.options.baseline_tests).sum()),
         )
 
     def effects(self, state: WatchState) -> tuple[FloatArray, FloatArray]:
-        """What a change does to each plane's first frequency and to its mean (r, n + q), and to
-        every mode (n, n + q)."""
+        """Return what a change does to each plane's first frequency and mean, and to every mode.
+
+        Arrays (r, n + q) and (n, n + q).
+        """
         measured = np.isfinite(state.variances)
         count = np.maximum(measured.sum(axis=0), 1)[:, None]
         slopes = np.where(measured[:, :, None], state.slopes, 0.0).sum(axis=0) / count
         of_modes = np.hstack([np.eye(self.structure.layout.n), slopes])
         planes = np.array([plane for plane, _ in self.modes])
         of_planes = [of_modes[planes == plane] for plane in dict.fromkeys(planes.tolist())]
-        rows = np.vstack([row for own in of_planes for row in (own[0], own.mean(axis=0))])
+        rows = np.vstack([row for its in of_planes for row in (its[0], its.mean(axis=0))])
         return rows, of_modes
 
 

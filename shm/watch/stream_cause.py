@@ -1,4 +1,4 @@
-"""What moved the modes of a stream, by its pattern and by what was noticed of its sensors.
+"""Causes of a change of the modes of a stream, by its pattern and by events of its sensors.
 
 A tension moves each mode by its sensitivity, springs the lower ones of a stiff bar more, a time
 base all alike, a sensor those of its plane, each as it likes. The hypotheses are compared by their
@@ -68,7 +68,7 @@ class _Pattern:
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """What moved the modes most likely, all that may have `moved`, and how each mode did."""
+    """The most probable cause, all that may have `moved`, and how each mode did."""
 
     name: str
     moved: tuple[Moved, ...]
@@ -78,12 +78,12 @@ class Cause:
 
     @property
     def is_measurement(self) -> bool:
-        """Whether it is none of the hanger, so that nobody need go there today."""
+        """Return True if it is none of the hanger, so that nobody need go there today."""
         return self.name in _MEASUREMENT
 
     @property
     def takes_hours(self) -> bool:
-        """Whether two mistaken modes in a few hours look like it."""
+        """Return True if two mistaken modes in a few hours look like it."""
         return self.name in (SWAPPED, _SENSOR, _UNEXPLAINED)
 
     @property
@@ -109,7 +109,7 @@ def cause_of(moved: FloatArray, table: ModeTable, readings: FloatArray) -> Cause
     known = np.isfinite(moved) & (readings > 0)
     sub = replace(
         table,
-        modes=tuple(mode for mode, own in zip(table.modes, known, strict=True) if own),
+        modes=tuple(mode for mode, its in zip(table.modes, known, strict=True) if its),
         **{name: getattr(table, name)[known] for name in ("tension", "ends", "spread", "level")},
     )
     if not known.any():
@@ -122,9 +122,9 @@ def cause_of(moved: FloatArray, table: ModeTable, readings: FloatArray) -> Cause
     chance = chance / chance.sum()
     best = int(chance.argmax())
     mean, sd = float(y.mean()), float(y.std()) / math.sqrt(len(y))
-    each_own = (mean / _DECADES_SD, sd / _DECADES_SD)  # of frequencies that no pattern ties
+    by_mode_size = (mean / _DECADES_SD, sd / _DECADES_SD)  # of frequencies that no pattern ties
     sized = [
-        fit if _names(pattern)[0] not in (_UNEXPLAINED, _SENSOR) else (fit[0], *each_own)
+        fit if _names(pattern)[0] not in (_UNEXPLAINED, _SENSOR) else (fit[0], *by_mode_size)
         for pattern, fit in zip(patterns, fits, strict=True)
     ]
     total = _moved_quantities(
@@ -155,8 +155,7 @@ def _best_of_each(
 
 
 def _ends(table: ModeTable) -> list[FloatArray]:
-    """What a decade of an end's spring moves ln f by (n,), as the table has it and from soft to
-    stiff."""
+    """Return what a decade of an end's spring moves ln f by (n,), from soft to stiff."""
     s = np.clip(table.tension, 0.01, 0.499)
     order = np.array([each for _, each in table.modes])
     xi = float(np.median(math.pi * order * np.sqrt(s / (0.5 - s))))
@@ -181,8 +180,8 @@ def _patterns(table: ModeTable, y: FloatArray) -> list[_Pattern]:
         found.append(_Pattern(SWAPPED, left, none, mean=swapped))
     for e in _ends(table):
         found += _loosened(e, y, table, planes)
-    for plane, own in planes.items() if len(planes) > 1 else ():
-        found.append(_Pattern(_SENSOR, left, np.where(own, _SENSOR_SD, 0.0), plane))
+    for plane, its in planes.items() if len(planes) > 1 else ():
+        found.append(_Pattern(_SENSOR, left, np.where(its, _SENSOR_SD, 0.0), plane))
     return found
 
 
@@ -195,22 +194,22 @@ def _loosened(
     tilt = (order - order.mean()) / max(order.max() - 1, 1)
     each = _EACH_OFF * (np.abs(loose).max() - np.abs(loose))  # as of a tension: off a string
     left, off = _LEFT_SD * table.tension, MODEL_OFF * loose * tilt
-    apart = [loose * (own - own.mean()) for own in planes.values()][:1]
+    apart = [loose * (its - its.mean()) for its in planes.values()][:1]
     both = np.column_stack([_DECADES_SD * e, off, left, *(_APART * part for part in apart)])
     found = [_Pattern("ends", both, each)]
-    for plane, own in planes.items() if len(planes) > 1 else ():
-        of_end = np.column_stack([_DECADES_SD * e * own, off * own, left])
-        found.append(_Pattern("end", of_end, each * own, plane))
+    for plane, its in planes.items() if len(planes) > 1 else ():
+        of_end = np.column_stack([_DECADES_SD * e * its, off * its, left])
+        found.append(_Pattern("end", of_end, each * its, plane))
     return found
 
 
 def _fit(y: FloatArray, variance: FloatArray, pattern: _Pattern) -> tuple[float, float, float]:
     """Log evidence, size along the first column with its sd; a mode may have gone astray."""
     n = len(y)
-    astray = [np.zeros(n), *(_ASTRAY_SD**2 * np.eye(n) if n > 2 else ())]
+    errant = [np.zeros(n), *(_ASTRAY_SD**2 * np.eye(n) if n > 2 else ())]
     both = [
         _normal(y - pattern.mean, variance + pattern.sd**2 + more, pattern.columns)
-        for more in astray
+        for more in errant
     ]
     log_each = np.array([each[0] for each in both]) + np.where(
         np.arange(len(both)) > 0, math.log(_ASTRAY), 0.0
@@ -241,7 +240,7 @@ def _moved_quantities(
     """Return what may have moved, in the words that alerts have for it; the likeliest first."""
     order = np.argsort(-chance)
     bayes = chance / [_prior(each) for each in patterns]
-    alike = tuple(
+    similar = tuple(
         name
         for i in order[1:]
         if bayes[i] > bayes[order[0]] / _ALIKE
@@ -256,7 +255,7 @@ def _moved_quantities(
             plane = next((each for each in PLANES if name.startswith(each)), None)
             size, sd = (unit * each for each in fits[i][1:])
             each = Moved(
-                name, float(chance[i]), size, sd, None, plane, () if rank else alike, together
+                name, float(chance[i]), size, sd, None, plane, () if rank else similar, together
             )
             found.setdefault(name, each)
     return tuple(found.values())
@@ -299,14 +298,16 @@ def _near(change: Change, events: Sequence[StreamEvent]) -> str:
     if not near:
         return ""
     event = min(near, key=lambda each: _HINTS.index(each.kind))
-    told = f"{event.channel}: {event.detail}" if event.channel else event.detail
+    reported = f"{event.channel}: {event.detail}" if event.channel else event.detail
     whose = "the logger said" if event.kind == "logger" else f"event '{event.kind}':"
-    return f"check the sensors first, at {event.start:%Y-%m-%d %H:%M} {whose} {told.rstrip('.')}."
+    return (
+        f"check the sensors first, at {event.start:%Y-%m-%d %H:%M} {whose} {reported.rstrip('.')}."
+    )
 
 
 def _unknown(alert: Alert, events: Sequence[StreamEvent]) -> str:
-    told = [e for e in events if e.kind == "thermometer" and e.end > alert.time - _LATELY]
-    if not told:
+    reported = [e for e in events if e.kind == "thermometer" and e.end > alert.time - _LATELY]
+    if not reported:
         return ""
-    why = told[-1].detail.partition(": ")[0]
+    why = reported[-1].detail.partition(": ")[0]
     return f"the temperature is not known ({why}): part of this may be the weather's."

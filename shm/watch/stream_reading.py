@@ -95,15 +95,15 @@ def _of_beam(
 
     xi, k, share = np.meshgrid(_XI, stiffness, shares, indexing="ij")
     misfit, planes = np.abs(log_f(xi, k, share) - log_hz), planes_of(keys).values()
-    by_plane = [misfit[..., own].sum(axis=-1) for own in planes]
+    by_plane = [misfit[..., its].sum(axis=-1) for its in planes]
     tension_n = hanger.bending_stiffness_n_m2 * share * (xi / length_m) ** 2
     total = sum(each.min(axis=1) for each in by_plane)
     if hanger.nominal_tension_n > 0:
         total = total + _NOMINAL * np.abs(np.log(tension_n[:, 0] / hanger.nominal_tension_n))
     at, of = np.unravel_index(int(np.argmin(total)), total.shape)
     springs = np.zeros(len(keys))
-    for own, each in zip(planes, by_plane, strict=True):
-        springs[own] = stiffness[each[at, :, of].argmin()]
+    for its, each in zip(planes, by_plane, strict=True):
+        springs[its] = stiffness[each[at, :, of].argmin()]
     mode = np.arange(len(keys))
 
     def each_mode(xi_by: float, k_by: float) -> FloatArray:
@@ -172,12 +172,12 @@ class ModeTable:
         modes anywhere within `elsewhere_sd` of ln f are more likely than either.
         """
         place = {mode: index for index, mode in enumerate(self.modes)}
-        own = [(mode.plane, mode.order) for mode in modes]
+        its = [(mode.plane, mode.order) for mode in modes]
         other = [(_other(mode).plane, mode.order) for mode in modes]
-        both = [n for n in range(len(modes)) if {own[n], other[n]} <= place.keys()]
+        both = [n for n in range(len(modes)) if {its[n], other[n]} <= place.keys()]
         if len(both) < least:
             return None
-        here, there = ([place[keys[n]] for n in both] for keys in (own, other))
+        here, there = ([place[keys[n]] for n in both] for keys in (its, other))
         spread = np.maximum(np.maximum(self.spread[here], self.spread[there]), LEAST_SD**2)
         if np.sum((self.level[here] - self.level[there]) ** 2 / spread) < 8 * surely:
             return None  # chance alone would tell them exchanged in some hour
@@ -212,10 +212,10 @@ class ModeTable:
         `expected` is the contrast between the planes by the readings before, with its sd.
         """
         off, variance = np.full(len(self.modes), np.nan), np.full(len(self.modes), np.inf)
-        own = [self.modes.index((mode.plane, mode.order)) for mode in modes]
+        its = [self.modes.index((mode.plane, mode.order)) for mode in modes]
         log_hz, sd = _measured(modes, assumed)
-        off[own] = log_hz - self.level[own] - warmth_k * self.softer(assumed)[own]
-        variance[own] = np.maximum(sd**2, self.spread[own])
+        off[its] = log_hz - self.level[its] - warmth_k * self.softer(assumed)[its]
+        variance[its] = np.maximum(sd**2, self.spread[its])
         return _read(off, variance, self.tension, planes_of(self.modes), expected)
 
     def learnt(self, seen: SeenReading) -> ModeTable:
@@ -293,20 +293,20 @@ def _read(
 ) -> SeenReading:
     """Read each plane by itself; where planes disagree by more than expected, the errors grow."""
     left = np.full(len(off), np.nan)
-    shift, own = np.zeros(len(PLANES)), np.full(len(PLANES), np.inf)
+    shift, its = np.zeros(len(PLANES)), np.full(len(PLANES), np.inf)
     for place, plane in enumerate(PLANES):
         seen = np.isfinite(off) & planes.get(plane, np.zeros(len(off), bool))
         if seen.any():
-            shift[place], own[place] = _read_plane(off[seen], variance[seen], slope[seen])
+            shift[place], its[place] = _read_plane(off[seen], variance[seen], slope[seen])
             left[seen] = off[seen] - slope[seen] * shift[place]
-    weight = (1 / own) / (1 / own).sum()
-    by_plane = np.where(np.isfinite(own), shift - expected[0] * _HALVES, np.nan)
+    weight = (1 / its) / (1 / its).sum()
+    by_plane = np.where(np.isfinite(its), shift - expected[0] * _HALVES, np.nan)
     mean = float(weight @ np.nan_to_num(by_plane))
-    total = 1 / float((1 / own).sum()) + (float(weight @ _HALVES) * expected[1]) ** 2
-    if not np.isfinite(own).all():
+    total = 1 / float((1 / its).sum()) + (float(weight @ _HALVES) * expected[1]) ** 2
+    if not np.isfinite(its).all():
         return SeenReading(mean, total, off, left, by_plane)
     contrast = float(shift[0] - shift[1])
-    both = float(own.sum())
+    both = float(its.sum())
     misfit = (contrast - expected[0]) ** 2 / (both + expected[1] ** 2)
     return SeenReading(mean, total * max(misfit, 1.0), off, left, by_plane, contrast, both)
 
@@ -330,6 +330,6 @@ def _weighted_median(values: FloatArray, weight: FloatArray) -> float:
 
 
 def planes_of(modes: Sequence[MeasuredMode]) -> dict[str, BoolArray]:
-    """Which modes (n,) are of each plane, for the planes that have any."""
+    """Return which modes (n,) are of each plane, for the planes that have any."""
     found = [plane for plane, _ in modes]
     return {plane: np.array([each == plane for each in found]) for plane in dict.fromkeys(found)}

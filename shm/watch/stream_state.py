@@ -1,4 +1,4 @@
-"""What goes from one reading of a stream to the next: kept as bytes of a bounded size.
+"""The state of the watch of a stream from one reading to the next, of a bounded size.
 
 Beside modes and filters it is the conditions: temperatures as they lag, the level and the wind at
 first, and the modes of the last day, by which a change is told apart.
@@ -66,7 +66,7 @@ class Reported:
 
 @dataclass(frozen=True, eq=False)
 class StreamState:
-    """What goes from reading to reading. Days count from `start`.
+    """The state from reading to reading. Days count from `start`.
 
     `lagged_c` are the temperature's exponential means, `reference` its first value, that of the
     log level and of the wind; `known_day` is the last with a temperature. `ring` (24, n) are the

@@ -112,7 +112,7 @@ def watch_reading(
     kept: bytes | None,
     options: StreamOptions | None = None,
 ) -> StreamWatched:
-    """What one more reading of a hanger's stream says, by what was `kept` after those before.
+    """Return the result of one more reading of a stream, from the state `kept` before it.
 
     The sensitivities are those of the baseline's model class, else of the beam that fits the first
     reading. Where the hanger's description, its baseline or this watch itself have changed, it
@@ -248,17 +248,17 @@ class StreamWatch:
                 now = _shift(state)[0]
                 state = replace(state, called=state.called.after(now - evidence.shift, now))
         test = self._watched_test(state, evidence, moved, is_apart, unlike, reading, end)
-        told, alert = after(state.told, test, self.hanger)
-        told = replace(told, called=told.called[-_CALLS_KEPT:])
+        reported, alert = after(state.told, test, self.hanger)
+        reported = replace(reported, called=reported.called[-_CALLS_KEPT:])
         standing = (*state.standing, alert.key) if alert else state.standing
-        stands = alert or told.beyond or told.called or state.bank.day < state.settled_day
-        ended = () if stands else standing
-        state = replace(state, told=told, standing=() if ended else standing)
+        in_force = alert or reported.beyond or reported.called or state.bank.day < state.settled_day
+        ended = () if in_force else standing
+        state = replace(state, told=reported, standing=() if ended else standing)
         if ended:
             state = replace(state, called=Reported(), apart=Reported())
         shift, sd = test.drifts[0].shift_mean, test.drifts[0].shift_sd
-        own, own_sd = shift_of_reading(state, seen)
-        return StreamWatched(b"", own, own_sd, shift, sd, test, alert, events, ended, ""), state
+        its, its_sd = shift_of_reading(state, seen)
+        return StreamWatched(b"", its, its_sd, shift, sd, test, alert, events, ended, ""), state
 
     def _weigh(self, state: StreamState) -> tuple[Evidence, Evidence, bool]:
         """Return the evidence of any change, that of one plane's, and whether it is mostly that."""
@@ -274,8 +274,8 @@ class StreamWatch:
 
     @property
     def _limit_years(self) -> float:
-        own = self.hanger.thresholds.false_call_years
-        return self.options.limit_years if own is None else own
+        its = self.hanger.thresholds.false_call_years
+        return self.options.limit_years if its is None else its
 
     def _watched_test(
         self,
@@ -301,7 +301,7 @@ class StreamWatch:
         of_plane = (between - state.apart.since, between_sd, state.apart.shift)
         standing = [each for each in (of_tension, of_plane) if each[2]]
         if standing:
-            left = max(_beyond(now / size - 0.5, own / abs(size)) for now, own, size in standing)
+            left = max(_beyond(now / size - 0.5, its / abs(size)) for now, its, size in standing)
             chance = max(left, chance) if moved else left
             now, _, size = of_plane if is_apart else of_tension
             if moved and size and now / size < 0.5:  # it came back: the end of an alert
@@ -437,9 +437,9 @@ def _sized(evidence: Evidence, cause: Cause, state: StreamState) -> Evidence:
     if cause.name != TENSION or evidence.kind:
         return evidence
     later = max(int((state.ring_day >= evidence.by_day).sum()) / TOGETHER, 1.0)
-    own = cause.moved[0]
-    sd = math.hypot(own.shift_sd, state.bank.wander_sd / math.sqrt(later), state.unknown_sd)
-    return replace(evidence, shift=own.shift_mean, shift_sd=sd)
+    its = cause.moved[0]
+    sd = math.hypot(its.shift_sd, state.bank.wander_sd / math.sqrt(later), state.unknown_sd)
+    return replace(evidence, shift=its.shift_mean, shift_sd=sd)
 
 
 def _absorb_plane(
@@ -449,10 +449,10 @@ def _absorb_plane(
 
     `of_tension` is what the filters of the tension took it for, if they did.
     """
-    table, own = state.table, planes_of(state.table.modes)[cause.plane]
-    other = np.nan_to_num(np.nanmedian((cause.by_mode / table.tension)[~own]))
-    moved = np.where(own, np.nan_to_num(cause.by_mode - other * table.tension), 0.0)
-    size = float(np.median((moved / table.tension)[own & np.isfinite(cause.by_mode)]))
+    table, its = state.table, planes_of(state.table.modes)[cause.plane]
+    other = np.nan_to_num(np.nanmedian((cause.by_mode / table.tension)[~its]))
+    moved = np.where(its, np.nan_to_num(cause.by_mode - other * table.tension), 0.0)
+    size = float(np.median((moved / table.tension)[its & np.isfinite(cause.by_mode)]))
     size = size if cause.plane == PLANES[0] else -size
     contrast = state.contrast
     if apart.beginning >= 0:

@@ -90,7 +90,7 @@ class Watcher:
 
     @cached_property
     def sums(self) -> StateSums:
-        """What the tests of a state are to the evidence."""
+        """Return what the tests of a state are to the evidence."""
         return StateSums(self.quantities, self.columns.modes, self.structure, self.options)
 
     def begin(self, readings: Sequence[Reading]) -> tuple[WatchState, Watch]:
@@ -157,8 +157,8 @@ class Watcher:
             state = self._without_baseline(state)
             evidence = self._evidence(state, _counting(state))
             evidence, causes, _ = self._apply_recurrence_bound(state, evidence)
-        own = slice(self.options.baseline_tests)
-        if np.isfinite(state.variances[own]).any() and not state.counted[own].any():
+        its = slice(self.options.baseline_tests)
+        if np.isfinite(state.variances[its]).any() and not state.counted[its].any():
             against = int(state.counted.sum())
             # How far it is since the baseline stays open all the same.
             whole = self._with_baseline(state)
@@ -180,7 +180,7 @@ class Watcher:
     def _apply_recurrence_bound(
         self, state: WatchState, evidence: Evidence
     ) -> tuple[Evidence, Evidence, int]:
-        """As far as it stays, by which causes are weighed, and tests against the baseline."""
+        """Return the bounded evidence, that for weighing causes, and tests against the baseline."""
         if evidence.log_evidence <= math.log(_LOOKED_AT * self.options.limit_years):
             return evidence, evidence, 0
         # How sure it is that anything changed is bounded; which cause it was is for all to say.
@@ -211,8 +211,11 @@ class Watcher:
         changes: tuple[Evidence, Evidence, int],
         shifts: tuple[Evidence, Evidence],
     ) -> WatchedTest:
-        """What people are told after the newest test: by the evidence of changes, that by which
-        causes are weighed, and tests against the baseline; and of shifts since the baseline."""
+        """Summarize the newest test.
+
+        By the evidence of changes, that by which causes are weighed, and tests against the
+        baseline; and that of shifts since the baseline.
+        """
         evidence, causes, against_baseline = changes
         of_baseline = float(state.years[: self.options.baseline_tests].mean())
         subject = SummaryContext(
@@ -327,11 +330,11 @@ class Watcher:
         )
 
     def _coefficients(self, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
-        """How far each quantity goes with a kelvin (laws q,), its sd; by the likeliest scatter."""
+        """Return what a kelvin does to each quantity (laws q,), its sd, by the best scatter."""
         n, count = self.structure.layout.n, self.structure.layout.q * self.structure.thermal_laws
-        likeliest, own = int(evidence.log_null.argmax()), slice(n, n + count)
-        variance = np.diag(evidence.null_covariance[likeliest])[own]
-        return np.asarray(evidence.null_mean[likeliest, own]), np.sqrt(np.maximum(variance, 0.0))
+        best, its = int(evidence.log_null.argmax()), slice(n, n + count)
+        variance = np.diag(evidence.null_covariance[best])[its]
+        return np.asarray(evidence.null_mean[best, its]), np.sqrt(np.maximum(variance, 0.0))
 
     def _creep(self, evidence: Evidence) -> CreepRate | None:
         """The tension's creep if nothing but what was called changes; None where that is unlikely.

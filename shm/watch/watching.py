@@ -104,11 +104,11 @@ def watch_hanger(
     dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
     readings = tuple(reader.reading(test, time) for test, time in dated)
     options = options_of(hanger, len(baseline_tests), options)
-    said = [known[test.id] for test, _ in later if test.id in known]
-    begin = readings if len(said) < len(later) else readings[: len(baseline_tests)]
+    words = [known[test.id] for test, _ in later if test.id in known]
+    begin = readings if len(words) < len(later) else readings[: len(baseline_tests)]
     watch = watched(begin, reader.quantities, reader.columns, hanger, options)
     if begin is not readings:
-        watch = Watch((*watch.tests, *said))
+        watch = Watch((*watch.tests, *words))
     tests = list(watch.tests)
     mistaken: tuple[RepeatedMistake, ...] = ()
     for n in range(len(baseline_tests), len(tests)):
@@ -127,7 +127,7 @@ def kept_of(baseline: Posterior, tests: Sequence[DatedTest]) -> tuple[DatedTest,
 
 @dataclass(frozen=True, eq=False)
 class Newest:
-    """What the watch says after the newest test, the alert it calls for, and what to keep."""
+    """The result after the newest test, the alert it calls for, and the state to store."""
 
     test: WatchedTest
     alert: Alert | None
@@ -157,36 +157,36 @@ def watch_newest(
     if kept is None:
         readings = [reader.reading(test, time) for test, time in baseline_tests]
         state, watch = watcher.begin(readings)
-        told, alert = AlertState(), None
+        reported, alert = AlertState(), None
         for found in watch.tests:
-            told, alert = after(told, found, hanger)
+            reported, alert = after(reported, found, hanger)
     else:
-        state, told = from_bytes(tuple[WatchState, AlertState], kept)
+        state, reported = from_bytes(tuple[WatchState, AlertState], kept)
         if state.key != watcher.key:
             return None
     since = max(time for _, time in baseline_tests)
     for test, time in later:
         reading = reader.reading(test, max(time, since))
         state, found = watcher.after(state, reading)
-        found = replace(found, mistaken=repeated_mistakes(told.mistaken, reading, reader.modes))
-        told, alert = after(told, found, hanger)
+        found = replace(found, mistaken=repeated_mistakes(reported.mistaken, reading, reader.modes))
+        reported, alert = after(reported, found, hanger)
     # A second test that agrees answers the notice that asks for one.
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
-        agreed = agreement(reader, later[-1], beside, hanger, options, told.beyond)
+        agreed = agreement(reader, later[-1], beside, hanger, options, reported.beyond)
         if agreed is not None:
             two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
-            alert, told = agreed, with_beyond(told, agreed.drifts, agreed.time)
-            told = replace(told, agreed=told.agreed | two_told)
-    return Newest(found, alert, to_bytes((state, told)))
+            alert, reported = agreed, with_beyond(reported, agreed.drifts, agreed.time)
+            reported = replace(reported, agreed=reported.agreed | two_told)
+    return Newest(found, alert, to_bytes((state, reported)))
 
 
 def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:
     """Return the options with a hanger's own: its baseline, its false calls, wires that slip."""
-    own = hanger.thresholds.false_call_years
+    its = hanger.thresholds.false_call_years
     if hanger.kind == "strand":
         slip = hanger.assumptions.strand_bending_per_amplitude_sd.value
         options = replace(options, bending_per_amplitude_sd=slip)
-    limit_years = options.limit_years if own is None else own
+    limit_years = options.limit_years if its is None else its
     return replace(options, baseline_tests=baseline_tests, limit_years=limit_years)
 
 
@@ -196,9 +196,9 @@ def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
     `watched` are all its tests since the baseline, the oldest first. The alert's key names hanger,
     rules, quantity, way and test: the same whenever it is asked for.
     """
-    told, alert = AlertState(), None
+    reported, alert = AlertState(), None
     for test in watched:
-        told, alert = after(told, test, hanger)
+        reported, alert = after(reported, test, hanger)
     return alert
 
 
@@ -224,7 +224,7 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     if alert is None and not explained and (new := news_of(test.mistaken, noted)):
         # It waits while there is worse to tell; a mass or lost section is why modes go astray.
         alert, noted = notice_of(test, hanger, new), wrong
-    stands = replace(
+    in_force = replace(
         with_beyond(standing, (*beyond, *since_baseline), test.time),
         call=call,
         called=called,
@@ -235,7 +235,7 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
         # Improbable to the watch, as what two tests tell: it ends once the shift has come back.
         agreed=standing.agreed | conditions(since_baseline),
     )
-    return stands, alert
+    return in_force, alert
 
 
 def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
@@ -243,15 +243,15 @@ def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
     if in_a_row not in (1, _ODD_IN_A_ROW):
         return None
     kind: AlertKind = _REPEAT if in_a_row == 1 else "tests disagree"
-    said = message_of_odd(test, hanger, in_a_row)
-    return alert_of(hanger, (test.test, test.time), kind.replace(" ", "-"), said, (kind,))
+    words = message_of_odd(test, hanger, in_a_row)
+    return alert_of(hanger, (test.test, test.time), kind.replace(" ", "-"), words, (kind,))
 
 
 def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
     """All alerts of a history, the oldest test first: what `new_alert` says after each test."""
-    told, alerts = AlertState(), []
+    reported, alerts = AlertState(), []
     for test in watched:
-        told, alert = after(told, test, hanger)
+        reported, alert = after(reported, test, hanger)
         alerts += [alert] if alert else []
     return tuple(alerts)
 
@@ -270,11 +270,11 @@ def _news(standing: AlertState, test: WatchedTest, level: float) -> tuple[tuple[
 
 
 def _is_known(standing: AlertState, change: Change) -> bool:
-    """Whether a called change began before an alert that stands, and so is what that one told."""
-    told = [] if standing.call is None else [standing.call]
+    """Return True if an alert that is in force has reported a called change already."""
+    reported = [] if standing.call is None else [standing.call]
     named = _suspects(change)
-    told += [at for (quantity, _), at in standing.beyond.items() if quantity in named]
-    return any(change.began_by <= at for at in told)
+    reported += [at for (quantity, _), at in standing.beyond.items() if quantity in named]
+    return any(change.began_by <= at for at in reported)
 
 
 def _suspects(change: Change) -> tuple[str, ...]:
@@ -313,7 +313,7 @@ def _alert(
         kinds.append("sudden change" if test.change.sudden >= 0.5 else "slow drift")
     if not kinds:
         return None
-    said = message_of(
+    words = message_of(
         test,
         hanger,
         change,
@@ -328,7 +328,7 @@ def _alert(
     by_name = {drift.quantity: drift for drift in test.drifts}
     suspected = tuple(by_name[name] for name in _suspects(test.change) if name in by_name)
     of_test = test.test, test.time
-    return alert_of(hanger, of_test, key, said, tuple(kinds), beyond or suspected, change)
+    return alert_of(hanger, of_test, key, words, tuple(kinds), beyond or suspected, change)
 
 
 def _standing(test: WatchedTest, standing: AlertState, hanger: Hanger) -> list[Drift]:
