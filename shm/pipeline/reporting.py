@@ -31,8 +31,7 @@ from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_ov
 from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
 from shm.values import Hanger, ResponsePoint, WatchedTest
 from shm.watch import WatchOptions, watch_hanger
-from shm.watch.alert_text import watch_words
-from shm.watch.change_words import frequency_words
+from shm.watch.alert_text import frequency_words, watch_words
 from shm.watch.neighbours import BridgePattern
 
 log = logging.getLogger(__name__)

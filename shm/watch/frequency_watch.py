@@ -15,12 +15,11 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.values import NAN, WITHOUT_MODEL, Alert, Hanger, ModalTest, Posterior, Reading, WatchedTest
-from shm.watch.alert_state import AlertState
 from shm.watch.frequencies import POOLED_DAYS, FrequencyReader, FrequencyWatcher
 from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.options import WatchOptions
 from shm.watch.state_sums import WatchState
-from shm.watch.watching import DatedTest, Newest, after, options_of
+from shm.watch.watching import AlertState, DatedTest, Newest, after, options_of
 
 _POOL = timedelta(days=POOLED_DAYS)
 

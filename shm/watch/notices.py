@@ -34,8 +34,9 @@ from shm.values.drift import ENOUGH_FITS
 from shm.values.messages import WEEK
 from shm.values.rounding import force_unit, listed
 from shm.watch.agreement import BY_A_LOAD
-from shm.watch.alert_text import against_baseline_words, alert_of
-from shm.watch.change_words import (
+from shm.watch.alert_text import (
+    against_baseline_words,
+    alert_of,
     is_stiffness,
     look_again,
     quantity_words,

@@ -21,8 +21,8 @@ import numpy as np
 from shm.values import TENSION, Alert, Drift, Hanger, ModalTest
 from shm.values.rounding import NINETY_PERCENT
 from shm.watch.agreement import drifts_of
+from shm.watch.alert_text import is_stiffness, probable_groups, quantity_words, size_words
 from shm.watch.baseline_check import known_modes
-from shm.watch.change_words import is_stiffness, probable_groups, quantity_words, size_words
 from shm.watch.readings import Reader
 
 _HALF = 0.5  # judgement: of what was told, so much may be left where it is repaired

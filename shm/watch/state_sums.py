@@ -18,9 +18,8 @@ import numpy as np
 from shm.values import BoolArray, Change, FloatArray, IntArray, WatchedQuantity, is_ratio
 from shm.watch.causes import DetectedChange, Structure
 from shm.watch.change_point import SIZES, Evidence, Sums, sums_of
-from shm.watch.isolated_tests import Seen
 from shm.watch.options import OF_ONE_VISIT_YEARS, Warmth, WatchOptions, temperature_offsets
-from shm.watch.persistence import Course
+from shm.watch.persistence import Course, Seen
 from shm.watch.quantities import MeasuredMode
 
 

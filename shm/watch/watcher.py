@@ -29,9 +29,8 @@ from shm.values import (
 from shm.values.drift import ENOUGH_AGAINST
 from shm.watch.causes import Columns, DetectedChange, Structure, structure_of
 from shm.watch.change_point import Evidence, evidence_of, log_probability_of_called
-from shm.watch.isolated_tests import outlier_probability, select_consistent_tests
 from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of, years_between
-from shm.watch.persistence import bound_by_recurrence
+from shm.watch.persistence import bound_by_recurrence, outlier_probability, select_consistent_tests
 from shm.watch.posterior_summary import (
     SummaryContext,
     probability_of_change,

@@ -19,11 +19,10 @@ from shm.values import (
     WatchedTest,
 )
 from shm.values.messages import Lead
-from shm.watch.alert_state import AlertState
-from shm.watch.change_words import shift_words
+from shm.watch.alert_text import shift_words
 from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.notices import message_of_odd
-from shm.watch.watching import after, alerts_of, new_alert
+from shm.watch.watching import AlertState, after, alerts_of, new_alert
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_drift, a_watched_test
 

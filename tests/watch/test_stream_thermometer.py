@@ -13,8 +13,8 @@ from shm.pipeline.stream_steps import Pooled, pool_stream
 from shm.values import outdoor_c
 from shm.values.stream import PooledReading, Window, WindowReading
 from shm.watch.kept_state import from_bytes
-from shm.watch.stream_state import StreamState
 from shm.watch.stream_thermometer import Thermometer, disagreeing
+from shm.watch.stream_watch import StreamState
 from tests.watch.test_stream_watch import HANGER, START, from_hour, hours
 
 Says = Callable[[int, float], float]

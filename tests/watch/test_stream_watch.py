@@ -17,9 +17,7 @@ from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, StreamEvent, Window, WindowReading
 from shm.watch.ambient_hammer import ambient_bias
 from shm.watch.kept_state import from_bytes, to_bytes
-from shm.watch.stream_cause import cause_of, led_by
-from shm.watch.stream_reading import ModeTable, exchanged
-from shm.watch.stream_state import windows_as_mounted
+from shm.watch.stream_reading import ModeTable, cause_of, exchanged, led_by
 from shm.watch.stream_watch import (
     StreamOptions,
     StreamState,
@@ -27,6 +25,7 @@ from shm.watch.stream_watch import (
     StreamWatched,
     daily_shift,
     watch_reading,
+    windows_as_mounted,
 )
 
 AREA = math.pi * 0.07**2 / 4
