@@ -45,7 +45,7 @@ from shm.store.queries.tests import count_tests, list_baseline_tests, list_undat
 from shm.store.stored_alerts import describe_silence
 from shm.values import Summary
 from shm.values.rounding import ForceUnit, force_unit, rounded_percent
-from shm.watch.change_words import frequency_words
+from shm.watch.alert_text import frequency_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document

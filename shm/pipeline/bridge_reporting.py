@@ -52,7 +52,7 @@ from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
-from shm.watch.change_words import look_again
+from shm.watch.alert_text import look_again
 
 if TYPE_CHECKING:
     from shm.watch.neighbours import BridgePattern, HangerShift

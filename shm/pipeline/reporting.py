@@ -40,8 +40,7 @@ from shm.store.queries.tests import (
 from shm.store.queries.trends import find_latest_trends, list_trend
 from shm.values import Hanger, ResponsePoint, WatchedTest
 from shm.watch import WatchOptions, watch_hanger
-from shm.watch.alert_text import watch_words
-from shm.watch.change_words import frequency_words
+from shm.watch.alert_text import frequency_words, watch_words
 from shm.watch.neighbours import BridgePattern
 
 log = logging.getLogger(__name__)

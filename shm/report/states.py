@@ -27,8 +27,8 @@ from shm.values import (
     WatchedQuantity,
     kind_of,
 )
-from shm.watch.change_words import group_words, is_stiffness, probable_groups, quantity_words
-from shm.watch.repeated_mistakes import off_the_baseline
+from shm.watch.alert_text import group_words, is_stiffness, probable_groups, quantity_words
+from shm.watch.notices import off_the_baseline
 from shm.watch.state import Band, StateHistory, StateOptions, set_free, states
 
 if TYPE_CHECKING:
