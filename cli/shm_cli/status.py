@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime, timedelta
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import rich_click as click
@@ -32,6 +33,7 @@ from shm.store import (
     Store,
     Workspace,
 )
+from shm.store.point_outbox import PointOutbox
 from shm.store.stored_alerts import said_of
 from shm.values import Summary
 from shm.values.rounding import ForceUnit, force_unit, rounded_percent
@@ -122,7 +124,8 @@ def _show(document: dict[str, Any]) -> None:
         f"alerts: {document['alerts']}, {document['open_alerts']} open; "
         f"deliveries: {owed or 'none'}"
     )
-    for text in (*document["quiet_hours"], *document["silences"], *document["streams"]):
+    lines = (document[key] for key in ("quiet_hours", "silences", "streams", "publications"))
+    for text in chain.from_iterable(lines):
         click.echo(text)
     click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
     _show_hangers(document)
@@ -260,6 +263,11 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "quiet_hours": _quiet(workspace, store, now),
         "silences": [said_of(each) for each in store.silences.list_all() if each.is_in_force(now)],
         "streams": [each.words for each in stream_leads(workspace, store, now)],
+        "publications": [
+            f"publish {each.name}: {words}"
+            for each in workspace.bridge.publications
+            if (words := PointOutbox(workspace.folder).state(each.name).words)
+        ],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
         "changed_settings": [str(each) for each in store.settings.list_current().values()],

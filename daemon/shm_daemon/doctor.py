@@ -180,6 +180,7 @@ _CHECKS: Sequence[tuple[str, of_store.Check]] = (
     ("deliveries", check_deliveries),
     ("hangers", of_store.check_hangers),
     ("streams", of_store.check_streams),
+    ("publish", of_store.check_publications),
     ("settings", of_store.check_changed_settings),
 )
 _REPORT = "This is a fault of shm; please report it."

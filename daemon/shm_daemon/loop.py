@@ -22,6 +22,7 @@ from shm_daemon.heartbeat import Pulse, longest_wait_s, tell_systemd, turn_faile
 from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
+from shm_daemon.publishing import Publisher, results_published
 from shm_daemon.spool import FileStabilityTracker, scan
 from shm_daemon.streams import StreamKeeper, streams_kept
 from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
@@ -129,7 +130,9 @@ def _begin(
     keeper = stack.enter_context(
         streams_kept(workspace, clock, until_done=once, sealed=streaming.note_sealed)
     )
-    daemon = Daemon(flow, streaming, keeper, wakeup, lock, pulse, lambda: make_executor(settings))
+    publisher = stack.enter_context(results_published(workspace, clock, when_done=once))
+    parts = flow, streaming, keeper, publisher
+    daemon = Daemon(*parts, wakeup, lock, pulse, lambda: make_executor(settings))
     stack.callback(daemon.close)
     log.info("watching %s", workspace.spool)
     return daemon
@@ -143,12 +146,14 @@ class Daemon:
         flow: Flow,
         streaming: Streaming,
         keeper: StreamKeeper,
+        publisher: Publisher,
         wakeup: Wakeup,
         lock: ActiveLock,
         pulse: Pulse,
         make_executor: Callable[[], Executor],
     ):
-        self._flow, self._streaming, self._keeper = flow, streaming, keeper
+        self._flow, self._streaming = flow, streaming
+        self._keeper, self._publisher = keeper, publisher
         self._wakeup, self._lock, self._pulse = wakeup, lock, pulse
         self._make_executor = make_executor
         settings = flow.workspace.settings
@@ -327,6 +332,7 @@ class Daemon:
             self._flow.use(self._flow.workspace.reopened())
             self._streaming.use(self._flow.workspace)
             self._keeper.use(self._flow.workspace)
+            self._publisher.use(self._flow.workspace)
         except ShmError as error:
             log.error("bridge.toml is not taken over: %s", error)
         else:

@@ -116,6 +116,10 @@ class Journal(Repository):
         with self.writing() as connection:
             note(connection, at, action, subject, detail)
 
+    def newest(self) -> int:
+        """Return the number of the last entry, 0 where there is none: it changes with results."""
+        return self.scalar(sa.select(sa.func.max(journal.c.id))) or 0
+
     def list_changes(
         self, limit: int | None = None, before: int | None = None
     ) -> tuple[AuditRow, ...]:
