@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 from click.testing import CliRunner
 
 import shm_daemon
@@ -23,6 +24,7 @@ from shm_daemon.doctor import examine
 from shm_daemon.publishing import Pace, Publisher, results_published
 from tests.helpers.flows import ingest, threads
 from tests.helpers.listeners import Answer, Told, a_listener
+from tests.helpers.pages import ROOT
 from tests.helpers.quick_update import stand_in
 from tests.helpers.streams import a_reading, with_stream
 from tests.helpers.time_series import a_victoria_metrics, an_influxdb
@@ -31,6 +33,7 @@ from tests.helpers.workspaces import SLOW_LOSS, make_workspace, write_test
 
 SERIES = re.compile(r"(?:\\.|[^ \\])+")
 """Measurement and tags: up to the first blank that is not escaped."""
+GRAFANA = ROOT / "config" / "grafana"
 NAME = 'Bridge "A", north = old'
 
 
@@ -207,6 +210,61 @@ def test_publish_to_victoria_metrics(bridge: Workspace, tmp_path: Path) -> None:
         assert of["shm_hanger_state_level", "3"]["values"] == [5]
         tests = [each for each in series if each["metric"]["__name__"] == "shm_test_tension_n"]  # type: ignore[index]
         assert sum(len(each["values"]) for each in tests) == 8  # type: ignore[arg-type]
+
+
+# ---------------------------------------------------------------- Grafana's files
+
+
+def queries(kind: str, name: str) -> dict[str, str]:
+    """Return the queries of a dashboard, by panel and letter, with its variables filled in."""
+    board = json.loads((GRAFANA / kind / "dashboards" / f"{name}.json").read_text())
+    filled = {"${bridge:regex}": ".*", "${hanger:regex}": ".*", "$timeFilter": "time > 0"}
+    filled |= {"$__interval": "30d", "$bridge": ".*", "$hanger": ".*"}
+    found = {}
+    for panel in board["panels"]:
+        for target in panel["targets"]:
+            text = target.get("query") or target["expr"]
+            for variable, value in filled.items():
+                text = text.replace(variable, value)
+            found[f"{panel['title']} {target['refId']}"] = text
+    return found
+
+
+EMPTY = {"Tension since the beginning A", "The same at the weather of the beginning A", "Wind A"}
+"""Panels of the sensors whose fields the one hour of the tests does not have."""
+
+
+def test_dashboards_query_influxdb(bridge: Workspace, tmp_path: Path) -> None:
+    with an_influxdb(tmp_path) as database:
+        database.influxql("CREATE DATABASE shm")
+        publish(publishing(bridge, database.url))
+
+        boards = {name: queries("influx", name) for name in ("overview", "hanger", "sensors")}
+        empty = {
+            panel
+            for board in boards.values()
+            for panel, query in board.items()
+            if not database.influxql(query)
+        }
+        rules = yaml.safe_load((GRAFANA / "influx" / "alert-rules.yaml").read_text())
+        for rule in rules["groups"][0]["rules"]:
+            assert database.influxql(rule["data"][0]["model"]["query"])
+    assert empty == EMPTY
+
+
+def test_dashboards_query_victoria_metrics(bridge: Workspace, tmp_path: Path) -> None:
+    with a_victoria_metrics(tmp_path) as database:
+        publish(publishing(bridge, database.url))
+
+        boards = {name: queries("prometheus", name) for name in ("overview", "hanger", "sensors")}
+        empty = {
+            panel
+            for board in boards.values()
+            for panel, query in board.items()
+            if not database.promql(query)
+        }
+    # The page for Prometheus alone knows the streams.
+    assert empty == {*EMPTY, "Since the last sample A", "Lost of the last day A"}
 
 
 # ---------------------------------------------------------------- a server of our own
