@@ -245,6 +245,7 @@ _MODULES = {
     "distributed": ("distributed",),
     "mqtt": ("paho",),
     "postgres": ("psycopg",),
+    "seedlink": ("seedlink_client",),
     "sso": ("authlib",),
     "web": ("fastapi", "prometheus_client", "uvicorn"),
 }
@@ -270,6 +271,7 @@ def check_extras(workspace: Workspace) -> Iterator[Finding]:
         "distributed": bool(settings.scheduler),
         "mqtt": bool(settings.mqtt_url),
         "postgres": "://" in settings.store,
+        "seedlink": any(each.feed is not None for each in workspace.bridge.streams),
         "sso": workspace.bridge.single_sign_on is not None,
     }
     missing = [extra for extra, wanted in needed.items() if wanted and extra not in installed]

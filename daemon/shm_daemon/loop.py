@@ -23,6 +23,7 @@ from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
 from shm_daemon.publishing import Publisher, results_published
+from shm_daemon.seedlink import StreamAskers, streams_asked
 from shm_daemon.spool import FileStabilityTracker, scan
 from shm_daemon.streams import StreamKeeper, streams_kept
 from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
@@ -131,7 +132,8 @@ def _begin(
         streams_kept(workspace, clock, until_done=once, sealed=streaming.note_sealed)
     )
     publisher = stack.enter_context(results_published(workspace, clock, when_done=once))
-    parts = flow, streaming, keeper, publisher
+    askers = stack.enter_context(streams_asked(workspace, clock, begun=not once))
+    parts = flow, streaming, keeper, publisher, askers
     daemon = Daemon(*parts, wakeup, lock, pulse, lambda: make_executor(settings))
     stack.callback(daemon.close)
     log.info("watching %s", workspace.spool)
@@ -147,13 +149,14 @@ class Daemon:
         streaming: Streaming,
         keeper: StreamKeeper,
         publisher: Publisher,
+        askers: StreamAskers,
         wakeup: Wakeup,
         lock: ActiveLock,
         pulse: Pulse,
         make_executor: Callable[[], Executor],
     ):
         self._flow, self._streaming = flow, streaming
-        self._keeper, self._publisher = keeper, publisher
+        self._keeper, self._publisher, self._askers = keeper, publisher, askers
         self._wakeup, self._lock, self._pulse = wakeup, lock, pulse
         self._make_executor = make_executor
         settings = flow.workspace.settings
@@ -333,6 +336,7 @@ class Daemon:
             self._streaming.use(self._flow.workspace)
             self._keeper.use(self._flow.workspace)
             self._publisher.use(self._flow.workspace)
+            self._askers.use(self._flow.workspace)
         except ShmError as error:
             log.error("bridge.toml is not taken over: %s", error)
         else:
