@@ -33,7 +33,7 @@ from shm.read.chunk_document import BY_TIME, chunk_document
 from shm.read.sandbox import read_test
 from shm.store import Store, Workspace
 from shm.values import Recording
-from shm.values.stream import Chunk, SeedLinkFeed, Stream, StreamEvent
+from shm.values.stream import Chunk, SeedLinkFeed, Stream
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.streams import note_refused, take_chunks
 
@@ -66,9 +66,13 @@ class Record:
 
 @dataclass
 class Progress:
-    """The last record of each station that is wholly on disk, and up to when samples are."""
+    """The record of each station from which on not all is on disk: its number and its time.
+
+    `known` are those that came after it and are on disk; `done_ns` is up to when samples are.
+    """
 
     last: dict[str, tuple[int, str]]
+    known: dict[str, list[int]]
     done_ns: int = 0
 
     @classmethod
@@ -77,8 +81,9 @@ class Progress:
         with suppress(OSError, ValueError, KeyError, TypeError):
             found = json.loads(path.read_text(encoding="utf-8"))
             last = {key: (int(seq), str(time)) for key, (seq, time) in found["last"].items()}
-            return cls(last, int(found["done_ns"]))
-        return cls({})
+            known = {key: list(map(int, numbers)) for key, numbers in found["known"].items()}
+            return cls(last, known, int(found["done_ns"]))
+        return cls({}, {})
 
 
 class StreamAsker:
@@ -95,7 +100,7 @@ class StreamAsker:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._task: asyncio.Task[None] | None = None
         self._path = workspace.folder / FOLDER / f"{stream.name}.json"
-        self._progress = Progress({})
+        self._progress = Progress({}, {})
         self._pending: list[Record] = []
         self._arrived: dict[str, deque[Record]] = {}
         self._channels = {_source_id(*each): n for n, each in enumerate(self._feed.ids)}
@@ -162,8 +167,7 @@ class StreamAsker:
                 self._take(packet)
             raise library.SeedLinkError("")
         except library.SeedLinkTimeout:
-            newest_ns = max((each.end_ns for each in self._pending), default=0)
-            self._flush(newest_ns, unfinished=True)
+            self._flush_all()
             raise
         finally:
             await client.close()
@@ -181,11 +185,13 @@ class StreamAsker:
         of_packet = packet.station_id, packet.seqnum or 0, channel
         record = Record(*of_packet, header.starttime, end_ns, packet.payload)
         self._arrived.setdefault(record.station, deque()).append(record)
-        if end_ns > self._progress.done_ns:
-            self._pending.append(record)
-            self._flush(self._complete_ns())
-        else:
-            self._note_late(record)
+        if record.sequence in self._progress.known.get(record.station, ()):
+            return
+        if end_ns <= self._progress.done_ns:  # a clock went back, or a gap is filled
+            self._flush_all()
+            self._progress.done_ns = record.start_ns
+        self._pending.append(record)
+        self._flush(self._complete_ns())
 
     def _complete_ns(self) -> int:
         """Return up to when all channels are there, or have been waited for."""
@@ -194,13 +200,10 @@ class StreamAsker:
             reached[each.channel] = max(reached[each.channel], each.end_ns)
         return max(min(reached), max(reached) - round(self._pace.patience_s * _SECOND))
 
-    def _note_late(self, record: Record) -> None:
-        start, end = _time(record.start_ns), _time(record.end_ns)
-        detail = "these samples came after their minute was stored, and are left out"
-        name = self._stream.channels[record.channel].name
-        assert self._store is not None
-        event = StreamEvent(self._stream.name, "late", start, end, detail, name)
-        self._store.streams.save_event(event)
+    def _flush_all(self) -> None:
+        """Store what waits, the beginning of a minute too."""
+        newest_ns = max((each.end_ns for each in self._pending), default=0)
+        self._flush(newest_ns, unfinished=True)
 
     def _flush(self, until_ns: int, *, unfinished: bool = False) -> None:
         """Store the minutes that end up to a time; then note from which record on to go on."""
@@ -262,21 +265,20 @@ class StreamAsker:
         return Chunk(self._stream.name, number, start, rate, channels, values)
 
     def _save(self) -> None:
-        """Note the last record of each station before the first that is still needed."""
+        """Note the last record of each station before the first that is needed, and known ones."""
         needed = set(map(id, self._pending))
         for station, arrived in self._arrived.items():
             while arrived and id(arrived[0]) not in needed:
                 done = arrived.popleft()
-                self._progress.last[station] = done.sequence, _time(done.start_ns).isoformat()
+                time = _EPOCH + timedelta(microseconds=done.start_ns // 1000)
+                self._progress.last[station] = done.sequence, time.isoformat()
+            numbers = [each.sequence for each in arrived if id(each) not in needed]
+            self._progress.known[station] = numbers
         replace_text(self._path, dump(vars(self._progress)) + "\n")
 
 
 def _source_id(network: str, station: str, location: str, code: str) -> str:
     return f"FDSN:{network}_{station}_{location}_{'_'.join(code)}"
-
-
-def _time(at_ns: int) -> datetime:
-    return _EPOCH + timedelta(microseconds=at_ns // 1000)
 
 
 def _library() -> Any:
