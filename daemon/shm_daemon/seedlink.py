@@ -17,7 +17,7 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from shm.pipeline.lineage import read_limits
 from shm.read import sidecar_path
 from shm.read.atomic import replace_text
 from shm.read.chunk_document import BY_TIME, chunk_document
+from shm.read.ring_segment import microseconds, time_of
 from shm.read.sandbox import read_test
 from shm.store import Store, Workspace
 from shm.values import Recording
@@ -38,8 +39,8 @@ from shm_daemon.hooks.contract import one_line
 from shm_daemon.streams import note_refused, take_chunks
 
 FOLDER = "seedlink"
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-_SECOND = 10**9
+_MINUTE_US = timedelta(minutes=1) // timedelta(microseconds=1)
+_SECOND_US = timedelta(seconds=1) // timedelta(microseconds=1)
 
 log = logging.getLogger(__name__)
 
@@ -54,13 +55,13 @@ class Pace:
 
 @dataclass(frozen=True)
 class Record:
-    """A miniSEED record of one of our channels; times in ns since 1970, its end excluded."""
+    """A miniSEED record of one of our channels; times in µs since 1970, its end excluded."""
 
     station: str
     sequence: int
     channel: int
-    start_ns: int
-    end_ns: int
+    start_us: int
+    end_us: int
     payload: bytes
 
 
@@ -68,12 +69,12 @@ class Record:
 class Progress:
     """The record of each station from which on not all is on disk: its number and its time.
 
-    `known` are those that came after it and are on disk; `done_ns` is up to when samples are.
+    `known` are those that came after it and are on disk; `done_us` is up to when samples are.
     """
 
     last: dict[str, tuple[int, str]]
     known: dict[str, list[int]]
-    done_ns: int = 0
+    done_us: int = 0
 
     @classmethod
     def read(cls, path: Path) -> Progress:
@@ -82,7 +83,7 @@ class Progress:
             found = json.loads(path.read_text(encoding="utf-8"))
             last = {key: (int(seq), str(time)) for key, (seq, time) in found["last"].items()}
             known = {key: list(map(int, numbers)) for key, numbers in found["known"].items()}
-            return cls(last, known, int(found["done_ns"]))
+            return cls(last, known, int(found["done_us"]))
         return cls({}, {})
 
 
@@ -181,49 +182,49 @@ class StreamAsker:
         channel = self._channels.get(header.sourceid)
         if channel is None or header.samprate <= 0:
             return  # a server may send more than was selected
-        end_ns = header.endtime + round(_SECOND / header.samprate)
+        start_us = header.starttime // 1000
+        end_us = header.endtime // 1000 + round(_SECOND_US / header.samprate)
         of_packet = packet.station_id, packet.seqnum or 0, channel
-        record = Record(*of_packet, header.starttime, end_ns, packet.payload)
+        record = Record(*of_packet, start_us, end_us, packet.payload)
         self._arrived.setdefault(record.station, deque()).append(record)
         if record.sequence in self._progress.known.get(record.station, ()):
             return
-        if end_ns <= self._progress.done_ns:  # a clock went back, or a gap is filled
+        if end_us <= self._progress.done_us:  # a clock went back, or a gap is filled
             self._flush_all()
-            self._progress.done_ns = record.start_ns
+            self._progress.done_us = record.start_us
         self._pending.append(record)
-        self._flush(self._complete_ns())
+        self._flush(self._complete_us())
 
-    def _complete_ns(self) -> int:
+    def _complete_us(self) -> int:
         """Return up to when all channels are there, or have been waited for."""
         reached = [0] * len(self._channels)
         for each in self._pending:
-            reached[each.channel] = max(reached[each.channel], each.end_ns)
-        return max(min(reached), max(reached) - round(self._pace.patience_s * _SECOND))
+            reached[each.channel] = max(reached[each.channel], each.end_us)
+        return max(min(reached), max(reached) - round(self._pace.patience_s * _SECOND_US))
 
     def _flush_all(self) -> None:
         """Store what waits, the beginning of a minute too."""
-        newest_ns = max((each.end_ns for each in self._pending), default=0)
-        self._flush(newest_ns, unfinished=True)
+        newest_us = max((each.end_us for each in self._pending), default=0)
+        self._flush(newest_us, unfinished=True)
 
-    def _flush(self, until_ns: int, *, unfinished: bool = False) -> None:
+    def _flush(self, until_us: int, *, unfinished: bool = False) -> None:
         """Store the minutes that end up to a time; then note from which record on to go on."""
-        minute_ns = 60 * _SECOND
         while self._pending:
-            begin_ns = min(max(each.start_ns, self._progress.done_ns) for each in self._pending)
-            end_ns = (begin_ns // minute_ns + 1) * minute_ns
-            if end_ns > until_ns:
+            begin_us = min(max(each.start_us, self._progress.done_us) for each in self._pending)
+            end_us = (begin_us // _MINUTE_US + 1) * _MINUTE_US
+            if end_us > until_us:
                 if not unfinished:
                     return
-                end_ns = until_ns
-            self._store_minute(begin_ns, end_ns)
-            self._progress.done_ns = end_ns
-            self._pending = [each for each in self._pending if each.end_ns > end_ns]
+                end_us = until_us
+            self._store_minute(begin_us, end_us)
+            self._progress.done_us = end_us
+            self._pending = [each for each in self._pending if each.end_us > end_us]
             self._save()
 
-    def _store_minute(self, begin_ns: int, end_ns: int) -> None:
+    def _store_minute(self, begin_us: int, end_us: int) -> None:
         """Put a minute of all channels into the ring; one that cannot be used is noted."""
         path, now = self._path.with_suffix(".mseed"), self._clock()
-        found = [r for r in self._pending if r.start_ns < end_ns and r.end_ns > begin_ns]
+        found = [r for r in self._pending if r.start_us < end_us and r.end_us > begin_us]
         names = {r.channel: "_".join(filter(None, self._feed.ids[r.channel])) for r in found}
         path.write_bytes(b"".join(each.payload for each in found))
         sidecar = "".join(
@@ -235,7 +236,7 @@ class StreamAsker:
         try:
             (recording,) = read_test(path, read_limits(self._workspace.settings))
             assert isinstance(recording, Recording)
-            chunk = self._chunk(recording, names, begin_ns, end_ns)
+            chunk = self._chunk(recording, names, begin_us, end_us)
         except BadInput as error:
             note_refused(self._store, self._stream.name, error, now)
             return
@@ -244,15 +245,15 @@ class StreamAsker:
             take_chunks(self._workspace, self._store, self._stream.name, content, now)
 
     def _chunk(
-        self, recording: Recording, names: dict[int, str], begin_ns: int, end_ns: int
+        self, recording: Recording, names: dict[int, str], begin_us: int, end_us: int
     ) -> Chunk:
         """Cut a minute out of a recording; a channel without samples is NaN."""
         rate = recording.sampling_rate_hz
         assert recording.time is not None
-        start_ns = (recording.time - _EPOCH) // timedelta(microseconds=1) * 1000
+        start_us = microseconds(recording.time)
         first, last = (
-            max(0, math.ceil((at_ns - start_ns) / _SECOND * rate - 1e-3))
-            for at_ns in (begin_ns, end_ns)
+            max(0, math.ceil((at_us - start_us) / _SECOND_US * rate - 1e-2))
+            for at_us in (begin_us, end_us)
         )
         by_name = {each.name: each.values for each in recording.channels}
         last = min(last, recording.samples)
@@ -261,7 +262,7 @@ class StreamAsker:
             values[channel] = by_name[name][first:last]
         start = recording.time + timedelta(seconds=first / rate)
         channels = tuple(each.name for each in self._stream.channels)
-        number = BY_TIME + begin_ns // (60 * _SECOND)
+        number = BY_TIME + begin_us // _MINUTE_US
         return Chunk(self._stream.name, number, start, rate, channels, values)
 
     def _save(self) -> None:
@@ -270,8 +271,8 @@ class StreamAsker:
         for station, arrived in self._arrived.items():
             while arrived and id(arrived[0]) not in needed:
                 done = arrived.popleft()
-                time = _EPOCH + timedelta(microseconds=done.start_ns // 1000)
-                self._progress.last[station] = done.sequence, time.isoformat()
+                time = time_of(done.start_us).isoformat()
+                self._progress.last[station] = done.sequence, time
             numbers = [each.sequence for each in arrived if id(each) not in needed]
             self._progress.known[station] = numbers
         replace_text(self._path, dump(vars(self._progress)) + "\n")

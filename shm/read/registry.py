@@ -37,6 +37,7 @@ from shm.read.header import CHANNEL_KEYS, Header
 from shm.read.matlab_file import FORMAT as MATLAB
 from shm.read.mini_seed_file import FORMAT as MINI_SEED
 from shm.read.numpy_file import FORMAT as NUMPY
+from shm.read.sep005 import FORMAT as SEP005
 from shm.read.sidecar import document_beside, sidecar_path
 from shm.read.table import Column, Table, describe
 from shm.read.tdms_file import FORMAT as TDMS
@@ -54,6 +55,7 @@ FORMATS: tuple[Format, ...] = (
     WAVE,
     MINI_SEED,
     CAMPBELL,
+    SEP005,
     UFF,
     CSV,
 )
