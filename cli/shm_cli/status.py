@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime, timedelta
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import rich_click as click
@@ -26,6 +27,7 @@ from shm.report.hanger_status import Status, bridge_message
 from shm.report.hanger_summary import HangerSummary
 from shm.report.open_warnings import dated_by_receipt
 from shm.store import ENDED, Decision, DeliveryState, Store, Workspace
+from shm.store.point_outbox import PointOutbox
 from shm.store.queries.alerts import count_deliveries, count_open_alerts
 from shm.store.queries.hangers import (
     find_latest_watches,
@@ -134,7 +136,8 @@ def _show(document: dict[str, Any]) -> None:
         f"alerts: {document['alerts']}, {document['open_alerts']} open; "
         f"deliveries: {owed or 'none'}"
     )
-    for text in (*document["quiet_hours"], *document["silences"], *document["streams"]):
+    lines = (document[key] for key in ("quiet_hours", "silences", "streams", "publications"))
+    for text in chain.from_iterable(lines):
         click.echo(text)
     click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
     _show_hangers(document)
@@ -274,6 +277,11 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
             describe_silence(each) for each in store.silences.list_all() if each.is_in_force(now)
         ],
         "streams": [each.words for each in stream_leads(workspace, store, now)],
+        "publications": [
+            f"publish {each.name}: {words}"
+            for each in workspace.bridge.publications
+            if (words := PointOutbox(workspace.folder).state(each.name).words)
+        ],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
         "changed_settings": [str(each) for each in store.settings.list_current().values()],

@@ -180,6 +180,7 @@ _CHECKS: Sequence[tuple[str, of_store.Check]] = (
     ("deliveries", check_deliveries),
     ("hangers", of_store.check_hangers),
     ("streams", of_store.check_streams),
+    ("publish", of_store.check_publications),
     ("settings", of_store.check_changed_settings),
 )
 _REPORT = "This is a fault of shm; please report it."
@@ -244,6 +245,7 @@ _MODULES = {
     "distributed": ("distributed",),
     "mqtt": ("paho",),
     "postgres": ("psycopg",),
+    "seedlink": ("seedlink_client",),
     "sso": ("authlib",),
     "web": ("fastapi", "prometheus_client", "uvicorn"),
 }
@@ -269,6 +271,7 @@ def check_extras(workspace: Workspace) -> Iterator[Finding]:
         "distributed": bool(settings.scheduler),
         "mqtt": bool(settings.mqtt_url),
         "postgres": "://" in settings.store,
+        "seedlink": any(each.feed is not None for each in workspace.bridge.streams),
         "sso": workspace.bridge.single_sign_on is not None,
     }
     missing = [extra for extra, wanted in needed.items() if wanted and extra not in installed]

@@ -22,6 +22,7 @@ from shm.bridge.assumed import assumptions_of
 from shm.bridge.changes import overlaid
 from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, escalations_s, hook_of, zone_of
+from shm.bridge.publish import Publication, publication_of
 from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table, is_loopback, web_address
 from shm.errors import BadInput, NotDescribed, suggest
@@ -185,6 +186,7 @@ class Bridge:
     single_sign_on: SingleSignOn | None = None
     assumptions: Assumptions = DEFAULTS
     time_zone: tzinfo = UTC
+    publications: tuple[Publication, ...] = ()
 
     @property
     def escalation_s(self) -> dict[str, float]:
@@ -238,7 +240,7 @@ def load_bridge(path: Path, changed: Mapping[str, object] = MappingProxyType({})
 
 _TABLES = (
     "bridge", "hanger", "structure", "hook", "other_bridge", "stream", "settings", "disturbance",
-    "report", "measurement_hours", "single_sign_on", "assumptions",
+    "report", "measurement_hours", "single_sign_on", "assumptions", "publish",
 )  # fmt: skip
 _OF_BRIDGE = ("name", "built", "time_zone")
 
@@ -263,6 +265,8 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
     _refuse_doubles([hook.name for hook in hooks], "hook name", path)
     others = tuple(other_bridge_of(each, path) for each in _tables(document, "other_bridge", path))
     _refuse_doubles([other.name for other in others], "other_bridge name", path)
+    publications = tuple(publication_of(each, path) for each in _tables(document, "publish", path))
+    _refuse_doubles([each.name for each in publications], "publish name", path)
     described = {each.id: each for each in hangers}
     streams = streams_of(_tables(document, "stream", path), path, described)
     watched = {stream.hanger for stream in streams}
@@ -285,6 +289,7 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
         single_sign_on=single_sign_on_of(document, path),
         assumptions=assumed,
         time_zone=zone,
+        publications=publications,
     )
 
 

@@ -87,7 +87,7 @@ def _either_words(hanger: Hanger, lead: Drift, tests: int) -> str:
     now = ""
     if lead.quantity == TENSION:
         unit = force_unit(lead.value, lead.baseline)
-        was, value = unit.told(lead.baseline), unit.told(lead.value)
+        was, value = unit.with_unit(lead.baseline), unit.with_unit(lead.value)
         now = f"Tension was {was} at the baseline, {value} since. "
     return (
         f"Hanger {hanger.id}: either {quantity_words(lead.quantity)} {size_words(lead)} since its "
