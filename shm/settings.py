@@ -205,6 +205,9 @@ class Settings:
     quiet_days: float = _row(
         400.0, "days", "`shm doctor` warns of hangers without a test for so long", 0.01, 36500
     )
+    campaign_days: float = _row(
+        1.0, "days", "tests so near to one of a control hanger are of its campaign", 0.01, 365
+    )
 
     @property
     def model_names(self) -> tuple[str, ...]:

@@ -47,7 +47,7 @@ def hangers(
 ) -> list[CompletionItem]:
     """Numbers of the bridge's hangers, with their names."""
     bridge = _bridge(ctx)
-    described = bridge.hangers if bridge else ()
+    described = bridge.bars if bridge else ()
     return _beginning(incomplete, ((str(each.id), each.name) for each in described))
 
 

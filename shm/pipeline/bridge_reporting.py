@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import shm
 from shm.errors import NothingThere
+from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.lineage import (
     discarded_of_baselines,
     redescribed,
@@ -48,6 +49,7 @@ from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
 from shm.watch.change_words import look_again
+from shm.watch.control_chart import ControlChart
 
 if TYPE_CHECKING:
     from shm.watch.neighbours import BridgePattern, HangerShift
@@ -128,6 +130,7 @@ def bridge_report(
             remedy=f"The latest is {newest.test} of hanger {newest.hanger}, "
             f"{newest.time:%Y-%m-%d}: ask for a longer period.",
         )
+    charts = control_charts(workspace, store)
     pattern, why_not = _pattern_or_why(store, [hanger.id for hanger in hangers])
     return BridgeReport(
         workspace.bridge.name,
@@ -146,6 +149,7 @@ def bridge_report(
         period,
         {"software": software()},
         settings_words(workspace.settings),
+        charts,
     )
 
 
@@ -210,6 +214,7 @@ class HangersNow:
     warnings: Mapping[int, tuple[str, ...]]
     blind: Mapping[int, Lead]
     undated: Mapping[int, tuple[str, ...]]
+    charts: tuple[ControlChart, ...]
 
     @classmethod
     def of(
@@ -239,6 +244,7 @@ class HangersNow:
             ),
             blind_hangers(heard(workspace, store, now)),
             store.tests.names_without_time(),
+            control_charts(workspace, store),
         )
 
     def summary(self, hanger: Hanger) -> HangerSummary:
@@ -247,6 +253,9 @@ class HangersNow:
         found = self.watches.get(hanger.id)
         watched, called = found.watched if found else None, self.called.get(hanger.id, ())
         standing, blind = self.standing.get(hanger.id, ()), self.blind.get(hanger.id)
+        control = next((each for each in self.charts if each.hanger.id == hanger.id), None)
+        days, at = self.workspace.settings.campaign_days, point.time if point else None
+        doubts = () if control else campaign_warnings(self.charts, hanger.id, at, days)
         return HangerSummary(
             hanger,
             LatestTest(point.test, point.time, point.averaged, point.model) if point else None,
@@ -257,12 +266,13 @@ class HangersNow:
             detected="; ".join(called_words(change) for change in called),
             standing=findings(each.alert for each in standing),
             open_alerts=self.open_alerts.get(hanger.id, 0),
-            warnings=self.warnings.get(hanger.id, ()),
+            warnings=(*doubts, *self.warnings.get(hanger.id, ())),
             notes=notes_of(standing, self.silences, hanger.id, self.now),
             unwatched=unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
             if point
             else blind,
             undated=self.undated.get(hanger.id, ()),
+            control=control,
         )
 
 

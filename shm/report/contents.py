@@ -41,6 +41,7 @@ from shm.values.stated_tension import averaged_now, selection_now
 
 if TYPE_CHECKING:  # `shm status` lists hangers and identifies nothing
     from shm.identify import Dropped, Hit, Identification
+    from shm.watch.control_chart import ControlChart
     from shm.watch.neighbours import BridgePattern
 
 
@@ -256,6 +257,7 @@ class BridgeReport:
     period: Period | None = None
     lineage: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, str] = field(default_factory=dict)
+    controls: tuple[ControlChart, ...] = ()
 
     @property
     def message(self) -> BridgeMessage:

@@ -14,6 +14,7 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet, HangerReport
 from shm.report.figures import (
+    control_chart,
     gap_before_and_after,
     gap_causes,
     gap_map,
@@ -29,6 +30,7 @@ from shm.report.formatting import Interval
 from shm.report.states import CalledChange, called_words
 from shm.store import EventKind, TrendPoint
 from shm.values.rounding import ForceUnit, force_unit
+from shm.watch.control_chart import ControlChart
 from shm_daemon.web import with_plotly
 from shm_daemon.web.hanger_view import HangerView
 
@@ -222,7 +224,22 @@ def report_of(view: HangerView) -> HangerReport:
     return view.report
 
 
+def _control(view: HangerView) -> ControlChart:
+    """Return the chart of a control hanger."""
+    assert view.report is not None and view.report.now.control is not None  # noqa: PT018
+    return view.report.now.control
+
+
 FIGURES: tuple[HangerFigure, ...] = (
+    HangerFigure(
+        "control",
+        control_chart.FIGURE.title,
+        "control",
+        lambda view: view.hanger.is_control and bool(view.trend),
+        lambda view: control_chart.specify(_control(view)),
+        lambda view: control_chart.FIGURE.caption(_control(view)),
+        lambda view: control_chart.FIGURE.alt(_control(view)),
+    ),
     HangerFigure(
         "trend",
         "Tension over time",
