@@ -11,16 +11,13 @@ from typing import Any
 
 import rich_click as click
 
-import shm
 from shm.documents import dump
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report
-from shm.pipeline.controls import control_charts
 from shm.pipeline.reporting import hanger_report, modal_test_report, structure_report
 from shm.report.as_text import as_brief_text, as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
-from shm.report.control_report import ControlReport, control_json, control_paper
 from shm.report.hanger_report import hanger_json, hanger_paper, structure_json, structure_paper
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.paper import Paper
@@ -122,15 +119,9 @@ def _gathered(
             content = bridge_report(workspace, store, now, period)
             return _Report(content, bridge_paper, bridge_json)
         if any(each.id == hanger_id for each in workspace.bridge.structures):
-            _refuse_further(test_id, period)
+            _refuse_of_structure(test_id, period)
             of_structure = structure_report(workspace, store, hanger_id, now)
             return _Report(of_structure, structure_paper, structure_json)
-        controls = [each for each in workspace.bridge.controls if each.id == hanger_id]
-        if controls and test_id is None:
-            _refuse_further(test_id, period)
-            (chart,) = control_charts(workspace, store, controls)
-            of_control = ControlReport(workspace.bridge.name, chart, now, shm.__version__)
-            return _Report(of_control, control_paper, control_json)
         if test_id is None:
             of_hanger = hanger_report(workspace, store, hanger_id, now, period)
             return _Report(of_hanger, hanger_paper, hanger_json)
@@ -138,10 +129,10 @@ def _gathered(
         return _Report(replace(sheet, generated_at=now), modal_test_paper, modal_test_json)
 
 
-def _refuse_further(test_id: str | None, period: Period | None) -> None:
+def _refuse_of_structure(test_id: str | None, period: Period | None) -> None:
     if test_id is not None or period is not None:
         raise UsageError(
-            "a structure without a model, like a control hanger, has one report of all its tests.",
+            "a structure without a model has one report, of all its tests.",
             remedy="Leave out --test and --since.",
         )
 

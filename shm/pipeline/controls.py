@@ -3,43 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import datetime
 from math import isfinite
 
 from shm.report.control_report import campaign_warning
 from shm.store import Store, Workspace
-from shm.values import NAN, ControlHanger, ModalTest
-from shm.watch.control_chart import ControlChart, ControlReading, chart_control
+from shm.values import ControlHanger
+from shm.watch.control_chart import ControlChart, chart_control
 
 
-def without_reading(test: ModalTest) -> ModalTest:
-    """Return a test of a control hanger to infer its tension from: what was read must not help."""
-    return replace(test, tension_read_n=NAN, tension_read_sd_n=NAN)
+def control_charts(workspace: Workspace, store: Store) -> tuple[ControlChart, ...]:
+    """Chart all tests of every control hanger of the bridge.
 
-
-def control_charts(
-    workspace: Workspace, store: Store, controls: Sequence[ControlHanger] = ()
-) -> tuple[ControlChart, ...]:
-    """Chart all tests of `controls`, else of every control hanger of the bridge.
-
-    A tension that the load cell of the bar showed during a test goes before the described one.
+    A tension that was read during a test, as of the bar's load cell, goes before the described.
     """
-    return tuple(_chart(store, each) for each in controls or workspace.bridge.controls)
+    return tuple(_chart(store, each) for each in workspace.bridge.controls)
 
 
 def _chart(store: Store, control: ControlHanger) -> ControlChart:
     read = {each.id: each.test.tension_read_n for each in store.tests.list_all(control.id)}
-    readings = []
-    for point in store.posteriors.trend(control):
-        averaged, known_n = point.averaged, read.get(point.test_id, NAN)
-        tension_n, repeats_n = averaged.tension_n, averaged.repeatability_sd_n
-        if not (isfinite(known_n) and known_n > 0):
-            known_n = control.known_tension_n
-        readings.append(
-            ControlReading(point.test, point.time, tension_n.mean, tension_n.sd, repeats_n, known_n)
-        )
-    return chart_control(control, readings)
+    known = {id_: n if isfinite(n) else control.known_tension_n for id_, n in read.items()}
+    trend = store.posteriors.trend(control)
+    of_tests = [
+        (e.test, e.time, e.averaged.tension_n, e.averaged.repeatability_sd_n, known[e.test_id])
+        for e in trend
+    ]
+    return chart_control(control, of_tests)
 
 
 def campaign_warnings(

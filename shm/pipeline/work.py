@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 from shm.errors import NothingThere
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline import Clock
-from shm.pipeline.controls import campaign_warnings, control_charts, without_reading
+from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.judging import judge
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
@@ -26,7 +26,7 @@ from shm.pipeline.watching import reconciled, tests_beside, to_watch
 from shm.report.hanger_summary import HangerSummary, LatestTest
 from shm.store import KeptWatch, Stage, Store, StoredAlert, StoredRecording, TestRow, Workspace
 from shm.store.archive import nothing
-from shm.values import WITHOUT_MODEL, Hanger, ModalTest
+from shm.values import NAN, WITHOUT_MODEL, Hanger, ModalTest
 from shm.values.stated_tension import averaged_now
 
 Work: TypeAlias = "Generator[Callable[[], Any], Any, Sequence[StoredAlert] | None]"
@@ -233,7 +233,8 @@ class Queue:
 
 def _to_infer(test: ModalTest, hanger: Hanger) -> ModalTest:
     """Return a test to infer a tension from: of a control hanger without what was read."""
-    return without_reading(test) if hanger.is_control else test
+    unread = replace(test, tension_read_n=NAN, tension_read_sd_n=NAN)
+    return unread if hanger.is_control else test
 
 
 def _make_task(kind: str, id_: int, work: Callable[[], Work], tests: Sequence[TestRow]) -> Task:

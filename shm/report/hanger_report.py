@@ -14,8 +14,10 @@ from shm.report.assumed import assumptions_line, assumptions_table, with_assumpt
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.bridge_report import pattern_json
 from shm.report.contents import DiagnosisSheet, HangerReport
+from shm.report.control_report import chart_document, control_table
 from shm.report.diagnosis_report import causes, diagnosis_json, diagnosis_part
 from shm.report.figures.bar_sketch import FIGURE as SKETCH
+from shm.report.figures.control_chart import FIGURE as CONTROL
 from shm.report.figures.every_figure import OF_HANGER_NAMES, hanger_figures
 from shm.report.figures.specification import drawn
 from shm.report.formatting import Interval
@@ -25,8 +27,8 @@ from shm.report.open_warnings import dated_by_receipt
 from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, appendices, filled
 from shm.report.shared_tables import settings
 from shm.report.states import period_json, temperature_documents
-from shm.values import Alert, Drift, FrequencyResponse, Hanger
-from shm.values.rounding import NINETY_PERCENT, rounded_percent
+from shm.values import Alert, ControlHanger, Drift, FrequencyResponse, Hanger
+from shm.values.rounding import NINETY_PERCENT, force_unit, rounded_percent
 from shm.values.stated_tension import StatedTension, stated
 from shm.watch.change_words import structure_words
 
@@ -54,8 +56,12 @@ def hanger_paper(data: HangerReport) -> Paper:
             ),
             Part(
                 "Tension over time",
-                figures=lambda: hanger_figures(data, TREND),
+                figures=lambda: (
+                    *drawn((CONTROL,), data.now.control),
+                    *hanger_figures(data, TREND),
+                ),
                 tables=filled(
+                    *([control_table(data.now.control)] if data.now.control else []),
                     tables.results(data),
                     tables.period(data),
                     tables.temperatures(data),
@@ -169,7 +175,7 @@ def facts(data: HangerReport) -> tuple[Fact, ...]:
     return (
         _tension(data),
         *_limits(data, stated(data.averaged, data.tension_unit)),
-        _since_baseline(data),
+        _against_known(data.hanger) or _since_baseline(data),
         _of_nominal(data),
         *_by_latest_test(data),
         _latest_test(data),
@@ -226,6 +232,14 @@ def _of_nominal(data: HangerReport) -> Fact:
         rounded_percent(share.mean / 100, share.width / 200),
         f"90 % interval; nominal {nominal}",
     )
+
+
+def _against_known(hanger: Hanger) -> Fact | None:
+    """Return the known tension of a control hanger; None of any other."""
+    if not isinstance(hanger, ControlHanger):
+        return None
+    known = Interval.normal(hanger.known_tension_n, hanger.known_tension_sd_n)
+    return ("Known tension", formatting.with_half(known, force_unit(known.mean)), "as described")
 
 
 def _since_baseline(data: HangerReport) -> Fact:
@@ -286,6 +300,8 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         "version": data.version,
         "generated_at": data.generated_at,
     }
+    if data.now.control is not None:
+        document["control"] = chart_document(data.now.control)
     return with_assumptions(document, data.hanger)
 
 

@@ -15,6 +15,7 @@ from shm.bridge import load_bridge
 from shm.documents import dump
 from shm.errors import BadInput
 from shm.modes_document import modes_document
+from shm.pipeline.controls import control_charts
 from shm.store import Workspace
 from shm_cli.main import run
 from tests.helpers.flows import ingest
@@ -96,8 +97,8 @@ def test_control_report_has_chart(
     workspace: Workspace, shown: Callable[..., dict[str, Any]], tmp_path: Path
 ) -> None:
     document = shown("report", "--hanger", str(CONTROL))
-    assert document["schema"] == "shm.control_report/1"
-    assert document["points"] == shown("status")["controls"][0]["points"]
+    assert document["control"] == shown("status")["controls"][0]
+    assert document["message"]["status"] == "check"
     assert shown("report", "--bridge")["controls"][0]["hanger"] == CONTROL
     for of in (("--hanger", str(CONTROL)), ("--bridge",)):
         page = tmp_path / "report.html"
@@ -129,16 +130,16 @@ def test_control_reading_is_the_known(tmp_path: Path) -> None:
     read = replace(test, tension_read_n=0.9 * 711e3, tension_read_sd_n=3e3)
     put(made.spool / "c1.modes.json", dump(modes_document([read])))
     ingest(made)
-    from shm.pipeline.controls import control_charts
 
     with made.store() as store:
         (chart,) = control_charts(made, store)
+        averaged = store.posteriors.trend(made.bridge.controls[0])[0].averaged
 
     (point,) = chart.points
-    assert point.reading.known_n == pytest.approx(0.9 * 711e3)
+    assert point.known_n == pytest.approx(0.9 * 711e3)
     assert not point.is_out
     # What was read is no part of the inference: else the tension would be as sure as the cell.
-    assert point.reading.sd_n > 1.5 * 3e3
+    assert averaged.tension_n.sd > 1.5 * 3e3
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
-from shm.values import ControlHanger
-from shm.watch.control_chart import ControlChart, ControlReading, chart_control
+from shm.values import ControlHanger, Summary
+from shm.watch.control_chart import ControlChart, chart_control
 from tests.helpers.workspaces import START
 
 KNOWN_N, KNOWN_SD_N = 20e3, 100.0
@@ -32,18 +32,13 @@ def control() -> ControlHanger:
 
 
 def charted(*deviations: float) -> ControlChart:
-    readings = [
-        ControlReading(
-            f"c{n}",
-            START + timedelta(days=30 * n),
-            KNOWN_N * (1 + deviation),
-            ABSOLUTE * KNOWN_N,
-            REPEATS * KNOWN_N,
-            KNOWN_N,
-        )
-        for n, deviation in enumerate(deviations)
-    ]
-    return chart_control(control(), readings)
+    tests = []
+    for n, deviation in enumerate(deviations):
+        mean_n, sd_n = KNOWN_N * (1 + deviation), ABSOLUTE * KNOWN_N
+        tension = Summary(mean_n, sd_n, mean_n - sd_n, mean_n, mean_n + sd_n)
+        time = START + timedelta(days=30 * n)
+        tests.append((f"c{n}", time, tension, REPEATS * KNOWN_N, KNOWN_N))
+    return chart_control(control(), tests)
 
 
 def test_chart_control_first_by_zeta() -> None:
@@ -95,4 +90,4 @@ def test_out_near_time(days: float, name: str | None) -> None:
 
     found = chart.out_near(START + timedelta(days=30 + days), 1.0)
 
-    assert (found and found.reading.test) == name
+    assert (found and found.test) == name

@@ -224,18 +224,17 @@ def report_of(view: HangerView) -> HangerReport:
     return view.report
 
 
-def _control(view: HangerView) -> ControlChart:
-    """Return the chart of a control hanger."""
-    assert view.report is not None and view.report.now.control is not None  # noqa: PT018
-    return view.report.now.control
+def _control(view: HangerView) -> ControlChart | None:
+    """Return the chart of a control hanger; None of any other."""
+    return view.report.now.control if view.report else None
 
 
 FIGURES: tuple[HangerFigure, ...] = (
     HangerFigure(
         "control",
         control_chart.FIGURE.title,
-        "control",
-        lambda view: view.hanger.is_control and bool(view.trend),
+        "trends",
+        lambda view: _control(view) is not None,
         lambda view: control_chart.specify(_control(view)),
         lambda view: control_chart.FIGURE.caption(_control(view)),
         lambda view: control_chart.FIGURE.alt(_control(view)),

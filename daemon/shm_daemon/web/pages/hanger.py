@@ -8,7 +8,6 @@ import csv
 import io
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -23,7 +22,6 @@ from shm.pipeline.reporting import hanger_report
 from shm.report import formatting, hanger_tables
 from shm.report.bar_table import bar_table
 from shm.report.contents import HangerReport
-from shm.report.control_report import table
 from shm.report.diagnosis_report import answers, evidence
 from shm.report.hanger_report import facts, gap_part, hanger_paper
 from shm.report.hanger_sentences import details
@@ -102,10 +100,6 @@ def hanger(request: Request, site: AtSite, _: Reader, view: View) -> HTMLRespons
     if view.report is None:
         (line,) = hanger_summaries(site.workspace, site.store, utc_now(), [one])
         return page(request, "hanger_untested.html.j2", message=line.message, **common)
-    if (chart := view.report.now.control) is not None:
-        drawn = [_chart(view, e) for e in FIGURES if e.part == "control" and e.is_there(view)]
-        shown = {"message": view.report.now.message, "charts": drawn, "numbers": table(chart)}
-        return page(request, "control.html.j2", **common, **shown)
     return page(request, "hanger.html.j2", **common, **_content(view, view.report))
 
 
@@ -176,7 +170,7 @@ def _events(view: HangerView) -> Table:
 
 def _neighbours(workspace: Workspace, hanger: Hanger) -> list[tuple[str, Hanger]]:
     """Return the hangers before and after it in the description."""
-    order: Sequence[Hanger] = workspace.bridge.bars
+    order = workspace.bridge.bars
     place = [each.id for each in order].index(hanger.id)
     before = [("previous", order[place - 1])] if place > 0 else []
     return before + [("next", each) for each in order[place + 1 : place + 2]]
