@@ -54,20 +54,7 @@ def hanger_paper(data: HangerReport) -> Paper:
                 figures=lambda: drawn((SKETCH,), data.bar),
                 tables=filled(tables.practice(data)),
             ),
-            Part(
-                "Tension over time",
-                figures=lambda: (
-                    *drawn((CONTROL,), data.now.control),
-                    *hanger_figures(data, TREND),
-                ),
-                tables=filled(
-                    *([control_table(data.now.control)] if data.now.control else []),
-                    tables.results(data),
-                    tables.period(data),
-                    tables.temperatures(data),
-                    tables.neighbours(data),
-                ),
-            ),
+            _trend_part(data),
             Part(
                 "Fit of the model",
                 paragraphs=[further(data)],
@@ -85,6 +72,22 @@ def hanger_paper(data: HangerReport) -> Paper:
         closing=f"{CREDIBLE}; times are UTC.",
         more=f"All of it: `shm report --hanger {data.hanger.id} --full`, or "
         f"`--out hanger{data.hanger.id}.pdf`.",
+    )
+
+
+def _trend_part(data: HangerReport) -> Part:
+    """Return the tension over time; of a control hanger its control chart first."""
+    chart = data.now.control
+    return Part(
+        "Tension over time",
+        figures=lambda: (*drawn((CONTROL,), chart), *hanger_figures(data, TREND)),
+        tables=filled(
+            *([control_table(chart)] if chart else []),
+            tables.results(data),
+            tables.period(data),
+            tables.temperatures(data),
+            tables.neighbours(data),
+        ),
     )
 
 
