@@ -181,6 +181,7 @@ def facts(data: HangerReport) -> tuple[Fact, ...]:
         _against_known(data.hanger) or _since_baseline(data),
         _of_nominal(data),
         *_by_latest_test(data),
+        *_at_level(data),
         _latest_test(data),
     )
 
@@ -207,6 +208,17 @@ def _by_latest_test(data: HangerReport) -> tuple[Fact, ...]:
     alone = Interval.of_averaged(data.by_latest_test)
     value = formatting.with_half(alone, data.tension_unit)
     return (("Latest test alone", value, f"test {data.latest.id}; 90 % interval"),)
+
+
+def _at_level(data: HangerReport) -> tuple[Fact, ...]:
+    """Return the tension at the reference level; nothing where none is set."""
+    if (known := data.at_level) is None:
+        return ()
+    what = f"At hits of {known.force_n:.4g} N"
+    if known.tension_n is None:
+        return ((what, "not known", known.reason),)
+    value = formatting.with_half(known.tension_n, data.tension_unit)
+    return ((what, value, f"90 % interval; test {data.latest.id} at level {known.level:g}"),)
 
 
 def _limits(data: HangerReport, statement: StatedTension) -> tuple[Fact, ...]:
@@ -305,6 +317,8 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
     }
     if data.now.control is not None:
         document["control"] = chart_document(data.now.control)
+    if data.at_level is not None:
+        document["at_level"] = asdict(data.at_level)
     return with_assumptions(document, data.hanger)
 
 
