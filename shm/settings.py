@@ -147,6 +147,9 @@ class Settings:
     )
     estimator: str = _choice("of frequency responses", "h1", "h2", "hv")
     reference_force_n: float = _row(1000.0, "N", "a hit this hard has amplitude 1", 1, None)
+    reference_level: float = _row(
+        0.0, "", "reports state the tension at this level of the hits as well; 0: not", 0, 100
+    )
     frequency_allowance: float = _row(
         1e-4, "", "part of a frequency that differs from test to test unseen", 0, 0.01
     )
@@ -225,6 +228,9 @@ class Settings:
     )
     quiet_days: float = _row(
         400.0, "days", "`shm doctor` warns of hangers without a test for so long", 0.01, 36500
+    )
+    campaign_days: float = _row(
+        1.0, "days", "tests so near to one of a control hanger are of its campaign", 0.01, 365
     )
 
     @property

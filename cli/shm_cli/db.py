@@ -75,7 +75,7 @@ def upgrade(ctx: click.Context) -> None:
         with waiting("upgrading the store"):
             Store.upgrade(workspace.location)
         with workspace.store() as store, counting_bar() as bar:
-            hangers = bar.track(workspace.bridge.hangers, description="summing up hangers")
+            hangers = bar.track(workspace.bridge.bars, description="summing up hangers")
             made = sum(store.posteriors.save_summaries(hanger) for hanger in hangers)
             location = store.location
     answer(

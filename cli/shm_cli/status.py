@@ -20,8 +20,10 @@ from shm.documents import creep_document
 from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
+from shm.pipeline.controls import control_charts
 from shm.pipeline.telling import quiet_until
 from shm.pipeline.unheard import stream_leads
+from shm.report.control_report import chart_document
 from shm.report.formatting import Interval, model_class, with_half
 from shm.report.hanger_status import Status, bridge_message
 from shm.report.hanger_summary import HangerSummary
@@ -103,6 +105,8 @@ def command(ctx: click.Context, which: str | None) -> None:
         if row["left_out"]:
             text = "; ".join(row["left_out"])
             click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {text}"))
+    for row in document["controls"]:
+        click.echo(paragraph(f"{row['state']} {row['action']}"))
     for row in document["structures"]:
         click.echo(paragraph(_structure_line(row)))
 
@@ -285,6 +289,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
         "changed_settings": [str(each) for each in store.settings.list_current().values()],
+        "controls": [chart_document(each) for each in control_charts(workspace, store)],
         "structures": _structures(workspace, store, open_at),
         "message": {**message.document, "others": message.others},
         "hangers": _hangers(workspace, store, lines, open_at, of_hangers),

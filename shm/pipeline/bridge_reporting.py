@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import shm
 from shm.errors import NothingThere
+from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.lineage import discarded_of_baselines, redescribed, settings_words, software
 from shm.pipeline.unheard import blind_hangers, heard
 from shm.report.contents import BridgeReport
@@ -53,6 +54,7 @@ from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
 from shm.watch.alert_text import look_again
+from shm.watch.control_chart import ControlChart
 
 if TYPE_CHECKING:
     from shm.watch.neighbours import BridgePattern, HangerShift
@@ -133,6 +135,7 @@ def bridge_report(
             remedy=f"The latest is {newest.test} of hanger {newest.hanger}, "
             f"{newest.time:%Y-%m-%d}: ask for a longer period.",
         )
+    charts = control_charts(workspace, store)
     pattern, why_not = _pattern_or_why(store, [hanger.id for hanger in hangers])
     return BridgeReport(
         workspace.bridge.name,
@@ -151,6 +154,7 @@ def bridge_report(
         period,
         {"software": software()},
         settings_words(workspace.settings),
+        charts,
     )
 
 
@@ -215,6 +219,7 @@ class HangersNow:
     warnings: Mapping[int, tuple[str, ...]]
     blind: Mapping[int, Lead]
     undated: Mapping[int, tuple[str, ...]]
+    charts: tuple[ControlChart, ...]
 
     @classmethod
     def of(
@@ -244,6 +249,7 @@ class HangersNow:
             ),
             blind_hangers(heard(workspace, store, now)),
             list_undated_names(store),
+            control_charts(workspace, store),
         )
 
     def summary(self, hanger: Hanger) -> HangerSummary:
@@ -252,6 +258,9 @@ class HangersNow:
         found = self.watches.get(hanger.id)
         watched, called = found.watched if found else None, self.called.get(hanger.id, ())
         standing, blind = self.standing.get(hanger.id, ()), self.blind.get(hanger.id)
+        control = next((each for each in self.charts if each.hanger.id == hanger.id), None)
+        days, at = self.workspace.settings.campaign_days, point.time if point else None
+        doubts = () if control else campaign_warnings(self.charts, hanger.id, at, days)
         return HangerSummary(
             hanger,
             LatestTest(point.test, point.time, point.averaged, point.model) if point else None,
@@ -262,12 +271,13 @@ class HangersNow:
             detected="; ".join(called_words(change) for change in called),
             standing=findings(each.alert for each in standing),
             open_alerts=self.open_alerts.get(hanger.id, 0),
-            warnings=self.warnings.get(hanger.id, ()),
+            warnings=(*doubts, *self.warnings.get(hanger.id, ())),
             notes=notes_of(standing, self.silences, hanger.id, self.now),
             unwatched=unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
             if point
             else blind,
             undated=self.undated.get(hanger.id, ()),
+            control=control,
         )
 
 

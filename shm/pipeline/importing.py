@@ -259,7 +259,7 @@ def _place_problems(
     found: Survey, described: Described, hanger: object, workspace: Workspace
 ) -> list[str]:
     """Sensors that are said to be off the hanger, where it is one of the bridge."""
-    tested = next((each for each in workspace.bridge.hangers if each.id == hanger), None)
+    tested = next((each for each in workspace.bridge.bars if each.id == hanger), None)
     if tested is None:
         return []
     columns = [_told(column, described) for column in found.columns]

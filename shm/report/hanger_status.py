@@ -14,6 +14,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from shm.report import formatting
+from shm.report.control_report import control_lead
 from shm.report.formatting import Interval
 from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedTest
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
@@ -251,6 +252,8 @@ def hanger_message(known: HangerSummary) -> HangerMessage:
 def _decide(known: HangerSummary) -> tuple[Status | None, Lead]:
     if known.latest is None and not known.standing:
         return None, _lead("untested", known.hanger)
+    if known.control is not None and (latest := known.control.latest) is not None:
+        return Status.CHECK if latest.is_out else Status.STEADY, control_lead(known.control)
     faults = known.tension.faults if known.tension else ()
     status = status_of(
         known.drifts,

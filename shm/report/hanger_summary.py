@@ -26,6 +26,7 @@ from shm.values import (
 )
 from shm.values.bar_description import BarDescription, describe_bar
 from shm.values.messages import Lead
+from shm.watch.control_chart import ControlChart
 
 LATEST_TEST = "the latest test"
 BASELINE_TESTS = "the tests of the baseline"
@@ -67,7 +68,7 @@ class HangerSummary:
     first, `open_alerts` how many nobody took note of; `notes` say what people did about them.
     `unwatched` says that nothing has looked at the hanger for too long; `undated` names the tests
     dated by their receipt; `sensors` are those of the latest test, or those that stay. `course`
-    is None without a period.
+    is None without a period; `control` is the chart of a control hanger, None of any other.
     """
 
     hanger: Hanger
@@ -85,6 +86,7 @@ class HangerSummary:
     undated: Sequence[str] = ()
     sensors: tuple[ResponsePoint, ...] = ()
     course: Course | None = None
+    control: ControlChart | None = None
 
     @cached_property
     def message(self) -> HangerMessage:

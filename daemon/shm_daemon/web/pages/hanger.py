@@ -6,7 +6,6 @@ import csv
 import io
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -167,7 +166,7 @@ def _events(view: HangerView) -> Table:
 
 def _neighbours(workspace: Workspace, hanger: Hanger) -> list[tuple[str, Hanger]]:
     """Return the hangers before and after it in the description."""
-    order: Sequence[Hanger] = workspace.bridge.hangers
+    order = workspace.bridge.bars
     place = [each.id for each in order].index(hanger.id)
     before = [("previous", order[place - 1])] if place > 0 else []
     return before + [("next", each) for each in order[place + 1 : place + 2]]
