@@ -39,7 +39,7 @@ def _channel_of(text: str, name: str, option: str) -> Channel:
             f"{' or '.join(PLANES)}, and what full scale of the interface is worth in N or m/s2.",
         ) from None
     quantity: Any = "force" if name == "force" else "acceleration"
-    return Channel(name, quantity, np.empty(0), plane, float(x_m), float(full_scale))  # type: ignore[arg-type]
+    return Channel(name, quantity, np.empty(0), plane, float(x_m), float(full_scale))
 
 
 @click.command()
@@ -77,6 +77,7 @@ def _channel_of(text: str, name: str, option: str) -> Channel:
 @click.pass_context
 def command(
     ctx: click.Context,
+    /,
     device: str,
     hammer: str,
     sensors: tuple[str, ...],
