@@ -170,7 +170,7 @@ def cli(ctx: click.Context, workspace: str, debug: bool) -> None:
 
 
 def _take_workspace(command: click.Command) -> None:
-    """Lets `--workspace` stand after the verb too."""
+    """Let `--workspace` follow the verb, too."""
     if isinstance(command, click.Group):
         for member in command.commands.values():
             _take_workspace(member)

@@ -16,6 +16,7 @@ from shm.models import Model, applicable, build, competing_names
 from shm.modes_document import load_modes
 from shm.report.assumed import assumptions_line, with_assumptions
 from shm.settings import load_settings
+from shm.store.queries.hangers import list_adoptions
 from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior, Selection
 from shm.values.rounding import force_unit
 from shm.values.stated_tension import averaged_now, stated
@@ -154,7 +155,7 @@ def tell_assumptions(hanger: Hanger) -> None:
 
 
 def tell_irregular(tests: Sequence[ModalTest]) -> None:
-    """Says on stderr which modes are left out, and what to do."""
+    """Print on stderr which modes are left out, and what to do."""
     for test in tests:
         for mode in test.modes:
             if mode.irregular:
@@ -281,18 +282,18 @@ def select_command(
 
 
 def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tuple[str, ...]:
-    """The classes asked for, or those of the setting and, of a workspace's hanger, the adopted."""
+    """Return the requested classes, or those of the setting and the hanger's adopted ones."""
     if models is not None:
         return load_settings({"models": models}, environment={}).model_names
     if hanger_id is None:
         return load_settings().model_names
     with opened_store(ctx) as (workspace, store):
-        adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger_id)]
+        adopted = [each.adoption.model for each in list_adoptions(store, hanger_id)]
     return tuple(dict.fromkeys([*workspace.settings.model_names, *adopted]))
 
 
 def _stated_priors(text: str) -> dict[str, float]:
-    """beam1=0.25,beam2=0.75 as numbers by class."""
+    """Parse beam1=0.25,beam2=0.75 into numbers by class."""
     pairs = [part.partition("=") for part in text.split(",")]
     try:
         return {name.strip(): float(value) for name, _, value in pairs}
@@ -304,7 +305,7 @@ def _stated_priors(text: str) -> dict[str, float]:
 
 
 def show_selection(selection: Selection, limits: Limits | None = None) -> None:
-    """The tension over all classes in words, and the classes as a table, most probable first."""
+    """Print the tension over all classes, and the classes as a table, most probable first."""
     show_stated(selection.averaged_with(limits))
     unit = force_unit(*(float(each.tension_n.mean()) for each in selection.posteriors))
     headings = (

@@ -22,6 +22,7 @@ from shm.bridge.assumed import assumptions_of
 from shm.bridge.changes import overlaid
 from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, escalations_s, hook_of, zone_of
+from shm.bridge.publish import Publication, publication_of
 from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table, is_loopback, web_address
 from shm.errors import BadInput, NotDescribed, suggest
@@ -186,6 +187,7 @@ class Bridge:
     single_sign_on: SingleSignOn | None = None
     assumptions: Assumptions = DEFAULTS
     time_zone: tzinfo = UTC
+    publications: tuple[Publication, ...] = ()
     controls: tuple[ControlHanger, ...] = ()
 
     @property
@@ -204,7 +206,7 @@ class Bridge:
         return (*self.bars, *self.structures)
 
     def tested(self, number: int) -> Hanger:
-        """The hanger or structure of that number; raises BadInput when there is none such."""
+        """Return the hanger or structure of that number; raises BadInput where there is none."""
         return next((each for each in self.structures if each.id == number), None) or self.hanger(
             number
         )
@@ -245,7 +247,7 @@ def load_bridge(path: Path, changed: Mapping[str, object] = MappingProxyType({})
 
 _TABLES = (
     "bridge", "hanger", "structure", "hook", "other_bridge", "stream", "settings", "disturbance",
-    "report", "measurement_hours", "single_sign_on", "assumptions",
+    "report", "measurement_hours", "single_sign_on", "assumptions", "publish",
 )  # fmt: skip
 _OF_BRIDGE = ("name", "built", "time_zone")
 
@@ -270,6 +272,8 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
     _refuse_doubles([hook.name for hook in hooks], "hook name", path)
     others = tuple(other_bridge_of(each, path) for each in _tables(document, "other_bridge", path))
     _refuse_doubles([other.name for other in others], "other_bridge name", path)
+    publications = tuple(publication_of(each, path) for each in _tables(document, "publish", path))
+    _refuse_doubles([each.name for each in publications], "publish name", path)
     controls = tuple(each for each in hangers if isinstance(each, ControlHanger))
     hangers = tuple(each for each in hangers if not each.is_control)
     described = {each.id: each for each in hangers}
@@ -294,12 +298,13 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
         single_sign_on=single_sign_on_of(document, path),
         assumptions=assumed,
         time_zone=zone,
+        publications=publications,
         controls=controls,
     )
 
 
 def load_hanger(path: Path, hanger_id: int | None = None) -> Hanger:
-    """One hanger of a file (`--hanger-file`); `hanger_id` is needed where the file has several."""
+    """Return one hanger of a file (`--hanger-file`), by `hanger_id` where it has several."""
     bridge = load_bridge(path)
     if hanger_id is not None:
         return bridge.hanger(hanger_id)

@@ -236,7 +236,7 @@ def _kind(table: Table) -> Kind:
 
 
 def _fittings(table: Table, length_m: float) -> tuple[float, float]:
-    """Lengths of the deck-end and the arch-end fitting; none where nothing is said."""
+    """Return lengths of the deck-end and the arch-end fitting; 0 where not given."""
     deck_m, arch_m = table.value(
         "fittings_m",
         tuple[float, float],
@@ -290,7 +290,7 @@ def _limits(table: Table | None) -> Limits:
 
 
 def _section(table: Table) -> tuple[float, float, float]:
-    """Area, second moment and mass per length, given or those of a round bar."""
+    """Return area, second moment and mass per length, given or those of a round bar."""
     if "diameter_m" not in table:
         area, second_moment, mass = (table.positive(key) for key in _SECTION)
         return area, second_moment, mass

@@ -8,6 +8,7 @@ from math import isfinite
 
 from shm.report.control_report import campaign_warning
 from shm.store import Store, Workspace
+from shm.store.queries.trends import list_trend
 from shm.values import ControlHanger
 from shm.watch.control_chart import ControlChart, chart_control
 
@@ -23,7 +24,7 @@ def control_charts(workspace: Workspace, store: Store) -> tuple[ControlChart, ..
 def _chart(store: Store, control: ControlHanger) -> ControlChart:
     read = {each.id: each.test.tension_read_n for each in store.tests.list_all(control.id)}
     known = {id_: n if isfinite(n) else control.known_tension_n for id_, n in read.items()}
-    trend = store.posteriors.trend(control)
+    trend = list_trend(store, control)
     of_tests = [
         (e.test, e.time, e.averaged.tension_n, e.averaged.repeatability_sd_n, known[e.test_id])
         for e in trend

@@ -26,6 +26,10 @@ from shm.pipeline.watching import reconciled, tests_beside, to_watch
 from shm.report.hanger_summary import HangerSummary, LatestTest
 from shm.store import KeptWatch, Stage, Store, StoredAlert, StoredRecording, TestRow, Workspace
 from shm.store.archive import nothing
+from shm.store.queries.hangers import list_detected_changes, list_selected_models
+from shm.store.queries.recordings import list_waiting_recordings
+from shm.store.queries.tests import list_waiting_tests
+from shm.store.queries.watching import find_latest_weighed, list_weighed
 from shm.values import NAN, WITHOUT_MODEL, Hanger, ModalTest
 from shm.values.stated_tension import averaged_now
 
@@ -77,14 +81,14 @@ class Queue:
         earliest tests make the baseline; a watch waits for the files received before its test, so
         that its result does not depend on which task was the faster.
         """
-        received = self.store.recordings.list_waiting(limit, excluding=excluding)
+        received = list_waiting_recordings(self.store, limit, excluding=excluding)
         for each in received:
             yield Task("identify", each.id, partial(self._identify, each), (each.id,))
         needed = self.workspace.settings.baseline_tests
         waiting: defaultdict[int, list[TestRow]] = defaultdict(list)
-        for test in self.store.tests.list_waiting(max(limit, needed), excluding=excluding):
+        for test in list_waiting_tests(self.store, max(limit, needed), excluding=excluding):
             waiting[test.hanger].append(test)
-        selected = self.store.posteriors.selected_models()
+        selected = list_selected_models(self.store)
         oldest = min((each.id for each in received), default=None)
         # Control hangers first: what they say of a campaign goes into its alerts.
         for hanger in sorted(self.workspace.bridge.watched, key=lambda each: not each.is_control):
@@ -100,7 +104,7 @@ class Queue:
     ) -> Iterator[Task]:
         to_update = [test for test in tests if test.stage is Stage.IDENTIFIED]
         ids = [test.id for test in to_update]
-        weighed = self.store.tests.weighed_among(ids) if len(ids) > 1 else ()
+        weighed = list_weighed(self.store, ids) if len(ids) > 1 else ()
         for test in to_update:
             yield _make_task("update", test.id, partial(self._update, hanger, model, test), [test])
             if test.id in weighed:  # later tests learn from its posterior
@@ -116,7 +120,7 @@ class Queue:
         archive: Opens = workspace.archive
         if settings.scheduler:  # workers elsewhere need not see our folders
             archive = RemoteFile.of(workspace.archive, recording.file, settings.max_file_bytes)
-        selected, step = store.posteriors.selected_models(), registered().identify
+        selected, step = list_selected_models(store), registered().identify
         found = yield partial(
             run_step, step, recording, archive, workspace.bridge, settings, selected
         )
@@ -182,12 +186,12 @@ class Queue:
             return None
         watched, alert, kept = found
         if alert is not None and tension is not None:
-            called = store.watch.detected_changes([hanger]).get(hanger.id, ())
+            called = list_detected_changes(store, [hanger]).get(hanger.id, ())
             now = HangerSummary(
                 hanger,
                 LatestTest(test.test.id, test.time, tension, current.model),
                 averaged_now(baseline.posterior, compared, hanger.limits),
-                drifts=watched.told,
+                drifts=watched.published_drifts,
                 called=(*called, *([watched.change] if watched.change.called else ())),
                 standing=(alert,),
             )
@@ -220,8 +224,8 @@ class Queue:
             for each in self.workspace.bridge.hangers
             if hanger.family and each.family == hanger.family and each.id != hanger.id
         ]
-        own = self.store.tests.latest_weighed([hanger.id], before)
-        weighed = own or (self.store.tests.latest_weighed(siblings, before) if siblings else None)
+        own = find_latest_weighed(self.store, [hanger.id], before)
+        weighed = own or (find_latest_weighed(self.store, siblings, before) if siblings else None)
         if weighed is None:
             return None
         try:

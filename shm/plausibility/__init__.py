@@ -1,4 +1,4 @@
-"""Whether a test can be what it says it is, before it counts: what is implausible is held.
+"""Check a test before it counts: one that is implausible is held.
 
 A check is one function `Candidate -> Doubt | None` and one line of `CHECKS`. It is asked once the
 modes of a test are identified, and before anything is computed from them.

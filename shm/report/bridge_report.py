@@ -30,7 +30,7 @@ from shm.watch.neighbours import BridgePattern
 
 
 def bridge_paper(data: BridgeReport) -> Paper:
-    """Summary, figures along the bridge, numbers."""
+    """Return the report of a bridge: summary, figures along the bridge, numbers."""
     return Paper(
         title=data.bridge,
         period=str(data.period) if data.period else "",
@@ -147,7 +147,7 @@ def of_status(lines: Sequence[HangerSummary], status: Status | None) -> list[Han
 
 
 def named(lines: Sequence[HangerSummary]) -> str:
-    """`hanger 3`, `hangers 3, 4 and 7`."""
+    """Return `hanger 3` or `hangers 3, 4 and 7`."""
     numbers = formatting.listed([str(line.hanger.id) for line in lines])
     return f"hanger {numbers}" if len(lines) == 1 else f"hangers {numbers}"
 
@@ -205,7 +205,7 @@ _NEXT_TO = {"repeatability": "repeatability", "above": "above limit", "slack": "
 
 
 def tables(data: BridgeReport) -> tuple[Table, ...]:
-    """All tables that this report can fill."""
+    """Return all tables that this report can fill."""
     return filled(
         _hangers(data),
         _since_baseline(data),
@@ -235,7 +235,7 @@ def _hangers(data: BridgeReport) -> Table:
 
 
 def _stated(line: HangerSummary, name: str, unit: ForceUnit) -> str:
-    """One of `_BESIDE` of a hanger; empty where it is not known."""
+    """Return one of `_BESIDE` of a hanger; empty where it is not known."""
     return str(getattr(stated(line.tension, unit), name)) if line.tension else ""
 
 

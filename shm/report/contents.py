@@ -65,7 +65,7 @@ class TrendRow:
 def trend_row(
     posterior: Posterior, test: ModalTest, hanger: Hanger, selection: Selection | None = None
 ) -> TrendRow:
-    """The row of one test of `hanger` and its posterior, averaged over the classes compared."""
+    """Return the row of one test of `hanger`, its posterior averaged over the classes."""
     return TrendRow(
         test=test.id,
         model=posterior.model,

@@ -154,7 +154,8 @@ class HangerSummary:
 
         It is the baseline's tension, moved by the change since: both intervals go into its own.
         Where the tests since do not show a change, it is the baseline's. Before there is a
-        baseline, and where the watch has not compared the latest test, it is that test's.
+        baseline, and where the watch has not compared the latest test, it is that test's. The
+        repeatability is always the latest test's.
         """
         if self.latest is None or self.baseline is None:
             return self.latest.tension if self.latest else None
@@ -162,7 +163,11 @@ class HangerSummary:
         if drift is None and not self.is_baseline:
             return of_test
         caveats = of_test.caveats if of_test.faults else (*of_test.caveats, *self.baseline.faults)
-        known = replace(self.baseline, caveats=tuple(dict.fromkeys(caveats)))
+        known = replace(
+            self.baseline,
+            caveats=tuple(dict.fromkeys(caveats)),
+            repeatability_sd_n=of_test.repeatability_sd_n,
+        )
         if drift is None or not self._follows_change:
             return known
         moved = _moved(known.tension_n, drift.shift_mean, drift.shift_sd)

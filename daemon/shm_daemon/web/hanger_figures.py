@@ -1,6 +1,4 @@
-"""The figures of the page of a hanger: its tests over time and over temperature; how the model's
-frequencies fit, what is open, and the causes of that.
-"""
+"""Draw the figures of a hanger's page: tests over time and temperature, model fit, causes."""
 
 from __future__ import annotations
 
@@ -72,7 +70,7 @@ _HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {
 
 
 def _course(view: HangerView) -> hanger_trend.Course:
-    """All that the figure shows; without the state over time where that is still worked out."""
+    """Return the data of the trend; without the state over time while that is computed."""
     states, at = view.states, {point.time: place for place, point in enumerate(view.trend)}
     baseline = view.baseline
     baseline_n = baseline.averaged.tension_n.mean if baseline else None
@@ -160,7 +158,7 @@ def _with_temperature(view: HangerView) -> list[TrendPoint]:
 
 
 def _over_temperature(view: HangerView) -> Specification:
-    """Thinned by tension and temperature where there are very many."""
+    """Return thinned by tension and temperature where there are very many."""
     known, unit = _with_temperature(view), tension_unit(view.trend)
     bounds = bounds_of([Interval.of_averaged(point.averaged) for point in known])
     temperatures = np.array([point.temperature_c for point in known])

@@ -43,7 +43,7 @@ router = APIRouter(tags=["recordings"])
 
 @router.get("/upload", include_in_schema=False)
 def upload_page(request: Request, site: AtSite, _: Reader) -> Response:
-    """Files go to `POST /api/recordings` one by one; `static/upload.js` follows each."""
+    """Show the form; files go to `POST /api/recordings` singly, `static/upload.js` follows each."""
     workspace = site.workspace
     return page(
         request,
