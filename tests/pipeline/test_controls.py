@@ -15,8 +15,11 @@ from shm.bridge import load_bridge
 from shm.documents import dump
 from shm.errors import BadInput
 from shm.modes_document import modes_document
-from shm.pipeline.controls import control_charts
+from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.store import Workspace
+from shm.store.queries.hangers import find_latest_watches
+from shm.store.queries.trends import find_latest_trends, list_trend
+from shm.values import MonitoredHanger
 from shm_cli.main import run
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import served
@@ -87,10 +90,21 @@ def test_control_never_watched(workspace: Workspace) -> None:
     with workspace.store() as store:
         alerts = [stored.alert for stored in store.alerts.list_all()]
         assert not store.watch.list_all(CONTROL)
-        assert CONTROL not in store.watch.latest()
+        assert CONTROL not in find_latest_watches(store)
     assert alerts  # the hangers are not silenced
     assert all(alert.hanger != CONTROL for alert in alerts)
-    assert any(DOUBT in alert.message for alert in alerts)
+    assert any(DOUBT in alert.message.partition(" Details: ")[0] for alert in alerts)
+
+
+def test_campaign_warnings_spare_sensors(workspace: Workspace) -> None:
+    hanger = workspace.bridge.hanger(3)
+    with workspace.store() as store:
+        charts = control_charts(workspace, store)
+        latest, _ = find_latest_trends(store, workspace.bridge.hangers).values()
+
+    assert len(campaign_warnings(charts, hanger, latest.time, 1.0)) == 1
+    assert not campaign_warnings(charts, hanger, latest.time, 0.1)
+    assert not campaign_warnings(charts, MonitoredHanger.of(hanger), latest.time, 1.0)
 
 
 def test_control_report_has_chart(
@@ -133,7 +147,7 @@ def test_control_reading_is_the_known(tmp_path: Path) -> None:
 
     with made.store() as store:
         (chart,) = control_charts(made, store)
-        averaged = store.posteriors.trend(made.bridge.controls[0])[0].averaged
+        averaged = list_trend(store, made.bridge.controls[0])[0].averaged
 
     (point,) = chart.points
     assert point.known_n == pytest.approx(0.9 * 711e3)
