@@ -159,7 +159,9 @@ def test_the_keyboard_reaches_the_content_and_every_hanger(signed_in: Browser, s
 
 @pytest.mark.parametrize(("address", "shown"), [("", "now"), ("#trend", "trend")])
 def test_tabs_open_one_part(signed_in: Browser, site: Site, address: str, shown: str) -> None:
-    page = signed_in.open(f"{site.url}/hangers/3{address}")
+    page = signed_in.open(site.url)
+
+    page.goto(f"{site.url}/hangers/3{address}")
 
     visible = page.locator("[data-tab]:visible")
 
