@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,6 +34,14 @@ from tests.identify.signals import (
     recording,
     response,
 )
+
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "identification.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", [row.name for row in CHECKS])
+def test_page_of_identification_has_check(name: str) -> None:
+    assert f"\n| {name} | " in PAGE, "Add a row to the table under Quality."
 
 
 def test_a_sound_test_has_nothing_to_remark() -> None:

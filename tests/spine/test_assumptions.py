@@ -321,3 +321,26 @@ def glance(hanger: Hanger, described: dict[str, object] | None = None) -> Baseli
     found = object.__new__(BaselineGlance)
     object.__setattr__(found, "described", stored)
     return found
+
+
+PAGE = (ROOT / "docs" / "hangers.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("key", "row"),
+    [
+        ("`section` (area)", "section_sd"),
+        ("`density`", "density_sd"),
+        ("`length`", "length_sd"),
+        ("`modulus`", "modulus_sd"),
+        ("`along`", "section_along_sd"),
+        ("`sensor_gain`, `sensor_place_m`, `sensor_turn_deg`", "sensor_gain_sd"),
+        ("`sensor_gain`, `sensor_place_m`, `sensor_turn_deg`", "sensor_place_sd_m"),
+        ("`sensor_gain`, `sensor_place_m`, `sensor_turn_deg`", "sensor_turn_sd_deg"),
+        ("`sensor_cross_axis`", "sensor_cross_axis_sd"),
+    ],
+)
+def test_page_of_hangers_has_default(key: str, row: str) -> None:
+    (line,) = [each for each in PAGE.splitlines() if each.startswith(f"| {key} |")]
+    stated = [word for cell in line.split("|")[2].split(",") for word in cell.split()]
+    assert f"{DEFAULTS[row].value:g}" in stated, f"{row} is {DEFAULTS[row].value:g}: {line}"
