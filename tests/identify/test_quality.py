@@ -35,7 +35,6 @@ from tests.identify.signals import (
     response,
 )
 
-
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "identification.md").read_text("utf-8")
 
 
