@@ -49,13 +49,9 @@ def plant_effects(
     return bar if added is None else _clamp_mass_on(bar, added)
 
 
-_OF_READINGS = ("load_scale",)
-"""Effects of readings of the tension, which no recording holds."""
-
-
 def plantable_effects() -> tuple[str, ...]:
     """Return the names of the effects that a simulated recording can show."""
-    return tuple(name for name in EFFECTS if name not in _OF_READINGS)
+    return tuple(name for name, effect in EFFECTS.items() if not effect.of_readings)
 
 
 def _survey_everything(at: str, places_m: Sequence[float]) -> Survey:

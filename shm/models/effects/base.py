@@ -138,13 +138,17 @@ class Effect:
     words for either sign (`{x_change_m:longer|shorter}`), and `{log10_k}` also stands for the
     springs `log10_k1` to `log10_k4`. `source` is the literature it follows;
     `seen_by` are the measurements that show it, `imitated_by` the effects that it is easily taken
-    for. The first parameter is the effect's size; `size` is the only one of an effect whose prior
-    is that of any hanger. `follows` are the conditions of a test that it
-    depends on; where it `dissipates`, damping rises with the level. `of_the_hanger` is False where
-    it is one of the measurement, that other sensors would not have. `other_laws` says in words by
-    which other laws, about as likely as its own, the same parameters may act. `over_time` is None
-    of an effect that the watch does not look for.
-    `localised_as` is what one is called that a diagnosis looks for at each place along the hanger.
+    for. The first parameter is the effect's size. Set `size` if the effect has one parameter and
+    its prior does not depend on the hanger; otherwise override `parameters`. `follows` are the
+    conditions of a test that it depends on; where it `dissipates`, damping rises with the level.
+    `of_the_hanger` is False for an effect of the measurement, which other sensors would not have;
+    `of_readings` is True if it is in readings of the tension alone, which no recording holds.
+    `other_laws` says in words by which other laws, about as likely as its own, the same parameters
+    may act. `over_time` is None of an effect that the watch does not look for. `localised_as` is
+    what one is called that a diagnosis looks for at each place along the hanger.
+
+    An effect that says no more than that the description is wrong is also named in
+    `DESCRIPTION_EFFECTS`, one that changes no frequency in `SHAPE_EFFECTS` (shm/values/verdict.py).
     """
 
     name: ClassVar[str]
@@ -157,6 +161,7 @@ class Effect:
     follows: ClassVar[tuple[Literal["temperature", "amplitude"], ...]] = ()
     dissipates: ClassVar[bool] = False
     of_the_hanger: ClassVar[bool] = True
+    of_readings: ClassVar[bool] = False
     other_laws: ClassVar[tuple[str, ...]] = ()
     over_time: ClassVar[OverTime | None] = None
     localised_as: ClassVar[str] = ""

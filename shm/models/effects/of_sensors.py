@@ -194,6 +194,7 @@ class LoadScale(Effect):
     seen_by = ("tensions that were read", "several tests")
     imitated_by = ("distributed_mass", "effective_length", "temperature_tension")
     of_the_hanger = False
+    of_readings = True
     size = Parameter(
         "load_error",
         "fraction",
