@@ -30,10 +30,9 @@ _REMEDIES = {
     "added_mass": "Give mass_kg and x_m.", "irregular": "Correct it.",
     "modes": "Give plane, order and frequency_hz of each.",
 }  # fmt: skip
-_TEST_KEYS = (
-    "id", "time", "temperature_c", "amplitude", "added_mass", "tension_read_n",
-    "tension_read_sd_n", "rattles_above", "modes",
-)  # fmt: skip
+_TEST_KEYS = tuple(field.name for field in fields(ModalTest) if field.name != "hanger")
+_ALWAYS = ("id", "modes", "time", "temperature_c", "amplitude")
+"""Keys of a test that stand in its document where they are unknown, too."""
 _MODE_KEYS = tuple(field.name for field in fields(Mode))
 _MASS_KEYS = tuple(field.name for field in fields(AddedMass))
 _SPELT = {"added_mass": 'Write added_mass = {"mass_kg": ..., "x_m": ...}, in kg and m.'}
@@ -54,15 +53,14 @@ def test_document(test: ModalTest) -> dict[str, Any]:
     """Return one entry of a modal-tests document."""
     document = asdict(test)
     document.pop("hanger")
-    if test.added_mass is None:
-        document.pop("added_mass")
-    elif test.added_mass.radius_of_gyration_m is None:
-        document["added_mass"].pop("radius_of_gyration_m")
-    if math.isnan(test.tension_read_n):
-        document.pop("tension_read_n")
+    optional = document.keys() - {*_ALWAYS, "tension_read_sd_n"}
+    for key in optional:
+        if document[key] in (None, "") or document[key] != document[key]:
+            document.pop(key)
+    if "tension_read_n" not in document:
         document.pop("tension_read_sd_n")
-    if math.isnan(test.rattles_above):
-        document.pop("rattles_above")
+    if test.added_mass is not None and test.added_mass.radius_of_gyration_m is None:
+        document["added_mass"].pop("radius_of_gyration_m")
     for mode in document["modes"]:
         if not mode["irregular"]:
             mode.pop("irregular")

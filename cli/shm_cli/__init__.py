@@ -1,1 +1,1 @@
-"""The shm command line: one module a verb, or of verbs that share."""
+"""Run the command `shm`: one module for each verb, or for verbs that share code."""

@@ -1,4 +1,4 @@
-"""The shm daemon: spool, loop, hooks.
+"""Run the daemon: spool, loop, hooks, web interface.
 
 Its names are loaded when they are asked for: the web interface, a process of its own, begins
 without loop and hooks.

@@ -1,4 +1,4 @@
-"""The guided hammer test: levels, hits checked while they are made, and when they are enough."""
+"""Guide a hammer test: levels, each hit checked when it is made, and when they are enough."""
 
 from __future__ import annotations
 

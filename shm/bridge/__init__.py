@@ -1,4 +1,4 @@
-"""Reads `bridge.toml`: the bridge, its hangers, their thresholds, the hooks, the settings."""
+"""Read `bridge.toml`: the bridge, its hangers, their thresholds, the hooks, the settings."""
 
 from __future__ import annotations
 

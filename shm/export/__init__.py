@@ -1,4 +1,4 @@
-"""Posteriors, modes and causes for other programs: pandas, ArviZ (xarray, netCDF), CSV, JSON, npz.
+"""Export posteriors, modes and causes: pandas, ArviZ (xarray, netCDF), CSV, JSON, npz.
 
 `samples`, `modes` and `causes` are tables, `datatree` is what ArviZ reads from a file and
 `inference_data` what it computes with, `write` makes a file. Units stand in the attributes of a

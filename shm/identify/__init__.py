@@ -1,6 +1,7 @@
-"""From the records of a hammer test to its modes: hits, windows, responses, identification.
+"""Identify the modes of a hammer test from its records: hits, windows, responses, quality.
 
-`identify` is the door. Identifiers stand in a registry: one file and one line each.
+`identify` does all of it. Identifiers are one file and one line each of `IDENTIFIERS`, quality
+checks one row each of `shm.identify.quality.CHECKS`.
 """
 
 from __future__ import annotations

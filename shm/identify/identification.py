@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import compress
+from typing import Any
 
 import numpy as np
 
@@ -64,6 +65,7 @@ from shm.values import (
     Recording,
     ResponsePoint,
     as_test_id,
+    known_conditions,
 )
 
 
@@ -318,17 +320,21 @@ def _test(
     modes: tuple[Mode, ...],
     amplitude: float,
 ) -> ModalTest:
-    """Return the test with the earliest time and the mean temperature of its records."""
-    temperatures = [r.temperature_c for r in records if not math.isnan(r.temperature_c)]
-    return ModalTest(
-        id=as_test_id(test_id),
-        modes=modes,
-        hanger=next((r.hanger for r in records if r.hanger is not None), None),
-        time=min((r.time for r in records if r.time is not None), default=None),
-        temperature_c=float(np.mean(temperatures)) if temperatures else NAN,
-        amplitude=amplitude,
-        added_mass=next((r.added_mass for r in records if r.added_mass is not None), None),
-    )
+    """Return the test, with the conditions of its records."""
+    return ModalTest(as_test_id(test_id), modes, amplitude=amplitude, **_conditions(records))
+
+
+def _conditions(records: Sequence[Recording | FrequencyResponse]) -> dict[str, Any]:
+    """Return the earliest time, the mean temperature, and of all else what is stated first."""
+    found: dict[str, Any] = {}
+    for record in reversed(records):
+        found |= known_conditions(record)
+    if times := [each.time for each in records if each.time is not None]:
+        found["time"] = min(times)
+    temperatures = [each.temperature_c for each in records if not math.isnan(each.temperature_c)]
+    if temperatures:
+        found["temperature_c"] = float(np.mean(temperatures))
+    return found
 
 
 def _nothing_found(

@@ -1,4 +1,4 @@
-"""Bayesian updating: the posterior of tension and end stiffness, and the evidence of each class."""
+"""Update tension and end stiffness by measured modes: posterior, and evidence of each class."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The model classes of a hanger: parameters to frequencies and shapes.
+"""Compute frequencies and shapes of a hanger from parameters, by each model class.
 
 A new class is one file and one line in `MODELS`; a baseline with effects that a hanger's owner
 adopted is made from its name (see `shm.models.adopted`).

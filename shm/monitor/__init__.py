@@ -1,4 +1,4 @@
-"""Permanent sensors: windows of a stream judged and tracked, pooled by hour and day, sensor health.
+"""Track the modes of permanent sensors: windows, pooling by hour and day, health of sensors.
 
 Pure functions of values; what runs them, and where their answers are kept, is above.
 """

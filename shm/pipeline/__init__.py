@@ -1,4 +1,4 @@
-"""The flow: file -> archive -> modal tests -> posterior -> drift, alert -> hooks.
+"""Run the flow: file -> archive -> modal tests -> posterior -> drift, alert -> hooks.
 
 `intake` takes files in, `steps` holds each arrow as a function of values, `work` says which of them
 wait and where results go, `flow` begins them and refuses what fails, `courier` tells hooks.

@@ -1,6 +1,7 @@
-"""Readers: a file becomes a `Recording` or a `FrequencyResponse`, in SI units, gaps as NaN.
+"""Read a file into a `Recording` or a `FrequencyResponse`, in SI units, gaps as NaN.
 
-A format is one file and one line of `FORMATS`. Beside a file NAME.csv (or .uff, .h5, .csv.gz) a
+A format is one file and one line of `FORMATS` in `registry.py`; `base.py` says what a `Format` is,
+`header.py` which keys a header may have (`KEYS`). Beside a file NAME.csv (or .uff, .h5, .csv.gz) a
 sidecar NAME.toml may say what the file does not: hanger, time, temperature, and each channel's
 unit, calibration, place and plane. What the sidecar says goes before what the file says. A .zip
 holds the files of one test.

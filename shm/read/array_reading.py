@@ -33,8 +33,7 @@ _STEPS = {"dt", "dts", "timestep", "samplinginterval", "sampleinterval", "wfincr
 _MOMENTS = {"time", "starttime", "wfstarttime", "timeutc"}
 _DAYS = {"date", "datetime", "start"}
 _KEYS = {
-    "hanger": "hanger", "temperaturec": "temperature_c", "addedmasskg": "added_mass_kg",
-    "addedmassatm": "added_mass_at_m", "addedmassradiusm": "added_mass_radius_m",
+    **{key.replace("_", ""): key for key in KEYS if key != "time"},
     **dict.fromkeys(_RATES, "sampling_rate_hz"),
 }  # fmt: skip
 _UNITS = ("unit", "units", "unit_string", "unitstring", "y_unit", "engineering_units")

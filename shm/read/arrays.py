@@ -24,10 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shm.documents import format_time
 from shm.errors import UsageError
 from shm.read.base import names_in
-from shm.read.header import CHANNEL_KEYS, KEYS, known_values, mass_entries
+from shm.read.header import CHANNEL_KEYS, KEYS, condition_entries, known_values
 from shm.read.logger_words import ACCELERANCE, SI
 from shm.values import (
     Channel,
@@ -205,14 +204,9 @@ def layout_of(described: Recording | FrequencyResponse) -> Layout:
                 f"the channel name {name!r} cannot name an array.",
                 remedy="Begin with a letter and use letters, digits and underscores, as in acc_1.",
             )
-    known = {
-        "hanger": described.hanger,
-        "time": format_time(described.time),
-        "temperature_c": described.temperature_c,
-        **mass_entries(described.added_mass),
-    }
+    known = condition_entries(described)
     if isinstance(described, FrequencyResponse):
-        return Layout(_response(described), known_values(known))
+        return Layout(_response(described), known)
     known["sampling_rate_hz"] = described.sampling_rate_hz
     return Layout(tuple(map(_channel, described.channels)), known_values(known))
 

@@ -16,13 +16,14 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read.base import Peek, PeekChannel
-from shm.read.header import OF_TEST, Header
+from shm.read.header import Header
 from shm.read.limits import limits, refuse_large, refuse_many_samples
 from shm.read.logger_words import ACCELERANCE
 from shm.read.sidecar import sidecar_path
 from shm.read.table import Column, Description, Table, describe, is_raw
 from shm.read.time_axis import on_even_grid, rate_of
 from shm.values import (
+    CONDITIONS,
     NAN,
     Channel,
     ComplexArray,
@@ -378,7 +379,7 @@ def _peek_channel(header: Header, name: str, attempt: Attempt) -> PeekChannel:
 
 def read_of_test(header: Header, attempt: Attempt) -> dict[str, Any]:
     """Return what a header says of the complete test; None and NaN where that is faulty."""
-    unknown = dict.fromkeys(OF_TEST) | {"temperature_c": NAN}
+    unknown = dict.fromkeys(CONDITIONS) | {"temperature_c": NAN}
     return {key: attempt(partial(getattr, header, key), none) for key, none in unknown.items()}
 
 

@@ -35,13 +35,12 @@ from typing import Any
 
 import numpy as np
 
-from shm.documents import format_time
 from shm.errors import BadInput, UsageError
 from shm.read import labview_file, logger_text
 from shm.read.atomic import replace_text
 from shm.read.base import Format, at_once, names_in
 from shm.read.content import LINE_BREAK, cells_of, is_text, mark_between, text_of
-from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, mass_entries, spread
+from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, condition_entries, spread
 from shm.read.limits import refuse_long_header
 from shm.read.logger_words import ACCELERANCE, SI
 from shm.read.table import Column, Role, Table
@@ -320,10 +319,7 @@ def _text(
     digits: str,
 ) -> str:
     whole = {
-        "hanger": described.hanger,
-        "time": format_time(described.time),
-        "temperature_c": described.temperature_c,
-        **mass_entries(described.added_mass),
+        **condition_entries(described),
         **facts,
     }
     head = [

@@ -9,7 +9,7 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
-from shm.documents import parse_time
+from shm.documents import format_time, parse_time
 from shm.errors import BadInput
 from shm.read.logger_words import (
     ACCELERANCE,
@@ -20,7 +20,18 @@ from shm.read.logger_words import (
     accelerance_si,
     unit_of,
 )
-from shm.values import NAN, PLANES, AddedMass, Plane, Quantity, outdoor_c
+from shm.values import (
+    CONDITIONS,
+    NAN,
+    PLANES,
+    AddedMass,
+    FrequencyResponse,
+    Plane,
+    Quantity,
+    Recording,
+    conditions_of,
+    outdoor_c,
+)
 
 KEYS = (
     "hanger",
@@ -35,9 +46,6 @@ CHANNEL_KEYS = ("unit", "x_m", "plane", "calibration", "full_scale", "leave_out"
 _OF_ALL_CHANNELS = ("unit", "calibration", "full_scale")
 _FACTOR_REMEDY = "Give a number other than 0: units of `unit` per recorded volt or count."
 _SCALE_REMEDY = "Give the largest value that can be recorded, in the channel's unit."
-
-
-OF_TEST = ("hanger", "time", "temperature_c", "added_mass")
 
 
 @dataclass(frozen=True)
@@ -74,8 +82,8 @@ class Header:
 
     @property
     def of_test(self) -> dict[str, Any]:
-        """Return the entries about the complete test: hanger, time, temperature, known mass."""
-        return {key: getattr(self, key) for key in OF_TEST}
+        """Return what is stated of the complete test, by the names of `CONDITIONS`."""
+        return {name: getattr(self, name) for name in CONDITIONS}
 
     @property
     def hanger(self) -> int | None:
@@ -307,6 +315,14 @@ def known_values(values: Mapping[str, Any]) -> dict[str, Any]:
 def entries_of(values: Mapping[str, Any], path: Path) -> dict[str, Entry]:
     """Return the known values of a file as entries."""
     return {key: Entry(value, path) for key, value in known_values(values).items()}
+
+
+def condition_entries(described: Recording | FrequencyResponse) -> dict[str, Any]:
+    """Return the entries that state the conditions of a test; what is unknown is left out."""
+    known = conditions_of(described)
+    mass = known.pop("added_mass")
+    known["time"] = format_time(known["time"])
+    return known_values({**known, **mass_entries(mass)})
 
 
 def mass_entries(added_mass: AddedMass | None) -> dict[str, float]:

@@ -24,7 +24,7 @@ from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read import logger_words as words
 from shm.read.content import LINE_BREAK, cells_of, mark_between
-from shm.read.header import Entry, entries_of, quantity_named
+from shm.read.header import CHANNEL_KEYS, KEYS, Entry, entries_of, quantity_named
 from shm.read.limits import refuse_long_header
 from shm.read.logger_heading import (
     Heading,
@@ -82,10 +82,7 @@ def _may_be_value(cell: str) -> bool:
     return is_over(cell) or is_gap(cell) or any(is_number(cell, mark) for mark in ".,")
 
 
-_OUR_KEYS = {
-    "hanger", "temperature_c", "added_mass_kg", "added_mass_at_m", "added_mass_radius_m",
-    "sampling_rate_hz", "unit", "x_m", "plane", "calibration", "full_scale", "leave_out",
-}  # fmt: skip
+_OUR_KEYS = {*KEYS, *CHANNEL_KEYS} - {"time", "coherence"}
 
 
 def table_in(text: str, path: Path, preamble: Sequence[str] = ()) -> Table | None:

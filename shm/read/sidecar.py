@@ -31,7 +31,15 @@ from shm.errors import BadInput
 from shm.read.atomic import replace_text
 from shm.read.base import PeekChannel
 from shm.read.content import unreadable
-from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, known_values, mass_entries, spread
+from shm.read.header import (
+    CHANNEL_KEYS,
+    KEYS,
+    Entry,
+    Header,
+    condition_entries,
+    known_values,
+    spread,
+)
 from shm.read.limits import refuse_long_header
 from shm.values import FrequencyResponse, Recording
 
@@ -167,10 +175,8 @@ def write_sidecar(
 ) -> None:
     """Write the sidecar of `path`; an interrupted write leaves the old one."""
     whole = {
-        "hanger": described.hanger,
+        **condition_entries(described),
         "time": described.time,
-        "temperature_c": described.temperature_c,
-        **mass_entries(described.added_mass),
         "sampling_rate_hz": sampling_rate_hz,
     }
     keys = ("unit", "plane", "x_m", "full_scale")

@@ -290,7 +290,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
             if data.selection
             else None
         ),
-        **{name: data.now.document[name] for name in ("averaged", "basis", "change")},
+        **data.now.numbers,
         "by_latest_test": documents.averaged_document(data.by_latest_test),
         "trend": [asdict(row) for row in data.trend],
         "drifts": [documents.drift_document(drift) for drift in data.drifts],

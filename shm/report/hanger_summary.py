@@ -208,14 +208,18 @@ class HangerSummary:
 
     @property
     def document(self) -> dict[str, Any]:
-        """Return what every JSON document gives of a hanger.
+        """Return what `shm status` and the report of a bridge give of a hanger in JSON."""
+        return {**self.message.document, **self.numbers}
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers that every JSON document gives of a hanger.
 
         `averaged` is the headline, `change` a fraction with its 90 % interval, `by_latest_test`
         the tension that the latest test gives by itself.
         """
         change, latest = self.change, self.latest
         return {
-            **self.message.document,
             "averaged": averaged_document(self.tension) if self.tension else None,
             "basis": self.basis,
             "change": {k: v for k, v in asdict(change).items() if v is not None}

@@ -10,14 +10,14 @@ import numpy as np
 
 from shm.models import equal_springs
 from shm.models.practice_formulas import FORMULAS
-from shm.report import formatting
+from shm.report import formatting, shared_tables
 from shm.report.bar_table import NOT_STATED
 from shm.report.contents import HangerReport, TrendRow
 from shm.report.formatting import Interval
 from shm.report.hanger_sentences import counted_tests, misfits_percent
 from shm.report.hanger_summary import BASELINE_ALONE, BASELINE_AND_CHANGE
 from shm.report.paper import Table, fold_improbable
-from shm.report.shared_tables import added_mass, lineage, quality_table
+from shm.report.shared_tables import lineage, quality_table
 from shm.report.shifts import shift_cells, shift_table
 from shm.report.sizes import size_of
 from shm.report.states import temperature_table
@@ -383,9 +383,7 @@ def conditions(data: HangerReport) -> Table:
     test = data.latest
     facts = {
         "test": f"{test.id}, {formatting.moment(test.time)}",
-        "temperature": formatting.temperature(test.temperature_c),
-        "hit level over reference level": formatting.plain(test.amplitude, absent="not recorded"),
-        "added mass": added_mass(test),
+        **shared_tables.conditions(test),
         "modes identified": f"{len(test.modes)}",
         "bar measured by": data.bar.measured_by or NOT_STATED,
         **lineage({key: value for key, value in data.lineage.items() if key not in _COMPUTING}),

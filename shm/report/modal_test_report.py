@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from shm import modes_document
-from shm.report import formatting
+from shm.report import formatting, shared_tables
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.contents import ModalTestReport
 from shm.report.figures.bar_sketch import FIGURE as SKETCH
@@ -18,7 +18,7 @@ from shm.report.figures.every_figure import modal_test_figures
 from shm.report.figures.specification import drawn
 from shm.report.figures.style import VERDICT_STYLES
 from shm.report.paper import Fact, Paper, Part, Table, filled
-from shm.report.shared_tables import added_mass, headline, lineage, overall, quality_table, settings
+from shm.report.shared_tables import headline, lineage, overall, quality_table, settings
 from shm.values import PLANES, FrequencyResponse, Mode, Plane, QualityCheck, Recording, Verdict
 from shm.values.rounding import force_unit
 
@@ -327,9 +327,7 @@ def conditions(sheet: ModalTestReport) -> Table:
         "test": test.id,
         "hanger": _hanger(sheet),
         "time": formatting.moment(test.time),
-        "temperature": formatting.temperature(test.temperature_c),
-        "hit level over reference level": formatting.plain(test.amplitude),
-        "added mass": added_mass(test),
+        **shared_tables.conditions(test),
         "band": _band(sheet),
         "exponential window on the responses": _window(sheet),
         "records": _records(sheet),

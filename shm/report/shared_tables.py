@@ -93,6 +93,15 @@ def lineage(known: Mapping[str, str]) -> dict[str, str]:
     return {_LINEAGE.get(key, formatting.quantity(key)): value for key, value in known.items()}
 
 
+def conditions(test: ModalTest) -> dict[str, str]:
+    """Return the conditions of a test in words, as every report of it gives them."""
+    return {
+        "temperature": formatting.temperature(test.temperature_c),
+        "hit level over reference level": formatting.plain(test.amplitude, absent="not recorded"),
+        "added mass": added_mass(test),
+    }
+
+
 def added_mass(test: ModalTest) -> str:
     mass = test.added_mass
     if mass is None:

@@ -1,4 +1,4 @@
-"""Hammer tests and ambient records of a hanger whose truth is chosen, on `shm.models`.
+"""Simulate hammer tests and ambient records of a hanger of known truth, by `shm.models`.
 
 The independent truth of the trials, finite elements that share no code with `shm.models`, stands
 in `tests/worlds`.

@@ -1,4 +1,4 @@
-"""Keeps every noun of the flow: tables, verbs, the archive of raw files, schema upgrade."""
+"""Keep every value of the flow: tables, transactions, the archive of raw files, schema upgrade."""
 
 from shm.store.archive import Archive, Quarantine
 from shm.store.disposition import Exclusion

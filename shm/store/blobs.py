@@ -25,6 +25,7 @@ from shm.values import (
     RepeatedMistake,
     ResponsePoint,
     WatchedTest,
+    conditions_of,
 )
 
 _HELD = 1024  # technical: what stands is shown again and again, some kilobytes a hanger
@@ -73,10 +74,7 @@ def unpack_response(blob: bytes, source: str, test: ModalTest) -> FrequencyRespo
         frequency_hz=arrays["frequency_hz"],
         accelerance=arrays["accelerance"].astype(np.complex128),
         coherence=None if coherence is None else coherence.astype(float),
-        hanger=test.hanger,
-        time=test.time,
-        temperature_c=test.temperature_c,
-        added_mass=test.added_mass,
+        **conditions_of(test),
     )
 
 

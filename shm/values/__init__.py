@@ -1,4 +1,4 @@
-"""The nouns that flow between the steps: frozen, complete at birth, SI units in their names.
+"""Define the values that pass between the steps: frozen, complete, SI units in their names.
 
 Arrays are numpy arrays whose shapes stand beside them. An unknown number is NaN, an unknown thing
 is None; neither is ever 0. Times are timezone-aware UTC. `x_m` runs along the hanger from the deck
@@ -117,6 +117,7 @@ from shm.values.posterior import (
     Summary,
 )
 from shm.values.recording import (
+    CONDITIONS,
     AddedMass,
     Channel,
     Doubt,
@@ -125,6 +126,8 @@ from shm.values.recording import (
     KnownSamples,
     Recording,
     ResponsePoint,
+    conditions_of,
+    known_conditions,
 )
 from shm.values.verdict import (
     FEW_MODES,

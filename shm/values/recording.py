@@ -116,6 +116,23 @@ class Recording(Shown):
         return figure
 
 
+CONDITIONS = ("hanger", "time", "temperature_c", "added_mass")
+"""What recordings, frequency responses and modal tests alike hold of how a test was made."""
+
+
+def conditions_of(test: Any) -> dict[str, Any]:
+    """Return the conditions of a test by name, from whatever has them as attributes."""
+    return {name: getattr(test, name) for name in CONDITIONS}
+
+
+def known_conditions(test: Any) -> dict[str, Any]:
+    """Return the conditions that are neither None, nor NaN, nor an empty text."""
+    stated = conditions_of(test)
+    return {
+        key: value for key, value in stated.items() if value not in (None, "") and value == value
+    }
+
+
 @dataclass(frozen=True)
 class ResponsePoint:
     """Return the position of the response or, with a roving hammer, of the hit (reciprocity)."""

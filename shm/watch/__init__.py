@@ -1,4 +1,7 @@
-"""Watching a hanger: what has moved over time, since when, how far, and when to say so."""
+"""Watch a hanger over time: what has changed, since when, by how much, and when to alert.
+
+`watcher.py` decides; `alert_text.py` alone puts a change into words, for alerts, pages and reports.
+"""
 
 from __future__ import annotations
 

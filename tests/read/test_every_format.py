@@ -13,7 +13,14 @@ import pytest
 from shm.errors import BadInput, UsageError
 from shm.read import FORMATS, Format, bundle, peek, peek_test, read, sidecar_path
 from shm.read import write as write_ours
-from shm.values import Channel, FrequencyResponse, Recording
+from shm.values import (
+    CONDITIONS,
+    Channel,
+    FrequencyResponse,
+    Recording,
+    conditions_of,
+    known_conditions,
+)
 from tests.helpers.written import needs_responses, write
 
 formats = pytest.mark.parametrize(
@@ -36,16 +43,20 @@ def written(file_format: Format, recording: Recording | FrequencyResponse, folde
 
 def assert_same(found: Recording | FrequencyResponse, expected: Recording) -> None:
     assert isinstance(found, Recording)
-    assert found.hanger == expected.hanger
-    assert found.time == expected.time
-    assert found.temperature_c == pytest.approx(expected.temperature_c, nan_ok=True)
-    assert found.added_mass == expected.added_mass
+    for name, stated in conditions_of(expected).items():
+        read_back = getattr(found, name)
+        is_number = isinstance(stated, float)
+        assert read_back == (pytest.approx(stated, nan_ok=True) if is_number else stated), name
     assert found.sampling_rate_hz == pytest.approx(expected.sampling_rate_hz, rel=1e-12)
     for one, other in zip(found.channels, expected.channels, strict=True):
         assert (one.name, one.quantity, one.plane) == (other.name, other.quantity, other.plane)
         assert one.x_m == pytest.approx(other.x_m, nan_ok=True)
         largest = np.nanmax(np.abs(other.values))
         np.testing.assert_allclose(one.values, other.values, atol=1e-8 * largest)
+
+
+def test_recording_states_every_condition(recording: Recording) -> None:
+    assert list(known_conditions(recording)) == list(CONDITIONS), "Add it to the fixture."
 
 
 @formats

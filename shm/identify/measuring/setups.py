@@ -34,7 +34,15 @@ from shm.identify.measuring.responses import measurement_of_responses, point_of
 from shm.identify.measuring.screening import FEWEST_TO_COMPARE, Screening, pulses_of, screen
 from shm.identify.measuring.signal_faults import HITS_NOT_SHOWN, KNOCK
 from shm.identify.options import IdentifyOptions
-from shm.values import Channel, ComplexArray, FloatArray, FrequencyResponse, Hanger, Recording
+from shm.values import (
+    Channel,
+    ComplexArray,
+    FloatArray,
+    FrequencyResponse,
+    Hanger,
+    Recording,
+    conditions_of,
+)
 
 _MOST_SECONDS_A_HIT = 90.0  # judgement: crews wait half a minute at most
 _SAME_RATE = 1e-5
@@ -339,10 +347,7 @@ def _response(
         frequency_hz=average.frequency_hz,
         accelerance=average.accelerance,
         coherence=average.coherence,
-        hanger=first.hanger,
-        time=first.time,
-        temperature_c=first.temperature_c,
-        added_mass=first.added_mass,
+        **conditions_of(first),
     )
     return response, average.spectra
 
