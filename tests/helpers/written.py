@@ -27,7 +27,7 @@ from shm.read import write as write_ours
 from shm.read.arrays import Layout, layout_of
 from shm.read.base import PeekChannel
 from shm.read.comma_separated import recording_text, response_text
-from shm.read.header import mass_entries
+from shm.read.header import condition_entries
 from shm.read.logger_words import SI
 from shm.read.sidecar import sidecar_path, write_sidecar
 from shm.values import FrequencyResponse, Recording
@@ -38,23 +38,8 @@ def write(described: Recording | FrequencyResponse, path: Path) -> None:
 
     A format that `shm` only reads needs a line of `_WRITERS`.
     """
-    if path.suffix == ".xlsx":
-        _excel(described, path)
-        return
-    if path.suffix == ".wav":
-        _wave(described, path)
-        return
-    if path.suffix == ".mseed":
-        _mini_seed(described, path)
-        return
-    if path.suffix == ".json":
-        _sep005(described, path)
-        return
     if path.suffix in _WRITERS:
-        _WRITERS[path.suffix](layout_of(described), path)
-        return
-    if path.suffix == ".tob3":
-        _campbell(described, path)
+        _WRITERS[path.suffix](described, path)
         return
     known = [each for each in FORMATS if path.suffix in each.suffixes]
     if known and all(each.write is None for each in known):
@@ -144,8 +129,7 @@ def _mini_seed(described: Recording | FrequencyResponse, path: Path) -> None:
 def _sep005(described: Recording | FrequencyResponse, path: Path) -> None:
     """Channels as JSON; what SEP005 does not know in keys of ours."""
     assert isinstance(described, Recording)
-    whole = {"hanger": described.hanger, "temperature_c": described.temperature_c}
-    whole |= mass_entries(described.added_mass)
+    whole = {key: value for key, value in condition_entries(described).items() if key != "time"}
     channels = [
         {
             **each,
@@ -209,9 +193,21 @@ def _number(cell: str) -> float | str | None:
     return value if math.isfinite(value) else str(value)
 
 
-_WRITERS: dict[str, Callable[[Layout, Path], None]] = {
-    ".h5": _hdf5,
-    ".hdf5": _hdf5,
-    ".mat": _matlab,
-    ".tdms": _tdms,
+def _of_layout(
+    write_layout: Callable[[Layout, Path], None],
+) -> Callable[[Recording | FrequencyResponse, Path], None]:
+    """Return a writer that is given the named arrays of what it writes."""
+    return lambda described, path: write_layout(layout_of(described), path)
+
+
+_WRITERS: dict[str, Callable[[Recording | FrequencyResponse, Path], None]] = {
+    ".h5": _of_layout(_hdf5),
+    ".hdf5": _of_layout(_hdf5),
+    ".mat": _of_layout(_matlab),
+    ".tdms": _of_layout(_tdms),
+    ".xlsx": _excel,
+    ".wav": _wave,
+    ".mseed": _mini_seed,
+    ".json": _sep005,
+    ".tob3": _campbell,
 }
