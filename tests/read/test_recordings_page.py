@@ -7,9 +7,12 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from shm.modes_document import load_modes
 from shm.read import FORMATS, peek, read, sidecar_path
 from shm.read.content import MOST_MEMBERS
+from shm.read.header import CHANNEL_KEYS, KEYS
 from shm.read.limits import Limits
 from shm.read.logger_words import unit_of
 from shm.values import FrequencyResponse, Recording
@@ -59,6 +62,11 @@ def test_the_modal_tests_are_read(tmp_path: Path) -> None:
     (test,) = load_modes(path)
     assert [mode.plane for mode in test.modes] == ["transverse", "longitudinal"]
     assert json.loads(document)["hanger"] == test.hanger
+
+
+@pytest.mark.parametrize("key", [*KEYS, *CHANNEL_KEYS])
+def test_page_of_recordings_names_key(key: str) -> None:
+    assert re.search(rf"\b{key}\b", PAGE), f"add the key {key} to docs/recordings.md"
 
 
 def test_the_page_names_every_format_unit_and_limit() -> None:
