@@ -14,7 +14,6 @@ from scipy.io import savemat, wavfile
 from shm.modes_document import load_modes
 from shm.pipeline.intake import as_taken_in
 from shm.read import read, sidecar_path
-from shm.read.modal_sets import _frequency
 from shm.store import Stage, Workspace
 from shm.values import Channel, Recording
 from tests.cli.conftest import Shm
@@ -329,14 +328,6 @@ def test_modes_without_places_keep_no_shape_and_are_numbered_by_frequency(
     (test,) = load_modes(workspace.spool / "m.modes.json")
     assert [mode.order for mode in test.modes] == [1, 1, 2, 2]
     assert all(mode.shape == () for mode in test.modes)
-
-
-def test_hysteretic_damping_is_twice_the_viscous_ratio_at_resonance() -> None:
-    found = {"analysis_type": 2, "freq": 6.1, "modal_damp_vis": 0.0, "modal_damp_his": 0.008}
-    assert _frequency(found) == (6.1, 0.004)
-    frequency, damping = _frequency(found | {"modal_damp_his": 0.0})
-    assert frequency == 6.1
-    assert np.isnan(damping)
 
 
 def modes_file(path: Path, with_nodes: bool = True) -> Path:

@@ -94,9 +94,7 @@ def states_of(view: HangerView) -> StatesOverTime:
         middle = np.full(count, value)
         band = Band(0.99 * middle, middle, 1.01 * middle)
         unit = "N m/rad" if name.startswith("log10_") else "N"
-        return QuantityOverTime(
-            name, title, band, band, band, value, 0.9 * value, 1.1 * value, unit=unit
-        )
+        return QuantityOverTime(name, title, band, band, band, value, unit=unit)
 
     return StatesOverTime(
         tuple(point.time for point in view.trend),

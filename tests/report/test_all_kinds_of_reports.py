@@ -48,10 +48,10 @@ def watched(data: HangerReport) -> StatesOverTime:
     times = tuple(row.time for row in data.trend if row.time is not None)
     level: FloatArray = np.full(len(times), 700e3)
     band = Band(level - 5e3, level, level + 5e3)
-    tension = QuantityOverTime("tension", "tension", band, band, band, 700e3, 665e3, 735e3)
+    tension = QuantityOverTime("tension", "tension", band, band, band, 700e3)
     unknown = np.full(len(times), NAN)
     spring = QuantityOverTime(
-        "log10_k1", "spring k1", Band(unknown, unknown, unknown), band, band, 7.0, 6.5, 7.5
+        "log10_k1", "spring k1", Band(unknown, unknown, unknown), band, band, 7.0
     )
     return StatesOverTime(
         times, np.full(len(times), NAN), NAN, np.zeros(len(times), bool), (tension, spring),
