@@ -77,9 +77,9 @@ def until(found: Callable[[], Text | None]) -> Text:
 def test_an_order_is_made_once_and_kept(background_worker: BackgroundWorker[Text]) -> None:
     order = Order("one", "slow")
     assert background_worker.stored(order) is None
-    assert [background_worker.wanted(order) for _ in range(5)] == [None] * 5
+    assert [background_worker.get_or_start(order) for _ in range(5)] == [None] * 5
     _LET_GO.set()
-    assert until(lambda: background_worker.wanted(order)) == Text("one")
+    assert until(lambda: background_worker.get_or_start(order)) == Text("one")
     assert background_worker.stored(Order("one", "slow")) == Text("one")
     assert _MADE == ["one"]
 
@@ -88,13 +88,13 @@ def test_orders_are_made_one_at_a_time_and_only_a_few_wait(
     background_worker: BackgroundWorker[Text],
 ) -> None:
     orders = [Order(str(number), "slow") for number in range(20)]
-    assert [background_worker.wanted(order) for order in orders] == [None] * 20
+    assert [background_worker.get_or_start(order) for order in orders] == [None] * 20
     time.sleep(0.1)
     assert _MADE == ["0"]
     _LET_GO.set()
     until(lambda: background_worker.stored(orders[7]))
     assert [background_worker.stored(order) for order in orders[8:]] == [None] * 12
-    assert until(lambda: background_worker.wanted(orders[19])) == Text("19")
+    assert until(lambda: background_worker.get_or_start(orders[19])) == Text("19")
 
 
 def test_what_fails_says_why_and_stops_nothing_else(
@@ -103,17 +103,17 @@ def test_what_fails_says_why_and_stops_nothing_else(
     for how, told in (("refused", "is no word"), ("bug", "internal error")):
         order = Order("none", how)
         with pytest.raises(ShmError, match=told):
-            until(lambda order=order: background_worker.wanted(order))  # type: ignore[misc]
+            until(lambda order=order: background_worker.get_or_start(order))  # type: ignore[misc]
         with pytest.raises(ShmError, match=told):
-            background_worker.wanted(order)
+            background_worker.get_or_start(order)
     assert _MADE == ["none", "none"]
-    assert until(lambda: background_worker.wanted(Order("some"))) == Text("some")
+    assert until(lambda: background_worker.get_or_start(Order("some"))) == Text("some")
 
 
 def test_the_oldest_go_where_memory_runs_out(background_worker: BackgroundWorker[Text]) -> None:
     orders = [Order(str(number), size_bytes=25_000_000) for number in range(3)]
     for order in orders:
-        until(lambda order=order: background_worker.wanted(order))  # type: ignore[misc]
+        until(lambda order=order: background_worker.get_or_start(order))  # type: ignore[misc]
     assert [background_worker.stored(order) is None for order in orders] == [True, False, False]
 
 
@@ -122,9 +122,11 @@ def test_what_takes_too_long_is_given_up() -> None:
     _LET_GO.clear()
     try:
         with pytest.raises(ShmError, match="more than 2 s"):
-            until(lambda: background_worker.wanted(Order("slow one", "slow")))
+            until(lambda: background_worker.get_or_start(Order("slow one", "slow")))
         # It hangs on, and nobody waits for it.
-        assert until(lambda: background_worker.wanted(Order("quick one"))) == Text("quick one")
+        assert until(lambda: background_worker.get_or_start(Order("quick one"))) == Text(
+            "quick one"
+        )
     finally:
         _LET_GO.set()
         background_worker.close()
@@ -134,8 +136,8 @@ def test_a_process_that_dies_is_told_and_replaced() -> None:
     background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=120.0, pool=a_process)
     try:
         with pytest.raises(ShmError, match="died"):
-            until(lambda: background_worker.wanted(Order("last words", "dies")))
-        assert until(lambda: background_worker.wanted(Order("next"))) == Text("next")
+            until(lambda: background_worker.get_or_start(Order("last words", "dies")))
+        assert until(lambda: background_worker.get_or_start(Order("next"))) == Text("next")
     finally:
         background_worker.close()
 
@@ -144,7 +146,7 @@ def test_an_order_whose_process_is_ended_once_is_made_all_the_same(tmp_path: Pat
     background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=120.0, pool=a_process)
     order = Order(str(tmp_path / "ended"), "dies once")
     try:
-        assert until(lambda: background_worker.wanted(order)) == Text(order.word)
+        assert until(lambda: background_worker.get_or_start(order)) == Text(order.word)
     finally:
         background_worker.close()
 
@@ -152,12 +154,12 @@ def test_an_order_whose_process_is_ended_once_is_made_all_the_same(tmp_path: Pat
 def test_closing_ends_the_work_at_once() -> None:
     background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=60.0, pool=a_process)
     _LET_GO.clear()
-    assert background_worker.wanted(Order("endless", "slow")) is None
+    assert background_worker.get_or_start(Order("endless", "slow")) is None
     time.sleep(0.2)
     closing = threading.Thread(target=background_worker.close)
     closing.start()
     closing.join(120)
     assert not closing.is_alive()  # the order would take ten minutes
-    assert background_worker.wanted(Order("endless", "slow")) is None
-    assert background_worker.wanted(Order("another")) is None
+    assert background_worker.get_or_start(Order("endless", "slow")) is None
+    assert background_worker.get_or_start(Order("another")) is None
     until(lambda: None if multiprocessing.active_children() else Text("all gone"))

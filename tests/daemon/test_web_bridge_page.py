@@ -27,7 +27,7 @@ from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import START, make_workspace, write_test
 
 
-def glance(hanger: Hanger, shift: float = 0.0, sd: float = 0.003) -> HangerGlance:
+def summarize_hangers(hanger: Hanger, shift: float = 0.0, sd: float = 0.003) -> HangerGlance:
     """A hanger whose tension moved by so much since its baseline."""
     moved = Drift(hanger.id, "t9", START, TENSION, 711e3, 711e3, shift, sd, 0.05, 0.1)
     tension = Interval.normal(711e3, 5e3)
@@ -140,7 +140,7 @@ def test_a_bridge_without_hangers_has_a_page(workspace: Workspace) -> None:
     ],
 )  # fmt: skip
 def test_a_shift_has_a_class_that_the_legend_names(hanger: Hanger, shift: float, kind: str) -> None:
-    assert kind_of(glance(hanger, shift)) == kind
+    assert kind_of(summarize_hangers(hanger, shift)) == kind
     assert kind in dict(CLASSES)
 
 
@@ -164,20 +164,20 @@ def test_a_test_that_the_watch_passed_over_is_compared_by_itself(hanger: Hanger)
 
 
 def test_a_shift_that_may_be_none_is_marked_hollow(hanger: Hanger) -> None:
-    sure, unsure = glance(hanger, -0.02, 0.005), glance(hanger, -0.02, 0.02)
+    sure, unsure = summarize_hangers(hanger, -0.02, 0.005), summarize_hangers(hanger, -0.02, 0.02)
     marks = elevation([sure, unsure]).hangers
     assert [[one.hollow for one in mark.triangles] for mark in marks] == [[False], [True]]
 
 
 def test_a_hanger_is_drawn_as_long_as_it_is(hanger: Hanger) -> None:
     short, long = replace(hanger, length_m=6.0), replace(hanger, id=4, length_m=12.0)
-    drawing = elevation([glance(short), glance(long)])
+    drawing = elevation([summarize_hangers(short), summarize_hangers(long)])
     heights = [drawing.deck - mark.top for mark in drawing.hangers]
     assert heights[1] == pytest.approx(2 * heights[0], abs=0.2)
 
 
 def test_two_hundred_hangers_have_room_and_alarms_keep_their_numbers(hanger: Hanger) -> None:
-    many = [glance(replace(hanger, id=number)) for number in range(1, 201)]
+    many = [summarize_hangers(replace(hanger, id=number)) for number in range(1, 201)]
     many[96] = replace(many[96], summary=replace(many[96].summary, open_alerts=1))
     drawing = elevation(many)
     places = [mark.x for mark in drawing.hangers]
@@ -195,7 +195,13 @@ def test_a_hanger_long_not_tested_is_said(bridge: Workspace) -> None:
     site = Site(Description(bridge), Address())
     later = START + timedelta(days=bridge.settings.quiet_days + 1000)
     try:
-        assert [each.is_quiet for each in bridge_view.glance(site, START).hangers] == [False, False]
-        assert [each.is_quiet for each in bridge_view.glance(site, later).hangers] == [True, False]
+        assert [each.is_quiet for each in bridge_view.summarize_hangers(site, START).hangers] == [
+            False,
+            False,
+        ]
+        assert [each.is_quiet for each in bridge_view.summarize_hangers(site, later).hangers] == [
+            True,
+            False,
+        ]
     finally:
         site.close()

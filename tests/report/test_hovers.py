@@ -13,7 +13,7 @@ import pytest
 from shm.report.contents import HangerReport
 from shm.report.figures import gap_before_and_after, gap_causes, gap_map
 from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST
-from shm.report.figures.modal_test_response import Shown
+from shm.report.figures.modal_test_response import ResponseCurves
 from shm.report.figures.specification import Panel, Points, Rule, Specification
 from tests.report.diagnoses import CASES, sheet
 from tests.report.test_modal_test_figures import CASES as SHEETS
@@ -27,7 +27,7 @@ def specifications(season: HangerReport) -> Iterator[tuple[str, Specification]]:
     """Of every case of every report that a screen draws, as it draws them."""
     drawn: list[tuple[str, Any]] = []
     for case, make in SHEETS.items():
-        shown = Shown.of(make())
+        shown = ResponseCurves.of(make())
         drawn += [(f"{case}: {member.name}", member.draw(shown)) for member in OF_MODAL_TEST]
     for case in CASES:
         made = sheet(case)

@@ -17,7 +17,7 @@ from shm.report.contents import ModalTestReport
 from shm.report.figures import style
 from shm.report.figures.every_figure import OF_MODAL_TEST
 from shm.report.figures.every_figure import modal_test_figures as report_test_figures
-from shm.report.figures.modal_test_response import Shown
+from shm.report.figures.modal_test_response import ResponseCurves
 from shm.report.figures.specification import Illustration
 from shm.report.figures.specification import drawn as members_drawn
 from shm.report.figures.style import PALETTE
@@ -75,7 +75,7 @@ def drawn() -> Drawn:
 def alone(name: str, sheet: ModalTestReport) -> Illustration:
     """One figure by itself: all of them take a second."""
     (item,) = members_drawn(
-        [member for member in OF_MODAL_TEST if member.name == name], Shown.of(sheet)
+        [member for member in OF_MODAL_TEST if member.name == name], ResponseCurves.of(sheet)
     )
     return item
 

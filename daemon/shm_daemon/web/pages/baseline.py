@@ -94,7 +94,7 @@ def order_baseline(
     order = Order(since, why, engineer.actor.name, EVENT_KINDS[kind] if kind else None)
     wanted = SetBaseline(site.workspace.folder, one.id, order, engineer.actor, utc_now())
     word = secrets.token_urlsafe(9)
-    background_worker_of(request).wanted(wanted)
+    background_worker_of(request).get_or_start(wanted)
     ordered: Ordered = request.app.state.ordered_baselines
     ordered[word] = wanted
     while len(ordered) > _MOST_REMEMBERED:
@@ -109,7 +109,7 @@ def outcome(request: Request, _: Engineer, hanger_id: HangerNumber, order: str) 
     found = ordered.get(order)
     if isinstance(found, SetBaseline):
         try:
-            made = background_worker_of(request).wanted(found)
+            made = background_worker_of(request).get_or_start(found)
         except ShmError as error:
             made = error
         if made is None:

@@ -22,7 +22,7 @@ from shm.store.changed_settings import ChangedSetting, said
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.faults import Refused
-from shm_daemon.web.forms import Form, done_or_again
+from shm_daemon.web.forms import Form, redirect_or_show_error
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import Before
 from shm_daemon.web.site import Site
@@ -94,7 +94,7 @@ def change(request: Request, site: AtSite, engineer: Engineer, form: Form) -> Re
         finally:
             site.forget_description()  # ours, or somebody else's change, which it may not show yet
 
-    return done_or_again(change, address, partial(_page, request, site, hanger))
+    return redirect_or_show_error(change, address, partial(_page, request, site, hanger))
 
 
 def _value(key: str, form: Mapping[str, str]) -> float | str | None:
