@@ -117,7 +117,7 @@ def add(ctx: click.Context, name: str, role: str, vouched: bool) -> None:
     Example: shm user add 'M. Huber' --role engineer
     """
     from shm.pipeline import utc_now
-    from shm.store.people import Role
+    from shm.store.rows import Role
 
     with opened_store(ctx) as (_, store):
         store.people.add(name, Role(role), None if vouched else _asked(), utc_now())

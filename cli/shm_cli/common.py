@@ -32,7 +32,7 @@ from rich.text import Text
 
 from shm.bridge import load_hanger
 from shm.documents import dump
-from shm.errors import NothingThere, UsageError
+from shm.errors import UsageError
 from shm.modes_document import load_modes
 from shm.values import Hanger, ModalTest
 from shm_cli import errors
@@ -42,7 +42,7 @@ from shm_cli.terminal import Terminal, escape_controls
 if TYPE_CHECKING:
     from shm.report.figures.specification import Illustration
     from shm.report.paper import Table as Texts
-    from shm.store import Store, StoredTest, Workspace
+    from shm.store import Store, Workspace
 
 # Technical: columns of a file, of no terminal at all, and of lines that are read with ease.
 _WIDTH_OF_A_FILE, _BEYOND_ANY = 120, 100_000
@@ -211,18 +211,11 @@ def tests_and_hanger(
             hanger_id = tests[0].hanger
         hanger = one_hanger(ctx, hanger_file, hanger_id)
         return tests, hanger
+    from shm.pipeline.diagnosing import latest_tests
+
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     with opened_store(ctx) as (_, store):
         return (latest_tests(store, hanger, 1)[0].test,), hanger
-
-
-def latest_tests(store: Store, hanger: Hanger, count: int) -> Sequence[StoredTest]:
-    """Return `count` tests at most, the latest last; raises NothingThere for none."""
-    if not (stored := store.tests.list_all(hanger.id)[-count:]):
-        raise NothingThere(
-            f"no test of hanger {hanger.id} is stored.", remedy="Take one in with `shm ingest`."
-        )
-    return stored
 
 
 def show_doubts(

@@ -48,7 +48,7 @@ def hangers(
 ) -> list[CompletionItem]:
     """Return numbers of the bridge's hangers, with their names."""
     bridge = _bridge(ctx)
-    described = bridge.hangers if bridge else ()
+    described = bridge.bars if bridge else ()
     return _beginning(incomplete, ((str(each.id), each.name) for each in described))
 
 

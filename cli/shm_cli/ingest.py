@@ -32,16 +32,11 @@ from shm.store import (
     Workspace,
 )
 from shm.store.archive import refuse_oversize
+from shm.store.queries.recordings import find_discard
 from shm.values import Alert
 from shm_cli import flags
 from shm_cli.common import is_workspace, open_workspace, show, show_rows
-from shm_cli.held import (
-    decide,
-    decided_words,
-    discarded_words,
-    hold_document,
-    show_held,
-)
+from shm_cli.held import decide, decided_words, discarded_words, hold_document, show_held
 from shm_cli.working import finish, rerun_document, send_back, working
 
 
@@ -213,7 +208,7 @@ def _received(
 
 def _row_of(store: Store, path: Path, receipt: Receipt) -> dict[str, object]:
     row = _row(path, receipt.outcome, store.recordings.get(receipt.recording.id))
-    hold = store.recordings.discard_in_force(receipt.recording.id)
+    hold = find_discard(store, receipt.recording.id)
     if receipt.outcome is Outcome.DISCARDED and hold is not None:
         row |= {"outcome": Outcome.DISCARDED.value, "reason": discarded_words(hold)}
     return row

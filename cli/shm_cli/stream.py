@@ -22,6 +22,7 @@ from shm.pipeline.stream_state import (
 from shm.read import write
 from shm.report.formatting import number
 from shm.store import Store, Workspace
+from shm.store.queries.streams import list_stream_events
 from shm.store.ring import ring_of
 from shm.store.ring_pieces import recording_of
 from shm.values import NAN
@@ -185,7 +186,7 @@ def _document(state: StreamCondition, hammer: AmbientBias) -> dict[str, Any]:
 
 
 def _show_events(store: Store, since: datetime) -> None:
-    found = store.streams.list_events(None, since)
+    found = list_stream_events(store, None, since)
     if flags.wants_json():
         show({"events": [asdict(event) for event in found]})
         return

@@ -1,5 +1,6 @@
-"""What a check finds: whether the work flows (daemon, spool, what is under way, quarantine, raw
-files), and whether store, backups, clock, hangers, streams and settings are in order.
+"""Check the work (daemon, spool, recordings, quarantine, raw files) and its store.
+
+Also backups, clock, hangers, streams and settings.
 """
 
 from __future__ import annotations
@@ -18,6 +19,11 @@ from shm.pipeline.unheard import REMEDIES, backlog_leads, heard, ring_leads
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
+from shm.store.point_outbox import PointOutbox
+from shm.store.queries.hangers import list_selected_models
+from shm.store.queries.recordings import count_stages, list_holds, list_recordings, list_under_way
+from shm.store.queries.tests import count_tests
+from shm.store.queries.upkeep import find_last_backup, find_newest_step, list_copies, list_removed
 from shm_daemon.heartbeat import duration_words, patience_s, seconds_since_beat, why_turn_failed
 from shm_daemon.spool import is_sidecar, left_alone, never_taken, scan
 
@@ -39,7 +45,7 @@ _SYNCHRONISED = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]
 
 
 class Level(StrEnum):
-    """How a finding is to be taken; `unknown` is what could not be looked at."""
+    """Level of a finding; `unknown` is what could not be looked at."""
 
     OK = "ok"
     UNKNOWN = "unknown"
@@ -49,7 +55,7 @@ class Level(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What one check found, and what to do where that is not well."""
+    """Finding of one check, and what to do where that is not well."""
 
     check: str
     level: Level
@@ -59,7 +65,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Examined:
-    """What the checks look at: an open workspace with its open store, and the time."""
+    """Subject of the checks: an open workspace with its open store, and the time."""
 
     workspace: Workspace
     store: Store
@@ -97,7 +103,7 @@ def some(names: list[str], most: int = 5) -> str:
 
 
 def check_daemon(examined: Examined) -> Iterator[Finding]:
-    """Whether a daemon is active, and its loop goes round."""
+    """Check whether a daemon is active, and its loop goes round."""
     workspace = examined.workspace
     holder, ago_s = workspace.holder(), seconds_since_beat(workspace)
     seen = (
@@ -120,7 +126,7 @@ def check_daemon(examined: Examined) -> Iterator[Finding]:
 
 
 def check_spool(examined: Examined) -> Iterator[Finding]:
-    """Whether files wait in the spool, or lie there for ever."""
+    """Check whether files wait in the spool, or lie there for ever."""
     spool = examined.workspace.spool
     ages = [_age(path, examined.now) for path in scan(spool)]
     if not ages:
@@ -158,19 +164,19 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
 
 
 def check_under_way(examined: Examined) -> Iterator[Finding]:
-    """Whether a recording has been standing still."""
+    """Check whether a recording has been standing still."""
     store, now = examined.store, examined.now
     unready = _without_baseline(examined)
     standing = [
         each
-        for each in store.recordings.list_under_way()
+        for each in list_under_way(store)
         if each.stage is Stage.RECEIVED or each.hanger not in unready
     ]
     if not standing:
         yield ok("recordings", "none is on its way")
         return
     oldest = min(standing, key=lambda each: each.since)
-    newest_at = store.upkeep.newest_row_at() or now
+    newest_at = find_newest_step(store) or now
     waits, idle = now - oldest.since, now - newest_at
     found = (
         f"{len(standing)} on their way; {oldest.file_name} (recording {oldest.id}) has been "
@@ -184,7 +190,7 @@ def check_under_way(examined: Examined) -> Iterator[Finding]:
 
 
 def check_quarantine(examined: Examined) -> Iterator[Finding]:
-    """Which files were refused, and since when."""
+    """Check which files were refused, and since when."""
     folder = examined.workspace.quarantine.folder
     reasons = sorted(folder.glob("*.reason.json"), key=lambda path: path.stat().st_mtime)
     if not reasons:
@@ -205,8 +211,8 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
 
 
 def check_held(examined: Examined) -> Iterator[Finding]:
-    """Whether recordings wait for a person to decide."""
-    found = examined.store.recordings.list_holds()
+    """Check whether recordings wait for a person to decide."""
+    found = list_holds(examined.store)
     if not found:
         yield ok("held", "nothing waits for you to decide")
         return
@@ -219,10 +225,10 @@ def check_held(examined: Examined) -> Iterator[Finding]:
 
 
 def check_raw_files(examined: Examined) -> Iterator[Finding]:
-    """Whether the raw files of the latest recordings are where the store says."""
+    """Check whether the raw files of the latest recordings are where the store says."""
     store, archive = examined.store, examined.workspace.archive
-    latest = store.recordings.list_all()[-_LOOKED_AT:]
-    away = store.upkeep.removed_to()
+    latest = list_recordings(store)[-_LOOKED_AT:]
+    away = list_removed(store)
     missing = [r.file.file_name for r in latest if not archive.holds(r.file) and r.id not in away]
     if missing:
         yield fault(
@@ -239,13 +245,13 @@ def check_raw_files(examined: Examined) -> Iterator[Finding]:
 def _without_baseline(examined: Examined) -> set[int]:
     """Hangers whose tests rightly wait until there are enough of them for a baseline."""
     wanted = examined.workspace.settings.baseline_tests
-    selected = examined.store.posteriors.selected_models()
-    latest = examined.store.tests.latest().items()
+    selected = list_selected_models(examined.store)
+    latest = count_tests(examined.store).items()
     return {id_ for id_, found in latest if id_ not in selected and found.tests < wanted}
 
 
 def _age(path: Path, now: datetime) -> timedelta:
-    """How long a file has been where it is; its own times come from wherever it was made."""
+    """Return how long a file has been where it is; its own times come from wherever it was made."""
     try:
         since = datetime.fromtimestamp(path.lstat().st_ctime, UTC)
     except FileNotFoundError:
@@ -254,7 +260,7 @@ def _age(path: Path, now: datetime) -> timedelta:
 
 
 def check_store(examined: Examined) -> Iterator[Finding]:
-    """Whether the store is whole, as far as a quick look tells."""
+    """Check whether the store is whole, as far as a quick look tells."""
     store = examined.store
     troubles = quick_troubles(store)
     if troubles:
@@ -264,7 +270,7 @@ def check_store(examined: Examined) -> Iterator[Finding]:
             "Stop the daemon, then `shm db restore FILE --replace`.",
         )
     else:
-        held = sum(store.recordings.stage_counts().values())
+        held = sum(count_stages(store).values())
         kind = store.engine.dialect.name
         yield ok(
             "store", f"{store.location} ({kind}), present schema, {counted(held, 'recording')}"
@@ -272,9 +278,9 @@ def check_store(examined: Examined) -> Iterator[Finding]:
 
 
 def check_backup(examined: Examined) -> Iterator[Finding]:
-    """How old the last backup is, and how many raw files have no copy."""
+    """Check how old the last backup is, and how many raw files have no copy."""
     store, now = examined.store, examined.now
-    last = store.upkeep.last_backup()
+    last = find_last_backup(store)
     remedy = "`shm db backup FILE --archive DIR`, best every night."
     if last is None:
         yield warning("backup", "never made here", remedy)
@@ -282,15 +288,15 @@ def check_backup(examined: Examined) -> Iterator[Finding]:
         found = f"{last[1]}, {duration_words(now - last[0])} ago"
         late = now - last[0] > timedelta(days=examined.workspace.settings.backup_days)
         yield warning("backup", found, remedy) if late else ok("backup", found)
-    copied = {copy.recording_id for copy in store.upkeep.list_copies()}
-    alone = sum(recording.id not in copied for recording in store.recordings.list_all())
+    copied = {copy.recording_id for copy in list_copies(store)}
+    alone = sum(recording.id not in copied for recording in list_recordings(store))
     if last is not None and alone:
         yield warning("backup", f"raw files without a copy elsewhere: {alone}", remedy)
 
 
 def check_clock(examined: Examined) -> Iterator[Finding]:
-    """Whether the clock has jumped back, and whether anything sets it."""
-    newest, now = examined.store.upkeep.newest_row_at(), examined.now
+    """Check whether the clock has jumped back, and whether anything sets it."""
+    newest, now = find_newest_step(examined.store), examined.now
     if newest is not None and newest - now > _CLOCK_TOLERANCE:
         yield fault(
             "clock",
@@ -308,10 +314,10 @@ def check_clock(examined: Examined) -> Iterator[Finding]:
 
 
 def check_hangers(examined: Examined) -> Iterator[Finding]:
-    """Which hangers have no test, none lately, or no baseline."""
+    """Check which hangers have no test, none lately, or no baseline."""
     store, bridge = examined.store, examined.workspace.bridge
-    settings, latest = examined.workspace.settings, store.tests.latest()
-    selected = store.posteriors.selected_models()
+    settings, latest = examined.workspace.settings, count_tests(store)
+    selected = list_selected_models(store)
     ids = [hanger.id for hanger in bridge.hangers]
     never = [str(each) for each in ids if each not in latest]
     before = examined.now - timedelta(days=settings.quiet_days)
@@ -377,14 +383,26 @@ def check_streams(examined: Examined) -> Iterator[Finding]:
         yield ok("streams", f"{counted(len(found), 'stream')}, heard within the hour")
 
 
+def check_publications(examined: Examined) -> Iterator[Finding]:
+    """Find databases that do not take the results; nothing where `bridge.toml` names none."""
+    outbox = PointOutbox(examined.workspace.folder)
+    for each in examined.workspace.bridge.publications:
+        check, state = f"publish {each.name}", outbox.state(each.name)
+        if state.refused or state.why:
+            remedy = "The daemon tries again each minute, and sends what waits once it is taken."
+            yield warning(check, state.words or state.why, remedy)
+        else:
+            yield ok(check, f"{each.url}: {state.waiting} points wait")
+
+
 def check_changed_settings(examined: Examined) -> Iterator[Finding]:
-    """Who reads `bridge.toml` must learn what holds instead of it."""
+    """List settings that hold instead of `bridge.toml`: who reads it must learn of them."""
     changed = examined.store.settings.list_current().values()
     yield ok("settings", "; ".join(map(str, changed)) or "all as bridge.toml says")
 
 
 def _synchronised() -> bool | None:
-    """Whether a service keeps the clock right; None where nobody can tell."""
+    """Return True if a service keeps the clock right; None where nobody can tell."""
     if shutil.which(_SYNCHRONISED[0]) is None:
         return None
     try:

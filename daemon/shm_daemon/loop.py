@@ -11,7 +11,15 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
-from shm.errors import SchemaOutdated, ShmError, StoreBusy, StoreDamaged, StoreError, TooLarge
+from shm.errors import (
+    SchemaOutdated,
+    ShmError,
+    StoreBusy,
+    StoreDamaged,
+    StoreError,
+    TooLarge,
+    retry_pause_s,
+)
 from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
@@ -22,6 +30,8 @@ from shm_daemon.heartbeat import Pulse, longest_wait_s, tell_systemd, turn_faile
 from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
+from shm_daemon.publishing import Publisher, results_published
+from shm_daemon.seedlink import StreamAskers, streams_asked
 from shm_daemon.spool import FileStabilityTracker, scan
 from shm_daemon.streams import StreamKeeper, streams_kept
 from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
@@ -80,7 +90,7 @@ class Patience:
         self._wakeup, self._standby, self._said = wakeup, standby, ""
 
     def __call__(self, error: StoreError) -> bool:
-        """Whether to try again, after a while: not where it is another's and we do not stand by."""
+        """Wait a while; return True to try again, not where the store is another's."""
         if isinstance(error, StoreBusy) and not self._standby:
             return False
         if self._said != error.message:
@@ -106,7 +116,12 @@ def _begin(
     store = stack.enter_context(workspace.store())
     stack.enter_context(children_ended())
     if notifier is None:
-        notifier = HookNotifier(workspace.folder, settings.hook_timeout_seconds, os.environ)
+        notifier = HookNotifier(
+            workspace.folder,
+            settings.hook_timeout_seconds,
+            os.environ,
+            settings.pages_address,
+        )
         stack.callback(notifier.close)
     executor = make_executor(settings)
     flow = Flow(
@@ -129,7 +144,10 @@ def _begin(
     keeper = stack.enter_context(
         streams_kept(workspace, clock, until_done=once, sealed=streaming.note_sealed)
     )
-    daemon = Daemon(flow, streaming, keeper, wakeup, lock, pulse, lambda: make_executor(settings))
+    publisher = stack.enter_context(results_published(workspace, clock, when_done=once))
+    askers = stack.enter_context(streams_asked(workspace, clock, begun=not once))
+    parts = flow, streaming, keeper, publisher, askers
+    daemon = Daemon(*parts, wakeup, lock, pulse, lambda: make_executor(settings))
     stack.callback(daemon.close)
     log.info("watching %s", workspace.spool)
     return daemon
@@ -143,12 +161,15 @@ class Daemon:
         flow: Flow,
         streaming: Streaming,
         keeper: StreamKeeper,
+        publisher: Publisher,
+        askers: StreamAskers,
         wakeup: Wakeup,
         lock: ActiveLock,
         pulse: Pulse,
         make_executor: Callable[[], Executor],
     ):
-        self._flow, self._streaming, self._keeper = flow, streaming, keeper
+        self._flow, self._streaming = flow, streaming
+        self._keeper, self._publisher, self._askers = keeper, publisher, askers
         self._wakeup, self._lock, self._pulse = wakeup, lock, pulse
         self._make_executor = make_executor
         settings = flow.workspace.settings
@@ -196,8 +217,9 @@ class Daemon:
         self._flow.executor.shutdown(wait=False, cancel_futures=True)
 
     def _turn(self) -> bool:
-        """Whether anything is left to do; errors that pass are waited for, and shown until a turn
-        with a scan went well.
+        """Take a turn; return True if anything is left to do.
+
+        Errors that pass are waited for, and shown until a turn with a scan went well.
         """
         is_whole = time.monotonic() >= self._scan_at
         try:
@@ -218,7 +240,7 @@ class Daemon:
             log.warning("%s", error)
             if not isinstance(error, StoreBusy):
                 self._tell_failure(str(error))
-            self._scan_at = time.monotonic() + (error.retry_after_s or _UNREADABLE_S)
+            self._scan_at = time.monotonic() + retry_pause_s(error, _UNREADABLE_S)
         except Exception as error:
             if self._once:
                 raise
@@ -251,7 +273,7 @@ class Daemon:
         return "".join(delays[:1]) + more
 
     def _is_fatal(self, error: ShmError) -> bool:
-        """Whether the service ends: not by what a damaged store answers, unless once is enough."""
+        """Return True if the service ends by an error: not by a damaged store, but with once."""
         if isinstance(error, StoreDamaged):
             return self._once
         mends = isinstance(error, StoreError) and not isinstance(error, SchemaOutdated)
@@ -287,8 +309,7 @@ class Daemon:
                 self._tracker.forget(path)
         except (ShmError, OSError) as error:
             log.warning("%s is left for now: %s", path.name, error)
-            wait_s = error.retry_after_s if isinstance(error, ShmError) else None
-            self._put_off(path, str(error), wait_s or _UNREADABLE_S)
+            self._put_off(path, str(error), retry_pause_s(error, _UNREADABLE_S))
         except Exception as error:
             log.exception("%s is left for now", path.name)
             self._put_off(path, f"{type(error).__name__}: {error}", _UNREADABLE_S)
@@ -327,6 +348,8 @@ class Daemon:
             self._flow.use(self._flow.workspace.reopened())
             self._streaming.use(self._flow.workspace)
             self._keeper.use(self._flow.workspace)
+            self._publisher.use(self._flow.workspace)
+            self._askers.use(self._flow.workspace)
         except ShmError as error:
             log.error("bridge.toml is not taken over: %s", error)
         else:

@@ -36,6 +36,7 @@ from shm.read.header import CHANNEL_KEYS, Header, known_values
 from shm.read.matlab_file import FORMAT as MATLAB
 from shm.read.mini_seed_file import FORMAT as MINI_SEED
 from shm.read.numpy_file import FORMAT as NUMPY
+from shm.read.sep005 import FORMAT as SEP005
 from shm.read.sidecar import sidecar_document, sidecar_path
 from shm.read.table import Column, Table, describe
 from shm.read.tdms_file import FORMAT as TDMS
@@ -53,6 +54,7 @@ FORMATS: tuple[Format, ...] = (
     WAVE,
     MINI_SEED,
     CAMPBELL,
+    SEP005,
     UFF,
     CSV,
 )

@@ -41,6 +41,7 @@ from shm.values.stated_tension import averaged_now, selection_now
 
 if TYPE_CHECKING:  # `shm status` lists hangers and identifies nothing
     from shm.identify import Dropped, Hit, Identification
+    from shm.watch.control_chart import ControlChart
     from shm.watch.neighbours import BridgePattern
 
 
@@ -78,6 +79,16 @@ def trend_row(
     )
 
 
+@dataclass(frozen=True)
+class TensionAtLevel:
+    """The tension by the latest test at a level of its hits, in N, or why it is not known."""
+
+    level: float
+    force_n: float
+    tension_n: Interval | None = None
+    reason: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class HangerReport:
     """All that a report of one hanger says.
@@ -95,7 +106,7 @@ class HangerReport:
     in it. `settings` are those that decide the numbers, each with its unit. `redescribed` says what
     of the hanger's description has changed since the baseline, where that moves results;
     `discarded` names the tests of the baseline that count no more. `inspections` are what people
-    wrote, the latest first.
+    wrote, the latest first. `at_level` is None where no reference level is set.
     """
 
     bridge: str
@@ -124,6 +135,7 @@ class HangerReport:
     redescribed: tuple[str, ...] = ()
     discarded: tuple[str, ...] = ()
     inspections: tuple[Note, ...] = ()
+    at_level: TensionAtLevel | None = None
     letterhead: Letterhead = NO_LETTERHEAD
 
     @property
@@ -256,6 +268,7 @@ class BridgeReport:
     period: Period | None = None
     lineage: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, str] = field(default_factory=dict)
+    controls: tuple[ControlChart, ...] = ()
 
     @property
     def message(self) -> BridgeMessage:

@@ -163,6 +163,8 @@ def _against_nominal(data: HangerReport) -> str:
 
 def _against_baseline(data: HangerReport) -> str:
     change = data.now.change
+    if data.now.control is not None:
+        return ""
     if data.baseline is None or data.baseline_tension_n is None:
         return "There is no earlier test to compare with: this one is the baseline."
     if change is None:

@@ -25,7 +25,7 @@ from shm.values import PLANES, WITHOUT_MODEL, Alert, Mode, Posterior, PredictedF
 from shm.values.messages import Lead
 from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import stated
-from shm.watch.change_words import factor
+from shm.watch.alert_text import factor
 
 
 def results(data: HangerReport) -> Table:

@@ -16,9 +16,8 @@ from shm.report.formatting import counted, listed
 from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
 from shm.values.messages import WEEK
 from shm.values.rounding import rounded_percent
-from shm.watch.alert_text import against_baseline_words
-from shm.watch.change_words import look_again
-from shm.watch.repeated_mistakes import warning_words
+from shm.watch.alert_text import against_baseline_words, look_again
+from shm.watch.notices import warning_words
 
 # Judgement: hangers of sound bridges are within a quarter of their nominal tension, or all are off.
 _OFF_NOMINAL = 0.25

@@ -27,8 +27,8 @@ from shm.values import (
     WatchedQuantity,
     kind_of,
 )
-from shm.watch.change_words import group_words, is_stiffness, probable_groups, quantity_words
-from shm.watch.repeated_mistakes import off_the_baseline
+from shm.watch.alert_text import group_words, is_stiffness, probable_groups, quantity_words
+from shm.watch.notices import off_the_baseline
 from shm.watch.state import Band, StateHistory, StateOptions, set_free, states
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ def states_over_time(watched: Watched, hanger: Hanger) -> StatesOverTime:
     """Return the states of a hanger at all tests, at the baseline's mean temperature."""
     outlier = np.array([each.change.outlier_probability for each in watched.watch.tests])
     explained = np.array([not off_the_baseline(each).any() for each in watched.readings])
-    calls = [call.change for call in watched.watch.calls]
+    calls = [change for _, change in watched.watch.calls]
     reference_c = watched.reader.reference_temperature_c
     options = StateOptions.of(hanger.assumptions, reference_temperature_c=reference_c)
     changes = set_free(calls, watched.readings)

@@ -20,7 +20,8 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from shm.pipeline import utc_now
 from shm.store import Scope
 from shm.store.journal import Actor
-from shm.store.people import SESSION, Role
+from shm.store.people import SESSION
+from shm.store.rows import Role
 from shm_daemon.web.address import caller_of
 from shm_daemon.web.faults import Refused
 from shm_daemon.web.middleware import PLACES, Kind

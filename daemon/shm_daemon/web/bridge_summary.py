@@ -13,6 +13,8 @@ from shm.errors import ShmError
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report.formatting import counted, listed
 from shm.report.hanger_status import QUIET, Status, bridge_message
+from shm.store.queries.alerts import count_alerts
+from shm.store.queries.recordings import list_holds
 from shm.values.messages import URGENCIES, Lead, Urgency
 from shm_daemon.web.health import notices, troubles
 from shm_daemon.web.site import Site
@@ -63,8 +65,8 @@ def summary_of(site: Site, now: datetime) -> Summary:
         troubles=tuple(troubles(site)),
         hangers=len(lines),
         latest_test_at=max((each.latest.time for each in lines if each.latest), default=None),
-        open_alerts=store.alerts.counts()[0],
-        held=len(store.recordings.list_holds()),
+        open_alerts=count_alerts(store)[0],
+        held=len(list_holds(store)),
     )
 
 

@@ -21,6 +21,7 @@ from shm.pipeline.bridge_reporting import hanger_shifts, hanger_summaries
 from shm.report import formatting
 from shm.report.hanger_status import BridgeMessage, bridge_message
 from shm.report.hanger_summary import HangerSummary
+from shm.store.queries.tests import count_tests
 from shm.values import NAN, Hanger
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
@@ -105,7 +106,7 @@ class Comparison:
 def summarize_hangers(site: Site, now: datetime) -> BridgeGlance:
     """Return the bridge as the store has it now."""
     workspace, store = site.workspace, site.store
-    tests, quiet_before = store.tests.latest(), now - timedelta(days=workspace.settings.quiet_days)
+    tests, quiet_before = count_tests(store), now - timedelta(days=workspace.settings.quiet_days)
     hangers = tuple(
         HangerGlance(
             summary,

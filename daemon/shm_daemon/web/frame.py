@@ -25,6 +25,7 @@ from shm.report import formatting
 from shm.report.as_html import ENVIRONMENT as OF_REPORTS
 from shm.report.as_html import environment
 from shm.report.figures.style import PALETTE
+from shm.store.queries.alerts import count_alerts
 from shm_daemon.web.health import notices
 from shm_daemon.web.site import Site
 
@@ -132,7 +133,7 @@ def _environment() -> Environment:
 def _open_alerts(site: Site) -> int | None:
     """Return the number of open alerts; None where the store fails, as the page itself says so."""
     try:
-        return site.store.alerts.counts()[0]
+        return count_alerts(site.store)[0]
     except ShmError:
         return None
 

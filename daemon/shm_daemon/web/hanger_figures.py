@@ -12,6 +12,7 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet, HangerReport
 from shm.report.figures import (
+    control_chart,
     gap_before_and_after,
     gap_causes,
     gap_map,
@@ -27,6 +28,7 @@ from shm.report.formatting import Interval
 from shm.report.states import CalledChange, called_words
 from shm.store import EventKind, TrendPoint
 from shm.values.rounding import ForceUnit, force_unit
+from shm.watch.control_chart import ControlChart
 from shm_daemon.web import with_plotly
 from shm_daemon.web.hanger_view import HangerView
 
@@ -220,7 +222,21 @@ def report_of(view: HangerView) -> HangerReport:
     return view.report
 
 
+def _control(view: HangerView) -> ControlChart | None:
+    """Return the chart of a control hanger; None of any other."""
+    return view.report.now.control if view.report else None
+
+
 FIGURES: tuple[HangerFigure, ...] = (
+    HangerFigure(
+        "control",
+        control_chart.FIGURE.title,
+        "trends",
+        lambda view: _control(view) is not None,
+        lambda view: control_chart.specify(_control(view)),
+        lambda view: control_chart.FIGURE.caption(_control(view)),
+        lambda view: control_chart.FIGURE.alt(_control(view)),
+    ),
     HangerFigure(
         "trend",
         "Tension over time",

@@ -16,6 +16,9 @@ from typing import Any
 from shm.errors import ShmError, sentence
 from shm.pipeline import utc_now
 from shm.pipeline.unheard import backlog_leads, heard, leads_of, ring_leads, stream_leads
+from shm.store.queries.alerts import count_alerts
+from shm.store.queries.recordings import list_holds
+from shm.store.queries.tests import count_tests
 from shm.store.stored_alerts import describe_silence
 from shm.values.messages import Lead
 from shm_daemon.heartbeat import (
@@ -101,7 +104,7 @@ def _of_description(site: Site) -> list[Lead]:
 
 def _of_strangers(site: Site) -> list[Lead]:
     try:
-        tested = site.store.tests.latest().keys()
+        tested = count_tests(site.store).keys()
     except ShmError:
         return []  # told as a trouble
     missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.watched})
@@ -171,7 +174,7 @@ def _found(site: Site, *checks: Callable[[Site], Sequence[str | Lead]]) -> list[
 
 def _store(site: Site) -> list[str]:
     try:
-        site.store.alerts.counts()
+        count_alerts(site.store)
     except ShmError as error:
         log.error("%s", error)
         return ["The store cannot be used."]
@@ -237,7 +240,7 @@ def _daemon(site: Site) -> list[str]:
 
 def _held(site: Site) -> list[str]:
     try:
-        holds = site.store.recordings.list_holds()
+        holds = list_holds(site.store)
     except ShmError:
         return []  # told as a trouble
     of_hangers: dict[int, list[int]] = {}

@@ -16,6 +16,7 @@ from typing import Any
 from shm.errors import BadInput, NothingThere, ShmError, StoreError
 from shm.store import Store, Workspace
 from shm.store.people import same_name
+from shm.store.queries.recordings import list_holds
 from shm.values import Hanger
 from shm_daemon.web.address import Address, network_of
 
@@ -175,7 +176,7 @@ def held_documents(site: Site, hanger: int | None = None) -> list[dict[str, Any]
             "held_at": hold.held_at,
             "message": hold.message,
         }
-        for hold in site.store.recordings.list_holds(hanger)
+        for hold in list_holds(site.store, hanger)
     ]
 
 

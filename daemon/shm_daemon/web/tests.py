@@ -16,6 +16,8 @@ from shm.report import formatting
 from shm.report.paper import Table
 from shm.report.shared_tables import overall
 from shm.store import FormerPosterior, FormerTest, Step
+from shm.store.queries.history import list_former_tests, list_steps
+from shm.store.queries.tests import find_neighbours
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import name_in
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
@@ -49,7 +51,7 @@ def origin(view: ModalTestView) -> Table:
 
 def steps_of(view: ModalTestView) -> tuple[Step, ...]:
     """Return the steps of the file, and those of this test of it."""
-    found = view.store.journal.list_steps(view.recording.id)
+    found = list_steps(view.store, view.recording.id)
     return tuple(step for step in found if step.test in (None, view.stored.test.id))
 
 
@@ -72,7 +74,7 @@ def steps(view: ModalTestView) -> Table:
 
 def formers_of(view: ModalTestView) -> tuple[FormerTest, ...]:
     """Return every identification of this test, in force or superseded, oldest first."""
-    found = view.store.tests.list_former(view.recording.id)
+    found = list_former_tests(view.store, view.recording.id)
     return tuple(each for each in found if each.name == view.stored.test.id)
 
 
@@ -281,7 +283,7 @@ def hits(_: Reader, view: View) -> Any:
 def test(_: Reader, view: View) -> Any:
     """Modes, quality, what was set aside, and where all that comes from."""
     sheet, stored, file = view.as_stored, view.stored, view.recording.file
-    before, after = view.store.tests.beside(stored)
+    before, after = find_neighbours(view.store, stored)
     response = sheet.identification.frequency_response
     return {
         "test": modes_document.test_document(stored.test),

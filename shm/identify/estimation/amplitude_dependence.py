@@ -192,7 +192,7 @@ def _fits(
     leads = np.array([lead for lead, row in zip(leads_s, seen, strict=True) if row is not None])
     starts = np.array([size[0] for *_, size in rows])
     at_hit = float(np.median(starts * np.exp(decay * leads)))
-    laws = [_fit(mode, [_through(row, decay, law, at_hit) for row in rows]) for law in _LAWS]
+    laws = [_fit(mode, [_through(row, decay, law, at_hit) for row in rows]) for law in LAWS]
     fit = _averaged([law for law in laws if law is not None])
     if fit is None:
         return None
@@ -258,7 +258,7 @@ def _slips_no_further(half: float) -> _Law:
     return lambda size: size * (1 + half) / (size + half)
 
 
-_LAWS: tuple[_Law, ...] = (
+LAWS: tuple[_Law, ...] = (
     lambda size: size,
     lambda size: size**2,
     *(_slips_no_further(half) for half in _HALVES),

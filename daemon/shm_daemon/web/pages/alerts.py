@@ -18,6 +18,7 @@ from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report import formatting
 from shm.report.hanger_status import HangerMessage
 from shm.store import Delivery, DeliveryState, News, Silence, StoredAlert
+from shm.store.queries.alerts import count_open_alerts, list_alert_page
 from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values.messages import Lead
 from shm_daemon.web.access import AtSite, Reader, Writer
@@ -58,7 +59,7 @@ def alerts_page(
     """
     opened, older_open = _some(site, hanger, open_before, is_open=True)
     noted, older_noted = _some(site, hanger, noted_before, is_open=False)
-    counts, now = site.store.alerts.open_counts(), utc_now()
+    counts, now = count_open_alerts(site.store), utc_now()
     return page(
         request,
         "alerts.html.j2",
@@ -91,7 +92,7 @@ def _some(
     site: Site, hanger: int | None, before: int | None, *, is_open: bool
 ) -> tuple[list[dict[str, Any]], int | None]:
     """Return a page of alerts, and the number to continue after, if there are more."""
-    rows = site.store.alerts.list_page(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
+    rows = list_alert_page(site.store, hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
     shown, older = paged(rows, _SHOWN)
     documents, now = alert_documents(shown, site), _messages(shown, site)
     return [
@@ -167,9 +168,9 @@ def alerts(
     """
     is_open = True if open else None
     if limit is None:
-        found = site.store.alerts.list_page(hanger, is_open=is_open)[::-1]
+        found = list_alert_page(site.store, hanger, is_open=is_open)[::-1]
         return {"alerts": alert_documents(found, site), "next_before": None}
-    rows = site.store.alerts.list_page(hanger, is_open=is_open, limit=limit + 1, before=before)
+    rows = list_alert_page(site.store, hanger, is_open=is_open, limit=limit + 1, before=before)
     shown, older = paged(rows, limit)
     return {"alerts": alert_documents(shown, site), "next_before": older}
 

@@ -12,8 +12,10 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 
 from shm.pipeline import utc_now
+from shm.pipeline.controls import control_charts
 from shm.report import formatting
 from shm.report.contents import hangers_unit
+from shm.report.control_report import control_lead
 from shm.values.messages import TODAY, WEEK, Lead, Urgency
 from shm.values.rounding import ForceUnit
 from shm_daemon.heartbeat import duration_words
@@ -74,6 +76,10 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
             text
             for each in bridge.hangers
             for text in each.summary.message.beyond_lead(each.summary.warnings)
+        ],
+        controls=[
+            (chart.hanger, control_lead(chart))
+            for chart in control_charts(site.workspace, site.store)
         ],
         notes=site.store.notes.list_all(of_bridge=True),
         rows=[SimpleNamespace(**_row(each, unit, now)) for each in bridge.hangers],

@@ -19,6 +19,8 @@ from shm.report.figures.compared_hangers import MOST, TensionShifts, alt, captio
 from shm.report.formatting import Interval
 from shm.report.hanger_summary import HangerSummary
 from shm.report.paper import Table
+from shm.store.queries.hangers import list_baselines_in_force
+from shm.store.queries.trends import list_trend
 from shm.values import Hanger
 from shm_daemon.web import with_plotly
 from shm_daemon.web.access import AtSite, Reader
@@ -123,10 +125,10 @@ def _day(text: str) -> date | None:
 def _courses(site: Site, chosen: Sequence[Hanger], since: date | None) -> list[TensionShifts]:
     """Return the courses of the hangers with a baseline and tests since that day."""
     begin = _begin(since) if since else None
-    baselines = site.store.watch.baselines_in_force(chosen)
+    baselines = list_baselines_in_force(site.store, chosen)
     found = []
     for hanger in chosen:
-        points = site.store.posteriors.trend(hanger, begin)
+        points = list_trend(site.store, hanger, begin)
         if hanger.id in baselines and points:
             base = Interval.of_averaged(baselines[hanger.id].averaged)
             found.append(

@@ -6,7 +6,6 @@ import csv
 import io
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -27,6 +26,7 @@ from shm.report.hanger_sentences import details
 from shm.report.paper import Table
 from shm.report.states import called_words, temperature_table
 from shm.store import EventKind, Store, TrendPoint, Workspace
+from shm.store.queries.trends import find_latest_trends, list_trend
 from shm.values import Hanger
 from shm.values.bar_description import describe_bar
 from shm_daemon.web.access import AtSite, Reader
@@ -51,13 +51,11 @@ _EVENTS = {
     EventKind.UNDONE: "adoption undone",
     EventKind.ACKNOWLEDGED: "alert acknowledged",
 }
-_TABLES = (
-    hanger_tables.results,
-    hanger_tables.frequencies,
-    hanger_tables.parameters,
-    hanger_tables.models,
-    hanger_tables.quality,
-)
+_TABLES = {
+    "numbers": (hanger_tables.results, hanger_tables.frequencies),
+    "model": (hanger_tables.models, hanger_tables.parameters),
+    "tests": (hanger_tables.quality, hanger_tables.conditions),
+}
 _TYPES = {"pdf": "application/pdf", "html": "text/html; charset=utf-8"}
 # Judgement: a report takes 5 to 15 s; a browser's user waits for a minute, hardly longer.
 _LONGEST_S = 60.0
@@ -122,9 +120,9 @@ def all_tests(request: Request, _: Reader, view: View, before: Before = None) ->
 def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
     lead = report.now.message
     assert lead.status is not None  # a hanger with a test has one
-    tables = [make(report) for make in _TABLES]
+    tables = {part: [make(report) for make in of] for part, of in _TABLES.items()}
     if view.states is not None:
-        tables.insert(2, temperature_table(view.states))
+        tables["numbers"].append(temperature_table(view.states))
     return {
         "status_word": lead.status.value,
         "style": lead.status.name.lower(),
@@ -136,13 +134,12 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
             part: [_chart(view, e) for e in FIGURES if e.part == part and e.is_there(view)]
             for part in ("trends", "model", "gap")
         },
-        "tables": [table for table in tables if table.rows],
+        "tables": {part: [each for each in of if each.rows] for part, of in tables.items()},
         "alerts": hanger_tables.alerts(report),
         "events": _events(view),
         "gap": gap_part(report),
         "answers": answers(view.sheet) if view.sheet else (),
         "evidence": evidence(view.sheet) if view.sheet else (),
-        "origin": hanger_tables.conditions(report),
     }
 
 
@@ -169,7 +166,7 @@ def _events(view: HangerView) -> Table:
 
 def _neighbours(workspace: Workspace, hanger: Hanger) -> list[tuple[str, Hanger]]:
     """Return the hangers before and after it in the description."""
-    order: Sequence[Hanger] = workspace.bridge.hangers
+    order = workspace.bridge.bars
     place = [each.id for each in order].index(hanger.id)
     before = [("previous", order[place - 1])] if place > 0 else []
     return before + [("next", each) for each in order[place + 1 : place + 2]]
@@ -217,12 +214,12 @@ def results(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Response:
     text = io.StringIO()
     writer = csv.writer(text)
     writer.writerow(_COLUMNS)
-    writer.writerows(_row(point) for point in site.store.posteriors.trend(hanger))
+    writer.writerows(_row(point) for point in list_trend(site.store, hanger))
     return _file(text.getvalue().encode(), f"hanger{hanger_id}.csv", "text/csv; charset=utf-8")
 
 
 def _refuse_untested(store: Store, hanger: Hanger) -> None:
-    if not store.posteriors.latest_trends([hanger]):
+    if not find_latest_trends(store, [hanger]):
         raise NothingThere(
             f"hanger {hanger.id} has no test to report.", remedy="Upload a recording of it."
         )

@@ -22,6 +22,8 @@ from shm.plausibility import refuse_impossible
 from shm.report import formatting
 from shm.report.paper import Table
 from shm.store import ENDED, DeliveryState, Workspace
+from shm.store.queries.alerts import count_deliveries
+from shm.store.queries.recordings import count_stages, find_latest_hold, find_oldest_waiting
 from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import duration_words, seconds_since_beat
 from shm_daemon.spool import scan
@@ -78,7 +80,7 @@ def operation_page(request: Request, site: AtSite, _: Reader, decided: Before = 
         request,
         "health.html.j2",
         state=state,
-        decided=None if decided is None else site.store.recordings.latest_hold(decided),
+        decided=None if decided is None else find_latest_hold(site.store, decided),
         facts=_facts(state),
         stages=_stages(state["recordings"]),
         examination=_examination(request, site),
@@ -111,8 +113,7 @@ def decide(site: AtSite, writer: Writer, recording: Row, form: Form) -> Response
 
 def _refuse_decided(site: Site, recording: int) -> None:
     """Raise UsageError where somebody has decided since the page was shown."""
-    recordings = site.store.recordings
-    hold = recordings.latest_hold(recordings.get(recording).id)
+    hold = find_latest_hold(site.store, site.store.recordings.get(recording).id)
     if hold is None or hold.decision is not None:
         now = "not held" if hold is None else f"not held: it was {hold.decision} by {hold.who}"
         raise UsageError(f"recording {recording} is {now}.", remedy="Load the page again.")
@@ -152,11 +153,11 @@ def _operation(site: Site) -> dict[str, Any]:
         "troubles": troubles(site),
         "daemon": workspace.holder(),
         "daemon_seen_seconds_ago": seconds_since_beat(workspace),
-        "recordings": store.recordings.stage_counts(),
+        "recordings": count_stages(store),
         "spool": len(scan(workspace.spool)),
-        "oldest_waiting_at": store.recordings.oldest_waiting(),
+        "oldest_waiting_at": find_oldest_waiting(store),
         "held": held_documents(site),
-        "deliveries": store.alerts.delivery_counts(),
+        "deliveries": count_deliveries(store),
         "quarantine": _refused(workspace),
         "quarantined": quarantined(workspace),
         "disk_free_bytes": disk.free,

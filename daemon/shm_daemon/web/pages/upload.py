@@ -49,8 +49,7 @@ def upload_page(request: Request, site: AtSite, _: Reader) -> Response:
         request,
         "upload.html.j2",
         hangers=[
-            (each.id, formatting.hanger_name(each.id, each.name))
-            for each in workspace.bridge.hangers
+            (each.id, formatting.hanger_name(each.id, each.name)) for each in workspace.bridge.bars
         ],
         max_mb=workspace.settings.max_file_bytes / 1e6,
         max_bytes=workspace.settings.max_file_bytes,
