@@ -301,8 +301,8 @@ def _found(
 def _of_modes_alone(found: JoinedFinding) -> JoinedFinding:
     """Return the finding without the sidebands of modes."""
     finding = without_sidebands(found.finding)
-    kept = [any(mode is own for own in finding.modes) for mode in found.finding.modes]
-    apart = tuple(tuple(compress(modes, kept)) for modes in found.apart)
+    remains = [any(mode is other for other in finding.modes) for mode in found.finding.modes]
+    apart = tuple(tuple(compress(modes, remains)) for modes in found.apart)
     return replace(found, finding=finding, apart=apart)
 
 

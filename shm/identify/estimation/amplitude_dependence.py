@@ -160,11 +160,11 @@ def _with_slope(
         share * _TO_ZERO * fit.slope * mode.frequency_hz,
     )
     as_found = mode.frequency_sd_hz if math.isnan(mode.damping_sd) else 0.0
-    kept = (1 - share) * mode.frequency_sd_hz
+    remaining_sd = (1 - share) * mode.frequency_sd_hz
     return replace(
         known,
         frequency_hz=mode.frequency_hz + shift_hz,
-        frequency_sd_hz=max(as_found, math.hypot(by_phase, kept)),
+        frequency_sd_hz=max(as_found, math.hypot(by_phase, remaining_sd)),
     )
 
 

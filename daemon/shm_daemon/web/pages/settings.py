@@ -120,10 +120,13 @@ def try_hook(request: Request, site: AtSite, _: Engineer, form: Form) -> Respons
     if hook is None:
         raise Refused(404, "bridge.toml describes no such hook.", "Load the page again.")
     try:
-        told, status = send_test_alert(workspace, hook, os.environ, utc_now()).sentence(hook), 200
+        outcome, status = (
+            send_test_alert(workspace, hook, os.environ, utc_now()).sentence(hook),
+            200,
+        )
     except ShmError as error:
-        told, status = f"{error.message} {error.remedy}", 409
-    return _page(request, site, None, told, status)
+        outcome, status = f"{error.message} {error.remedy}", 409
+    return _page(request, site, None, outcome, status)
 
 
 def _is_changed(key: str, form: Mapping[str, str]) -> bool:
