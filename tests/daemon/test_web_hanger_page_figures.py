@@ -20,7 +20,8 @@ from shm_daemon.web.hanger_view import HangerView
 from tests.helpers.workspaces import START
 from tests.report.diagnoses import HANGER
 
-TREND, STIFFNESS, TEMPERATURE = FIGURES[:3]
+_BY_NAME = {figure.name: figure for figure in FIGURES}
+TREND, STIFFNESS, TEMPERATURE = (_BY_NAME[n] for n in ("trend", "stiffness", "temperature"))
 BLUNDER = 700
 
 
