@@ -35,7 +35,7 @@ def workspace(tmp_path: Path) -> Workspace:
 
 
 def export(path: Path, seed: int = 1, columns: str = "A1") -> Path:
-    """A German export of numbers that look like a hammer test."""
+    """Return a German export of numbers that look like a hammer test."""
     rng = np.random.default_rng(seed)
     rate, count = 500.0, 4000
     times = np.arange(count) / rate

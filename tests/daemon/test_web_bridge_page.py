@@ -28,7 +28,7 @@ from tests.helpers.workspaces import START, make_workspace, write_test
 
 
 def glance(hanger: Hanger, shift: float = 0.0, sd: float = 0.003) -> HangerGlance:
-    """A hanger whose tension moved by so much since its baseline."""
+    """Return a hanger whose tension moved by so much since its baseline."""
     moved = Drift(hanger.id, "t9", START, TENSION, 711e3, 711e3, shift, sd, 0.05, 0.1)
     tension = Interval.normal(711e3, 5e3)
     return HangerGlance(

@@ -83,7 +83,7 @@ def page(site: Served) -> str:
 
 
 def words_of(page: str) -> str:
-    """What a person reads."""
+    """Return the visible text."""
     return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
 
 

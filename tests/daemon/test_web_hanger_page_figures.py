@@ -69,7 +69,7 @@ BASELINE = BaselineGlance(
 
 
 def a_view(tests: int, **parts: Any) -> HangerView:
-    """A hanger of so many tests, one of which is far off."""
+    """Return a hanger of so many tests, one of which is far off."""
     points = [a_point(i, 500e3 if i == BLUNDER else 700e3 + 1e3 * (i % 7)) for i in range(tests)]
     view = SimpleNamespace(
         hanger=HANGER,

@@ -31,7 +31,7 @@ def rate(seconds: FloatArray, stated_hz: float = NAN) -> float:
 
 
 def whole_seconds(hz: int, seconds: int, late: int = 0) -> FloatArray:
-    """Times of a clock that counts seconds, begun `late` samples after one."""
+    """Return times of a clock that counts seconds, begun `late` samples after one."""
     return np.floor((np.arange(hz * seconds) + late) / hz)
 
 

@@ -53,7 +53,7 @@ def test_the_words_beside_every_figure_are_those_that_were_agreed(
 
 
 def _plain(fixture: Any) -> Any:
-    """What a fixture calls."""
+    """Return the function that a fixture calls."""
     return getattr(fixture, "__wrapped__", None) or fixture._fixture_function
 
 

@@ -221,8 +221,11 @@ def test_hits_are_laid_over_each_other_dropped_ones_in_red(drawn: Drawn) -> None
 
 
 def test_the_force_spectrum_reaches_as_far_as_its_pulse_allows() -> None:
-    """A pulse of samples 1/2, 1, 1/2 has the spectrum (1 + cos(2 pi f / rate))/2, a tenth of it
-    where the cosine is -0.8: at 0.398 of the sampling rate."""
+    """Compare with a pulse of samples 1/2, 1, 1/2.
+
+    Its spectrum is (1 + cos(2 pi f / rate))/2, a tenth of it where the cosine is -0.8: at 0.398
+    of the sampling rate.
+    """
     item = alone("hits", make_sheet())
     found = re.search(r"A tenth of the force is left at (\d+) Hz", item.alt)
     assert found is not None

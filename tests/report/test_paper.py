@@ -123,7 +123,7 @@ def squeezed(text: str) -> str:
 
 
 def first_missing(paper: Paper, renderer: str, found: str) -> str | None:
-    """The first text of the paper that does not follow those before it.
+    """Return the first text of the paper that does not follow those before it.
 
     A PDF repeats headings and lines over pages, even amid a paragraph: there each word counts.
     """

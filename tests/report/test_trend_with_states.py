@@ -42,7 +42,7 @@ def quantity(name: str, title: str, level: float, step: float, reach: float) -> 
 
 @pytest.fixture
 def data() -> StatesOverTime:
-    """A step of the tension at test 40, a loosening spring, an outlier far out of view."""
+    """Return a step of the tension at test 40, a loosening spring, an outlier far out of view."""
     tension = quantity("tension", "tension", 711e3, -28e3, 35e3)
     spring = quantity("log10_k1", "spring k1 (transverse, deck end)", 7.1, 0.0, 0.5)
     for part in (tension.read.low, tension.read.middle, tension.read.high):
