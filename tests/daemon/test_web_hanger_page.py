@@ -54,7 +54,7 @@ class AtTheSecondRequest(BackgroundWorker[Any]):
 
     made: ClassVar[dict[WorkRequest, Any]] = {}
 
-    def wanted(self, order: WorkRequest) -> Any:
+    def get_or_start(self, order: WorkRequest) -> Any:
         if order not in self.made:
             self.made[order] = None
             return None
