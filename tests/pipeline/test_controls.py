@@ -17,6 +17,8 @@ from shm.errors import BadInput
 from shm.modes_document import modes_document
 from shm.pipeline.controls import control_charts
 from shm.store import Workspace
+from shm.store.queries.hangers import find_latest_watches
+from shm.store.queries.trends import list_trend
 from shm_cli.main import run
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import served
@@ -87,7 +89,7 @@ def test_control_never_watched(workspace: Workspace) -> None:
     with workspace.store() as store:
         alerts = [stored.alert for stored in store.alerts.list_all()]
         assert not store.watch.list_all(CONTROL)
-        assert CONTROL not in store.watch.latest()
+        assert CONTROL not in find_latest_watches(store)
     assert alerts  # the hangers are not silenced
     assert all(alert.hanger != CONTROL for alert in alerts)
     assert any(DOUBT in alert.message for alert in alerts)
@@ -133,7 +135,7 @@ def test_control_reading_is_the_known(tmp_path: Path) -> None:
 
     with made.store() as store:
         (chart,) = control_charts(made, store)
-        averaged = store.posteriors.trend(made.bridge.controls[0])[0].averaged
+        averaged = list_trend(store, made.bridge.controls[0])[0].averaged
 
     (point,) = chart.points
     assert point.known_n == pytest.approx(0.9 * 711e3)
