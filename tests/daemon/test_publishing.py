@@ -192,9 +192,11 @@ def test_influxdb_wrong_database_and_token(bridge: Workspace, tmp_path: Path) ->
         assert "influx.token cannot be read" in doctor(workspace)[1]
 
 
-def test_publish_to_victoria_metrics(bridge: Workspace, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", ['database = "shm"', 'organisation = "city"\nbucket = "shm"'])
+def test_publish_to_victoria_metrics(bridge: Workspace, tmp_path: Path, kind: str) -> None:
+    """It takes both versions of the protocol over HTTP."""
     with a_victoria_metrics(tmp_path) as database:
-        workspace = publishing(bridge, database.url)
+        workspace = publishing(bridge, database.url, kind)
         publish(workspace)
         publish(workspace)
 
@@ -310,6 +312,34 @@ def test_publish_after_failure(workspace: Workspace, server: Server, answer: Ans
     assert waiting(workspace) == 0
     assert len(server.taken) >= n_points
     assert set(server.taken.values()) == {1}
+
+
+@pytest.mark.parametrize(
+    ("kind", "header"),
+    [
+        ('database = "shm"', "Basic YW5uOnNlY3JldA=="),
+        ('organisation = "city"\nbucket = "shm"', "Token ann:secret"),
+    ],
+)
+def test_publish_sends_token(
+    bridge: Workspace, monkeypatch: pytest.MonkeyPatch, kind: str, header: str
+) -> None:
+    monkeypatch.setenv("INFLUX_TOKEN", "ann:secret")
+    with a_listener(lambda _: Answer(204)) as listener:
+        url = listener.url.removesuffix("/alerts")
+        publish(publishing(bridge, url, f'{kind}\ntoken_env = "INFLUX_TOKEN"'))
+    assert {told.headers["Authorization"] for told in listener.told} == {header}
+
+
+def test_doctor_warns_of_readable_token(bridge: Workspace) -> None:
+    token = bridge.folder / "influx.token"
+    token.write_text("secret")
+    token.chmod(0o644)
+    workspace = publishing(
+        bridge, "http://localhost:1", 'database = "a"\ntoken_file = "influx.token"'
+    )
+    found = examine(workspace.folder, utc_now())
+    assert "others can read influx.token" in [each.found for each in found]
 
 
 def test_publish_again_same_lines(workspace: Workspace, server: Server) -> None:
