@@ -61,6 +61,11 @@ class ShmError(Exception):
         return f"{where}{self.message}{remedy}"
 
 
+def retry_pause_s(error: BaseException, otherwise_s: float) -> float:
+    """Return the pause that an error asks for before the next try, else another."""
+    return getattr(error, "retry_after_s", None) or otherwise_s
+
+
 class UsageError(ShmError):
     """The command or call was put together wrongly."""
 

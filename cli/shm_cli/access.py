@@ -117,7 +117,7 @@ def add(ctx: click.Context, name: str, role: str, vouched: bool) -> None:
     Example: shm user add 'M. Huber' --role engineer
     """
     from shm.pipeline import utc_now
-    from shm.store.people import Role
+    from shm.store.rows import Role
 
     with opened_store(ctx) as (_, store):
         store.people.add(name, Role(role), None if vouched else _asked(), utc_now())
@@ -198,7 +198,7 @@ def use_single_sign_on(ctx: click.Context, name: str) -> None:
 
 
 def _asked() -> str:
-    """Never an argument: those stand in the list of processes and the shell's history."""
+    """Ask for a secret: an argument would be in the list of processes and the shell's history."""
     if not sys.stdin.isatty():
         return sys.stdin.readline().rstrip("\r\n")
     return str(click.prompt("Password", hide_input=True, confirmation_prompt=True, err=True))

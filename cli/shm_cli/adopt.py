@@ -12,6 +12,7 @@ from shm.pipeline.adopting import Wish, gap_watch
 from shm.pipeline.adopting import adopt as adopt_in_store
 from shm.report.formatting import model_class
 from shm.store import Store, StoredAdoption
+from shm.store.queries.hangers import list_adoptions, list_selected_models
 from shm_cli import completion, flags
 from shm_cli.common import answer, opened_store, progress_bar, show, show_rows
 
@@ -80,7 +81,7 @@ def adopted(ctx: click.Context, hanger_id: int | None, undone: bool) -> None:
     with opened_store(ctx) as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.hanger(hanger_id)
-        found = store.posteriors.list_adoptions(hanger_id, undone=undone)
+        found = list_adoptions(store, hanger_id, undone=undone)
         documents = [_watched(store, each) for each in found]
     if not found:
         raise NothingThere(
@@ -121,7 +122,7 @@ def drop(
         workspace.bridge.hanger(hanger_id)
         chosen = _chosen(store, hanger_id, number)
         made = store.posteriors.drop_adoption(chosen.id, why, who, utc_now())
-        model = store.posteriors.selected_models()[hanger_id]
+        model = list_selected_models(store)[hanger_id]
     answer(
         _document(made),
         f"Dropped {made.adoption.model}; hanger {hanger_id} has the class {model} again.",
@@ -130,7 +131,7 @@ def drop(
 
 def _chosen(store: Store, hanger_id: int, number: int | None) -> StoredAdoption:
     """Return the adoption asked for, or the only one; raises NothingThere or UsageError."""
-    found = store.posteriors.list_adoptions(hanger_id)
+    found = list_adoptions(store, hanger_id)
     numbers = ", ".join(str(each.id) for each in found)
     if not found:
         raise NothingThere(

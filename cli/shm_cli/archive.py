@@ -12,6 +12,7 @@ import rich_click as click
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Store, Workspace
+from shm.store.queries.recordings import find_recording
 from shm.store.retention import (
     Refused,
     Retention,
@@ -81,7 +82,7 @@ def fetch_command(ctx: click.Context, which: str) -> None:
     Example: shm archive fetch t7
     """
     with opened_store(ctx) as (workspace, store):
-        recording = store.recordings.get(store.recordings.find(which)[0])
+        recording = store.recordings.get(find_recording(store, which)[0])
         held = workspace.archive.holds_whole(recording.file)
         folder = None if held else fetch(store, workspace.archive, recording)
     file, come_from = recording.file.file_name, None if folder is None else str(folder)

@@ -22,6 +22,7 @@ from shm.store.checking import (
     unknown_files,
 )
 from shm.store.copying import TableContent
+from shm.store.queries.upkeep import list_removed_names
 from shm.store.retention import CopiedArchive, copy_archive
 from shm_cli import flags
 from shm_cli.common import (
@@ -74,7 +75,7 @@ def upgrade(ctx: click.Context) -> None:
         with waiting("upgrading the store"):
             Store.upgrade(workspace.location)
         with workspace.store() as store, counting_bar() as bar:
-            hangers = bar.track(workspace.bridge.hangers, description="summing up hangers")
+            hangers = bar.track(workspace.bridge.bars, description="summing up hangers")
             made = sum(store.posteriors.save_summaries(hanger) for hanger in hangers)
             location = store.location
     answer(
@@ -165,7 +166,7 @@ def backup(
         if target.is_dir():
             workspace.copy_description(file.parent)
         if copies is not None:
-            copied_to, removed = Archive(copies), store.upkeep.removed_names(workspace.archive)
+            copied_to, removed = Archive(copies), list_removed_names(store, workspace.archive)
             names = [name for name in archived_names(store) if name not in removed]
             copied = copy_archive(workspace.archive, copied_to, names, tell)
             noted = store.upkeep.note_copies(copied_to, datetime.now(UTC))
@@ -314,12 +315,12 @@ def _raise_troubles(troubles: Sequence[str], remedy: str) -> None:
 
 
 def _raise_lines(summary: str, findings: Iterable[object]) -> None:
-    """One finding a line, after what they amount to: for the eye, and for grep."""
+    """Raise an error with its summary, and one finding a line: for the eye, and for grep."""
     raise StoreError("\n".join((summary, *map(str, findings))))
 
 
 def _counted(count: int, what: str) -> str:
-    """`1 damaged row`, `3 faults of the file`."""
+    """Return `1 damaged row`, `3 faults of the file`."""
     if count == 1:
         return f"1 {what}"
     head, of, rest = what.partition(" of ")

@@ -36,6 +36,8 @@ from shm.report.hanger_report import hanger_paper
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.simulate.ambient import Loss, MonitoringPlan, described_stream
 from shm.store import Stage, Store, StoredAlert, Workspace
+from shm.store.queries.recordings import count_stages, list_recordings
+from shm.store.queries.streams import find_progress
 from shm.store.ring import ring_of
 from shm.values import Hanger
 from shm_cli import example, flags
@@ -52,7 +54,7 @@ _WINDOWS_A_DAY = 144
 
 
 def live_description() -> str:
-    """`bridge.toml` of the bridge, its hangers and their streams."""
+    """Return `bridge.toml` of the bridge, its hangers and their streams."""
     tables = [
         '[bridge]\nname = "Bridge that lives"',
         '[[hook]]\nname = "file"\ncommand = ["tee", "-a", "alerts.jsonl"]',
@@ -102,7 +104,7 @@ def await_windows(workspace: Workspace, store: Store, looks: Iterator[int], ends
         total = round(DAYS * _WINDOWS_A_DAY * len(names))
         task = bar.add_task("windows read, hours pooled and watched", total=total)
         for _ in looks:
-            done = [store.streams.progress(name) for name in names]
+            done = [find_progress(store, name) for name in names]
             left = [ends - at for at in done if at is not None]
             missing = sum(each / timedelta(minutes=10) for each in left)
             bar.update(task, completed=0 if len(left) < len(names) else total - missing)
@@ -158,7 +160,7 @@ def bridge_description() -> str:
         '[bridge]\nname = "Arch bridge of the demo"',
         '[[hook]]\nname = "file"\ncommand = ["tee", "-a", "alerts.jsonl"]',
         '[settings]\nworkers = 2\nmodels = "beam1,beam2"\n'
-        "spool_scan_seconds = 0.5\nspool_stable_seconds = 0.5",
+        "spool_scan_seconds = 0.5\nspool_stable_seconds = 0.5\nalert_grouping_seconds = 5",
     ]
     for number in range(1, HANGERS + 1):
         name = 'name = "measured for the thesis"\n' if number == MEASURED else ""
@@ -283,7 +285,7 @@ def command(folder: Path, live: bool) -> None:
 
 
 def _live(folder: Path) -> None:
-    """Four days of permanent sensors; then the alert of a loss of 2 %."""
+    """Simulate four days of permanent sensors, and print the alert of a loss of 2 %."""
     workspace = _fresh_workspace(folder, live_description())
     click.echo(f"Workspace {workspace.folder}: 3 hangers with permanent sensors.", err=True)
     with workspace.store() as store, _daemon(workspace) as daemon:
@@ -340,10 +342,10 @@ def _watched(store: Store, daemon: subprocess.Popen[bytes], poll_s: float = 0.3)
     """Yield how many recordings are done, every ``poll_s`` while the daemon lives."""
     deadline = time.monotonic() + _DAEMON_LIMIT_S
     while time.monotonic() < deadline and daemon.poll() is None:
-        refused = store.recordings.list_all(Stage.REFUSED)
+        refused = list_recordings(store, Stage.REFUSED)
         if refused:
             raise ShmError(f"a file of the demo was refused: {refused[0].reason}.")
-        yield store.recordings.stage_counts()[Stage.DONE]
+        yield count_stages(store)[Stage.DONE]
         time.sleep(poll_s)
     raise ShmError("the demo's daemon did not finish.", remedy="Read daemon.log in its folder.")
 
@@ -358,7 +360,7 @@ def _await_alert(store: Store, daemon: subprocess.Popen[bytes]) -> Sequence[Stor
 
 
 def _conclude(workspace: Workspace, alerts: Sequence[StoredAlert]) -> None:
-    """Says what was found and where the reports are; raises ShmError without the alert."""
+    """Print the result and the paths of the reports; raises ShmError without the alert."""
     for stored in alerts:
         click.echo(f"ALERT {stored.alert.message}")
     if LOSING not in {stored.alert.hanger for stored in alerts}:

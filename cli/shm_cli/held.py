@@ -17,6 +17,8 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Decision, Exclusion, Hold, Stage, Store, StoredAlert, Workspace
 from shm.store.holding import discarded_reason, taking_back
+from shm.store.queries.history import list_former_tests
+from shm.store.queries.recordings import find_latest_hold, find_recording, list_holds
 from shm_cli import flags
 from shm_cli.common import paragraph, show
 
@@ -24,7 +26,7 @@ from shm_cli.common import paragraph, show
 def show_held(workspace: Workspace) -> int:
     """List the recordings that wait for a decision."""
     with workspace.store() as store:
-        found = store.recordings.list_holds()
+        found = list_holds(store)
     if flags.wants_json():
         show({"held": [hold_document(hold) for hold in found]}, "held")
         return 0
@@ -64,10 +66,10 @@ def decide(
     who, why = record[0] or getpass.getuser(), record[1] or ""
     with workspace.store() as store:
         known = {stored.id for stored in store.alerts.list_all()}
-        recording_id, test = store.recordings.find(which)
+        recording_id, test = find_recording(store, which)
         held = _is_held(store, recording_id, test)
         if held and test is not None:
-            _refuse_part(store.recordings.latest_hold(recording_id), test, decision)
+            _refuse_part(find_latest_hold(store, recording_id), test, decision)
         if not held:
             _refuse_without_reason(store, recording_id, decision, why)
         exclusion = None
@@ -76,7 +78,7 @@ def decide(
             hold = exclusion.hold
         else:
             if held:
-                _refuse_copy_without_reason(store.recordings.latest_hold(recording_id), why)
+                _refuse_copy_without_reason(find_latest_hold(store, recording_id), why)
             hold = store.recordings.accept(recording_id, who, why, utc_now(), time, test)
             if held:
                 learn_from_answer(workspace, store, hold)
@@ -88,10 +90,12 @@ def decide(
 
 def _is_held(store: Store, recording_id: int, test: str | None) -> bool:
     """Return True if the recording, or that test of it, waits for a decision."""
-    hold = store.recordings.latest_hold(recording_id)
+    hold = find_latest_hold(store, recording_id)
     if hold is None or hold.decision is not None:
         return False
-    present = [each for each in store.tests.list_former(recording_id) if each.superseded_at is None]
+    present = [
+        each for each in list_former_tests(store, recording_id) if each.superseded_at is None
+    ]
     return test is None or any(t.name == test and t.stage is Stage.HELD for t in present)
 
 
@@ -112,7 +116,7 @@ def _refuse_part(hold: Hold | None, test: str, decision: Decision) -> None:
 
 def _refuse_without_reason(store: Store, recording_id: int, decision: Decision, why: str) -> None:
     """Require a reason to reverse a decision or to exclude a used recording."""
-    recording, hold = store.recordings.get(recording_id), store.recordings.latest_hold(recording_id)
+    recording, hold = store.recordings.get(recording_id), find_latest_hold(store, recording_id)
     confirms = decision is Decision.CONFIRMED
     is_out = hold is not None and hold.is_out
     if why or (not is_out if confirms else recording.stage is Stage.REFUSED):
@@ -126,7 +130,7 @@ def _refuse_without_reason(store: Store, recording_id: int, decision: Decision, 
 
 
 def _refuse_copy_without_reason(hold: Hold | None, why: str) -> None:
-    """One impact that counts twice confirms itself: that is not done by one word."""
+    """Refuse to accept a copy without a reason: an impact that counts twice confirms itself."""
     copies = [d for test in (hold.tests if hold else ()) for d in test.doubts if d.check == "copy"]
     if copies and not why and hold is not None and hold.decision is None:
         raise UsageError(

@@ -32,16 +32,11 @@ from shm.store import (
     Workspace,
 )
 from shm.store.archive import refuse_oversize
+from shm.store.queries.recordings import find_discard
 from shm.values import Alert
 from shm_cli import flags
 from shm_cli.common import is_workspace, open_workspace, show, show_rows
-from shm_cli.held import (
-    decide,
-    decided_words,
-    discarded_words,
-    hold_document,
-    show_held,
-)
+from shm_cli.held import decide, decided_words, discarded_words, hold_document, show_held
 from shm_cli.working import finish, rerun_document, send_back, working
 
 
@@ -187,7 +182,7 @@ def _again(workspace: Workspace, which: str, stage: Stage) -> int:
 def _ingest(
     workspace: Workspace, files: Sequence[Path]
 ) -> tuple[dict[Path, Receipt], list[dict[str, object]]]:
-    """Receipts of the files that could be taken in, rows of those that could not."""
+    """Return receipts of the files taken in, and rows of the refused ones."""
     with working(workspace) as flow:
         receipts, unreadable = _received(flow, files)
         finish(flow, [receipt.recording.id for receipt in receipts.values()])
@@ -213,7 +208,7 @@ def _received(
 
 def _row_of(store: Store, path: Path, receipt: Receipt) -> dict[str, object]:
     row = _row(path, receipt.outcome, store.recordings.get(receipt.recording.id))
-    hold = store.recordings.discard_in_force(receipt.recording.id)
+    hold = find_discard(store, receipt.recording.id)
     if receipt.outcome is Outcome.DISCARDED and hold is not None:
         row |= {"outcome": Outcome.DISCARDED.value, "reason": discarded_words(hold)}
     return row
@@ -236,7 +231,7 @@ _REFUSED = "refused"
 
 
 def _sentence(reason: Mapping[str, Any]) -> str:
-    """Line and channel where they are known, what is wrong, what to do."""
+    """Return line and channel where known, the error and the remedy."""
     line = f"line {reason['line']}: " if reason["line"] is not None else ""
     channel = f"channel {reason['channel']}: " if reason["channel"] else ""
     return f"{line}{channel}{reason['message']} {reason['remedy']}".strip()

@@ -9,6 +9,7 @@ import rich_click as click
 
 from shm.errors import UsageError
 from shm.pipeline import utc_now
+from shm.store.queries.history import list_changes
 from shm.values.notes import NoteKind
 from shm_cli import flags
 from shm_cli.common import answer, opened_store, show_rows
@@ -109,7 +110,7 @@ def audit(ctx: click.Context, limit: int | None) -> None:
     Example: shm audit --limit 20
     """
     with opened_store(ctx) as (_, store):
-        rows = store.journal.list_changes(limit)
+        rows = list_changes(store, limit)
     if flags.wants_json() or not rows:
         answer({"changes": [vars(each) for each in rows]}, "Nothing was changed.")
         return

@@ -20,28 +20,40 @@ from shm.documents import creep_document
 from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
+from shm.pipeline.controls import control_charts
 from shm.pipeline.telling import quiet_until
 from shm.pipeline.unheard import stream_leads
+from shm.report.control_report import chart_document
 from shm.report.formatting import Interval, model_class, with_half
 from shm.report.hanger_status import Status, bridge_message
 from shm.report.hanger_summary import HangerSummary
 from shm.report.open_warnings import dated_by_receipt
-from shm.store import (
-    ENDED,
-    Decision,
-    DeliveryState,
-    Store,
-    Workspace,
-)
+from shm.store import ENDED, Decision, DeliveryState, Store, Workspace
 from shm.store.point_outbox import PointOutbox
-from shm.store.stored_alerts import said_of
+from shm.store.queries.alerts import count_deliveries, count_open_alerts
+from shm.store.queries.hangers import (
+    find_latest_watches,
+    list_adoptions,
+    list_baselines_in_force,
+    list_detections,
+    list_selected_models,
+)
+from shm.store.queries.history import list_events, list_former_tests, list_steps
+from shm.store.queries.recordings import (
+    count_stages,
+    find_oldest_waiting,
+    find_recording,
+    list_holds,
+)
+from shm.store.queries.tests import count_tests, list_baseline_tests, list_undated_names
+from shm.store.stored_alerts import describe_silence
 from shm.values import Summary
 from shm.values.rounding import ForceUnit, force_unit, rounded_percent
-from shm.watch.change_words import frequency_words
+from shm.watch.alert_text import frequency_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document
-from shm_daemon.heartbeat import seconds_since_beat, told, why_turn_failed
+from shm_daemon.heartbeat import duration_words, seconds_since_beat, why_turn_failed
 from shm_daemon.spool import never_taken, scan
 
 if TYPE_CHECKING:
@@ -93,6 +105,8 @@ def command(ctx: click.Context, which: str | None) -> None:
         if row["left_out"]:
             text = "; ".join(row["left_out"])
             click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {text}"))
+    for row in document["controls"]:
+        click.echo(paragraph(f"{row['state']} {row['action']}"))
     for row in document["structures"]:
         click.echo(paragraph(_structure_line(row)))
 
@@ -101,7 +115,9 @@ def _show(document: dict[str, Any]) -> None:
     recordings = ", ".join(f"{n} {stage}" for stage, n in document["recordings"].items() if n)
     daemon, deliveries, now = document["daemon"], document["deliveries"], utc_now()
     ago = (
-        f", last seen {told(now - daemon['seen_at'])} ago" if daemon["seen_at"] else ", never seen"
+        f", last seen {duration_words(now - daemon['seen_at'])} ago"
+        if daemon["seen_at"]
+        else ", never seen"
     )
     oldest = document["oldest_waiting_at"]
     since = f", the oldest since {oldest:%Y-%m-%d %H:%M}" if oldest else ""
@@ -180,7 +196,7 @@ def _structure_line(row: Mapping[str, Any]) -> str:
 
 
 def _held_lines(held: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Of each hanger how many are held, and the one whose modes say most."""
+    """Return for each hanger the number held, and the one whose modes show most."""
     of_hangers: dict[int, list[Mapping[str, Any]]] = {}
     for each in held:
         of_hangers.setdefault(each["hanger"], []).append(each)
@@ -236,11 +252,11 @@ def _by_reason(not_applicable: Mapping[str, str]) -> dict[str, list[str]]:
 
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
-    alerts, deliveries = store.alerts.list_all(), store.alerts.delivery_counts()
-    open_at = Counter(store.alerts.open_counts())
-    counts = store.recordings.stage_counts()
+    alerts, deliveries = store.alerts.list_all(), count_deliveries(store)
+    open_at = Counter(count_open_alerts(store))
+    counts = count_stages(store)
     ended = sum(counts[stage] for stage in ENDED)
-    held, now = store.recordings.list_holds(), utc_now()
+    held, now = list_holds(store), utc_now()
     lines = {each.hanger.id: each for each in hanger_summaries(workspace, store, now)}
     of_hangers = Counter(hold.hanger for hold in held)
     message = bridge_message({id_: each.message for id_, each in lines.items()})
@@ -249,7 +265,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "daemon": _daemon(workspace),
         "recordings": counts,
         "under_way": sum(counts.values()) - ended,
-        "oldest_waiting_at": store.recordings.oldest_waiting(),
+        "oldest_waiting_at": find_oldest_waiting(store),
         "spool": len(scan(workspace.spool)),
         "never_taken": [
             {"path": str(path.relative_to(workspace.spool)), "what": what}
@@ -261,7 +277,9 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
         "quiet_hours": _quiet(workspace, store, now),
-        "silences": [said_of(each) for each in store.silences.list_all() if each.is_in_force(now)],
+        "silences": [
+            describe_silence(each) for each in store.silences.list_all() if each.is_in_force(now)
+        ],
         "streams": [each.words for each in stream_leads(workspace, store, now)],
         "publications": [
             f"publish {each.name}: {words}"
@@ -271,6 +289,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
         "changed_settings": [str(each) for each in store.settings.list_current().values()],
+        "controls": [chart_document(each) for each in control_charts(workspace, store)],
         "structures": _structures(workspace, store, open_at),
         "message": {**message.document, "others": message.others},
         "hangers": _hangers(workspace, store, lines, open_at, of_hangers),
@@ -297,11 +316,11 @@ def _structures(
     workspace: Workspace, store: Store, open_alerts: Mapping[int, int]
 ) -> list[dict[str, Any]]:
     """Show structures without a model, of which only frequencies are watched."""
-    latest, rows, undated = store.tests.latest(), [], store.tests.names_without_time()
+    latest, rows, undated = count_tests(store), [], list_undated_names(store)
     for each in workspace.bridge.structures:
         found, baseline = latest.get(each.id), store.watch.baseline(each.id)
-        of_baseline = store.tests.of_baseline(baseline) if baseline else ()
-        watched = store.watch.list_detected(baseline.hanger, baseline.id) if baseline else ()
+        of_baseline = list_baseline_tests(store, baseline) if baseline else ()
+        watched = list_detections(store, baseline.hanger, baseline.id) if baseline else ()
         rows.append(
             {
                 "structure": each.id,
@@ -324,12 +343,12 @@ def _hangers(
     open_alerts: Mapping[int, int],
     held: Mapping[int, int],
 ) -> list[dict[str, Any]]:
-    models, latest, rows = store.posteriors.selected_models(), store.tests.latest(), []
-    baselines = store.watch.baselines_in_force(workspace.bridge.hangers)
-    watches = store.watch.latest()
+    models, latest, rows = list_selected_models(store), count_tests(store), []
+    baselines = list_baselines_in_force(store, workspace.bridge.hangers)
+    watches = find_latest_watches(store)
     for hanger in workspace.bridge.hangers:
         found, baseline = latest.get(hanger.id), baselines.get(hanger.id)
-        adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger.id)]
+        adopted = [each.adoption.model for each in list_adoptions(store, hanger.id)]
         gap = _gap(store, hanger.id) if adopted else None
         check = baseline.check if baseline else None
         names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])
@@ -362,15 +381,15 @@ _OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
 
 
 def show_stages(ctx: click.Context, which: str) -> None:
-    """Raise NothingThere where there is no such recording or test."""
+    """Print the stages of a recording or test; raises NothingThere where there is none."""
     with opened_store(ctx) as (_, store):
-        recording_id, _ = store.recordings.find(which)
+        recording_id, _ = find_recording(store, which)
         recording = store.recordings.get(recording_id)
         steps, tests = (
-            store.journal.list_steps(recording_id),
-            store.tests.list_former(recording_id),
+            list_steps(store, recording_id),
+            list_former_tests(store, recording_id),
         )
-        noticed = store.journal.list_events(recording_id=recording_id)
+        noticed = list_events(store, recording_id=recording_id)
         names = dict.fromkeys(event.file_name for event in noticed)
         other_names = [name for name in names if name != recording.file.file_name]
     if flags.wants_json():
@@ -386,7 +405,8 @@ def show_stages(ctx: click.Context, which: str) -> None:
                     for event in noticed
                 ],
                 "results": [asdict(test) for test in tests],
-            }
+            },
+            "recording_stages",
         )
         return
     also = f" (also came as {', '.join(other_names)})" if other_names else ""

@@ -13,6 +13,8 @@ import rich_click as click
 from shm.errors import NothingThere, StoreBusy
 from shm.pipeline import Flow, utc_now
 from shm.store import ENDED, Rerun, Stage, Store, Workspace
+from shm.store.queries.recordings import find_recording
+from shm.store.queries.upkeep import list_removed
 from shm_cli.common import counting_bar
 from shm_daemon.execution import children_ended, executor_of
 from shm_daemon.hooks import HookNotifier
@@ -28,7 +30,12 @@ def working(workspace: Workspace) -> Iterator[Flow]:
         stack.enter_context(children_ended())
         executor = executor_of(settings)
         stack.callback(executor.shutdown, wait=False, cancel_futures=True)
-        notifier = HookNotifier(workspace.folder, settings.hook_timeout_seconds, os.environ)
+        notifier = HookNotifier(
+            workspace.folder,
+            settings.hook_timeout_seconds,
+            os.environ,
+            settings.pages_address,
+        )
         stack.callback(notifier.close)
         flow = Flow(workspace, store, executor, notifier=notifier, lanes=settings.workers)
         stack.callback(flow.close)
@@ -36,7 +43,7 @@ def working(workspace: Workspace) -> Iterator[Flow]:
 
 
 def finish(flow: Flow, ids: Sequence[int]) -> None:
-    """Works until nothing waits, and counts the recordings that are through."""
+    """Work until no recording waits, and print how many are done."""
     with counting_bar() as bar:
         task = bar.add_task("ingesting", total=len(ids))
 
@@ -54,7 +61,7 @@ def finish(flow: Flow, ids: Sequence[int]) -> None:
 
 
 def finish_now(workspace: Workspace, recording_id: int) -> None:
-    """Works until a recording is through, or leaves that to the daemon at work."""
+    """Work until a recording is done, or leave that to the daemon at work."""
     try:
         with working(workspace) as flow:
             finish(flow, [recording_id])
@@ -63,13 +70,13 @@ def finish_now(workspace: Workspace, recording_id: int) -> None:
 
 
 def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
-    """Supersedes what was made of it and does it again, or leaves that to the daemon at work.
+    """Supersede results and recompute them, or leave that to the daemon at work.
 
-    `which` is a recording's number or a test's name. Raises NothingThere, UsageError; then nothing
-    is superseded.
+    `which` is a recording's number or a test's name. Raises NothingThere, UsageError; then
+    nothing is superseded.
     """
     with workspace.store() as store:
-        recording_id, test = store.recordings.find(which)
+        recording_id, test = find_recording(store, which)
         if stage is Stage.IDENTIFIED:
             _refuse_without_raw_file(workspace, store, recording_id)
         rerun = store.recordings.rerun(recording_id, stage, utc_now(), test)
@@ -87,7 +94,7 @@ def _refuse_without_raw_file(workspace: Workspace, store: Store, recording_id: i
     file = store.recordings.get(recording_id).file
     if workspace.archive.holds(file):
         return workspace.archive.refuse_damaged(file)
-    folder = store.upkeep.removed_to().get(recording_id)
+    folder = list_removed(store).get(recording_id)
     lies = f"; a copy lies in {folder}" if folder else ""
     raise NothingThere(
         f"the raw file {file.file_name} is no longer in the archive{lies}.",

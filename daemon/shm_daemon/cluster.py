@@ -69,7 +69,7 @@ class Cluster(Executor):
 
 
 def traits() -> dict[str, str]:
-    """What must be the same wherever a step runs, lest its result differ in the last digits."""
+    """Return versions that must be the same wherever a step runs, for equal results to the bit."""
     return {
         "shm": shm.__version__,
         "Python": platform.python_version(),

@@ -37,7 +37,7 @@ from shm.store.stored_alerts import silenced_until
 from shm.store.workspace import FOLDERS
 from shm_daemon import doctor_checks as of_store
 from shm_daemon.doctor_checks import Finding, Level, fault, ok, some, unknown, warning
-from shm_daemon.heartbeat import NEARLY_FULL, told
+from shm_daemon.heartbeat import NEARLY_FULL, duration_words
 from shm_daemon.hooks import HookFailed, HookNotifier
 from shm_daemon.web.other_bridges import ask_all
 
@@ -47,7 +47,7 @@ _REMEMBERED = timedelta(days=30)  # judgement: a month, within which an operator
 
 
 def check_hooks(workspace: Workspace) -> Iterator[Finding]:
-    """Whether the described hooks could be run; nothing is sent. Needs no store."""
+    """Check whether the described hooks could be run; nothing is sent. Needs no store."""
     if not workspace.bridge.hooks:
         yield warning("hooks", "none is described: nobody is told of alerts", "See docs/alerts.md.")
     timeout_s = workspace.settings.hook_timeout_seconds
@@ -88,7 +88,7 @@ def check_single_sign_on(workspace: Workspace) -> Iterator[Finding]:
 
 
 def check_other_bridges(workspace: Workspace) -> Iterator[Finding]:
-    """Whether the dashboards of other bridges answer; nothing where none is named."""
+    """Check whether the dashboards of other bridges answer; nothing where none is named."""
     others = workspace.bridge.other_bridges
     for other, row in zip(others, ask_all(others, workspace.folder), strict=True):
         check = f"bridge {other.name}"
@@ -114,7 +114,7 @@ def check_publications(examined: of_store.Examined) -> Iterator[Finding]:
 
 
 def check_logo(workspace: Workspace) -> Iterator[Finding]:
-    """Whether the logo of the reports can be read; nothing where none is named."""
+    """Check whether the logo of the reports can be read; nothing where none is named."""
     path = workspace.bridge.letterhead.logo
     if why := read_logo(path).fault:
         yield warning("logo", f"reports are made w{why[1:]}", f"Put it at {path}.")
@@ -123,7 +123,7 @@ def check_logo(workspace: Workspace) -> Iterator[Finding]:
 
 
 def check_deliveries(examined: of_store.Examined) -> Iterator[Finding]:
-    """Whether alerts wait for their hooks, or were given up."""
+    """Check whether alerts wait for their hooks, or were given up."""
     store, now = examined.store, examined.now
     waiting = store.alerts.list_deliveries(DeliveryState.WAITING)
     bridge, silences = examined.workspace.bridge, store.silences.list_all()
@@ -143,7 +143,7 @@ def check_deliveries(examined: of_store.Examined) -> Iterator[Finding]:
         last = lost[-1]
         yield warning(
             "deliveries",
-            f"{len(lost)} were given up in the last {told(_REMEMBERED)}; {last.hook}: "
+            f"{len(lost)} were given up in the last {duration_words(_REMEMBERED)}; {last.hook}: "
             f"{last.last_error}",
             "See `shm alerts` for what nobody was told of, and mend the hook.",
         )
@@ -154,7 +154,7 @@ def check_deliveries(examined: of_store.Examined) -> Iterator[Finding]:
 def _is_late(
     delivery: Delivery, silences: tuple[Silence, ...], bridge: Bridge, now: datetime
 ) -> bool:
-    """Whether a delivery waits long, and nothing that people asked for keeps it."""
+    """Return True if a delivery waits long, and nothing that people asked for keeps it."""
     if any(quiet_until(delivery, bridge.hooks, at) for at in (now, now - of_store.WAITS_LONG)):
         return False
     if delivery.message_id is not None:
@@ -202,7 +202,7 @@ _REPORT = "This is a fault of shm; please report it."
 
 
 def examine(folder: Path, now: datetime) -> tuple[Finding, ...]:
-    """What all checks of a workspace find; those that need what is broken are left out."""
+    """Run all checks of a workspace; those that need what is broken are left out."""
     folder = folder.resolve()
     findings = [*_found("versions", check_versions)]
     if not folder.is_dir():
@@ -268,7 +268,7 @@ _SHOWN = ("numpy", "scipy", "sqlalchemy")
 
 
 def check_versions() -> Iterator[Finding]:
-    """What results depend on."""
+    """List the versions on which results depend."""
     libraries = ", ".join(f"{name} {version(name)}" for name in _SHOWN)
     yield ok(
         "versions",
@@ -278,7 +278,7 @@ def check_versions() -> Iterator[Finding]:
 
 
 def check_extras(workspace: Workspace) -> Iterator[Finding]:
-    """Whether what the settings call for is installed."""
+    """Check whether what the settings call for is installed."""
     installed = [extra for extra, modules in _MODULES.items() if all(map(find_spec, modules))]
     settings, hooks = workspace.settings, workspace.bridge.hooks
     needed = {
@@ -298,7 +298,7 @@ def check_extras(workspace: Workspace) -> Iterator[Finding]:
 
 
 def check_models(workspace: Workspace) -> Iterator[Finding]:
-    """Whether each hanger has a model class; raises UsageError, as the daemon does."""
+    """Check whether each hanger has a model class; raises UsageError, as the daemon does."""
     names = workspace.settings.model_names
     for hanger in workspace.bridge.hangers:
         competing_names(hanger, names)
@@ -306,9 +306,9 @@ def check_models(workspace: Workspace) -> Iterator[Finding]:
 
 
 def check_confinement() -> Iterator[Finding]:
-    """Whether files of others are read within all bounds that we know; ShmError where they cannot.
+    """Check whether files of others are read within all bounds that we know.
 
-    A file is read by a child process here, as the daemon's are.
+    Raises ShmError where they cannot. A file is read by a child process here, as the daemon's are.
     """
     missing = sandbox.missing_bounds()
     for name, why in missing.items():
@@ -322,7 +322,7 @@ def check_confinement() -> Iterator[Finding]:
 
 
 def check_folders(folder: Path) -> Iterator[Finding]:
-    """Whether the folders of a workspace are there and we may write in them."""
+    """Check whether the folders of a workspace are there and we may write in them."""
     missing = [name for name in FOLDERS if not (folder / name).is_dir()]
     if missing:
         yield fault(
@@ -361,7 +361,7 @@ def _owner(folder: Path) -> Iterator[Finding]:
 
 
 def check_disks(folder: Path, settings: Settings) -> Iterator[Finding]:
-    """Whether there is room wherever we write."""
+    """Check whether there is room wherever we write."""
     places = {
         "workspace": folder,
         "archive": folder / "archive",

@@ -1,5 +1,6 @@
-"""What a check finds: whether the work flows (daemon, spool, what is under way, quarantine, raw
-files), and whether store, backups, clock, hangers, streams and settings are in order.
+"""Check the work (daemon, spool, recordings, quarantine, raw files) and its store.
+
+Also backups, clock, hangers, streams and settings.
 """
 
 from __future__ import annotations
@@ -18,7 +19,11 @@ from shm.pipeline.unheard import REMEDIES, backlog_leads, heard, ring_leads
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
-from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
+from shm.store.queries.hangers import list_selected_models
+from shm.store.queries.recordings import count_stages, list_holds, list_recordings, list_under_way
+from shm.store.queries.tests import count_tests
+from shm.store.queries.upkeep import find_last_backup, find_newest_step, list_copies, list_removed
+from shm_daemon.heartbeat import duration_words, patience_s, seconds_since_beat, why_turn_failed
 from shm_daemon.spool import is_sidecar, left_alone, never_taken, scan
 
 # Judgement: a step takes seconds to minutes, so that work which stands for longer than these is
@@ -39,7 +44,7 @@ _SYNCHRONISED = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]
 
 
 class Level(StrEnum):
-    """How a finding is to be taken; `unknown` is what could not be looked at."""
+    """Level of a finding; `unknown` is what could not be looked at."""
 
     OK = "ok"
     UNKNOWN = "unknown"
@@ -49,7 +54,7 @@ class Level(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What one check found, and what to do where that is not well."""
+    """Finding of one check, and what to do where that is not well."""
 
     check: str
     level: Level
@@ -59,7 +64,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Examined:
-    """What the checks look at: an open workspace with its open store, and the time."""
+    """Subject of the checks: an open workspace with its open store, and the time."""
 
     workspace: Workspace
     store: Store
@@ -97,10 +102,14 @@ def some(names: list[str], most: int = 5) -> str:
 
 
 def check_daemon(examined: Examined) -> Iterator[Finding]:
-    """Whether a daemon is active, and its loop goes round."""
+    """Check whether a daemon is active, and its loop goes round."""
     workspace = examined.workspace
     holder, ago_s = workspace.holder(), seconds_since_beat(workspace)
-    seen = "never seen here" if ago_s is None else f"last seen {told(timedelta(seconds=ago_s))} ago"
+    seen = (
+        "never seen here"
+        if ago_s is None
+        else f"last seen {duration_words(timedelta(seconds=ago_s))} ago"
+    )
     if holder is None:
         yield warning("daemon", f"none is active, {seen}", _BEGIN)
     elif ago_s is None or ago_s > patience_s(workspace):
@@ -116,13 +125,15 @@ def check_daemon(examined: Examined) -> Iterator[Finding]:
 
 
 def check_spool(examined: Examined) -> Iterator[Finding]:
-    """Whether files wait in the spool, or lie there for ever."""
+    """Check whether files wait in the spool, or lie there for ever."""
     spool = examined.workspace.spool
     ages = [_age(path, examined.now) for path in scan(spool)]
     if not ages:
         yield ok("spool", "empty")
     else:
-        found = f"{counted(len(ages), 'file')} in the queue, the oldest for {told(max(ages))}"
+        found = (
+            f"{counted(len(ages), 'file')} in the queue, the oldest for {duration_words(max(ages))}"
+        )
         late = max(ages) > WAITS_LONG
         remedy = "Is a daemon active, and what does its log say of these files?"
         yield warning("spool", found, remedy) if late else ok("spool", found)
@@ -152,23 +163,23 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
 
 
 def check_under_way(examined: Examined) -> Iterator[Finding]:
-    """Whether a recording has been standing still."""
+    """Check whether a recording has been standing still."""
     store, now = examined.store, examined.now
     unready = _without_baseline(examined)
     standing = [
         each
-        for each in store.recordings.list_under_way()
+        for each in list_under_way(store)
         if each.stage is Stage.RECEIVED or each.hanger not in unready
     ]
     if not standing:
         yield ok("recordings", "none is on its way")
         return
     oldest = min(standing, key=lambda each: each.since)
-    newest_at = store.upkeep.newest_row_at() or now
+    newest_at = find_newest_step(store) or now
     waits, idle = now - oldest.since, now - newest_at
     found = (
         f"{len(standing)} on their way; {oldest.file_name} (recording {oldest.id}) has been "
-        f"{oldest.stage} for {told(waits)}"
+        f"{oldest.stage} for {duration_words(waits)}"
     )
     if waits > _STUCK_BEHIND_OTHERS or (waits > _STUCK and idle > _NOTHING_MOVES):
         remedy = f"See the daemon's log, then `shm ingest --again {oldest.id}`."
@@ -178,7 +189,7 @@ def check_under_way(examined: Examined) -> Iterator[Finding]:
 
 
 def check_quarantine(examined: Examined) -> Iterator[Finding]:
-    """Which files were refused, and since when."""
+    """Check which files were refused, and since when."""
     folder = examined.workspace.quarantine.folder
     reasons = sorted(folder.glob("*.reason.json"), key=lambda path: path.stat().st_mtime)
     if not reasons:
@@ -192,18 +203,19 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
         why = reasons[-1].name
     yield warning(
         "quarantine",
-        f"{counted(len(reasons), 'file')} since {told(first)}, the latest {told(last)} ago: {why}",
+        f"{counted(len(reasons), 'file')} since {duration_words(first)},"
+        f" the latest {duration_words(last)} ago: {why}",
         "Mend and drop them again, or `shm archive prune --quarantine-days 90`.",
     )
 
 
 def check_held(examined: Examined) -> Iterator[Finding]:
-    """Whether recordings wait for a person to decide."""
-    found = examined.store.recordings.list_holds()
+    """Check whether recordings wait for a person to decide."""
+    found = list_holds(examined.store)
     if not found:
         yield ok("held", "nothing waits for you to decide")
         return
-    since = told(max(examined.now - found[0].held_at, timedelta(0)))
+    since = duration_words(max(examined.now - found[0].held_at, timedelta(0)))
     yield warning(
         "held",
         f"{counted(len(found), 'recording')}, the first for {since}: {found[0].file_name}",
@@ -212,10 +224,10 @@ def check_held(examined: Examined) -> Iterator[Finding]:
 
 
 def check_raw_files(examined: Examined) -> Iterator[Finding]:
-    """Whether the raw files of the latest recordings are where the store says."""
+    """Check whether the raw files of the latest recordings are where the store says."""
     store, archive = examined.store, examined.workspace.archive
-    latest = store.recordings.list_all()[-_LOOKED_AT:]
-    away = store.upkeep.removed_to()
+    latest = list_recordings(store)[-_LOOKED_AT:]
+    away = list_removed(store)
     missing = [r.file.file_name for r in latest if not archive.holds(r.file) and r.id not in away]
     if missing:
         yield fault(
@@ -232,13 +244,13 @@ def check_raw_files(examined: Examined) -> Iterator[Finding]:
 def _without_baseline(examined: Examined) -> set[int]:
     """Hangers whose tests rightly wait until there are enough of them for a baseline."""
     wanted = examined.workspace.settings.baseline_tests
-    selected = examined.store.posteriors.selected_models()
-    latest = examined.store.tests.latest().items()
+    selected = list_selected_models(examined.store)
+    latest = count_tests(examined.store).items()
     return {id_ for id_, found in latest if id_ not in selected and found.tests < wanted}
 
 
 def _age(path: Path, now: datetime) -> timedelta:
-    """How long a file has been where it is; its own times come from wherever it was made."""
+    """Return how long a file has been where it is; its own times come from wherever it was made."""
     try:
         since = datetime.fromtimestamp(path.lstat().st_ctime, UTC)
     except FileNotFoundError:
@@ -247,7 +259,7 @@ def _age(path: Path, now: datetime) -> timedelta:
 
 
 def check_store(examined: Examined) -> Iterator[Finding]:
-    """Whether the store is whole, as far as a quick look tells."""
+    """Check whether the store is whole, as far as a quick look tells."""
     store = examined.store
     troubles = quick_troubles(store)
     if troubles:
@@ -257,7 +269,7 @@ def check_store(examined: Examined) -> Iterator[Finding]:
             "Stop the daemon, then `shm db restore FILE --replace`.",
         )
     else:
-        held = sum(store.recordings.stage_counts().values())
+        held = sum(count_stages(store).values())
         kind = store.engine.dialect.name
         yield ok(
             "store", f"{store.location} ({kind}), present schema, {counted(held, 'recording')}"
@@ -265,29 +277,30 @@ def check_store(examined: Examined) -> Iterator[Finding]:
 
 
 def check_backup(examined: Examined) -> Iterator[Finding]:
-    """How old the last backup is, and how many raw files have no copy."""
+    """Check how old the last backup is, and how many raw files have no copy."""
     store, now = examined.store, examined.now
-    last = store.upkeep.last_backup()
+    last = find_last_backup(store)
     remedy = "`shm db backup FILE --archive DIR`, best every night."
     if last is None:
         yield warning("backup", "never made here", remedy)
     else:
-        found = f"{last[1]}, {told(now - last[0])} ago"
+        found = f"{last[1]}, {duration_words(now - last[0])} ago"
         late = now - last[0] > timedelta(days=examined.workspace.settings.backup_days)
         yield warning("backup", found, remedy) if late else ok("backup", found)
-    copied = {copy.recording_id for copy in store.upkeep.list_copies()}
-    alone = sum(recording.id not in copied for recording in store.recordings.list_all())
+    copied = {copy.recording_id for copy in list_copies(store)}
+    alone = sum(recording.id not in copied for recording in list_recordings(store))
     if last is not None and alone:
         yield warning("backup", f"raw files without a copy elsewhere: {alone}", remedy)
 
 
 def check_clock(examined: Examined) -> Iterator[Finding]:
-    """Whether the clock has jumped back, and whether anything sets it."""
-    newest, now = examined.store.upkeep.newest_row_at(), examined.now
+    """Check whether the clock has jumped back, and whether anything sets it."""
+    newest, now = find_newest_step(examined.store), examined.now
     if newest is not None and newest - now > _CLOCK_TOLERANCE:
         yield fault(
             "clock",
-            f"it says {now:%Y-%m-%d %H:%M} UTC, {told(newest - now)} before the newest row",
+            f"it says {now:%Y-%m-%d %H:%M} UTC, "
+            f"{duration_words(newest - now)} before the newest row",
             "Set it; tests without a time of their own are dated by it.",
         )
     said = _synchronised()
@@ -300,10 +313,10 @@ def check_clock(examined: Examined) -> Iterator[Finding]:
 
 
 def check_hangers(examined: Examined) -> Iterator[Finding]:
-    """Which hangers have no test, none lately, or no baseline."""
+    """Check which hangers have no test, none lately, or no baseline."""
     store, bridge = examined.store, examined.workspace.bridge
-    settings, latest = examined.workspace.settings, store.tests.latest()
-    selected = store.posteriors.selected_models()
+    settings, latest = examined.workspace.settings, count_tests(store)
+    selected = list_selected_models(store)
     ids = [hanger.id for hanger in bridge.hangers]
     never = [str(each) for each in ids if each not in latest]
     before = examined.now - timedelta(days=settings.quiet_days)
@@ -370,13 +383,13 @@ def check_streams(examined: Examined) -> Iterator[Finding]:
 
 
 def check_changed_settings(examined: Examined) -> Iterator[Finding]:
-    """Who reads `bridge.toml` must learn what holds instead of it."""
+    """List settings that hold instead of `bridge.toml`: who reads it must learn of them."""
     changed = examined.store.settings.list_current().values()
     yield ok("settings", "; ".join(map(str, changed)) or "all as bridge.toml says")
 
 
 def _synchronised() -> bool | None:
-    """Whether a service keeps the clock right; None where nobody can tell."""
+    """Return True if a service keeps the clock right; None where nobody can tell."""
     if shutil.which(_SYNCHRONISED[0]) is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""Where steps run: processes of our own, of which each may die for itself, or a cluster."""
+"""Executors of steps: processes of our own, of which each may die for itself, or a cluster."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def turn_failed(workspace: Workspace, why: str) -> None:
 
 
 def why_turn_failed(workspace: Workspace) -> str:
-    """Why the daemon's last turn failed; empty where it went well."""
+    """Return why the daemon's last turn failed; empty where it went well."""
     try:
         return (workspace.folder / HEARTBEAT).read_text(encoding="utf-8")
     except (OSError, ValueError):
@@ -80,14 +80,14 @@ def tell_systemd(*said: str) -> None:
 
 
 def longest_wait_s() -> float:
-    """How long the loop may rest between two signs: systemd ends a service that gives none."""
+    """Return the longest rest between two signs: systemd ends a service that gives none."""
     limit_us = os.environ.get("WATCHDOG_USEC", "")
     asked_s = int(limit_us) / 1e6 / _BEATS_A_WATCHDOG if limit_us.isdecimal() else math.inf
     return min(asked_s, LONGEST_REST_S)
 
 
 def seconds_since_beat(workspace: Workspace) -> float | None:
-    """How long ago the loop last went round; None where it never did."""
+    """Return how long ago the loop last went round; None where it never did."""
     try:
         return max(0.0, time.time() - (workspace.folder / HEARTBEAT).stat().st_mtime)
     except OSError:
@@ -99,8 +99,8 @@ def patience_s(workspace: Workspace) -> float:
     return _PATIENCE_S + 2 * workspace.settings.spool_scan_seconds
 
 
-def told(age: timedelta) -> str:
-    """A duration as people say it."""
+def duration_words(age: timedelta) -> str:
+    """Return a duration in words: `3 d`, `5 h`, `12 min`, `7 s`."""
     seconds = age.total_seconds()
     for size, unit in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 2 * size:

@@ -1,4 +1,4 @@
-"""What the daemon tells: a line of text or a JSON object for each thing that happens.
+"""Log of the daemon: a line of text or a JSON object for each thing that happens.
 
 Fields that programs look for (recording, file, hanger, test, stage, hook, alert) come with the
 record, by `extra=`. Libraries tell nothing below INFO, whatever the level: some of them write whole
@@ -49,7 +49,7 @@ def begin_logging(settings: Settings, file: Path | None = None) -> None:
 
 
 def tells_the_journal() -> bool:
-    """Whether standard error goes to the journal of systemd, which knows the time by itself."""
+    """Return True if standard error goes to the journal of systemd, which adds the time."""
     try:
         status = os.fstat(sys.stderr.fileno())
     except (OSError, ValueError):

@@ -11,7 +11,15 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
-from shm.errors import SchemaOutdated, ShmError, StoreBusy, StoreDamaged, StoreError, TooLarge
+from shm.errors import (
+    SchemaOutdated,
+    ShmError,
+    StoreBusy,
+    StoreDamaged,
+    StoreError,
+    TooLarge,
+    retry_pause_s,
+)
 from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
@@ -82,7 +90,7 @@ class Patience:
         self._wakeup, self._standby, self._said = wakeup, standby, ""
 
     def __call__(self, error: StoreError) -> bool:
-        """Whether to try again, after a while: not where it is another's and we do not stand by."""
+        """Wait a while; return True to try again, not where the store is another's."""
         if isinstance(error, StoreBusy) and not self._standby:
             return False
         if self._said != error.message:
@@ -108,7 +116,12 @@ def _begin(
     store = stack.enter_context(workspace.store())
     stack.enter_context(children_ended())
     if notifier is None:
-        notifier = HookNotifier(workspace.folder, settings.hook_timeout_seconds, os.environ)
+        notifier = HookNotifier(
+            workspace.folder,
+            settings.hook_timeout_seconds,
+            os.environ,
+            settings.pages_address,
+        )
         stack.callback(notifier.close)
     executor = make_executor(settings)
     flow = Flow(
@@ -204,8 +217,9 @@ class Daemon:
         self._flow.executor.shutdown(wait=False, cancel_futures=True)
 
     def _turn(self) -> bool:
-        """Whether anything is left to do; errors that pass are waited for, and shown until a turn
-        with a scan went well.
+        """Take a turn; return True if anything is left to do.
+
+        Errors that pass are waited for, and shown until a turn with a scan went well.
         """
         is_whole = time.monotonic() >= self._scan_at
         try:
@@ -226,7 +240,7 @@ class Daemon:
             log.warning("%s", error)
             if not isinstance(error, StoreBusy):
                 self._tell_failure(str(error))
-            self._scan_at = time.monotonic() + (error.retry_after_s or _UNREADABLE_S)
+            self._scan_at = time.monotonic() + retry_pause_s(error, _UNREADABLE_S)
         except Exception as error:
             if self._once:
                 raise
@@ -259,7 +273,7 @@ class Daemon:
         return "".join(delays[:1]) + more
 
     def _is_fatal(self, error: ShmError) -> bool:
-        """Whether the service ends: not by what a damaged store answers, unless once is enough."""
+        """Return True if the service ends by an error: not by a damaged store, but with once."""
         if isinstance(error, StoreDamaged):
             return self._once
         mends = isinstance(error, StoreError) and not isinstance(error, SchemaOutdated)
@@ -295,8 +309,7 @@ class Daemon:
                 self._tracker.forget(path)
         except (ShmError, OSError) as error:
             log.warning("%s is left for now: %s", path.name, error)
-            wait_s = error.retry_after_s if isinstance(error, ShmError) else None
-            self._put_off(path, str(error), wait_s or _UNREADABLE_S)
+            self._put_off(path, str(error), retry_pause_s(error, _UNREADABLE_S))
         except Exception as error:
             log.exception("%s is left for now", path.name)
             self._put_off(path, f"{type(error).__name__}: {error}", _UNREADABLE_S)

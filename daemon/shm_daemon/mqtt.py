@@ -25,12 +25,14 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
 
-from shm.errors import BadInput, ShmError, TooLarge, needing
+from shm.errors import BadInput, ShmError, TooLarge, needing, retry_pause_s
 from shm.pipeline import utc_now
+from shm.pipeline.faults import move_to_quarantine
 from shm.read import FORMATS
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
-from shm_daemon.spool import Landed, incoming, landing_name, lay_out
+from shm.store.queries.recordings import find_by_checksum
+from shm_daemon.spool import Landed, incoming, landing_name
 from shm_daemon.streams import take_chunks
 from shm_daemon.web.site import Description
 
@@ -50,7 +52,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Broker:
-    """Where the broker is and who we are there."""
+    """Address of the broker and our user there."""
 
     host: str
     port: int
@@ -140,7 +142,7 @@ class Listener:
         self._client.loop_start()
 
     def end(self) -> None:
-        """What is not acknowledged by now the broker sends again."""
+        """End; the broker sends again what is not acknowledged by now."""
         self._ended.set()
         self._queue.put(None)
         self._client.disconnect()
@@ -149,7 +151,7 @@ class Listener:
 
     @property
     def connected(self) -> bool:
-        """Whether the broker has accepted our subscription."""
+        """Return True if the broker has accepted our subscription."""
         return self._subscribed
 
     @property
@@ -251,7 +253,7 @@ class Listener:
         if message is not None:
             self._free(message)
             self._put(message)
-        self._ended.wait(getattr(error, "retry_after_s", None) or _RETRY_S)
+        self._ended.wait(retry_pause_s(error, _RETRY_S))
 
     def _put(self, message: _Message) -> None:
         with self._room:
@@ -304,7 +306,9 @@ class Listener:
                     most = getattr(self._workspace.settings, setting)
                     refuse_oversize(file.size_bytes, most, setting=setting)
             except TooLarge as error:  # the broker would send it again for ever
-                lay_out(self._workspace, file.whole(), name, error, utc_now(), file.sha256)
+                move_to_quarantine(
+                    self._workspace, file.whole(), name, error, utc_now(), file.sha256
+                )
                 log.warning("%s is refused: %s %s", name, error.message, error.remedy)
                 self._acknowledge(message)
                 return
@@ -327,7 +331,7 @@ class Listener:
             self._client.ack(message.mid, qos=1)
 
     def _is_received(self, sha256: str) -> bool:
-        return self._opened().recordings.with_checksum(sha256) is not None
+        return find_by_checksum(self._opened(), sha256) is not None
 
     def _opened(self) -> Store:
         if self._store is None:

@@ -59,7 +59,7 @@ class Provider:
         self._read: tuple[float, Mapping[str, Any]] | None = None
 
     def discover(self) -> Mapping[str, Any]:
-        """What the provider says of itself (OpenID Connect Discovery 1.0, 4); raises ShmError."""
+        """Return the provider's metadata (OpenID Connect Discovery 1.0, 4); raises ShmError."""
         now = time.monotonic()
         if self._read is None or now - self._read[0] > _KEPT_S:
             address = f"{self.described.issuer.rstrip('/')}/.well-known/openid-configuration"
@@ -70,7 +70,7 @@ class Provider:
         return self._read[1]
 
     def begin(self, back: str) -> Begun:
-        """Where to send a person who is to come back to `back`; raises ShmError."""
+        """Return where to send a person who is to come back to `back`; raises ShmError."""
         document = self.discover()
         state, nonce, verifier = (secrets.token_urlsafe(48) for _ in range(3))
         with _session(self.described, document, back) as session:
@@ -185,7 +185,7 @@ def _document(answer: requests.Response) -> dict[str, Any]:
 def _claims(
     described: SingleSignOn, token: Mapping[str, Any], keys: Any, nonce: str
 ) -> Mapping[str, Any]:
-    """What an ID token says, once all of it holds (OpenID Connect Core 1.0, 3.1.3.7)."""
+    """Return the claims of an ID token, all verified (OpenID Connect Core 1.0, 3.1.3.7)."""
     registry = JWSRegistry(algorithms=_ALGORITHMS, strict_check_header=False)
     read = jwt.decode(token["id_token"], KeySet.import_key_set(keys), registry=registry)
     claims = CodeIDToken(

@@ -1,4 +1,4 @@
-"""What lies in the spool, and which of it is whole.
+"""Look through the spool, and decide which of its files are whole.
 
 The spool is looked through with all its subfolders but `streams/`, where loggers roll their files:
 see `streams`. Left alone are names that begin with a dot,
@@ -24,13 +24,11 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path, PurePosixPath
 
 from shm.errors import BadInput
 from shm.read import sidecar_path
 from shm.read.sidecar import SIDECAR_SUFFIX, Described, sidecar_text
-from shm.store import Workspace
 from shm.store.archive import (
     MODES_SUFFIX,
     checksum,
@@ -50,7 +48,7 @@ _PATIENCE_WITH_EMPTY = 10.0  # judgement: times as long: some loggers open a fil
 
 @dataclass(frozen=True, order=True)
 class Look:
-    """What a file looks like from outside: when and how large, it and its sidecar."""
+    """State of a file and its sidecar from outside: when changed and how large."""
 
     modified_ns: int
     size_bytes: int
@@ -71,7 +69,7 @@ def scan(spool: Path, meanwhile: Callable[[], object] = lambda: None) -> dict[Pa
 
 
 def is_sidecar(path: Path) -> bool:
-    """Whether a name is that of a sidecar, which waits for its file."""
+    """Return True if a name is that of a sidecar, which waits for its file."""
     return path.name.lower().endswith(SIDECAR_SUFFIX)
 
 
@@ -87,7 +85,7 @@ def left_alone(spool: Path) -> list[Path]:
 
 
 def never_taken(spool: Path) -> dict[Path, str]:
-    """What lies in the spool and will never be taken, by what it is."""
+    """Return the entries of the spool that will never be taken, by what they are."""
     unlisted: dict[Path, str] = {}
 
     def note(error: OSError) -> None:
@@ -158,7 +156,7 @@ class FileStabilityTracker:
         self._left: dict[Path, Look] = {}
 
     def whole(self, looks: Mapping[Path, Look]) -> list[Path]:
-        """Those of the files that are whole, the oldest first."""
+        """Return those of the files that are whole, the oldest first."""
         now = self._clock()
         known, self._seen = self._seen, {}
         self._left = {path: look for path, look in self._left.items() if looks.get(path) == look}
@@ -184,11 +182,11 @@ class FileStabilityTracker:
 
     @property
     def watching(self) -> bool:
-        """Whether any file is yet to be taken."""
+        """Return True if any file is yet to be taken."""
         return bool(self._seen)
 
     def seconds_to_next(self) -> float:
-        """How long until the next file may be whole; infinite without files."""
+        """Return how long until the next file may be whole; infinite without files."""
         if not self._seen:
             return float("inf")
         return max(0.0, min(map(self._whole_at, self._seen)) - self._clock())
@@ -254,7 +252,7 @@ class Incoming:
         self.size_bytes += len(piece)
 
     def whole(self) -> Path:
-        """Where the file lies, forced to disk, until it lands or is closed."""
+        """Return where the file lies, forced to disk, until it lands or is closed."""
         self._file.flush()
         os.fsync(self._file.fileno())
         return self._path
@@ -292,7 +290,7 @@ class Incoming:
         return path
 
     def _lies_there(self, target: Path, sidecar: Path | None) -> bool:
-        """Whether the same bytes wait already under that name, with the same sidecar."""
+        """Return True if the same bytes wait already under that name, with the same sidecar."""
         beside = sidecar_path(target)
         try:
             if target.stat().st_size != self.size_bytes:
@@ -304,7 +302,7 @@ class Incoming:
             return False
 
     def _placed(self, target: Path, sidecar: Path | None) -> bool:
-        """Whether the place was free, of the file and of its sidecar, and is ours now."""
+        """Return True if the place was free, of the file and of its sidecar, and is ours now."""
         beside = sidecar_path(target)
         if target.exists() or beside.exists():
             return False
@@ -320,23 +318,6 @@ class Incoming:
 def incoming(spool: Path, max_bytes: int) -> closing[Incoming]:
     """A file under way that leaves nothing behind where it does not land."""
     return closing(Incoming(spool, max_bytes))
-
-
-def lay_out(
-    workspace: Workspace, path: Path, name: str, error: BadInput, at: datetime, sha256: str
-) -> None:
-    """Moves a refused file and its sidecar into the quarantine, with the reason."""
-    reason = {
-        "schema": "shm.reason/1",
-        "file": name,
-        "line": error.line,
-        "channel": error.channel or None,
-        "message": error.message,
-        "remedy": error.remedy,
-        "time": at,
-        "sha256": sha256,
-    }
-    workspace.quarantine.move(path, name, reason, sidecar_path(path))
 
 
 def _places(spool: Path, name: str, sha256: str) -> Iterator[Path]:

@@ -28,7 +28,8 @@ from pathlib import Path
 
 import numpy as np
 
-from shm.errors import BadInput, DoubledChunk, ShmError
+from shm.errors import BadInput, DoubledChunk, ShmError, retry_pause_s
+from shm.pipeline.faults import move_to_quarantine
 from shm.pipeline.lineage import read_limits
 from shm.pipeline.unheard import sweep_ring
 from shm.read import sidecar_path
@@ -36,10 +37,11 @@ from shm.read.chunk_document import BY_TIME, chunk_document
 from shm.read.sandbox import read_test
 from shm.store import Store, Workspace
 from shm.store.archive import checksum, refuse_oversize
+from shm.store.queries.streams import list_stream_events
 from shm.store.ring import Kept, ring_of
 from shm.values import Channel, FloatArray, Recording
 from shm.values.stream import Chunk, Stream, StreamEvent
-from shm_daemon.spool import STREAMS, FileStabilityTracker, lay_out, scan
+from shm_daemon.spool import STREAMS, FileStabilityTracker, scan
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +69,7 @@ def note_refused(store: Store, stream: str, error: BadInput, now: datetime) -> N
     """Once an hour: a logger that is set up wrong sends as wrong a chunk every few seconds."""
     log.warning("stream %s: refused: %s", stream, error)
     hour = now.replace(minute=0, second=0, microsecond=0)
-    known = store.streams.list_events(stream, hour)
+    known = list_stream_events(store, stream, hour)
     if all(event.kind != "refused" or event.start < hour for event in known):
         store.streams.save_event(StreamEvent(stream[:64], "refused", now, now, str(error)[:500]))
 
@@ -79,7 +81,7 @@ _MINUTE_S = 60
 
 
 class RollingFiles:
-    """What lies in the folders of the streams, and which of it is whole."""
+    """Files in the folders of the streams, of which the whole ones are taken."""
 
     def __init__(self, workspace: Workspace, store: Store, clock: Callable[[], datetime]):
         self._store, self._clock = store, clock
@@ -103,7 +105,7 @@ class RollingFiles:
                         tracker.leave(path)
                 except (ShmError, OSError) as error:
                     log.warning("%s is left for now: %s", path.name, error)
-                    tracker.put_off(path, getattr(error, "retry_after_s", None) or _RETRY_FILE_S)
+                    tracker.put_off(path, retry_pause_s(error, _RETRY_FILE_S))
         return left
 
     def _take(self, workspace: Workspace, path: Path) -> None:
@@ -116,7 +118,7 @@ class RollingFiles:
         except BadInput as error:
             if not isinstance(error, DoubledChunk):  # which is noted
                 note_refused(self._store, name, error, now)
-            lay_out(workspace, path, path.name, error, now, checksum(path))
+            move_to_quarantine(workspace, path, path.name, error, now, checksum(path))
         else:
             path.unlink()
             sidecar_path(path).unlink(missing_ok=True)
@@ -266,5 +268,5 @@ def _work(keeper: StreamKeeper, ended: threading.Event) -> None:
         except Exception as error:  # the daemon goes on without streams rather than not at all
             known = isinstance(error, ShmError)
             log.warning("streams wait: %s", error, exc_info=not known)
-            pause_s = getattr(error, "retry_after_s", None) or _RETRY_S
+            pause_s = retry_pause_s(error, _RETRY_S)
         ended.wait(pause_s)

@@ -1,4 +1,4 @@
-"""What ends the daemon's waiting: a signal, a change in the spool, a step that has ended."""
+"""Wake the daemon: by a signal, a change in the spool, a step that has ended."""
 
 from __future__ import annotations
 

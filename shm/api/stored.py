@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Self
 
 from shm.errors import NothingThere
 from shm.read import read_test
+from shm.store.queries.hangers import find_latest_diagnosis
+from shm.store.queries.tests import load_frequency_response
+from shm.store.queries.trends import list_history, list_trend
 from shm.values import (
     Averaged,
     Diagnosis,
@@ -51,11 +54,11 @@ class Store:
         return self._workspace.bridge.hangers
 
     def hanger(self, hanger_id: int) -> Hanger:
-        """One hanger; raises BadInput when the bridge has none such."""
+        """Return one hanger; raises BadInput when the bridge has none such."""
         return self._workspace.bridge.hanger(hanger_id)
 
     def tests(self, hanger_id: int) -> tuple[ModalTest, ...]:
-        """The modal tests of a hanger, oldest first; empty before the first."""
+        """Return the modal tests of a hanger, oldest first; empty before the first."""
         self.hanger(hanger_id)
         return tuple(stored.test for stored in self._store.tests.list_all(hanger_id))
 
@@ -76,7 +79,7 @@ class Store:
 
     def tensions(self, hanger_id: int) -> dict[str, Averaged]:
         """Return the tension by each test of a hanger, oldest first: see `tension`."""
-        points = self._store.posteriors.trend(self.hanger(hanger_id))
+        points = list_trend(self._store, self.hanger(hanger_id))
         return {point.test: point.averaged for point in points}
 
     def _headline(self, hanger_id: int) -> Averaged | None:
@@ -127,7 +130,7 @@ class Store:
         For the tension over all classes see `tensions`.
         """
         self.hanger(hanger_id)
-        return tuple(posterior for _, posterior in self._store.posteriors.history(hanger_id))
+        return tuple(posterior for _, posterior in list_history(self._store, hanger_id))
 
     def selection(self, hanger_id: int) -> Selection:
         """Return the model classes compared on the hanger's first tests; raises NothingThere."""
@@ -143,7 +146,7 @@ class Store:
     def diagnosis(self, hanger_id: int) -> Diagnosis:
         """Return the latest gap diagnosis of a hanger; raises NothingThere."""
         self.hanger(hanger_id)
-        found = self._store.posteriors.latest_diagnosis(hanger_id)
+        found = find_latest_diagnosis(self._store, hanger_id)
         if found is None:
             raise NothingThere(
                 f"the gap of hanger {hanger_id} has not been diagnosed yet.",
@@ -163,7 +166,7 @@ class Store:
 
     def frequency_response(self, hanger_id: int, test_id: str) -> FrequencyResponse:
         """Return the response behind a test's modes; raises NothingThere without one."""
-        found = self._store.tests.frequency_response(self._stored(hanger_id, test_id))
+        found = load_frequency_response(self._store, self._stored(hanger_id, test_id))
         if found is None:
             raise NothingThere(
                 f"no frequency response of test {test_id} is kept.",
@@ -172,7 +175,7 @@ class Store:
         return found
 
     def close(self) -> None:
-        """Lets go of the database."""
+        """Let go of the database."""
         self._store.close()
 
     def _stored(self, hanger_id: int, test_id: str) -> StoredTest:

@@ -135,7 +135,7 @@ def _refuse_second(streams: Sequence[Stream], path: Path) -> None:
 
 
 def _same_names(names: Sequence[str]) -> tuple[str, str] | None:
-    """Two names that are the same but for capitals."""
+    """Return two names that differ in capitals only."""
     seen: dict[str, str] = {}
     for name in names:
         if name.lower() in seen:

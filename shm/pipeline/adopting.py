@@ -40,6 +40,7 @@ from shm.store import (
     StoredTest,
     Workspace,
 )
+from shm.store.queries.hangers import find_latest_diagnosis, list_adoptions
 from shm.values import BaselineCheck, Cause, EffectEstimate, Hanger
 from shm.values.diagnosis import joined
 from shm.watch import gap_percent, has_grown
@@ -48,7 +49,7 @@ from shm.watch.options import reference_of
 
 @dataclass(frozen=True)
 class Wish:
-    """What is to be adopted: `effects` and, unless the diagnosis tells, where each acts (`at`).
+    """Request to adopt `effects`, each at a place (`at`) unless the diagnosis tells it.
 
     `baseline` is the class to which they are added; empty: that of the latest diagnosis, or beam1.
     """
@@ -62,7 +63,7 @@ class Wish:
 
 @dataclass(frozen=True)
 class GapWatch:
-    """What became of the gap since an adoption: `now_percent` is NaN before the next test."""
+    """Gap since an adoption: `now_percent` is NaN before the next test."""
 
     adopted: StoredAdoption
     now_percent: float
@@ -88,7 +89,7 @@ def _percent(value: float) -> str:
 
 def gap_watch(store: Store, hanger: int) -> GapWatch | None:
     """The gap of the class that a hanger has adopted last; None where none is in force."""
-    adopted = store.posteriors.list_adoptions(hanger)
+    adopted = list_adoptions(store, hanger)
     if not adopted:
         return None
     made = adopted[-1].adoption
@@ -114,14 +115,14 @@ def adopt(
     met, BadInput where the class cannot describe the tests of the baseline.
     """
     before, baseline = _in_force(store, hanger)
-    diagnosis = store.posteriors.latest_diagnosis(hanger.id)
+    diagnosis = find_latest_diagnosis(store, hanger.id)
     tests = store.tests.list_all(hanger.id)
     name = adopted_name(wish.effects, wish.at, wish.baseline, hanger, diagnosis, tests)
     _refuse_second(store, hanger, str(name))
     chosen = [test for test in tests if test.test.id in baseline.posterior.tests]
     terms, lineage = update_terms(hanger, [str(name)], chosen, workspace.settings)
     check = baseline.posterior.baseline_check or BaselineCheck()
-    measured = check.kept_of([test.test for test in chosen])
+    measured = check.accepted_tests([test.test for test in chosen])
     posterior = update(
         measured,
         build(str(name), hanger, terms.priors),
@@ -150,7 +151,7 @@ def _in_force(store: Store, hanger: Hanger) -> tuple[StoredSelection, Baseline]:
 
 def _refuse_second(store: Store, hanger: Hanger, model: str) -> None:
     """Said before the work is done, not after."""
-    if any(each.adoption.model == model for each in store.posteriors.list_adoptions(hanger.id)):
+    if any(each.adoption.model == model for each in list_adoptions(store, hanger.id)):
         raise UsageError(
             f"hanger {hanger.id} has adopted {model} already.", remedy="See `shm gap adopted`."
         )
@@ -279,7 +280,7 @@ def _place_in(cause: Cause, effect: str) -> str:
 
 
 def _estimates(effect: str, cause: Cause) -> dict[str, EffectEstimate]:
-    """What the diagnosis found; of a pair, names that both have stand behind their effect's."""
+    """Return the diagnosis's estimates; of a pair, shared names are those of their effect."""
     return {each.name.removeprefix(f"{effect}."): each for each in cause.parameters}
 
 

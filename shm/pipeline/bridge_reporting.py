@@ -14,12 +14,8 @@ from typing import TYPE_CHECKING
 
 import shm
 from shm.errors import NothingThere
-from shm.pipeline.lineage import (
-    discarded_of_baselines,
-    redescribed,
-    settings_words,
-    software,
-)
+from shm.pipeline.controls import campaign_warnings, control_charts
+from shm.pipeline.lineage import discarded_of_baselines, redescribed, settings_words, software
 from shm.pipeline.unheard import blind_hangers, heard
 from shm.report.contents import BridgeReport
 from shm.report.formatting import Interval
@@ -43,11 +39,22 @@ from shm.store import (
     TrendPoint,
     Workspace,
 )
-from shm.store.stored_alerts import said_of, silenced_until
+from shm.store.queries.alerts import count_open_alerts
+from shm.store.queries.hangers import (
+    find_baseline_temperatures,
+    find_latest_watches,
+    list_baselines_in_force,
+    list_detected_changes,
+    list_detections,
+)
+from shm.store.queries.tests import list_undated_names, load_frequency_response
+from shm.store.queries.trends import find_latest_trends, list_trend
+from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
-from shm.watch.change_words import look_again
+from shm.watch.alert_text import look_again
+from shm.watch.control_chart import ControlChart
 
 if TYPE_CHECKING:
     from shm.watch.neighbours import BridgePattern, HangerShift
@@ -74,9 +81,9 @@ def warnings_from(
         if hanger.id not in now or watched is None:
             return ""
         level = hanger.thresholds.alert_probability
-        is_told = any(d.quantity == TENSION and d.probability >= level for d in watched.drifts)
+        is_reported = any(d.quantity == TENSION and d.probability >= level for d in watched.drifts)
         of_test = now[hanger.id].averaged.tension_n
-        return nearly_slack(hanger, tensions[hanger.id], of_test, is_told=is_told)
+        return nearly_slack(hanger, tensions[hanger.id], of_test, is_reported=is_reported)
 
     def of_works(hanger: Hanger) -> str:
         point, watched = now.get(hanger.id), latest.get(hanger.id)
@@ -85,7 +92,7 @@ def warnings_from(
         if watched is not None and watched.watched.time >= point.time:
             return ""
         windows = [each for each in works if each.covers(hanger.id, point.time)]
-        return passed_over(hanger, said_of(windows[-1])) if windows else ""
+        return passed_over(hanger, describe_silence(windows[-1])) if windows else ""
 
     return {
         hanger.id: open_warnings(
@@ -121,13 +128,14 @@ def bridge_report(
         )
     courses = _courses(store, hangers, period) if period else {}
     if period and not any(course.tests for course in courses.values()):
-        latest = store.posteriors.latest_trends(hangers)
+        latest = find_latest_trends(store, hangers)
         newest = max(latest.values(), key=lambda point: point.time)
         raise NothingThere(
             f"no test of any hanger lies in the period {period}.",
             remedy=f"The latest is {newest.test} of hanger {newest.hanger}, "
             f"{newest.time:%Y-%m-%d}: ask for a longer period.",
         )
+    charts = control_charts(workspace, store)
     pattern, why_not = _pattern_or_why(store, [hanger.id for hanger in hangers])
     return BridgeReport(
         workspace.bridge.name,
@@ -146,6 +154,7 @@ def bridge_report(
         period,
         {"software": software()},
         settings_words(workspace.settings),
+        charts,
     )
 
 
@@ -153,7 +162,7 @@ def _sensors(workspace: Workspace, store: Store, line: HangerSummary) -> tuple[R
     """Return the sensors of a hanger's latest test; before the first those that stay on it."""
     if line.latest:
         stored = store.tests.named(line.hanger.id, line.latest.name)
-        return list_sensors(stored.test, store.tests.frequency_response(stored))
+        return list_sensors(stored.test, load_frequency_response(store, stored))
     streams = [each for each in workspace.bridge.streams if each.hanger == line.hanger.id]
     return tuple(ResponsePoint(c.name, c.plane, c.x_m) for each in streams for c in each.channels)
 
@@ -181,7 +190,7 @@ def unwatched(
 def notes_of(
     standing: Sequence[StoredAlert], silences: tuple[Silence, ...], hanger: int, now: datetime
 ) -> tuple[str, ...]:
-    """What people did about the alerts of a hanger that stand."""
+    """Return what people did about the alerts of a hanger that stand."""
     noted = [(each.id, each.acknowledgement) for each in standing if each.alert.kinds != ("test",)]
     until = silenced_until(silences, hanger, now) if noted else None
     return (
@@ -196,7 +205,7 @@ def notes_of(
 
 @dataclass(frozen=True)
 class HangersNow:
-    """What the store says of all hangers, asked in a few queries without any samples."""
+    """State of all hangers by the store, asked in a few queries without any samples."""
 
     workspace: Workspace
     now: datetime
@@ -210,15 +219,16 @@ class HangersNow:
     warnings: Mapping[int, tuple[str, ...]]
     blind: Mapping[int, Lead]
     undated: Mapping[int, tuple[str, ...]]
+    charts: tuple[ControlChart, ...]
 
     @classmethod
     def of(
         cls, workspace: Workspace, store: Store, hangers: Sequence[Hanger], now: datetime
     ) -> HangersNow:
         every = workspace.bridge.hangers
-        now_at = store.posteriors.latest_trends(hangers)
-        baselines = store.watch.baselines_in_force(every)  # of neighbours too: one may stand out
-        watches = store.watch.latest(hangers)
+        now_at = find_latest_trends(store, hangers)
+        baselines = list_baselines_in_force(store, every)  # of neighbours too: one may stand out
+        watches = find_latest_watches(store, hangers)
         standing = defaultdict[int, list[StoredAlert]](list)
         silences = store.silences.list_all()
         works = [each for each in silences if each.is_maintenance]
@@ -230,15 +240,16 @@ class HangersNow:
             now_at,
             baselines,
             watches,
-            store.watch.detected_changes(hangers),
-            store.alerts.open_counts(),
+            list_detected_changes(store, hangers),
+            count_open_alerts(store),
             standing,
             tuple(each for each in silences if not each.is_over(now)),
             warnings_from(
                 every, hangers, baselines, watches, now_at, works, discarded_of_baselines(store)
             ),
             blind_hangers(heard(workspace, store, now)),
-            store.tests.names_without_time(),
+            list_undated_names(store),
+            control_charts(workspace, store),
         )
 
     def summary(self, hanger: Hanger) -> HangerSummary:
@@ -247,22 +258,26 @@ class HangersNow:
         found = self.watches.get(hanger.id)
         watched, called = found.watched if found else None, self.called.get(hanger.id, ())
         standing, blind = self.standing.get(hanger.id, ()), self.blind.get(hanger.id)
+        control = next((each for each in self.charts if each.hanger.id == hanger.id), None)
+        days, at = self.workspace.settings.campaign_days, point.time if point else None
+        doubts = () if control else campaign_warnings(self.charts, hanger.id, at, days)
         return HangerSummary(
             hanger,
             LatestTest(point.test, point.time, point.averaged, point.model) if point else None,
             baseline.averaged if baseline else None,
             is_first=point is not None and (baseline is None or point.test in baseline.tests),
-            drifts=watched.told if watched else (),
+            drifts=watched.published_drifts if watched else (),
             called=still_detected(called, watched, hanger),
             detected="; ".join(called_words(change) for change in called),
             standing=findings(each.alert for each in standing),
             open_alerts=self.open_alerts.get(hanger.id, 0),
-            warnings=self.warnings.get(hanger.id, ()),
+            warnings=(*doubts, *self.warnings.get(hanger.id, ())),
             notes=notes_of(standing, self.silences, hanger.id, self.now),
             unwatched=unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
             if point
             else blind,
             undated=self.undated.get(hanger.id, ()),
+            control=control,
         )
 
 
@@ -272,12 +287,12 @@ def _only(hangers: Sequence[Hanger]) -> int | None:
 
 
 def _courses(store: Store, hangers: Sequence[Hanger], period: Period) -> dict[int, Course]:
-    """What became of each hanger in the period."""
+    """Return what became of each hanger in the period."""
     raised = Counter(
         each.alert.hanger for each in store.alerts.list_all() if period.holds(each.alert.time)
     )
     return {
-        hanger.id: _course(store.posteriors.trend(hanger, period.since), raised[hanger.id])
+        hanger.id: _course(list_trend(store, hanger, period.since), raised[hanger.id])
         for hanger in hangers
     }
 
@@ -302,8 +317,8 @@ def latest_drifts(store: Store, hanger: int) -> tuple[Drift, ...]:
     None where no test has been compared with it, as after the hanger was given a new one.
     """
     baseline = store.watch.baseline(hanger)
-    told = store.watch.list_detected(baseline.hanger, baseline.id) if baseline else ()
-    return told[-1].watched.told if told else ()
+    told = list_detections(store, baseline.hanger, baseline.id) if baseline else ()
+    return told[-1].watched.published_drifts if told else ()
 
 
 def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
@@ -321,7 +336,7 @@ def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]
     """The latest known shift of each hanger that has one, in their `order` along the bridge."""
     from shm.watch.neighbours import shifts_of
 
-    latest, before_c = store.watch.latest(), store.watch.baseline_temperatures()
+    latest, before_c = find_latest_watches(store), find_baseline_temperatures(store)
     compared = [latest[hanger] for hanger in order if hanger in latest]
     drifts = {each.hanger: _known_drifts(store, each) for each in compared}
     changes = {each.hanger: each.watched.temperature_c - before_c[each.hanger] for each in compared}
@@ -330,9 +345,9 @@ def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]
 
 
 def _known_drifts(store: Store, latest: StoredWatch) -> Sequence[Drift]:
-    """Those of the latest test; of all, where its shift of the tension is not known."""
-    drifts = latest.watched.told
+    """Return those of the latest test; of all, where its shift of the tension is not known."""
+    drifts = latest.watched.published_drifts
     if any(each.quantity == TENSION and math.isfinite(each.shift_mean) for each in drifts):
         return drifts
     watches = store.watch.list_all(latest.hanger, latest.baseline_id)
-    return [drift for watch in watches for drift in watch.watched.told]
+    return [drift for watch in watches for drift in watch.watched.published_drifts]

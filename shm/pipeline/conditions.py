@@ -1,4 +1,4 @@
-"""What the tests of a hanger show now of what alerts have told, and of what they call for.
+"""Conditions of alerts by the tests of a hanger: which still hold, which are new.
 
 A condition ends as it begins: by tests of two visits that agree, after which nothing contradicts. A
 van on the deck, a wrong hanger or a mistaken mode disturbs one visit, and must not silence a loss

@@ -19,15 +19,18 @@ from typing import Any
 from shm.errors import DISK_FULL, ShmError, StoreDamaged, StoreError, WorkerDied
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.courier import Courier, Notifier, alert_fields
-from shm.pipeline.faults import contained
+from shm.pipeline.faults import contained, explain_refusal
 from shm.pipeline.intake import Sharing, receive
 from shm.pipeline.limits import heed_limits
-from shm.pipeline.lineage import competing, reason_document
+from shm.pipeline.lineage import competing
 from shm.pipeline.watching import JudgedAgain
 from shm.pipeline.work import Queue, Task, Work
 from shm.read import sidecar_path
 from shm.store import Outcome, Receipt, Store, StoredAlert, Workspace
 from shm.store.archive import Meanwhile, nothing
+from shm.store.queries.hangers import list_selected_models
+from shm.store.queries.history import list_events
+from shm.store.queries.recordings import count_deaths, is_waiting
 
 _MOST_DEATHS = 6
 """A recording is refused when so many processes died at it, whoever ended them."""
@@ -81,7 +84,7 @@ class Flow:
         self._stopped: dict[int, datetime] = {}  # hangers, and until when
         self.delays: dict[int, str] = {}
         """Why recordings wait that something outside keeps from being worked on, by number."""
-        deaths = store.recordings.deaths()
+        deaths = count_deaths(store)
         self._suspects = set(deaths)
         self._postponed = {key: each.last_at + _pause(each.count) for key, each in deaths.items()}
         self.use(workspace)
@@ -89,7 +92,7 @@ class Flow:
 
     def use(self, workspace: Workspace) -> None:
         """Goes on with another description of the bridge; raises UsageError where it is wrong."""
-        selected = self.store.posteriors.selected_models()
+        selected = list_selected_models(self.store)
         for hanger in workspace.bridge.hangers:
             competing(hanger, workspace.settings, {})
             if hanger.id in selected:
@@ -145,7 +148,10 @@ class Flow:
         return bool(self.under_way)
 
     def suspects_due_s(self) -> float | None:
-        """How long until a recording is tried again whose process died; None without such."""
+        """Return the seconds until a recording whose process died is tried again.
+
+        None without one.
+        """
         times = [self._postponed[key] for key in self._suspects if key in self._postponed]
         return max(0.0, (min(times) - self.clock()).total_seconds()) if times else None
 
@@ -265,7 +271,7 @@ class Flow:
         log.warning("%s %s: %s", *task.key, how, extra=task.log_fields)
         for recording_id in task.recordings:
             self.store.recordings.note_death(recording_id, how, now)
-        known = self.store.recordings.deaths()
+        known = count_deaths(self.store)
         most = max(known[key].count if key in known else 1 for key in task.recordings)
         lacks_memory = running.alone and isinstance(error, MemoryError)
         if len(task.recordings) == 1 and (lacks_memory or most >= _MOST_DEATHS):
@@ -284,14 +290,15 @@ class Flow:
         if not isinstance(error, ShmError):
             log.error("%s %s failed", *task.key, exc_info=error, extra=task.log_fields)
         for recording_id in task.recordings:
-            if self.store.recordings.is_waiting(recording_id, task.stage, task.tests):
+            if is_waiting(self.store, recording_id, task.stage, task.tests):
                 self._refuse_recording(task, recording_id, error)
 
     def _refuse_recording(self, task: Task, recording_id: int, error: BaseException) -> None:
         recordings, now = self.store.recordings, self.clock()
         recording = recordings.get(recording_id)
-        name, reason = recording.file.file_name, reason_document(error, recording, now)
-        if self.store.journal.list_events(Outcome.REDESCRIBED, recording_id=recording_id):
+        name = recording.file.file_name
+        reason = explain_refusal(error, name, recording.file.sha256, now)
+        if list_events(self.store, Outcome.REDESCRIBED, recording_id=recording_id):
             reason["remedy"] += (
                 " What it gave with its former sidecar counts no more: correct the sidecar and "
                 "drop both again."

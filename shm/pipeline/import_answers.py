@@ -113,7 +113,7 @@ def _calibrated(text: str, recorded_in: str) -> dict[str, object]:
 
 
 def import_document(found: Import) -> dict[str, Any]:
-    """What is understood of a file and what is open; unknown numbers are NaN."""
+    """Return what is understood of a file and what is open; unknown numbers are NaN."""
     survey = found.survey
     return {
         "format": survey.format,

@@ -1,4 +1,4 @@
-"""Which column of an imported file holds its times, and the sampling rate that they tell.
+"""Find the column of times in an imported file, and the sampling rate.
 
 The picture of a channel over time that an import shows.
 """

@@ -29,7 +29,7 @@ from shm.read.base import Survey, SurveyedColumn
 from shm.read.header import CHANNEL_KEYS, Entry, Header
 from shm.read.profiles import Profile, completed, profile_for, save_profile, with_day_order
 from shm.read.sandbox import survey
-from shm.read.sidecar import Described, document_beside
+from shm.read.sidecar import Described, sidecar_document
 from shm.read.stamps import DayOrder, in_zone, order_of_choice
 from shm.store import Workspace
 from shm.values import NAN, PLANES, Channel, Plane, Quantity, Recording
@@ -131,7 +131,7 @@ class Import:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a person should look at, though nothing is refused for it."""
+        """Return what a person should look at, though nothing is refused for it."""
         wild = [
             f"{c.name} reaches {max(-c.least, c.largest):.3g} m/s2, beyond most accelerometers"
             f" ({_WILD_M_S2:.0f}): is its unit right?"
@@ -146,7 +146,10 @@ class Import:
 
 
 def look_into(path: Path, workspace: Workspace, answers: Answers) -> Import:
-    """What a file holds, with all that is known of it; raises BadInput where that is nothing."""
+    """Return what a file holds, with all that is known of it.
+
+    Raises BadInput where that is nothing.
+    """
     with ThreadPoolExecutor(1) as beside:
         found = beside.submit(survey, path, read_limits(workspace.settings))
         import_module("shm.identify.measuring")  # a second, while another process reads
@@ -157,7 +160,7 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     """The same of a file that was looked into before."""
     path = Path(found.source)
     profile = profile_for(found.layout, workspace.folder)
-    own = _joined(document_beside(path), answers.said)
+    own = _joined(sidecar_document(path), answers.said)
     own, order = _with_chosen_time(own, found, workspace.bridge.time_zone)
     _refuse_unknown(own, found, path)
     known = profile.described if profile is not None else {}
@@ -235,7 +238,7 @@ def _refuse_unknown(own: Described, found: Survey, path: Path) -> None:
 
 
 def _to_keep(known: Described, said: Described, found: Survey) -> dict[str, Any]:
-    """What holds for every file of the logger: not the hanger that the file itself says."""
+    """Return what holds for every file of the logger: not the hanger that the file itself says."""
     kept = _joined(known, {k: v for k, v in said.items() if k not in ("time", "temperature_c")})
     if found.layout.hanger is not None:
         kept.pop("hanger", None)
@@ -256,7 +259,7 @@ def _place_problems(
     found: Survey, described: Described, hanger: object, workspace: Workspace
 ) -> list[str]:
     """Sensors that are said to be off the hanger, where it is one of the bridge."""
-    tested = next((each for each in workspace.bridge.hangers if each.id == hanger), None)
+    tested = next((each for each in workspace.bridge.bars if each.id == hanger), None)
     if tested is None:
         return []
     columns = [_told(column, described) for column in found.columns]
@@ -313,7 +316,7 @@ def _of_time(found: Survey) -> Question:
 
 
 def _holds_nothing(found: Survey, described: Described, questions: Sequence[Question]) -> bool:
-    """Whether no answer can make it a recording: no column is, or may be, an acceleration."""
+    """Return True if no answer can make it a recording: no column may be an acceleration."""
     may_be = any(question.about == "unit" for question in questions)
     measured = {_told(column, described).quantity for column in found.columns}
     return "acceleration" not in measured and not may_be
@@ -362,7 +365,7 @@ def _open(columns: Sequence[SurveyedColumn]) -> list[SurveyedColumn]:
 
 
 def _is_in_doubt(column: SurveyedColumn) -> bool:
-    """Whether nobody knows the unit, or it is not one of what the name says."""
+    """Return True if nobody knows the unit, or it is not one of what the name says."""
     return not words.is_unit(column.unit) or words.unit_of(column.unit) is not None
 
 

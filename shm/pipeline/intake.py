@@ -17,12 +17,13 @@ from datetime import UTC, datetime, tzinfo
 from pathlib import Path
 
 from shm.errors import BadInput, TooLarge
+from shm.pipeline.faults import move_to_quarantine
 from shm.pipeline.lineage import read_limits
 from shm.read import sidecar_path
 from shm.read.base import Layout
 from shm.read.profiles import Profile, any_profile, completed, learn_day_order, profile_for
 from shm.read.sandbox import layout_of
-from shm.read.sidecar import Described, document_beside, sidecar_text
+from shm.read.sidecar import Described, sidecar_document, sidecar_text
 from shm.read.stamps import may_hold_days, order_of_choice
 from shm.store import Hold, Receipt, ReceivedFile, Store, Workspace
 from shm.store.archive import (
@@ -34,11 +35,11 @@ from shm.store.archive import (
     refuse_oversize,
     safe_name,
 )
-from shm.store.files import reason_document
+from shm.store.queries.history import list_events
 
 
 class Sharing:
-    """How many files wait for the same sidecar; each folder is listed once.
+    """Count of files that wait for the same sidecar; each folder is listed once.
 
     One for each look into the spool: with one for each file, ten thousand files would be listed
     ten thousand times.
@@ -49,7 +50,7 @@ class Sharing:
         self._waiting: dict[Path, Counter[Path]] = {}
 
     def others_need(self, sidecar: Path) -> bool:
-        """Whether more than one file of the folder waits for a sidecar."""
+        """Return True if more than one file of the folder waits for a sidecar."""
         return self._of(sidecar.parent)[sidecar] > 1
 
     def taken(self, sidecar: Path) -> None:
@@ -107,7 +108,7 @@ def receive(
 
 
 def _modified(path: Path) -> datetime | None:
-    """When the file was last written; None where its folder says something impossible."""
+    """Return when the file was last written; None where its folder says something impossible."""
     try:
         return datetime.fromtimestamp(path.stat().st_mtime, UTC)
     except (OSError, OverflowError, ValueError):
@@ -178,7 +179,7 @@ def _layout_and_sidecar(path: Path, workspace: Workspace) -> tuple[Layout, Descr
     if path.name.lower().endswith(MODES_SUFFIX):
         return None
     try:
-        return layout_of(path, read_limits(workspace.settings)), document_beside(path)
+        return layout_of(path, read_limits(workspace.settings)), sidecar_document(path)
     except BadInput:
         return None  # it is refused with its reason where it is read
 
@@ -211,9 +212,8 @@ def _set_aside(
     path: Path, name: str, error: TooLarge, workspace: Workspace, store: Store, at: datetime
 ) -> None:
     """Lays what is too large in the quarantine, unread: nobody knows its checksum."""
-    reason = reason_document(name, None, error.message, error.remedy, at)
-    lies = workspace.quarantine.move(path, name, reason, sidecar_path(path))
-    said = {event.message for event in store.journal.list_events("refused", file_name=name)}
+    lies = move_to_quarantine(workspace, path, name, error, at, None)
+    said = {event.message for event in list_events(store, "refused", file_name=name)}
     if lies != path or error.message not in said:  # what stays is met at each start
         store.recordings.refuse_unread(name, error.message, at)
 

@@ -27,6 +27,14 @@ from shm.store import (
     Workspace,
 )
 from shm.store.holding import time_note
+from shm.store.queries.judging import (
+    list_decisions,
+    list_known_samples,
+    list_latest_tests,
+    list_tests_taken_at,
+)
+from shm.store.queries.recordings import list_holds
+from shm.store.queries.tests import list_baseline_tests
 from shm.values import Alert, Doubt, Hanger, ModalTest
 
 log = logging.getLogger(__name__)
@@ -43,7 +51,7 @@ def judge(
     gave it.
     """
     sidecar_as, fingerprint = recording.file.sidecar_as, found[0].fingerprint
-    decided = store.recordings.decisions(recording.id, sidecar_as)
+    decided = list_decisions(store, recording.id, sidecar_as)
     out = tuple(n for n, hold in decided.items() if hold.is_out)
     if set(out) >= {item.position for item in found}:  # sent anew, to be asked of once more
         out = ()
@@ -99,12 +107,12 @@ def _candidate(
     item: IdentifiedTest,
     found: Sequence[IdentifiedTest],
 ) -> Candidate:
-    test, tests = item.test, store.tests
+    test = item.test
     hanger = workspace.bridge.tested(test.hanger or 0)
-    earlier = tests.list_latest(hanger.id, recording.id, _LATEST)
+    earlier = list_latest_tests(store, hanger.id, recording.id, _LATEST)
     baseline = store.watch.baseline(hanger.id, time=_possible(test.time))
-    reference = tests.of_baseline(baseline) if baseline else earlier
-    at_once = tests.taken_at(hanger.id, test.time, recording.id) if test.time else ()
+    reference = list_baseline_tests(store, baseline) if baseline else earlier
+    at_once = list_tests_taken_at(store, hanger.id, test.time, recording.id) if test.time else ()
     print_ = item.fingerprint
     return Candidate(
         hanger=hanger,
@@ -122,11 +130,11 @@ def _candidate(
         earlier=[each.test for each in earlier],
         arrived=[
             each.test
-            for each in tests.list_latest(hanger.id, recording.id, _LATEST, as_received=True)
+            for each in list_latest_tests(store, hanger.id, recording.id, _LATEST, as_received=True)
         ],
         baseline=baseline.posterior if baseline else None,
         fingerprint=print_,
-        copies=tests.known_samples(recording.id, hanger.id, print_) if print_ else (),
+        copies=list_known_samples(store, recording.id, hanger.id, print_) if print_ else (),
         signals=item.signals,
         others=[
             (other, _latest_of_other(store, other, recording))
@@ -142,7 +150,7 @@ def _latest_of_other(
     """Return the latest tests of another hanger; none where these cannot be read."""
     found: Sequence[StoredTest] = ()
     with contained(log, "tests of hanger %d cannot be compared with", other.id):
-        found = store.tests.list_latest(other.id, recording.id, _OF_OTHERS)
+        found = list_latest_tests(store, other.id, recording.id, _OF_OTHERS)
     return [each.test for each in found]
 
 
@@ -157,11 +165,11 @@ def _notice(
     held: Sequence[HeldTest],
     candidates: Mapping[int, Candidate],
 ) -> Alert:
-    """What to tell of a recording, once: of the test whose modes say most."""
+    """Return what to tell of a recording, once: of the test whose modes say most."""
     leading = max(held, key=lambda each: np.nan_to_num(abs(each.tension_shift)))
     candidate = candidates[leading.position]
     hanger = candidate.hanger.id
-    clocks = [hold for hold in store.recordings.list_holds(hanger) if hold.is_for_its_clock]
+    clocks = [hold for hold in list_holds(store, hanger) if hold.is_for_its_clock]
     others = [test.tension_shift for hold in clocks for test in hold.tests]
     others += [test.tension_shift for test in held if test is not leading]
     counted = {test.id: test for test in (*candidate.earlier, *candidate.arrived)}

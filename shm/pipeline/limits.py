@@ -12,7 +12,8 @@ from math import isclose, isfinite, isnan
 
 from shm.pipeline.reconcile import SHM, Condition, reconcile
 from shm.store import Store, StoredAlert, Workspace
-from shm.store.list_rows import TrendPoint
+from shm.store.queries.trends import find_latest_trends, list_trend
+from shm.store.rows import TrendPoint
 from shm.values import Alert, AlertKind, Averaged, CrossedLimit, Hanger
 
 _KIND: AlertKind = "limit"
@@ -28,7 +29,7 @@ def heed_limits(
         is_open = [each for each in known if each.resolution is None]
         if not is_open and not any(_limits(hanger)):
             continue
-        if (point := store.posteriors.latest_trends([hanger]).get(hanger.id)) is not None:
+        if (point := find_latest_trends(store, [hanger]).get(hanger.id)) is not None:
             conditions = list(_conditions(workspace, store, hanger, point, known))
             store.alerts.settle(reconcile(is_open, conditions), hooks, at)
 
@@ -113,7 +114,7 @@ def _is_another_crossing(store: Store, hanger: Hanger, last: StoredAlert) -> boo
     if last.resolution.who == SHM:
         return True
     side, end = _side(last.alert), hanger.thresholds.end_probability
-    since = store.posteriors.trend(hanger, last.alert.time)
+    since = list_trend(store, hanger, last.alert.time)
     return any(_probability(each.averaged, side) < end for each in since)
 
 

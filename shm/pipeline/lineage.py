@@ -1,4 +1,4 @@
-"""What the steps agree on: classes, seeds, refusals, what results depend on and what of it changed.
+"""Settings shared by the steps: classes, seeds, refusals, lineage of results and its changes.
 
 Nothing here imports what computes, so that the daemon itself begins quickly and stays small.
 
@@ -14,15 +14,12 @@ import math
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass, replace
-from datetime import datetime
 from functools import cache
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 from shm.assumptions import DEFAULTS, number_text
 from shm.documents import dump
-from shm.errors import BadInput, ShmError
 from shm.models import Model, build, competing_names
 from shm.pipeline.reconcile import SHM
 from shm.read import Limits
@@ -35,8 +32,9 @@ from shm.store import (
     StoredRecording,
     StoredTest,
     Workspace,
-    files,
 )
+from shm.store.queries.recordings import find_discard
+from shm.store.queries.tests import list_refused_of_baselines
 from shm.values import Hanger, Posterior
 
 IDENTIFY_SETTINGS = (
@@ -55,7 +53,7 @@ class Taught:
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """How an update is made: samples, seed, priors, and what a measured tension has taught."""
+    """Options of an update: samples, seed, priors, and what a measured tension has taught."""
 
     samples: int
     seed: int
@@ -80,14 +78,14 @@ def identify_settings(settings: Settings) -> dict[str, Any]:
 
 
 def read_limits(settings: Settings) -> Limits:
-    """What one file may hold and what reading it may cost."""
+    """Return what one file may hold and what reading it may cost."""
     return Limits(**{each.name: getattr(settings, each.name) for each in fields(Limits)})
 
 
 def identify_lineage(
     recording: StoredRecording, hanger_id: int | None, workspace: Workspace
 ) -> Lineage:
-    """What the tests of a recording depend on: file, sidecar, settings, description, version."""
+    """Return the lineage of tests: file, sidecar, settings, description, version."""
     bridge = workspace.bridge
     inputs = [recording.file.sha256, recording.file.sidecar_as]
     terms = {
@@ -106,7 +104,7 @@ def _described(hanger: Hanger) -> dict[str, Any]:
 def diagnosis_lineage(
     tests: Sequence[StoredTest], hanger: Hanger, terms: Mapping[str, Any]
 ) -> Lineage:
-    """What a diagnosis depends on: tests, description, options, version."""
+    """Return what a diagnosis depends on: tests, description, options, version."""
     inputs = [[test.key, test.lineage.columns] for test in tests]
     return Lineage.of(inputs, {**terms, "hanger": _described(hanger)})
 
@@ -135,22 +133,6 @@ def seed_of(seed: int, keys: Sequence[str]) -> int:
     """The seed of one result: the same in whatever order and wherever it is computed."""
     text = "\n".join([str(seed), *sorted(keys)])
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4])
-
-
-def reason_document(
-    error: BaseException, recording: StoredRecording, time: datetime
-) -> dict[str, Any]:
-    """Why a file is refused: which file, line and channel, what is wrong, what to do."""
-    message = f"internal error: {error!r}."
-    remedy = "Report this with the log, then drop the file again."
-    if isinstance(error, ShmError):
-        message, remedy = error.message, error.remedy
-    name, sha256 = recording.file.file_name, recording.file.sha256
-    reason = files.reason_document(name, sha256, message, remedy, time)
-    if isinstance(error, BadInput):
-        file = Path(error.file).name or recording.file.file_name
-        reason |= {"file": file, "line": error.line, "channel": error.channel or None}
-    return reason
 
 
 _ALL = (*IDENTIFY_SETTINGS, "models", "samples", "seed", "baseline_tests", "false_call_years")
@@ -209,8 +191,8 @@ def discarded_of_baselines(store: Store) -> dict[int, tuple[str, ...]]:
     A day of a stream that was replaced by the complete day measured the same, of fewer hours.
     """
     found: dict[int, tuple[str, ...]] = {}
-    for hanger, name, recording_id in store.tests.refused_of_baselines():
-        why = store.recordings.discard_in_force(recording_id)
+    for hanger, name, recording_id in list_refused_of_baselines(store):
+        why = find_discard(store, recording_id)
         if why is None or why.who != SHM:
             found[hanger] = (*found.get(hanger, ()), name)
     return found

@@ -14,6 +14,9 @@ from shm.report.hanger_status import Status
 from shm.report.hanger_summary import HangerSummary
 from shm.store import Store, StoredAlert, Workspace
 from shm.store.point_outbox import PointOutbox
+from shm.store.queries.history import find_newest_entry
+from shm.store.queries.streams import list_pooled
+from shm.store.queries.trends import list_trend
 from shm.values import Hanger, Mode
 from shm.values.messages import URGENCIES, Lead
 
@@ -121,7 +124,7 @@ def queue_results(
     progress: Progress,
 ) -> int:
     """Queue for a database all that is new or changed; return how many points."""
-    look, newest = _Look(outbox, target, workspace, store, now), store.journal.newest()
+    look, newest = _Look(outbox, target, workspace, store, now), find_newest_entry(store)
     points = [*look.headlines(), *alert_points(store.alerts.list_all(), look.tags)]
     lines: dict[str, str] = {}
     for hanger in workspace.bridge.hangers:
@@ -170,7 +173,7 @@ class _Look:
 
     def tests(self, hanger: Hanger, looked_at: set[int]) -> Iterator[Point]:
         """Yield the tests that count, each with the tension by it alone; and their modes."""
-        tags, trend = self.tags_of(hanger), self.store.posteriors.trend(hanger)
+        tags, trend = self.tags_of(hanger), list_trend(self.store, hanger)
         for each in trend:
             tension = Interval.of_averaged(each.averaged)
             fields: dict[str, Value] = {
@@ -204,7 +207,7 @@ class _Look:
             tags = {**of_hanger, "stream": stream.name}
             _, newest = self.last_sent(Point(HOUR, tags, {}, self.now))
             since = max(_EPOCH, newest - _HOURS_REVIEWED)
-            for each in self.store.streams.list_pooled(hanger.id, "hour", since, self.now):
+            for each in list_pooled(self.store, hanger.id, "hour", since, self.now):
                 fields: dict[str, Value] = {
                     **_shift("tension_shift", each.tension_shift, each.tension_shift_sd),
                     **_shift("compensated_shift", each.compensated_shift, each.compensated_sd),

@@ -19,6 +19,7 @@ from shm.pipeline.lineage import update_terms
 from shm.pipeline.steps import checked, options_of
 from shm.pipeline.watching import dated_tests
 from shm.store import Baseline, Stage, Store, StoredAlert, StoredTest, Workspace
+from shm.store.queries.hangers import list_detected_changes
 from shm.values import Change, Hanger
 from shm.values.rounding import force_unit
 from shm.watch.readings import Reader
@@ -28,7 +29,7 @@ from shm.watch.watching import kept_of
 
 @dataclass(frozen=True)
 class Order:
-    """Who wants a hanger compared with itself as it is since when, and why.
+    """Request to compare a hanger with itself since a time, by whom and why.
 
     With a `kind` of event only the alerts that it explains are resolved.
     """
@@ -66,7 +67,7 @@ class Outcome:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What holds from now on."""
+        """Return sentences on what holds from now on."""
         tension_n, made = self.made.posterior.tension_n, self.made
         unit = force_unit(float(tension_n.mean()))
         tension, count = unit.of(tension_n), len(made.posterior.tests)
@@ -107,7 +108,7 @@ def set_baseline(
 
 
 def _is_explained_by(stored: StoredAlert, made: Baseline) -> bool:
-    """Whether a new baseline has ended an alert, and nobody had taken note of it before."""
+    """Return True if a new baseline has ended an alert, and nobody had taken note of it before."""
     noted = stored.acknowledgement
     return noted is not None and (noted.who, noted.at) == (made.who, made.set_at)
 
@@ -143,7 +144,7 @@ def rebaseline(
     measured = [test.test for test in chosen]
     check = checked(measured, hanger, terms)
     posterior = update(
-        check.kept_of(measured),
+        check.accepted_tests(measured),
         build(model, hanger, terms.priors),
         options_of(terms, hanger),
         progress,
@@ -156,9 +157,9 @@ def rebaseline(
 
 
 def still_shown(store: Store, hanger: Hanger, order: Order) -> tuple[Unrepaired, ...]:
-    """What of the alerts that an order ends its tests still show, each against the baseline that it
-    was raised against: a later one may hold the loss already.
+    """Return what tests of a request still show of the alerts that it ends.
 
+    Each against the baseline that it was raised against: a later one may hold the loss already.
     Raises NothingThere as `rebaseline` does.
     """
     if store.watch.baseline(hanger.id) is None:
@@ -212,7 +213,7 @@ def changes_within(store: Store, hanger: int, since: datetime) -> tuple[Change, 
     times = [test.time for test in store.tests.list_all(hanger) if test.time >= since]
     return tuple(
         each
-        for each in store.watch.detected_changes().get(hanger, ())
+        for each in list_detected_changes(store).get(hanger, ())
         if times and min(times) <= each.began_after and max(times) >= each.began_by
     )
 

@@ -117,7 +117,7 @@ def registered() -> Steps:
 
 
 def run_step(step: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
-    """What a step gives; the process that ran it gives back the memory that it has freed."""
+    """Return what a step gives; the process that ran it gives back the memory that it has freed."""
     try:
         return step(*arguments, **named)
     finally:

@@ -10,6 +10,9 @@ from datetime import datetime
 import shm
 from shm.errors import NothingThere, ShmError
 from shm.identify import identify
+from shm.inference import UpdateOptions, refresh
+from shm.inference.reference_level import at_level
+from shm.models import build
 from shm.pipeline.adopting import gap_watch
 from shm.pipeline.bridge_reporting import hanger_summaries, stored_pattern
 from shm.pipeline.lineage import (
@@ -24,15 +27,24 @@ from shm.pipeline.lineage import (
 from shm.pipeline.steps import identify_options
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import peek_test, read_test
-from shm.report.contents import HangerReport, ModalTestReport, TrendRow
+from shm.report.contents import HangerReport, ModalTestReport, TensionAtLevel, TrendRow
 from shm.report.formatting import Interval
 from shm.report.hanger_report import StructureReport
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
 from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
+from shm.store.queries.alerts import count_open_alerts
+from shm.store.queries.hangers import find_latest_diagnosis, list_detections
+from shm.store.queries.tests import (
+    count_tests,
+    list_baseline_tests,
+    list_undated_names,
+    load_frequency_response,
+)
+from shm.store.queries.trends import find_latest_trends, list_trend
 from shm.values import Hanger, ResponsePoint, WatchedTest
+from shm.values.stated_tension import averaged_now
 from shm.watch import WatchOptions, watch_hanger
-from shm.watch.alert_text import watch_words
-from shm.watch.change_words import frequency_words
+from shm.watch.alert_text import frequency_words, watch_words
 from shm.watch.neighbours import BridgePattern
 
 log = logging.getLogger(__name__)
@@ -57,14 +69,32 @@ def hanger_report(
         report,
         alerts=tuple(each for each in report.alerts if period is None or period.holds(each.time)),
         inspections=tuple(e for e in report.inspections if period is None or period.holds(e.at)),
-        frequency_response=store.tests.frequency_response(latest),
+        frequency_response=load_frequency_response(store, latest),
         hits=_hit_places(workspace, store, latest),
         states=hanger_states(
             workspace, store, hanger, store.watch.baseline(hanger_id, report.posterior.model)
         ),
         neighbours=_neighbours(workspace, store) if report.now.called else None,
         period=period,
+        at_level=_at_level(workspace, report),
     )
+
+
+def _at_level(workspace: Workspace, report: HangerReport) -> TensionAtLevel | None:
+    """Return the tension by the latest test at the reference level; None where none is set."""
+    settings, known = workspace.settings, report.posterior
+    level = settings.reference_level
+    if not level:
+        return None
+    at = TensionAtLevel(level, level * settings.reference_force_n)
+    try:
+        test = at_level(report.latest, level)
+        model = build(known.model, report.hanger, settings.priors)
+        moved = refresh([test], model, known, UpdateOptions(settings.samples, settings.seed))
+    except ShmError as reason:
+        return replace(at, reason=str(reason))
+    averaged = averaged_now(moved, report.selection, report.hanger.limits)
+    return replace(at, tension_n=Interval.of_averaged(averaged))
 
 
 def _hit_places(workspace: Workspace, store: Store, test: StoredTest) -> tuple[ResponsePoint, ...]:
@@ -85,9 +115,9 @@ def structure_report(
 ) -> StructureReport:
     """All that the store knows of a structure without a model."""
     structure, baseline = workspace.bridge.tested(number), store.watch.baseline(number)
-    of_baseline = store.tests.of_baseline(baseline) if baseline else ()
+    of_baseline = list_baseline_tests(store, baseline) if baseline else ()
     watched, alerts = _watched_against(store, baseline), store.alerts.list_all(number)
-    latest = store.tests.latest().get(number)
+    latest = count_tests(store).get(number)
     levels = baseline.posterior if baseline else None
     return StructureReport(
         bridge=workspace.bridge.name,
@@ -101,8 +131,8 @@ def structure_report(
         statement=frequency_words(watched, structure),
         drifts=watched[-1].drifts if watched else (),
         alerts=tuple(stored.alert for stored in alerts),
-        open_alerts=store.alerts.open_counts().get(number, 0),
-        undated=store.tests.names_without_time().get(number, ()),
+        open_alerts=count_open_alerts(store).get(number, 0),
+        undated=list_undated_names(store).get(number, ()),
         generated_at=generated_at,
         version=shm.__version__,
     )
@@ -126,7 +156,7 @@ def hanger_now(
         store.watch.baseline(hanger.id, posterior.model),
     )
     in_force = store.watch.baseline(hanger.id)
-    diagnosis, watch = store.posteriors.latest_diagnosis(hanger.id), gap_watch(store, hanger.id)
+    diagnosis, watch = find_latest_diagnosis(store, hanger.id), gap_watch(store, hanger.id)
     watched, alerts = _watched_against(store, baseline), store.alerts.list_all(hanger.id)
     (now,) = hanger_summaries(workspace, store, generated_at, [hanger])
     return HangerReport(
@@ -156,7 +186,7 @@ def hanger_now(
 
 
 def _changed(store: Store, hanger: Hanger) -> dict[str, str]:
-    """What holds of a hanger instead of what `bridge.toml` says."""
+    """Return what holds of a hanger instead of what `bridge.toml` says."""
     current = store.settings.list_current().values()
     return {f"changed: {each.key}": str(each) for each in current if each.is_of(hanger.id)}
 
@@ -174,10 +204,10 @@ def _trend_row(point: TrendPoint) -> TrendRow:
 
 
 def _trend(store: Store, hanger: Hanger, period: Period | None) -> tuple[TrendPoint, ...]:
-    points = store.posteriors.trend(hanger, period.since if period else None)
+    points = list_trend(store, hanger, period.since if period else None)
     if points:
         return points
-    latest = store.posteriors.latest_trends([hanger]).get(hanger.id)
+    latest = find_latest_trends(store, [hanger]).get(hanger.id)
     if latest is None:
         raise NothingThere(
             f"no test of hanger {hanger.id} has been through updating yet.",
@@ -205,7 +235,7 @@ def _baseline_words(baseline: Baseline | None) -> dict[str, str]:
 
 
 def _acknowledged(alerts: Sequence[StoredAlert]) -> dict[str, str]:
-    """Who took note of an alert, or that it ended, when and why, by its key."""
+    """Return who took note of an alert, or that it ended, when and why, by its key."""
     noted = {each.alert.key: each.acknowledgement or each.resolution for each in alerts}
     ended = {each.alert.key for each in alerts if each.resolution and not each.acknowledgement}
     return {
@@ -217,12 +247,12 @@ def _acknowledged(alerts: Sequence[StoredAlert]) -> dict[str, str]:
 
 def _watched_against(store: Store, baseline: Baseline | None) -> tuple[WatchedTest, ...]:
     """The watches that call a change, and the latest one."""
-    found = store.watch.list_detected(baseline.hanger, baseline.id) if baseline else ()
+    found = list_detections(store, baseline.hanger, baseline.id) if baseline else ()
     return tuple(each.watched for each in found)
 
 
 def _neighbours(workspace: Workspace, store: Store) -> BridgePattern | None:
-    """What moved over the bridge; None where fewer than three hangers can be compared."""
+    """Return what moved over the bridge; None where fewer than three hangers can be compared."""
     try:
         return stored_pattern(store, [hanger.id for hanger in workspace.bridge.hangers])
     except NothingThere:
@@ -248,14 +278,14 @@ def hanger_states(
 def modal_test_report(
     workspace: Workspace, store: Store, hanger_id: int, name: str
 ) -> ModalTestReport:
-    """How a stored test came to its modes: its raw file is identified once more.
+    """Return how a stored test came to its modes: its raw file is identified once more.
 
     Raises NothingThere for an unknown test and for one whose modes a file gave.
     """
     hanger = workspace.bridge.hanger(hanger_id)
     stored = store.tests.named(hanger_id, name)
     recording = store.recordings.get(stored.recording_id)
-    if store.tests.frequency_response(stored) is None and not stored.quality:
+    if load_frequency_response(store, stored) is None and not stored.quality:
         raise NothingThere(
             f"{recording.file.file_name} gave the modes of {name}, not what they come from.",
             remedy="Ask for a test that was identified here.",

@@ -46,12 +46,15 @@ def options_of(terms: Terms, hanger: Hanger) -> UpdateOptions:
 
 
 def checked(tests: Sequence[ModalTest], hanger: Hanger, terms: Terms) -> BaselineCheck:
-    """What is mistaken among the tests of a baseline, by a beam on springs whatever competes."""
+    """Find mistakes among the tests of a baseline, by a beam on springs whatever competes."""
     return check_baseline(tests, described(_CHECKED_BY, hanger, terms.priors))
 
 
 def calibration(taught: Taught | None, hanger: Hanger) -> Calibration | None:
-    """What a measured tension has taught of `hanger`; None where there is nothing to learn from."""
+    """Return what a measured tension has taught of `hanger`.
+
+    None where there is nothing to learn from.
+    """
     return None if taught is None else learn(taught.posterior, hanger, taught.own)
 
 
@@ -127,7 +130,7 @@ def _possible_times(test: ModalTest, records: Sequence[Recording]) -> tuple[date
 
 
 def identify_options(settings: Settings, bridge: Bridge) -> IdentifyOptions:
-    """How recordings of a bridge are identified."""
+    """Return how recordings of a bridge are identified."""
     bands = tuple((each.name, each.low_hz, each.high_hz) for each in bridge.disturbances)
     return IdentifyOptions(**identify_settings(settings), disturbance_bands=bands)
 
@@ -150,7 +153,7 @@ def select_model(
         return Selection((measured_levels(tests, terms.seed),), (1.0,))
     models = [build(name, hanger, terms.priors) for name in names]
     check = checked(tests, hanger, terms)
-    found = select(check.kept_of(tests), models, options_of(terms, hanger))
+    found = select(check.accepted_tests(tests), models, options_of(terms, hanger))
     posteriors = tuple(replace(each, baseline_check=check) for each in found.posteriors)
     return replace(found, posteriors=posteriors)
 

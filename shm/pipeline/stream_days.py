@@ -13,6 +13,8 @@ from shm.pipeline.reconcile import SHM
 from shm.read.atomic import replace_text
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX
+from shm.store.queries.streams import find_first_window, find_pooled_range, list_window_starts
+from shm.store.queries.tests import list_test_rows
 from shm.store.ring_files import PERIOD
 from shm.values import ModalTest, Posterior
 from shm.values.stream import PERIODS, Stream, period_start
@@ -28,7 +30,7 @@ log = logging.getLogger(__name__)
 
 @dataclass
 class RestOfDays:
-    """Whether what a day lacks may still come: a part of a day, as its night, is no test of it.
+    """Days whose rest may still come: a part of a day, as its night, is no test of it.
 
     A logger that was offline sends what it stored after what is new, or before it, in any order.
     `came` is when each stream last brought anything out of its turn, or was back after hours; what
@@ -48,13 +50,13 @@ class RestOfDays:
             self.lacking.pop(name, None)
 
     def is_awaited(self, store: Store, name: str, day: datetime) -> bool:
-        """Whether a day that is over lacks windows, and is not old enough to be judged without."""
+        """Return True if a day that is over lacks windows that may still come."""
         end, now = day + PERIODS["day"], self.clock()
         if self.hurry or now >= max(self.came.setdefault(name, now), end) + _REST_COMES:
             return False
         if self.lacking.get(name) != day:
-            begin = max(day, store.streams.first_window(name) or day)
-            found = sum(start < end for start in store.streams.window_starts(name, begin))
+            begin = max(day, find_first_window(store, name) or day)
+            found = sum(start < end for start in list_window_starts(store, name, begin))
             if end - begin - found * PERIOD <= _MAY_LACK:
                 return False
             self.lacking[name] = day
@@ -68,7 +70,7 @@ def baseline_of(store: Store, stream: Stream) -> Posterior | None:
     found = store.watch.baseline(stream.hanger)
     if found is None:
         return None
-    pooled = store.streams.pooled_range(stream.name)
+    pooled = find_pooled_range(store, stream.name)
     if pooled is None:
         return found.posterior
     first = period_start(pooled[0], PERIODS["day"])
@@ -85,7 +87,7 @@ def hand_on_day(workspace: Workspace, store: Store, test: ModalTest, at: datetim
     """
     if test.hanger is None:
         return
-    for row in store.tests.list_rows(test.hanger):
+    for row in list_test_rows(store, test.hanger):
         if not row.name.startswith(test.id):
             continue
         if _hz(store.tests.get(row.id).test) == _hz(test):

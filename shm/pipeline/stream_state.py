@@ -1,4 +1,4 @@
-"""How each stream is, and what it has shown over the last days."""
+"""State of each stream, and its readings over the last days."""
 
 from __future__ import annotations
 
@@ -13,6 +13,15 @@ from shm.documents import parse_time
 from shm.pipeline.unheard import LATELY, State, last_samples, measure_unread, word_of
 from shm.report.figures.stream_course import Course
 from shm.store import Store, Workspace
+from shm.store.queries.streams import (
+    find_last_window,
+    find_pooled_range,
+    list_hours_near,
+    list_pooled,
+    list_spectra,
+    list_stream_events,
+)
+from shm.store.queries.tests import list_test_rows
 from shm.store.ring import Ring
 from shm.store.ring_files import PERIOD
 from shm.store.ring_notices import StreamState as RingState
@@ -84,8 +93,8 @@ def _state(
     store: Store,
     now: datetime,
 ) -> StreamCondition:
-    events = store.streams.list_events(stream.name, now - LATELY)
-    window = store.streams.last_window(stream.name)
+    events = list_stream_events(store, stream.name, now - LATELY)
+    window = find_last_window(store, stream.name)
     state = ring.state(stream.name)
     received, lost = _received(state, now)
     return StreamCondition(
@@ -123,10 +132,10 @@ def _as_one(run: Sequence[StreamEvent]) -> StreamEvent:
 
 
 def _received(state: RingState, now: datetime) -> tuple[float, float]:
-    """Which share of the last ten minutes that are sealed came, and which share of a day did not,
-    from the first sample on up to the last one.
+    """Return the received fraction of the last ten minutes, and the lost fraction of a day.
 
-    Ten minutes are those of the chunks that begin in them: what these have beyond the edges counts.
+    Of samples from the first one on up to the last one. Ten minutes are those of the chunks that
+    begin in them: what these have beyond the edges counts.
     """
     came_s = {parse_time(start): seconds for start, seconds in state.received_s.items()}
     spans = {parse_time(start): span for start, span in state.spans.items()}
@@ -150,32 +159,28 @@ def _lately_s(seconds: Mapping[str, float], now: datetime) -> float:
 
 
 def _last_hour(store: Store, stream: Stream) -> PooledReading | None:
-    hours = store.streams.pooled_range(stream.name, "hour")
+    hours = find_pooled_range(store, stream.name, "hour")
     if hours is None:
         return None
-    found = store.streams.list_pooled(stream.hanger, "hour", hours[1], hours[1] + PERIODS["hour"])
+    found = list_pooled(store, stream.hanger, "hour", hours[1], hours[1] + PERIODS["hour"])
     return next((each for each in found if each.stream == stream.name), None)
 
 
 def against_hammer(store: Store, stream: Stream) -> AmbientBias:
-    """What a stream's frequencies differ by from those of the latest hammer tests made while it
-    ran.
-    """
-    hours = store.streams.pooled_range(stream.name, "hour")
+    """Compare a stream's frequencies with those of hammer tests made while it ran."""
+    hours = find_pooled_range(store, stream.name, "hour")
     if hours is None:
         return ambient_bias(stream.hanger, (), ())
     last = hours[1]
     own = [
         row.id
-        for row in store.tests.list_rows(stream.hanger, _ROWS_SEEN)
+        for row in list_test_rows(store, stream.hanger, _ROWS_SEEN)
         if row.time <= last + TOGETHER
         and not row.name.startswith(f"{stream.name}-{row.time:%Y-%m-%d}")  # a day of its own
     ][:_TESTS_COMPARED]
     tests = [each.test for each in store.tests.list_all(ids=own)]
     times = [test.time for test in tests if test.time is not None]
-    return ambient_bias(
-        stream.hanger, tests, store.streams.list_hours_near(stream.name, times, TOGETHER)
-    )
+    return ambient_bias(stream.hanger, tests, list_hours_near(store, stream.name, times, TOGETHER))
 
 
 def tension_words(hour: PooledReading | None) -> str:
@@ -206,11 +211,11 @@ def stream_course(store: Store, stream: Stream, since: datetime, until: datetime
     )
     hours = [
         each
-        for each in store.streams.list_pooled(stream.hanger, period, since, until)
+        for each in list_pooled(store, stream.hanger, period, since, until)
         if each.stream == stream.name
     ]
     first = max(since, until - _LONGEST_SPECTRA)
-    windows = store.streams.list_spectra(stream.name, first, until, _MOST_SPECTRA)
+    windows = list_spectra(store, stream.name, first, until, _MOST_SPECTRA)
     if not hours and not windows:
         return None
     lines = len(windows[0][1]) if windows else 0
@@ -224,7 +229,7 @@ def stream_course(store: Store, stream: Stream, since: datetime, until: datetime
         period=period,
         modes=_modes(hours),
         tension=_tension(hours),
-        events=store.streams.list_events(stream.name, since),
+        events=list_stream_events(store, stream.name, since),
     )
 
 

@@ -14,6 +14,7 @@ import logging
 from collections import defaultdict, deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
@@ -21,7 +22,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from shm.documents import format_time
-from shm.errors import ShmError, StoreError
+from shm.errors import BadInput, ShmError, StoreError
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.reconcile import Condition, is_same_event, reconcile
 from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day
@@ -34,6 +35,17 @@ from shm.pipeline.unheard import (
 )
 from shm.store import Reconciled, Store, Workspace
 from shm.store.archive import nothing
+from shm.store.queries.streams import (
+    find_first_unpooled,
+    find_first_window,
+    find_pooled_range,
+    find_progress,
+    list_latest_with_modes,
+    list_pooled,
+    list_stream_events,
+    list_windows,
+    load_stream_watch,
+)
 from shm.store.ring import ring_of
 from shm.store.ring_files import PERIOD
 from shm.values import Mode, Plane
@@ -46,7 +58,7 @@ from shm.values.stream import (
     WindowReading,
     period_start,
 )
-from shm.watch.stream_state import gone_back
+from shm.watch.stream_watch import gone_back
 
 if TYPE_CHECKING:
     from shm.pipeline.stream_steps import Pooled, WindowFound
@@ -128,7 +140,7 @@ class Streaming:
 
     @property
     def under_way(self) -> tuple[Future[Any], ...]:
-        """What is being computed now."""
+        """Return what is being computed now."""
         return tuple(running.future for running in self._running.values())
 
     def advance(self, *, hurry: bool = False) -> bool:
@@ -192,15 +204,15 @@ class Streaming:
             self._begin_window(stream, start)
 
     def _recall(self, stream: Stream) -> None:
-        """How far the stream had come, what was sealed since, and what came late."""
+        """Return how far the stream had come, what was sealed since, and what came late."""
         name = stream.name
         self._known.add(name)
-        done = self.store.streams.progress(name)
+        done = find_progress(self.store, name)
         since = lateness_limit(self.workspace, self.clock())
-        changed = self.store.streams.first_unpooled(name, since)
+        changed = find_first_unpooled(self.store, name, since)
         if changed is not None:
             self._changed[name] = changed
-        hours = self.store.streams.pooled_range(name, "hour")
+        hours = find_pooled_range(self.store, name, "hour")
         watched = self._watched_until(stream)
         if hours is not None and watched is not None and watched <= hours[1]:
             self._pooled[name, "hour"] = watched
@@ -211,27 +223,30 @@ class Streaming:
             self._note(name, start)
 
     def _go_back(self, stream: Stream, changed: datetime) -> None:
-        """What windows that came late belong to is pooled next, from the earliest of them on.
+        """Pool again from the earliest window on that came late.
 
         The watch goes on from how it was before them; further back than its states are kept, they
         are pooled and not watched.
         """
         name, streams = stream.name, self.store.streams
         starts = {each: period_start(changed, length) for each, length in PERIODS.items()}
-        newest = streams.watch(stream.hanger)
-        before = streams.watch(stream.hanger, starts["hour"])
-        if newest and before and starts["hour"] < newest.time:
-            content = gone_back(before.content, newest.content)
-            streams.go_back(stream.hanger, before.time, content)
-            starts["hour"] = before.time
-            self._settled[name] = max(newest.time, self._settled.get(name, newest.time))
+        newest = load_stream_watch(self.store, stream.hanger)
+        before = load_stream_watch(self.store, stream.hanger, starts["hour"])
+        if newest and before and starts["hour"] < newest.reading_time:
+            with suppress(BadInput):  # states of before an upgrade cannot be read
+                content = gone_back(before.content, newest.content)
+                streams.go_back(stream.hanger, before.reading_time, content)
+                starts["hour"] = before.reading_time
+                self._settled[name] = max(
+                    newest.reading_time, self._settled.get(name, newest.reading_time)
+                )
         for period, start in starts.items():
             former = self._pooled.get((name, period), start)
             self._pooled[name, period] = min(former, start)
 
     def _watched_until(self, stream: Stream) -> datetime | None:
-        watch = self.store.streams.watch(stream.hanger)
-        return None if watch is None else watch.time
+        watch = load_stream_watch(self.store, stream.hanger)
+        return None if watch is None else watch.reading_time
 
     def _next_window(self, name: str) -> datetime | None:
         """The next ten minutes that are whole, or not waited for any more; late ones last."""
@@ -252,7 +267,7 @@ class Streaming:
 
         hanger = self.workspace.bridge.tested(stream.hanger)
         options = identify_options(self.workspace.settings, self.workspace.bridge)
-        known = self.store.streams.latest_with_modes(stream.name)
+        known = list_latest_with_modes(self.store, stream.name)
         self._submit(
             stream.name,
             partial(
@@ -286,9 +301,9 @@ class Streaming:
         return start if start is not None and start + length <= done else None
 
     def _is_due(self, stream: Stream, period: Period, start: datetime) -> bool:
-        """Whether it has windows and is not pooled, or is an hour yet to be watched."""
+        """Return True if it has windows and is not pooled, or is an hour yet to be watched."""
         end = start + PERIODS[period]
-        known = self.store.streams.list_pooled(stream.hanger, period, start, end)
+        known = list_pooled(self.store, stream.hanger, period, start, end)
         if any(each.stream == stream.name for each in known):
             watched = self._watched_until(stream)
             if period != "hour" or watched is None or start < watched:
@@ -297,23 +312,23 @@ class Streaming:
 
     def _pooled_until(self, stream: Stream, period: Period, length: timedelta) -> datetime | None:
         """The end of the last reading of a period; the first window's period where none is."""
-        pooled = self.store.streams.pooled_range(stream.name, period)
+        pooled = find_pooled_range(self.store, stream.name, period)
         if pooled is not None:
             return pooled[1] + length
-        first = self.store.streams.first_window(stream.name)
+        first = find_first_window(self.store, stream.name)
         return None if first is None else period_start(first, length)
 
     def _windows(
         self, stream: Stream, start: datetime, length: timedelta
     ) -> tuple[WindowReading, ...]:
-        found = self.store.streams.list_windows(stream.hanger, start, start + length)
+        found = list_windows(self.store, stream.hanger, start, start + length)
         return tuple(each for each in found if each.window.stream == stream.name)
 
     def _begin_pool(self, stream: Stream, period: Period, start: datetime) -> None:
         from shm.pipeline.stream_steps import pool_stream
 
         hanger = self.workspace.bridge.tested(stream.hanger)
-        watch = self.store.streams.watch(stream.hanger)
+        watch = load_stream_watch(self.store, stream.hanger)
         self._submit(
             stream.name,
             partial(
@@ -326,14 +341,14 @@ class Streaming:
                 None if watch is None else watch.content,
                 self.workspace.settings.false_call_years,
                 self._recent_events(stream, start) if period == "hour" else (),
-                is_watched=period == "hour" and (watch is None or start >= watch.time),
+                is_watched=period == "hour" and (watch is None or start >= watch.reading_time),
             ),
             partial(self._keep_pooled, stream, period, start),
             partial(self._give_up_pool, stream, period, start),
         )
 
     def _recent_events(self, stream: Stream, start: datetime) -> tuple[StreamEvent, ...]:
-        return self.store.streams.list_events(stream.name, start - _LOOKED_BACK)
+        return list_stream_events(self.store, stream.name, start - _LOOKED_BACK)
 
     def _submit(
         self,

@@ -1,4 +1,4 @@
-"""Which alerts go to which hook now, and what the message says: all decided from rows and a clock.
+"""Decide from rows and a clock which alerts go to which hook now, and write the message.
 
 Nothing is remembered between two looks, so that a kill at any instant changes nothing; what has
 been decided is kept by the store (`begin_messages`) before anything is sent.
@@ -31,10 +31,10 @@ _LISTED = 60  # technical: hangers that a message names; the bridges we know hav
 
 @dataclass(frozen=True)
 class Terms:
-    """How hooks are told: the window in which alike alerts are gathered, and the hooks, some in
-    quiet hours or only of what nobody has acknowledged.
+    """Terms of messages: the window in which similar alerts are gathered, and the hooks.
 
-    With `hurry` nothing is gathered any longer: who asks is about to end.
+    Some are in quiet hours, or receive only what nobody has acknowledged. With `hurry` nothing is
+    gathered any longer: who asks is about to end.
     """
 
     window_s: float = 0.0
@@ -57,7 +57,7 @@ class Plan:
 def plan(
     unsent: Sequence[Delivery], silences: tuple[Silence, ...], now: datetime, terms: Terms
 ) -> Plan:
-    """What to do now with the deliveries whose first attempt has not begun."""
+    """Return what to do now with the deliveries whose first attempt has not begun."""
     not_needed: dict[int, str] = {}
     gathered: defaultdict[object, list[tuple[datetime, int]]] = defaultdict(list)
     seen: Counter[object] = Counter()
@@ -82,7 +82,7 @@ def plan(
 
 
 def _no_need(delivery: Delivery, silences: tuple[Silence, ...], terms: Terms) -> str:
-    """Why a hook need not be told that something is raised; empty where it must be."""
+    """Return why a hook need not be told that something is raised; empty where it must be."""
     stored = delivery.stored
     if delivery.news is News.RESOLVED:
         return ""
@@ -157,14 +157,14 @@ def _ready_at(
 
 
 def _first_told(alert: Alert, hooks: Sequence[Hook], at: datetime) -> datetime:
-    """When the first of the hooks that do not escalate is told, which quiet hours may put off."""
+    """Return when the first hook that does not escalate is told; quiet hours may put it off."""
     first = (hook for hook in hooks if hook.escalation_after_seconds is None)
     ends = (hook.quiet_until(alert.message, at, is_raised=True) for hook in first)
     return min((each.astimezone(UTC) if each else at for each in ends), default=at)
 
 
 def _is_whole(times: Sequence[datetime], now: datetime, terms: Terms, *, is_late: bool) -> bool:
-    """Whether alike alerts wait for no further one; those of an escalation wait for less."""
+    """Return True if alike alerts wait for no further one; those of an escalation wait for less."""
     if terms.hurry or not terms.window_s:
         return True
     window = timedelta(seconds=terms.window_s)
@@ -175,7 +175,7 @@ def _is_whole(times: Sequence[datetime], now: datetime, terms: Terms, *, is_late
 
 
 def _condition(alert: Alert) -> tuple[object, ...]:
-    """What alerts that are alike have in common: rules, and the quantity that leads and its way."""
+    """Return what similar alerts have in common: rules, and the leading quantity and its sign."""
     if not alert.drifts:
         return (alert.kinds,)
     lead = alert.drifts[0]
@@ -186,7 +186,7 @@ def _condition(alert: Alert) -> tuple[object, ...]:
 
 
 def message_of(deliveries: Sequence[Delivery]) -> Alert:
-    """What a hook is told by the deliveries of one message, the first of them first.
+    """Return what a hook is told by the deliveries of one message, the first of them first.
 
     Its key is that of the only alert, else of the first with the number of the others: the same at
     each attempt, since a message keeps its deliveries.

@@ -1,4 +1,4 @@
-"""Which permanent sensors say nothing, or something else than the others.
+"""Find permanent sensors that are silent or disagree with the others.
 
 What `shm doctor`, the pages and the messages tell alike. An event of each stream that begins to see
 nothing, an alert of what lasts for a day, over once it ends; thermometers against each other.
@@ -13,6 +13,13 @@ from typing import TYPE_CHECKING, Literal
 
 from shm.pipeline.reconcile import Condition, reconcile
 from shm.store import Store, StoredAlert, Workspace
+from shm.store.queries.streams import (
+    find_progress,
+    list_pooled,
+    list_stream_events,
+    list_window_starts,
+    list_windows,
+)
 from shm.values import Alert, AlertKind
 from shm.values.messages import WEEK, Lead
 from shm.values.rounding import listed
@@ -79,7 +86,7 @@ def heard(workspace: Workspace, store: Store, now: datetime) -> tuple[Heard, ...
     return tuple(
         Heard(
             each,
-            word_of(last[each.name], store.streams.list_events(each.name, now - LATELY), now),
+            word_of(last[each.name], list_stream_events(store, each.name, now - LATELY), now),
             last[each.name],
             measure_unread(workspace, ring, store, each.name, now),
         )
@@ -94,11 +101,11 @@ def last_samples(workspace: Workspace, ring: Ring, store: Store) -> dict[str, da
     """
     latest = ring.latest()
     names = [stream.name for stream in workspace.bridge.streams]
-    return {name: latest.get(name) or store.streams.progress(name) for name in names}
+    return {name: latest.get(name) or find_progress(store, name) for name in names}
 
 
 def word_of(last: datetime | None, events: Sequence[StreamEvent], now: datetime) -> State:
-    """How a stream is by its last sample and the `events` of a day."""
+    """Return how a stream is by its last sample and the `events` of a day."""
     if last is None:
         return "never sent"
     if last - now > _AHEAD:  # whether it still sends cannot be told by its stamps
@@ -163,9 +170,9 @@ def list_unread(
     workspace: Workspace, ring: Ring, store: Store, stream: str, now: datetime
 ) -> tuple[datetime, ...]:
     """Return when the sealed ten minutes of a stream begin that the watch has not read."""
-    done, since = store.streams.progress(stream), lateness_limit(workspace, now)
+    done, since = find_progress(store, stream), lateness_limit(workspace, now)
     begin = datetime.min.replace(tzinfo=UTC) if done is None else min(done, since)
-    read = store.streams.window_starts(stream, begin)
+    read = list_window_starts(store, stream, begin)
     return tuple(start for start in ring.periods(stream, begin) if start not in read)
 
 
@@ -218,7 +225,7 @@ def _gigabytes(size: int) -> str:
 
 
 def blind_hangers(found: Sequence[Heard]) -> dict[int, Lead]:
-    """What is said first of each hanger whose stream says nothing."""
+    """Return what is said first of each hanger whose stream says nothing."""
     leads = {}
     for each in found:
         if each.state in _BLIND:
@@ -265,7 +272,7 @@ def heed_silences(workspace: Workspace, store: Store, at: datetime) -> None:
 def _blind_since(store: Store, name: str, at: datetime) -> datetime:
     """Since when a stream has seen nothing; no longer ago than twice what an alert takes."""
     since = None
-    for each in reversed(store.streams.list_events(name, at - 2 * _LONG)):
+    for each in reversed(list_stream_events(store, name, at - 2 * _LONG)):
         if each.kind == "lost modes" and not each.channel:
             if since and since - each.end > _BROKEN_OFF:
                 break
@@ -279,8 +286,8 @@ def note_blindness(store: Store, stream: Stream, start: datetime) -> None:
     from shm.store.ring_files import PERIOD
 
     since = start - SEEN_BEFORE
-    found = store.streams.list_windows(stream.hanger, since, start + PERIOD)
-    events = store.streams.list_events(stream.name, since)
+    found = list_windows(store, stream.hanger, since, start + PERIOD)
+    events = list_stream_events(store, stream.name, since)
     windows = [each for each in found if each.window.stream == stream.name]
     reported = [each for each in events if each.kind == "lost modes" and each.start <= start]
     event = sees_nothing(windows, reported)
@@ -330,7 +337,7 @@ def compare_thermometers(workspace: Workspace, store: Store, at: datetime) -> No
 
     hours: dict[str, list[PooledReading]] = {stream.name: [] for stream in streams}
     for hanger in dict.fromkeys(stream.hanger for stream in streams):
-        for each in store.streams.list_pooled(hanger, "hour", at - _COMPARED, at):
+        for each in list_pooled(store, hanger, "hour", at - _COMPARED, at):
             hours.get(each.stream, []).append(each)
     for event in disagreeing(hours):
         store.streams.save_event(event)

@@ -1,4 +1,4 @@
-"""Which tests the watch goes over, which are judged again, and the alerts that follow.
+"""Choose the tests that the watch goes over or judges again; reconcile the alerts.
 
 A threshold judges the stored tests too: at once they are compared with their baseline again. A loss
 that only the new one calls is raised; an alert that no test is beyond any more is closed, and says
@@ -33,6 +33,17 @@ from shm.store import (
     TestRow,
     Workspace,
 )
+from shm.store.queries.hangers import find_latest_watches
+from shm.store.queries.recordings import list_holds
+from shm.store.queries.tests import list_baseline_tests, list_waiting_tests
+from shm.store.queries.watching import (
+    find_watch_state,
+    is_caught_up,
+    is_watched_again,
+    list_tests_by_receipt,
+    list_tests_by_time,
+    list_watched_tests,
+)
 from shm.store.rows import StoredWatch
 from shm.values import Alert, Beside, Hanger, ModalTest, WatchedTest
 from shm.values.drift import threshold_of
@@ -46,7 +57,7 @@ _BESIDE = 2  # of which two that agree have been told before
 
 @dataclass(frozen=True)
 class ToWatch:
-    """What a watch needs: the tests of the baseline and those to go over, the newest last.
+    """Input of a watch: the tests of the baseline and those to go over, the newest last.
 
     With something `kept` the newest goes alone. `key` tells what is kept after it from what was
     kept after other tests, or by another shm.
@@ -59,12 +70,17 @@ class ToWatch:
 
 
 def to_watch(store: Store, baseline: Baseline, newest: StoredTest) -> ToWatch:
-    """What the watch of a test needs; how many tests there were before costs next to nothing."""
-    before, kept = store.watch.list_watched(baseline, newest), store.watch.state(baseline)
+    """Return what the watch of a test needs.
+
+    How many tests there were before costs next to nothing.
+    """
+    before, kept = list_watched_tests(store, baseline, newest), find_watch_state(store, baseline)
     key = _key(before, newest)
     if kept is None or kept.key != _key(before):
         return ToWatch(*dated_tests(store, baseline, newest), None, key)
-    return ToWatch(_dated(store.tests.of_baseline(baseline)), _dated([newest]), kept.content, key)
+    return ToWatch(
+        _dated(list_baseline_tests(store, baseline)), _dated([newest]), kept.content, key
+    )
 
 
 def tests_beside(store: Store, baseline: Baseline, newest: StoredTest) -> Beside:
@@ -74,14 +90,12 @@ def tests_beside(store: Store, baseline: Baseline, newest: StoredTest) -> Beside
     that were passed over for planned works count here alone: a loss that lasts agrees with them.
     """
     by_clock = [
-        hold.recording_id
-        for hold in store.recordings.list_holds(newest.hanger)
-        if hold.is_for_its_clock
+        hold.recording_id for hold in list_holds(store, newest.hanger) if hold.is_for_its_clock
     ]
-    came = store.tests.received_beside(baseline, newest, _BESIDE, by_clock)
-    dated = store.tests.dated_beside(baseline, newest, _BESIDE)
+    came = list_tests_by_receipt(store, baseline, newest, _BESIDE, by_clock)
+    dated = list_tests_by_time(store, baseline, newest, _BESIDE)
     held = [each.test.id for each in (*came[0], *came[1]) if each.stage is Stage.HELD]
-    watched = {each.id for each in store.watch.list_watched(baseline)}
+    watched = {each.id for each in list_watched_tests(store, baseline)}
     of_works = {
         each.test.id
         for each in (*came[0], *came[1], *dated[0], *dated[1])
@@ -101,9 +115,9 @@ def dated_tests(
     store: Store, baseline: Baseline, newest: StoredTest | None = None
 ) -> tuple[list[DatedTest], list[DatedTest]]:
     """The tests of a baseline, and those since that were watched, up to and with `newest`."""
-    watched = {each.id for each in store.watch.list_watched(baseline, newest)}
+    watched = {each.id for each in list_watched_tests(store, baseline, newest)}
     later = [each for each in store.tests.list_all(baseline.hanger) if each.id in watched]
-    return _dated(store.tests.of_baseline(baseline)), _dated(
+    return _dated(list_baseline_tests(store, baseline)), _dated(
         [*later, *([newest] if newest else [])]
     )
 
@@ -150,7 +164,7 @@ class JudgedAgain:
             self._unread.pop(0)
         if not self._left:
             return
-        waiting = {test.hanger for test in self._store.tests.list_waiting(1, excluding=held)}
+        waiting = {test.hanger for test in list_waiting_tests(self._store, 1, excluding=held)}
         for hanger in waiting & self._left.keys():
             self._send_back(hanger, at)
         while self._left and self._judging not in waiting - set(damaged):
@@ -159,7 +173,7 @@ class JudgedAgain:
                 return
 
     def _note_differences(self, hanger: Hanger) -> None:
-        watch = self._store.watch.latest([hanger]).get(hanger.id)
+        watch = find_latest_watches(self._store, [hanger]).get(hanger.id)
         why = "; ".join(differences(watch, hanger, self._workspace.settings)) if watch else ""
         if watch and why:
             self._left[hanger.id] = watch.baseline_id, why
@@ -174,7 +188,7 @@ class JudgedAgain:
 
 
 def differences(judged: StoredWatch, hanger: Hanger, settings: Settings) -> Iterator[str]:
-    """Which thresholds in force are others than those that a test was judged with."""
+    """Return which thresholds in force are others than those that a test was judged with."""
     limits, watched = hanger.thresholds, judged.watched
     own = limits.false_call_years
     pairs = {
@@ -205,12 +219,12 @@ def reconciled(
     `found` is what the watch says, and the alert that it calls for. While other tests of the hanger
     wait to be compared once more nothing is decided: what there is lies in the past.
     """
-    if not store.watch.is_caught_up(test, baseline):
+    if not is_caught_up(store, test, baseline):
         return Reconciled()
     alerts = store.alerts.list_all(hanger.id)
     known = [each for each in alerts if each.baseline_id == baseline.id]
     watched, alert = found
-    is_again = store.watch.is_again(test, baseline)
+    is_again = is_watched_again(store, test, baseline)
     if is_again:
         stored = store.watch.list_all(hanger.id, baseline.id)
     else:

@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 from shm.errors import NothingThere
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline import Clock
+from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.judging import judge
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
@@ -25,7 +26,11 @@ from shm.pipeline.watching import reconciled, tests_beside, to_watch
 from shm.report.hanger_summary import HangerSummary, LatestTest
 from shm.store import KeptWatch, Stage, Store, StoredAlert, StoredRecording, TestRow, Workspace
 from shm.store.archive import nothing
-from shm.values import WITHOUT_MODEL, Hanger
+from shm.store.queries.hangers import list_detected_changes, list_selected_models
+from shm.store.queries.recordings import list_waiting_recordings
+from shm.store.queries.tests import list_waiting_tests
+from shm.store.queries.watching import find_latest_weighed, list_weighed
+from shm.values import NAN, WITHOUT_MODEL, Hanger, ModalTest
 from shm.values.stated_tension import averaged_now
 
 Work: TypeAlias = "Generator[Callable[[], Any], Any, Sequence[StoredAlert] | None]"
@@ -76,21 +81,22 @@ class Queue:
         earliest tests make the baseline; a watch waits for the files received before its test, so
         that its result does not depend on which task was the faster.
         """
-        received = self.store.recordings.list_waiting(limit, excluding=excluding)
+        received = list_waiting_recordings(self.store, limit, excluding=excluding)
         for each in received:
             yield Task("identify", each.id, partial(self._identify, each), (each.id,))
         needed = self.workspace.settings.baseline_tests
         waiting: defaultdict[int, list[TestRow]] = defaultdict(list)
-        for test in self.store.tests.list_waiting(max(limit, needed), excluding=excluding):
+        for test in list_waiting_tests(self.store, max(limit, needed), excluding=excluding):
             waiting[test.hanger].append(test)
-        selected = self.store.posteriors.selected_models()
+        selected = list_selected_models(self.store)
         oldest = min((each.id for each in received), default=None)
-        for hanger in self.workspace.bridge.watched:
+        # Control hangers first: what they say of a campaign goes into its alerts.
+        for hanger in sorted(self.workspace.bridge.watched, key=lambda each: not each.is_control):
             tests = waiting[hanger.id]
             if hanger.id in selected:
                 yield from self._list_later(hanger, selected[hanger.id], tests, oldest)
-            elif not received and len(tests) >= needed:
-                first = tests[:needed]
+            elif not received and len(tests) >= (count := 1 if hanger.is_control else needed):
+                first = tests[:count]
                 yield _make_task("select", hanger.id, partial(self._select, hanger, first), first)
 
     def _list_later(
@@ -98,7 +104,7 @@ class Queue:
     ) -> Iterator[Task]:
         to_update = [test for test in tests if test.stage is Stage.IDENTIFIED]
         ids = [test.id for test in to_update]
-        weighed = self.store.tests.weighed_among(ids) if len(ids) > 1 else ()
+        weighed = list_weighed(self.store, ids) if len(ids) > 1 else ()
         for test in to_update:
             yield _make_task("update", test.id, partial(self._update, hanger, model, test), [test])
             if test.id in weighed:  # later tests learn from its posterior
@@ -114,7 +120,7 @@ class Queue:
         archive: Opens = workspace.archive
         if settings.scheduler:  # workers elsewhere need not see our folders
             archive = RemoteFile.of(workspace.archive, recording.file, settings.max_file_bytes)
-        selected, step = store.posteriors.selected_models(), registered().identify
+        selected, step = list_selected_models(store), registered().identify
         found = yield partial(
             run_step, step, recording, archive, workspace.bridge, settings, selected
         )
@@ -130,7 +136,7 @@ class Queue:
             names = competing_names(hanger, settings.model_names)
         taught = self._find_taught(hanger, min(test.time for test in tests))
         terms, lineage = update_terms(hanger, names, tests, settings, taught=taught)
-        plain = [test.test for test in tests]
+        plain = [_to_infer(test.test, hanger) for test in tests]
         found = yield partial(run_step, registered().select, plain, hanger, names, terms)
         self.store.posteriors.save_selection(hanger.id, tests, found, lineage, self.clock())
         self._summarise(hanger)
@@ -145,9 +151,10 @@ class Queue:
         terms, lineage = update_terms(hanger, [model], [test], settings, known, taught)
         # A test of the baseline, done again, would be compared with what it has made itself.
         own = store.watch.baseline(hanger.id, model, test.time)
-        to_watch = own is None or test.test.id not in own.posterior.tests
-        step = registered().update
-        found = yield partial(run_step, step, test.test, hanger, model, known, terms)
+        of_baseline = own is not None and test.test.id in own.posterior.tests
+        to_watch = not (of_baseline or hanger.is_control)
+        step, plain = registered().update, _to_infer(test.test, hanger)
+        found = yield partial(run_step, step, plain, hanger, model, known, terms)
         store.posteriors.save(test, found, lineage, self.clock(), to_watch=to_watch)
         self._summarise(hanger)
         return None
@@ -179,12 +186,12 @@ class Queue:
             return None
         watched, alert, kept = found
         if alert is not None and tension is not None:
-            called = store.watch.detected_changes([hanger]).get(hanger.id, ())
+            called = list_detected_changes(store, [hanger]).get(hanger.id, ())
             now = HangerSummary(
                 hanger,
                 LatestTest(test.test.id, test.time, tension, current.model),
                 averaged_now(baseline.posterior, compared, hanger.limits),
-                drifts=watched.told,
+                drifts=watched.published_drifts,
                 called=(*called, *([watched.change] if watched.change.called else ())),
                 standing=(alert,),
             )
@@ -193,6 +200,10 @@ class Queue:
             earlier = [each.alert for each in store.alerts.list_all(hanger.id)]
             works = works_before(alert, silences, earlier)
             alert = alert if works is None else after_works(alert, works)
+        if alert is not None and self.workspace.bridge.controls:
+            charts, days = control_charts(self.workspace, store), settings.campaign_days
+            doubts = campaign_warnings(charts, hanger.id, test.time, days)
+            alert = replace(alert, message=" ".join((alert.message, *doubts)))
         changes = reconciled(store, hanger, baseline, test, (watched, alert))
         stored = (test, baseline, watched, alert, hooks, self.clock())
         state, level = KeptWatch(needed.key, test.time, kept), hanger.thresholds.alert_probability
@@ -201,19 +212,20 @@ class Queue:
     def _summarise(self, hanger: Hanger) -> None:
         if hanger.is_modelled:
             self.store.posteriors.save_summaries(hanger)
+        if hanger.is_modelled and not hanger.is_control:
             heed_limits(self.workspace, self.store, [hanger], self.clock())
 
     def _find_taught(self, hanger: Hanger, before: datetime) -> Taught | None:
         """Return the last time before then that its tension was read, else a sibling's."""
-        if self.workspace.settings.priors != DESCRIPTION:
+        if self.workspace.settings.priors != DESCRIPTION or hanger.is_control:
             return None
         siblings = [
             each.id
             for each in self.workspace.bridge.hangers
             if hanger.family and each.family == hanger.family and each.id != hanger.id
         ]
-        own = self.store.tests.latest_weighed([hanger.id], before)
-        weighed = own or (self.store.tests.latest_weighed(siblings, before) if siblings else None)
+        own = find_latest_weighed(self.store, [hanger.id], before)
+        weighed = own or (find_latest_weighed(self.store, siblings, before) if siblings else None)
         if weighed is None:
             return None
         try:
@@ -221,6 +233,12 @@ class Queue:
         except NothingThere:  # not through updating yet
             return None
         return Taught(posterior, own is not None)
+
+
+def _to_infer(test: ModalTest, hanger: Hanger) -> ModalTest:
+    """Return a test to infer a tension from: of a control hanger without what was read."""
+    unread = replace(test, tension_read_n=NAN, tension_read_sd_n=NAN)
+    return unread if hanger.is_control else test
 
 
 def _make_task(kind: str, id_: int, work: Callable[[], Work], tests: Sequence[TestRow]) -> Task:

@@ -21,7 +21,7 @@ from shm.read.assemble import assemble
 from shm.read.base import Format, at_once
 from shm.read.header import KEYS, Entry
 from shm.read.limits import guarded, refuse_large, refuse_many_samples
-from shm.read.logger_text import is_measured, said_of
+from shm.read.logger_text import is_measured, stated_entries
 from shm.read.logger_words import name_and_unit
 from shm.read.table import Column, Role, Table, describe
 from shm.values import NAN, FrequencyResponse, Recording
@@ -43,7 +43,7 @@ def from_sep005(
     """
     listed = [channels] if isinstance(channels, Mapping) else list(channels)
     table = _table(listed, _SOURCE, hanger)
-    found = assemble(table, describe(table, with_beside=False))
+    found = assemble(table, describe(table, with_sidecars=False))
     assert not isinstance(found, FrequencyResponse)
     return replace(found, source=_NAME)
 
@@ -100,7 +100,7 @@ def _columns(channel: Any, path: Path) -> list[Column]:
             "its data are no single row.", file=path, channel=name, remedy="Split its columns."
         )
     role: Role = "channel" if is_measured(name, unit[1], None) else "other"
-    said = dict(said_of(name, unit[1], None, None, path))
+    said = dict(stated_entries(name, unit[1], None, None, path))
     said |= {key: Entry(channel[key], path) for key in _OF_CHANNEL if key in channel}
     found = [Column(name, len(values), values.copy, unit[1], role, said, rate_hz=rate, label=name)]
     if channel.get("fs") is None:

@@ -102,7 +102,7 @@ class FileLock:
         self._file = file
 
     def held(self) -> bool:
-        """Whether it is still ours; who has lost it must stop ingesting at once.
+        """Return True if it is still ours; who has lost it must stop ingesting at once.
 
         False too where the file was removed: the next process would lock another one.
         """

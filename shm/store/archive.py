@@ -25,7 +25,7 @@ from typing import Any, BinaryIO
 from shm.documents import dump
 from shm.errors import DISK_FULL, BadInput, ShmError, StoreError, TooLarge
 from shm.read import sidecar_path
-from shm.store.list_rows import ReceivedFile
+from shm.store.rows import ReceivedFile
 from shm.values import printable
 
 log = logging.getLogger(__name__)
@@ -89,7 +89,7 @@ def checksum(path: Path, meanwhile: Meanwhile = nothing) -> str:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether a file of an archive has the SHA-256 that it is named by."""
+    """Return True if a file of an archive has the SHA-256 that it is named by."""
     try:
         return checksum(path) == path.name[:64]
     except OSError:
@@ -158,7 +158,7 @@ class Archive:
                 )
 
     def holds_whole(self, file: ReceivedFile) -> bool:
-        """Whether the file and its sidecar are there as they were kept; reads them."""
+        """Return True if the file and its sidecar are there as they were kept; reads them."""
         try:
             self.refuse_damaged(file)
         except StoreError:
@@ -166,7 +166,7 @@ class Archive:
         return True
 
     def holds(self, file: ReceivedFile) -> bool:
-        """Whether the file is there; what is in it is looked at where it is read."""
+        """Return True if the file is there; what is in it is looked at where it is read."""
         return file.archived_as is not None and (self.folder / file.archived_as).is_file()
 
     @contextmanager
@@ -292,14 +292,14 @@ class Quarantine:
 
     @staticmethod
     def _holds(source: Path, sha256: str, meanwhile: Meanwhile, there: Path) -> bool:
-        """Whether a file holds the same as the source; one of another size is not read."""
+        """Return True if a file holds the same as the source; one of another size is not read."""
         if there.stat().st_size != source.stat().st_size:
             return False
         return checksum(there, meanwhile) == sha256
 
 
 def entry_of(status: os.stat_result) -> str:
-    """What tells one file of a folder from a later one of the same name and contents."""
+    """Return what tells one file of a folder from a later one of the same name and contents."""
     return f"{status.st_ino}-{status.st_ctime_ns}"
 
 

@@ -27,7 +27,7 @@ _PAGES_AT_ONCE = 1000  # technical: 4 MB, between which the daemon may write
 
 @dataclass(frozen=True)
 class Restored:
-    """What a store holds after a restore, and the backup of what it held before, if anything."""
+    """Content of a store after a restore, and the backup of the former content, if any."""
 
     tables: tuple[TableContent, ...]
     kept: Path | None

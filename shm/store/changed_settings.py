@@ -2,45 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import datetime
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
 from shm.errors import UsageError
-from shm.store.columns import loads
 from shm.store.database import Repository, insert
 from shm.store.journal import note
-from shm.store.people_and_stream_tables import changed_settings
-
-
-@dataclass(frozen=True)
-class ChangedSetting:
-    """The value of a key of `bridge.toml` that holds instead of what the file says."""
-
-    key: str
-    value: float | str
-    at: datetime
-    who: str
-    id: int = 0
-
-    def __str__(self) -> str:
-        setting, by = self.key.replace(".", " "), f"{self.who} on {self.at:%Y-%m-%d}"
-        return f"{setting} = {said(self.value)} instead of what bridge.toml says, by {by}"
-
-    def is_of(self, hanger: int) -> bool:
-        """Whether it changes a hanger, or all of them."""
-        return self.key.startswith(("settings.", f"hanger.{hanger}."))
-
-
-def said(value: float | str | None) -> str:
-    """A value as people read it."""
-    if isinstance(value, str):
-        return value or "none"
-    return "not set" if value is None or math.isnan(value) else f"{value:.10g}"
+from shm.store.mapping import value_in
+from shm.store.rows import ChangedSetting, said
+from shm.store.tables import changed_settings
 
 
 class ChangedSettings(Repository):
@@ -78,7 +51,7 @@ class ChangedSettings(Repository):
         return self.scalar(sa.select(sa.func.max(changed_settings.c.id))) or 0
 
     def list_current(self) -> Mapping[str, ChangedSetting]:
-        """What holds instead of `bridge.toml`, by its key."""
+        """Return what holds instead of `bridge.toml`, by its key."""
         with self.reading() as connection:
             return _current(connection)
 
@@ -87,7 +60,7 @@ def _current(connection: Connection, *which: sa.ColumnElement[bool]) -> dict[str
     newest = sa.select(sa.func.max(changed_settings.c.id)).group_by(changed_settings.c.key)
     query = sa.select(changed_settings).where(changed_settings.c.id.in_(newest), *which)
     rows = connection.execute(query.order_by(changed_settings.c.key)).all()
-    changed = (ChangedSetting(r.key, loads(r.document), r.at, r.who, r.id) for r in rows)
+    changed = (value_in(row, ChangedSetting, value=row.document) for row in rows)
     return {each.key: each for each in changed if each.value is not None}
 
 

@@ -1,4 +1,4 @@
-"""Whether a store and its archive are whole."""
+"""Check a store and its archive."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from shm.store.blobs import unpack
 from shm.store.columns import Document, loads
 from shm.store.copying import TableContent, Tell, contents
 from shm.store.database import Database
+from shm.store.queries.upkeep import list_removed_names
 from shm.store.schema import changed_objects
 from shm.store.store import Store
 from shm.store.tables import fingerprints, posteriors, recordings, tests
@@ -133,7 +134,7 @@ def file_troubles(missing: Iterable[str], damaged: Iterable[str]) -> tuple[str, 
 
 
 def quick_troubles(store: Database) -> tuple[str, ...]:
-    """What a look at the pages of a SQLite file finds wrong; of a server, nothing."""
+    """Return what a look at the pages of a SQLite file finds wrong; of a server, nothing."""
     with store.reading() as connection:
         return _faults(connection, "quick_check(5)")
 
@@ -179,7 +180,7 @@ _PACKED = {posteriors.c.samples, tests.c.frequency_response, fingerprints.c.shap
 
 def check_archive(store: Store, archive: Archive, tell: Tell) -> CheckedArchive:
     """Reads every raw file that the store refers to and compares it with its name, a SHA-256."""
-    referenced, removed = archived_names(store), store.upkeep.removed_names(archive)
+    referenced, removed = archived_names(store), list_removed_names(store, archive)
     names = [name for name in referenced if name not in removed]
     missing, damaged = [], []
     for number, name in enumerate(names, start=1):
@@ -208,7 +209,7 @@ def unknown_files(store: Database, archive: Archive) -> tuple[str, ...]:
 
 
 def of_no_recording(names: Sequence[str]) -> tuple[str, str]:
-    """What is said of such files, and what to do."""
+    """Return a message on such files, and what to do."""
     return (
         f"{len(names)} of the archive belong to no recording: {names[0]}"
         + (" and others" if names[1:] else ""),
@@ -223,7 +224,10 @@ def _unreferenced(archive: Archive, names: Collection[str]) -> tuple[str, ...]:
 
 
 def _faults(connection: Connection, check: str) -> tuple[str, ...]:
-    """What SQLite finds wrong with its file; a PostgreSQL server watches over its own pages."""
+    """Return what SQLite finds wrong with its file.
+
+    A PostgreSQL server watches over its own pages.
+    """
     if connection.dialect.name != "sqlite":
         return ()
     found = connection.exec_driver_sql(f"PRAGMA {check}").scalars()

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict, is_dataclass
 from datetime import UTC, datetime
+from enum import StrEnum
+from functools import lru_cache
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Dialect
 
-from shm.documents import dump
+from shm.documents import dump, value_of
 from shm.errors import StoreDamaged
 from shm.values import NAN
 
@@ -20,6 +23,7 @@ class Number(sa.types.TypeDecorator[float]):
 
     impl = sa.Double
     cache_ok = True
+    may_be_null = True
 
     def process_bind_param(self, value: float | None, dialect: Dialect) -> float | None:
         return None if value is None or math.isnan(value) else float(value)
@@ -51,6 +55,85 @@ class Document(sa.types.TypeDecorator[Any]):
 
     def process_bind_param(self, value: Any, dialect: Dialect) -> str | None:
         return None if value is None else dump(value)
+
+
+class Json(Document):
+    """A value of some kind as a JSON document, back by the types that its class declares.
+
+    `absent` stands for a document that is not there; those that are `cached` are immutable values
+    that are read again and again.
+    """
+
+    cache_ok = True
+
+    def __init__(self, kind: Any, *, absent: Any = None, cached: bool = False):
+        super().__init__()
+        self.kind, self.absent, self.cached = kind, absent, cached
+        self.may_be_null = absent is not None
+
+    def process_bind_param(self, value: Any, dialect: Dialect) -> str | None:
+        return super().process_bind_param(_plain(value), dialect)
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> Any:
+        if value is None:
+            return self.absent
+        return (_cached_value if self.cached else _value)(self.kind, value)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+
+
+def _value(kind: Any, text: str) -> Any:
+    return value_of(kind, loads(text))
+
+
+_cached_value = lru_cache(1024)(_value)  # technical: what is shown again, some kilobytes each
+
+
+class Name(sa.types.TypeDecorator[Any]):
+    """A member of an enumeration by its value; a name of a newer version stays a text."""
+
+    impl = sa.String
+    cache_ok = True
+
+    def __init__(self, kind: type[StrEnum], length: int = 16):
+        super().__init__(length)
+        self.kind, self._names = kind, frozenset(map(str, kind))
+
+    def process_bind_param(self, value: Any, dialect: Dialect) -> str | None:
+        return None if value is None else str(value)
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> Any:
+        return self.kind(value) if value in self._names else value
+
+
+class Names(Name):
+    """Several members of an enumeration, separated by commas."""
+
+    cache_ok = True
+
+    def process_bind_param(self, value: Any, dialect: Dialect) -> str | None:
+        return value if isinstance(value, str | None) else ",".join(sorted(value))
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> Any:
+        return None if value is None else frozenset(map(self.kind, value.split(",")))
+
+
+class Blank(sa.types.TypeDecorator[str]):
+    """A text that is empty in memory and NULL in the table where there is none."""
+
+    impl = sa.Text
+    cache_ok = True
+    may_be_null = True
+
+    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
+        return value or None
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> str:
+        return value or ""
 
 
 def loads(text: Any) -> Any:
@@ -85,17 +168,8 @@ def reference(table: str, *, nullable: bool = False) -> sa.Column[int]:
     return sa.Column(f"{table[:-1]}_id", sa.ForeignKey(f"{table}.id"), nullable=nullable)
 
 
-def lineage() -> tuple[sa.Column[str], ...]:
-    """Where a result comes from."""
-    return (
-        sa.Column("input_sha256", sa.String(64), nullable=False),
-        sa.Column("settings_sha256", sa.String(64), nullable=False),
-        sa.Column("version", sa.String(32), nullable=False),
-    )
-
-
 def note_on_alert(prefix: str) -> tuple[sa.Column[Any], ...]:
-    """What is noted on an alert once: when, by whom and why."""
+    """Return the columns of a note on an alert: when, by whom and why."""
     names = ("at", "who", "why")
     return tuple(sa.Column(f"{prefix}_{n}", UtcTime if n == "at" else sa.Text) for n in names)
 
@@ -107,7 +181,7 @@ def model() -> sa.Column[str]:
 
 
 def superseded_at() -> sa.Column[Any]:
-    """When a later run replaced it."""
+    """Return the column for when a later run replaced a row."""
     # What a later run has replaced stays with its lineage; empty of what is in force.
     return sa.Column("superseded_at", UtcTime)
 

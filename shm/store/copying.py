@@ -22,7 +22,7 @@ _ROWS_AT_ONCE = 50  # a row may hold a frequency response of some 100 kB
 
 @dataclass(frozen=True)
 class TableContent:
-    """What a table holds: rows, and a checksum that does not depend on their order."""
+    """Content of a table: number of rows, and a checksum that does not depend on their order."""
 
     table: str
     rows: int
@@ -30,7 +30,7 @@ class TableContent:
 
 
 def row_counts(connection: Connection) -> dict[str, int]:
-    """How many rows each table holds, the tables that others refer to first."""
+    """Count the rows of each table, the tables that others refer to first."""
     counted = {}
     for table in metadata.sorted_tables:
         count = connection.scalar(sa.select(sa.func.count()).select_from(table))

@@ -46,12 +46,12 @@ def url_of(location: str | Path) -> sa.URL:
 
 
 def is_server(location: str | Path) -> bool:
-    """Whether the store is a PostgreSQL database rather than a file."""
+    """Return True if the store is a PostgreSQL database rather than a file."""
     return url_of(location).get_backend_name() == "postgresql"
 
 
 def has_password(location: str) -> bool:
-    """Whether the URL itself holds a password, which then stands wherever the URL stands."""
+    """Return True if the URL itself holds a password, which then stands wherever the URL stands."""
     url = url_of(location)
     return bool(url.password) or "password" in url.query
 
@@ -292,8 +292,8 @@ def reading(engine: Engine) -> Iterator[Connection]:
 
 
 def insert(connection: Connection, table: sa.Table, values: Mapping[str, Any]) -> int:
-    """Inserts one row; its number."""
-    result = connection.execute(sa.insert(table).values(values))
+    """Insert one row of plain values; return its number."""
+    result = connection.execute(sa.insert(table), dict(values))
     return int((result.inserted_primary_key or (0,))[0])
 
 

@@ -5,7 +5,7 @@ Nothing is deleted: raw file, test and results stay, and each decision can be ta
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
@@ -15,14 +15,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError, sentence
 from shm.store.database import Repository
-from shm.store.files import (
-    advance_recordings,
-    by_id,
-    counts,
-    end_recording,
-    end_tests,
-    in_force,
-)
+from shm.store.files import advance_recordings, by_id, counts, end_recording, end_tests, in_force
 from shm.store.holding import (
     confirmed_values,
     decide,
@@ -31,18 +24,15 @@ from shm.store.holding import (
     holds_of,
     insert_hold,
     latest_hold,
-    open_holds,
     reason_of,
     refuse_time,
-    standing_discard,
     taking_back,
 )
 from shm.store.journal import write
-from shm.store.list_rows import Decision, HeldTest, Hold, Rerun
 from shm.store.outbox import resolve
-from shm.store.queries import WEIGHED
 from shm.store.rerun import of_baselines, rerun_recording, rerun_watched, supersede_results
-from shm.store.rows import Stage
+from shm.store.rows import Decision, HeldTest, Hold, Rerun, Stage
+from shm.store.selects import WEIGHED
 from shm.store.tables import alerts, recordings, tests, watches
 
 
@@ -62,27 +52,6 @@ class Exclusion:
 
 class Dispositions(Repository):
     """The part of `Recordings` by which people decide what counts."""
-
-    def list_holds(self, hanger: int | None = None) -> tuple[Hold, ...]:
-        """Return the holds that nobody has decided on, the oldest first; of one hanger if named."""
-        with self.reading() as connection:
-            return open_holds(connection, hanger)
-
-    def latest_hold(self, recording_id: int) -> Hold | None:
-        """Return the last hold of a recording with its reason and decision, None if it had none."""
-        with self.reading() as connection:
-            return latest_hold(connection, recording_id)
-
-    def discard_in_force(self, recording_id: int) -> Hold | None:
-        """The decision by which a recording is out; None where it counts, or was refused since."""
-        with self.reading() as connection:
-            return standing_discard(connection, by_id(connection, recording_id))
-
-    def decisions(self, recording_id: int, sidecar_as: str | None) -> Mapping[int, Hold]:
-        """The newest decision on each test of a recording, by its place in the file, among those
-        that were made on it with one sidecar."""
-        with self.reading() as connection:
-            return _decided_with(connection, recording_id, sidecar_as)
 
     def accept(
         self,
@@ -185,7 +154,7 @@ def _excluded(
 ) -> tuple[Hold, Sequence[Row[Any]]]:
     """Return the decision that takes an exclusion back, and its tests; raises UsageError."""
     refused = _chosen(connection, recording.id, tests.c.stage == Stage.REFUSED, test)
-    past = _decided_with(connection, recording.id, recording.sidecar_as)
+    past = decided_with(connection, recording.id, recording.sidecar_as)
     rows = [row for row in refused if row.position in past and past[row.position].is_out]
     if not rows:
         raise _not_held(connection, recording)
@@ -231,7 +200,7 @@ def _let_count(
         write(connection, at, Stage.IDENTIFIED, row.recording_id, row.id)
 
 
-def _decided_with(
+def decided_with(
     connection: Connection, recording_id: int, sidecar_as: str | None
 ) -> dict[int, Hold]:
     return {

@@ -6,7 +6,7 @@ Within the caller's transaction.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from datetime import datetime
 from pathlib import PurePath
 from typing import Any
@@ -18,10 +18,9 @@ from shm.errors import NothingThere
 from shm.modes_document import test_document
 from shm.store.archive import suffix_of
 from shm.store.blobs import pack_response
-from shm.store.columns import loads
 from shm.store.journal import RENAMED, write
-from shm.store.list_rows import ReceivedFile, StoredRecording
-from shm.store.rows import IdentifiedTest, Stage, StoredTest
+from shm.store.mapping import value_in
+from shm.store.rows import IdentifiedTest, Stage, StoredRecording, StoredTest
 from shm.store.tables import journal, recordings, tests
 
 
@@ -39,26 +38,17 @@ def by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
 
 
 def recording_from(row: Row[Any]) -> StoredRecording:
-    file = ReceivedFile(
-        row.sha256,
-        row.file_name,
-        row.size_bytes,
-        row.arrival,
-        row.archived_as,
-        row.sidecar_as,
-        row.modified_at,
-    )
-    stage, reason = Stage(row.stage), loads(row.reason)
-    return StoredRecording(row.id, file, row.received_at, stage, row.hanger, reason)
+    """Return a row of `recordings` as a value."""
+    return value_in(row, StoredRecording)
 
 
 def counts(table: sa.Table) -> sa.ColumnElement[bool]:
-    """What is neither refused nor held: all that is shown and computed with."""
+    """Select what is neither refused nor held: all that is shown and computed with."""
     return table.c.stage.not_in([Stage.REFUSED, Stage.HELD])
 
 
 def in_force(table: sa.Table) -> sa.ColumnElement[bool]:
-    """What no later run has replaced."""
+    """Select what no later run has replaced."""
     return table.c.superseded_at.is_(None)
 
 
@@ -86,7 +76,7 @@ def end_recording(
 def reason_document(
     file_name: str, sha256: str | None, message: str, remedy: str, at: datetime
 ) -> dict[str, Any]:
-    """Why a file is held or refused, no `line` and no `channel` of it being at fault."""
+    """Return why a file is held or refused, no `line` and no `channel` of it being at fault."""
     return {
         "schema": "shm.reason/1",
         "file": file_name,
@@ -141,7 +131,10 @@ _PROGRESS = (Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
 
 
 def all_at(connection: Connection, chosen: Iterable[StoredTest], stage: Stage) -> bool:
-    """Whether tests are in force and still at a stage: another process may have been first."""
+    """Return True if tests are in force and still at a stage.
+
+    Another process may have been first.
+    """
     query = sa.select(tests.c.stage, tests.c.superseded_at).where(
         tests.c.id.in_([test.id for test in chosen])
     )
@@ -170,7 +163,7 @@ def advance_recordings(connection: Connection, ids: Collection[int], at: datetim
         query = sa.select(tests.c.stage).where(
             tests.c.recording_id == recording_id, in_force(tests), tests.c.stage != Stage.REFUSED
         )
-        stages = [Stage(stage) for stage in connection.scalars(query)]
+        stages = connection.scalars(query).all()
         stage = Stage.HELD if Stage.HELD in stages else min(stages, key=_PROGRESS.index)
         stage = Stage.DONE if stage is Stage.WATCHED else stage
         moved = connection.execute(
@@ -186,19 +179,19 @@ def advance_recordings(connection: Connection, ids: Collection[int], at: datetim
 
 def _why_held(connection: Connection, recording_id: int) -> tuple[str, str]:
     row = by_id(connection, recording_id)
-    return row.file_name, loads(row.reason)["message"]
+    return row.file_name, row.reason["message"]
 
 
 def test_contents(item: IdentifiedTest, name: str) -> dict[str, Any]:
-    """What an identification gave, by column."""
+    """Return the result of an identification, by column."""
     response = item.frequency_response
     return {
         "hanger": item.test.hanger,
         "document": test_document(replace(item.test, id=name)),
         "frequency_response": None if response is None else pack_response(response),
-        "notes": list(item.notes),
-        "quality": [asdict(check) for check in item.quality],
-        "set_aside": [asdict(mode) for mode in item.set_aside],
+        "notes": item.notes,
+        "quality": item.quality,
+        "set_aside": item.set_aside,
         "taken_at": item.test.time,
         "temperature_c": item.test.temperature_c,
     }

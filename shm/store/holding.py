@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import Any
@@ -18,9 +18,9 @@ from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.files import in_force, reason_document
 from shm.store.journal import REFUSED, write
-from shm.store.list_rows import Decision, HeldTest, Hold
+from shm.store.mapping import value_in
 from shm.store.outbox import acknowledge, raise_alert, resolve
-from shm.store.rows import Stage, StoredAlert
+from shm.store.rows import Decision, HeldTest, Hold, Stage, StoredAlert
 from shm.store.tables import (
     alerts,
     fingerprints,
@@ -36,7 +36,7 @@ _holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(reco
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """What plausibility says of a recording with the sidecar that it was judged with.
+    """Judgement of plausibility on a recording with the sidecar that it was judged with.
 
     `held` are its tests that are held, `notice` what to tell of that; None where none is.
     `fingerprint` is that of its samples, None where it has none. `out` are the places in the file
@@ -96,11 +96,6 @@ def fingerprint_from(row: Row[Any]) -> Fingerprint:
     return Fingerprint(row.digest, **{name: arrays[name] for name in _ARRAYS if name in arrays})
 
 
-def held_tests_from(document: Mapping[str, Any]) -> tuple[HeldTest, ...]:
-    """The tests of a hold back from its document."""
-    return value_of(tuple[HeldTest, ...], document["tests"])
-
-
 def _keep_fingerprint(connection: Connection, recording_id: int, found: Fingerprint) -> None:
     former = fingerprints.c.recording_id == recording_id
     connection.execute(sa.delete(fingerprints).where(former))
@@ -131,12 +126,12 @@ def _mark(
 
 
 def reason_of(recording: Row[Any], message: str, at: datetime, remedy: str = "") -> dict[str, Any]:
-    """Why a recording is held, or counts no more."""
+    """Return why a recording is held, or counts no more."""
     return reason_document(recording.file_name, recording.sha256, message, remedy, at)
 
 
 def open_holds(connection: Connection, hanger: int | None = None) -> tuple[Hold, ...]:
-    """What nobody has decided on yet, the oldest first; of one hanger where named."""
+    """List holds that nobody has decided on, the oldest first; of one hanger where named."""
     query = _holds.where(holds.c.decision.is_(None)).order_by(holds.c.id)
     if hanger is not None:
         query = query.where(recordings.c.hanger == hanger)
@@ -150,7 +145,7 @@ def holds_of(connection: Connection, recording_id: int) -> tuple[Hold, ...]:
 
 
 def latest_hold(connection: Connection, recording_id: int) -> Hold | None:
-    """Why a recording is or was last held, and what a person made of it."""
+    """Return why a recording is or was last held, and what a person made of it."""
     row = _latest(connection, recording_id)
     return None if row is None else _hold(row)
 
@@ -178,13 +173,13 @@ def standing_discard(connection: Connection, recording: Row[Any]) -> Hold | None
 
 
 def discarded_reason(hold: Hold) -> str:
-    """Who discarded it, when and why, as a sentence."""
+    """Return who discarded it, when and why, as a sentence."""
     because = f", because: {hold.why}" if hold.why else ""
     return sentence(f"discarded on {hold.decided_at:%Y-%m-%d} by {hold.who}{because}")
 
 
 def taking_back(hold: Hold) -> str:
-    """How to change one's mind about what was discarded."""
+    """Return how to change one's mind about what was discarded."""
     return (
         "Its raw file stays in the archive. To let it count after all: "
         f"`shm ingest --confirm {hold.recording_id} --why TEXT`."
@@ -222,7 +217,7 @@ def held_rows(connection: Connection, recording_id: int) -> Sequence[Row[Any]]:
 def confirmed_values(
     connection: Connection, row: Row[Any], hold: Hold, time: datetime | None, who: str
 ) -> dict[str, Any]:
-    """What changes of a test whose time is given, or certainly wrong."""
+    """Return the changed columns of a test whose time is given, or certainly wrong."""
     doubts = {test.position: test.doubts for test in hold.tests}.get(row.position, ())
     if time is None and not any(doubt.time_unknown for doubt in doubts):
         return {}
@@ -231,12 +226,12 @@ def confirmed_values(
         "document": test_document(test),
         "taken_at": time,
         "time": time or row.received_at,
-        "notes": [*loads(row.notes), time_note(hold, time, who)],
+        "notes": (*row.notes, time_note(hold, time, who)),
     }
 
 
 def time_note(hold: Hold, time: datetime | None, who: str) -> str:
-    """Where the time of a confirmed test comes from."""
+    """Return where the time of a confirmed test comes from."""
     given = "not known: that of its receipt counts" if time is None else "given"
     why = f": {hold.doubts[0].state}" if hold.doubts else ""
     return f"time {given}, confirmed by {who}{why}"
@@ -264,18 +259,5 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
 
 def _hold(row: Row[Any]) -> Hold:
     document = loads(row.document)
-    return Hold(
-        id=row.id,
-        recording_id=row.recording_id,
-        file_name=row.file_name,
-        hanger=row.hanger,
-        held_at=row.held_at,
-        message=document["message"],
-        tests=held_tests_from(document),
-        sidecar_as=document["sidecar_as"],
-        decision=None if row.decision is None else Decision(row.decision),
-        decided_at=row.decided_at,
-        who=row.who or "",
-        why=row.why or "",
-        time=row.time,
-    )
+    tests = value_of(tuple[HeldTest, ...], document.pop("tests"))
+    return value_in(row, Hold, tests=tests, **document)

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
-import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Engine
 
 import shm
 from shm.store.database import Repository, insert
-from shm.store.list_rows import Decision, Event, Outcome, Step
-from shm.store.rows import Stage
-from shm.store.tables import journal, tests
+from shm.store.mapping import row_of
+from shm.store.rows import Decision, Entry, Outcome, Stage
+from shm.store.tables import journal
 
 COMMAND_LINE = "command line"
 _OPTION = "shm_actor"
@@ -31,7 +29,7 @@ AGAIN, REMOVED, BACKUP, DIED = "again", "removed", "backup", "worker died"
 RENAMED = "renamed"
 """Keeps the former name of a file that came again under another."""
 
-_ACTIONS: dict[str, str] = {
+ACTIONS: dict[str, str] = {
     **{str(decision): f"recording {decision}" for decision in Decision},
     **dict.fromkeys([str(Stage.RECEIVED), *map(str, Outcome)], "recording taken in"),
     AGAIN: "recording done again",
@@ -42,7 +40,7 @@ _ACTIONS: dict[str, str] = {
 is_step = journal.c.kind.in_(STEPS) & (
     journal.c.test_id.is_not(None) | journal.c.recording_id.is_not(None)
 )
-_is_event = (
+is_event = (
     (journal.c.subject != "")
     & (journal.c.kind != Stage.RECEIVED)
     & (journal.c.recording_id.is_not(None) | journal.c.who.is_(None))
@@ -51,23 +49,10 @@ _is_event = (
 
 @dataclass(frozen=True)
 class Actor:
-    """Who works with a store: a user, `token NAME`, a user of the computer; and by which way."""
+    """Person or program that works with a store, and by which way."""
 
     name: str
     via: str
-
-
-@dataclass(frozen=True)
-class AuditRow:
-    """One change: `who` did `action` on `subject` by `via`; `detail` is the reason or the value."""
-
-    id: int
-    at: datetime
-    who: str
-    via: str
-    action: str
-    subject: str
-    detail: str
 
 
 def write(
@@ -90,9 +75,9 @@ def write(
     if who is not None and actor is not None:
         detail = f"{detail} (for {who})".strip() if who and actor.name not in who else detail
         who, via = actor.name, actor.via
-    about = {"recording_id": recording_id, "test_id": test_id, "subject": subject}
-    by = {"who": who or None, "via": via, "version": shm.__version__}
-    insert(connection, journal, {"at": at, "kind": kind, "detail": detail, **about, **by})
+    by = who or None, via, shm.__version__
+    entry = Entry(at, kind, recording_id, test_id, subject, detail, *by)
+    insert(connection, journal, row_of(entry, journal))
 
 
 def note(
@@ -109,64 +94,9 @@ def acting_as(engine: Engine, actor: Actor) -> Engine:
 
 
 class Journal(Repository):
-    """What happened, read back as steps, events or changes."""
+    """Journal of events; `shm.store.queries.history` reads it back."""
 
     def note(self, at: datetime, action: str, subject: str, detail: str = "") -> None:
         """Note what changed outside the store, as a file that was uploaded."""
         with self.writing() as connection:
             note(connection, at, action, subject, detail)
-
-    def newest(self) -> int:
-        """Return the number of the last entry, 0 where there is none: it changes with results."""
-        return self.scalar(sa.select(sa.func.max(journal.c.id))) or 0
-
-    def list_changes(
-        self, limit: int | None = None, before: int | None = None
-    ) -> tuple[AuditRow, ...]:
-        """Return what people changed, the newest first; `before` is the number to go on after."""
-        query = sa.select(journal).where(journal.c.who.is_not(None)).order_by(journal.c.id.desc())
-        if before is not None:
-            query = query.where(journal.c.id < before)
-        return tuple(map(_change, self.rows(query.limit(limit))))
-
-    def list_events(
-        self,
-        kind: str | None = None,
-        *,
-        recording_id: int | None = None,
-        file_name: str | None = None,
-    ) -> tuple[Event, ...]:
-        """Return what was noticed of recordings, the oldest first; `kind` as duplicate or refused.
-
-        Of one recording, or of what came under one name, where that is given.
-        """
-        query = sa.select(journal).where(_is_event).order_by(journal.c.id)
-        wanted = {"kind": kind, "recording_id": recording_id, "subject": file_name}
-        for name, value in wanted.items():
-            if value is not None:
-                query = query.where(journal.c[name] == value)
-        return tuple(map(_event, self.rows(query)))
-
-    def list_steps(self, recording_id: int) -> tuple[Step, ...]:
-        """Return the stages that a recording and its tests have reached, in that order."""
-        query = sa.select(journal, tests.c.name).outerjoin(tests, tests.c.id == journal.c.test_id)
-        query = query.where(is_step, journal.c.recording_id == recording_id)
-        return tuple(
-            Step(row.kind, row.at, row.version, row.test_id, row.name)
-            for row in self.rows(query.order_by(journal.c.id))
-        )
-
-
-def _change(row: sa.Row[Any]) -> AuditRow:
-    detail = row.detail
-    if row.kind in (Stage.RECEIVED, *Outcome):
-        detail = str(Outcome.NEW) if row.kind == Stage.RECEIVED else row.kind
-    action = _ACTIONS.get(row.kind, row.kind)
-    return AuditRow(row.id, row.at, row.who, row.via or "", action, row.subject, detail)
-
-
-def _event(row: sa.Row[Any]) -> Event:
-    message = row.detail
-    if row.kind in (*Decision,) and row.who:
-        message = f"{row.kind} by {row.who}" + (f": {row.detail}" if row.detail else "")
-    return Event(row.at, row.kind, row.subject, message, row.recording_id)

@@ -7,16 +7,15 @@ where it was taken nor anything that is no picture.
 from __future__ import annotations
 
 import io
-from dataclasses import replace
 from datetime import datetime, timedelta
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Row
 
 from shm.errors import BadInput, NothingThere, UsageError
-from shm.store.database import Repository, insert
+from shm.store.database import Repository
 from shm.store.journal import note
-from shm.store.people_and_stream_tables import notes
+from shm.store.mapping import insert_value, value_in
+from shm.store.tables import notes
 from shm.values.notes import Note, NoteKind
 
 LARGEST_PHOTO_BYTES = 5_000_000
@@ -52,12 +51,9 @@ class Notes(Repository):
         text = _checked(text, at, now)
         kept = _drawn_anew(photo) if photo else None
         written = Note(0, hanger, at, kind, text, who, now, kept is not None)
-        values = {name: value for name, value in vars(written).items() if name in notes.c}
-        del values["id"]
         with self.writing() as connection:
-            number = insert(connection, notes, {**values, "photo": kept})
-            made = replace(written, id=number)
-            note(connection, now, "note written", f"note {number}, {made.of}", text, who)
+            made = insert_value(connection, notes, written, photo=kept)
+            note(connection, now, "note written", f"note {made.id}, {made.of}", text, who)
         return made
 
     def list_all(self, hanger: int | None = None, *, of_bridge: bool = False) -> tuple[Note, ...]:
@@ -69,7 +65,7 @@ class Notes(Repository):
             query = query.where(sa.or_(notes.c.hanger == hanger, notes.c.hanger.is_(None)))
         elif of_bridge:
             query = query.where(notes.c.hanger.is_(None))
-        return tuple(map(_note, self.rows(query)))
+        return tuple(value_in(row, Note) for row in self.rows(query))
 
     def photo(self, number: int) -> bytes:
         """The photo of a note, a JPEG; raises NothingThere."""
@@ -118,8 +114,3 @@ def _drawn_anew(content: bytes) -> bytes:
 
 def _unfit(why: str) -> BadInput:
     return BadInput(f"the photo {why}.", remedy="Give a JPEG or PNG of 5 MB at most.")
-
-
-def _note(row: Row[tuple[object, ...]]) -> Note:
-    values = dict(row._mapping)
-    return Note(**{**values, "kind": NoteKind(values["kind"])})

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from datetime import datetime, timedelta
-from functools import lru_cache
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import alert_document, value_of
+from shm.documents import alert_document
 from shm.errors import NothingThere, UsageError
-from shm.store.columns import loads
 from shm.store.database import Repository, insert
 from shm.store.journal import NOTIFIED, write
 from shm.store.rows import (
@@ -25,12 +23,9 @@ from shm.store.rows import (
     Resolution,
     StoredAlert,
     StoredTest,
-    counts_by_name,
 )
 from shm.store.tables import alerts, deliveries, journal, tests
 from shm.values import Alert
-
-_HELD = 1024  # technical: those that stand on a large bridge, of some kilobytes each
 
 stored_alerts = sa.select(alerts)
 
@@ -116,7 +111,7 @@ def _note_on(
 ) -> bool:
     once = (alerts.c.id == alert_id) & alerts.c[f"{prefix}_at"].is_(None)
     note = {f"{prefix}_at": at, f"{prefix}_who": who, f"{prefix}_why": why}
-    return bool(connection.execute(sa.update(alerts).where(once).values(**note)).rowcount)
+    return bool(connection.execute(sa.update(alerts).where(once), note).rowcount)
 
 
 def owe_resolution(connection: Connection, alert_id: int, hook: str, at: datetime) -> None:
@@ -147,7 +142,7 @@ def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert and its acknowledgement, of a row of `stored_alerts`."""
     return StoredAlert(
         row.id,
-        alert_from(row.document),
+        row.document,
         row.raised_at,
         acknowledgement_of(row),
         resolution_of(row),
@@ -155,21 +150,15 @@ def stored_alert(row: Row[Any]) -> StoredAlert:
     )
 
 
-@lru_cache(_HELD)
-def alert_from(text: str) -> Alert:
-    """An alert as it was raised; those that stand are asked for again and again."""
-    return value_of(Alert, loads(text))
-
-
 def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
-    """Who took note of an alert, of a row of `stored_alerts`; None while it is open."""
+    """Return the acknowledgement in a row of `stored_alerts`; None while it is open."""
     if row.noted_at is None:
         return None
     return Acknowledgement(row.id, row.noted_who, row.noted_why, row.noted_at)
 
 
 def resolution_of(row: Row[Any]) -> Resolution | None:
-    """How the condition of an alert ended, of a row of `stored_alerts`; None while it stands."""
+    """Return the resolution in a row of `stored_alerts`; None while its condition holds."""
     if row.ended_at is None:
         return None
     return Resolution(row.id, row.ended_who, row.ended_why, row.ended_at)
@@ -183,7 +172,7 @@ _any_waits = sa.select(sa.exists().where(deliveries.c.state == DeliveryState.WAI
 
 
 class Deliveries(Repository):
-    """What hooks are owed; a part of the repository of alerts."""
+    """Messages owed to hooks; a part of the repository of alerts."""
 
     def list_deliveries(
         self,
@@ -299,11 +288,6 @@ class Deliveries(Repository):
             connection.execute(sa.update(deliveries).where(again).values(**waits))
         return self._deliveries(_outbox.where(deliveries.c.id.in_(ids)).order_by(deliveries.c.id))
 
-    def delivery_counts(self) -> dict[str, int]:
-        """How many deliveries stand in each state; see `counts_by_name`."""
-        query = sa.select(deliveries.c.state, sa.func.count()).group_by(deliveries.c.state)
-        return counts_by_name(DeliveryState, self.rows(query))
-
     def _end(self, delivery: Delivery, state: DeliveryState, error: str, at: datetime) -> None:
         with self.writing() as connection:
             ended = {"state": state, "last_error": error, "ended_at": at}
@@ -326,7 +310,7 @@ def alert_in(connection: Connection, alert_id: int) -> StoredAlert:
 
 
 def _note(connection: Connection, delivery: Delivery, values: dict[str, Any]) -> Sequence[Row[Any]]:
-    """Those of the message that were still owed: another process may have had an answer before.
+    """Update the deliveries of a message that are still owed; return these.
 
     What is tried is a message, if only of one alert.
     """
@@ -376,5 +360,4 @@ def _told_alerts(connection: Connection, test_id: int) -> int:
 
 def _delivery(row: Row[Any]) -> Delivery:
     owed = {name: getattr(row, f"owed_{name}") for name in _OWED}
-    as_named = {"state": DeliveryState(row.owed_state), "news": News(row.owed_news)}
-    return Delivery(stored=stored_alert(row), **{**owed, **as_named})
+    return Delivery(stored=stored_alert(row), **owed)

@@ -1,4 +1,4 @@
-"""Who may come in: people who sign in by name, their roles, passwords and browsers; tokens."""
+"""Users, roles, passwords and sessions of people; tokens of programs."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ import re
 import secrets
 import unicodedata
 from collections.abc import Collection
-from dataclasses import dataclass
 from datetime import datetime, timedelta
-from enum import StrEnum
 from functools import cache
 from typing import Any
 
@@ -21,8 +19,9 @@ from sqlalchemy.engine import Connection, Row
 from shm.errors import NothingThere, UsageError
 from shm.store.database import Repository, insert
 from shm.store.journal import note
-from shm.store.people_and_stream_tables import sessions, users
-from shm.store.tables import tokens
+from shm.store.mapping import value_in
+from shm.store.rows import Role, Scope, StoredToken, User
+from shm.store.tables import sessions, tokens, users
 
 SIGNED_IN_FOR = timedelta(days=30)  # judgement: a month; removing the user ends it at once
 SESSION = "session_"
@@ -42,32 +41,6 @@ the empty pattern of Braille."""
 _CHINESE = {"CJK", "IDEOGRAPHIC"}
 _TOGETHER = (_CHINESE | {"HIRAGANA", "KATAKANA"}, _CHINESE | {"HANGUL"}, _CHINESE | {"BOPOMOFO"})
 """Scripts in which one name is written: Unicode technical standard 39, 5.2, but without Latin."""
-
-
-class Role(StrEnum):
-    """What a person may do; each may what the one before may."""
-
-    READER = "reader"
-    OPERATOR = "operator"
-    ENGINEER = "engineer"
-
-    def may(self, needed: Role) -> bool:
-        """Whether this role may do what `needed` may."""
-        order = list(Role)
-        return order.index(self) >= order.index(needed)
-
-
-@dataclass(frozen=True)
-class User:
-    """A person who may sign in, or once might."""
-
-    id: int
-    name: str
-    role: Role
-    made_at: datetime
-    removed_at: datetime | None = None
-    single_sign_on: bool = False
-    """Whether a provider alone lets in, which says who it is; else a password alone does."""
 
 
 class People(Repository):
@@ -152,7 +125,7 @@ class People(Repository):
         return self._begin(row.id, at)
 
     def user_of(self, secret: str, at: datetime) -> User | None:
-        """Whose session this is; None where it has ended or never was."""
+        """Return the user of a session; None where it has ended or never was."""
         query = _in_force.join(sessions, sessions.c.user_id == users.c.id).where(
             sessions.c.secret_sha256 == _checksum(secret),
             sessions.c.ended_at.is_(None),
@@ -209,7 +182,7 @@ _in_force = sa.select(users).where(users.c.removed_at.is_(None))
 
 
 def same_name(name: str) -> str:
-    """What names have in common that read alike: Unicode form, spaces and case are left out."""
+    """Return a name without Unicode form, spaces and case, in which names that read alike agree."""
     return _in_one_form(name).casefold()
 
 
@@ -290,30 +263,6 @@ def _checksum(secret: str) -> str:
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _user(row: sa.Row[Any]) -> User:
-    by_provider = row.password_hash == _NO_PASSWORD
-    return User(row.id, row.name, Role(row.role), row.made_at, row.removed_at, by_provider)
-
-
-class Scope(StrEnum):
-    """What a token allows; one that may write may read."""
-
-    READ = "read"
-    WRITE = "write"
-
-
-@dataclass(frozen=True)
-class StoredToken:
-    """A token without its secret."""
-
-    id: int
-    name: str
-    scopes: frozenset[Scope]
-    created_at: datetime
-    revoked_at: datetime | None = None
-    last_used_at: datetime | None = None
-
-
 class Tokens(Repository):
     """The tokens of programs; a part of the repository of upkeep."""
 
@@ -335,13 +284,15 @@ class Tokens(Repository):
                     remedy=f"Take another name, or revoke it: `shm token revoke {name}`.",
                 )
             values = {"name": name, "token_sha256": _checksum(secret), "created_at": at}
-            insert(connection, tokens, {**values, "scopes": ",".join(scopes)})
+            insert(connection, tokens, {**values, "scopes": scopes})
             note(connection, at, "token made", f"token {name}", f"may {scope}")
         return secret
 
     def list_tokens(self) -> tuple[StoredToken, ...]:
         """All tokens, those revoked too, as they were made."""
-        return tuple(_token(row) for row in self.rows(sa.select(tokens).order_by(tokens.c.id)))
+        return tuple(
+            value_in(row, StoredToken) for row in self.rows(sa.select(tokens).order_by(tokens.c.id))
+        )
 
     def revoke_token(self, name: str, at: datetime) -> None:
         """Ends a token from now on; raises NothingThere where none of that name is in force."""
@@ -370,7 +321,7 @@ class Tokens(Repository):
             with self.writing() as connection:
                 noted = sa.update(tokens).where(tokens.c.id == found.id)
                 connection.execute(noted.values(last_used_at=at))
-        return _token(found)
+        return value_in(found, StoredToken)
 
 
 _valid_tokens = sa.select(tokens).where(tokens.c.revoked_at.is_(None))
@@ -384,6 +335,5 @@ def _matching(rows: Collection[Row[Any]], hashed: str) -> Row[Any] | None:
     return found
 
 
-def _token(row: Row[Any]) -> StoredToken:
-    scopes = frozenset(Scope(scope) for scope in row.scopes.split(","))
-    return StoredToken(row.id, row.name, scopes, row.created_at, row.revoked_at, row.last_used_at)
+def _user(row: Row[Any]) -> User:
+    return value_in(row, User, single_sign_on=row.password_hash == _NO_PASSWORD)

@@ -17,8 +17,7 @@ from shm.errors import UsageError
 from shm.store.files import begin_again, by_id, counts, in_force, move_numbers, recording_from
 from shm.store.holding import discarded_reason, end_hold, standing_discard, taking_back
 from shm.store.journal import AGAIN, write
-from shm.store.list_rows import ReceivedFile, Rerun
-from shm.store.rows import Stage
+from shm.store.rows import ReceivedFile, Rerun, Stage
 from shm.store.tables import (
     baselines,
     drifts,

@@ -19,8 +19,9 @@ from shm.read import sidecar_path
 from shm.store.archive import Archive, checksum, is_whole
 from shm.store.checking import file_troubles
 from shm.store.copying import Tell
-from shm.store.list_rows import StoredRecording
-from shm.store.rows import Stage
+from shm.store.queries.recordings import find_by_checksum, list_recordings
+from shm.store.queries.upkeep import list_copies
+from shm.store.rows import Stage, StoredRecording
 from shm.store.store import Store
 
 REASON_SUFFIX = ".reason.json"
@@ -34,7 +35,7 @@ _UNDER_WAY = "not through yet"
 
 @dataclass(frozen=True)
 class CopiedArchive:
-    """What came of copying an archive: files copied now and before, and what could not be."""
+    """Outcome of copying an archive: files copied now and before, and those that failed."""
 
     copied: int
     present: int
@@ -58,7 +59,7 @@ class Removal:
 
 @dataclass(frozen=True)
 class Retention:
-    """What may go, and of those old enough how many stay for which reason."""
+    """Files that may go, and of those old enough how many stay for which reason."""
 
     removals: tuple[Removal, ...]
     kept: Mapping[str, int]
@@ -105,7 +106,7 @@ def copy_archive(
 def removable(store: Store, archive: Archive, before: datetime, tell: Tell) -> Retention:
     """The raw files here of recordings that were received before a time and may go."""
     folders = _folders(store)
-    everything = store.recordings.list_all()
+    everything = list_recordings(store)
     old = [each for each in everything if each.received_at < before and archive.holds(each.file)]
     kept: Counter[str] = Counter()
     found: dict[int, str] = {}
@@ -182,7 +183,7 @@ def expendable(store: Store, archive: Archive, files: Iterable[Refused]) -> tupl
     folders = _folders(store)
     kept = []
     for file in files:
-        recording = store.recordings.with_checksum(file.sha256)
+        recording = find_by_checksum(store, file.sha256)
         if recording is not None and recording.file.archived_as is not None:
             places = [str(archive.folder), *folders[recording.id]]
             name = recording.file.archived_as
@@ -208,9 +209,9 @@ def _has(target: Archive, source: Archive, name: str) -> bool:
 
 
 def _folders(store: Store) -> defaultdict[int, list[str]]:
-    """Where copies of each recording were noted, the newest first."""
+    """Return where copies of each recording were noted, the newest first."""
     found: defaultdict[int, list[str]] = defaultdict(list)
-    for copy in reversed(store.upkeep.list_copies()):
+    for copy in reversed(list_copies(store)):
         found[copy.recording_id].append(copy.folder)
     return found
 
@@ -230,7 +231,7 @@ def _copy(archive: Archive, recording: StoredRecording, folders: Iterable[str]) 
 
 
 def _is_copy(copy: Path, original: Path) -> bool:
-    """Whether a file has the SHA-256 that it is named by, and is not `original` itself."""
+    """Return True if a file has the SHA-256 that it is named by, and is not `original` itself."""
     try:
         if original.exists() and copy.samefile(original):
             return False  # a link to what would be deleted is no copy of it

@@ -248,7 +248,7 @@ class Ring:
             return None
 
     def latest(self) -> dict[str, datetime]:
-        """When the last sample of each stream ended."""
+        """Return when the last sample of each stream ended."""
         ends = {folder.folder.name: self._recent(folder) for folder in self._folders()}
         return {name: time_of(max(e for _, e in spans)) for name, spans in ends.items() if spans}
 
@@ -262,7 +262,7 @@ class Ring:
         return frozenset(period_of(each.key.start_us) for each in waiting)
 
     def state(self, stream: str) -> StreamState:
-        """What is known of a stream from what is sealed."""
+        """Return what is known of a stream from what is sealed."""
         return load_state(self._folder(stream).folder / "state.json")
 
     def size_bytes(self, stream: str) -> int:

@@ -65,7 +65,7 @@ class Segment:
 
 
 def period_of(time_us: int) -> datetime:
-    """When the ten minutes began that a time is in."""
+    """Return when the ten minutes began that a time is in."""
     return time_of(time_us // _PERIOD_US * _PERIOD_US)
 
 
@@ -97,7 +97,7 @@ class StreamFolder:
                 sync(folder)
 
     def chunk_path(self, key: ChunkKey, end_us: int) -> Path:
-        """Where a chunk waits."""
+        """Return the path where a chunk waits."""
         name = f"{key.start_us:017d}-{end_us:017d}-{key.sequence}-{key.checksum}.chunk"
         return self.incoming / name
 
@@ -144,7 +144,7 @@ class StreamFolder:
                         yield day, name
 
     def segments_at(self, start: datetime) -> list[Path]:
-        """Those of the ten minutes from `start` on: one for each way to sample."""
+        """Return those of the ten minutes from `start` on: one for each way to sample."""
         return sorted(self.folder.glob(f"{start:%Y%m%d}/{start:{_NAME}}-*.h5"))
 
     def between(
@@ -244,7 +244,7 @@ class StreamFolder:
             return {}
 
     def remove_unfinished(self, before: datetime) -> None:
-        """What a killed process left half written before a time."""
+        """Remove what a killed process left half written before a time."""
         for left in self.folder.glob("*/.*.part"):
             with suppress(FileNotFoundError):  # it has its name by now
                 if left.stat().st_mtime < before.timestamp():

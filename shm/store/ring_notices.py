@@ -1,4 +1,4 @@
-"""What is noticed of a stream as its chunks are sealed: gaps, overlaps, clocks, what came late."""
+"""Events of a stream noticed as its chunks are sealed: gaps, overlaps, clocks, late chunks."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def save_state(path: Path, state: StreamState) -> None:
 def notice(
     stream: str, state: StreamState, chunks: Iterable[PassedChunk]
 ) -> tuple[StreamState, list[StreamEvent]]:
-    """What chunks, by time, say beside those before; the state after them."""
+    """Compare chunks, by time, with those before; return events and the state after them."""
     events: list[StreamEvent] = []
     late: list[PassedChunk] = []
     for chunk in chunks:
@@ -110,7 +110,7 @@ def notice(
 def notice_overlap(
     new: Mapping[ChunkKey, Chunk], covered: Mapping[ChunkKey, int]
 ) -> list[StreamEvent]:
-    """What chunks have of a time that was there before they came, as one event."""
+    """Return as one event what chunks have of a time that was there before they came."""
     found = [(chunk, covered[key]) for key, chunk in sorted(new.items()) if key in covered]
     if not found:
         return []
@@ -209,7 +209,7 @@ def notice_missing(new: Mapping[ChunkKey, Chunk]) -> list[StreamEvent]:
 
 
 def notice_told(new: Mapping[ChunkKey, Chunk]) -> list[StreamEvent]:
-    """What loggers say was done to them or to their sensors."""
+    """Return events that loggers report of themselves or their sensors."""
     return [
         StreamEvent(chunk.stream, "logger", chunk.start, chunk.start, chunk.event)
         for _, chunk in sorted(new.items())

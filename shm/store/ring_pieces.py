@@ -45,7 +45,7 @@ class Layout:
 
 
 def slack_s(before: int, sequence: int, sampling_rate_hz: float, length_s: float) -> float:
-    """How far a chunk may begin from where the one before, so long, ended and follow without a gap.
+    """Return the largest offset between stamps of two chunks that follow without a gap, in s.
 
     Where their numbers follow, no sample is missing between them: then it is a matter of stamps.
     Numbers that were made of the time cannot tell; there as much as jitter may be missing unseen.
@@ -97,7 +97,7 @@ def joined(found: Mapping[ChunkKey, Chunk], start: datetime, end: datetime) -> t
 
 
 def agree(one: Chunk, other: Chunk) -> bool:
-    """Whether two chunks have the same samples, as far as both have any."""
+    """Return True if two chunks have the same samples, as far as both have any."""
     samples = min(one.values.shape[1], other.values.shape[1])
     first, second = one.values[:, :samples], other.values[:, :samples]
     return _is_alike(one, other) and np.array_equal(first, second, equal_nan=True)
@@ -128,8 +128,9 @@ def _rank(item: tuple[ChunkKey, Chunk]) -> tuple[bool, int, int, int, str]:
 
 
 def _free(chunk: Chunk, earlier: Sequence[Chunk]) -> NDArray[np.bool_]:
-    """Which samples of a chunk are of a time that nothing counts for yet; none where it
-    contradicts what does.
+    """Return a mask of the samples of a chunk whose time is free.
+
+    None is free where the chunk contradicts what counts already.
     """
     free = np.ones(chunk.values.shape[1], bool)
     for before in earlier:
@@ -141,14 +142,20 @@ def _free(chunk: Chunk, earlier: Sequence[Chunk]) -> NDArray[np.bool_]:
 
 
 def _runs_on(before: Chunk, chunk: Chunk) -> bool:
-    """Whether it is the next one, of a clock that was set back a little; files are not counted."""
+    """Return True if it is the next one, of a clock that was set back a little.
+
+    Files are not counted.
+    """
     numbers = before.sequence, chunk.sequence
     is_next = numbers[1] == numbers[0] + 1 or min(numbers) >= BY_TIME
     return is_next and before.start <= chunk.start
 
 
 def _repeats(before: Chunk, chunk: Chunk, taken: slice) -> bool:
-    """Whether what is there twice is the same, as of a logger that sends again in other chunks."""
+    """Return True if what is there twice is the same.
+
+    So it is of a logger that sends again in other chunks.
+    """
     first = round((chunk.start - before.start).total_seconds() * chunk.sampling_rate_hz)
     there = before.values[:, first + taken.start : first + taken.stop]
     return _is_alike(before, chunk) and np.array_equal(
@@ -157,7 +164,7 @@ def _repeats(before: Chunk, chunk: Chunk, taken: slice) -> bool:
 
 
 def _taken(before: Chunk, chunk: Chunk) -> slice:
-    """Which samples of a chunk are of the time of one that came before it."""
+    """Return which samples of a chunk are of the time of one that came before it."""
     rate = chunk.sampling_rate_hz
     begin, end = max(before.start, chunk.start), min(before.end, chunk.end)
     common_s = (end - begin).total_seconds()
@@ -170,9 +177,7 @@ def _taken(before: Chunk, chunk: Chunk) -> slice:
 
 
 def _ends_as_begins(first: Chunk, second: Chunk, samples: int) -> bool:
-    """Whether so many samples at a seam are there twice, to the bit; of a sensor that shows the
-    same value all the time, nobody can tell.
-    """
+    """Return True if so many samples at a seam are there twice, to the bit."""
     if samples < 1 or not _is_alike(first, second):
         return False
     tail, head = first.values[:, -samples:], second.values[:, :samples]
@@ -211,7 +216,7 @@ def _piece(run: list[Chunk]) -> Piece:
 
 
 def _middle_c(run: list[Chunk]) -> float:
-    """What a chunk says: a mean would make a likely temperature of 10 °C and a broken -127."""
+    """Return the median: a mean would make a likely temperature of 10 °C and a broken -127."""
     known = sorted(c.temperature_c for c in run if not math.isnan(c.temperature_c))
     return known[len(known) // 2] if known else NAN
 

@@ -1,8 +1,9 @@
-"""What the store hands out beside the nouns of `shm.values`: frozen rows, complete at birth."""
+"""Values of the store next to those of `shm.values`, frozen; `shm.store.tables` stores them."""
 
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -14,7 +15,10 @@ from shm.documents import dump
 from shm.values import (
     NAN,
     Alert,
+    Averaged,
+    BaselineCheck,
     Diagnosis,
+    Doubt,
     Fingerprint,
     ForeignMode,
     FrequencyResponse,
@@ -22,12 +26,13 @@ from shm.values import (
     Posterior,
     QualityCheck,
     Selection,
+    Summary,
     WatchedTest,
 )
 
 
 class Stage(StrEnum):
-    """How far a recording or a test has come. A recording stands where its last test stands."""
+    """Progress of a recording or a test. A recording is where its least advanced test is."""
 
     RECEIVED = "received"
     IDENTIFIED = "identified"
@@ -43,7 +48,7 @@ ENDED = (Stage.DONE, Stage.REFUSED, Stage.HELD)
 
 
 class DeliveryState(StrEnum):
-    """What has become of a delivery."""
+    """State of a delivery."""
 
     WAITING = "waiting"
     DELIVERED = "delivered"
@@ -64,10 +69,9 @@ OTHER = "other"
 
 
 def counts_by_name(known: type[StrEnum], rows: Iterable[Sequence[Any]]) -> dict[str, int]:
-    """How many rows say what: each name of `known`, 0 where there is none, and `OTHER` where a row
-    says something else, as one of a newer version may.
+    """Sum the counts in pairs of a name and a count; unknown names are summed under `OTHER`.
 
-    `rows` are pairs of what is said and how often. Counting never fails for what a row says.
+    Each name of `known` is counted, 0 where there is none.
     """
     counted: dict[str, int] = {str(name): 0 for name in known}
     for said, times in rows:
@@ -82,7 +86,7 @@ DESCRIBED = "described"
 
 @dataclass(frozen=True)
 class Lineage:
-    """Where a result comes from: checksums of its input and settings, and the version.
+    """Origin of a result: checksums of its input and settings, and the version.
 
     `described` is the description of the hanger among those settings, where it is known: kept
     beside a posterior, so that a later description can be compared with it.
@@ -91,7 +95,9 @@ class Lineage:
     input_sha256: str
     settings_sha256: str
     version: str
-    described: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
+    described: Mapping[str, Any] | None = field(
+        default=None, compare=False, repr=False, metadata={"stored": False}
+    )
 
     @classmethod
     def of(
@@ -102,7 +108,7 @@ class Lineage:
 
     @property
     def columns(self) -> dict[str, str]:
-        """What stands in columns of its own, and in the lineage of what is made from it."""
+        """Return the part that has columns, and is in the lineage of what is made from it."""
         return {
             name: getattr(self, name) for name in ("input_sha256", "settings_sha256", "version")
         }
@@ -244,7 +250,7 @@ class StoredAdoption:
 
 @dataclass(frozen=True, eq=False)
 class StoredWatch:
-    """What the watch said after a test, and the baseline it was compared with.
+    """Result of the watch after a test, and the baseline it was compared with.
 
     `alert_probability` is by how much its alert was judged; NaN of a former version. `called` is
     the alert that it called for, raised or not; None of a former version, too.
@@ -260,7 +266,7 @@ class StoredWatch:
 
 @dataclass(frozen=True)
 class KeptWatch:
-    """What a watch goes on from: bytes of its own, made with what `key` tells."""
+    """Stored state of a watch, made with what `key` tells."""
 
     key: str
     last_test_time: datetime
@@ -269,7 +275,7 @@ class KeptWatch:
 
 @dataclass(frozen=True)
 class Note:
-    """What somebody notes on an alert, once."""
+    """Note of somebody on an alert, made once."""
 
     alert_id: int
     who: str
@@ -278,16 +284,16 @@ class Note:
 
     @property
     def said(self) -> dict[str, object]:
-        """Who, why and when, as documents tell it."""
+        """Return who, why and when, for documents."""
         return {"who": self.who, "why": self.why, "at": self.at}
 
 
 class Acknowledgement(Note):
-    """Who has taken note of an alert, when, and what they say to it."""
+    """Person who has taken note of an alert, when, and what they say to it."""
 
 
 class Resolution(Note):
-    """When the condition that an alert tells of ended, who found that (`shm` or a person), why."""
+    """End of the condition of an alert: when, found by whom (`shm` or a person), why."""
 
 
 @dataclass(frozen=True)
@@ -307,7 +313,7 @@ class StoredAlert:
 
     @property
     def is_open(self) -> bool:
-        """Whether it waits for somebody: it stands, and nobody has acknowledged it."""
+        """Return True while its condition holds and nobody has acknowledged it."""
         return self.acknowledgement is None and self.resolution is None
 
 
@@ -340,11 +346,11 @@ class Silence:
 
     @property
     def until(self) -> datetime:
-        """When it ends, or ended."""
+        """Return its end, planned or made earlier by a person."""
         return self.ends_at if self.ended_at is None else min(self.ended_at, self.ends_at)
 
     def is_over(self, at: datetime) -> bool:
-        """Whether it is not in force and will not be: one may end before it begins."""
+        """Return True if it is not in force and will not be: one may end before it begins."""
         return self.until <= max(at, self.starts_at)
 
     def is_in_force(self, at: datetime) -> bool:
@@ -352,7 +358,7 @@ class Silence:
         return self.starts_at <= at < self.until
 
     def covers(self, hanger: int, at: datetime) -> bool:
-        """Whether it is in force for a hanger at a time; its end is not part of it."""
+        """Return True if it is in force for a hanger at a time; its end is not part of it."""
         return self.hanger in (None, hanger) and self.is_in_force(at)
 
 
@@ -402,3 +408,404 @@ class FormerTest:
     superseded_at: datetime | None
     lineage: Lineage
     posteriors: tuple[FormerPosterior, ...]
+
+
+ON_THE_WAY = (Stage.RECEIVED, Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
+"""Where recordings stand that are not through."""
+
+
+class Outcome(StrEnum):
+    """Outcome of receiving a file."""
+
+    NEW = "new"
+    RESUMED = "resumed"  # the same spool entry, after a crash before it was removed
+    DUPLICATE = "duplicate"  # the same bytes dropped again
+    REOPENED = "reopened"  # refused before, dropped again: tried again
+    DISCARDED = "discarded before"  # a person discarded it, dropped again: it stays so
+    REDESCRIBED = "redescribed"  # the same bytes with another sidecar: done again with that
+
+
+@dataclass(frozen=True)
+class ReceivedFile:
+    """A file as it came in; `archived_as` and `sidecar_as` are relative to the archive.
+
+    `modified_at` is when the file was last written, as its folder says; copying resets that.
+    """
+
+    sha256: str
+    file_name: str
+    size_bytes: int
+    arrival: str
+    archived_as: str | None = None
+    sidecar_as: str | None = None
+    modified_at: datetime | None = None
+
+
+@dataclass(frozen=True)
+class StoredRecording:
+    """A file that was taken in and how far it has come; `reason` says why it was refused."""
+
+    id: int
+    file: ReceivedFile
+    received_at: datetime
+    stage: Stage
+    hanger: int | None = None
+    reason: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class Receipt:
+    """Outcome of taking a file in, with its recording."""
+
+    outcome: Outcome
+    recording: StoredRecording
+
+
+@dataclass(frozen=True)
+class Step:
+    """A stage that a recording or, where one is named, a test of it has reached.
+
+    `version` is that of the shm that brought it there; None where it was not noted.
+    """
+
+    stage: str
+    at: datetime
+    version: str | None
+    test_id: int | None = None
+    test: str | None = None
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """Tests that were sent back to be done again, and the results that this has superseded.
+
+    `of_baseline` are those of the tests from which the hanger's baseline was made: they are not
+    watched, and the baseline stays as it was made until it is set anew.
+    """
+
+    recording: StoredRecording
+    tests: tuple[str, ...]
+    posteriors: int
+    watches: int
+    of_baseline: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something noticed on the way: a duplicate, a file reopened or refused."""
+
+    at: datetime
+    kind: str
+    file_name: str
+    message: str
+    recording_id: int | None = field(default=None)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A recording that is not through: how far it has come, and since when it is there."""
+
+    id: int
+    file_name: str
+    stage: Stage
+    hanger: int | None
+    since: datetime
+
+
+@dataclass(frozen=True)
+class Deaths:
+    """Count the processes that died at a recording since it last moved on, the last `last_at`."""
+
+    count: int
+    last_at: datetime
+
+
+class Decision(StrEnum):
+    """Decision of a person on a recording; `REPLACED`: it was done again before one was made.
+
+    `WITHDRAWN`: it counted, and was discarded then; `REINSTATED`: what was discarded counts again.
+    Of these two nothing was held, and no alert told.
+    """
+
+    CONFIRMED = "confirmed"
+    DISCARDED = "discarded"
+    REPLACED = "replaced"
+    WITHDRAWN = "withdrawn"
+    REINSTATED = "reinstated"
+
+
+@dataclass(frozen=True)
+class HeldTest:
+    """One test that is held and why: its place in its file, and the shift of the tension that it
+    implies (a fraction, NaN where that cannot be said)."""
+
+    position: int
+    name: str
+    doubts: tuple[Doubt, ...]
+    tension_shift: float = NAN
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A recording that is or was held; `message` is what its owner was told of it.
+
+    `time` is the one that a person gave its test. All of `decision`, `decided_at`, `who`, `why` are
+    empty while nobody has decided.
+    """
+
+    id: int
+    recording_id: int
+    file_name: str
+    hanger: int
+    held_at: datetime
+    message: str
+    tests: tuple[HeldTest, ...]
+    sidecar_as: str | None = None
+    decision: Decision | None = None
+    decided_at: datetime | None = None
+    who: str = ""
+    why: str = ""
+    time: datetime | None = None
+
+    @property
+    def is_for_its_clock(self) -> bool:
+        """Return True if only the time of its tests is in doubt, not what they measured."""
+        return bool(self.doubts) and all(each.check.startswith("clock") for each in self.doubts)
+
+    @property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Of all its tests, each check once."""
+        return tuple({d.check: d for test in self.tests for d in test.doubts}.values())
+
+    @property
+    def time_unknown(self) -> bool:
+        """Return True if the time that its test claims is certainly wrong."""
+        return any(doubt.time_unknown for doubt in self.doubts)
+
+    @property
+    def is_in(self) -> bool:
+        """Return True if a person said that it counts."""
+        return self.decision in (Decision.CONFIRMED, Decision.REINSTATED)
+
+    @property
+    def is_out(self) -> bool:
+        """Return True if a person said that it does not."""
+        return self.decision in (Decision.DISCARDED, Decision.WITHDRAWN)
+
+
+@dataclass(frozen=True)
+class TestRow:
+    """A test by its name; `time` is its own or, where it has none, the time of receipt."""
+
+    __test__ = False  # no test, though named so
+
+    id: int
+    recording_id: int
+    hanger: int
+    name: str
+    time: datetime
+    stage: Stage
+
+
+@dataclass(frozen=True)
+class LatestTest:
+    """The number of a hanger's tests and the time of the latest."""
+
+    tests: int
+    time: datetime
+
+
+@dataclass(frozen=True, kw_only=True)
+class Numbers:
+    """A posterior in numbers.
+
+    `stiffness` is that of each plane's ends as `shm.models.end_stiffness` has it, log10 of
+    N m/rad, by `transverse_end_stiffness` and the like; empty where the class clamps the ends.
+    `parameters` are those of the class, as it takes them, and sigma. `averaged` is the tension over
+    all model classes of the hanger.
+    """
+
+    tension_n: Summary
+    most_probable_tension_n: float
+    stiffness: Mapping[str, Summary]
+    parameters: Mapping[str, Summary]
+    averaged: Averaged
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrendPoint(Numbers):
+    """One test in the history of a hanger, with its posterior in numbers.
+
+    `taken_at` is None where the test tells no time and `time` is that of its receipt.
+    """
+
+    test_id: int
+    test: str
+    hanger: int
+    time: datetime
+    taken_at: datetime | None
+    temperature_c: float
+    posterior_id: int
+    model: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class BaselineGlance(Numbers):
+    """A baseline in force with its posterior in numbers; see `Baseline`.
+
+    `temperature_c` is the mean of its tests, NaN where none has one; `check` is None of a baseline
+    that a former version made; `begins_at` is when the first of its tests was made.
+    """
+
+    id: int
+    hanger: int
+    set_at: datetime
+    who: str
+    why: str
+    since: datetime | None
+    model: str
+    tests: tuple[str, ...]
+    temperature_c: float
+    check: BaselineCheck | None = None
+    begins_at: datetime | None = None
+    described: Mapping[str, Any] | None = None
+
+
+class EventKind(StrEnum):
+    """Kind of an event of a hanger other than a test."""
+
+    BASELINE = "baseline"
+    ADOPTED = "adopted"
+    UNDONE = "adoption undone"
+    ALERT = "alert"
+    ACKNOWLEDGED = "acknowledged"
+
+
+@dataclass(frozen=True)
+class HangerEvent:
+    """Something that happened to a hanger, and who did it and why; `id` is that of its kind's row.
+
+    An alert has its message for a reason and nobody who did it; its time is that of its test.
+    """
+
+    at: datetime
+    kind: EventKind
+    who: str
+    why: str
+    id: int
+
+
+class Role(StrEnum):
+    """Role of a person; each may what the one before may."""
+
+    READER = "reader"
+    OPERATOR = "operator"
+    ENGINEER = "engineer"
+
+    def may(self, needed: Role) -> bool:
+        """Return True if this role may do what `needed` may."""
+        order = list(Role)
+        return order.index(self) >= order.index(needed)
+
+
+@dataclass(frozen=True)
+class User:
+    """A person who may sign in, or once might."""
+
+    id: int
+    name: str
+    role: Role
+    made_at: datetime
+    removed_at: datetime | None = None
+    single_sign_on: bool = False
+    """Whether a provider alone lets in, which says who it is; else a password alone does."""
+
+
+class Scope(StrEnum):
+    """Right of a token; one that may write may read."""
+
+    READ = "read"
+    WRITE = "write"
+
+
+@dataclass(frozen=True)
+class StoredToken:
+    """A token without its secret."""
+
+    id: int
+    name: str
+    scopes: frozenset[Scope]
+    created_at: datetime
+    revoked_at: datetime | None = None
+    last_used_at: datetime | None = None
+
+
+@dataclass(frozen=True)
+class ArchiveCopy:
+    """A recording whose file, and sidecar if it has one, were copied whole into a folder."""
+
+    recording_id: int
+    folder: str
+    at: datetime
+
+
+@dataclass(frozen=True)
+class KeptStreamWatch:
+    """State of the watch of a hanger's sensors, and up to when it has seen readings."""
+
+    reading_time: datetime
+    content: bytes
+
+
+@dataclass(frozen=True)
+class AuditRow:
+    """One change: `who` did `action` on `subject` by `via`; `detail` is the reason or the value."""
+
+    id: int
+    at: datetime
+    who: str
+    via: str
+    action: str
+    subject: str
+    detail: str
+
+
+@dataclass(frozen=True)
+class ChangedSetting:
+    """The value of a key of `bridge.toml` that holds instead of what the file says."""
+
+    key: str
+    value: float | str
+    at: datetime
+    who: str
+    id: int = 0
+
+    def __str__(self) -> str:
+        setting, by = self.key.replace(".", " "), f"{self.who} on {self.at:%Y-%m-%d}"
+        return f"{setting} = {said(self.value)} instead of what bridge.toml says, by {by}"
+
+    def is_of(self, hanger: int) -> bool:
+        """Return True if it changes a hanger, or all of them."""
+        return self.key.startswith(("settings.", f"hanger.{hanger}."))
+
+
+def said(value: float | str | None) -> str:
+    """A value as people read it."""
+    if isinstance(value, str):
+        return value or "none"
+    return "not set" if value is None or math.isnan(value) else f"{value:.10g}"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Entry of the journal: the event, its subject, when, by whom, by which way, why, which shm."""
+
+    at: datetime
+    kind: str
+    recording_id: int | None
+    test_id: int | None
+    subject: str
+    detail: str
+    who: str | None
+    via: str | None
+    version: str | None

@@ -112,7 +112,7 @@ def _parts(sql: str) -> Counter[str]:
 
 @cache
 def _made() -> dict[tuple[str, str], _Object]:
-    """What the migrations make, all run on an empty database in memory."""
+    """Return what the migrations make, all run on an empty database in memory."""
     engine = make_engine("sqlite://")
     try:
         upgrade(engine)

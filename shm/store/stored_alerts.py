@@ -6,17 +6,15 @@ Silences and maintenance windows: who wants which hooks' messages held back, whe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from datetime import datetime
-from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Row
 
 from shm.errors import NothingThere, UsageError
-from shm.store.database import Repository, insert
+from shm.store.database import Repository
 from shm.store.journal import note
-from shm.store.list_rows import EventKind, HangerEvent
+from shm.store.mapping import insert_value, value_in
 from shm.store.outbox import (
     Deliveries,
     acknowledge,
@@ -27,16 +25,7 @@ from shm.store.outbox import (
     stored_alerts,
 )
 from shm.store.rows import Acknowledgement, Reconciled, Silence, StoredAlert
-from shm.store.tables import (
-    adoptions,
-    alerts,
-    baselines,
-    silences,
-)
-
-_is_open = alerts.c.noted_at.is_(None) & alerts.c.ended_at.is_(None)
-"""What `StoredAlert.is_open` says."""
-_closed_at = sa.func.coalesce(alerts.c.noted_at, alerts.c.ended_at)
+from shm.store.tables import alerts, silences
 
 
 class Alerts(Deliveries):
@@ -61,31 +50,6 @@ class Alerts(Deliveries):
         if baseline_id is not None:
             query = query.where(alerts.c.baseline_id == baseline_id)
         return tuple(stored_alert(row) for row in self.rows(query))
-
-    def list_page(
-        self,
-        hanger: int | None = None,
-        *,
-        is_open: bool | None = None,
-        limit: int | None = None,
-        before: int | None = None,
-    ) -> tuple[StoredAlert, ...]:
-        """Alerts, the newest first; `before` is the number of the alert to go on after.
-
-        Only those that are open, or that are acknowledged or resolved, where `is_open` tells; the
-        latter come in the order in which they were, the latest first.
-        """
-        query = stored_alerts
-        if is_open is False:
-            query = query.order_by(_closed_at.desc())
-        query = query.order_by(alerts.c.id.desc())
-        if hanger is not None:
-            query = query.where(alerts.c.hanger == hanger)
-        if is_open is not None:
-            query = query.where(_is_open if is_open else sa.not_(_is_open))
-        if before is not None:
-            query = query.where(_is_after(before, is_open=is_open))
-        return tuple(stored_alert(row) for row in self.rows(query.limit(limit)))
 
     def get(self, alert_id: int) -> StoredAlert:
         """Return one alert; raise NothingThere."""
@@ -131,77 +95,9 @@ class Alerts(Deliveries):
             note(connection, at, "alert acknowledged", _said_of(alert), why, who)
         return replace(alert, acknowledgement=Acknowledgement(alert_id, who, why, at))
 
-    def counts(self) -> tuple[int, int]:
-        """How many alerts are open, and how many were acknowledged."""
-        noted = self.scalar(sa.select(sa.func.count(alerts.c.noted_at)))
-        return sum(self.open_counts().values()), int(noted or 0)
-
-    def open_counts(self) -> dict[int, int]:
-        """How many alerts of each hanger are open; hangers without any are left out.
-
-        The only place where they are counted: whoever states a number of them asks here.
-        """
-        query = sa.select(alerts.c.hanger, sa.func.count())
-        rows = self.rows(query.where(_is_open).group_by(alerts.c.hanger))
-        return {row[0]: int(row[1]) for row in rows}
-
-    def list_hanger_events(
-        self, hanger: int, since: datetime | None = None
-    ) -> tuple[HangerEvent, ...]:
-        """What happened to a hanger beside its tests, by time."""
-        with self.reading() as connection:
-            found = [
-                HangerEvent(row.at, kind, row.who or "", row.why or "", row.id)
-                for kind, query in _events(hanger).items()
-                for row in connection.execute(query)
-            ]
-        late = (event for event in found if since is None or event.at >= since)
-        return tuple(sorted(late, key=lambda event: event.at))
-
-
-def _is_after(alert_id: int, *, is_open: bool | None) -> sa.ColumnElement[bool]:
-    """Which alerts stand after one in a list of `list_page`."""
-    older = alerts.c.id < alert_id
-    if is_open is not False:
-        return older
-    one = alerts.alias()
-    closed_at = sa.func.coalesce(one.c.noted_at, one.c.ended_at)
-    of_one = sa.select(closed_at).where(one.c.id == alert_id).scalar_subquery()
-    return (_closed_at < of_one) | ((_closed_at == of_one) & older)
-
-
-def _events(hanger: int) -> dict[EventKind, sa.Select[Any]]:
-    noted = _named(alerts, "noted_at", "noted_who", "noted_why")
-    undone = _named(adoptions, "undone_at", "undone_who", "undone_why")
-    raised = sa.select(
-        alerts.c.id,
-        alerts.c.time.label("at"),
-        sa.null().label("who"),
-        alerts.c.message.label("why"),
-    )
-    return {
-        EventKind.BASELINE: _of(hanger, baselines, _named(baselines, "set_at", "who", "why")),
-        EventKind.ADOPTED: _of(hanger, adoptions, _named(adoptions, "adopted_at", "who", "why")),
-        EventKind.UNDONE: _of(hanger, adoptions, undone.where(adoptions.c.undone_at.is_not(None))),
-        EventKind.ALERT: _of(hanger, alerts, raised),
-        EventKind.ACKNOWLEDGED: _of(hanger, alerts, noted.where(alerts.c.noted_at.is_not(None))),
-    }
-
-
-def _of(hanger: int, table: sa.Table, query: sa.Select[Any]) -> sa.Select[Any]:
-    return query.where(table.c.hanger == hanger).order_by(table.c.id)
-
-
-def _named(table: sa.Table, at: str, who: str, why: str) -> sa.Select[Any]:
-    named = {"at": at, "who": who, "why": why}
-    return sa.select(table.c.id, *(table.c[name].label(label) for label, name in named.items()))
-
 
 def _said_of(stored: StoredAlert) -> str:
     return f"alert {stored.id}, hanger {stored.alert.hanger}"
-
-
-_COLUMNS = tuple(silences.c[field.name] for field in fields(Silence))
 
 
 class Silences(Repository):
@@ -228,29 +124,21 @@ class Silences(Repository):
                 remedy="Give a later --until.",
             )
         made = Silence(0, hanger, starts_at, ends_at, is_maintenance, who, why, at)
-        values = {name: value for name, value in vars(made).items() if name != "id"}
         with self.writing() as connection:
-            number = insert(connection, silences, {**values, "ended_who": None})
-            found = replace(made, id=number)
-            told = f"{starts_at:%Y-%m-%d %H:%M} to {ends_at:%Y-%m-%d %H:%M} UTC"
-            note(
-                connection,
-                at,
-                f"{kind_of(found)} made",
-                f"{_silence_named(found)}, {told}",
-                why,
-                who,
-            )
-            return found
+            made = insert_value(connection, silences, made)
+            period_text = f"{starts_at:%Y-%m-%d %H:%M} to {ends_at:%Y-%m-%d %H:%M} UTC"
+            subject = f"{_silence_named(made)}, {period_text}"
+            note(connection, at, f"{kind_of(made)} made", subject, why, who)
+            return made
 
     def end(self, silence_id: int, who: str, at: datetime) -> Silence:
         """Ends a silence before its time; raises NothingThere, or UsageError where it is over."""
         with self.writing() as connection:
-            query = sa.select(*_COLUMNS).where(silences.c.id == silence_id)
+            query = sa.select(silences).where(silences.c.id == silence_id)
             row = connection.execute(query).one_or_none()
             if row is None:
                 raise NothingThere(f"no silence {silence_id}.", remedy="See `shm alerts silences`.")
-            found = _silence(row)
+            found = value_in(row, Silence)
             if found.until <= at or found.ended_at is not None:
                 raise UsageError(
                     f"silence {silence_id} is over.", remedy="See `shm alerts silences`."
@@ -263,18 +151,22 @@ class Silences(Repository):
 
     def list_all(self) -> tuple[Silence, ...]:
         """All that were ever made, the oldest first."""
-        return tuple(map(_silence, self.rows(sa.select(*_COLUMNS).order_by(silences.c.id))))
+        query = sa.select(silences).order_by(silences.c.id)
+        return tuple(value_in(row, Silence) for row in self.rows(query))
 
 
 def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> datetime | None:
-    """When hooks are told of a hanger again, silences one after the other; None where they are."""
+    """Return when hooks are told of a hanger again, silences one after the other.
+
+    None where they are.
+    """
     until = at
     while ends := [each.until for each in silences if each.covers(hanger, until)]:
         until = max(ends)
     return None if until == at else until
 
 
-def said_of(silence: Silence) -> str:
+def describe_silence(silence: Silence) -> str:
     """A silence or a maintenance window in words: what it keeps from whom, until when, and why."""
     of = hangers_of(silence.hanger)
     kept = f"hooks are told nothing of {of}"
@@ -287,7 +179,7 @@ def said_of(silence: Silence) -> str:
 
 
 def kind_of(silence: Silence) -> str:
-    """What it is called."""
+    """Return the name of its kind."""
     return "maintenance window" if silence.is_maintenance else "silence"
 
 
@@ -298,8 +190,3 @@ def hangers_of(hanger: int | None) -> str:
 
 def _silence_named(silence: Silence) -> str:
     return f"{kind_of(silence)} {silence.id}, {hangers_of(silence.hanger)}"
-
-
-def _silence(row: Row[tuple[object, ...]]) -> Silence:
-    values = dict(row._mapping)
-    return Silence(**{**values, "ended_who": values["ended_who"] or ""})

@@ -2,43 +2,36 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection, Row
+from sqlalchemy.engine import Connection
 
-from shm.diagnosis_document import diagnosis_document, diagnosis_of
+from shm.diagnosis_document import diagnosis_document
 from shm.errors import NothingThere, StoreBusy, UsageError
-from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.files import all_at, in_force, move
 from shm.store.journal import note
-from shm.store.queries import (
-    counted_tests,
-    hidden,
-    insert_baseline,
-    insert_posterior,
-    insert_selection,
-    lineage_from,
-    posterior_of_row,
-    read_tests,
-    selected_classes,
-    selection_in_force,
-    selection_of,
-)
+from shm.store.mapping import row_of, value_in
 from shm.store.rows import (
     Adoption,
     Lineage,
     Stage,
     StoredAdoption,
     StoredDiagnosis,
-    StoredPosterior,
     StoredSelection,
     StoredTest,
+)
+from shm.store.selects import (
+    hidden,
+    insert_baseline,
+    insert_posterior,
+    insert_selection,
+    posterior_of_row,
+    selection_in_force,
+    selection_of,
 )
 from shm.store.tables import (
     adoptions,
@@ -52,8 +45,6 @@ from shm.store.tables import (
 from shm.store.trends import Trends
 from shm.values import Diagnosis, Posterior, Selection
 
-log = logging.getLogger(__name__)
-_ADOPTION = tuple(field.name for field in fields(Adoption))
 _in_force = adoptions.c.undone_at.is_(None)
 
 
@@ -102,7 +93,7 @@ class Posteriors(Trends):
 
     def get(self, hanger: int, test: str | None = None) -> Posterior:
         """The latest posterior of a hanger, or that of one test; raises NothingThere."""
-        query = _shown(hanger)
+        query = posteriors_of(hanger)
         if test is not None:
             query = query.where(posteriors.c.id.in_(_of_test(hanger, test)))
         # First which one, then its samples: else those of all would be sorted.
@@ -115,40 +106,10 @@ class Posteriors(Trends):
             raise NothingThere(f"no posterior of {what} yet.", remedy="Ingest a test of it.")
         return posterior_of_row(row)
 
-    def list_all(self, hanger: int) -> tuple[StoredPosterior, ...]:
-        """Return the posteriors of a hanger in its selected class, by time."""
-        query = _shown(hanger)
-        return tuple(
-            StoredPosterior(row.id, posterior_of_row(row), row.time, lineage_from(row))
-            for row in self.rows(query.order_by(posteriors.c.time, posteriors.c.id))
-        )
-
-    def history(self, hanger: int) -> tuple[tuple[StoredTest, Posterior], ...]:
-        """Each test of a hanger that has a posterior, with it, by time."""
-        newest = (
-            sa.select(posterior_tests.c.test_id, sa.func.max(posterior_tests.c.posterior_id))
-            .join(posteriors)
-            .where(posteriors.c.id.in_(_shown(hanger).with_only_columns(posteriors.c.id)))
-            .group_by(posterior_tests.c.test_id)
-        )
-        stored = {row.id: row.posterior for row in self.list_all(hanger)}
-        with self.reading() as connection:
-            newest_of = {row[0]: row[1] for row in connection.execute(newest)}
-        with self.reading() as connection:
-            known = read_tests(connection, counted_tests(hanger))
-        return tuple(
-            (test, stored[newest_of[test.id]]) for test in known if newest_of.get(test.id) in stored
-        )
-
     def selection(self, hanger: int) -> StoredSelection | None:
         """The selection in force."""
         with self.reading() as connection:
             return selection_of(connection, hanger)
-
-    def selected_models(self) -> dict[int, str]:
-        """The name of the selected or adopted class of each hanger that has one."""
-        with self.reading() as connection:
-            return selected_classes(connection)
 
     def save_diagnosis(
         self, hanger: int, diagnosis: Diagnosis, lineage: Lineage, at: datetime
@@ -164,19 +125,6 @@ class Posteriors(Trends):
         with self.writing() as connection:
             id_ = insert(connection, diagnoses, values)
         return StoredDiagnosis(id_, hanger, diagnosis, at, lineage)
-
-    def latest_diagnosis(self, hanger: int) -> StoredDiagnosis | None:
-        """The latest diagnosis of a hanger; None where there is none that this version reads."""
-        query = sa.select(diagnoses).where(diagnoses.c.hanger == hanger)
-        row = self.first(query.order_by(diagnoses.c.id.desc()).limit(1))
-        if row is None:
-            return None
-        try:
-            found = diagnosis_of(loads(row.document))
-        except (KeyError, TypeError, ValueError):
-            log.warning("the diagnosis of hanger %d is of a former version: make it again", hanger)
-            return None
-        return StoredDiagnosis(row.id, row.hanger, found, row.diagnosed_at, lineage_from(row))
 
     def adopt(
         self,
@@ -209,7 +157,7 @@ class Posteriors(Trends):
                 ),
                 "adopted_at": at,
             }
-            id_ = insert(connection, adoptions, {**vars(adoption), **kept})
+            id_ = insert(connection, adoptions, row_of(adoption, adoptions) | kept)
             subject, who = f"hanger {hanger}, {model}", adoption.who
             note(connection, at, "class adopted", subject, adoption.why, who)
         return StoredAdoption(id_, adoption, at)
@@ -233,21 +181,7 @@ class Posteriors(Trends):
             connection.execute(changed.values(**undoing))
             subject = f"hanger {row.hanger}, {row.model}"
             note(connection, at, "adoption dropped", subject, why, who)
-            return _adoption(connection.execute(by_id).one())
-
-    def list_adoptions(
-        self, hanger: int | None = None, *, undone: bool = False
-    ) -> tuple[StoredAdoption, ...]:
-        """Adoptions in force, of one hanger where named; with `undone` also those that were undone.
-
-        They stand as they were made: the last one in force of a hanger is the one that counts.
-        """
-        query = sa.select(adoptions).order_by(adoptions.c.id)
-        if hanger is not None:
-            query = query.where(adoptions.c.hanger == hanger)
-        if not undone:
-            query = query.where(_in_force)
-        return tuple(_adoption(row) for row in self.rows(query))
+            return value_in(connection.execute(by_id).one(), StoredAdoption)
 
 
 def _has(connection: Connection, hanger: int) -> bool:
@@ -255,7 +189,7 @@ def _has(connection: Connection, hanger: int) -> bool:
     return connection.execute(query).first() is not None
 
 
-def _shown(hanger: int) -> sa.Select[Any]:
+def posteriors_of(hanger: int) -> sa.Select[Any]:
     refused = (tests.c.hanger == hanger) & (tests.c.stage == Stage.REFUSED) & in_force(tests)
     of_refused = sa.select(posterior_tests.c.posterior_id).join(tests).where(refused)
     return sa.select(posteriors).where(
@@ -295,14 +229,3 @@ def _entries(connection: Connection, selection_id: int) -> dict[str, int]:
     query = sa.select(posteriors.c.model, posteriors.c.id).join(selection_entries)
     rows = connection.execute(query.where(selection_entries.c.selection_id == selection_id))
     return {row.model: row.id for row in rows}
-
-
-def _adoption(row: Row[Any]) -> StoredAdoption:
-    return StoredAdoption(
-        id=row.id,
-        adoption=Adoption(**{name: getattr(row, name) for name in _ADOPTION}),
-        adopted_at=row.adopted_at,
-        undone_at=row.undone_at,
-        undone_why=row.undone_why or "",
-        undone_who=row.undone_who or "",
-    )

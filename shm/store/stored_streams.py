@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, fields
 from datetime import datetime, timedelta
 from typing import Any, TypeVar
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection, Row
+from sqlalchemy.engine import Connection
 
-from shm.documents import compact, parse_time
+from shm.documents import compact
 from shm.store.database import Repository, insert
+from shm.store.mapping import row_of
 from shm.store.outbox import settle
-from shm.store.people_and_stream_tables import (
+from shm.store.rows import Reconciled, StoredAlert
+from shm.store.tables import (
     pooled_readings,
     stream_events,
     stream_progress,
@@ -22,12 +23,10 @@ from shm.store.people_and_stream_tables import (
     stream_watch_days,
     stream_windows,
 )
-from shm.store.rows import Reconciled, StoredAlert
-from shm.values import NAN, ShapePoint
+from shm.values import ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import (
     PERIODS,
-    Period,
     PooledReading,
     StreamEvent,
     Window,
@@ -40,23 +39,12 @@ HOURS_KEPT = timedelta(days=800)
 
 _DAYS_BACK = 10
 """States of the watch, a day apart: twice the default of `late_hours`. Judgement."""
-_LATEST = 36
-"""Windows of a train-free night: a mode that traffic hides for some hours is not forgotten."""
-_EVENT = tuple(field.name for field in fields(StreamEvent))
 _NO_CHANGE = Reconciled()
 _T = TypeVar("_T", WindowReading, PooledReading)
 
 
-@dataclass(frozen=True)
-class KeptStreamWatch:
-    """What the watch of a hanger's sensors goes on from, and up to when it has seen readings."""
-
-    time: datetime
-    content: bytes
-
-
 class Streams(Repository):
-    """What permanent sensors said."""
+    """Windows, pooled readings and events of permanent sensors."""
 
     def save_window(self, reading: WindowReading) -> None:
         """Keeps what a window said, in the place of what it said before, and that it is done.
@@ -70,94 +58,6 @@ class Streams(Repository):
             _replace(connection, stream_windows, row, "stream", "start")
             connection.execute(sa.delete(pooled_readings).where(_pooled_with(window)))
             _advance(connection, window.stream, window.start + timedelta(seconds=window.duration_s))
-
-    def list_windows(
-        self, hanger: int, since: datetime, until: datetime
-    ) -> tuple[WindowReading, ...]:
-        """The windows of a hanger that began from `since` on and before `until`, by time."""
-        table = stream_windows
-        within = (table.c.hanger == hanger, table.c.start >= since, table.c.start < until)
-        query = sa.select(table).where(*within).order_by(table.c.start, table.c.id)
-        return self._values(query, WindowReading)
-
-    def list_spectra(
-        self, stream: str, since: datetime, until: datetime, most: int
-    ) -> tuple[tuple[datetime, Sequence[int]], ...]:
-        """When windows of a stream began, and the spectrum that each kept in dB: at most so many,
-        evenly taken out of all.
-        """
-        table = stream_windows
-        within = (table.c.stream == stream, table.c.start >= since, table.c.start < until)
-        with self.reading() as connection:
-            ids = connection.scalars(sa.select(table.c.id).where(*within).order_by(table.c.start))
-            chosen = ids.all()
-            some = table.c.id.in_(chosen[:: max(1, -(-len(chosen) // most))])
-            rows = connection.execute(sa.select(table).where(some).order_by(table.c.start)).all()
-        spectra = ((row.start, json.loads(row.document)["spectrum_db"]) for row in rows)
-        return tuple(each for each in spectra if each[1])
-
-    def last_window(self, stream: str) -> WindowReading | None:
-        """What the latest window of a stream said; None where there is none."""
-        table = stream_windows
-        query = sa.select(table).where(table.c.stream == stream).order_by(table.c.start.desc())
-        return next(iter(self._values(query.limit(1), WindowReading)), None)
-
-    def latest_with_modes(self, stream: str) -> tuple[WindowReading, ...]:
-        """Return the latest windows of a stream that have modes, the last first."""
-        table = stream_windows
-        query = sa.select(table).where(table.c.stream == stream, table.c.has_modes)
-        latest = query.order_by(table.c.start.desc()).limit(_LATEST)
-        return self._values(latest, WindowReading)
-
-    def first_window(self, stream: str) -> datetime | None:
-        """When the first window of a stream began; None where there is none."""
-        query = sa.select(sa.func.min(stream_windows.c.start)).where(
-            stream_windows.c.stream == stream
-        )
-        return self._moment(query)
-
-    def window_starts(self, stream: str, since: datetime) -> frozenset[datetime]:
-        """When the windows of a stream began that are done, from a time on."""
-        table = stream_windows
-        query = sa.select(table.c.start).where(table.c.stream == stream, table.c.start >= since)
-        return frozenset(self.scalars(query))
-
-    def first_unpooled(self, stream: str, since: datetime) -> datetime | None:
-        """The first window with modes from `since` on of which, though later hours are pooled, its
-        own hour, six hours or day is not.
-        """
-        table, windows = pooled_readings, stream_windows
-        of_windows = sa.select(windows.c.start).where(
-            windows.c.stream == stream, windows.c.has_modes, windows.c.start >= since
-        )
-        starts: dict[str, set[datetime]] = {period: set() for period in PERIODS}
-        with self.reading() as connection:
-            for row in connection.execute(
-                sa.select(table.c.period, table.c.start).where(
-                    table.c.stream == stream, table.c.start >= since - PERIODS["day"]
-                )
-            ):
-                starts[row.period].add(row.start)
-            found = connection.scalars(of_windows.order_by(windows.c.start)).all()
-        start: datetime
-        for start in found:
-            for period, length in PERIODS.items():
-                own = period_start(start, length)
-                if own not in starts[period] and own < max(starts[period], default=own):
-                    return start
-        return None
-
-    def pooled_range(
-        self, stream: str, period: Period | None = None
-    ) -> tuple[datetime, datetime] | None:
-        """Return when the first and the latest reading of a period, or of any, began."""
-        start = pooled_readings.c.start
-        query = sa.select(sa.func.min(start), sa.func.max(start))
-        query = query.where(pooled_readings.c.stream == stream)
-        if period is not None:
-            query = query.where(pooled_readings.c.period == period)
-        first, last = self.first(query)
-        return None if first is None else (first, last)
 
     def save_pooled(
         self,
@@ -184,35 +84,6 @@ class Streams(Repository):
                 _keep_day(connection, state)
             return settle(connection, changes, hooks, at or end)
 
-    def list_pooled(
-        self, hanger: int, period: Period, since: datetime, until: datetime
-    ) -> tuple[PooledReading, ...]:
-        """The readings of a hanger that began from `since` on and before `until`, by time."""
-        table = pooled_readings
-        within = (table.c.start >= since, table.c.start < until)
-        query = sa.select(table).where(table.c.hanger == hanger, table.c.period == period, *within)
-        return self._values(query.order_by(table.c.start, table.c.id), PooledReading)
-
-    def list_hours_near(
-        self, stream: str, times: Sequence[datetime], within: timedelta
-    ) -> tuple[PooledReading, ...]:
-        """The readings of an hour of a stream that began near any of these times, by time."""
-        table = pooled_readings
-        near = (table.c.start.between(at - within, at + within) for at in times)
-        of_hours = (table.c.stream == stream) & (table.c.period == "hour")
-        query = sa.select(table).where(of_hours, sa.or_(sa.false(), *near))
-        return self._values(query.order_by(table.c.start), PooledReading)
-
-    def watch(self, hanger: int, until: datetime | None = None) -> KeptStreamWatch | None:
-        """Return what the watch of a hanger's sensors goes on from; with `until` as it was at the
-        last kept time up to then."""
-        table = stream_watch if until is None else stream_watch_days
-        own = sa.select(table.c.reading_time, table.c.content).where(table.c.hanger == hanger)
-        if until is not None:
-            own = own.where(table.c.reading_time <= until)
-        row = self.first(own.order_by(table.c.reading_time.desc()).limit(1))
-        return None if row is None else KeptStreamWatch(*row)
-
     def go_back(self, hanger: int, to: datetime, content: bytes) -> None:
         """The watch of a hanger goes on from a state of before."""
         days = stream_watch_days
@@ -224,24 +95,11 @@ class Streams(Repository):
 
     def save_event(self, event: StreamEvent) -> None:
         """Notes something once; what was noted already is not noted again."""
-        row = vars(event)
-        same = (stream_events.c[name] == row[name] for name in _EVENT)
+        row = row_of(event, stream_events)
+        same = (stream_events.c[name] == value for name, value in row.items())
         with self.writing() as connection:
             if connection.execute(sa.select(stream_events.c.id).where(*same)).first() is None:
                 insert(connection, stream_events, row)
-
-    def list_events(self, stream: str | None, since: datetime) -> tuple[StreamEvent, ...]:
-        """What was noticed from a time on, of one stream where named, by time."""
-        query = sa.select(stream_events).where(stream_events.c.end >= since)
-        if stream is not None:
-            query = query.where(stream_events.c.stream == stream)
-        rows = self.rows(query.order_by(stream_events.c.start, stream_events.c.id))
-        return tuple(map(_event, rows))
-
-    def progress(self, stream: str) -> datetime | None:
-        """Up to when the windows of a stream are done; None where none is."""
-        progress = stream_progress
-        return self._moment(sa.select(progress.c.done_until).where(progress.c.stream == stream))
 
     def sweep(self, now: datetime, window_days: float) -> None:
         """Takes out windows and events of before so many days, and hours of before `HOURS_KEPT`.
@@ -259,34 +117,6 @@ class Streams(Repository):
                 ),
             ):
                 connection.execute(chosen)
-
-    def _moment(self, query: sa.Select[Any]) -> datetime | None:
-        found: datetime | None = self.scalar(query)
-        return found
-
-    def _values(self, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:
-        return tuple(_reading(kind, json.loads(row.document)) for row in self.rows(query))
-
-
-def _reading(kind: type[_T], document: dict[str, Any]) -> _T:
-    """A reading back from its document. The row is as it was written, so that no type is looked at
-    again: there are thousands to be shown at once.
-    """
-    if kind is WindowReading:
-        document["window"] = Window(**_known(document["window"]))
-        document["spectrum_db"] = tuple(document["spectrum_db"])
-    document["modes"] = tuple(map(_mode, document["modes"]))
-    return kind(**_known(document))
-
-
-def _known(values: dict[str, Any]) -> dict[str, Any]:
-    known: dict[str, Any] = {k: NAN if value is None else value for k, value in values.items()}
-    return {**known, "start": parse_time(known["start"])} if "start" in known else known
-
-
-def _mode(values: dict[str, Any]) -> Mode:
-    shape = tuple(ShapePoint(**_known(each)) for each in values.pop("shape", ()))
-    return Mode(**_known(values), shape=shape)
 
 
 def _document(reading: WindowReading | PooledReading) -> str:
@@ -306,10 +136,6 @@ def _told(values: dict[str, Any], kind: type[Mode | ShapePoint]) -> dict[str, An
 
 def _is_usual(value: Any, usual: Any) -> bool:
     return bool(value == usual or (value != value and usual != usual))
-
-
-def _event(row: Row[Any]) -> StreamEvent:
-    return StreamEvent(**{name: getattr(row, name) for name in _EVENT})
 
 
 def _replace(connection: Connection, table: sa.Table, row: dict[str, Any], *keys: str) -> None:

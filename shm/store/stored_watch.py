@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import fields, replace
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
@@ -13,24 +13,12 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.documents import alert_document
 from shm.errors import StoreBusy
-from shm.store.blobs import change_in, watch_document, watch_in
-from shm.store.columns import Number
+from shm.store.blobs import watch_document, watch_in
 from shm.store.database import Repository, insert
 from shm.store.files import all_at, in_force, move
 from shm.store.journal import note
-from shm.store.list_rows import BaselineGlance, TestRow
+from shm.store.mapping import row_of, value_in
 from shm.store.outbox import acknowledge, resolve, settle
-from shm.store.queries import (
-    among,
-    baseline_in_force,
-    baselines_now,
-    compared_with,
-    insert_baseline,
-    insert_posterior,
-    read_baseline,
-    test_columns,
-    test_row,
-)
 from shm.store.rerun import rerun_watched
 from shm.store.rows import (
     Baseline,
@@ -42,23 +30,13 @@ from shm.store.rows import (
     StoredTest,
     StoredWatch,
 )
-from shm.store.tables import (
-    alerts,
-    baselines,
-    drifts,
-    posterior_tests,
-    tests,
-    watch_states,
-    watches,
-)
-from shm.store.trends import baselines_in_numbers
-from shm.values import NAN, Alert, Change, Drift, Hanger, Posterior, WatchedTest
-
-_DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")
+from shm.store.selects import baseline_in_force, insert_baseline, insert_posterior, read_baseline
+from shm.store.tables import alerts, drifts, tests, watch_states, watches
+from shm.values import NAN, Alert, Drift, Posterior, WatchedTest
 
 
 class Watch(Repository):
-    """What the watch said, and the baselines it compares with."""
+    """Results of the watch, and the baselines it compares with."""
 
     def save(
         self,
@@ -83,8 +61,9 @@ class Watch(Repository):
         with self.writing() as connection:
             if not all_at(connection, [test], Stage.UPDATED):
                 return ()
+            against = {"test_id": test.id, "baseline_id": baseline.id}
             for drift in found.drifts:
-                insert(connection, drifts, _drift_values(drift, test, baseline))
+                insert(connection, drifts, row_of(drift, drifts) | against)
             insert(connection, watches, _watch_values(found, test, baseline, alert, level))
             raised = settle(connection, changes, hooks, at, test, baseline.id)
             if state is not None:
@@ -107,23 +86,6 @@ class Watch(Repository):
                 note(connection, at, "tests judged again", f"hanger {hanger}", why, "shm")
             return count
 
-    def is_again(self, test: StoredTest, baseline: Baseline) -> bool:
-        """Return True where a test has been compared with a baseline before."""
-        own = (watches.c.test_id == test.id) & (watches.c.baseline_id == baseline.id)
-        return self.first(sa.select(watches.c.id).where(own)) is not None
-
-    def is_caught_up(self, test: StoredTest, baseline: Baseline) -> bool:
-        """Return True where no other test waits to be compared with a baseline once more."""
-        waiting = tests.c.stage.in_([Stage.IDENTIFIED, Stage.UPDATED]) & in_force(tests)
-        query = sa.select(tests.c.id).join(watches).where(watches.c.baseline_id == baseline.id)
-        return self.first(query.where(waiting, tests.c.id != test.id)) is None
-
-    def state(self, baseline: Baseline) -> KeptWatch | None:
-        """What the watch goes on from at the next test that is compared with a baseline."""
-        query = sa.select(watch_states).where(watch_states.c.baseline_id == baseline.id)
-        row = self.first(query)
-        return None if row is None else KeptWatch(row.key, row.last_test_time, row.content)
-
     def forget_state(self, baseline: Baseline) -> None:
         """Drops what the watch would go on from: it then begins anew at the next test."""
         with self.writing() as connection:
@@ -143,23 +105,6 @@ class Watch(Repository):
         """
         with self.reading() as connection:
             return read_baseline(connection, hanger, model, time, number)
-
-    def baselines_in_force(self, hangers: Iterable[Hanger]) -> dict[int, BaselineGlance]:
-        """The baseline in force of each hanger that has one, in numbers, by hanger."""
-        with self.reading() as connection:
-            return baselines_in_numbers(connection, hangers)
-
-    def baseline_temperatures(self) -> dict[int, float]:
-        """Mean temperature of the tests of each baseline in force, by hanger; NaN where unknown."""
-        mean_c = sa.func.avg(tests.c.temperature_c, type_=Number)
-        query: sa.Select[Any] = (
-            sa.select(baselines.c.hanger, mean_c.label("mean_c"))
-            .join(posterior_tests, posterior_tests.c.posterior_id == baselines.c.posterior_id)
-            .join(tests, tests.c.id == posterior_tests.c.test_id)
-            .where(baselines.c.id.in_(baselines_now()))
-            .group_by(baselines.c.hanger)
-        )
-        return {row.hanger: row.mean_c for row in self.rows(query)}
 
     def rebaseline(
         self,
@@ -200,26 +145,14 @@ class Watch(Repository):
             note(connection, at, "baseline set", f"hanger {hanger}", why, who)
         return Baseline(id_, hanger, posterior, at, who, why, since)
 
-    def list_watched(
-        self, baseline: Baseline, before: StoredTest | None = None
-    ) -> tuple[TestRow, ...]:
-        """The tests that were watched since a baseline, or those of them `before` a test, by time.
-
-        Tests that were watched against an earlier baseline count, but for those before a day since
-        which the hanger is compared anew.
-        """
-        query = sa.select(*test_columns).where(*compared_with(baseline))
-        if before is not None:
-            at_once = (tests.c.time == before.time) & (tests.c.id < before.id)
-            query = query.where((tests.c.time < before.time) | at_once)
-        return tuple(map(test_row, self.rows(query.order_by(tests.c.time, tests.c.id))))
-
     def list_drifts(self, hanger: int | None = None) -> tuple[Drift, ...]:
         """Shifts from the baseline, by time; of one hanger where named."""
         query = sa.select(drifts, tests.c.name.label("test")).join(tests).where(in_force(drifts))
         if hanger is not None:
             query = query.where(drifts.c.hanger == hanger)
-        return tuple(_drift(row) for row in self.rows(query.order_by(drifts.c.time, drifts.c.id)))
+        return tuple(
+            value_in(row, Drift) for row in self.rows(query.order_by(drifts.c.time, drifts.c.id))
+        )
 
     def list_all(
         self, hanger: int | None = None, baseline_id: int | None = None, *, last: int | None = None
@@ -232,75 +165,32 @@ class Watch(Repository):
         if baseline_id is not None:
             query = query.where(watches.c.baseline_id == baseline_id)
         if last is None:
-            return self._watches(query)
+            return load_watches(self, query)
         latest = query.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(last)
-        return self._watches(self.scalars(latest))
+        return load_watches(self, self.scalars(latest))
 
-    def latest(self, hangers: Sequence[Hanger] | None = None) -> dict[int, StoredWatch]:
-        """Return the watch of the latest test of each hanger (or these) against its baseline."""
-        held = baselines.alias()
-        latest = (
-            sa.select(watches.c.id)
-            .where(
-                watches.c.hanger == held.c.hanger,
-                watches.c.baseline_id == held.c.id,
-                in_force(watches),
-            )
-            .order_by(watches.c.time.desc(), watches.c.id.desc())
-            .limit(1)
-            .scalar_subquery()
-        )
-        ids = (
-            sa.select(latest)
-            .select_from(held)
-            .where(held.c.id.in_(baselines_now()), among(held.c.hanger, hangers))
-        )
-        found = [id_ for id_ in self.scalars(ids) if id_ is not None]
-        return {each.hanger: each for each in self._watches(found)}
 
-    def detected_changes(
-        self, hangers: Sequence[Hanger] | None = None
-    ) -> dict[int, tuple[Change, ...]]:
-        """The changes detected of each (or these) hanger against its baseline in force, by time."""
-        query = sa.select(watches).where(*_called(), among(watches.c.hanger, hangers))
-        found = defaultdict[int, list[Change]](list)
-        for row in self.rows(query.order_by(watches.c.time, watches.c.id)):
-            found[row.hanger].append(change_in(row.document))
-        return {hanger: tuple(changes) for hanger, changes in found.items()}
-
-    def list_detected(self, hanger: int, baseline_id: int) -> tuple[StoredWatch, ...]:
-        """Return the watches that detected a change from a baseline, and the latest of it, by
-        time."""
-        against = sa.select(watches.c.id).where(
-            watches.c.hanger == hanger, watches.c.baseline_id == baseline_id, in_force(watches)
-        )
-        latest = against.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(1)
-        with self.reading() as connection:
-            ids = {*connection.scalars(against.where(watches.c.called)), connection.scalar(latest)}
-        return self._watches([id_ for id_ in ids if id_ is not None])
-
-    def _watches(self, chosen: sa.Select[Any] | Sequence[int]) -> tuple[StoredWatch, ...]:
-        """Watches that are `chosen` by their numbers, with their shifts, by time."""
-        name = tests.c.name.label("test")
-        query: sa.Select[Any] = sa.select(watches, name).select_from(watches).join(tests)
-        query = query.where(watches.c.id.in_(chosen))
-        same_test = watches.c.test_id == drifts.c.test_id
-        together = same_test & (watches.c.baseline_id == drifts.c.baseline_id)
-        of_shift = (drifts.c[name] for name in _DRIFT_COLUMNS)
-        shifts: sa.Select[Any] = (
-            sa.select(drifts.c.test_id, drifts.c.baseline_id, name, *of_shift)
-            .select_from(drifts.join(tests).join(watches, together))
-            .where(watches.c.id.in_(chosen), in_force(drifts))
-            .order_by(drifts.c.id)
-        )
-        with self.reading() as connection:
-            rows = connection.execute(query.order_by(watches.c.time, watches.c.id)).all()
-            found: defaultdict[tuple[int, int], list[Drift]] = defaultdict(list)
-            for row in connection.execute(shifts):
-                test_id, baseline_id, test, *values = row
-                named = dict(zip(_DRIFT_COLUMNS, values, strict=True))
-                found[test_id, baseline_id].append(Drift(test=test, **named))
-        return tuple(_stored_watch(row, found[row.test_id, row.baseline_id]) for row in rows)
+def load_watches(
+    store: Repository, chosen: sa.Select[Any] | Sequence[int]
+) -> tuple[StoredWatch, ...]:
+    """Watches that are `chosen` by their numbers, with their shifts, by time."""
+    name = tests.c.name.label("test")
+    query: sa.Select[Any] = sa.select(watches, name).select_from(watches).join(tests)
+    query = query.where(watches.c.id.in_(chosen))
+    same_test = watches.c.test_id == drifts.c.test_id
+    together = same_test & (watches.c.baseline_id == drifts.c.baseline_id)
+    shifts: sa.Select[Any] = (
+        sa.select(drifts, name)
+        .select_from(drifts.join(tests).join(watches, together))
+        .where(watches.c.id.in_(chosen), in_force(drifts))
+        .order_by(drifts.c.id)
+    )
+    with store.reading() as connection:
+        rows = connection.execute(query.order_by(watches.c.time, watches.c.id)).all()
+        found: defaultdict[tuple[int, int], list[Drift]] = defaultdict(list)
+        for row in connection.execute(shifts):
+            found[row.test_id, row.baseline_id].append(value_in(row, Drift))
+    return tuple(_stored_watch(row, found[row.test_id, row.baseline_id]) for row in rows)
 
 
 def _refuse_late(connection: Connection, before: Baseline) -> None:
@@ -315,22 +205,13 @@ def _refuse_late(connection: Connection, before: Baseline) -> None:
 
 def _keep_state(connection: Connection, baseline: Baseline, state: KeptWatch) -> None:
     _drop_state(connection, baseline)
-    row = {**vars(state), "hanger": baseline.hanger, "baseline_id": baseline.id}
-    insert(connection, watch_states, row)
+    own = {"hanger": baseline.hanger, "baseline_id": baseline.id}
+    insert(connection, watch_states, row_of(state, watch_states) | own)
 
 
 def _drop_state(connection: Connection, baseline: Baseline) -> None:
     former = watch_states.c.baseline_id == baseline.id
     connection.execute(sa.delete(watch_states).where(former))
-
-
-def _drift_values(drift: Drift, test: StoredTest, baseline: Baseline) -> dict[str, Any]:
-    values = {name: getattr(drift, name) for name in _DRIFT_COLUMNS}
-    return {**values, "test_id": test.id, "baseline_id": baseline.id}
-
-
-def _drift(row: Row[Any]) -> Drift:
-    return Drift(test=row.test, **{name: getattr(row, name) for name in _DRIFT_COLUMNS})
 
 
 def _watch_values(
@@ -351,9 +232,3 @@ def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
     found, level, called = watch_in(row.document)
     found = replace(found, test=row.test, time=row.time, drifts=tuple(shifts))
     return StoredWatch(row.id, row.hanger, row.baseline_id, found, level, called)
-
-
-def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:
-    """Which watches detected a change from the baseline in force, of all hangers or of one."""
-    against = watches.c.baseline_id.in_(baselines_now(hanger))
-    return watches.c.called, against, in_force(watches)

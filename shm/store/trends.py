@@ -14,7 +14,6 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple
-from datetime import datetime
 from functools import lru_cache
 from statistics import fmean
 from typing import Any
@@ -26,16 +25,15 @@ from shm.documents import averaged_document, number, value_of
 from shm.errors import UsageError
 from shm.store.columns import loads
 from shm.store.database import Repository
-from shm.store.files import counts, in_force
-from shm.store.list_rows import BaselineGlance, Numbers, TrendPoint
-from shm.store.queries import (
+from shm.store.files import in_force
+from shm.store.rows import DESCRIBED, BaselineGlance, Numbers, TrendPoint
+from shm.store.selects import (
     baselines_now,
     hidden,
     posterior_of_row,
     selection_numbers,
     selection_of,
 )
-from shm.store.rows import DESCRIBED
 from shm.store.tables import baselines, posterior_tests, posteriors, summaries, tests
 from shm.values import NAN, Averaged, BaselineCheck, Hanger, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
@@ -51,29 +49,6 @@ _SUMMARY = summaries.c.key, summaries.c.document.label("summary")
 
 class Trends(Repository):
     """The part of `Posteriors` that answers in numbers."""
-
-    def trend(self, hanger: Hanger, since: datetime | None = None) -> tuple[TrendPoint, ...]:
-        """Each test of a hanger that has a posterior, in numbers, by time: see `history`."""
-        chosen = _shown_tests().where(tests.c.hanger == hanger.id)
-        if since is not None:
-            chosen = chosen.where(tests.c.time >= since)
-        return self._points(chosen, [hanger])
-
-    def latest_trends(self, hangers: Iterable[Hanger]) -> dict[int, TrendPoint]:
-        """The latest point of each hanger that has one, by hanger."""
-        known = list(hangers)
-        one = [tests.c.hanger == each.id for each in known] if len(known) == 1 else []
-        of_hangers = sa.select(tests.c.hanger).where(in_force(tests), *one).distinct().subquery()
-        latest = (
-            _shown_tests()
-            .where(tests.c.hanger == of_hangers.c.hanger, tests.c.id.in_(_of_shown(tests.c.id)))
-            .order_by(tests.c.time.desc(), tests.c.id.desc())
-            .limit(1)
-            .correlate(of_hangers)
-        )
-        query = sa.select(latest.scalar_subquery()).select_from(of_hangers)
-        ids = [id_ for id_ in self.scalars(query) if id_ is not None]
-        return {point.hanger: point for point in self._points(ids, known)}
 
     def save_summaries(self, hanger: Hanger, tell: Callable[[float], None] = lambda _: None) -> int:
         """Keeps the summaries of a hanger that are not kept yet; how many there were.
@@ -100,7 +75,7 @@ class Trends(Repository):
         return len(missing)
 
     def _missing(self, hanger: Hanger, key: str) -> list[int]:
-        """What is shown of a hanger and has no summary under its present description."""
+        """Return what is shown of a hanger and has no summary under its present description."""
         up_to_date = sa.exists().where(
             summaries.c.posterior_id == posteriors.c.id, summaries.c.key == key
         )
@@ -113,34 +88,35 @@ class Trends(Repository):
         )
         return list(self.scalars(query.order_by(posteriors.c.id)))
 
-    def _points(
-        self, chosen: sa.Select[Any] | Sequence[int], hangers: Iterable[Hanger]
-    ) -> tuple[TrendPoint, ...]:
-        """Of tests that are `chosen` by their numbers, by time."""
-        newest = (
-            sa.select(
-                posterior_tests.c.test_id,
-                sa.func.max(posterior_tests.c.posterior_id).label("posterior_id"),
-            )
-            .join(posteriors)
-            .where(posterior_tests.c.test_id.in_(chosen), *_shown())
-            .group_by(posterior_tests.c.test_id)
-            .subquery()
+
+def load_points(
+    store: Repository, chosen: sa.Select[Any] | Sequence[int], hangers: Iterable[Hanger]
+) -> tuple[TrendPoint, ...]:
+    """Of tests that are `chosen` by their numbers, by time."""
+    newest = (
+        sa.select(
+            posterior_tests.c.test_id,
+            sa.func.max(posterior_tests.c.posterior_id).label("posterior_id"),
         )
-        of_test = (tests.c[name] for name in _OF_TEST)
-        query: sa.Select[Any] = (
-            sa.select(*of_test, newest.c.posterior_id, posteriors.c.model, *_SUMMARY)
-            .select_from(newest)
-            .join(tests, tests.c.id == newest.c.test_id)
-            .join(posteriors, posteriors.c.id == newest.c.posterior_id)
-            .outerjoin(summaries, summaries.c.posterior_id == posteriors.c.id)
-            .order_by(tests.c.time, tests.c.id)
-        )
-        known = {hanger.id: hanger for hanger in hangers}
-        with self.reading() as connection:
-            rows = [row for row in connection.execute(query) if row.hanger in known]
-            numbers = _numbers(connection, rows, known)
-        return tuple(_point(row, numbers[row.posterior_id]) for row in rows)
+        .join(posteriors)
+        .where(posterior_tests.c.test_id.in_(chosen), *shown_posteriors())
+        .group_by(posterior_tests.c.test_id)
+        .subquery()
+    )
+    of_test = (tests.c[name] for name in _OF_TEST)
+    query: sa.Select[Any] = (
+        sa.select(*of_test, newest.c.posterior_id, posteriors.c.model, *_SUMMARY)
+        .select_from(newest)
+        .join(tests, tests.c.id == newest.c.test_id)
+        .join(posteriors, posteriors.c.id == newest.c.posterior_id)
+        .outerjoin(summaries, summaries.c.posterior_id == posteriors.c.id)
+        .order_by(tests.c.time, tests.c.id)
+    )
+    known = {hanger.id: hanger for hanger in hangers}
+    with store.reading() as connection:
+        rows = [row for row in connection.execute(query) if row.hanger in known]
+        numbers = _numbers(connection, rows, known)
+    return tuple(_point(row, numbers[row.posterior_id]) for row in rows)
 
 
 def baselines_in_numbers(
@@ -165,18 +141,8 @@ def baselines_in_numbers(
     }
 
 
-def _shown_tests() -> sa.Select[Any]:
-    return sa.select(tests.c.id).where(in_force(tests), counts(tests))
-
-
-def _shown() -> tuple[sa.ColumnElement[bool], ...]:
+def shown_posteriors() -> tuple[sa.ColumnElement[bool], ...]:
     return posteriors.c.id.not_in(hidden), in_force(posteriors)
-
-
-def _of_shown(test_id: sa.ColumnElement[int]) -> sa.Select[Any]:
-    """The test itself, where it has a posterior that is shown."""
-    query = sa.select(posterior_tests.c.test_id).join(posteriors)
-    return query.where(posterior_tests.c.test_id == test_id, *_shown())
 
 
 def _numbers(

@@ -152,7 +152,7 @@ class Workspace:
             yield lock
 
     def holder(self) -> str | None:
-        """Who holds the lock now; None where nobody does. Raises StoreError."""
+        """Return who holds the lock now; None where nobody does. Raises StoreError."""
         return holder(self.location, self._lock_file)
 
     @property
@@ -176,7 +176,10 @@ def changed_in(location: str | Path) -> tuple[int | None, Mapping[str, object]]:
 def _with_changes(
     path: Path, changed: Mapping[str, object], flags: Mapping[str, object] | None
 ) -> tuple[Bridge, Settings]:
-    """What holds with what a page has changed; raises BadInput where it no longer fits the file."""
+    """Return what holds with what a page has changed.
+
+    Raises BadInput where it no longer fits the file.
+    """
     try:
         bridge = load_bridge(path, changed)
         return bridge, _settings(bridge, flags)

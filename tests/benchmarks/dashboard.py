@@ -28,6 +28,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
+from shm.store.queries.tests import list_test_rows
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import httpx
@@ -203,7 +205,7 @@ def ask(workspace: Workspace, rounds: int) -> tuple[Visitor, float]:
         names = {
             hanger: [
                 row.name
-                for row in store.tests.list_rows(hanger, 10 * RECORDED_EVERY)
+                for row in list_test_rows(store, hanger, 10 * RECORDED_EVERY)
                 if is_recorded(row.name)
             ]
             for hanger in (ids[len(ids) * place // rounds] for place in range(rounds))

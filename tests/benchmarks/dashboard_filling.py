@@ -26,7 +26,7 @@ from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Archive, IdentifiedTest, Lineage, Outcome, Store, Workspace
 from shm.store.archive import Kept
 from shm.store.columns import Document
-from shm.store.people import Role
+from shm.store.rows import Role
 from shm.store.tables import alerts, metadata, recordings, summaries
 from shm.store.trends import key_of
 from shm.values import (
@@ -171,8 +171,14 @@ class _Made:
     @property
     def posterior(self) -> Posterior:
         model = build("beam2", self.hanger)
-        centre = np.array([self.share, 0.98, 7.2, 7.4, 7.1, 7.3, 1.0, 1.0, 1.0, 0.005])
-        spread = np.array([0.01, 0.004, 0.2, 0.2, 0.2, 0.2, 0.01, 0.01, 0.01, 0.001])
+        known = {
+            "theta_F": (self.share, 0.01),
+            "theta_L": (0.98, 0.004),
+            **{f"log10_k{end}": (7.2, 0.2) for end in range(1, 5)},
+            "sigma": (0.005, 0.001),
+        }
+        names = (*model.parameter_names, "sigma")
+        centre, spread = np.array([known.get(name, (1.0, 0.01)) for name in names]).T
         predicted = tuple(
             PredictedFrequency(
                 mode.plane, mode.order, mode.frequency_hz * 1.003, 0.02, mode.frequency_hz
@@ -182,7 +188,7 @@ class _Made:
         return Posterior(
             model=model.name,
             hanger=self.hanger.id,
-            names=(*model.parameter_names, "sigma"),
+            names=names,
             samples=self.rng.normal(centre, spread, (SAMPLES, len(centre))),
             log_likelihood=self.rng.normal(size=SAMPLES),
             most_probable=centre,

@@ -23,6 +23,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from shm.store.queries.recordings import list_recordings
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
@@ -174,7 +176,7 @@ def through_a_flow(files: int, seed: int) -> Counter[str]:
             for path in dropped:
                 flow.receive(path)
             flow.drain()
-            refused = flow.store.recordings.list_all(Stage.REFUSED)
+            refused = list_recordings(flow.store, Stage.REFUSED)
             pids = len(list(workspace.quarantine.folder.glob("*.reason.json")))
         reasons = [
             json.loads(path.read_text())

@@ -17,6 +17,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
+from shm.store.queries.history import list_events
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.resources import one_thread_a_process
@@ -44,7 +46,7 @@ def main() -> None:
         struck = kill_workers(workspace, options.files, options.kills, rng, options.longest)
         counts = stage_counts(workspace)
         with workspace.store() as store:
-            noted = Counter(event.kind for event in store.journal.list_events())
+            noted = Counter(event.kind for event in list_events(store))
     print(
         f"{struck} kills over {options.files} healthy files, {options.workers} workers: "
         f"{ {str(stage): n for stage, n in counts.items()} }; noted: {dict(noted)}; "

@@ -25,6 +25,8 @@ from datetime import datetime, timedelta
 from functools import cache
 from pathlib import Path
 
+from shm.store.queries.recordings import count_stages
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
@@ -143,7 +145,7 @@ def until_done(workspace: Workspace, files: int, pid: int) -> Load:
     with workspace.store() as store:
         while not load.done or load.done[-1][1] < files:
             time.sleep(2.0)
-            counts = store.recordings.stage_counts()
+            counts = count_stages(store)
             if counts[Stage.REFUSED]:
                 raise SystemExit(f"{counts[Stage.REFUSED]} files are refused")
             # What is held as another hanger's has been through all stages but the last.
@@ -210,7 +212,7 @@ def called(store: Store, hanger: Hanger, drops: Iterator[float], folder: Path) -
 
 def heard_of(store: Store, hanger: int, folder: Path) -> float | None:
     """When the hook had the alert of a hanger; None where its file is done and called none."""
-    before, end = store.recordings.stage_counts()[Stage.DONE], math.inf
+    before, end = count_stages(store)[Stage.DONE], math.inf
     while time.monotonic() < end:
         for path in (each for each in folder.iterdir() if not each.name.startswith(".")):
             heard, at = json.loads(path.read_text())["hanger"], path.stat().st_mtime
@@ -218,7 +220,7 @@ def heard_of(store: Store, hanger: int, folder: Path) -> float | None:
             if heard == hanger:
                 return at
         time.sleep(0.05)
-        if end == math.inf and store.recordings.stage_counts()[Stage.DONE] > before:
+        if end == math.inf and count_stages(store)[Stage.DONE] > before:
             end = time.monotonic() + LONGEST_DELIVERY_S
     return None
 

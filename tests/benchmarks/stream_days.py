@@ -25,6 +25,9 @@ from datetime import UTC, datetime, timedelta
 from itertools import groupby
 from pathlib import Path
 
+from shm.store.queries.streams import find_progress, list_pooled, list_stream_events
+from shm.store.queries.tests import list_test_rows
+
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -38,6 +41,7 @@ from shm.store import Workspace  # noqa: E402
 from shm.store.ring import ring_of  # noqa: E402
 from shm.values import Hanger  # noqa: E402
 from shm.values.stream import Chunk, PooledReading, Stream  # noqa: E402
+from shm.watch.kept_state import to_bytes  # noqa: E402
 from shm.watch.stream_watch import StreamOptions, StreamWatch, daily_shift  # noqa: E402
 from shm_daemon.loop import run  # noqa: E402
 from tests.benchmarks.stream_load import processor_s  # noqa: E402
@@ -101,7 +105,7 @@ def daily(
             said, state = watch.after(state, each)
             told += [said.alert.time] if said.alert else []
         if state and not state.is_learning and len(hours) > 12:
-            found[day] = daily_shift(state.to_bytes(), hours)[0]
+            found[day] = daily_shift(to_bytes(state), hours)[0]
     return found, told
 
 
@@ -138,7 +142,7 @@ def main() -> None:
                 lag_h = AHEAD_H + 1.0
                 while lag_h > AHEAD_H:
                     time.sleep(1.0)
-                    done = [store.streams.progress(stream.name) for _, stream in sites]
+                    done = [find_progress(store, stream.name) for _, stream in sites]
                     lag_h = max((now() - (each or START)) / HOUR for each in done)
                     if not daemon.is_alive():
                         raise SystemExit("the daemon has ended")
@@ -150,9 +154,9 @@ def main() -> None:
             clock.value += 7200
             time.sleep(60.0)
             alerts = store.alerts.list_all()
-            read = {h.id: store.streams.list_pooled(h.id, "hour", START, now()) for h, _ in sites}
-            tests = {h.id: len(store.tests.list_rows(h.id)) for h, _ in sites}
-            events = store.streams.list_events(None, START)
+            read = {h.id: list_pooled(store, h.id, "hour", START, now()) for h, _ in sites}
+            tests = {h.id: len(list_test_rows(store, h.id)) for h, _ in sites}
+            events = list_stream_events(store, None, START)
             daemon.terminate()
             daemon.join(30)
     days = (hour + 1) / 24

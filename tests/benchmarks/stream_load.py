@@ -21,6 +21,8 @@ from datetime import UTC, datetime, timedelta
 from itertools import islice
 from pathlib import Path
 
+from shm.store.queries.streams import find_progress
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.read.chunk_document import chunk_document
@@ -57,7 +59,7 @@ def processor_s(pid: int, seen: dict[int, float]) -> float:
 
 
 def is_read(store: Store, workspace: Workspace, until: datetime) -> bool:
-    done = [store.streams.progress(each.name) for each in workspace.bridge.streams]
+    done = [find_progress(store, each.name) for each in workspace.bridge.streams]
     return all(each is not None and each >= until for each in done)
 
 

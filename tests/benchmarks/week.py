@@ -21,6 +21,8 @@ from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
 
+from shm.store.queries.recordings import count_stages
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
@@ -118,7 +120,7 @@ def served(week: Week) -> Iterator[None]:
 
 def through(store: Store) -> int:
     """Tests that are done, or held as another hanger's: a loss of a tenth may look so."""
-    counts = store.recordings.stage_counts()
+    counts = count_stages(store)
     return sum(counts[stage] for stage in ENDED)
 
 
@@ -170,7 +172,7 @@ def faults(week: Week, told: list[tuple[str, object]]) -> list[str]:
     with week.workspace.store() as store:
         hangers = [hanger.id for hanger in week.workspace.bridge.hangers]
         watched = sum(len(store.watch.list_all(hanger)) for hanger in hangers)
-        done = store.recordings.stage_counts()[Stage.DONE]
+        done = count_stages(store)[Stage.DONE]
         if through(store) != week.tests or watched != done - len(hangers):
             found.append("tests are lost or doubled")
     return found

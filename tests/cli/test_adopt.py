@@ -10,6 +10,7 @@ import pytest
 
 from shm.pipeline import adopting
 from shm.store import Store, Workspace
+from shm.store.queries.hangers import list_adoptions
 from tests.cli.conftest import Shm
 from tests.helpers import quick_update
 
@@ -108,7 +109,7 @@ def test_the_gap_now_stands_beside_the_adoption_that_is_watched_and_no_other(
     shm("--workspace", workspace, *ADOPT[:-4], "--effect", "distributed_mass", "--why", "b")
 
     def watch(store: Store, hanger: int) -> adopting.GapWatch:
-        return adopting.GapWatch(store.posteriors.list_adoptions(hanger)[-1], 4.321, True)
+        return adopting.GapWatch(list_adoptions(store, hanger)[-1], 4.321, True)
 
     monkeypatch.setattr("shm_cli.adopt.gap_watch", watch)
     listed = shm("--workspace", workspace, "gap", "adopted", "--json").document["adoptions"]

@@ -14,6 +14,7 @@ from shm.pipeline.reporting import hanger_report
 from shm.report.as_text import as_text
 from shm.report.hanger_report import hanger_paper
 from shm.store import Workspace
+from shm.store.queries.recordings import list_holds
 from tests.cli.conftest import Shm
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import served
@@ -38,7 +39,7 @@ def doubted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
         put(workspace.spool / f"{test.id}.modes.json", dump(modes_document([test])))
     ingest(workspace)
     with workspace.store() as store:
-        for hold in store.recordings.list_holds():
+        for hold in list_holds(store):
             store.recordings.accept(hold.recording_id, "Ann", "as measured", START)
     ingest(workspace)
     return workspace

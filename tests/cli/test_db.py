@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from shm.store import Store, Workspace
+from shm.store.queries.recordings import list_recordings
+from shm.store.queries.upkeep import list_copies
 from tests.cli.conftest import Shm
 from tests.helpers.postgres import Databases
 from tests.helpers.workspaces import write_test
@@ -89,7 +91,7 @@ def test_a_lost_workspace_comes_back_from_its_backup(
     assert (again["archive"]["copied"], again["archive"]["present"]) == (0, 3)
     assert again["newly_noted"] == 0
     with copied.store() as store:
-        noted = [(copy.recording_id, copy.folder) for copy in store.upkeep.list_copies()]
+        noted = [(copy.recording_id, copy.folder) for copy in list_copies(store)]
     assert noted == [(number, str(copies)) for number in (1, 2, 3)]
     copied.database.unlink()
     shutil.rmtree(copied.archive.folder)
@@ -138,7 +140,7 @@ def test_raw_files_that_cannot_be_copied_are_told_and_not_noted(
     assert (ended.code, ended.document["newly_noted"]) == (5, 2)
     assert lost.name in ended.err
     with Store.open(tmp_path / "may.db") as backup:
-        assert len(backup.recordings.list_all()) == 3
+        assert len(list_recordings(backup)) == 3
 
 
 def test_a_restore_over_a_store_is_refused_or_keeps_the_old_one(
@@ -153,7 +155,7 @@ def test_a_restore_over_a_store_is_refused_or_keeps_the_old_one(
     kept = Path(ended.document["kept"])
     assert kept.parent == copied.folder
     with Store.open(kept) as store:
-        assert len(store.recordings.list_all()) == 3
+        assert len(list_recordings(store)) == 3
 
 
 def test_a_restore_waits_for_no_daemon(shm: Shm, copied: Workspace, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from shm.pipeline.intake import as_taken_in
 from shm.read import read, sidecar_path
 from shm.read.modal_sets import _frequency
 from shm.store import Stage, Workspace
+from shm.store.queries.recordings import list_recordings
 from shm.values import Channel, Recording
 from tests.cli.conftest import Shm
 from tests.helpers.flows import ingest
@@ -139,7 +140,7 @@ def test_what_is_dropped_into_the_spool_is_read_by_its_profile(
     sidecar_path(workspace.spool / "later.csv").write_text("temperature_c = 4.5\n")
     ingest(workspace)
     with workspace.store() as store:
-        (stored,) = store.recordings.list_all()
+        (stored,) = list_recordings(store)
         with workspace.archive.opened(stored.file) as path:
             found = read(path)
     assert isinstance(found, Recording)
@@ -154,7 +155,7 @@ def test_a_file_of_an_unknown_logger_is_refused_with_the_command_to_give(
     export(workspace.spool / "first.csv")
     ingest(workspace)
     with workspace.store() as store:
-        (stored,) = store.recordings.list_all()
+        (stored,) = list_recordings(store)
     assert stored.stage is Stage.REFUSED
     assert stored.reason is not None
     assert "shm import FILE" in stored.reason["remedy"]

@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 
 from shm.store import Workspace
+from shm.store.queries.recordings import list_recordings
+from shm.store.queries.trends import list_history
 from shm_cli.main import run
 from tests.cli.conftest import Shm
 from tests.helpers.workspaces import make_workspace, write_test
@@ -87,7 +89,7 @@ def test_a_file_that_is_known_is_said_to_be_known_and_not_stored_twice(
     (row,) = [row for row in json.loads(ended.stdout)["files"] if row["outcome"] == "known already"]
     assert (row["file"], row["known_as"]) == ("again.modes.json", "a.modes.json")
     with workspace.store() as store:
-        assert len(store.recordings.list_all()) == 4
+        assert len(list_recordings(store)) == 4
 
 
 def test_while_a_daemon_serves_the_workspace_ingest_says_what_to_do(
@@ -108,7 +110,7 @@ def test_the_daemon_empties_the_spool_once_and_ends(empty: Workspace) -> None:
     assert ended.stdout == ""
     assert "watching" in ended.stderr
     with empty.store() as store:
-        assert len(store.posteriors.history(3)) == 1
+        assert len(list_history(store, 3)) == 1
 
 
 def test_peek_shows_what_is_in_a_file_and_takes_nothing_in(
@@ -126,7 +128,7 @@ def test_peek_shows_what_is_in_a_file_and_takes_nothing_in(
     assert look["sampling_rate_hz"] == 512
     assert look["channels"][0]["quantity"] == "force"
     with empty.store() as store:
-        assert store.recordings.list_all() == ()
+        assert list_recordings(store) == ()
 
 
 def test_peek_goes_on_after_a_file_it_cannot_read(

@@ -12,6 +12,7 @@ from shm.documents import dump
 from shm.modes_document import modes_document
 from shm.pipeline.lineage import discarded_of_baselines
 from shm.store import Stage, Workspace
+from shm.store.queries.recordings import count_stages, list_holds
 from tests.cli.conftest import Shm
 from tests.helpers.taken_in import copied, ingest_quickly
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put, write_test
@@ -95,7 +96,7 @@ def test_what_is_confirmed_while_a_daemon_serves_is_left_to_it(shm: Shm, held: W
     assert "The daemon does the rest" in ended.err
     assert "its receipt counts" in ended.out
     with held.store() as store:
-        assert store.recordings.stage_counts()[Stage.IDENTIFIED] == 1
+        assert count_stages(store)[Stage.IDENTIFIED] == 1
 
 
 def test_what_is_discarded_says_that_its_raw_file_stays(shm: Shm, held: Workspace) -> None:
@@ -251,4 +252,4 @@ def test_what_makes_no_sense_changes_nothing(
     (tmp_path / "a.csv").write_text("")
     assert shm("--workspace", held.folder, "ingest", *words).code == code
     with held.store() as store:
-        assert len(store.recordings.list_holds()) == 1
+        assert len(list_holds(store)) == 1

@@ -11,6 +11,7 @@ import pytest
 from shm.identify import Identification, identify
 from shm.pipeline import reporting
 from shm.store import Stage, Workspace
+from shm.store.queries.recordings import count_stages
 from shm_cli import working
 from shm_cli.main import run
 from tests.cli.conftest import Shm
@@ -66,11 +67,7 @@ def test_files_taken_in_together_are_one_test_kept_as_one_archive(
     workspace, code = taken_in
     assert code == 0
     with workspace.store() as store:
-        assert (
-            sum(store.recordings.stage_counts().values())
-            == store.recordings.stage_counts()[Stage.DONE]
-            == 1
-        )
+        assert sum(count_stages(store).values()) == count_stages(store)[Stage.DONE] == 1
         (stored,) = store.tests.list_all(3)
         assert store.recordings.get(stored.recording_id).file.file_name == "set_up_0.zip"
     assert stored.test.id == "set_up_0"

@@ -15,7 +15,7 @@ from rich.text import Text
 from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm.store.journal import Actor
-from shm.store.people import Role, Scope
+from shm.store.rows import Role, Scope
 from shm.values.notes import NoteKind
 from shm_cli.terminal import Terminal, escape_controls
 from tests.cli.conftest import Shm

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
-from urllib.parse import unquote
 
 import pytest
 
@@ -52,37 +50,12 @@ def test_people_are_told_what_happened_and_when(tmp_path: Path, listener: Listen
     assert told["type"] == "warning"
 
 
-def test_a_test_alert_is_marked_as_one(tmp_path: Path, listener: Listener) -> None:
-    alert = replace(an_alert(), kinds=("test",), message="Nothing has happened.")
-    a_notifier(tmp_path)(AppriseHook("people", (address(listener.url),)), alert)
-    told = json.loads(listener.told[0].body)
-    assert (told["title"], told["type"]) == ("shm: test of a hook", "info")
-    assert told["message"].startswith("Nothing has happened.\nKey:")
-
-
 def test_addresses_may_stand_in_a_file_with_remarks(tmp_path: Path, listener: Listener) -> None:
     one, two = address(listener.url), address(listener.url.replace("alerts", "others"))
     (tmp_path / "people.txt").write_text(f"# the crew\n{one}\n\n  {two}\n")
     hook = AppriseHook("people", address_file="people.txt")
     assert a_notifier(tmp_path)(hook, an_alert()) == "taken by json, json"
     assert [told.path for told in listener.told] == ["/alerts", "/others"]
-
-
-@pytest.mark.parametrize("text", [None, "", "# nobody\n", "syslog://\n", "people"])
-def test_a_file_without_proper_addresses_is_named_or_explained(
-    tmp_path: Path, text: str | None
-) -> None:
-    if text is not None:
-        (tmp_path / "people.txt").write_text(text)
-    with pytest.raises(HookFailed, match=r"people\.txt|syslog://|not of the form"):
-        a_notifier(tmp_path)(AppriseHook("people", address_file="people.txt"), an_alert())
-
-
-def test_one_line_is_one_address(tmp_path: Path, listener: Listener) -> None:
-    pair = f"{address(listener.url)},syslog://localhost"
-    a_notifier(tmp_path)(AppriseHook("people", (pair,)), an_alert())
-    (told,) = listener.told
-    assert unquote(told.path).startswith("/alerts,syslog:")
 
 
 def test_a_service_that_does_not_take_the_alert_is_named_without_its_password(

@@ -23,7 +23,8 @@ from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
 from shm.store.journal import Actor
-from shm.store.people import Role
+from shm.store.queries.recordings import list_recordings
+from shm.store.rows import Role
 from shm_daemon.web.address import test_page as page_of
 from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.frame import FOR_ENGINEERS, NAVIGATION
@@ -47,7 +48,7 @@ PAGES = {
     "bridges": "/bridges",
     "password": "/password",
 }
-CHARTS = {"hanger": 3, "recording": 6}
+CHARTS = {"hanger": 3, "recording": 5}
 PAPER, INK = "rgb(255, 255, 255)", "rgb(29, 35, 48)"
 PAPER_WIDE = "640px"
 
@@ -79,7 +80,7 @@ def site(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator
     ingest(workspace)
     with workspace.store() as store:
         store.people.add("Anna", Role.ENGINEER, PASSWORD, utc_now())
-        assert {each.stage for each in store.recordings.list_all()} == {Stage.DONE}
+        assert {each.stage for each in list_recordings(store)} == {Stage.DONE}
         assert [each.test.id for each in store.tests.list_all(3)][-1] == RECORDED
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(

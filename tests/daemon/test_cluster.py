@@ -14,6 +14,8 @@ import shm
 from shm.errors import BadInput, ShmError
 from shm.pipeline.streaming import Streaming
 from shm.store import Stage, Workspace
+from shm.store.queries.recordings import count_stages
+from shm.store.queries.streams import list_windows
 from shm_daemon import run
 from shm_daemon.cluster import Cluster, run_if_alike, traits
 from shm_daemon.execution import executor_of
@@ -57,8 +59,8 @@ def test_a_cluster_gives_what_the_processes_of_one_machine_give_to_the_bit(
     there = worked_through(tmp_path / "there", cluster.address)
     here = worked_through(tmp_path / "here", "")
     with there.store() as first, here.store() as second:
-        assert first.recordings.stage_counts()[Stage.DONE] == FILES
-        assert first.recordings.stage_counts()[Stage.REFUSED] == 1
+        assert count_stages(first)[Stage.DONE] == FILES
+        assert count_stages(first)[Stage.REFUSED] == 1
         assert canonical(first) == canonical(second)
 
 
@@ -121,6 +123,6 @@ def test_windows_of_a_stream_are_read_on_a_cluster_to_the_bit(
         with workspace.store() as store:
             clock = Clock(FIRST + HOUR)
             drain(Streaming(workspace, store, executor, clock=clock, lanes=2), clock)
-            found.append(store.streams.list_windows(3, FIRST, FIRST + HOUR))
+            found.append(list_windows(store, 3, FIRST, FIRST + HOUR))
     assert len(found[0]) == 1
     assert found[0] == found[1]

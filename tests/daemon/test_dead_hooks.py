@@ -11,6 +11,7 @@ import pytest
 
 from shm.bridge import Hook
 from shm.store import Delivery, DeliveryState, Stage, Workspace
+from shm.store.queries.recordings import count_stages
 from shm.values import Alert
 from shm_daemon import HookNotifier, Wakeup, run
 from tests.helpers.flows import Clock, a_flow, threads
@@ -121,7 +122,7 @@ def until_refused(workspace: Workspace, number: int) -> None:
     end = time.monotonic() + 120
     while time.monotonic() < end:
         with workspace.store() as store:
-            if store.recordings.stage_counts()[Stage.REFUSED] == number:
+            if count_stages(store)[Stage.REFUSED] == number:
                 return
         time.sleep(0.05)
     raise TimeoutError(f"{number} files are not refused")

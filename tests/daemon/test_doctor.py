@@ -17,6 +17,7 @@ import pytest
 from shm.pipeline.intake import receive
 from shm.read import sandbox
 from shm.store import Archive, DeliveryState, Stage, Workspace
+from shm.store.queries.recordings import count_stages
 from shm_cli.main import run
 from shm_daemon import doctor_checks as checks
 from shm_daemon.doctor import Finding, Level, examine
@@ -299,7 +300,7 @@ def test_tests_that_wait_for_a_baseline_are_not_stuck(tmp_path: Path) -> None:
     workspace = make_workspace(tmp_path / "three", settings={"baseline_tests": 3})
     with workspace.store() as store:
         entered(store, [1, 2])
-        assert store.recordings.stage_counts()[Stage.IDENTIFIED] == 2
+        assert count_stages(store)[Stage.IDENTIFIED] == 2
     assert "none is on its way" in only(workspace, "recordings", NOW + timedelta(days=9)).found
     forming = [each.found for each in found(workspace, "hangers")]
     assert "no baseline yet: 3 (2 of 3 tests)" in forming
@@ -455,11 +456,11 @@ def test_looking_changes_nothing(workspace: Workspace) -> None:
 
 
 @pytest.mark.parametrize(("since", "said"), [(3, "3 h"), (-1, "0 s")])
-def test_what_is_held_is_counted_with_how_long_it_waits(since: int, said: str) -> None:
+def test_held_counts_with_its_wait(monkeypatch: pytest.MonkeyPatch, since: int, said: str) -> None:
     """No time is negative where the clock was set back."""
     examined = Mock(now=NOW)
     hold = Mock(held_at=NOW - timedelta(hours=since), file_name="a.csv")
-    examined.store.recordings.list_holds.return_value = [hold]
+    monkeypatch.setattr(checks, "list_holds", lambda _: [hold])
     (finding,) = checks.check_held(examined)
     assert finding.level is Level.WARNING
     assert finding.found == f"1 recording, the first for {said}: a.csv"

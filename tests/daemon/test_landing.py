@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from shm.errors import BadInput, ShmError
-from shm_daemon import spool as landing
 from shm_daemon.spool import Landed, incoming, landing_name
 
 SAID = {"hanger": 3}
@@ -58,12 +57,6 @@ def test_another_file_of_the_name_gets_one_beside_it(
     assert third.path.read_bytes() == content
 
 
-def test_a_sidecar_that_waits_for_another_file_keeps_its_name(tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text("hanger = 9")
-    assert land(tmp_path).path.name == f"a-{DIGEST[:8]}.csv"
-    assert (tmp_path / "a.toml").read_text() == "hanger = 9"
-
-
 def test_what_does_not_land_leaves_nothing(tmp_path: Path) -> None:
     with incoming(tmp_path, 100) as file:
         file.write(CONTENT)
@@ -71,18 +64,6 @@ def test_what_does_not_land_leaves_nothing(tmp_path: Path) -> None:
         assert (file.sha256, file.size_bytes) == (DIGEST, len(CONTENT))
         with pytest.raises(BadInput):
             file.land("..", SAID)
-    assert names(tmp_path) == set()
-
-
-def test_a_sidecar_under_way_goes_with_its_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(*_: object) -> None:
-        raise OSError(28, "disk full")
-
-    monkeypatch.setattr(landing.Incoming, "_placed", full)
-    with pytest.raises(OSError, match="disk full"):
-        land(tmp_path, **SAID)
     assert names(tmp_path) == set()
 
 
@@ -130,30 +111,3 @@ def test_what_a_killed_process_left_goes_after_a_day(tmp_path: Path) -> None:
 )
 def test_a_name_is_its_last_part_without_what_harms(given: str, name: str) -> None:
     assert landing_name(given) == name
-
-
-@pytest.mark.parametrize("given", ["", ".", "..", "/", "\x00", "a/.."])
-def test_what_is_no_name_is_refused(given: str) -> None:
-    with pytest.raises(BadInput, match="is no file name"):
-        landing_name(given)
-
-
-@pytest.mark.parametrize("given", ["a.csv.toml", "a.PART"])
-def test_a_name_that_the_spool_leaves_alone_is_refused(given: str) -> None:
-    with pytest.raises(BadInput, match="would lie in the spool for ever"):
-        landing_name(given)
-
-
-@pytest.mark.parametrize(
-    ("name", "beside"),
-    [
-        ("a.csv", "a-01234567.csv"),
-        ("a.csv.gz", "a-01234567.csv.gz"),
-        ("a.b.csv", "a.b-01234567.csv"),
-        ("a", "a-01234567"),
-        ("a.modes.json", "a-01234567.modes.json"),
-    ],
-)
-def test_a_name_beside_keeps_its_ending(name: str, beside: str, tmp_path: Path) -> None:
-    places = landing._places(tmp_path, name, "0123456789")
-    assert [next(places).name, next(places).name] == [name, beside]

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import json
 import logging
-import os
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from shm.errors import UsageError
 from shm.settings import Settings
 from shm.store import Workspace
 from shm_daemon import run
@@ -57,17 +54,6 @@ def test_json_is_one_object_a_line_with_the_fields_that_are_known() -> None:
     }
 
 
-def test_a_traceback_is_part_of_its_object() -> None:
-    record = a_record("it failed", logging.ERROR)
-    try:
-        raise ZeroDivisionError("by zero")
-    except ZeroDivisionError:
-        record.exc_info = sys.exc_info()
-    told = json.loads(formatter("json").format(record))
-    assert told["traceback"].endswith("ZeroDivisionError: by zero")
-    assert len(formatter("text").format(record).splitlines()) > 2
-
-
 def test_a_file_name_cannot_write_lines_of_its_own() -> None:
     line = formatter("text").format(a_record("a\n2026-01-01 ERROR forged\x1b[2J.csv: new"))
     assert "\n" not in line
@@ -82,23 +68,6 @@ def test_the_journal_gets_the_importance_and_no_second_time() -> None:
     assert formatter("json", journal=True).format(a_record("x", logging.DEBUG))[:4] == "<7>{"
 
 
-def test_the_journal_is_known_by_its_stream(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    with capfd.disabled():
-        monkeypatch.setattr(sys, "stderr", open(os.dup(2), "w"))  # noqa: SIM115, PTH123
-        status = os.fstat(sys.stderr.fileno())
-        monkeypatch.setenv("JOURNAL_STREAM", f"{status.st_dev}:{status.st_ino}")
-        begin_logging(Settings())
-        (handler,) = logging.getLogger().handlers
-        assert handler.format(a_record("well")) == "<6>well"
-        monkeypatch.setenv("JOURNAL_STREAM", "1:1")
-        begin_logging(Settings())
-        (handler,) = logging.getLogger().handlers
-        assert handler.format(a_record("well")).endswith(" INFO well")
-        sys.stderr.close()
-
-
 def test_a_log_file_is_put_aside_as_it_grows_and_old_ones_go(tmp_path: Path) -> None:
     begin_logging(Settings(log_file_bytes=10_000, log_files=2), tmp_path / "shm.log")
     for number in range(1000):
@@ -107,22 +76,6 @@ def test_a_log_file_is_put_aside_as_it_grows_and_old_ones_go(tmp_path: Path) -> 
     assert names == ["shm.log", "shm.log.1", "shm.log.2"]
     assert all(path.stat().st_size <= 10_000 for path in tmp_path.iterdir())
     assert "line 999 " in (tmp_path / "shm.log").read_text()
-
-
-def test_a_log_file_that_cannot_be_written_is_told(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--log-file"):
-        begin_logging(Settings(), tmp_path / "no" / "such" / "shm.log")
-
-
-@pytest.mark.parametrize(
-    ("level", "told"), [("debug", "dwe"), ("info", "we"), ("warning", "we"), ("error", "e")]
-)
-def test_the_level_bounds_what_is_told(tmp_path: Path, level: str, told: str) -> None:
-    begin_logging(Settings(log_level=level), tmp_path / "shm.log")
-    for method, letter in (("debug", "d"), ("warning", "w"), ("error", "e")):
-        getattr(logging.getLogger("shm_daemon.loop"), method)(f"said {letter}")
-    lines = (tmp_path / "shm.log").read_text().splitlines()
-    assert "".join(line[-1] for line in lines) == told
 
 
 def test_libraries_do_not_tell_addresses_even_at_debug(tmp_path: Path) -> None:

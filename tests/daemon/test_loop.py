@@ -19,12 +19,12 @@ from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
 from shm.store import Archive, Delivery, DeliveryState, Stage, Workspace
 from shm.store.checking import check_store
+from shm.store.queries.history import list_events
+from shm.store.queries.recordings import count_stages
 from shm.store.stored_recordings import Recordings
 from shm_cli import main as cli
-from shm_daemon import Wakeup, loop, run
+from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import why_turn_failed
-from shm_daemon.spool import Look, scan
-from shm_daemon.wakeup import SPOOL
 from tests.helpers import quick_update
 from tests.helpers.flows import Postman
 from tests.helpers.flows import threads as make_threads
@@ -68,7 +68,7 @@ def run_once(workspace: Workspace, **options: object) -> None:
 
 def counts(workspace: Workspace) -> dict[Stage, int]:
     with workspace.store() as store:
-        return {stage: count for stage, count in store.recordings.stage_counts().items() if count}
+        return {stage: count for stage, count in count_stages(store).items() if count}
 
 
 def deliveries(workspace: Workspace) -> tuple[Delivery, ...]:
@@ -149,7 +149,7 @@ def test_no_name_of_a_file_holds_up_the_others(
     assert why_turn_failed(workspace) == ""
     with workspace.store() as store:
         assert check_store(store, lambda *_: None).troubles == ()
-        names = [event.file_name for event in store.journal.list_events("refused")]
+        names = [event.file_name for event in list_events(store, "refused")]
     assert len(names) == len(_ODD_NAMES)
     assert all(name.isprintable() and len(name) <= 200 for name in names)
 
@@ -173,20 +173,6 @@ def test_nothing_is_taken_while_a_folder_is_on_another_disk(
     away.rename(workspace.archive.folder)
     until(lambda: counts(workspace) == {Stage.DONE: 2})
     assert why_turn_failed(workspace) == ""
-
-
-def test_files_are_taken_however_long_it_takes_to_look_through_the_spool(
-    workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def slow_scan(spool: Path, meanwhile: Callable[[], object]) -> dict[Path, Look]:
-        time.sleep(0.1)
-        return scan(spool, meanwhile)
-
-    monkeypatch.setattr("shm_daemon.loop._RECEIVING_S", 0.01)
-    monkeypatch.setattr("shm_daemon.loop.scan", slow_scan)
-    write_test(workspace.spool / "a.modes.json", workspace)
-    serve()
-    until(lambda: counts(workspace) == {Stage.DONE: 1})
 
 
 def test_a_turn_that_fails_is_shown_until_one_goes_well(
@@ -274,14 +260,6 @@ def test_advance_delayed_recording_shows(
     write_test(workspace.spool / "a.modes.json", workspace)
     serve()
     until(lambda: "recording 1 waits: [Errno 5]" in why_turn_failed(workspace))
-
-
-def test_an_alert_reaches_the_hook(tmp_path: Path) -> None:
-    hook = ["sh", "-c", "cat > told.json"]
-    workspace = make_workspace(tmp_path / "told", hooks={"mail": hook})
-    write_slow_loss(workspace.spool, workspace)
-    run_once(workspace)
-    assert "tension fell by" in (workspace.folder / "told.json").read_text()
 
 
 def test_a_hook_that_hangs_does_not_hold_up_the_files(
@@ -406,12 +384,6 @@ def test_dead_workers_are_replaced(workspace: Workspace, caplog: pytest.LogCaptu
     assert counts(workspace) == {Stage.DONE: 1}
 
 
-def test_a_description_that_names_no_class_is_refused_at_the_start(tmp_path: Path) -> None:
-    workspace = make_workspace(tmp_path / "wrong", settings={"models": "beam9"})
-    with pytest.raises(ShmError, match="beam9"):
-        run_once(workspace)
-
-
 def test_deliveries_put_off_do_not_keep_it_from_ending(tmp_path: Path) -> None:
     workspace = make_workspace(
         tmp_path / "later", hooks={"mail": ["true"]}, settings={"hook_backoff_seconds": 3600.0}
@@ -420,12 +392,6 @@ def test_deliveries_put_off_do_not_keep_it_from_ending(tmp_path: Path) -> None:
     run_once(workspace, notifier=Postman(failures=9))
     with workspace.store() as store:
         assert [each.attempts for each in store.alerts.list_deliveries()] == [1]
-
-
-def test_a_missing_store_is_told(workspace: Workspace) -> None:
-    workspace.database.unlink()
-    with pytest.raises(ShmError, match="shm init"):
-        run_once(workspace)
 
 
 def test_a_setting_changed_on_a_page_is_taken_over(
@@ -437,46 +403,3 @@ def test_a_setting_changed_on_a_page_is_taken_over(
     with workspace.store() as store:
         workspace.change_setting(store, key, 0.9, utc_now(), "anna")
     until(lambda: "a setting has changed and is taken over" in caplog.text)
-
-
-class ScriptedWakeup(Wakeup):
-    """Hears what it is told, wait by wait, and keeps how long each would have been."""
-
-    def __init__(self, heard: list[set[str]]):
-        super().__init__()
-        self.heard, self.waits = heard, list[float]()
-
-    def wait(self, seconds: float) -> set[str]:
-        self.waits.append(seconds)
-        return self.heard.pop(0)
-
-
-class Beats:
-    count = 0
-
-    def beat(self) -> None:
-        self.count += 1
-
-
-@pytest.mark.parametrize(
-    ("heard", "found", "beats"), [([set(), {SPOOL}], {SPOOL}, 1), ([{SPOOL}], {SPOOL}, 0)]
-)
-def test_a_long_rest_gives_a_sign_from_time_to_time_and_ends_with_a_ring(
-    heard: list[set[str]], found: set[str], beats: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("shm_daemon.loop._DELIVERING_S", 500.0)
-    daemon, wakeup, pulse = loop.Daemon.__new__(loop.Daemon), ScriptedWakeup(heard), Beats()
-    daemon._wakeup, daemon._pulse = wakeup, pulse  # type: ignore[assignment]
-    daemon._scan_at, daemon._longest_wait_s = time.monotonic() + 1000, 10.0
-    assert daemon._rest() == found
-    assert (pulse.count, set(wakeup.waits)) == (beats, {10.0})
-
-
-def test_a_short_rest_ends_with_the_next_scan_or_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    daemon, wakeup = loop.Daemon.__new__(loop.Daemon), ScriptedWakeup([set(), set(), set()])
-    daemon._wakeup, daemon._pulse, daemon._longest_wait_s = wakeup, Beats(), 10.0  # type: ignore[assignment]
-    for ahead_s, deliver_s, waits in ((5, 500.0, 5), (500, 3.0, 3), (-5, 500.0, 0)):
-        monkeypatch.setattr("shm_daemon.loop._DELIVERING_S", deliver_s)
-        daemon._scan_at = time.monotonic() + ahead_s
-        assert daemon._rest() == set()
-        assert wakeup.waits[-1] == pytest.approx(waits, abs=0.5)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import threading
 import time
 import tracemalloc
 from collections.abc import Iterator
@@ -16,8 +15,9 @@ from shm.errors import BadInput
 from shm.pipeline import utc_now
 from shm.pipeline.intake import receive
 from shm.store import Outcome, Workspace
+from shm.store.queries.history import list_events
 from shm_daemon.mqtt import Broker as Address
-from shm_daemon.mqtt import Listener, messages, topic_of
+from shm_daemon.mqtt import Listener, messages
 from shm_daemon.spool import scan
 from tests.helpers.brokers import Broker, a_broker
 from tests.helpers.waiting import until
@@ -115,7 +115,7 @@ def test_what_was_received_but_not_acknowledged_is_not_taken_twice(
         time.sleep(0.5)
         assert (spooled(bridge), second.waiting) == ([], [])
     with bridge.store() as store:
-        assert store.journal.list_events() == ()
+        assert list_events(store) == ()
 
 
 @pytest.mark.slow
@@ -209,12 +209,6 @@ def test_a_store_that_is_out_holds_messages_up_and_loses_none(
         until(lambda: not listener.waiting)
 
 
-def test_without_a_broker_named_nothing_is_begun(tmp_path: Path) -> None:
-    before = threading.enumerate()
-    with messages(make_workspace(tmp_path / "bridge")):
-        assert threading.enumerate() == before
-
-
 @pytest.mark.parametrize(
     "url", ["mqtt://a:secret@b", "http://b", "b:1883", "mqtt://b:port", "mqtt://b/path"]
 )
@@ -223,15 +217,3 @@ def test_a_wrong_address_is_refused_without_telling_a_password(url: str) -> None
         Address.of(url, {})
     assert "secret" not in str(refused.value)
     assert "SHM_MQTT_PASSWORD" in str(refused.value)
-
-
-def test_the_password_comes_from_the_environment_and_is_not_shown() -> None:
-    address = Address.of("mqtts://shm@b", {"SHM_MQTT_PASSWORD": "secret"})
-    assert (address.host, address.port, address.encrypted) == ("b", 8883, True)
-    assert (address.user, address.password) == ("shm", "secret")
-    assert "secret" not in repr(address)
-
-
-def test_a_topic_is_made_of_the_name_of_the_bridge() -> None:
-    assert topic_of("Brücke am Weg, 2") == "shm/br-cke-am-weg-2"
-    assert topic_of("橋") == "shm/bridge"

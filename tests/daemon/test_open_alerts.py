@@ -11,6 +11,7 @@ import pytest
 
 from shm.store import Workspace
 from shm.store.outbox import resolve
+from shm.store.queries.alerts import count_open_alerts, list_alert_page
 from shm_cli.main import run
 from tests.helpers.taken_in import with_a_loss
 from tests.helpers.web_servers import served
@@ -68,8 +69,8 @@ def stated(
         "heading of the page of alerts": number(r">Open \((\d+)\)", alerts_page),
     }
     with bridge.store() as store:
-        found["store"] = store.alerts.open_counts().get(3, 0)
-        found["rows"] = len(store.alerts.list_page(3, is_open=True))
+        found["store"] = count_open_alerts(store).get(3, 0)
+        found["rows"] = len(list_alert_page(store, 3, is_open=True))
     return found
 
 

@@ -16,6 +16,8 @@ import pytest
 from shm.errors import TooLarge
 from shm.pipeline.intake import receive
 from shm.store import Archive, Stage, Workspace
+from shm.store.queries.history import list_events
+from shm.store.queries.recordings import list_recordings
 from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import HEARTBEAT
 from tests.helpers.flows import threads
@@ -67,8 +69,8 @@ def test_a_hundred_sparse_gigabytes_go_to_the_quarantine_unread(tmp_path: Path) 
     assert reason["message"] == f"{HUNDRED_GB} bytes are more than the 1000000000 that are taken."
     assert "max_file_bytes" in reason["remedy"]
     with workspace.store() as store:
-        assert [each.stage for each in store.recordings.list_all()] == [Stage.DONE]
-        assert [event.file_name for event in store.journal.list_events("refused")] == ["huge.csv"]
+        assert [each.stage for each in list_recordings(store)] == [Stage.DONE]
+        assert [event.file_name for event in list_events(store, "refused")] == ["huge.csv"]
 
 
 def test_two_of_one_name_lie_beside_each_other(tmp_path: Path) -> None:
@@ -102,7 +104,7 @@ def test_what_cannot_be_moved_stays_where_it_is_and_is_said_once(
     reason = json.loads((workspace.quarantine.folder / "huge.csv.reason.json").read_text())
     assert f"left at {huge}" in reason["remedy"]
     with workspace.store() as store:
-        assert len(store.journal.list_events("refused")) == 1
+        assert len(list_events(store, "refused")) == 1
 
 
 def test_a_file_that_a_person_names_is_refused_unread_and_stays(tmp_path: Path) -> None:
@@ -187,4 +189,4 @@ def test_the_heart_beats_while_a_large_permitted_file_is_copied_and_refused(
         until(lambda: not (workspace.spool / "large.csv").exists())
     assert len(beats) > 2  # while it was copied
     with workspace.store() as store:
-        assert len(store.recordings.list_all()) == 1
+        assert len(list_recordings(store)) == 1

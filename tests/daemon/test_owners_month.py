@@ -18,7 +18,7 @@ from playwright.sync_api import Locator, Page, expect
 from shm.pipeline import utc_now
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Workspace
-from shm.store.people import Role
+from shm.store.rows import Role
 from shm_daemon.web.background_work import BackgroundWorker
 from tests.helpers.browsers import PHONE, a_browser, faults, undrawn_charts
 from tests.helpers.daemons import real_daemon

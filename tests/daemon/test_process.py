@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from shm.store import Stage, Workspace
+from shm.store.queries.recordings import count_stages
 from shm_daemon.__main__ import main
 from tests.helpers.daemons import quick_daemons, real_daemon
 from tests.helpers.waiting import until
@@ -19,7 +20,7 @@ def log_of(workspace: Workspace) -> str:
 
 def done(workspace: Workspace) -> int:
     with workspace.store() as store:
-        return store.recordings.stage_counts()[Stage.DONE]
+        return count_stages(store)[Stage.DONE]
 
 
 def processes_of(workspace: Workspace) -> list[int]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from shm.store import Stage, Store, Workspace
+from shm.store.queries.recordings import count_stages
 from shm_daemon import Wakeup, run
 from tests.helpers import quick_update
 from tests.helpers.flows import threads
@@ -46,7 +47,7 @@ def served(
 
 def done(url: str) -> int:
     with Store.open(url) as store:
-        return store.recordings.stage_counts()[Stage.DONE]
+        return count_stages(store)[Stage.DONE]
 
 
 def test_the_daemon_waits_while_its_server_is_away_and_goes_on(

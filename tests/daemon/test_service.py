@@ -19,7 +19,6 @@ from shm.store import Workspace
 from shm_cli.main import cli
 from shm_cli.services import unit_text
 from shm_daemon import Wakeup, run
-from shm_daemon.heartbeat import LONGEST_REST_S, longest_wait_s, tell_systemd
 from tests.helpers.flows import threads
 from tests.helpers.workspaces import make_workspace
 
@@ -77,12 +76,6 @@ def test_what_confines_the_daemon_confines_all() -> None:
     confining = {line for line in first if line.startswith(("Protect", "Restrict", "NoNew", "Cap"))}
     assert len(confining) >= 15
     assert all(confining <= other for other in others)
-
-
-def test_a_workspace_in_a_home_stays_visible(tmp_path: Path) -> None:
-    for name in UNITS:
-        assert "\nProtectHome=true\n" in unit_text(name, tmp_path, Path("/opt/shm"), [])
-        assert "\nProtectHome=read-only\n" in unit_text(name, tmp_path, Path("/home/ann/shm"), [])
 
 
 def test_a_path_that_would_have_to_be_quoted_is_refused(tmp_path: Path) -> None:
@@ -162,22 +155,3 @@ def test_a_daemon_that_fails_says_that_it_ends(
     with pytest.raises(Exception, match="no store"):
         run(workspace, make_executor=threads)
     assert "STOPPING=1" in hear(systemd)
-
-
-def test_nobody_listening_does_no_harm(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "nobody"))
-    tell_systemd("READY=1")
-    monkeypatch.delenv("NOTIFY_SOCKET")
-    tell_systemd("READY=1")
-    monkeypatch.setenv("WATCHDOG_USEC", "nonsense")
-    assert longest_wait_s() == LONGEST_REST_S
-
-
-def test_an_abstract_name_is_understood(monkeypatch: pytest.MonkeyPatch) -> None:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
-        line.bind(b"\0shm-test-notify-%d" % time.monotonic_ns())
-        line.settimeout(5)
-        name = line.getsockname().decode()
-        monkeypatch.setenv("NOTIFY_SOCKET", f"@{name[1:]}")
-        tell_systemd("READY=1")
-        assert hear(line) == ["READY=1"]

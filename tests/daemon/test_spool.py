@@ -68,48 +68,6 @@ def test_an_empty_file_is_given_ten_times_as_long(
     assert tracker.whole(looks) == [A]
 
 
-def test_a_file_that_went_and_came_back_is_waited_for_again(
-    tracker: FileStabilityTracker, clock: Seconds
-) -> None:
-    tracker.whole({A: Look(1, 10)})
-    clock.now += 5
-    tracker.whole({})
-    assert not tracker.watching
-    assert tracker.whole({A: Look(1, 10)}) == []
-
-
-def test_the_oldest_file_comes_first(tracker: FileStabilityTracker, clock: Seconds) -> None:
-    looks = {A: Look(9, 10), B: Look(1, 10)}
-    tracker.whole(looks)
-    clock.now += 2
-    assert tracker.whole(looks) == [B, A]
-
-
-def test_a_file_that_cannot_be_taken_is_left_for_a_while(
-    tracker: FileStabilityTracker, clock: Seconds
-) -> None:
-    looks = {A: Look(1, 10), B: Look(2, 10)}
-    tracker.whole(looks)
-    clock.now += 2
-    tracker.put_off(A, 60)
-    assert tracker.whole(looks) == [B]
-    tracker.forget(B)
-    assert tracker.seconds_to_next() == 60
-    clock.now += 61
-    assert A in tracker.whole(looks)
-
-
-def test_it_says_how_long_until_a_file_may_be_whole(
-    tracker: FileStabilityTracker, clock: Seconds
-) -> None:
-    assert tracker.seconds_to_next() == float("inf")
-    tracker.whole({A: Look(1, 10)})
-    clock.now += 0.5
-    assert tracker.seconds_to_next() == 1.5
-    clock.now += 5
-    assert tracker.seconds_to_next() == 0
-
-
 def test_what_is_no_file_to_be_read_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "logger" / "deep").mkdir(parents=True)
     (tmp_path / ".cache").mkdir()

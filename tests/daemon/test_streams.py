@@ -20,6 +20,7 @@ from shm.pipeline import utc_now
 from shm.read.chunk_document import chunk_document
 from shm.store import Workspace
 from shm.store import ring as ring_module
+from shm.store.queries.streams import list_stream_events
 from shm.store.ring import Ring
 from shm.values import Channel, Recording
 from shm.values.stream import Chunk
@@ -68,7 +69,7 @@ def samples_of(workspace: Workspace) -> int:
 
 def events_of(workspace: Workspace) -> list[tuple[str, str]]:
     with workspace.store() as store:
-        found = store.streams.list_events(None, utc_now() - 100 * HOUR)
+        found = list_stream_events(store, None, utc_now() - 100 * HOUR)
     return [(event.kind, event.detail) for event in found]
 
 

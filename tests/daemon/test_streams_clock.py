@@ -12,6 +12,7 @@ import pytest
 
 from shm.read.chunk_document import chunk_document
 from shm.store import Workspace
+from shm.store.queries.streams import list_stream_events
 from shm.store.ring import Ring, ring_of
 from shm.values import Channel, Recording
 from shm.values.stream import Chunk, StreamEvent
@@ -70,7 +71,7 @@ def write_file(bridge: Workspace, dated: datetime, number: int) -> None:
 
 def list_events(bridge: Workspace, kind: str) -> list[StreamEvent]:
     with bridge.store() as store:
-        found = store.streams.list_events("h3", BEGIN - HOUR)
+        found = list_stream_events(store, "h3", BEGIN - HOUR)
     return [event for event in found if event.kind == kind]
 
 

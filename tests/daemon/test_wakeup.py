@@ -4,27 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 from pathlib import Path
 
 import pytest
 from watchdog.observers import Observer
 
 from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
-
-
-def test_a_ring_before_the_wait_is_heard() -> None:
-    wakeup = Wakeup()
-    wakeup.ring("one")
-    wakeup.ring("two")
-    assert wakeup.wait(10) == {"one", "two"}
-    assert wakeup.wait(0.01) == set()
-
-
-def test_a_ring_ends_the_wait() -> None:
-    wakeup = Wakeup()
-    threading.Timer(0.05, wakeup.ring, ["now"]).start()
-    assert wakeup.wait(10) == {"now"}
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
@@ -35,22 +20,6 @@ def test_signals_stop_the_listener_and_only_within_the_context(number: int) -> N
         wakeup.wait(10)
     assert wakeup.stopped
     assert signal.getsignal(number) is before
-
-
-def test_in_another_thread_signals_are_left_alone() -> None:
-    errors = []
-
-    def run() -> None:
-        try:
-            with stopped_by_signals(Wakeup()):
-                pass
-        except ValueError as error:
-            errors.append(error)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    thread.join()
-    assert errors == []
 
 
 def test_a_change_in_the_folder_rings(tmp_path: Path) -> None:

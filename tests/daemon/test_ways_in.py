@@ -19,6 +19,7 @@ from shm.documents import dump
 from shm.errors import UsageError
 from shm.modes_document import modes_document
 from shm.store import Stage, Workspace
+from shm.store.queries.recordings import count_stages
 from shm_daemon.web.address import Address
 from shm_daemon.web.serving import web_with_daemon
 from tests.helpers.brokers import a_broker
@@ -133,8 +134,8 @@ def test_messages_outlast_killed_daemons_and_each_is_stored_once(tmp_path: Path)
                     assert daemons.kill(pid) == -signal.SIGKILL
                     until_serving(daemons.begin(), workspace.folder)
             with workspace.store() as store:
-                until(lambda: store.recordings.stage_counts()[Stage.DONE] == messages)
-                assert sum(store.recordings.stage_counts().values()) == messages
+                until(lambda: count_stages(store)[Stage.DONE] == messages)
+                assert sum(count_stages(store).values()) == messages
             daemons.kill(int((workspace.folder / "shm.lock").read_text()))
 
 

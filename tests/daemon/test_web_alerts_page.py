@@ -9,8 +9,8 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
+from shm.documents import alert_document
 from shm.store import Workspace
-from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.tables import alerts
 from shm_daemon.web.access import COOKIE
@@ -130,6 +130,6 @@ def copied(bridge: Workspace, alert: int, key: str) -> int:
     """The same alert raised for another reason; its number."""
     with bridge.store() as store, store.writing() as connection:
         row = connection.execute(sa.select(alerts).where(alerts.c.id == alert)).one()
-        changed = {"id": None, "key": key, "document": loads(row.document)}
+        changed = {"id": None, "key": key, "document": alert_document(row.document)}
         changed |= {f"{prefix}_at": None for prefix in ("noted", "ended")}
         return insert(connection, alerts, {**row._mapping, **changed})

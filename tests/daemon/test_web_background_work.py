@@ -74,29 +74,6 @@ def until(found: Callable[[], Text | None]) -> Text:
     raise AssertionError("nothing came")
 
 
-def test_an_order_is_made_once_and_kept(background_worker: BackgroundWorker[Text]) -> None:
-    order = Order("one", "slow")
-    assert background_worker.stored(order) is None
-    assert [background_worker.wanted(order) for _ in range(5)] == [None] * 5
-    _LET_GO.set()
-    assert until(lambda: background_worker.wanted(order)) == Text("one")
-    assert background_worker.stored(Order("one", "slow")) == Text("one")
-    assert _MADE == ["one"]
-
-
-def test_orders_are_made_one_at_a_time_and_only_a_few_wait(
-    background_worker: BackgroundWorker[Text],
-) -> None:
-    orders = [Order(str(number), "slow") for number in range(20)]
-    assert [background_worker.wanted(order) for order in orders] == [None] * 20
-    time.sleep(0.1)
-    assert _MADE == ["0"]
-    _LET_GO.set()
-    until(lambda: background_worker.stored(orders[7]))
-    assert [background_worker.stored(order) for order in orders[8:]] == [None] * 12
-    assert until(lambda: background_worker.wanted(orders[19])) == Text("19")
-
-
 def test_what_fails_says_why_and_stops_nothing_else(
     background_worker: BackgroundWorker[Text],
 ) -> None:
@@ -108,13 +85,6 @@ def test_what_fails_says_why_and_stops_nothing_else(
             background_worker.wanted(order)
     assert _MADE == ["none", "none"]
     assert until(lambda: background_worker.wanted(Order("some"))) == Text("some")
-
-
-def test_the_oldest_go_where_memory_runs_out(background_worker: BackgroundWorker[Text]) -> None:
-    orders = [Order(str(number), size_bytes=25_000_000) for number in range(3)]
-    for order in orders:
-        until(lambda order=order: background_worker.wanted(order))  # type: ignore[misc]
-    assert [background_worker.stored(order) is None for order in orders] == [True, False, False]
 
 
 def test_what_takes_too_long_is_given_up() -> None:
@@ -136,15 +106,6 @@ def test_a_process_that_dies_is_told_and_replaced() -> None:
         with pytest.raises(ShmError, match="died"):
             until(lambda: background_worker.wanted(Order("last words", "dies")))
         assert until(lambda: background_worker.wanted(Order("next"))) == Text("next")
-    finally:
-        background_worker.close()
-
-
-def test_an_order_whose_process_is_ended_once_is_made_all_the_same(tmp_path: Path) -> None:
-    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=120.0, pool=a_process)
-    order = Order(str(tmp_path / "ended"), "dies once")
-    try:
-        assert until(lambda: background_worker.wanted(order)) == Text(order.word)
     finally:
         background_worker.close()
 

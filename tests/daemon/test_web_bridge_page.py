@@ -19,7 +19,7 @@ from shm.store import Workspace
 from shm.values import TENSION, Drift, Hanger
 from shm_daemon.web import bridge_view
 from shm_daemon.web.address import Address
-from shm_daemon.web.bridge_view import CLASSES, HangerGlance, elevation, kind_of, shift_words
+from shm_daemon.web.bridge_view import CLASSES, HangerGlance, elevation, kind_of
 from shm_daemon.web.site import Description, Site
 from tests.helpers.nouns import a_summary, averaged
 from tests.helpers.taken_in import ingest_quickly
@@ -35,10 +35,6 @@ def glance(hanger: Hanger, shift: float = 0.0, sd: float = 0.003) -> HangerGlanc
         a_summary(hanger, Status.STEADY, tension, drifts=(moved,), baseline=averaged(tension)),
         tests=9,
     )
-
-
-def never_tested(hanger: Hanger) -> HangerGlance:
-    return HangerGlance(a_summary(hanger))
 
 
 @pytest.fixture(scope="module")
@@ -142,38 +138,6 @@ def test_a_bridge_without_hangers_has_a_page(workspace: Workspace) -> None:
 def test_a_shift_has_a_class_that_the_legend_names(hanger: Hanger, shift: float, kind: str) -> None:
     assert kind_of(glance(hanger, shift)) == kind
     assert kind in dict(CLASSES)
-
-
-def test_where_there_is_no_change_to_tell_none_is_told(hanger: Hanger) -> None:
-    tension = Interval.normal(711e3, 5e3)
-    first = a_summary(hanger, Status.FIRST, tension, baseline=averaged(tension))
-    unready = a_summary(hanger, Status.FIRST, tension)
-    told = {
-        "is the baseline": HangerGlance(first),
-        "no baseline yet": HangerGlance(unready),
-        "no test yet": never_tested(hanger),
-    }
-    for words, seen in told.items():
-        assert (shift_words(seen), kind_of(seen)) == (words, "unknown")
-
-
-def test_a_test_that_the_watch_passed_over_is_compared_by_itself(hanger: Hanger) -> None:
-    then, now = Interval.normal(700e3, 5e3), Interval.normal(630e3, 5e3)
-    summary = a_summary(hanger, Status.STEADY, now, drifts=(), baseline=averaged(then))
-    assert kind_of(HangerGlance(summary)) == "lost3"
-
-
-def test_a_shift_that_may_be_none_is_marked_hollow(hanger: Hanger) -> None:
-    sure, unsure = glance(hanger, -0.02, 0.005), glance(hanger, -0.02, 0.02)
-    marks = elevation([sure, unsure]).hangers
-    assert [[one.hollow for one in mark.triangles] for mark in marks] == [[False], [True]]
-
-
-def test_a_hanger_is_drawn_as_long_as_it_is(hanger: Hanger) -> None:
-    short, long = replace(hanger, length_m=6.0), replace(hanger, id=4, length_m=12.0)
-    drawing = elevation([glance(short), glance(long)])
-    heights = [drawing.deck - mark.top for mark in drawing.hangers]
-    assert heights[1] == pytest.approx(2 * heights[0], abs=0.2)
 
 
 def test_two_hundred_hangers_have_room_and_alarms_keep_their_numbers(hanger: Hanger) -> None:

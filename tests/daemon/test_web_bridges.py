@@ -20,15 +20,13 @@ import pytest
 
 from shm.bridge import OtherBridge
 from shm.documents import dump, value_of
-from shm.report.hanger_status import Status
 from shm.store import Workspace
-from shm.values.messages import Lead
 from shm_cli.main import run
 from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import HEARTBEAT, beat
 from shm_daemon.hooks.webhook import Lines
 from shm_daemon.web.address import SUMMARY, Address
-from shm_daemon.web.bridge_summary import BridgeRow, Summary, headline, worst_first
+from shm_daemon.web.bridge_summary import BridgeRow, Summary
 from shm_daemon.web.other_bridges import NotTold, OtherBridges, ask
 from tests.helpers.listeners import Answer, Listener, a_listener, a_silent_listener
 from tests.helpers.nouns import NOW
@@ -262,12 +260,6 @@ def test_what_answers_instead_is_said(
     assert remedy in caught.value.remedy
 
 
-def test_what_a_newer_bridge_adds_is_left_alone(tmp_path: Path) -> None:
-    document = {**asdict(SAID), "version": "9.0", "mood": "good"}
-    with a_listener(lambda _: Answer(200, dump(document).encode())) as listener:
-        assert asked(listener, tmp_path) == replace(SAID, version="9.0")
-
-
 def test_nobody_else_is_asked_where_an_address_sends_elsewhere(tmp_path: Path) -> None:
     (tmp_path / "t").write_text("shm_secret")
     with a_listener() as elsewhere:
@@ -366,45 +358,3 @@ def test_what_was_said_last_is_shown_with_its_age(tmp_path: Path) -> None:
         assert (lost.states, lost.urgency) == ((("Not reached", "alert"),), "today")
         asking.close()
     assert len(listener.told) == 2
-
-
-def test_the_page_shows_the_last_state_in_no_colour_and_as_text(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("shm_daemon.web.other_bridges._FRESH_FOR", timedelta(0))
-    said = replace(SAID, state="<b>No change</b> detected.")
-    with a_listener(lambda _: Answer(200, dump(asdict(said)).encode())) as listener:
-        name_others(workspace, OtherBridge("Severn", listener.url.removesuffix("/alerts")))
-        with served(workspace.reopened()) as site, site.client() as client:
-            now = client.get("/bridges").text
-            listener.answer = lambda _: Answer(cut=True)
-            later = client.get("/bridges").text
-    parts = [page.split('id="bridge-Severn"')[1].split("</article>")[0] for page in (now, later)]
-    assert all("&lt;b&gt;No change&lt;/b&gt; detected." in part for part in parts)
-    assert ["steady" in part for part in parts] == [True, False]
-    assert re.search(r"Last state, of \d{4}-\d\d-\d\d \d\d:\d\d UTC: ", parts[1])
-
-
-def test_a_fault_of_ours_while_asking_is_said_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def broken(*_: object) -> Summary:
-        raise RuntimeError("a bug")
-
-    monkeypatch.setattr("shm_daemon.web.other_bridges.ask", broken)
-    asking = OtherBridges()
-    (row,) = asking.rows([OtherBridge("Severn", "http://127.0.0.1:1")], tmp_path)
-    asking.close()
-    assert "an internal error" in str(row.trouble)
-
-
-def test_every_state_has_its_place_in_the_order() -> None:
-    rows = [
-        BridgeRow(f"{status.name}", "", replace(SAID, status=status.name.lower()), NOW)  # type: ignore[arg-type]
-        for status in reversed(Status)
-    ]
-    assert [each.name for each in worst_first(rows)] == [status.name for status in Status]
-    urgent = BridgeRow("urgent", "", replace(SAID, urgency="week"), NOW)
-    gone = BridgeRow("gone", "", None, None, Lead("It is not reached.", ""))
-    assert [each.name for each in worst_first([*rows, urgent, gone])][:2] == ["gone", "urgent"]
-    assert headline([urgent]) == "1 bridge. Action within a week: urgent."

@@ -18,6 +18,7 @@ from shm.report.figures.hanger_trend import FIGURE
 from shm.report.figures.specification import Points
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.store import Workspace
+from shm.store.queries.history import list_changes
 from shm.values.notes import NoteKind
 from shm_daemon.web.address import Address
 from tests.daemon.test_web_people import add_a_user_of_each_role, sign_in
@@ -77,7 +78,7 @@ def test_an_operator_writes_and_a_reader_sees_the_note_its_photo_and_its_mark(
     assert Image.open(io.BytesIO(photo.content)).size == (150, 200)
     assert browser.get("/notes/2/photo").status_code == 404
     with workspace.store() as store:
-        assert [row.who for row in store.journal.list_changes(2)] == ["operator", "operator"]
+        assert [row.who for row in list_changes(store, 2)] == ["operator", "operator"]
     traces = browser.get("/api/hangers/3/figures/trend").json()["data"]
     (marked,) = [each for each in traces if each.get("name") == "repair"]
     assert "of hanger 3 by operator: new pin" in str(marked)

@@ -18,8 +18,9 @@ from fastapi.routing import APIRoute
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Workspace
-from shm.store.people import Role
-from shm.store.people_and_stream_tables import users
+from shm.store.queries.history import list_changes
+from shm.store.rows import Role
+from shm.store.tables import users
 from shm_daemon.web.access import engineering, reading, signed_in_person, writing
 from shm_daemon.web.address import Address
 from shm_daemon.web.app import load_pages
@@ -123,7 +124,7 @@ def test_a_person_changes_the_own_password_and_ends_all_other_sessions(
     browser.cookies.clear()
     assert [sign_in(browser, "reader", each) for each in (PASSWORD, new)] == [401, 303]
     with workspace.store() as store:
-        (row,) = store.journal.list_changes(limit=1)
+        (row,) = list_changes(store, limit=1)
     assert (row.who, row.via, row.action, row.subject) == (
         "reader", "page", "password changed", "user reader",
     )  # fmt: skip

@@ -23,6 +23,7 @@ import pytest
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState
 from shm.store import Stage, Workspace
+from shm.store.queries.recordings import list_recordings
 from shm.values import Channel
 from shm_daemon.web.address import name_in
 from shm_daemon.web.address import test_json as document_of
@@ -84,7 +85,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     ingest(workspace)
     with workspace.store() as store:
         names = [stored.test.id for stored in store.tests.list_all(3)]
-        assert {recording.stage for recording in store.recordings.list_all()} == {Stage.DONE}
+        assert {recording.stage for recording in list_recordings(store)} == {Stage.DONE}
     assert names[1:] == [MODES_ALONE]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(

@@ -11,6 +11,7 @@ import pytest
 
 from shm.read import sidecar_path
 from shm.store import Stage, Workspace
+from shm.store.queries.history import list_events
 from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace, write_test
@@ -50,7 +51,7 @@ def test_an_upload_is_safe_in_the_spool_and_goes_through_like_a_dropped_file(
     assert again.json()["outcome"] == "duplicate"
     ingest_quickly(workspace)
     with workspace.store() as store:
-        assert [event.kind for event in store.journal.list_events()] == ["duplicate"]
+        assert [event.kind for event in list_events(store)] == ["duplicate"]
 
 
 def test_a_refused_upload_tells_its_reason(client: httpx.Client, workspace: Workspace) -> None:

@@ -121,13 +121,6 @@ def test_a_server_that_is_not_there_is_named(tmp_path: Path) -> None:
     assert message == "127.0.0.1 cannot be reached (Connection refused)."
 
 
-def test_a_server_that_ends_without_an_answer_has_failed(
-    tmp_path: Path, listener: Listener
-) -> None:
-    listener.answer = lambda told: Answer(cut=True)
-    assert "cannot be reached" in failure(tmp_path, listener.url)
-
-
 @pytest.mark.parametrize("drip", [b"", b"HTTP/1.1 200 OK\r\n" + b"X-A: 1\r\n" * 500])
 def test_a_server_that_hangs_or_answers_drop_by_drop_is_given_up(
     tmp_path: Path, drip: bytes
@@ -178,11 +171,6 @@ def test_what_goes_wrong_shows_neither_the_secret_nor_the_address(
         assert SECRET not in message
     caplog_text = "".join(r.getMessage() for r in caplog.records if r.levelname != "DEBUG")
     assert "token-of-mine" not in caplog_text
-
-
-def test_a_key_beyond_ascii_is_delivered(tmp_path: Path, listener: Listener) -> None:
-    a_notifier(tmp_path)(a_hook(listener.url), an_alert("test:\u0431\u0440:1"))
-    assert listener.told[0].headers["Idempotency-Key"] == "test:\\u0431\\u0440:1"
 
 
 def test_a_password_of_the_users_own_is_not_sent(

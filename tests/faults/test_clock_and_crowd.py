@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 
 from shm.store import Stage, Workspace
+from shm.store.queries.history import list_steps
+from shm.store.queries.recordings import count_stages
+from shm.store.queries.trends import list_history
 from shm_daemon import run
 from shm_daemon.spool import FileStabilityTracker, scan
 from tests.helpers import quick_update
@@ -30,9 +33,9 @@ def test_a_clock_that_jumps_back_holds_nothing_up(workspace: Workspace) -> None:
             receive_all(flow)
             clock.now -= timedelta(days=1)
             flow.drain()
-        assert flow.store.recordings.stage_counts()[Stage.DONE] == 3
-        assert [test.test.id for test, _ in flow.store.posteriors.history(3)] == ["t0", "t1", "t2"]
-        stages = [step.stage for step in flow.store.journal.list_steps(3)]
+        assert count_stages(flow.store)[Stage.DONE] == 3
+        assert [test.test.id for test, _ in list_history(flow.store, 3)] == ["t0", "t1", "t2"]
+        stages = [step.stage for step in list_steps(flow.store, 3)]
     assert stages == ["archived", "received", *2 * ["identified"], *2 * ["updated"],
                       "watched", "done"]  # fmt: skip
 
@@ -64,4 +67,4 @@ def test_a_spool_of_which_the_file_system_tells_nothing_is_scanned(
     write_test(workspace.spool / "t0.modes.json", workspace)
     run(workspace, once=True, make_executor=threads)
     with workspace.store() as store:
-        assert store.recordings.stage_counts()[Stage.DONE] == 1
+        assert count_stages(store)[Stage.DONE] == 1

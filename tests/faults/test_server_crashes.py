@@ -10,6 +10,7 @@ import pytest
 
 from shm.store import Stage, Workspace
 from shm.store.checking import check_archive, check_store
+from shm.store.queries.recordings import count_stages
 from tests.helpers.contents import quiet
 from tests.helpers.daemons import quick_daemons, until_serving
 from tests.helpers.feeds import Feed, assert_all_done_once
@@ -55,7 +56,7 @@ def until_through(workspace: Workspace, files: int, seconds: float = 120.0) -> N
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         with workspace.store() as store:
-            counts = store.recordings.stage_counts()
+            counts = count_stages(store)
         if counts[Stage.DONE] + counts[Stage.REFUSED] == files:
             return
         time.sleep(0.2)

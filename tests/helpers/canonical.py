@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import defaultdict
+from dataclasses import asdict, is_dataclass
 from typing import Any
 
 import sqlalchemy as sa
@@ -55,6 +56,8 @@ def canonical(store: Store) -> dict[str, list[str]]:
 
 
 def _plain(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return _plain(asdict(value))
     if isinstance(value, dict):
         return {k: _plain(v) for k, v in value.items() if k not in _TIMES | _ROWS}
     if isinstance(value, list | tuple):

@@ -11,6 +11,7 @@ import numpy as np
 
 from shm.documents import dump
 from shm.modes_document import modes_document
+from shm.store.queries.recordings import list_holds
 from shm.values import Hanger, ModalTest
 from tests.helpers.flows import Clock, a_flow, receive_all
 from tests.helpers.workspaces import START, make_workspace, modes_of, put
@@ -67,7 +68,7 @@ def one_case(fault: str, seed: int, folder: Path) -> Outcome:
             receive_all(flow)
             flow.drain()
             if number == good - 1:
-                held = len(flow.store.recordings.list_holds())
+                held = len(list_holds(flow.store))
         return Outcome(bool(flow.store.alerts.list_all()), held)
 
 

@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from shm.store import Stage, Workspace
+from shm.store.queries.history import list_events
+from shm.store.queries.recordings import list_recordings
+from shm.store.queries.trends import list_posteriors
 from tests.helpers.workspaces import put, write_test
 
 BAD_EVERY = 4
@@ -54,7 +57,7 @@ def assert_all_done_once(feed: Feed) -> None:
     assert [path for path in workspace.spool.rglob("*") if path.is_file()] == []
     _assert_archive_holds(workspace.folder / "archive", set(names))
     with workspace.store() as store:
-        recordings = store.recordings.list_all()
+        recordings = list_recordings(store)
         assert len(recordings) == len(feed.files)
         assert {r.file.sha256: r.file.file_name for r in recordings} == names
         refused = {r.file.file_name for r in recordings if r.stage is Stage.REFUSED}
@@ -62,10 +65,10 @@ def assert_all_done_once(feed: Feed) -> None:
         assert (refused, done) == (feed.bad, set(feed.files) - feed.bad)
         tests = [test.test.id for test in store.tests.list_all(3)]
         assert tests == sorted(name.removesuffix(".modes.json") for name in done)
-        assert len(store.posteriors.list_all(3)) == len(tests)
+        assert len(list_posteriors(store, 3)) == len(tests)
         assert [drift.test for drift in store.watch.list_drifts(3)] == tests[1:]
         assert len(store.watch.list_all(3)) == len(tests) - 1
-        assert store.journal.list_events("duplicate") == ()
+        assert list_events(store, "duplicate") == ()
     _assert_quarantine_holds(workspace.folder / "quarantine", feed)
 
 

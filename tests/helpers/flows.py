@@ -11,6 +11,7 @@ from shm.bridge import Hook
 from shm.pipeline import Flow, Notifier
 from shm.settings import Settings
 from shm.store import Store, Workspace
+from shm.store.queries.trends import list_history
 from shm.values import Alert
 from tests.helpers.workspaces import START
 
@@ -88,5 +89,5 @@ def tension_kn(store: Store, hanger: int = 3) -> dict[str, float]:
     """The mean tension of each test, rounded to 1 N."""
     return {
         test.test.id: round(float(posterior.tension_n.mean()) / 1e3, 3)
-        for test, posterior in store.posteriors.history(hanger)
+        for test, posterior in list_history(store, hanger)
     }

@@ -24,6 +24,7 @@ from types import SimpleNamespace
 from shm.errors import ShmError
 from shm.store import Workspace
 from shm.store.checking import check_archive, check_store
+from shm.store.queries.recordings import list_recordings
 from shm_daemon import Wakeup, loop
 from tests.helpers import quick_update
 from tests.helpers.contents import quiet
@@ -141,7 +142,7 @@ def _look(feed: Feed) -> None:
     with workspace.store() as store:
         assert check_store(store, quiet).troubles == ()
         assert check_archive(store, workspace.archive, quiet).troubles == ()
-        known = {each.file.file_name for each in store.recordings.list_all()}
+        known = {each.file.file_name for each in list_recordings(store)}
     lying = in_spool(workspace)
     for name, checksum in feed.checksums.items():
         assert name in known or checksum in lying, f"{name} is lost"

@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 from shm.store import Workspace
+from shm.store.queries.recordings import count_stages
 from tests.helpers.canonical import canonical
 from tests.helpers.daemons import quick_daemons, until_serving
 from tests.helpers.feeds import Feed, assert_all_done_once
@@ -60,7 +61,7 @@ def assert_nothing_lost_doubled_or_half_written(feed: Feed, undisturbed: Workspa
 def where_files_stand(workspace: Workspace, files: int) -> Standing:
     """How many files lie in the spool and how many at each stage: none less than were dropped."""
     with workspace.store() as store:
-        counts = store.recordings.stage_counts()
+        counts = count_stages(store)
     in_spool = sum(not path.name.startswith(".") for path in workspace.spool.iterdir())
     assert in_spool + sum(counts.values()) >= files
     return in_spool, *counts.values()

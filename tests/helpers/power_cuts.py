@@ -17,6 +17,7 @@ import sqlalchemy as sa
 from shm.store import Stage, Workspace
 from shm.store.checking import check_archive, check_store
 from shm.store.journal import is_step
+from shm.store.queries.recordings import list_recordings
 from shm.store.tables import journal
 from tests.helpers.contents import quiet
 from tests.helpers.flows import ingest
@@ -95,7 +96,7 @@ def _look(disk: Disk, rng: random.Random, goes_on: bool, memory: str | None) -> 
             assert check_store(store, quiet).troubles == ()
             archived = check_archive(store, workspace.archive, quiet)
             assert archived.troubles == ()
-            known = {each.file.sha256 for each in store.recordings.list_all()}
+            known = {each.file.sha256 for each in list_recordings(store)}
             with store.reading() as connection:
                 count = connection.scalar(
                     sa.select(sa.func.count()).select_from(journal).where(is_step)
@@ -106,7 +107,7 @@ def _look(disk: Disk, rng: random.Random, goes_on: bool, memory: str | None) -> 
         if goes_on:
             ingest(workspace)
             with workspace.store() as store:
-                stages = {each.file.sha256: each.stage for each in store.recordings.list_all()}
+                stages = {each.file.sha256: each.stage for each in list_recordings(store)}
                 assert landed <= stages.keys()
                 assert set(stages.values()) <= {Stage.DONE, Stage.REFUSED}
                 assert check_store(store, quiet).troubles == ()

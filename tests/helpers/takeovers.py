@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shm.store import Stage, Workspace
+from shm.store.queries.recordings import count_stages
 from tests.helpers.clusters import a_cluster
 from tests.helpers.daemons import real_daemon
 from tests.helpers.feeds import Feed
@@ -48,12 +49,12 @@ def kill_a_worker_then_the_active_daemon(folder: Path, store: str, files: int) -
 
 def done(workspace: Workspace) -> int:
     with workspace.store() as store:
-        return store.recordings.stage_counts()[Stage.DONE]
+        return count_stages(store)[Stage.DONE]
 
 
 def ended(workspace: Workspace) -> int:
     with workspace.store() as store:
-        counts = store.recordings.stage_counts()
+        counts = count_stages(store)
     return counts[Stage.DONE] + counts[Stage.REFUSED]
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from shm.pipeline import steps
 from shm.settings import Settings
 from shm.store import Stage, Workspace
+from shm.store.queries.recordings import count_stages
 from shm_daemon import Wakeup, run
 from shm_daemon.execution import Workers
 from tests.helpers import quick_update
@@ -89,7 +90,7 @@ def _kill_one(busy: Path, rng: random.Random) -> bool:
 
 def stage_counts(workspace: Workspace) -> dict[Stage, int]:
     with workspace.store() as store:
-        return {stage: count for stage, count in store.recordings.stage_counts().items() if count}
+        return {stage: count for stage, count in count_stages(store).items() if count}
 
 
 def _all_through(workspace: Workspace, files: int) -> bool:

@@ -7,19 +7,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 
-from shm.errors import BadInput, NothingThere, UsageError
+from shm.errors import BadInput, UsageError
 from shm.inference import UpdateOptions
-from shm.models import Model, build
+from shm.models import Model
 from shm.pipeline import adopting, steps
-from shm.pipeline.adopting import GapWatch, Wish, adopt, adopted_name, gap_watch
+from shm.pipeline.adopting import GapWatch, Wish, adopt, gap_watch
 from shm.pipeline.reporting import hanger_report
 from shm.store import Adoption, Lineage, Store, StoredAdoption, Workspace
+from shm.store.queries.trends import list_history
 from shm.values import ModalTest, Posterior, PredictedFrequency
 from tests.helpers import quick_update
-from tests.helpers.diagnoses import MASS, WARMTH, a_diagnosis
+from tests.helpers.diagnoses import MASS, a_diagnosis
 from tests.helpers.flows import Clock, Postman, ingest
 from tests.helpers.workspaces import START, make_workspace, put, write_test
 
@@ -75,7 +75,7 @@ def adopted(workspace: Workspace, *effects: str, at: Sequence[str] = ()) -> Stor
 
 
 def models(store: Store) -> dict[str, str]:
-    return {test.test.id: posterior.model for test, posterior in store.posteriors.history(3)}
+    return {test.test.id: posterior.model for test, posterior in list_history(store, 3)}
 
 
 def test_the_next_test_uses_the_adopted_class_and_its_baseline(begun: Workspace) -> None:
@@ -204,46 +204,6 @@ def test_a_gap_that_opens_again_is_one_alert(
     assert str(watch).endswith("1.00 % now, grown: diagnose it again.")
 
 
-def test_a_gap_that_opens_with_a_loss_of_tension_is_the_same_alert(
-    begun: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    adopted(begun, "point_mass")
-    monkeypatch.setattr(steps, "watch_gap", lambda *a, **k: _gap_alert(*a, **k))
-    for number in (2, 3):
-        spool(begun, f"t{number}", day=60 + number, tension=0.8)
-    ingest(begun)
-    with begun.store() as store:
-        notice, stored = store.alerts.list_all()
-    assert (notice.alert.test, notice.alert.kinds) == ("t2", ("repeat the test",))
-    assert stored.alert.key.startswith("hanger-3:two-tests-agree:tension-down:t3:gap-up:baseline-")
-    assert stored.alert.kinds == ("beyond threshold", "gap")
-    assert "tension fell by" in stored.alert.message
-    assert stored.alert.message.endswith("The gap opened.")
-
-
-def _gap_alert(_before: Any, _now: Any, hanger: Any, *, test: str, time: Any) -> Any:
-    from shm.values import Alert
-
-    if test != "t3":
-        return None
-    key = f"hanger-{hanger.id}:gap-up"
-    return Alert(key, hanger.id, test, time, "The gap opened.", (), ("gap",))
-
-
-def test_there_is_nothing_to_adopt_before_the_first_test(workspace: Workspace) -> None:
-    with pytest.raises(NothingThere, match="no baseline yet"):
-        adopted(workspace, "point_mass")
-
-
-def test_adopting_twice_is_refused_before_the_work(
-    begun: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    adopted(begun, "point_mass")
-    monkeypatch.setattr(adopting, "update", lambda *a, **k: pytest.fail("computed"))
-    with pytest.raises(UsageError, match="already"):
-        adopted(begun, "point_mass")
-
-
 def test_where_it_acts_must_be_said_where_no_diagnosis_tells(begun: Workspace) -> None:
     with pytest.raises(UsageError, match=r"--at, one of deck_end, arch_end, both_ends") as caught:
         adopted(begun, "effective_length")
@@ -266,42 +226,6 @@ def test_the_likeliest_place_and_the_baseline_come_from_the_diagnosis(begun: Wor
     assert both.adoption.model == "beam2+effective_length@both_ends+sag@everywhere.transverse"
 
 
-def test_what_single_tests_cannot_show_takes_its_size_from_the_diagnosis(
-    begun: Workspace,
-) -> None:
-    hanger = begun.bridge.hanger(3)
-    with begun.store() as store:
-        for day, temperature in ((1, 5.0), (2, 16.0)):
-            test = write_test(begun.spool / "w.modes.json", begun, day=day, name=f"w{day}")
-            put(begun.spool / "w.modes.json", _with_temperature(test, temperature))
-            ingest(begun)
-        tests = store.tests.list_all(3)
-        with pytest.raises(BadInput, match="must come from a diagnosis"):
-            adopted_name(["temperature_tension"], (), "beam1", hanger, None, tests)
-        diagnosis = store.posteriors.save_diagnosis(3, a_diagnosis(("w1", "w2")), LINEAGE, START)
-        name = adopted_name(["temperature_tension"], (), "", hanger, diagnosis, tests)
-    estimate = WARMTH.parameters[0]
-    model = build(str(name), hanger)
-    low, high = model.bounds["tension_per_kelvin_n_k"]
-    assert str(name).startswith("beam1+temperature_tension@everywhere:reference_c=10.5:")
-    shares = np.linspace(low, high, 10001)
-    np.testing.assert_allclose(
-        np.quantile(shares, [0.05, 0.95]), [estimate.q05, estimate.q95], rtol=1e-3
-    )
-
-
-def test_where_an_effect_sits_stays_as_diagnosed_and_its_size_is_free(begun: Workspace) -> None:
-    hanger = begun.bridge.hanger(3)
-    with begun.store() as store:
-        diagnosis = store.posteriors.save_diagnosis(3, a_diagnosis(), LINEAGE, START)
-        tests = store.tests.list_all(3)
-    name = adopted_name(["point_mass"], (), "", hanger, diagnosis, tests)
-    assert str(name) == f"{MASS_MODEL}:x_m=3.31111..3.48889"
-    elsewhere = replace(MASS, at="nowhere")
-    other = replace(diagnosis, diagnosis=a_diagnosis(causes=[elsewhere]))
-    assert str(adopted_name(["point_mass"], ["everywhere"], "", hanger, other, tests)) == MASS_MODEL
-
-
 def _with_temperature(test: ModalTest, temperature_c: float) -> str:
     from shm.documents import dump
     from shm.modes_document import modes_document
@@ -315,22 +239,6 @@ def test_an_effect_of_the_temperature_needs_tests_with_temperatures(workspace: W
     ingest(workspace)
     with pytest.raises(BadInput, match="no test of hanger 3 has"):
         adopted(workspace, "temperature_tension")
-
-
-def test_each_effect_needs_its_place(begun: Workspace) -> None:
-    with pytest.raises(UsageError, match=r"2 effect\(s\) and 1 place"):
-        adopted(begun, "point_mass", "sag", at=["everywhere"])
-
-
-def test_an_adoption_says_from_what_it_was_made(begun: Workspace) -> None:
-    adopted(begun, "bending_stiffness", at=["everywhere"])
-    with begun.store() as store:
-        posteriors = {each.posterior.model: each for each in store.posteriors.list_all(3)}
-        test = store.tests.list_all(3)[0]
-    assert posteriors.keys() == {STIFFNESS}
-    lineage = posteriors[STIFFNESS].lineage
-    assert lineage.input_sha256
-    assert lineage != test.lineage
 
 
 @pytest.mark.slow

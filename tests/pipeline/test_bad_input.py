@@ -10,6 +10,9 @@ from typing import Any
 import pytest
 
 from shm.store import Stage, Workspace
+from shm.store.queries.hangers import list_selected_models
+from shm.store.queries.history import list_events
+from shm.store.queries.recordings import count_stages, list_recordings
 from tests.helpers.flows import ingest
 from tests.helpers.workspaces import make_workspace, put, write_test
 
@@ -80,15 +83,15 @@ def test_a_bad_file_is_quarantined_with_a_reason_and_a_remedy(served: Workspace,
 
 def test_the_good_file_behind_them_is_done(served: Workspace) -> None:
     with served.store() as store:
-        counts = store.recordings.stage_counts()
+        counts = count_stages(store)
         assert (counts[Stage.REFUSED], counts[Stage.DONE]) == (len(BAD), 1)
-        assert list(store.posteriors.selected_models()) == [3]
+        assert list(list_selected_models(store)) == [3]
     assert [path for path in served.spool.rglob("*") if path.is_file()] == []
 
 
 def test_every_refused_file_is_kept_in_the_archive(served: Workspace) -> None:
     with served.store() as store:
-        refused = store.recordings.list_all(Stage.REFUSED)
+        refused = list_recordings(store, Stage.REFUSED)
     assert all(served.archive.holds(recording.file) for recording in refused)
     assert {recording.file.file_name for recording in refused} == set(BAD)
 
@@ -104,8 +107,6 @@ def test_a_file_mended_by_a_sidecar_is_taken_when_dropped_again(workspace: Works
     ingest(workspace)
     assert "sampling" not in reason_of(workspace, "no_rate.csv")["message"]
     with workspace.store() as store:
-        assert [event.file_name for event in store.journal.list_events("reopened")] == [
-            "no_rate.csv"
-        ]
-        assert len(store.recordings.list_all()) == 1
+        assert [event.file_name for event in list_events(store, "reopened")] == ["no_rate.csv"]
+        assert len(list_recordings(store)) == 1
     assert (workspace.folder / "quarantine" / "no_rate.toml").is_file()

@@ -14,6 +14,7 @@ from shm.pipeline.importing import Answers, keep_profile, look_into
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
+from shm.store.queries.recordings import list_holds, list_recordings
 from tests.helpers.flows import ingest
 from tests.helpers.workspaces import START, make_workspace
 
@@ -51,10 +52,10 @@ def test_modes_of_another_hanger_are_held_and_the_profile_is_named(workspace: Wo
     record(workspace.spool / "third.csv", workspace, 4, day=-20_000.0)  # by a dead clock
     ingest(workspace)
     with workspace.store() as store:
-        own, carried = store.recordings.list_all()
+        own, carried = list_recordings(store)
         assert (own.stage, own.hanger) == (Stage.DONE, 3)
         assert carried.stage is Stage.HELD
-        (hold,) = store.recordings.list_holds(3)
+        (hold,) = list_holds(store, 3)
     early, doubt = [each for test in hold.tests for each in test.doubts]
     assert (early.check, doubt.check) == ("clock before the bridge", "right hanger")
     assert "fit hanger 4 rather than hanger 3" in doubt.state
@@ -73,7 +74,7 @@ def test_a_profile_that_asks_each_time_books_no_file_by_itself(workspace: Worksp
     record(workspace.spool / "hanger_04_third.csv", workspace, 4)
     ingest(workspace)
     with workspace.store() as store:
-        named, silent = sorted(store.recordings.list_all(), key=lambda each: each.file.file_name)
+        named, silent = sorted(list_recordings(store), key=lambda each: each.file.file_name)
     assert (named.hanger, named.stage) == (4, Stage.DONE)
     assert silent.stage is Stage.REFUSED
     assert silent.reason is not None

@@ -15,6 +15,7 @@ from shm.pipeline.unheard import Heard, heard, leads_of
 from shm.read.chunk_document import chunk_document
 from shm.simulate.ambient import streamed
 from shm.store import Store, Workspace
+from shm.store.queries.streams import find_last_window, list_stream_events, list_windows
 from shm.store.ring import ring_of
 from shm.values import PLANES, FloatArray, Mode, Plane
 from shm.values.stream import StreamEvent, WindowReading
@@ -85,11 +86,11 @@ def follow(workspace: Workspace, planes: tuple[Plane, ...]) -> Followed:
             clock.now = end + HOUR
             drain(streaming, clock)
             if first == FIRST:
-                remember_sound_day(store, store.streams.last_window(stream.name))
+                remember_sound_day(store, find_last_window(store, stream.name))
             states += heard(workspace, store, end)
         streaming.close()
-        windows = store.streams.list_windows(hanger.id, FIRST, END)
-        return Followed(windows, store.streams.list_events(stream.name, FIRST), *states[1:])
+        windows = list_windows(store, hanger.id, FIRST, END)
+        return Followed(windows, list_stream_events(store, stream.name, FIRST), *states[1:])
 
 
 @pytest.fixture(scope="module")

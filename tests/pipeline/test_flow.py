@@ -21,12 +21,15 @@ import numpy as np
 import pytest
 
 from shm.documents import dump
-from shm.errors import ShmError, StoreBusy, StoreError, UsageError, WorkerDied
+from shm.errors import ShmError, StoreBusy, StoreError, WorkerDied
 from shm.modes_document import modes_document
 from shm.pipeline import Flow, steps
 from shm.read import Limits
 from shm.store import DeliveryState, Stage, Workspace
 from shm.store.archive import Quarantine
+from shm.store.queries.hangers import find_latest_watches
+from shm.store.queries.recordings import list_recordings
+from shm.store.queries.trends import list_history
 from shm.store.stored_tests import Tests
 from shm.values import AddedMass, ModalTest, Posterior
 from tests.helpers import quick_update
@@ -48,9 +51,7 @@ def spool(workspace: Workspace, name: str, **values: float) -> None:
 
 def stages(workspace: Workspace) -> dict[str, Stage]:
     with workspace.store() as store:
-        return {
-            recording.file.file_name: recording.stage for recording in store.recordings.list_all()
-        }
+        return {recording.file.file_name: recording.stage for recording in list_recordings(store)}
 
 
 @pytest.mark.usefixtures("real_sampler")
@@ -135,39 +136,6 @@ def test_tests_are_watched_in_the_order_of_their_times(
         ]
 
 
-def test_several_first_tests_make_the_baseline_together(tmp_path: Path) -> None:
-    workspace = make_workspace(tmp_path / "bridge", settings={"baseline_tests": 3})
-    for day in (1, 2):
-        spool(workspace, f"t{day}", day=day)
-    ingest(workspace)
-    assert set(stages(workspace).values()) == {Stage.IDENTIFIED}
-    for day in (3, 4):
-        spool(workspace, f"t{day}", day=day)
-    ingest(workspace)
-    assert set(stages(workspace).values()) == {Stage.DONE}
-    with workspace.store() as store:
-        baseline = store.watch.baseline(3)
-        assert baseline is not None
-        assert baseline.posterior.tests == ("t1", "t2", "t3")
-        assert [drift.test for drift in store.watch.list_drifts(3)] == ["t4"]
-
-
-def test_each_hanger_has_its_own_baseline_and_selected_class(tmp_path: Path) -> None:
-    workspace = make_workspace(
-        tmp_path / "bridge", hangers=(3, 4), settings={"models": "beam1,beam2"}
-    )
-    spool(workspace, "three", hanger=3)
-    spool(workspace, "four", hanger=4, tension=0.9)
-    ingest(workspace)
-    with workspace.store() as store:
-        assert set(store.posteriors.selected_models()) == {3, 4}
-        for hanger in (3, 4):
-            selection = store.posteriors.selection(hanger)
-            assert selection is not None
-            assert {p.model for p in selection.selection.posteriors} == {"beam1", "beam2"}
-            assert sum(selection.selection.probabilities) == pytest.approx(1)
-
-
 def test_a_lost_tension_is_told_once_to_each_hook_and_names_the_test_that_calls_it(
     workspace: Workspace,
 ) -> None:
@@ -184,22 +152,6 @@ def test_a_lost_tension_is_told_once_to_each_hook_and_names_the_test_that_calls_
         assert postman.told == [("mail", each.key) for each in stored]
         assert {each.state for each in store.alerts.list_deliveries()} == {DeliveryState.DELIVERED}
         assert len(store.watch.list_drifts(3)) == 3
-
-
-def test_a_slow_loss_is_told_once_by_the_test_that_detects_it_beyond_its_threshold(
-    workspace: Workspace,
-) -> None:
-    write_slow_loss(workspace.spool, workspace)
-    postman = Postman()
-    ingest(workspace, notifier=postman, lanes=3)
-    with workspace.store() as store:
-        (stored,) = store.alerts.list_all()
-        assert stored.alert.key == (
-            "hanger-3:beyond-threshold+slow-drift:tension-down:t6:baseline-1"
-        )
-        assert postman.told == [("mail", stored.alert.key)]
-        assert [each.state for each in store.alerts.list_deliveries()] == [DeliveryState.DELIVERED]
-        assert len(store.watch.list_drifts(3)) == 6
 
 
 @pytest.fixture
@@ -239,17 +191,6 @@ def test_a_hook_that_fails_is_tried_again_ever_later_and_then_given_up(untold: W
     assert set(stages(untold).values()) == {Stage.DONE}
 
 
-def test_a_hook_that_recovers_is_told(untold: Workspace) -> None:
-    clock, postman = Clock(), Postman(failures=1)
-    with a_flow(untold, clock=clock, notifier=postman) as flow:
-        flow.drain()
-        clock.pass_by(60)
-        flow.drain()
-        (delivery,) = flow.store.alerts.list_deliveries()
-    assert (delivery.state, delivery.attempts) == (DeliveryState.DELIVERED, 2)
-    assert len(postman.told) == 2
-
-
 def test_an_alert_raised_while_the_clock_was_ahead_is_told_once_it_is_right(
     workspace: Workspace,
 ) -> None:
@@ -267,53 +208,6 @@ def test_an_alert_raised_while_the_clock_was_ahead_is_told_once_it_is_right(
     assert delivery.state is DeliveryState.DELIVERED
 
 
-def test_a_hook_that_is_no_longer_described_fails_and_says_so(untold: Workspace) -> None:
-    bare = replace(untold, bridge=replace(untold.bridge, hooks=()))
-    ingest(bare, notifier=Postman())
-    with untold.store() as store:
-        (delivery,) = store.alerts.list_deliveries()
-    assert delivery.attempts == 1
-    assert "no hook mail" in delivery.last_error
-
-
-def test_the_same_file_twice_is_one_recording_and_leaves_the_spool(workspace: Workspace) -> None:
-    spool(workspace, "t1")
-    content = (workspace.spool / "t1.modes.json").read_bytes()
-    put(workspace.spool / "copy.modes.json", content)
-    ingest(workspace)
-    put(workspace.spool / "late.modes.json", content)
-    ingest(workspace)
-    assert list(workspace.spool.iterdir()) == []
-    assert len(stages(workspace)) == 1
-    with workspace.store() as store:
-        assert len(store.tests.list_all()) == 1
-        assert [event.kind for event in store.journal.list_events()] == [
-            "duplicate",
-            "duplicate",
-        ]
-
-
-def test_later_tests_start_from_the_baseline_whichever_was_computed_before(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    quick, known_samples = steps.refresh, []
-
-    def refresh(tests: Any, model: Any, known: Posterior, options: Any) -> Posterior:
-        known_samples.append(known.samples)
-        return quick(tests, model, known, options)
-
-    monkeypatch.setattr(steps, "refresh", refresh)
-    for day, name in enumerate(("first", "second", "third")):
-        spool(workspace, name, day=day)
-        ingest(workspace)
-    with workspace.store() as store:
-        baseline = store.watch.baseline(3)
-        assert baseline is not None
-        assert len(known_samples) == 2
-        for samples in known_samples:
-            np.testing.assert_array_equal(samples, baseline.posterior.samples)
-
-
 def test_results_do_not_depend_on_order_or_executor(tmp_path: Path) -> None:
     found = []
     for label, names, lanes in (("one", "abc", 1), ("many", "cab", 3)):
@@ -327,7 +221,7 @@ def test_results_do_not_depend_on_order_or_executor(tmp_path: Path) -> None:
                 if lanes == 1:
                     flow.drain()
             flow.drain()
-            history = flow.store.posteriors.history(3)
+            history = list_history(flow.store, 3)
             found.append({test.test.id: posterior.samples for test, posterior in history})
     assert found[0].keys() == found[1].keys() == {"0", "a", "b", "c"}
     for name, samples in found[0].items():
@@ -379,7 +273,7 @@ def test_a_fault_of_ours_refuses_the_file_and_the_rest_goes_on(
     assert any(record.exc_info for record in caplog.records)
     with workspace.store() as store:
         assert list(tension_kn(store)) == ["t1", "t3"]
-        (refused,) = store.recordings.list_all(Stage.REFUSED)
+        (refused,) = list_recordings(store, Stage.REFUSED)
         assert workspace.archive.holds(refused.file)
 
 
@@ -539,18 +433,6 @@ def test_deaths_and_pauses_outlast_the_daemon(workspace: Workspace) -> None:
     assert pauses == [2.0, 8.0, 32.0, 128.0, 512.0, None]
 
 
-def test_a_recording_that_moves_on_is_no_suspect_any_more(workspace: Workspace) -> None:
-    spool(workspace, "t1")
-    clock = Clock()
-    with Killed(4) as pool, a_flow(workspace, executor=pool, clock=clock) as flow:
-        receive_all(flow)
-        drain_patiently(flow, clock)
-        clock.pass_by(1.0)
-        assert set(stages(workspace).values()) == {Stage.DONE}
-        assert flow.store.recordings.deaths() == {}
-        assert [event.kind for event in flow.store.journal.list_events()] == ["worker died"] * 4
-
-
 def test_a_file_that_needs_more_memory_than_there_is_is_refused_and_says_so(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -563,7 +445,7 @@ def test_a_file_that_needs_more_memory_than_there_is_is_refused_and_says_so(
     with a_flow(workspace, clock=clock) as flow:
         receive_all(flow)
         assert sum(drain_patiently(flow, clock)) < 60
-        (refused,) = flow.store.recordings.list_all(Stage.REFUSED)
+        (refused,) = list_recordings(flow.store, Stage.REFUSED)
     assert refused.reason is not None
     assert "needs more memory than one step is given" in refused.reason["message"]
 
@@ -740,7 +622,7 @@ def test_a_test_with_a_mass_beyond_the_hanger_is_refused_with_its_file(
     assert stages(workspace) == {"good.modes.json": Stage.DONE, "x.modes.json": Stage.REFUSED}
     with workspace.store() as store:
         assert [test.test.id for test in store.tests.list_all()] == ["good"]
-        (refused,) = store.recordings.list_all(Stage.REFUSED)
+        (refused,) = list_recordings(store, Stage.REFUSED)
         assert refused.reason is not None
         assert "heavy" in refused.reason["message"]
 
@@ -788,35 +670,6 @@ def test_a_file_gone_from_the_archive_is_refused_all_the_same(workspace: Workspa
     assert set(stages(workspace).values()) == {Stage.REFUSED}
 
 
-def test_an_unknown_model_class_is_told_before_any_file_is_touched(tmp_path: Path) -> None:
-    workspace = make_workspace(tmp_path / "bridge", settings={"models": "beam1,beam9"})
-    with pytest.raises(UsageError, match="beam9"), a_flow(workspace):
-        pytest.fail("began")
-
-
-@pytest.mark.parametrize(
-    ("changed", "same_input", "same_settings"),
-    [({}, True, True), ({"band_high_hz": 90.0}, True, False), ({"samples": 200}, True, True)],
-)
-def test_a_result_says_from_what_and_how_it_was_made(
-    tmp_path: Path, changed: dict[str, object], same_input: bool, same_settings: bool
-) -> None:
-    """Only what went into the identification changes its lineage; the posterior's has all."""
-    found = []
-    for label, settings in (("one", {}), ("two", changed)):
-        workspace = make_workspace(tmp_path / label, settings=settings)
-        spool(workspace, "t1")
-        ingest(workspace)
-        with workspace.store() as store:
-            found.append(
-                (store.tests.list_all(3)[0].lineage, store.posteriors.list_all(3)[0].lineage)
-            )
-    (test, posterior), (other_test, other_posterior) = found
-    assert (test.input_sha256 == other_test.input_sha256) is same_input
-    assert (test.settings_sha256 == other_test.settings_sha256) is same_settings
-    assert (posterior == other_posterior) is (not changed)
-
-
 def test_documents_that_cannot_be_read_stop_their_hanger_and_not_the_beginning(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -843,5 +696,5 @@ def test_documents_that_cannot_be_read_stop_their_hanger_and_not_the_beginning(
         receive_all(flow)
         flow.drain()
         assert flow.store.tests.named(4, "h4-90").stage is Stage.WATCHED
-        assert flow.store.watch.latest([bridge.bridge.hanger(4)])[4].watched.test == "h4-90"
+        assert find_latest_watches(flow.store, [bridge.bridge.hanger(4)])[4].watched.test == "h4-90"
     assert "hanger 3 cannot be judged again" in caplog.text

@@ -16,12 +16,21 @@ from shm.modes_document import modes_document
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Decision, Outcome, Stage, Store, StoredAlert, Workspace
 from shm.store.checking import check_store
+from shm.store.queries.history import list_former_tests
+from shm.store.queries.recordings import (
+    count_stages,
+    find_latest_hold,
+    find_oldest_waiting,
+    list_holds,
+)
+from shm.store.queries.tests import count_tests, list_test_rows, list_waiting_tests
+from shm.store.queries.trends import list_history, list_posteriors, list_trend
 from shm.values import ModalTest, Recording
 from tests.helpers.contents import quiet
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.taken_in import copied
-from tests.helpers.workspaces import START, make_workspace, modelled_test, put, write_test
+from tests.helpers.workspaces import START, make_workspace, modelled_test, put
 from tests.helpers.written import write
 
 EPOCH = datetime(1970, 1, 1, 0, 3, tzinfo=UTC)
@@ -77,17 +86,17 @@ def test_two_tests_of_1970_with_a_loss_tell_of_it(held: Workspace) -> None:
 def test_what_is_held_counts_in_nothing(held: Workspace) -> None:
     with held.store() as store:
         assert counted(store) == ["good"]
-        assert store.recordings.stage_counts()[Stage.HELD] == 1
+        assert count_stages(store)[Stage.HELD] == 1
         assert store.watch.list_drifts(3) == ()
-        assert [test.test.id for test, _ in store.posteriors.history(3)] == ["good"]
-        assert [row.name for row in store.tests.list_rows(3)] == ["good"]
-        assert store.tests.latest()[3].tests == 1
-        assert len(store.posteriors.trend(held.bridge.hanger(3))) == 1
-        assert store.recordings.oldest_waiting() is None
-        assert store.tests.list_waiting() == ()
+        assert [test.test.id for test, _ in list_history(store, 3)] == ["good"]
+        assert [row.name for row in list_test_rows(store, 3)] == ["good"]
+        assert count_tests(store)[3].tests == 1
+        assert len(list_trend(store, held.bridge.hanger(3))) == 1
+        assert find_oldest_waiting(store) is None
+        assert list_waiting_tests(store) == ()
         with pytest.raises(NothingThere):
             store.tests.named(3, "lost")
-        (hold,) = store.recordings.list_holds()
+        (hold,) = list_holds(store)
         assert (hold.recording_id, hold.hanger, hold.decision) == (2, 3, None)
         assert [doubt.check for doubt in hold.doubts] == ["clock before the bridge"]
 
@@ -97,7 +106,7 @@ def test_a_first_test_that_is_held_makes_no_baseline(workspace: Workspace) -> No
     ingest(workspace)
     with workspace.store() as store:
         assert store.watch.baseline(3) is None
-        assert store.recordings.stage_counts()[Stage.HELD] == 1
+        assert count_stages(store)[Stage.HELD] == 1
 
 
 def test_what_is_confirmed_counts_from_its_receipt_where_its_time_is_wrong(
@@ -114,7 +123,7 @@ def test_what_is_confirmed_counts_from_its_receipt_where_its_time_is_wrong(
         assert test.test.time is None
         assert "confirmed by Ann" in test.notes[-1]
         assert [drift.test for drift in flow.store.watch.list_drifts(3)] == ["lost"]
-        assert flow.store.recordings.list_holds() == ()
+        assert list_holds(flow.store) == ()
         (notice,) = alerts_but_notices(flow.store)
         assert notice.acknowledgement is not None
         assert notice.acknowledgement.who == "Ann"
@@ -128,14 +137,9 @@ def test_a_confirmed_test_has_the_time_that_a_person_gave_it(held: Workspace) ->
         flow.store.recordings.rerun(2, Stage.IDENTIFIED, flow.clock())
         flow.drain()
         assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
-        assert flow.store.recordings.stage_counts()[Stage.HELD] == 0
+        assert count_stages(flow.store)[Stage.HELD] == 0
         with pytest.raises(UsageError, match="not held: it was confirmed by Ann"):
             flow.store.recordings.accept(2, "Bob", "", flow.clock())
-
-
-def test_a_time_yet_to_come_is_given_to_no_test(held: Workspace) -> None:
-    with a_flow(held) as flow, pytest.raises(UsageError, match="yet to come"):
-        flow.store.recordings.accept(2, "Ann", "", flow.clock(), day(9000))
 
 
 def test_what_is_discarded_ends_and_its_raw_file_stays(held: Workspace) -> None:
@@ -151,7 +155,7 @@ def test_what_is_discarded_ends_and_its_raw_file_stays(held: Workspace) -> None:
         assert "`shm ingest --confirm 2 --why TEXT`" in recording.reason["remedy"]
         assert held.archive.holds(recording.file)
         assert counted(flow.store) == ["good"]
-        assert flow.store.recordings.list_holds() == ()
+        assert list_holds(flow.store) == ()
 
 
 def test_what_was_discarded_and_comes_again_stays_discarded(held: Workspace) -> None:
@@ -177,14 +181,6 @@ def test_a_discarded_file_with_another_sidecar_is_judged_again(held: Workspace) 
         assert flow.receive(held.spool / "lost.modes.json").outcome is Outcome.REOPENED
         flow.drain()
         assert flow.store.recordings.get(2).stage is Stage.HELD
-
-
-def test_what_failed_after_a_discard_is_tried_again(held: Workspace) -> None:
-    with a_flow(held) as flow:
-        flow.store.recordings.exclude(2, "Ann", "", flow.clock())
-        flow.store.recordings.refuse(2, {"message": "no rate."}, flow.clock())
-        spool(held, "lost", EPOCH, tension=0.9)
-        assert flow.receive(held.spool / "lost.modes.json").outcome is Outcome.REOPENED
 
 
 def test_what_was_discarded_is_taken_back_with_its_true_time(held: Workspace) -> None:
@@ -227,11 +223,9 @@ def test_what_counts_is_taken_out_and_back_again(counting: Workspace) -> None:
         assert [watch.watched.test for watch in store.watch.list_all(3)] == ["t1", "t2", "t4"]
         assert [watch.watched.change.called for watch in store.watch.list_all(3)] == [False] * 3
         assert {drift.test for drift in store.watch.list_drifts(3)} == {"t1", "t2", "t4"}
-        assert [test.test.id for test, _ in store.posteriors.history(3)] == ["t0", "t1", "t2", "t4"]
+        assert [test.test.id for test, _ in list_history(store, 3)] == ["t0", "t1", "t2", "t4"]
         assert (
-            len(store.posteriors.list_all(3))
-            == len(store.posteriors.trend(counting.bridge.hanger(3)))
-            == 4
+            len(list_posteriors(store, 3)) == len(list_trend(store, counting.bridge.hanger(3))) == 4
         )
         with pytest.raises(NothingThere):
             store.posteriors.get(3, "t3")
@@ -261,7 +255,7 @@ def test_the_baseline_of_what_is_taken_out_is_told_of_and_its_posterior_not_show
         made = store.recordings.exclude(1, "Ann", "a part", START)
         assert (made.of_baseline, made.since, made.watched_again) == (("t0",), day(0), 4)
         assert store.watch.baseline(3) is not None
-        assert len(store.posteriors.list_all(3)) == 4
+        assert len(list_posteriors(store, 3)) == 4
 
 
 def test_one_test_of_a_campaign_is_taken_out_and_stays_out(workspace: Workspace) -> None:
@@ -294,7 +288,7 @@ def test_the_whole_counts_in_place_of_its_part(workspace: Workspace) -> None:
     write(whole, workspace.spool / "whole.npz")
     ingest(workspace)
     with a_flow(workspace) as flow:
-        (hold,) = flow.store.recordings.list_holds()
+        (hold,) = list_holds(flow.store)
         assert "it holds all of part.npz (recording 1), 67 % of its own samples" in hold.message
         assert (
             "`shm ingest --discard 1 --why TEXT`, then `shm ingest --confirm 2 --why TEXT`"
@@ -308,7 +302,7 @@ def test_the_whole_counts_in_place_of_its_part(workspace: Workspace) -> None:
         write(replace(whole, channels=tuple(cut[::-1])), workspace.spool / "again.npz")
         receive_all(flow)
         flow.drain()
-        (hold,) = flow.store.recordings.list_holds()
+        (hold,) = list_holds(flow.store)
         assert "a part of whole.npz (recording 2), 67 % of that one, sent again" in hold.message
 
 
@@ -337,7 +331,7 @@ def test_a_held_test_that_is_killed_on_the_way_is_told_of_once(workspace: Worksp
     for _ in range(3):  # each time a process of its own
         ingest(workspace)
     with workspace.store() as store:
-        assert len(store.alerts.list_all()) == len(store.recordings.list_holds()) == 1
+        assert len(store.alerts.list_all()) == len(list_holds(store)) == 1
 
 
 @pytest.mark.parametrize(
@@ -354,7 +348,7 @@ def test_a_time_that_cannot_be_is_held(workspace: Workspace, time: datetime, che
     spool(workspace, "first", time)
     ingest(workspace)
     with workspace.store() as store:
-        (hold,) = store.recordings.list_holds()
+        (hold,) = list_holds(store)
         assert [doubt.check for doubt in hold.doubts] == [check]
         assert hold.time_unknown
 
@@ -372,7 +366,7 @@ def test_what_may_be_passes(workspace: Workspace, time: datetime | None) -> None
     spool(workspace, "other", time)
     ingest(workspace)
     with workspace.store() as store:
-        assert store.recordings.stage_counts()[Stage.DONE] == 2
+        assert count_stages(store)[Stage.DONE] == 2
 
 
 def test_a_time_before_the_bridge_was_built_is_held(workspace: Workspace) -> None:
@@ -384,7 +378,7 @@ def test_a_time_before_the_bridge_was_built_is_held(workspace: Workspace) -> Non
     ingest(workspace.reopened())
     with workspace.store() as store:
         assert counted(store) == ["after"]
-        assert "The bridge was built on 1998-06-01." in store.recordings.list_holds()[0].message
+        assert "The bridge was built on 1998-06-01." in list_holds(store)[0].message
 
 
 def test_a_stuck_clock_is_held_and_a_mere_date_is_not(workspace: Workspace) -> None:
@@ -399,7 +393,7 @@ def test_a_stuck_clock_is_held_and_a_mere_date_is_not(workspace: Workspace) -> N
         ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["a", "c", "d"]
-        (hold,) = store.recordings.list_holds()
+        (hold,) = list_holds(store)
         assert [doubt.check for doubt in hold.doubts] == [
             "clock stuck",
             "clock before the baseline",
@@ -416,7 +410,7 @@ def test_a_loss_dated_before_the_baseline_is_held_and_an_old_test_is_not(
         ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["old", "a"]
-        (hold,) = store.recordings.list_holds()
+        (hold,) = list_holds(store)
         assert [doubt.check for doubt in hold.doubts] == ["clock before the baseline"]
 
 
@@ -428,32 +422,16 @@ def test_the_same_modes_at_the_same_time_are_a_copy(workspace: Workspace) -> Non
     ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["a"]
-        assert "copy" in [doubt.check for doubt in store.recordings.list_holds()[0].doubts]
+        assert "copy" in [doubt.check for doubt in list_holds(store)[0].doubts]
 
 
 def test_a_held_recording_that_is_done_again_waits_for_nobody_twice(held: Workspace) -> None:
     with a_flow(held) as flow:
         flow.store.recordings.rerun(2, Stage.IDENTIFIED, flow.clock())
         flow.drain()
-        assert len(flow.store.recordings.list_holds()) == 1
+        assert len(list_holds(flow.store)) == 1
         former, _ = flow.store.alerts.list_all()
         assert former.acknowledgement is not None
-
-
-def test_what_is_not_there_cannot_be_confirmed(held: Workspace) -> None:
-    with held.store() as store:
-        with pytest.raises(NothingThere, match="no recording 9"):
-            store.recordings.accept(9, "Ann", "", START)
-        with pytest.raises(UsageError, match="nothing of recording 1 is held"):
-            store.recordings.accept(1, "Ann", "", START)
-
-
-def test_the_same_bytes_are_a_duplicate_while_they_are_held(held: Workspace) -> None:
-    spool(held, "lost", EPOCH, tension=0.9)
-    with a_flow(held) as flow:
-        receipt = flow.receive(held.spool / "lost.modes.json")
-        assert receipt.outcome is Outcome.DUPLICATE
-        assert flow.store.recordings.get(2).stage is Stage.HELD
 
 
 @cache
@@ -478,12 +456,12 @@ def test_one_impact_counts_once_in_whatever_format_it_comes_again(workspace: Wor
     ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["a", "e"]
-        assert [hold.file_name for hold in store.recordings.list_holds()] == [
+        assert [hold.file_name for hold in list_holds(store)] == [
             "b.uff",
             "c.csv",
             "d.h5",
         ]
-        for hold in store.recordings.list_holds():
+        for hold in list_holds(store):
             assert "copy" in [doubt.check for doubt in hold.doubts]
             assert "again" in hold.message
 
@@ -505,21 +483,9 @@ def test_a_corrected_sidecar_beside_the_same_bytes_is_taken(workspace: Workspace
         (after,) = flow.store.tests.list_all(3)
         assert after.time == before.time + timedelta(days=8)
         assert after.lineage.input_sha256 != before.lineage.input_sha256
-        former, _ = flow.store.tests.list_former(1)
+        former, _ = list_former_tests(flow.store, 1)
         assert former.superseded_at is not None
         assert list(workspace.spool.iterdir()) == []
-
-
-def test_a_broken_sidecar_says_that_the_test_counts_no_more(workspace: Workspace) -> None:
-    write_test(workspace.spool / "a.modes.json", workspace)
-    ingest(workspace)
-    put(workspace.spool / "a.modes.toml", 'hanger = "two"')
-    write_test(workspace.spool / "a.modes.json", workspace)
-    ingest(workspace)
-    with workspace.store() as store:
-        recording = store.recordings.get(1)
-        assert (recording.stage, store.tests.list_all(3)) == (Stage.REFUSED, ())
-        assert "counts no more" in recording.reason["remedy"]
 
 
 def test_a_corrected_sidecar_ends_a_hold(workspace: Workspace) -> None:
@@ -528,12 +494,12 @@ def test_a_corrected_sidecar_ends_a_hold(workspace: Workspace) -> None:
     sidecar = (workspace.spool / "a.toml").read_text()
     ingest(workspace)
     with workspace.store() as store:
-        assert store.recordings.stage_counts()[Stage.HELD] == 1
+        assert count_stages(store)[Stage.HELD] == 1
     put(workspace.spool / "a.toml", sidecar.replace("1970-01-01", "2026-05-09"))
     put(workspace.spool / "a.uff", raw)
     ingest(workspace)
     with workspace.store() as store:
-        assert store.recordings.list_holds() == ()
+        assert list_holds(store) == ()
         assert store.recordings.get(1).stage is Stage.DONE
         (notice,) = store.alerts.list_all()
         assert notice.acknowledgement is not None
@@ -574,18 +540,6 @@ def test_a_counted_test_that_agrees_with_a_held_one_raises_an_alert(held: Worksp
         assert check_store(store, quiet).troubles == ()
 
 
-def test_a_loss_that_is_told_by_two_tests_is_not_told_by_the_third(workspace: Workspace) -> None:
-    for number, seconds in enumerate((0, 1, 2, 3)):
-        time = day(0) + timedelta(seconds=seconds)
-        spool(workspace, f"t{number}", time, tension=0.85 if number else 1.0)
-        ingest(workspace)
-    with workspace.store() as store:
-        (loss,) = alerts_but_notices(store)
-        assert loss.alert.test == "t2"
-        # The watch had no time for a change: its low probability is no sign that the loss ended.
-        assert loss.resolution is None
-
-
 def test_two_tests_of_a_loss_in_the_wrong_order_raise_an_alert(workspace: Workspace) -> None:
     for name, when, tension in (("good", 0, 1.0), ("later", 80, 0.9), ("earlier", 40, 0.9)):
         spool(workspace, name, day(when), tension=tension)
@@ -616,4 +570,4 @@ def test_a_copy_of_a_loss_confirms_no_loss(workspace: Workspace) -> None:
         assert "--confirm 3" in notice.message
         assert [test.test.id for test in store.tests.list_all(3)] == ["a", "b"]
         store.recordings.accept(3, "Ann", "another hit", day(61))
-        assert store.recordings.latest_hold(3).decision is Decision.CONFIRMED  # type: ignore[union-attr]
+        assert find_latest_hold(store, 3).decision is Decision.CONFIRMED  # type: ignore[union-attr]

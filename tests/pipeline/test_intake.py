@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import os
-import shutil
 from pathlib import Path
 
 import pytest
 
 from shm.errors import BadInput, ShmError
 from shm.pipeline import intake
-from shm.pipeline.intake import Sharing, receive
+from shm.pipeline.intake import receive
 from shm.store import Outcome, Receipt, Stage, Workspace
+from shm.store.queries.history import list_events
+from shm.store.queries.recordings import list_recordings
 from shm.store.stored_recordings import Recordings
 from tests.helpers.workspaces import START, put
 
@@ -74,24 +75,6 @@ def test_a_file_outside_the_spool_stays_where_it_is(workspace: Workspace, tmp_pa
     assert (first.outcome, again.outcome) == (Outcome.NEW, Outcome.DUPLICATE)
 
 
-def test_a_file_of_the_spool_is_known_however_it_is_named(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    put(workspace.spool / "h3.csv", "force,acc_1\n")
-    monkeypatch.chdir(workspace.folder)
-    with workspace.store() as store:
-        receive(Path("spool/../spool/h3.csv"), workspace, store, START)
-    assert files_in(workspace.spool) == []
-
-
-def test_a_copy_with_the_same_dates_is_still_noticed(workspace: Workspace, tmp_path: Path) -> None:
-    put(workspace.spool / "h3.csv", "force,acc_1\n")
-    shutil.copy2(workspace.spool / "h3.csv", tmp_path / "kept.csv")
-    take(workspace, "h3.csv")
-    shutil.copy2(tmp_path / "kept.csv", workspace.spool / "h3.csv")
-    assert take(workspace, "h3.csv").outcome is Outcome.DUPLICATE
-
-
 @pytest.mark.parametrize(
     ("owner", "verb"),
     [
@@ -122,8 +105,8 @@ def test_a_receipt_cut_short_anywhere_is_finished_by_the_next(
     assert files_in(workspace.spool) == []
     assert len(files_in(workspace.archive.folder)) == 2
     with workspace.store() as store:
-        assert len(store.recordings.list_all()) == 1
-        assert store.journal.list_events() == ()
+        assert len(list_recordings(store)) == 1
+        assert list_events(store) == ()
 
 
 def test_a_receipt_cut_short_between_the_two_removals_is_finished(
@@ -152,7 +135,7 @@ def test_a_file_that_vanishes_is_left_for_later(workspace: Workspace) -> None:
     with pytest.raises((ShmError, FileNotFoundError)):
         take(workspace, "gone.csv")
     with workspace.store() as store:
-        assert store.recordings.list_all() == ()
+        assert list_recordings(store) == ()
 
 
 def test_a_file_swapped_for_a_link_after_the_scan_sends_nothing_in(
@@ -230,28 +213,4 @@ def test_what_came_under_the_same_names_since_it_was_read_stays(
     second = take(workspace, "h3.csv")
     assert second.outcome is Outcome.NEW
     assert second.recording.file.sidecar_as is not None
-    assert files_in(workspace.spool) == []
-
-
-def test_a_folder_of_many_sidecars_is_listed_once_a_look(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for number in range(3):
-        put(workspace.spool / f"h{number}.csv", f"{number}\n")
-        put(workspace.spool / f"h{number}.toml", "hanger = 3\n")
-    put(workspace.spool / "h0.uff", "0 too\n")
-    listed, listing = [], Path.iterdir
-
-    def counted(self: Path) -> object:
-        listed.append(self)
-        return listing(self)
-
-    sharing = Sharing()
-    with workspace.store() as store, monkeypatch.context() as patched:
-        patched.setattr(Path, "iterdir", counted)
-        for name in ("h0.csv", "h1.csv", "h2.csv"):
-            receive(workspace.spool / name, workspace, store, START, sharing)
-        assert sorted(path.name for path in files_in(workspace.spool)) == ["h0.toml", "h0.uff"]
-        receive(workspace.spool / "h0.uff", workspace, store, START, sharing)
-    assert listed.count(workspace.spool) == 1
     assert files_in(workspace.spool) == []

@@ -18,8 +18,11 @@ from shm.pipeline.lineage import discarded_of_baselines
 from shm.pipeline.stream_days import hand_on_day
 from shm.pipeline.streaming import Streaming
 from shm.store import Stage, Store, Workspace
+from shm.store.queries.streams import list_pooled, load_stream_watch
+from shm.store.queries.tests import list_baseline_tests
 from shm.values import Mode
 from shm.values.stream import PooledReading, Window, WindowReading
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.stream_thermometer import Thermometer
 from shm.watch.stream_watch import StreamState, watch_reading
 from tests.helpers.flows import Clock, ingest
@@ -83,7 +86,7 @@ def come(working: tuple[Streaming, Store, Clock], *hours: int) -> None:
 
 
 def hours_of(store: Store) -> tuple[PooledReading, ...]:
-    return store.streams.list_pooled(3, "hour", FIRST, FIRST + timedelta(days=9))
+    return list_pooled(store, 3, "hour", FIRST, FIRST + timedelta(days=9))
 
 
 def in_order(workspace: Workspace, readings: tuple[PooledReading, ...]) -> list[Any]:
@@ -118,10 +121,11 @@ def test_what_was_offline_is_watched_in_its_place_and_its_alert_raised_once(
         [each.compensated_shift for each in readings[72:]], nan_ok=True
     )
     assert [each.alert.key for each in found if each.alert] == [raised.alert.key]
-    kept = store.streams.watch(3)
+    kept = load_stream_watch(store, 3)
     assert kept is not None
-    state = StreamState.from_bytes(kept.content)
-    assert replace(state, settled_day=0.0, thermometer=Thermometer()).to_bytes() == found[-1].kept
+    state = from_bytes(StreamState, kept.content)
+    begun = replace(state, settled_day=0.0, thermometer=Thermometer())
+    assert to_bytes(begun) == found[-1].kept
     assert days_of(workspace) == [1, 2, 3, 4]
 
 
@@ -171,10 +175,10 @@ def test_whoever_comes_next_ends_what_late_hours_began(
     with ThreadPoolExecutor(1) as threads:
         drain(Streaming(workspace, store, threads, clock=clock), clock)
     readings = hours_of(store)
-    kept = store.streams.watch(3)
+    kept = load_stream_watch(store, 3)
     assert kept is not None
     assert len(readings) == 19
-    assert StreamState.from_bytes(kept.content).readings == 19
+    assert from_bytes(StreamState, kept.content).readings == 19
     assert readings[-1].learning == in_order(workspace, readings)[-1].learning
 
 
@@ -192,6 +196,6 @@ def test_the_whole_day_takes_the_place_of_what_was_known_of_it(workspace: Worksp
         found = [each.test.modes[0].frequency_hz for each in store.tests.list_all(3)]
         baseline = store.watch.baseline(3)
         assert baseline is not None
-        assert any(each.stage == Stage.REFUSED for each in store.tests.of_baseline(baseline))
+        assert any(each.stage == Stage.REFUSED for each in list_baseline_tests(store, baseline))
         assert discarded_of_baselines(store) == {}  # no person discarded it
     assert found == [2.002, 2.001]

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report.hanger_status import Status
-from shm.store import Reconciled, StoredAlert, Workspace
+from shm.store import StoredAlert, Workspace
 from shm.values import CrossedLimit
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
 from tests.helpers.workspaces import write_test
@@ -72,22 +70,6 @@ def test_a_limit_that_is_changed_judges_at_once_and_what_a_person_resolved_stays
     _, two = after(workspace, upper=800e3)
     assert two.resolution is not None
     assert two.resolution.why == "the limit has been changed"
-
-
-def test_heed_limits_reads_no_key(workspace: Workspace) -> None:
-    """An alert of any key, and one of shm 1.0.0, which stored no limit, is told once and ends."""
-    after(workspace, 1.0)
-    (told,) = after(workspace, lower=800e3)
-    assert told.alert.limit == CrossedLimit("below", 800e3)
-    with workspace.reopened().store() as store:
-        ended = {told.id: "ended by this test"}
-        older = replace(told.alert, key="hanger-3:limit", limit=None)
-        store.alerts.settle(Reconciled((older,), ended), [], Clock()())
-    _, older_one = after(workspace, 1.0)
-    assert older_one.alert == older
-    assert older_one.resolution is None
-    _, older_one = after(workspace, lower=600e3)
-    assert older_one.resolution is not None
 
 
 def test_heed_limits_slightly_changed(workspace: Workspace) -> None:

@@ -11,6 +11,7 @@ from shm.models import MODELS
 from shm.models.beam import Beam1
 from shm.pipeline.lineage import competing
 from shm.store import Stage, Workspace
+from shm.store.queries.recordings import count_stages
 from shm.values import Hanger
 from tests.helpers.flows import a_flow, ingest
 from tests.helpers.workspaces import make_workspace, write_test
@@ -54,7 +55,7 @@ def test_each_hanger_is_served_by_the_classes_that_apply_to_it(tmp_path: Path) -
         write_test(workspace.spool / f"t{number}.modes.json", workspace, hanger=number)
     ingest(workspace)
     with workspace.store() as store:
-        assert store.recordings.stage_counts()[Stage.DONE] == 2
+        assert count_stages(store)[Stage.DONE] == 2
         found = {number: store.posteriors.selection(number) for number in (3, 4)}
     names = {n: [p.model for p in each.selection.posteriors] for n, each in found.items() if each}
     assert (sorted(names[3]), names[4]) == (["bare", "beam1"], ["beam1"])

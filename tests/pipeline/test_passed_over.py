@@ -11,6 +11,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report.hanger_status import HangerMessage, Status
 from shm.store import Workspace
+from shm.store.queries.recordings import find_recording
 from tests.helpers import quick_update
 from tests.helpers.flows import ingest
 from tests.helpers.taken_in import with_a_slow_loss
@@ -48,7 +49,7 @@ def test_the_alert_of_a_discarded_test_ends(tmp_path: Path) -> None:
     workspace = with_a_slow_loss(tmp_path / "bridge")
     with workspace.store() as store:
         (alert,) = store.alerts.list_all(3, standing=True)
-        recording, _ = store.recordings.find(alert.alert.test)
+        recording, _ = find_recording(store, alert.alert.test)
         store.recordings.exclude(recording, "Ada", "of another hanger", utc_now())
         assert store.alerts.list_all(3, standing=True) == ()
         ended = store.alerts.get(alert.id).resolution

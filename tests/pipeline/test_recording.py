@@ -15,6 +15,8 @@ import pytest
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage
+from shm.store.queries.recordings import list_recordings
+from shm.store.queries.tests import load_frequency_response
 from tests.helpers.flows import ingest
 from tests.helpers.slow import few_of
 from tests.helpers.workspaces import START, make_workspace
@@ -32,13 +34,13 @@ def test_a_recording_gives_the_tension_that_was_planted(tmp_path: Path, suffix: 
     ingest(workspace)
     assert list(workspace.spool.iterdir()) == []
     with workspace.store() as store:
-        (stored,) = store.recordings.list_all()
+        (stored,) = list_recordings(store)
         assert (stored.stage, stored.hanger) == (Stage.DONE, 3)
         (test,) = store.tests.list_all(3)
         assert (test.test.id, test.time) == ("hanger3", START)
         low, high = np.quantile(store.posteriors.get(3).tension_n, [0.005, 0.995])
         assert low < 690e3 < high
         assert (high - low) / 690e3 < 0.1
-        response = store.tests.frequency_response(test)
+        response = load_frequency_response(store, test)
         assert response is not None
         assert len(response.points) == 4

@@ -8,6 +8,10 @@ import pytest
 
 from shm.pipeline.watching import differences
 from shm.store import Stage, StoredAlert, Workspace
+from shm.store.queries.hangers import find_latest_watches
+from shm.store.queries.history import list_changes
+from shm.store.queries.recordings import count_stages
+from shm.store.queries.tests import list_waiting_tests
 from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all
 from tests.helpers.workspaces import make_workspace, write_loss, write_slow_loss, write_test
 
@@ -22,7 +26,7 @@ def changed(
         workspace.change_setting(flow.store, key, value, flow.clock(), "Meier")
         flow.use(workspace.reopened())
         flow.drain()
-        counts = flow.store.recordings.stage_counts()
+        counts = count_stages(flow.store)
         assert sum(counts.values()) == counts[Stage.DONE]
         return tuple(
             each
@@ -79,9 +83,9 @@ def test_an_alert_that_the_new_threshold_calls_too_is_raised_once(workspace: Wor
         assert one.resolution is None
     (one,) = changed(workspace, "settings.false_call_years", 90.0)
     with a_flow(workspace.reopened()) as flow:
-        (judged,) = flow.store.watch.latest().values()
+        (judged,) = find_latest_watches(flow.store).values()
         assert judged.watched.change.limit_years == 90.0
-        changes = flow.store.journal.list_changes()
+        changes = list_changes(flow.store)
         told = [each for each in changes if each.action == "tests judged again"]
     assert len(told) == 4
 
@@ -102,7 +106,7 @@ def test_hangers_are_judged_again_one_by_one_a_new_test_goes_first_and_a_kill_lo
 
     with a_flow(bridge) as killed:
         killed.advance()
-        waiting = killed.store.tests.list_waiting()
+        waiting = list_waiting_tests(killed.store)
         assert {test.hanger for test in waiting} == {1}
         assert len(waiting) == 3  # all but the baseline's
     with a_flow(bridge) as flow:
@@ -110,12 +114,12 @@ def test_hangers_are_judged_again_one_by_one_a_new_test_goes_first_and_a_kill_lo
         receive_all(flow)
         for _ in range(200):
             flow.advance()
-            if {test.hanger for test in flow.store.tests.list_waiting()} >= {3}:
+            if {test.hanger for test in list_waiting_tests(flow.store)} >= {3}:
                 break
-        names = [t.name for t in flow.store.tests.list_waiting() if t.hanger == 3]
+        names = [t.name for t in list_waiting_tests(flow.store) if t.hanger == 3]
         flow.drain()
         watches = flow.store.watch.list_all(3)
-        settings, stored = bridge.settings, flow.store.watch.latest()
+        settings, stored = bridge.settings, find_latest_watches(flow.store)
         assert len(watches) == 4
         assert names[-1] == "h3-4"
         for hanger in bridge.bridge.hangers:
@@ -124,4 +128,4 @@ def test_hangers_are_judged_again_one_by_one_a_new_test_goes_first_and_a_kill_lo
                 each.watched.change.limit_years == 50.0
                 for each in flow.store.watch.list_all(hanger.id)
             )
-        assert not flow.store.tests.list_waiting()
+        assert not list_waiting_tests(flow.store)

@@ -6,6 +6,9 @@ import pytest
 
 from shm.pipeline import Flow
 from shm.store import Stage, Workspace
+from shm.store.queries.history import list_former_tests
+from shm.store.queries.recordings import count_stages, find_recording
+from shm.store.queries.trends import list_history
 from tests.helpers.comparing import assert_same
 from tests.helpers.flows import a_flow, ingest, tension_kn
 from tests.helpers.workspaces import write_loss
@@ -19,7 +22,7 @@ def done(workspace: Workspace) -> Workspace:
 
 
 def do_again(flow: Flow, name: str, stage: Stage) -> None:
-    recording_id, test = flow.store.recordings.find(name)
+    recording_id, test = find_recording(flow.store, name)
     flow.store.recordings.rerun(recording_id, stage, flow.clock(), test)
     flow.drain()
 
@@ -34,8 +37,8 @@ def test_a_test_done_again_gives_the_same_and_raises_no_second_alert(
         do_again(flow, "t2", stage)
         assert_same((tension_kn(flow.store), flow.store.watch.list_all(3)[-1].watched), before)
         assert flow.store.alerts.list_all() == alerts
-        assert flow.store.recordings.stage_counts()[Stage.DONE] == 3
-        rows = flow.store.tests.list_former(flow.store.recordings.find("t2")[0])
+        assert count_stages(flow.store)[Stage.DONE] == 3
+        rows = list_former_tests(flow.store, find_recording(flow.store, "t2")[0])
         kept = (len(rows), sum(len(row.posteriors) for row in rows))
         assert kept == {"identified": (2, 2), "updated": (1, 2), "watched": (1, 1)}[stage]
 
@@ -49,8 +52,8 @@ def test_the_test_of_the_baseline_done_again_leaves_the_baseline_alone(done: Wor
         assert after is not None
         assert after.id == before.id
         assert flow.store.watch.list_drifts(3) == shifts
-        assert flow.store.recordings.stage_counts()[Stage.DONE] == 3
-        assert [test.test.id for test, _ in flow.store.posteriors.history(3)] == ["t0", "t1", "t2"]
+        assert count_stages(flow.store)[Stage.DONE] == 3
+        assert [test.test.id for test, _ in list_history(flow.store, 3)] == ["t0", "t1", "t2"]
 
 
 def test_a_test_that_is_watched_while_the_baselines_own_is_done_again_is_watched_as_ever(
@@ -59,7 +62,7 @@ def test_a_test_that_is_watched_while_the_baselines_own_is_done_again_is_watched
     with a_flow(done) as flow:
         shifts = flow.store.watch.list_drifts(3)
         flow.store.recordings.rerun(
-            flow.store.recordings.find("t0")[0], Stage.IDENTIFIED, flow.clock()
+            find_recording(flow.store, "t0")[0], Stage.IDENTIFIED, flow.clock()
         )
         do_again(flow, "t2", Stage.WATCHED)
         assert flow.store.watch.list_drifts(3) == shifts
@@ -68,10 +71,10 @@ def test_a_test_that_is_watched_while_the_baselines_own_is_done_again_is_watched
 def test_a_result_of_work_that_was_sent_back_meanwhile_is_not_kept(done: Workspace) -> None:
     with a_flow(done) as flow:
         store = flow.store
-        recording_id, _ = store.recordings.find("t2")
+        recording_id, _ = find_recording(store, "t2")
         test = store.tests.list_all(3)[-1]
         store.recordings.rerun(recording_id, Stage.UPDATED, flow.clock(), "t2")
         store.recordings.rerun(recording_id, Stage.IDENTIFIED, flow.clock())
         store.posteriors.save(test, store.posteriors.get(3, "t1"), test.lineage, flow.clock())
-        (row,) = store.tests.list_former(recording_id)
+        (row,) = list_former_tests(store, recording_id)
         assert len(row.posteriors) == 1

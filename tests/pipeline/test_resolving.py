@@ -11,14 +11,13 @@ import pytest
 
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
-from shm.pipeline.conditions import Evidence, why_over
-from shm.pipeline.reconcile import SHM, Condition, reconcile, tells
+from shm.pipeline.reconcile import SHM, Condition, reconcile
 from shm.report.hanger_status import Status
 from shm.store import Reconciled, Stage, StoredAlert, Workspace
-from shm.values import Alert, WatchedTest
+from shm.values import Alert
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
-from tests.helpers.nouns import NOW, a_change, a_drift, a_watched_test, an_alert
+from tests.helpers.nouns import NOW, a_change, a_drift, an_alert
 from tests.helpers.slow import few_of
 from tests.helpers.streams import a_reading
 from tests.helpers.workspaces import START, make_workspace, write_test
@@ -153,66 +152,6 @@ def test_a_loss_that_lasts_beyond_a_maintenance_window_is_told_once_at_the_first
     assert "Planned works lie in between (new pin)" in raised.message
 
 
-def why(told: Alert, tests: Sequence[WatchedTest], bridge: Workspace) -> str:
-    hanger = bridge.bridge.hangers[0]
-    return why_over(told, Evidence(hanger, tests, tests[-1].test, lambda _: False, ()))
-
-
-def later_test(day: float, probability: float, shift: float = -0.01) -> WatchedTest:
-    told = a_drift(f"d{day:g}")
-    drift = replace(told, shift_mean=shift, shift_sd=0.005, threshold=0.05, probability=probability)
-    test = a_watched_test(f"d{day:g}")
-    test = replace(test, time=NOW + timedelta(days=day), drifts=(drift,))
-    return replace(test, change=replace(test.change, outlier_probability=0.0))
-
-
-LOSS = replace(a_drift("t1"), shift_mean=-0.08, threshold=0.05)
-TOLD = Alert("k", 3, "t1", NOW, "fell", (LOSS,), ("beyond threshold",))
-
-
-@pytest.mark.parametrize(
-    ("probability", "is_over"), [(0.01, True), (0.6, False), (float("nan"), False)]
-)
-def test_a_shift_has_ended_below_half_the_level_and_never_where_that_is_unknown(
-    bridge: Workspace, probability: float, is_over: bool
-) -> None:
-    # Of two visits: one that is disturbed, by a van on the deck for one, must end nothing.
-    later = [later_test(1, 0.01), later_test(3, probability)]
-    assert bool(why(TOLD, later, bridge)) is is_over
-    assert not why(replace(TOLD, time=NOW + timedelta(days=2)), later, bridge)
-    assert not why(replace(TOLD, drifts=()), later, bridge)
-
-
-@pytest.mark.parametrize(
-    ("tests", "is_over"),
-    [
-        ([(1, 0.01)], False),
-        ([(1, 0.01), (1.2, 0.01), (1.4, 0.01)], False),  # all of one visit
-        ([(1, 0.01), (3, 0.01)], True),
-        ([(1, 0.01), (3, 0.9), (5, 0.01)], False),  # the one between contradicts
-        ([(1, 0.01), (3, 0.01), (5, 0.9)], False),
-        ([(1, 0.9), (3, 0.01), (5, 0.01)], True),
-    ],
-)
-def test_an_alert_ends_by_two_visits_that_agree_and_no_test_after_the_first_differs(
-    bridge: Workspace, tests: Sequence[tuple[float, float]], is_over: bool
-) -> None:
-    later = [later_test(day, probability) for day, probability in tests]
-    assert bool(why(TOLD, later, bridge)) is is_over
-
-
-def test_a_loss_that_is_still_there_below_the_threshold_has_not_ended(bridge: Workspace) -> None:
-    later = [later_test(day, 0.01, shift=-0.045) for day in (1, 3, 5)]
-    assert not why(TOLD, later, bridge)
-
-
-def test_a_test_that_agrees_with_none_before_it_ends_no_shift(bridge: Workspace) -> None:
-    later = [later_test(day, 0.01) for day in (1, 3)]
-    odd = replace(later[1], change=replace(later[1].change, outlier_probability=0.9))
-    assert why(TOLD, later, bridge)
-    assert not why(TOLD, [later[0], odd], bridge)
-
-
 RAMP = (
     (0, 1.0),
     (30, 1.0),
@@ -275,19 +214,6 @@ def test_a_resolved_alert_whose_change_two_visits_show_again_rings_anew(
     assert "of two visits, show it again" in again.alert.message
 
 
-@pytest.mark.slow
-def test_a_resolved_alert_of_a_change_that_is_gone_stays_so(bridge: Workspace) -> None:
-    postman = Postman()
-    for day in (0, 30, 60, 90, 120, 150, 180):
-        take(bridge, postman, day, 1.0 if day < 120 else 0.92)
-    with bridge.store() as store:
-        raised = store.alerts.list_all()[-1]
-        store.alerts.resolve(raised.id, "Ann", "a new pin", START + timedelta(days=185))
-    for day in (210, 240, 270, 300, 330):
-        take(bridge, postman, day, 1.0)
-    assert not [key for _, key in postman.told if ":again-" in key]
-
-
 def test_that_a_test_is_to_be_repeated_ends_with_one_that_does_not_show_the_same(
     bridge: Workspace,
 ) -> None:
@@ -304,20 +230,3 @@ def test_that_a_test_is_to_be_repeated_ends_with_one_that_does_not_show_the_same
     with bridge.store() as store:
         assert store.alerts.list_all()[0].resolution is not None
         assert hanger_summaries(bridge, store, utc_now())[0].status is Status.STEADY
-
-
-def test_a_loss_that_a_test_done_again_calls_by_another_rule_is_told_already() -> None:
-    told = replace(
-        an_alert("a", "t2"),
-        drifts=(a_drift(),),
-        kinds=("beyond threshold", "sudden change"),
-        change=a_change(),
-    )
-    later = replace(told, key="b", time=told.time + timedelta(days=9))
-    assert tells([told], replace(later, kinds=("sudden change",)))
-    assert tells([told], replace(later, kinds=("beyond threshold",)))
-    assert tells([told], later)
-    # What is new: that it is beyond its threshold; or a change that began after the first.
-    assert not tells([replace(told, kinds=("sudden change",))], later)
-    began = replace(a_change(), began_by=told.time + timedelta(days=2))
-    assert not tells([told], replace(later, kinds=("sudden change",), change=began))

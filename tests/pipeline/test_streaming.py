@@ -20,12 +20,13 @@ from shm.pipeline.streaming import Streaming
 from shm.read.chunk_document import chunk_document
 from shm.simulate.ambient import streamed
 from shm.store import Store, Workspace
+from shm.store.queries.streams import list_pooled, list_windows, load_stream_watch
 from shm.store.ring import ring_of
 from shm.store.stored_streams import Streams
 from shm.values.stream import PooledReading
+from shm.watch.kept_state import to_bytes
 from shm.watch.stream_reading import ModeTable
-from shm.watch.stream_state import StreamState
-from shm.watch.stream_watch import StreamWatched
+from shm.watch.stream_watch import StreamState, StreamWatched
 from tests.helpers.flows import Clock
 from tests.helpers.live_streams import CALM, FIRST, HOUR, drain, send, with_live_streams
 from tests.helpers.workspaces import make_workspace
@@ -47,9 +48,7 @@ def at_work(workspace: Workspace, clock: Clock) -> Iterator[tuple[Streaming, Sto
 
 
 def hours_of(store: Store, period: str = "hour") -> tuple[PooledReading, ...]:
-    return store.streams.list_pooled(
-        3, period, FIRST - timedelta(days=2), FIRST + timedelta(days=9)
-    )
+    return list_pooled(store, 3, period, FIRST - timedelta(days=2), FIRST + timedelta(days=9))
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +64,7 @@ def two_hours(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 def test_chunks_become_windows_hours_and_a_day_in_the_spool(two_hours: Workspace) -> None:
     with two_hours.store() as store:
-        windows = store.streams.list_windows(3, FIRST, FIRST + 2 * HOUR)
+        windows = list_windows(store, 3, FIRST, FIRST + 2 * HOUR)
         assert [each.window.start for each in windows] == [
             FIRST + n * timedelta(minutes=10) for n in range(12)
         ]
@@ -106,7 +105,7 @@ def test_what_was_begun_and_not_kept_is_done_by_whoever_comes_next(workspace: Wo
         streaming.advance()  # begins the first window, and is gone
     with at_work(workspace, clock) as (streaming, store):
         drain(streaming, clock)
-        assert len(store.streams.list_windows(3, FIRST, FIRST + HOUR)) == 6
+        assert len(list_windows(store, 3, FIRST, FIRST + HOUR)) == 6
         assert len(hours_of(store)) == 1
 
 
@@ -137,10 +136,10 @@ def test_ten_minutes_of_which_more_comes_later_are_read_anew(workspace: Workspac
         ring.append(chunk_document(chunk))
     with at_work(workspace, clock) as (streaming, store):
         drain(streaming, clock)
-        assert len(store.streams.list_windows(3, FIRST, FIRST + HOUR)) == 5
+        assert len(list_windows(store, 3, FIRST, FIRST + HOUR)) == 5
         ring.append(chunk_document(chunks[2]))
         drain(streaming, clock)
-        assert len(store.streams.list_windows(3, FIRST, FIRST + HOUR)) == 6
+        assert len(list_windows(store, 3, FIRST, FIRST + HOUR)) == 6
 
 
 def test_a_step_that_fails_is_said_in_its_window_and_the_stream_goes_on(
@@ -158,7 +157,7 @@ def test_a_step_that_fails_is_said_in_its_window_and_the_stream_goes_on(
     clock = Clock(FIRST + timedelta(days=1))
     with at_work(workspace, clock) as (streaming, store):
         drain(streaming, clock)
-        windows = store.streams.list_windows(3, FIRST, FIRST + HOUR)
+        windows = list_windows(store, 3, FIRST, FIRST + HOUR)
     assert [each.window.kind == "unusable" for each in windows] == [False] * 2 + [True] + [
         False
     ] * 3
@@ -186,31 +185,12 @@ def test_advance_storing_raises(
             with pytest.raises(StoreBusy):
                 drain(streaming, clock)
         drain(streaming, clock)
-        windows = store.streams.list_windows(3, FIRST, FIRST + HOUR)
+        windows = list_windows(store, 3, FIRST, FIRST + HOUR)
         unread = [each for each in windows if "not a number" in each.why]
         assert len(windows) == 6
         given_up = isinstance(error, ValueError)
         assert len(unread) == (given_up and place == "save_window")
         assert len(hours_of(store)) == 1 - (given_up and place == "save_pooled")
-
-
-def test_advance_without_memory(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ten minutes that could not be read for want of memory are read a minute later."""
-    read, failures = stream_steps.read_stream_window, [MemoryError()]
-
-    def fail_once(*args: Any) -> Any:
-        if failures:
-            raise failures.pop()
-        return read(*args)
-
-    monkeypatch.setattr(stream_steps, "read_stream_window", fail_once)
-    send(workspace, 1)
-    clock = Clock(FIRST + timedelta(days=1))
-    with at_work(workspace, clock) as (streaming, store):
-        drain(streaming, clock)
-        clock.pass_by(61)
-        drain(streaming, clock)
-        assert len(store.streams.list_windows(3, FIRST, FIRST + HOUR)) == 6
 
 
 def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
@@ -224,7 +204,7 @@ def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
         at = reading.start + HOUR
         alert = Alert("hanger-3:sudden-change:x", 3, "hanger03-x", at, "Hanger 3 lost 3 %.", ())
         nonlocal state
-        state = StreamState.begun("", at, ModeTable.of(None, hanger, reading.modes)).to_bytes()
+        state = to_bytes(StreamState.begun("", at, ModeTable.of(None, hanger, reading.modes)))
         return StreamWatched(state, -0.03, 1e-3, -0.03, 1e-3, None, alert, (), (), "")
 
     monkeypatch.setattr(stream_steps, "watch_reading", alarmed)
@@ -234,7 +214,7 @@ def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
         drain(streaming, clock)
         assert [each.alert.key for each in store.alerts.list_all()] == ["hanger-3:sudden-change:x"]
         assert hours_of(store)[0].tension_shift == -0.03
-        kept = store.streams.watch(3)
+        kept = load_stream_watch(store, 3)
         assert kept is not None
         assert kept.content == state
     assert len(list((workspace.folder / "ring").glob("*/kept/*.json"))) == 2

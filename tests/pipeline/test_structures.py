@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from shm.bridge import load_bridge
 from shm.errors import BadInput
 from shm.pipeline import steps
 from shm.store import Workspace
@@ -73,34 +72,6 @@ def test_the_watch_of_a_deck_goes_on_from_what_it_kept(
         ingest(workspace)
 
     assert seen == [1] * 4  # three made the baseline; each other one alone
-
-
-def test_a_deck_has_a_number_that_no_hanger_has(tmp_path: Path, workspace: Workspace) -> None:
-    config = workspace.folder / "bridge.toml"
-    config.write_text(f"{config.read_text()}\n[[structure]]\nid = 3\n")
-
-    with pytest.raises(BadInput, match="hanger id 3 is given twice"):
-        load_bridge(config)
-
-
-@pytest.mark.parametrize("line", ["length_m = 12.0", 'kind = "rod"'])
-def test_a_structure_has_no_other_keys(workspace: Workspace, line: str) -> None:
-    config = workspace.folder / "bridge.toml"
-    config.write_text(f"{config.read_text()}{line}\n")
-
-    with pytest.raises(BadInput, match="structure"):
-        load_bridge(config)
-
-
-def test_a_hanger_of_any_kind_is_sent_to_the_structures(workspace: Workspace) -> None:
-    config = workspace.folder / "bridge.toml"
-    described = config.read_text().replace("length_m = 12.0", 'length_m = 12.0\nkind = "any"')
-    config.write_text(described)
-
-    with pytest.raises(BadInput) as refused:
-        load_bridge(config)
-
-    assert "[[structure]]" in refused.value.remedy
 
 
 def test_what_asks_for_a_tension_says_that_a_deck_has_none(workspace: Workspace) -> None:

@@ -154,28 +154,6 @@ def test_fifty_hangers_that_move_alike_are_one_message_that_lists_all(
     assert states(bridge, "mail") == {"delivered"}
 
 
-def test_a_single_alert_goes_as_it_is_once_no_other_came(
-    bridge: Workspace, clock: Clock, inbox: Inbox
-) -> None:
-    raise_on(bridge, clock, [7])
-    live(bridge, clock, inbox, 50.0, 10.0)
-    assert inbox.had == []
-    live(bridge, clock, inbox, 20.0, 10.0)
-    (told,) = inbox.of("mail")
-    assert (told.key, told.message, told.alerts) == ("hanger-7:h7-1", "Hanger 7: tension fell.", ())
-
-
-def test_what_moves_the_other_way_and_a_second_alert_of_a_hanger_are_other_messages(
-    bridge: Workspace, clock: Clock, inbox: Inbox
-) -> None:
-    raise_on(bridge, clock, [1, 2])
-    raise_on(bridge, clock, [3, 4], shift=0.08)
-    raise_on(bridge, clock, [1], day=2)
-    live(bridge, clock, inbox, 90.0, 30.0)
-    told = sorted(sorted(one.hanger for one in each.alerts) for each in inbox.of("mail"))
-    assert told == [[], [1, 2], [3, 4]]
-
-
 def test_alike_alerts_that_keep_coming_wait_for_five_windows_at_most(
     bridge: Workspace, clock: Clock, inbox: Inbox
 ) -> None:
@@ -229,19 +207,6 @@ def test_what_was_acknowledged_in_time_is_never_escalated(
     assert states(bridge, "boss") == {"not needed"}
 
 
-def test_escalation_counts_from_the_end_of_a_silence(
-    bridge: Workspace, clock: Clock, inbox: Inbox
-) -> None:
-    _silence(bridge, clock, 7, 0.0, 2 * HOUR)
-    raise_on(bridge, clock, [7])
-    live(bridge, clock, inbox, 3 * HOUR - 600.0, 600.0)
-    live(bridge, clock, inbox, 540.0, 60.0)
-    assert len(inbox.of("mail")) == 1
-    assert inbox.of("boss") == []
-    live(bridge, clock, inbox, 120.0, 30.0)
-    assert len(inbox.of("boss")) == 1
-
-
 # ---------------------------------------------------------------- quiet hours
 
 
@@ -289,23 +254,6 @@ def test_in_quiet_hours_what_is_urgent_goes_and_the_rest_goes_grouped_at_their_e
     assert [one.hanger for one in inbox.of("boss")[1].alerts] == [1, 2]
 
 
-def test_a_failed_attempt_at_what_is_not_urgent_is_not_repeated_in_quiet_hours(
-    quiet: Workspace, clock: Clock, inbox: Inbox
-) -> None:
-    clock.pass_by(8 * HOUR - 62.0)
-    raise_on(quiet, clock, [1])
-    raise_on(quiet, clock, [3], action="Repeat the hammer test today.", shift=0.08)
-    inbox.failures = 2
-    clock.pass_by(61.0)  # a second before ten
-    look(quiet, clock, inbox)
-    assert {each.hanger for each in inbox.of("mail")} == {1, 3}
-    live(quiet, clock, inbox, 60.0, 10.0)
-    assert [each.hanger for each in inbox.of("mail")][2:] == [3]
-    clock.pass_by(8 * HOUR)
-    look(quiet, clock, inbox)
-    assert [each.hanger for each in inbox.of("mail")][3:] == [1]
-
-
 def test_lists_status_and_page_say_until_when_a_delivery_waits(
     bridge: Workspace, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -337,28 +285,6 @@ def _silence(
     period = (at + timedelta(seconds=begins), at + timedelta(seconds=ends))
     with workspace.store() as store:
         return store.silences.make(hanger, period, "Ann", "new pin", at, is_maintenance=works)
-
-
-@pytest.mark.parametrize("hanger", [7, None])
-def test_a_silence_made_ahead_holds_the_message_back_until_its_end(
-    bridge: Workspace, clock: Clock, inbox: Inbox, hanger: int | None
-) -> None:
-    _silence(bridge, clock, hanger, 100.0, 1000.0)
-    clock.pass_by(200.0)
-    raise_on(bridge, clock, [7])
-    live(bridge, clock, inbox, 780.0, 60.0)
-    assert inbox.had == []
-    live(bridge, clock, inbox, 120.0, 30.0)
-    assert [each.hanger for each in inbox.of("mail")] == [7]
-
-
-def test_a_silence_of_one_hanger_leaves_the_others_alone(
-    bridge: Workspace, clock: Clock, inbox: Inbox
-) -> None:
-    _silence(bridge, clock, 7, 0.0, 1000.0)
-    raise_on(bridge, clock, [7, 8])
-    live(bridge, clock, inbox, 90.0, 30.0)
-    assert [each.hanger for each in inbox.of("mail")] == [8]
 
 
 def test_what_is_acknowledged_or_resolved_in_a_silence_is_told_to_nobody(
@@ -402,12 +328,6 @@ def test_silences_one_after_the_other_are_one(bridge: Workspace, clock: Clock) -
     assert silenced_until(found, 8, clock()) is None
 
 
-def test_a_silence_needs_an_end_that_is_yet_to_come(bridge: Workspace, clock: Clock) -> None:
-    for begins, ends in ((0.0, 0.0), (50.0, 40.0), (-50.0, -40.0)):
-        with pytest.raises(UsageError, match="must end"):
-            _silence(bridge, clock, 7, begins, ends)
-
-
 # ---------------------------------------------------------------- resolutions
 
 
@@ -426,33 +346,6 @@ def test_who_was_told_of_an_alert_is_told_once_that_it_is_resolved(
     assert (resolved.key, resolved.kinds) == (f"{raised.key}:resolved", ("resolved",))
     assert resolved.message.startswith("Hanger 7: alert 1 is resolved. No action is needed.")
     assert inbox.of("boss") == []
-
-
-def test_a_hook_that_had_the_alert_late_hears_of_its_end_all_the_same(
-    bridge: Workspace, clock: Clock, inbox: Inbox
-) -> None:
-    raise_on(bridge, clock, [7])
-    inbox.failures = 1
-    clock.pass_by(61.0)
-    look(bridge, clock, inbox)
-    with bridge.store() as store:
-        store.alerts.resolve(1, "Ann", "pin replaced", clock())
-    live(bridge, clock, inbox, 180.0, 20.0)
-    keys = [each.key for each in inbox.of("mail")]
-    assert keys == ["hanger-7:h7-1", "hanger-7:h7-1", "hanger-7:h7-1:resolved"]
-
-
-@pytest.mark.slow
-def test_fifty_resolutions_are_one_message(bridge: Workspace, clock: Clock, inbox: Inbox) -> None:
-    raise_on(bridge, clock, HANGERS)
-    live(bridge, clock, inbox, 90.0, 30.0)
-    with bridge.store() as store:
-        for alert in store.alerts.list_all():
-            store.alerts.resolve(alert.id, "Ann", "the scaffold is gone", clock())
-    live(bridge, clock, inbox, 90.0, 30.0)
-    raised, resolved = inbox.of("mail")
-    assert resolved.key == f"{raised.key}:resolved"
-    assert {each.kinds for each in resolved.alerts} == {("resolved",)}
 
 
 # ---------------------------------------------------------------- planned works

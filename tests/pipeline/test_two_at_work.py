@@ -13,6 +13,8 @@ import pytest
 
 from shm.pipeline import Flow, steps
 from shm.store import DeliveryState, Stage, Workspace
+from shm.store.queries.history import list_events, list_steps
+from shm.store.queries.recordings import list_recordings
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all, tension_kn
 from tests.helpers.workspaces import make_workspace, put, write_loss, write_test
 
@@ -35,14 +37,14 @@ def outcome(workspace: Workspace) -> object:
     with workspace.store() as store:
         return (
             [
-                [step.stage for step in store.journal.list_steps(each.id)]
-                for each in store.recordings.list_all()
+                [step.stage for step in list_steps(store, each.id)]
+                for each in list_recordings(store)
             ],
             tension_kn(store),
             len(store.watch.list_drifts(3)),
             [stored.alert.key for stored in store.alerts.list_all()],
             [(delivery.hook, delivery.state) for delivery in store.alerts.list_deliveries()],
-            Counter(event.kind for event in store.journal.list_events()),
+            Counter(event.kind for event in list_events(store)),
         )
 
 
@@ -83,6 +85,6 @@ def test_what_another_has_done_is_not_refused_for_failing_here(
             assert begun(failing)
         able.drain()
         failing.drain()
-        (recording,) = able.store.recordings.list_all()
+        (recording,) = list_recordings(able.store)
     assert recording.stage is Stage.DONE
     assert list(workspace.quarantine.folder.iterdir()) == []

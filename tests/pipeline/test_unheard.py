@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -17,12 +16,12 @@ from shm.pipeline.unheard import (
     compare_thermometers,
     heard,
     heed_silences,
-    leads_of,
     note_blindness,
     word_of,
 )
 from shm.read.chunk_document import chunk_document
 from shm.report.hanger_status import Status
+from shm.store.queries.streams import list_stream_events
 from shm.store.ring import ring_of
 from shm.values.stream import StreamEvent
 from tests.helpers.live_streams import send, with_live_streams
@@ -50,35 +49,6 @@ def an_event(kind: str, end: datetime) -> StreamEvent:
 )
 def test_a_stream_is_in_one_state(ago: timedelta, kind: str, state: State) -> None:
     assert word_of(NOW - ago, [an_event(kind, NOW - ago)], NOW) == state
-
-
-def test_word_of_channel_without_modes() -> None:
-    event = replace(an_event("lost modes", NOW), channel="acc_1")
-    assert word_of(NOW, [event], NOW) == "sensor at fault"
-    assert word_of(NOW, [event, an_event("lost modes", NOW)], NOW) == "sees nothing"
-
-
-def test_each_state_that_asks_for_a_person_is_told_once_with_its_remedy() -> None:
-    found = [
-        Heard(STREAM, "silent", NOW),
-        Heard(replace(STREAM, name="h4"), "silent", NOW - HOUR),
-        Heard(replace(STREAM, name="h5"), "never sent", None),
-        Heard(replace(STREAM, name="h6"), "late", NOW),
-    ]
-    never, silent = leads_of(found)
-    assert never.words == "Stream h5: never sent. Connect the logger: docs/permanent_sensors.md."
-    assert silent.state == (
-        "Streams h3 (last sample 2026-05-01 12:00 UTC) and h4 (last sample 2026-05-01 11:00 UTC): "
-        "silent."
-    )
-
-
-@pytest.mark.parametrize(
-    ("state", "said"),
-    [("silent", True), ("sees nothing", True), ("late", False), ("clock ahead", False)],
-)
-def test_a_hanger_is_blind_whose_stream_says_nothing(state: State, said: bool) -> None:
-    assert (3 in blind_hangers([Heard(STREAM, state, NOW)])) is said
 
 
 def test_of_a_hanger_whose_stream_is_silent_nobody_says_that_nothing_needs_doing(
@@ -118,20 +88,6 @@ def test_a_silence_of_a_day_is_one_alert_which_ends_with_it(tmp_path: Path) -> N
         (over,) = store.alerts.list_all()
         assert over.resolution is not None
         assert over.resolution.why == "stream hanger03 sends again"
-
-
-def test_heed_silences_after_ring_is_empty(tmp_path: Path) -> None:
-    """Whether a sweep or a restore emptied it: the stream did not send again."""
-    workspace = with_live_streams(make_workspace(tmp_path / "bridge"))
-    send(workspace, hours=1 / 6, first=NOW)
-    with workspace.store() as store:
-        window = replace(a_window().window, stream="hanger03")
-        store.streams.save_window(replace(a_window(), window=window))
-        for later in (2, 40):
-            heed_silences(workspace, store, NOW + timedelta(days=later))
-            (raised,) = store.alerts.list_all()
-            assert raised.resolution is None
-            shutil.rmtree(workspace.folder / "ring", ignore_errors=True)
 
 
 def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(
@@ -182,7 +138,7 @@ def test_a_thermometer_unlike_that_of_another_stream_is_noted(tmp_path: Path) ->
                     replace(reading, temperature_c=reading.temperature_c + off_k)
                 )
         compare_thermometers(workspace, store, NOW + 24 * HOUR)
-        told = {each.stream: each.detail for each in store.streams.list_events(None, NOW)}
+        told = {each.stream: each.detail for each in list_stream_events(store, None, NOW)}
     assert set(told) == {one, other}
     assert told[other].startswith("temperature_c is -8.0 K off that of another stream over a day")
 
@@ -198,7 +154,7 @@ def test_a_stream_of_noise_is_noted_by_its_windows_and_said_to_see_nothing(tmp_p
             )
         for n in (40, 41):
             note_blindness(store, STREAM, a_window(10 * n).window.start)
-        (event,) = store.streams.list_events("h3", NOW)
+        (event,) = list_stream_events(store, "h3", NOW)
         ring_of(workspace).append(chunk_document(a_chunk(0, event.end - timedelta(seconds=5))))
         (found,) = heard(workspace, store, event.end)
         assert found.state == "sees nothing"

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np
 
 from shm.store import Adoption, HeldTest, IdentifiedTest, Judged, Lineage, Stage, Store
-from shm.store.people import Role
+from shm.store.rows import Role
 from shm.store.tables import SCHEMA
 from shm.values import Doubt, Fingerprint, Selection
 from shm.values.notes import NoteKind

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import sqlite3
-from dataclasses import replace
 from datetime import datetime, timedelta
 
 import pytest
 import sqlalchemy as sa
 
-from shm.errors import NothingThere, StoreBusy, UsageError
+from shm.errors import StoreBusy, UsageError
 from shm.store import (
-    Acknowledgement,
     Adoption,
     Baseline,
     IdentifiedTest,
     Lineage,
-    Resolution,
     Store,
     StoredTest,
 )
@@ -80,22 +77,6 @@ def adopted(store: Store, first: StoredTest) -> int:
 # ---------------------------------------------------------------- alerts
 
 
-def test_an_alert_is_open_until_somebody_takes_note(
-    store: Store, watched: list[StoredTest]
-) -> None:
-    (raised,) = store.alerts.list_all()
-    assert raised.acknowledgement is None
-    noted = store.alerts.acknowledge(raised.id, "Jansen", "pin replaced", LATER)
-    assert noted.acknowledgement == Acknowledgement(raised.id, "Jansen", "pin replaced", LATER)
-    assert store.alerts.list_all() == store.alerts.list_all(3) == (noted,)
-    assert noted.alert == raised.alert
-
-
-def test_taking_note_stops_no_delivery(store: Store, watched: list[StoredTest]) -> None:
-    store.alerts.acknowledge(1, "Jansen", "pin replaced", LATER)
-    assert [each.hook for each in store.alerts.list_due_deliveries(LATER, 10)] == ["mail"]
-
-
 def test_an_alert_is_acknowledged_once(store: Store, watched: list[StoredTest]) -> None:
     store.alerts.acknowledge(1, "Jansen", "pin replaced", LATER)
     with pytest.raises(UsageError, match="by Jansen on 2026-05-31 already"):
@@ -103,11 +84,6 @@ def test_an_alert_is_acknowledged_once(store: Store, watched: list[StoredTest]) 
     (stored,) = store.alerts.list_all()
     assert stored.acknowledgement is not None
     assert stored.acknowledgement.who == "Jansen"
-
-
-def test_an_unknown_alert_is_said_to_be_so(store: Store, watched: list[StoredTest]) -> None:
-    with pytest.raises(NothingThere, match="no alert 7"):
-        store.alerts.acknowledge(7, "Jansen", "pin replaced", LATER)
 
 
 # ---------------------------------------------------------------- baselines
@@ -122,47 +98,6 @@ def test_a_baseline_set_anew_is_in_force_with_who_when_why_and_since(
         "engineer", "new pin", watched[2].time, LATER,
     )  # fmt: skip
     assert found.posterior.tests == ("t2", "t3")
-
-
-def test_what_was_compared_with_the_old_baseline_stays(
-    store: Store, watched: list[StoredTest]
-) -> None:
-    drifts, (alert,) = store.watch.list_drifts(3), store.alerts.list_all(3)
-    anew(store, watched[2:])
-    assert store.watch.list_drifts(3) == drifts
-    resolution = Resolution(alert.id, "engineer", "new baseline: new pin", LATER)
-    assert store.alerts.list_all(3) == (replace(alert, resolution=resolution),)
-
-
-def test_the_tests_of_a_baseline_set_anew_keep_their_own_posteriors(
-    store: Store, watched: list[StoredTest]
-) -> None:
-    before = [posterior.tests for _, posterior in store.posteriors.history(3)]
-    anew(store, watched[2:])
-    assert [posterior.tests for _, posterior in store.posteriors.history(3)] == before
-    assert (
-        store.posteriors.get(3).tests
-        == store.posteriors.get(3, watched[3].test.id).tests
-        == ("t3",)
-    )
-    assert len(store.posteriors.list_all(3)) == 4
-
-
-def test_a_test_of_before_that_day_belongs_to_the_baseline_before(
-    store: Store, watched: list[StoredTest]
-) -> None:
-    first = baseline(store)
-    made = anew(store, watched[2:])
-    assert baseline(store, watched[1].time).id == first.id
-    assert baseline(store, watched[2].time).id == baseline(store, LATER).id == made.id
-
-
-def test_of_two_baselines_set_anew_the_later_one_holds(
-    store: Store, watched: list[StoredTest]
-) -> None:
-    anew(store, watched[1:])
-    second = anew(store, watched[3:])
-    assert baseline(store).id == second.id
 
 
 def test_a_baseline_computed_while_another_came_in_is_refused_whole(

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import sqlite3
 from dataclasses import replace
-from datetime import timedelta
 
 import pytest
 import sqlalchemy as sa
 
-from shm.errors import NothingThere, StoreBusy, UsageError
-from shm.store import Adoption, Baseline, IdentifiedTest, Lineage, Stage, Store, StoredAdoption
+from shm.errors import StoreBusy
+from shm.store import Adoption, Baseline, IdentifiedTest, Lineage, Store, StoredAdoption
+from shm.store.queries.hangers import list_adoptions, list_selected_models
+from shm.store.queries.trends import list_history
 from shm.store.tables import adoptions, baselines, posteriors, selections
 from shm.values import Selection
-from tests.helpers.comparing import assert_same
-from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.nouns import NOW, a_file, a_posterior, a_test
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
@@ -53,7 +52,7 @@ def baseline(store: Store, model: str | None = None) -> Baseline:
 
 
 def history(store: Store) -> list[tuple[str, str]]:
-    return [(test.test.id, posterior.model) for test, posterior in store.posteriors.history(3)]
+    return [(test.test.id, posterior.model) for test, posterior in list_history(store, 3)]
 
 
 def rows(store: Store) -> list[int]:
@@ -63,48 +62,6 @@ def rows(store: Store) -> list[int]:
             connection.execute(sa.select(count).select_from(table)).scalar_one()
             for table in (adoptions, posteriors, selections, baselines)
         ]
-
-
-def test_a_diagnosis_comes_back_as_it_was_and_the_newest_holds(store: Store) -> None:
-    assert store.posteriors.latest_diagnosis(3) is None
-    store.posteriors.save_diagnosis(3, a_diagnosis(("t0",)), LINEAGE, NOW)
-    later = NOW + timedelta(days=1)
-    made = store.posteriors.save_diagnosis(3, a_diagnosis(), LINEAGE, later)
-    found = store.posteriors.latest_diagnosis(3)
-    assert found is not None
-    assert_same(found.diagnosis, a_diagnosis())
-    assert (found.id, found.diagnosed_at, found.lineage) == (made.id, later, LINEAGE)
-    assert store.posteriors.latest_diagnosis(4) is None
-
-
-def test_an_adopted_class_is_in_force_with_a_baseline_of_the_same_tests(filled: Store) -> None:
-    made = adopted(filled)
-    assert filled.posteriors.selected_models() == {3: MASS}
-    found = baseline(filled)
-    assert (found.posterior.model, found.posterior.tests, found.who) == (MASS, ("t1",), "engineer")
-    assert found.why == f"adopted {MASS}: a lamp at 3.4 m"
-    assert filled.posteriors.list_adoptions(3) == (made,)
-    assert made.adoption.gap_percent == 0.6
-    assert history(filled) == [("t1", MASS), ("t2", "beam2")]
-
-
-def test_the_selection_on_record_stays_in_the_order_of_probability(filled: Store) -> None:
-    adopted(filled)
-    selection = filled.posteriors.selection(3)
-    assert selection is not None
-    assert selection.model == MASS
-    assert [each.model for each in selection.selection.posteriors] == ["beam2", MASS, "beam1"]
-    assert selection.selection.probabilities == (0.5, 0.3, 0.2)
-
-
-def test_a_test_updated_in_the_class_before_finds_the_baseline_of_that_class(
-    filled: Store,
-) -> None:
-    adopted(filled)
-    second = filled.tests.list_all(3)[1]
-    assert second.stage is Stage.UPDATED
-    assert filled.posteriors.get(3, second.test.id).model == "beam2"
-    assert baseline(filled, "beam2").posterior.model == "beam2"
 
 
 def test_dropping_an_adoption_restores_what_was_in_force(filled: Store) -> None:
@@ -120,31 +77,8 @@ def test_dropping_an_adoption_restores_what_was_in_force(filled: Store) -> None:
     assert (after.id, after.model) == (before.id, "beam2")
     assert baseline(filled).posterior.model == "beam2"
     assert history(filled) == [("t1", "beam2"), ("t2", "beam2")]
-    assert filled.posteriors.list_adoptions() == ()
-    assert filled.posteriors.list_adoptions(undone=True) == (dropped,)
-
-
-def test_of_two_adoptions_the_last_in_force_counts(filled: Store) -> None:
-    first, second = adopted(filled), adopted(filled, STIFF)
-    assert filled.posteriors.selected_models() == {3: STIFF}
-    filled.posteriors.drop_adoption(first.id, "no", "engineer", NOW)
-    assert filled.posteriors.selected_models() == {3: STIFF}
-    filled.posteriors.drop_adoption(second.id, "no", "engineer", NOW)
-    assert filled.posteriors.selected_models() == {3: "beam2"}
-    assert history(filled) == [("t1", "beam2"), ("t2", "beam2")]
-
-
-def test_what_was_dropped_can_be_adopted_again(filled: Store) -> None:
-    filled.posteriors.drop_adoption(adopted(filled).id, "no", "engineer", NOW)
-    again = adopted(filled, why="it is back")
-    assert filled.posteriors.list_adoptions() == (again,)
-    assert baseline(filled).why.endswith("it is back")
-
-
-def test_adopting_twice_is_refused(filled: Store) -> None:
-    adopted(filled)
-    with pytest.raises(UsageError, match="already"):
-        adopted(filled)
+    assert list_adoptions(filled) == ()
+    assert list_adoptions(filled, undone=True) == (dropped,)
 
 
 def test_an_adoption_computed_from_a_selection_no_longer_in_force_is_refused_whole(
@@ -154,7 +88,7 @@ def test_an_adoption_computed_from_a_selection_no_longer_in_force_is_refused_who
     assert before is not None
     adopted(filled)
     held = rows(filled)
-    made = replace(filled.posteriors.list_adoptions()[0].adoption, model=STIFF)
+    made = replace(list_adoptions(filled)[0].adoption, model=STIFF)
     late = (before, filled.tests.list_all(3)[:1])
     with pytest.raises(StoreBusy):
         filled.posteriors.adopt(made, a_posterior(STIFF), PROBABILITIES, late, LINEAGE, NOW)
@@ -180,16 +114,7 @@ def test_an_adoption_cut_short_leaves_nothing_behind(
             with pytest.raises(sqlite3.OperationalError):
                 adopted(filled)
         assert rows(filled) == held
-        assert filled.posteriors.selected_models() == {3: "beam2"}
-
-
-def test_dropping_what_is_not_there_says_so(filled: Store) -> None:
-    with pytest.raises(NothingThere, match="no adoption 7"):
-        filled.posteriors.drop_adoption(7, "no", "engineer", NOW)
-    made = adopted(filled)
-    filled.posteriors.drop_adoption(made.id, "no", "engineer", NOW)
-    with pytest.raises(UsageError, match="already"):
-        filled.posteriors.drop_adoption(made.id, "no", "engineer", NOW)
+        assert list_selected_models(filled) == {3: "beam2"}
 
 
 def test_a_name_of_two_effects_with_ranges_fits(filled: Store) -> None:
@@ -199,5 +124,5 @@ def test_a_name_of_two_effects_with_ranges_fits(filled: Store) -> None:
     )
     PROBABILITIES[long] = 0.9
     adopted(filled, long)
-    assert filled.posteriors.selected_models() == {3: long}
+    assert list_selected_models(filled) == {3: long}
     assert selections.c.model.type.length > len(long)  # type: ignore[attr-defined]

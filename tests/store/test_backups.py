@@ -13,6 +13,7 @@ from shm.errors import NothingThere, SchemaOutdated, StoreBusy, StoreError, Usag
 from shm.store import Store, backups, database
 from shm.store.backups import back_up, restore
 from shm.store.checking import check_store
+from shm.store.queries.recordings import count_stages
 from tests.helpers.contents import held, quiet
 from tests.helpers.nouns import NOW, a_file
 from tests.helpers.slow import few_of
@@ -38,7 +39,7 @@ def test_a_backup_is_consistent_while_others_write(
 ) -> None:
     monkeypatch.setattr(backups, "_PAGES_AT_ONCE", 1)
     fill(file_store)
-    before = file_store.recordings.stage_counts()
+    before = count_stages(file_store)
     numbers = iter(range(100, 200))
     told: list[float] = []
 
@@ -55,7 +56,7 @@ def test_a_backup_is_consistent_while_others_write(
     back_up(file_store, tmp_path / "backup.db", write_meanwhile)
     assert told == sorted(told)  # it did not begin anew
     with Store.open(tmp_path / "backup.db") as backup:
-        assert backup.recordings.stage_counts() == before
+        assert count_stages(backup) == before
         assert check_store(backup, quiet).troubles == ()
 
 

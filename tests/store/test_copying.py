@@ -14,6 +14,8 @@ from shm.errors import StoreError, UsageError
 from shm.store import Store, copying
 from shm.store.backups import copy_store
 from shm.store.checking import check_store
+from shm.store.queries.recordings import list_recordings
+from shm.store.queries.trends import list_history
 from shm.store.tables import posteriors
 from tests.helpers.contents import held, quiet
 from tests.helpers.nouns import NOW, a_file
@@ -29,12 +31,12 @@ def test_a_copy_holds_the_same_in_either_kind_and_is_numbered_on(
     with Store.open(empty) as copy:
         assert held(copy) == copied
         assert np.array_equal(latest_tension_n(copy), latest_tension_n(filled))
-        newest = copy.recordings.list_all()[-1].id
+        newest = list_recordings(copy)[-1].id
         assert copy.recordings.receive(a_file(9), NOW).recording.id == newest + 1
 
 
 def latest_tension_n(store: Store) -> np.ndarray:
-    return store.posteriors.history(3)[-1][1].tension_n
+    return list_history(store, 3)[-1][1].tension_n
 
 
 def test_a_copy_goes_only_into_an_empty_store(file_store: Store, empty: str | Path) -> None:

@@ -11,6 +11,8 @@ import sqlalchemy as sa
 
 from shm.errors import StoreBusy, StoreError
 from shm.store import Stage, Store, database
+from shm.store.queries.hangers import list_selected_models
+from shm.store.queries.recordings import count_stages, list_recordings
 from tests.helpers.nouns import NOW, a_file
 from tests.helpers.quick_stores import AS_SHIPPED
 
@@ -32,7 +34,7 @@ def test_many_writers_never_find_the_store_locked(store: Store) -> None:
     for thread in threads:
         thread.join()
     assert failures == []
-    assert store.recordings.stage_counts()[Stage.RECEIVED] == 100
+    assert count_stages(store)[Stage.RECEIVED] == 100
 
 
 def test_a_store_held_by_another_process_is_busy_and_says_when_to_return(
@@ -45,7 +47,7 @@ def test_a_store_held_by_another_process_is_busy_and_says_when_to_return(
         with pytest.raises(StoreBusy) as caught:
             store.recordings.receive(a_file(1), NOW)
         assert caught.value.retry_after_s == 1.0
-        assert store.recordings.list_all() == ()  # reading goes on meanwhile
+        assert list_recordings(store) == ()  # reading goes on meanwhile
         holder.execute("ROLLBACK")
         holder.close()
         store.recordings.receive(a_file(1), NOW)
@@ -79,7 +81,7 @@ def test_a_transaction_is_all_or_nothing(store: Store) -> None:
 
     with pytest.raises(RuntimeError):
         insert_and_fail()
-    assert store.posteriors.selected_models() == {}
+    assert list_selected_models(store) == {}
 
 
 def test_a_reference_to_nothing_is_refused(store: Store) -> None:

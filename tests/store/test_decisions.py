@@ -7,9 +7,12 @@ from datetime import timedelta
 
 import pytest
 
-from shm.errors import NothingThere, UsageError
+from shm.errors import UsageError
 from shm.store import Stage, Store
-from shm.store.list_rows import Decision
+from shm.store.queries.history import list_changes
+from shm.store.queries.judging import list_decisions
+from shm.store.queries.recordings import find_discard, list_holds
+from shm.store.rows import Decision
 from tests.helpers.nouns import NOW, a_watched_test
 
 DAY = timedelta(days=1)
@@ -38,67 +41,9 @@ def counting(store: Store, hanger: int) -> list[str]:
     return [each.test.id for each in store.tests.list_all(hanger)]
 
 
-def test_what_waits_for_a_decision_is_listed_by_hanger(store: Store) -> None:
-    (hold,) = store.recordings.list_holds()
-    assert (hold.recording_id, hold.decision) == (HELD, None)
-    assert [(each.name, each.position) for each in hold.tests] == [("t6", 0)]
-    assert store.recordings.list_holds(3) == ()
-    assert store.recordings.latest_hold(HELD) == hold
-    assert store.recordings.latest_hold(1) is None
-    confirmed = store.recordings.latest_hold(CONFIRMED)
-    assert confirmed is not None
-    assert (confirmed.decision, confirmed.who, confirmed.why) == (
-        Decision.CONFIRMED,
-        "engineer",
-        "battery was flat",
-    )
-    assert (confirmed.is_in, confirmed.is_out) == (True, False)
-    assert store.recordings.discard_in_force(CONFIRMED) is None
-
-
-def test_a_held_test_that_is_confirmed_counts_at_the_time_that_is_given(store: Store) -> None:
-    hold = store.recordings.accept(HELD, "Ada", "it was there", LATER, NOW + DAY)
-    assert (hold.decision, hold.who, hold.why, hold.time, hold.decided_at) == (
-        Decision.CONFIRMED, "Ada", "it was there", NOW + DAY, LATER,
-    )  # fmt: skip
-    assert stage(store, HELD) == Stage.IDENTIFIED
-    assert store.recordings.list_holds() == ()
-    (test,) = [each for each in store.tests.list_all(5) if each.test.id == "t6"]
-    assert test.test.time == test.time == NOW + DAY
-    with pytest.raises(UsageError, match="is not held: it was confirmed by Ada"):
-        store.recordings.accept(HELD, "Ben", "", LATER)
-
-
-def test_a_test_of_unknown_time_counts_from_its_receipt(store: Store) -> None:
-    store.recordings.accept(HELD, "Ada", "", LATER)
-    (test,) = [each for each in store.tests.list_all(5) if each.test.id == "t6"]
-    assert test.test.time is None
-    assert test.time == NOW
-
-
-def test_a_time_yet_to_come_is_refused_and_nothing_changes(store: Store) -> None:
-    with pytest.raises(UsageError, match="yet to come"):
-        store.recordings.accept(HELD, "Ada", "", LATER, LATER + DAY)
-    assert stage(store, HELD) == Stage.HELD
-    store.recordings.accept(HELD, "Ada", "", LATER, LATER)
-
-
-def test_what_counts_is_not_accepted(store: Store) -> None:
-    decide = store.recordings.accept
-    with pytest.raises(NothingThere, match="no recording 99"):
-        store.recordings.exclude(99, "Ada", "", LATER)
-    with pytest.raises(NothingThere, match="no recording 99"):
-        decide(99, "Ada", "", LATER)
-    with pytest.raises(UsageError, match="nothing of recording 2 is held"):
-        decide(WATCHED, "Ada", "", LATER)
-    with pytest.raises(UsageError, match="it was confirmed by engineer") as refused:
-        decide(CONFIRMED, "Ada", "", LATER)
-    assert "shm ingest --discard 5 --why TEXT" in str(refused.value)
-
-
 def test_what_is_discarded_says_who_and_why_and_how_to_take_it_back(store: Store) -> None:
     hold = store.recordings.exclude(HELD, "Ada", "a copy", LATER).hold
-    assert hold == store.recordings.discard_in_force(HELD)
+    assert hold == find_discard(store, HELD)
     assert (hold.decision, hold.is_in, hold.is_out) == (Decision.DISCARDED, False, True)
     recording = store.recordings.get(HELD)
     assert recording.stage == Stage.REFUSED
@@ -106,26 +51,10 @@ def test_what_is_discarded_says_who_and_why_and_how_to_take_it_back(store: Store
     assert recording.reason["message"] == "discarded on 2026-05-21 by Ada, because: a copy."
     assert "shm ingest --confirm 6 --why TEXT" in recording.reason["remedy"]
     assert counting(store, 5) == ["t5"]
-    assert store.recordings.list_holds() == ()
-    assert store.recordings.decisions(HELD, None) == {0: hold}
-    assert store.recordings.decisions(HELD, "other.toml") == {}
-    assert store.recordings.decisions(WATCHED, None) == {}
-
-
-def test_what_was_discarded_is_reinstated_as_it_would_have_been(store: Store) -> None:
-    store.recordings.exclude(HELD, "Ada", "a copy", LATER)
-    hold = store.recordings.accept(HELD, "Ben", "no copy", LATER + DAY, NOW + DAY)
-    assert (hold.decision, hold.who, hold.time) == (Decision.REINSTATED, "Ben", NOW + DAY)
-    assert hold.is_in
-    assert [(each.name, each.doubts[0].check) for each in hold.tests] == [("t6", "copy")]
-    recording = store.recordings.get(HELD)
-    assert (recording.stage, recording.reason) == (Stage.IDENTIFIED, None)
-    assert counting(store, 5) == ["t6", "t5"]  # in the order of their times
-    assert store.recordings.discard_in_force(HELD) is None
-    with pytest.raises(UsageError, match="nothing of recording 6 is held or discarded"):
-        store.recordings.accept(HELD, "Ben", "", LATER)
-    with pytest.raises(UsageError, match="nothing of recording 3 is held or discarded"):
-        store.recordings.accept(REFUSED, "Ben", "", LATER)
+    assert list_holds(store) == ()
+    assert list_decisions(store, HELD, None) == {0: hold}
+    assert list_decisions(store, HELD, "other.toml") == {}
+    assert list_decisions(store, WATCHED, None) == {}
 
 
 def test_what_is_withdrawn_counts_no_more_and_later_tests_are_watched_again(store: Store) -> None:
@@ -153,30 +82,10 @@ def test_what_is_withdrawn_counts_no_more_and_later_tests_are_watched_again(stor
         store.recordings.exclude(REFUSED, "Ada", "", LATER)
 
 
-def test_a_withdrawal_is_taken_back(store: Store) -> None:
-    store.recordings.exclude(WATCHED, "Ada", "", LATER)
-    hold = store.recordings.accept(WATCHED, "Ben", "it was right", LATER)
-    assert [each.name for each in hold.tests] == ["t2"]
-    assert counting(store, 3) == ["t1", "t2", "t4"]
-    assert stage(store, WATCHED) == Stage.IDENTIFIED
-    assert [each.decision for each in (hold, store.recordings.latest_hold(WATCHED)) if each] == [
-        Decision.REINSTATED
-    ] * 2
-
-
-def test_a_test_of_another_name_is_not_withdrawn(store: Store) -> None:
-    with pytest.raises(UsageError, match="does not count"):
-        store.recordings.exclude(WATCHED, "Ada", "", LATER, test="t1")
-    store.recordings.exclude(WATCHED, "Ada", "", LATER, test="t2")
-    with pytest.raises(UsageError, match="nothing of recording"):
-        store.recordings.accept(WATCHED, "Ada", "", LATER, test="t1")
-    assert store.recordings.accept(WATCHED, "Ada", "", LATER, test="t2").is_in
-
-
 def test_each_decision_is_noted_with_its_reason(store: Store) -> None:
     store.recordings.exclude(WATCHED, "Ada", "the wrong hanger", LATER)
     store.recordings.exclude(HELD, "Ada", "a copy", LATER)
-    newest = [(row.who, row.action, row.detail) for row in store.journal.list_changes(2)]
+    newest = [(row.who, row.action, row.detail) for row in list_changes(store, 2)]
     assert newest == [
         ("Ada", "recording discarded", "a copy"),
         ("Ada", "recording withdrawn", "t2: the wrong hanger"),

@@ -2,38 +2,16 @@
 
 from __future__ import annotations
 
-from datetime import timedelta
-
-import pytest
-
-from shm.errors import NothingThere
 from shm.store import IdentifiedTest, Judged, Lineage, Outcome, Stage, Store
+from shm.store.queries.history import list_events, list_former_tests, list_steps
+from shm.store.queries.recordings import (
+    is_waiting,
+    list_recordings,
+)
 from tests.helpers.nouns import NOW, a_file, a_test
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 REASON = {"message": "no sampling rate.", "remedy": "Give it.", "sha256": "1"}
-
-
-def test_a_received_file_is_entered_as_it_came(store: Store) -> None:
-    receipt = store.recordings.receive(a_file(1, sidecar_as="11/1.toml"), NOW)
-    assert receipt.outcome is Outcome.NEW
-    stored = store.recordings.get(receipt.recording.id)
-    assert stored == receipt.recording
-    assert stored.file == a_file(1, sidecar_as="11/1.toml")
-    assert (stored.received_at, stored.stage, stored.hanger) == (NOW, Stage.RECEIVED, None)
-    assert store.recordings.with_checksum(a_file(1).sha256) == stored
-    assert store.recordings.with_checksum("f" * 64) is None
-
-
-def test_the_same_bytes_dropped_again_are_noticed_and_not_entered(store: Store) -> None:
-    first = store.recordings.receive(a_file(1), NOW).recording
-    again = store.recordings.receive(a_file(1, file_name="copy.csv", arrival="other"), NOW)
-    assert again.outcome is Outcome.DUPLICATE
-    assert store.recordings.list_all() == (first,)
-    (event,) = store.journal.list_events("duplicate")
-    assert (event.file_name, event.recording_id) == ("copy.csv", first.id)
-    assert "h3-1.csv" in event.message
-    assert "sidecar" not in event.message
 
 
 def test_the_same_bytes_with_another_sidecar_are_done_again_with_that(store: Store) -> None:
@@ -46,35 +24,19 @@ def test_the_same_bytes_with_another_sidecar_are_done_again_with_that(store: Sto
     assert again.recording.file.sidecar_as == "22/2.toml"
     assert again.recording.stage is Stage.RECEIVED
     assert store.tests.list_all(3) == ()
-    assert len(store.tests.list_former(first)) == 1
-    assert "another sidecar" in store.journal.list_events("redescribed")[0].message
+    assert len(list_former_tests(store, first)) == 1
+    assert "another sidecar" in list_events(store, "redescribed")[0].message
     assert store.recordings.receive(described, NOW).outcome is Outcome.RESUMED
     late = Judged("11/1.toml")  # what was begun with the sidecar of before
     store.tests.save(first, found, LINEAGE, NOW, late)
     assert store.recordings.get(first).stage is Stage.RECEIVED
 
 
-def test_a_duplicate_without_a_sidecar_changes_nothing(store: Store) -> None:
-    store.recordings.receive(a_file(1, sidecar_as="11/1.toml"), NOW)
-    bare = store.recordings.receive(a_file(1, arrival="other"), NOW)
-    assert bare.outcome is Outcome.DUPLICATE
-    assert bare.recording.file.sidecar_as == "11/1.toml"
-
-
 def test_a_receipt_cut_short_by_a_crash_is_no_duplicate(store: Store) -> None:
     store.recordings.receive(a_file(1), NOW)
     assert store.recordings.receive(a_file(1), NOW).outcome is Outcome.RESUMED
-    assert store.journal.list_events() == ()
-    assert len(store.recordings.list_all()) == 1
-
-
-def test_a_refused_file_keeps_its_reason(store: Store) -> None:
-    recording = store.recordings.receive(a_file(1), NOW).recording
-    store.recordings.refuse(recording.id, REASON, NOW)
-    stored = store.recordings.get(recording.id)
-    assert stored.stage is Stage.REFUSED
-    assert stored.reason == REASON
-    assert store.journal.list_events("refused")[0].message == "no sampling rate."
+    assert list_events(store) == ()
+    assert len(list_recordings(store)) == 1
 
 
 def test_only_what_still_waits_at_a_stage_is_refused_from_there(store: Store) -> None:
@@ -84,18 +46,18 @@ def test_only_what_still_waits_at_a_stage_is_refused_from_there(store: Store) ->
     )
     for _ in range(2):
         store.recordings.refuse(first, REASON, NOW, stage=Stage.RECEIVED)
-    assert len(store.journal.list_events("refused")) == 1
-    assert [step.stage for step in store.journal.list_steps(first)].count(Stage.REFUSED) == 1
+    assert len(list_events(store, "refused")) == 1
+    assert [step.stage for step in list_steps(store, first)].count(Stage.REFUSED) == 1
     store.tests.save(second, [IdentifiedTest(a_test("t2"))], LINEAGE, NOW)
     (test,) = store.tests.list_all()
-    assert not store.recordings.is_waiting(second, Stage.RECEIVED)
+    assert not is_waiting(store, second, Stage.RECEIVED)
     store.recordings.refuse(second, REASON, NOW, stage=Stage.RECEIVED)
     store.recordings.refuse(second, REASON, NOW, [test.id], stage=Stage.UPDATED)
     assert store.recordings.get(second).stage is Stage.IDENTIFIED
-    assert store.recordings.is_waiting(second, Stage.IDENTIFIED, [test.id])
+    assert is_waiting(store, second, Stage.IDENTIFIED, [test.id])
     store.recordings.refuse(second, REASON, NOW, [test.id], stage=Stage.IDENTIFIED)
     assert store.recordings.get(second).stage is Stage.REFUSED
-    assert not store.recordings.is_waiting(second, Stage.IDENTIFIED, [test.id])
+    assert not is_waiting(store, second, Stage.IDENTIFIED, [test.id])
 
 
 def test_files_refused_together_each_end_with_their_own_tests(store: Store) -> None:
@@ -106,20 +68,8 @@ def test_files_refused_together_each_end_with_their_own_tests(store: Store) -> N
     for number in ids:
         store.recordings.refuse(number, REASON, NOW, tests, stage=Stage.IDENTIFIED)
     for number in ids:
-        stages = [step.stage for step in store.journal.list_steps(number)]
+        stages = [step.stage for step in list_steps(store, number)]
         assert stages.count(Stage.REFUSED) == 2  # the file and its test
-
-
-def test_a_refused_file_dropped_again_is_tried_again(store: Store) -> None:
-    recording = store.recordings.receive(a_file(1), NOW).recording
-    store.recordings.refuse(recording.id, REASON, NOW)
-    mended = a_file(1, arrival="later", sidecar_as="22/2.toml")
-    receipt = store.recordings.receive(mended, NOW + timedelta(days=1))
-    assert receipt.outcome is Outcome.REOPENED
-    assert receipt.recording.file == mended
-    assert receipt.recording.stage is Stage.RECEIVED
-    assert receipt.recording.reason is None
-    assert [event.kind for event in store.journal.list_events()] == ["refused", "reopened"]
 
 
 def test_the_spool_entry_of_a_refused_file_left_by_a_crash_is_not_tried_again(
@@ -142,34 +92,3 @@ def test_trying_again_drops_refused_tests_and_keeps_those_that_have_results(stor
     store.tests.save(recording.id, found, LINEAGE, NOW)
     assert [test.test.id for test in store.tests.list_all()] == ["good", "bad"]
     assert store.tests.list_all()[0].id == good.id
-
-
-def test_waiting_files_come_in_order_and_without_those_held_back(store: Store) -> None:
-    ids = [store.recordings.receive(a_file(number), NOW).recording.id for number in (1, 2, 3, 4)]
-    store.recordings.refuse(ids[0], REASON, NOW)
-    waiting = store.recordings.list_waiting(2, excluding=[ids[1]])
-    assert [recording.id for recording in waiting] == ids[2:]
-
-
-def test_every_stage_is_counted(store: Store) -> None:
-    ids = [store.recordings.receive(a_file(number), NOW).recording.id for number in (1, 2)]
-    store.recordings.refuse(ids[0], REASON, NOW)
-    counts = store.recordings.stage_counts()
-    assert counts == {**dict.fromkeys(Stage, 0), Stage.RECEIVED: 1, Stage.REFUSED: 1}
-    assert [recording.id for recording in store.recordings.list_all(Stage.REFUSED)] == ids[:1]
-
-
-def test_an_unknown_recording_is_nothing_there(store: Store) -> None:
-    with pytest.raises(NothingThere, match="no recording 9"):
-        store.recordings.get(9)
-
-
-def test_the_events_of_one_recording_or_name_are_read_alone(store: Store) -> None:
-    """Each refusal read all events of the store to find those of its own recording."""
-    for number in (1, 2):
-        for arrival in ("first", "again"):
-            store.recordings.receive(a_file(number, arrival=arrival), NOW)
-    assert len(store.journal.list_events("duplicate")) == 2
-    (own,) = store.journal.list_events("duplicate", recording_id=2)
-    assert own.recording_id == 2
-    assert [each.recording_id for each in store.journal.list_events(file_name="h3-1.csv")] == [1]

@@ -13,7 +13,6 @@ import sqlalchemy as sa
 from shm.errors import NothingThere
 from shm.store import (
     Baseline,
-    EventKind,
     IdentifiedTest,
     Lineage,
     Stage,
@@ -21,9 +20,15 @@ from shm.store import (
     StoredAlert,
     StoredTest,
     StoredWatch,
-    TestRow,
 )
 from shm.store.outbox import resolve
+from shm.store.queries.alerts import (
+    count_alerts,
+    count_open_alerts,
+    list_alert_page,
+)
+from shm.store.queries.hangers import find_latest_watches, list_detected_changes, list_detections
+from shm.store.queries.tests import list_test_rows
 from shm.values import Selection
 from tests.helpers.nouns import (
     NOW,
@@ -84,50 +89,11 @@ def latest_of_each(watches: tuple[StoredWatch, ...]) -> dict[int, int]:
     return {each.hanger: each.id for each in watches}
 
 
-def test_tests_are_listed_page_by_page_newest_first(store: Store) -> None:
-    for number in (1, 3, 2):
-        identified(store, number)
-    first = store.tests.list_rows(3, limit=2)
-    second = store.tests.list_rows(3, limit=2, before=first[-1].id)
-    assert [row.name for row in (*first, *second)] == ["t3", "t2", "t1"]
-    assert store.tests.list_rows(3, before=second[-1].id) == store.tests.list_rows(4) == ()
-    stored = store.tests.named(3, "t3")
-    assert (first[0].id, first[0].time, first[0].stage) == (stored.id, stored.time, stored.stage)
-
-
-def test_tests_at_one_time_are_on_one_page_each(file_store: Store) -> None:
-    recording = file_store.recordings.receive(a_file(1), NOW).recording
-    same = [IdentifiedTest(a_test(f"t{i}"), position=i) for i in range(5)]
-    file_store.tests.save(recording.id, same, LINEAGE, NOW)
-    seen: list[TestRow] = []
-    while page := file_store.tests.list_rows(3, 2, seen[-1].id if seen else None):
-        seen += page
-    assert [row.name for row in seen] == ["t4", "t3", "t2", "t1", "t0"]
-
-
-def test_a_test_is_found_by_its_name_and_what_is_beside_it(store: Store) -> None:
-    for number in (1, 2, 3):
-        identified(store, number)
-    identified(store, 4, hanger=5)
-    names = [store.tests.beside(store.tests.named(3, f"t{number}")) for number in (1, 2, 3)]
-    assert names == [(None, "t2"), ("t1", "t3"), ("t2", None)]
-
-
-def test_a_name_that_is_not_there_names_the_latest(file_store: Store) -> None:
-    for number in range(1, 6):
-        identified(file_store, number)
-    with pytest.raises(NothingThere, match="no test t9 of hanger 3") as caught:
-        file_store.tests.named(3, "t9")
-    assert caught.value.remedy == "The latest: t3, t4, t5."
-    with pytest.raises(NothingThere, match="none"):
-        file_store.tests.named(4, "t1")
-
-
 def test_what_was_superseded_or_refused_is_not_listed(file_store: Store) -> None:
     first, second = identified(file_store, 1), identified(file_store, 2)
     file_store.recordings.rerun(first.recording_id, Stage.IDENTIFIED, NOW)
     file_store.recordings.refuse(second.recording_id, {"message": "no."}, NOW, [second.id])
-    assert file_store.tests.list_rows(3) == ()
+    assert list_test_rows(file_store, 3) == ()
     with pytest.raises(NothingThere):
         file_store.tests.named(3, "t1")
 
@@ -139,7 +105,7 @@ def test_the_latest_watches_are_those_of_each_hanger_in_few_questions(store: Sto
             watched(store, baseline, 10 * hanger + number)
     expected = latest_of_each(store.watch.list_all())
     with questions(store) as asked:
-        found = store.watch.latest()
+        found = find_latest_watches(store)
     assert {hanger: each.id for hanger, each in found.items()} == expected
     assert found[3].watched.drifts == store.watch.list_all(3)[-1].watched.drifts != ()
     assert sum("SELECT" in text for text in asked) == 3
@@ -152,50 +118,11 @@ def test_a_watch_against_a_baseline_of_before_is_not_the_latest(file_store: Stor
     chosen = [file_store.tests.named(3, "t2")]
     posterior = a_posterior("beam1", ("t2",))
     file_store.watch.rebaseline(baseline, posterior, chosen, record, LINEAGE, NOW)
-    assert file_store.watch.latest() == {}
-    assert file_store.watch.list_detected(3, baseline_of(file_store).id) == ()
-    assert file_store.watch.detected_changes() == {}
-    told = file_store.watch.list_detected(3, baseline.id)
+    assert find_latest_watches(file_store) == {}
+    assert list_detections(file_store, 3, baseline_of(file_store).id) == ()
+    assert list_detected_changes(file_store) == {}
+    told = list_detections(file_store, 3, baseline.id)
     assert [each.watched.test for each in told] == ["t2"]
-
-
-def test_only_called_changes_are_listed_as_called(store: Store) -> None:
-    baseline = with_baseline(store)
-    for number, evidence_years in ((2, 1.0), (3, 350.0), (4, 400.0)):
-        watched(store, baseline, number, evidence_years)
-    other = with_baseline(store, 5, hanger=4)
-    watched(store, other, 6, 1.0)
-    called = [each for each in store.watch.list_all() if each.watched.change.called]
-    assert [each.watched.test for each in called] == ["t3", "t4"]
-    detected = store.watch.list_detected(3, baseline.id)
-    assert [each.id for each in detected] == [each.id for each in called]
-    assert store.watch.detected_changes() == {3: tuple(each.watched.change for each in called)}
-    assert not any(e.watched.change.called for e in store.watch.list_detected(4, other.id))
-
-
-def test_calls_and_the_latest_watch_tell_what_there_is_to_tell(store: Store) -> None:
-    baseline = with_baseline(store)
-    for number, evidence_years in ((2, 1.0), (3, 350.0), (4, 1.0), (5, 1.0)):
-        watched(store, baseline, number, evidence_years)
-    found = [(each.id, each.watched.test) for each in store.watch.list_detected(3, baseline.id)]
-    assert found == [(2, "t3"), (4, "t5")]
-    assert (
-        store.watch.list_detected(3, baseline.id)[-1].watched.drifts
-        == store.watch.list_drifts(3)[-1:]
-        != ()
-    )
-
-
-def test_open_alerts_are_counted_by_hanger(store: Store) -> None:
-    for hanger in (3, 4):
-        baseline = with_baseline(store, 10 * hanger, hanger)
-        for number in range(1, hanger):
-            watched(store, baseline, 10 * hanger + number)
-    assert store.alerts.open_counts() == {3: 2, 4: 3}
-    for alert in store.alerts.list_all(3):
-        store.alerts.acknowledge(alert.id, "engineer", "seen", NOW)
-    assert store.alerts.open_counts() == {4: 3}
-    assert store.alerts.counts() == (3, 2)
 
 
 def test_a_resolved_alert_is_open_no_more_whoever_took_note(store: Store) -> None:
@@ -204,13 +131,13 @@ def test_a_resolved_alert_is_open_no_more_whoever_took_note(store: Store) -> Non
         resolve(connection, 2, "shm", "two visits agree", NOW)
         resolve(connection, 6, "shm", "two visits agree", NOW + timedelta(days=2))
     store.alerts.acknowledge(3, "engineer", "seen", NOW + timedelta(days=1))
-    assert store.alerts.open_counts() == {3: 2, 4: 1}
-    assert store.alerts.counts() == (3, 1)
-    opened, others = (store.alerts.list_page(is_open=each) for each in (True, False))
+    assert count_open_alerts(store) == {3: 2, 4: 1}
+    assert count_alerts(store) == (3, 1)
+    opened, others = (list_alert_page(store, is_open=each) for each in (True, False))
     assert numbers(opened) == [5, 4, 1]
     assert numbers(others) == [6, 3, 2]
-    assert numbers(store.alerts.list_page(is_open=False, before=6)) == [3, 2]
-    assert numbers(store.alerts.list_page(is_open=False, before=3)) == [2]
+    assert numbers(list_alert_page(store, is_open=False, before=6)) == [3, 2]
+    assert numbers(list_alert_page(store, is_open=False, before=3)) == [2]
     assert [each.id for each in store.alerts.list_all() if each.is_open] == [1, 4, 5]
 
 
@@ -226,51 +153,12 @@ def numbers(rows: tuple[StoredAlert, ...]) -> list[int]:
     return [row.id for row in rows]
 
 
-def test_alerts_are_listed_page_by_page_newest_first(store: Store) -> None:
-    raise_alerts(store)
-    first = store.alerts.list_page(limit=4)
-    second = store.alerts.list_page(limit=4, before=first[-1].id)
-    assert numbers((*first, *second)) == [6, 5, 4, 3, 2, 1]
-    assert numbers(store.alerts.list_page()) == [6, 5, 4, 3, 2, 1]
-    assert numbers(store.alerts.list_page(3, limit=2)) == [4, 3]
-    assert store.alerts.list_page(5) == store.alerts.list_page(before=1) == ()
-
-
 def test_acknowledged_alerts_stand_in_the_order_in_which_they_were(store: Store) -> None:
     raise_alerts(store)
     for days, alert in enumerate((4, 1, 5)):
         store.alerts.acknowledge(alert, "engineer", "seen", NOW + timedelta(days=days))
-    assert numbers(store.alerts.list_page(is_open=True)) == [6, 3, 2]
-    assert numbers(store.alerts.list_page(3, is_open=True, before=3)) == [2]
-    assert numbers(store.alerts.list_page(is_open=False)) == [5, 1, 4]
-    assert numbers(store.alerts.list_page(is_open=False, limit=1, before=5)) == [1]
-    assert numbers(store.alerts.list_page(is_open=False, before=1)) == [4]
-
-
-def test_one_alert_is_read_with_who_was_told(store: Store) -> None:
-    raise_alerts(store)
-    noted = store.alerts.acknowledge(2, "engineer", "seen", NOW)
-    (delivery,) = (each for each in store.alerts.list_deliveries() if each.alert == noted.alert)
-    store.alerts.save_failure(delivery, "no power", NOW, NOW)
-    (owed,) = (each for each in store.alerts.list_deliveries() if each.alert == noted.alert)
-    assert store.alerts.get(2) == noted
-    assert noted in store.alerts.list_page(3)
-    assert store.alerts.list_deliveries(alert_ids=[2]) == (owed,)
-    assert (owed.attempts, owed.last_error) == (1, "no power")
-    with pytest.raises(NothingThere, match="no alert 9"):
-        store.alerts.get(9)
-
-
-def test_what_happened_to_a_hanger_stands_in_the_order_of_time(filled: Store) -> None:
-    happened = filled.alerts.list_hanger_events(3)
-    assert [event.at for event in happened] == sorted(event.at for event in happened)
-    kinds = sorted(event.kind for event in happened)
-    assert kinds == sorted([*[EventKind.BASELINE] * 3, *set(EventKind) - {EventKind.BASELINE}])
-    by_kind = {event.kind: event for event in happened}
-    dropped, noted = by_kind[EventKind.UNDONE], by_kind[EventKind.ACKNOWLEDGED]
-    assert (dropped.who, dropped.why) == ("engineer", "the lamp is gone")
-    assert (noted.who, noted.why) == ("engineer", "looked at the pin")
-    raised = by_kind[EventKind.ALERT]
-    assert (raised.who, raised.why) == ("", filled.alerts.list_all(3)[0].alert.message)
-    assert filled.alerts.list_hanger_events(4) == ()
-    assert filled.alerts.list_hanger_events(3, NOW + timedelta(days=400)) == ()
+    assert numbers(list_alert_page(store, is_open=True)) == [6, 3, 2]
+    assert numbers(list_alert_page(store, 3, is_open=True, before=3)) == [2]
+    assert numbers(list_alert_page(store, is_open=False)) == [5, 1, 4]
+    assert numbers(list_alert_page(store, is_open=False, limit=1, before=5)) == [1]
+    assert numbers(list_alert_page(store, is_open=False, before=1)) == [4]

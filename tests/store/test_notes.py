@@ -12,6 +12,7 @@ from PIL import Image
 from shm.errors import BadInput, NothingThere, ShmError, UsageError
 from shm.store import Store
 from shm.store.notes import LARGEST_PHOTO_BYTES
+from shm.store.queries.history import list_changes
 from shm.values.notes import NoteKind
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
@@ -29,23 +30,6 @@ def a_photo(kind: str, width: int = 40, height: int = 20) -> bytes:
     image.save(made, kind, exif=exif, comment=SECRET, xmp=SECRET, icc_profile=SECRET)
     assert SECRET in made.getvalue()
     return made.getvalue()
-
-
-def test_notes_of_a_hanger_and_the_bridge_are_listed_the_latest_event_first(store: Store) -> None:
-    store.notes.add(3, NOW - DAY, NoteKind.REPAIR, " new\0 pin\n ", "anna", NOW)
-    store.notes.add(None, NOW, NoteKind.INSPECTION, "storm", "ben", NOW)
-    store.notes.add(4, NOW, NoteKind.NOTE, "nest\udcff", "ben", NOW)
-    assert [each.text for each in store.notes.list_all(3)] == ["storm", "new pin"]
-    assert [each.of for each in store.notes.list_all()] == ["hanger 4", "the bridge", "hanger 3"]
-    assert [each.text for each in store.notes.list_all(4)] == ["nest?", "storm"]
-    pin = store.notes.list_all()[-1]
-    assert (pin.id, pin.at, pin.kind, pin.who) == (1, NOW - DAY, NoteKind.REPAIR, "anna")
-    (newest, *_) = store.journal.list_changes()
-    assert (newest.who, newest.action, newest.subject) == (
-        "ben",
-        "note written",
-        "note 3, hanger 4",
-    )
 
 
 @pytest.mark.parametrize("kind", ["JPEG", "PNG"])
@@ -91,6 +75,6 @@ def test_what_cannot_be_is_refused_and_leaves_nothing(
     with pytest.raises(error):
         file_store.notes.add(3, NOW + days * DAY, NoteKind.NOTE, text, "anna", NOW, photo)
     assert file_store.notes.list_all() == ()
-    assert file_store.journal.list_changes() == ()
+    assert list_changes(file_store) == ()
     with pytest.raises(NothingThere):
         file_store.notes.photo(1)

@@ -9,7 +9,8 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import DeliveryState, Reconciled, Store
-from shm.store.rows import News
+from shm.store.queries.alerts import count_deliveries
+from shm.store.queries.history import list_steps
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import a_reading
 
@@ -59,7 +60,7 @@ def test_messages_keep_the_deliveries_that_they_were_made_of(file_store: Store) 
     ]  # fmt: skip
     alerts.save_delivery(alerts.list_deliveries(messages=[1])[0], NOW + 7 * HOUR)
     assert [each[2] for each in states(file_store)] == [DELIVERED, DELIVERED, NOT_NEEDED]
-    counts = {state: n for state, n in alerts.delivery_counts().items() if n}
+    counts = {state: n for state, n in count_deliveries(file_store).items() if n}
     assert counts == {DELIVERED: 2, NOT_NEEDED: 1}
 
 
@@ -100,82 +101,11 @@ def test_what_was_given_up_is_owed_again_with_its_whole_message(file_store: Stor
     assert {each.next_attempt_at for each in again} == {NOW + HOUR}
 
 
-def test_who_was_told_of_an_alert_is_told_of_its_end_once(file_store: Store) -> None:
-    alerts = file_store.alerts
-    first = raised(file_store, 1, "mail", "sms")
-    mail, sms = alerts.list_deliveries()
-    alerts.save_delivery(mail, NOW)
-    ended = alerts.resolve(first, "Ada", "repaired", NOW + HOUR)
-    assert ended.resolution is not None
-    assert (ended.resolution.who, ended.resolution.why) == ("Ada", "repaired")
-    assert ended.acknowledgement is not None
-    assert ended.acknowledgement.who == "Ada"
-    owed = [(each.hook, each.news, each.state) for each in alerts.list_deliveries()]
-    assert owed[2:] == [("mail", News.RESOLVED, WAITING)]
-    alerts.save_delivery(sms, NOW + 2 * HOUR)
-    owed = [(each.hook, each.news) for each in alerts.list_deliveries()]
-    assert owed[2:] == [("mail", News.RESOLVED), ("sms", News.RESOLVED)]
-    with pytest.raises(UsageError, match=f"alert {first} is resolved already"):
-        alerts.resolve(first, "Ben", "", NOW)
-    assert alerts.list_all(standing=True) == ()
-    assert [each.id for each in alerts.list_all(standing=False)] == [first]
-
-
-def test_an_alert_of_a_key_is_raised_once(file_store: Store) -> None:
-    raised(file_store, 1, "mail")
-    again = Reconciled((replace(an_alert("hanger-3:1"), test=""),))
-    assert file_store.streams.save_pooled(a_reading(5), None, again, ("mail",), NOW) == ()
-    assert len(file_store.alerts.list_deliveries()) == 1
-
-
-def test_an_alert_that_was_acknowledged_keeps_who_did(file_store: Store) -> None:
-    alerts = file_store.alerts
-    first = raised(file_store, 1)
-    alerts.acknowledge(first, "Ada", "seen", NOW)
-    with pytest.raises(UsageError, match="was acknowledged by Ada on 2026-05-01 already"):
-        alerts.acknowledge(first, "Ben", "", NOW)
-    ended = alerts.resolve(first, "Ben", "over", NOW + HOUR)
-    assert ended.acknowledgement is not None
-    assert (ended.acknowledgement.who, ended.acknowledgement.why) == ("Ada", "seen")
-    assert alerts.counts() == (0, 1)
-    noted = [(row.who, row.action, row.detail) for row in file_store.journal.list_changes()]
-    assert noted == [("Ben", "alert resolved", "over"), ("Ada", "alert acknowledged", "seen")]
-
-
 def test_a_test_is_through_when_no_hook_is_owed_its_alert(filled_copy: Store) -> None:
     """Once, however many hooks there are."""
     store = filled_copy
     (first,) = (e for e in store.alerts.list_deliveries() if e.stored.alert.test == "t2")
-    before = [step.stage for step in store.journal.list_steps(2)]
+    before = [step.stage for step in list_steps(store, 2)]
     store.alerts.save_delivery(first, NOW + HOUR)
-    after = [step.stage for step in store.journal.list_steps(2)]
+    after = [step.stage for step in list_steps(store, 2)]
     assert after == [*before, "notified"]
-
-
-def test_a_changed_setting_holds_until_it_is_given_back(file_store: Store) -> None:
-    settings = file_store.settings
-    assert settings.newest() == 0
-    assert settings.list_current() == {}
-    settings.change("settings.samples", 4000.0, "Ada", NOW)
-    settings.change("hanger.3.thresholds.alert_probability", 0.9, "Ada", NOW)
-    settings.change("settings.samples", 2000.0, "Ben", NOW + HOUR)
-    assert settings.newest() == 3
-    current = settings.list_current()
-    assert {key: (e.value, e.who, e.at) for key, e in current.items()} == {
-        "settings.samples": (2000.0, "Ben", NOW + HOUR),
-        "hanger.3.thresholds.alert_probability": (0.9, "Ada", NOW),
-    }
-    own = current["hanger.3.thresholds.alert_probability"]
-    assert str(own) == (
-        "hanger 3 thresholds alert_probability = 0.9 instead of what bridge.toml says, "
-        "by Ada on 2026-05-01"
-    )
-    assert [own.is_of(3), own.is_of(33), own.is_of(4)] == [True, False, False]
-    assert current["settings.samples"].is_of(4)
-    settings.change("settings.samples", None, "Ada", NOW)
-    assert list(settings.list_current()) == ["hanger.3.thresholds.alert_probability"]
-    told = [(row.subject, row.detail) for row in file_store.journal.list_changes(2)]
-    assert told == [
-        ("settings samples", "from 2000 to not set, back to bridge.toml"),
-        ("settings samples", "from 4000 to 2000"),
-    ]

@@ -8,8 +8,8 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import Store
-from shm.store.journal import Actor, AuditRow
-from shm.store.people import SIGNED_IN_FOR, Role, Scope
+from shm.store.people import SIGNED_IN_FOR
+from shm.store.rows import Role, Scope
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
 SECOND, DAY = timedelta(seconds=1), timedelta(days=1)
@@ -29,18 +29,6 @@ def people(store: Store) -> Store:
     return store
 
 
-def said(store: Store) -> list[tuple[str, str, str, str]]:
-    rows = reversed(store.journal.list_changes())
-    return [(row.who, row.action, row.subject, row.detail) for row in rows]
-
-
-def test_each_role_may_what_the_one_before_may() -> None:
-    order = list(Role)
-    assert order == ["reader", "operator", "engineer"]
-    for place, role in enumerate(order):
-        assert [role.may(needed) for needed in order] == [n <= place for n in range(3)]
-
-
 def test_who_signs_in_is_known_by_the_secret_until_it_ends(people: Store) -> None:
     secret = people.people.sign_in("Ben", OTHER, NOW)
     assert secret is not None
@@ -57,11 +45,6 @@ def test_who_signs_in_is_known_by_the_secret_until_it_ends(people: Store) -> Non
     people.people.sign_out(secret, NOW)
     assert people.people.user_of(secret, NOW) is None
     assert people.people.user_of(second or "", NOW) == user
-
-
-@pytest.mark.parametrize(("name", "password"), [("Ben", WORDS), ("Eve", OTHER), ("Ada", "")])
-def test_a_wrong_name_or_password_signs_nobody_in(people: Store, name: str, password: str) -> None:
-    assert people.people.sign_in(name, password, NOW) is None
 
 
 @pytest.mark.parametrize("change", ["remove", "password", "role"])
@@ -99,22 +82,6 @@ def test_the_last_engineer_stays_one(people: Store) -> None:
         people.people.remove("Ada", NOW)
 
 
-def test_a_name_is_taken_while_its_user_is_there(people: Store) -> None:
-    with pytest.raises(UsageError, match="a user Ben already"):
-        people.people.add("Ben", Role.READER, WORDS, NOW)
-    people.people.remove("Ben", NOW)
-    people.people.add("Ben", Role.READER, WORDS, NOW)
-    assert [each.role for each in people.people.list_all()] == ["engineer", "operator", "reader"]
-
-
-@pytest.mark.parametrize("name", ["", "  ", "a" * 256, "a\nb"])
-def test_a_name_is_a_short_text_of_one_line(store: Store, name: str) -> None:
-    with pytest.raises(UsageError, match="a short text"):
-        store.people.add(name, Role.READER, WORDS, NOW)
-    with pytest.raises(UsageError, match="a short text"):
-        store.upkeep.create_token(name, Scope.READ, NOW)
-
-
 def test_the_bounds_of_names_and_passwords_belong_to_them(store: Store) -> None:
     store.people.add("a" * 255, Role.READER, "p" * 15, NOW)
     store.people.add("b", Role.READER, "p" * 1024, NOW)
@@ -123,58 +90,6 @@ def test_the_bounds_of_names_and_passwords_belong_to_them(store: Store) -> None:
     for password in ("p" * 14, "p" * 1025):
         with pytest.raises(UsageError, match="15 to 1024 characters"):
             store.people.add("c", Role.READER, password, NOW)
-
-
-def test_each_change_of_people_and_tokens_is_noted_as_the_actors(store: Store) -> None:
-    store.people.add("nobody", Role.READER, WORDS, NOW)
-    assert said(store) == []
-    acting = store.acting_as(Actor("Ada", "dashboard"))
-    acting.people.add("Ben", Role.OPERATOR, WORDS, NOW)
-    acting.people.set_role("Ben", Role.READER, NOW)
-    acting.people.set_password("Ben", OTHER, NOW)
-    acting.people.remove("Ben", NOW)
-    acting.upkeep.create_token("logger", Scope.READ, NOW)
-    acting.upkeep.create_token("robot", Scope.WRITE, NOW)
-    acting.upkeep.revoke_token("logger", NOW)
-    acting.journal.note(NOW, "file uploaded", "a.csv", "5 kB")
-    assert said(store) == [
-        ("Ada", "user added", "user Ben", "operator"),
-        ("Ada", "role changed", "user Ben", "from operator to reader"),
-        ("Ada", "password set", "user Ben", ""),
-        ("Ada", "user removed", "user Ben", ""),
-        ("Ada", "token made", "token logger", "may read"),
-        ("Ada", "token made", "token robot", "may write"),
-        ("Ada", "token revoked", "token logger", ""),
-        ("Ada", "file uploaded", "a.csv", "5 kB"),
-    ]
-    newest, before = store.journal.list_changes(2)
-    assert newest == AuditRow(newest.id, NOW, "Ada", "dashboard", "file uploaded", "a.csv", "5 kB")
-    assert store.journal.list_changes(1, newest.id) == (before,)
-    assert len(store.journal.list_changes(before=newest.id)) == 7
-
-
-def test_a_token_is_good_for_what_it_was_made_for_until_it_is_revoked(store: Store) -> None:
-    secret = store.upkeep.create_token("logger", Scope.WRITE, NOW)
-    reading = store.upkeep.create_token("wall", Scope.READ, NOW)
-    assert secret.startswith("shm_")
-    assert len(secret) >= 40
-    found = store.upkeep.token_of(secret, NOW + DAY)
-    assert found is not None
-    assert (found.name, found.scopes) == ("logger", {Scope.READ, Scope.WRITE})
-    wall = store.upkeep.token_of(reading, NOW)
-    assert wall is not None
-    assert wall.scopes == {Scope.READ}
-    assert store.upkeep.token_of("shm_no", NOW) is None
-    with pytest.raises(UsageError, match="named logger is in force already"):
-        store.upkeep.create_token("logger", Scope.READ, NOW)
-    store.upkeep.revoke_token("logger", NOW + DAY)
-    assert store.upkeep.token_of(secret, NOW) is None
-    assert store.upkeep.token_of(reading, NOW) is not None
-    with pytest.raises(NothingThere, match="no token named logger"):
-        store.upkeep.revoke_token("logger", NOW)
-    store.upkeep.create_token("logger", Scope.READ, NOW)
-    told = [(each.name, each.created_at, each.revoked_at) for each in store.upkeep.list_tokens()]
-    assert told == [("logger", NOW, NOW + DAY), ("wall", NOW, None), ("logger", NOW, None)]
 
 
 def test_the_use_of_a_token_is_noted_now_and_then(store: Store) -> None:

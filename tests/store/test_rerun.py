@@ -8,8 +8,13 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import Baseline, IdentifiedTest, KeptWatch, Lineage, Stage, Store, StoredTest
+from shm.store.queries.history import list_events, list_former_tests
+from shm.store.queries.recordings import find_recording
+from shm.store.queries.tests import list_baseline_tests, list_waiting_tests
+from shm.store.queries.trends import list_history, list_posteriors
+from shm.store.queries.watching import find_watch_state
 from shm.values import Selection
-from tests.helpers.nouns import NOW, a_file, a_posterior, a_test, a_watched_test, an_alert
+from tests.helpers.nouns import NOW, a_file, a_posterior, a_test, a_watched_test
 
 OLD, NEW = Lineage("0" * 64, "1" * 64, "0.1.0"), Lineage("0" * 64, "1" * 64, "0.2.0")
 LATER = NOW + timedelta(days=400)
@@ -46,23 +51,23 @@ def test_identifying_again_keeps_the_old_result_beside_the_new_one(store: Store)
     assert (rerun.tests, rerun.posteriors, rerun.watches, rerun.of_baseline) == (("t2",), 1, 1, ())
     assert rerun.recording.stage is Stage.RECEIVED
     assert [test.test.id for test in store.tests.list_all(3)] == ["t1"]
-    assert store.tests.list_waiting() == ()
-    assert [test.test.id for test, _ in store.posteriors.history(3)] == ["t1"]
+    assert list_waiting_tests(store) == ()
+    assert [test.test.id for test, _ in list_history(store, 3)] == ["t1"]
     assert (store.watch.list_drifts(3), store.watch.list_all(3)) == ((), ())
 
     again = identified(store, 2, NEW)
     assert again.test.id == "t2"
     assert again.id != second.id
     watched(store, again, baseline, seed=2)
-    former, present = store.tests.list_former(again.recording_id)
+    former, present = list_former_tests(store, again.recording_id)
     assert (former.superseded_at, present.superseded_at) == (LATER, None)
     assert (former.lineage, present.lineage) == (OLD, NEW)
     assert [made.superseded_at for made in former.posteriors] == [LATER]
     assert [made.lineage.version for made in present.posteriors] == ["0.2.0"]
     assert store.posteriors.get(3, "t2").seed == 2
-    assert len(store.posteriors.list_all(3)) == 2
+    assert len(list_posteriors(store, 3)) == 2
     assert [drift.test for drift in store.watch.list_drifts(3)] == ["t2"]
-    assert store.journal.list_events("again")[0].recording_id == second.recording_id
+    assert list_events(store, "again")[0].recording_id == second.recording_id
 
 
 @pytest.mark.parametrize(
@@ -79,7 +84,7 @@ def test_a_test_is_sent_back_to_the_stage_before(
     assert (rerun.posteriors, rerun.watches) == (posteriors, 1)
     assert store.tests.get(second.id).stage is stands
     assert rerun.recording.stage is stands
-    assert [test.id for test in store.tests.list_waiting()] == [second.id]
+    assert [test.id for test in list_waiting_tests(store)] == [second.id]
     if stage is Stage.UPDATED:
         store.posteriors.save(second, a_posterior("beam1", ("t2",), seed=2), NEW, LATER)
     store.watch.save(second, baseline, a_watched_test("t2"), None, [], LATER)
@@ -98,31 +103,17 @@ def test_the_baseline_stays_when_its_own_test_is_identified_again(store: Store) 
     kept = store.watch.baseline(3)
     assert kept is not None
     assert kept.id == baseline.id
-    assert [test.id for test in store.tests.of_baseline(kept)] == [first.id]
-    assert [posterior.seed for _, posterior in store.posteriors.history(3)] == [2]
-
-
-def test_a_test_of_a_changed_name_keeps_it(store: Store) -> None:
-    identified(store, 1, name="t")
-    second = identified(store, 2, name="t")
-    store.recordings.rerun(second.recording_id, Stage.IDENTIFIED, LATER)
-    assert identified(store, 2, name="t").test.id == second.test.id != "t"
+    assert [test.id for test in list_baseline_tests(store, kept)] == [first.id]
+    assert [posterior.seed for _, posterior in list_history(store, 3)] == [2]
 
 
 def test_what_the_watch_kept_is_dropped_with_a_test_that_is_done_again(store: Store) -> None:
     baseline = with_baseline(store)
     second = identified(store, 2)
     watched(store, second, baseline)
-    assert store.watch.state(baseline) == KeptWatch("a key", second.time, b"state")
+    assert find_watch_state(store, baseline) == KeptWatch("a key", second.time, b"state")
     store.recordings.rerun(second.recording_id, Stage.WATCHED, LATER)
-    assert store.watch.state(baseline) is None
-
-
-def test_a_refused_file_may_be_tried_again(store: Store) -> None:
-    recording = store.recordings.receive(a_file(1), NOW).recording
-    store.recordings.refuse(recording.id, {"message": "no rate."}, NOW)
-    assert store.recordings.rerun(recording.id, Stage.IDENTIFIED, LATER).recording.reason is None
-    assert [each.id for each in store.recordings.list_waiting(5)] == [recording.id]
+    assert find_watch_state(store, baseline) is None
 
 
 @pytest.mark.parametrize("stage", [Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED])
@@ -130,19 +121,7 @@ def test_what_has_not_come_so_far_cannot_be_done_again(store: Store, stage: Stag
     recording = store.recordings.receive(a_file(1), NOW).recording
     with pytest.raises(UsageError, match="not come so far"):
         store.recordings.rerun(recording.id, stage, LATER)
-    assert store.journal.list_events() == ()
-
-
-def test_a_recording_is_found_by_its_number_or_by_the_name_of_a_test(store: Store) -> None:
-    test = identified(store, 1)
-    assert store.recordings.find("1") == (test.recording_id, None)
-    assert store.recordings.find("t1") == (test.recording_id, "t1")
-    with pytest.raises(NothingThere, match="no recording and no test 't9'"):
-        store.recordings.find("t9")
-    recording = store.recordings.receive(a_file(2), NOW).recording
-    store.tests.save(recording.id, [IdentifiedTest(a_test("t1", hanger=4))], OLD, NOW)
-    with pytest.raises(UsageError, match="2 hangers"):
-        store.recordings.find("t1")
+    assert list_events(store) == ()
 
 
 def test_a_renamed_file_is_found_by_both_names(store: Store) -> None:
@@ -154,46 +133,13 @@ def test_a_renamed_file_is_found_by_both_names(store: Store) -> None:
     store.tests.save(recording.id, [IdentifiedTest(a_test("new"))], NEW, LATER)
     store.recordings.receive(a_file(1, file_name="copy.csv", arrival="third"), LATER)
     names = ("t1", "h3-1.csv", "h3-1", "crew/new.uff", "new.uff", "copy", "copy.csv")
-    assert {store.recordings.find(name) for name in names} == {(test.recording_id, None)}
-    assert store.recordings.find("new") == (test.recording_id, "new")
-    came_as = {each.file_name for each in store.journal.list_events(recording_id=recording.id)}
+    assert {find_recording(store, name) for name in names} == {(test.recording_id, None)}
+    assert find_recording(store, "new") == (test.recording_id, "new")
+    came_as = {each.file_name for each in list_events(store, recording_id=recording.id)}
     assert came_as == {"crew/new.uff", "h3-1.csv", "copy.csv"}
     with pytest.raises(NothingThere):
-        store.recordings.find("h3")
+        find_recording(store, "h3")
     refused = store.recordings.receive(a_file(2), NOW).recording
     store.recordings.refuse(refused.id, {"message": "no rate."}, NOW)
     store.recordings.receive(a_file(2, file_name="retry.csv", arrival="again"), LATER)
-    assert store.recordings.find("h3-2") == store.recordings.find("retry") == (refused.id, None)
-
-
-def test_a_name_that_several_files_had_is_told_with_their_numbers(store: Store) -> None:
-    for number in (1, 2):
-        store.recordings.receive(a_file(number, file_name="same.csv"), NOW)
-    with pytest.raises(UsageError, match="2 recordings were called 'same'") as caught:
-        store.recordings.find("same")
-    assert "1, 2" in caught.value.remedy
-
-
-def test_each_stage_that_was_reached_is_a_row(store: Store) -> None:
-    baseline = with_baseline(store)
-    second = identified(store, 2)
-    store.posteriors.save(second, a_posterior("beam1", ("t2",)), OLD, NOW)
-    store.watch.save(second, baseline, a_watched_test(), an_alert(), ["mail", "sms"], NOW)
-    for delivery in store.alerts.list_deliveries():
-        store.alerts.save_delivery(delivery, LATER)
-    steps = store.journal.list_steps(second.recording_id)
-    assert [step.stage for step in steps if step.test is None] == [
-        "archived", "received", "identified", "updated", "done"
-    ]  # fmt: skip
-    assert [(step.stage, step.at) for step in steps if step.test == "t2"] == [
-        ("identified", NOW), ("updated", NOW), ("watched", NOW), ("notified", LATER)
-    ]  # fmt: skip
-
-
-def test_a_refusal_is_a_step_of_the_file_and_of_its_tests(store: Store) -> None:
-    test = identified(store, 1)
-    store.recordings.refuse(test.recording_id, {"message": "no."}, LATER, [test.id])
-    refused = [
-        s.test for s in store.journal.list_steps(test.recording_id) if s.stage == Stage.REFUSED
-    ]
-    assert refused == [None, "t1"]
+    assert find_recording(store, "h3-2") == find_recording(store, "retry") == (refused.id, None)

@@ -9,24 +9,18 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
-from shm.errors import NothingThere
-from shm.store import (
-    IdentifiedTest,
-    Judged,
-    Lineage,
-    Stage,
-    Store,
-    StoredTest,
-    stored_tests,
-)
+from shm.store import IdentifiedTest, Judged, Lineage, Stage, Store, StoredTest
 from shm.store.blobs import unpack
+from shm.store.queries import judging
+from shm.store.queries.hangers import list_selected_models
+from shm.store.queries.judging import list_known_samples
+from shm.store.queries.tests import load_frequency_response
+from shm.store.queries.trends import list_history, list_posteriors
 from shm.values import AddedMass, Fingerprint, Selection
 from tests.helpers.comparing import assert_same
 from tests.helpers.nouns import (
     NOW,
-    a_check,
     a_file,
-    a_foreign_mode,
     a_posterior,
     a_response,
     a_test,
@@ -63,34 +57,6 @@ def test_a_test_comes_back_as_it_was(store: Store) -> None:
     assert store.recordings.get(stored.recording_id).hanger == 3
 
 
-def test_the_quality_of_a_test_comes_back_with_what_was_set_aside(store: Store) -> None:
-    unknown = a_check(name="coherence", verdict="unknown", value=math.nan)
-    item = IdentifiedTest(a_test("t1"), quality=(a_check(), unknown), set_aside=(a_foreign_mode(),))
-    (stored,) = identified(store, 1, item)
-    assert_same(stored.quality, (a_check(), unknown))
-    assert stored.set_aside == (a_foreign_mode(),)
-
-
-def test_a_test_without_time_stands_at_its_receipt_and_stays_without(store: Store) -> None:
-    (stored,) = identified(store, 1, IdentifiedTest(a_test(time=None)))
-    assert stored.time == NOW
-    assert stored.test.time is None
-
-
-def test_a_frequency_response_comes_back_in_single_precision(store: Store) -> None:
-    response = a_response()
-    (stored,) = identified(store, 1, IdentifiedTest(a_test(), 0, response))
-    found = store.tests.frequency_response(stored)
-    assert found is not None
-    assert_same(found.points, response.points)
-    np.testing.assert_array_equal(found.frequency_hz, response.frequency_hz)
-    np.testing.assert_allclose(found.accelerance, response.accelerance, rtol=1e-6)
-    assert response.coherence is not None
-    assert found.coherence is not None
-    np.testing.assert_allclose(found.coherence, response.coherence, rtol=1e-6)
-    assert (found.source, found.hanger) == ("h3-1.csv", 3)
-
-
 def test_frequency_response_every_field(store: Store) -> None:
     """A response and its test come back with every field, of which none has its default here."""
     mass = AddedMass(25.0, 3.6)
@@ -107,7 +73,7 @@ def test_frequency_response_every_field(store: Store) -> None:
         for field in fields(value):
             assert repr(getattr(value, field.name)) != repr(field.default), field.name
     (stored,) = identified(store, 1, IdentifiedTest(test, 0, response))
-    found = store.tests.frequency_response(stored)
+    found = load_frequency_response(store, stored)
     assert found is not None
     single = {
         "accelerance": response.accelerance.astype(np.complex64),
@@ -117,32 +83,11 @@ def test_frequency_response_every_field(store: Store) -> None:
     np.testing.assert_equal(asdict(stored.test), asdict(test))
 
 
-def test_a_response_of_unknown_coherence_stays_so(store: Store) -> None:
-    response = replace(a_response(), coherence=None)
-    (stored,) = identified(store, 1, IdentifiedTest(a_test(), 0, response))
-    found = store.tests.frequency_response(stored)
-    assert found is not None
-    assert found.coherence is None
-
-
-def test_modes_given_by_a_file_have_no_frequency_response(store: Store) -> None:
-    (stored,) = identified(store, 1)
-    assert store.tests.frequency_response(stored) is None
-
-
 def test_two_files_may_call_their_tests_the_same(store: Store) -> None:
     identified(store, 1, IdentifiedTest(a_test("t1")))
     identified(store, 2, IdentifiedTest(a_test("t1")), IdentifiedTest(a_test("t2"), 1))
     suffix = a_file(2).sha256[:8]
     assert [test.test.id for test in store.tests.list_all(3)] == ["t1", f"t1-{suffix}-0", "t2"]
-
-
-def test_identifying_a_file_again_changes_nothing(store: Store) -> None:
-    (stored,) = identified(store, 1)
-    for position in (0, 1):
-        again = [IdentifiedTest(a_test("other"), position)]
-        store.tests.save(stored.recording_id, again, LINEAGE, NOW)
-    assert [test.test.id for test in store.tests.list_all()] == ["t1"]
 
 
 def test_the_most_probable_class_is_selected_and_its_posterior_the_baseline(store: Store) -> None:
@@ -152,7 +97,7 @@ def test_the_most_probable_class_is_selected_and_its_posterior_the_baseline(stor
     assert selection is not None
     assert selection.selection.selected.model == "beam2"
     assert selection.selection.probabilities == (0.8, 0.2)
-    assert store.posteriors.selected_models() == {3: "beam2"}
+    assert list_selected_models(store) == {3: "beam2"}
     baseline = store.watch.baseline(3)
     assert baseline is not None
     assert_same(baseline.posterior, a_posterior("beam2"))
@@ -165,17 +110,17 @@ def test_a_second_first_selection_is_not_kept(store: Store) -> None:
     (second,) = identified(store, 2)
     baseline_of_two_models(store, first)
     baseline_of_two_models(store, second)
-    assert len(store.posteriors.list_all(3)) == 1
+    assert len(list_posteriors(store, 3)) == 1
     assert store.tests.get(second.id).stage is Stage.IDENTIFIED
 
 
 def test_several_tests_may_make_one_baseline(store: Store) -> None:
     tests = (*identified(store, 1), *identified(store, 2))
     baseline_of_two_models(store, *tests)
-    history = store.posteriors.history(3)
+    history = list_history(store, 3)
     assert [test.test.id for test, _ in history] == ["t1", "t2"]
     assert {posterior.tests for _, posterior in history} == {("t1", "t2")}
-    assert store.posteriors.list_all(3)[0].time == NOW + timedelta(days=2)
+    assert list_posteriors(store, 3)[0].time == NOW + timedelta(days=2)
 
 
 def test_a_posterior_comes_back_complete_with_its_samples(store: Store) -> None:
@@ -188,7 +133,7 @@ def test_a_posterior_comes_back_complete_with_its_samples(store: Store) -> None:
     assert_same(store.posteriors.get(3, "t2"), posterior)
     assert_same(store.posteriors.get(3, second.test.id), posterior)
     assert store.posteriors.get(3, "t1").model == "beam2"
-    assert store.posteriors.list_all(3)[-1].lineage == LINEAGE
+    assert list_posteriors(store, 3)[-1].lineage == LINEAGE
     assert store.tests.get(second.id).stage is Stage.UPDATED
     assert store.recordings.get(second.recording_id).stage is Stage.UPDATED
 
@@ -199,44 +144,6 @@ def test_posterior_of_a_sampler_that_is_gone_is_read(store: Store) -> None:
     posterior = replace(a_posterior("beam2", ("t1",)), method="textbook", priors="thesis")
     store.posteriors.save_selection(3, [first], Selection((posterior,), (1.0,)), LINEAGE, NOW)
     assert_same(store.posteriors.get(3), posterior)
-
-
-def test_updating_a_test_again_changes_nothing(store: Store) -> None:
-    (first,) = identified(store, 1)
-    (second,) = identified(store, 2)
-    baseline_of_two_models(store, first)
-    for seed in (1, 2):
-        store.posteriors.save(second, a_posterior("beam2", ("t2",), seed=seed), LINEAGE, NOW)
-    assert store.posteriors.get(3, "t2").seed == 1
-
-
-def test_a_recording_stands_where_its_last_test_stands(store: Store) -> None:
-    first, second = identified(store, 1, IdentifiedTest(a_test()), IdentifiedTest(a_test("t2"), 1))
-    baseline_of_two_models(store, first)
-    assert store.recordings.get(first.recording_id).stage is Stage.IDENTIFIED
-    store.posteriors.save(second, a_posterior("beam2", ("t2",)), LINEAGE, NOW)
-    assert store.recordings.get(first.recording_id).stage is Stage.UPDATED
-
-
-def test_waiting_tests_come_by_hanger_and_time_whatever_their_arrival(store: Store) -> None:
-    for number, (hanger, days) in enumerate([(4, 1), (3, 5), (3, 2)], start=1):
-        identified(store, number, IdentifiedTest(a_test(f"t{number}", days, hanger=hanger)))
-    waiting = store.tests.list_waiting()
-    assert [(test.hanger, test.id) for test in waiting] == [(3, 3), (3, 2), (4, 1)]
-    first = store.tests.list_waiting(1)
-    assert [(test.hanger, test.id) for test in first] == [(3, 3), (4, 1)]
-    others = store.tests.list_waiting(1, excluding=[first[0].recording_id])
-    assert [(test.hanger, test.id) for test in others] == [(3, 2), (4, 1)]
-
-
-@pytest.mark.parametrize("test", [None, "t1"])
-def test_what_was_never_updated_is_nothing_there(store: Store, test: str | None) -> None:
-    with pytest.raises(NothingThere, match="no posterior of hanger 3"):
-        store.posteriors.get(3, test)
-    assert store.posteriors.selection(3) is None
-    assert store.watch.baseline(3) is None
-    with pytest.raises(NothingThere):
-        store.tests.get(1)
 
 
 def test_a_pickled_blob_is_not_read() -> None:
@@ -257,8 +164,8 @@ def test_samples_are_compared_with_the_earliest_first_and_always_with_the_same_n
         recording = store.recordings.receive(a_file(number), NOW).recording
         items = [IdentifiedTest(a_test(f"t{number}", days=number))]
         store.tests.save(recording.id, items, LINEAGE, NOW, Judged(None, print_))
-    known = [each.fingerprint.digest for each in store.tests.known_samples(5, 3, prints[4])]
+    known = [each.fingerprint.digest for each in list_known_samples(store, 5, 3, prints[4])]
     assert known == [each.digest for each in prints[:4]]
-    monkeypatch.setattr(stored_tests, "_MOST_COMPARED", 2)
-    known = [each.fingerprint.digest for each in store.tests.known_samples(5, 3, prints[0])]
+    monkeypatch.setattr(judging, "_MOST_COMPARED", 2)
+    known = [each.fingerprint.digest for each in list_known_samples(store, 5, 3, prints[0])]
     assert known == [prints[0].digest, prints[3].digest]

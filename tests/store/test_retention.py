@@ -14,6 +14,7 @@ from shm.errors import NothingThere, StoreError
 from shm.pipeline.intake import receive
 from shm.store import Archive, Store, StoredRecording, Workspace
 from shm.store.checking import archived_names, check_archive
+from shm.store.queries.upkeep import list_removed
 from shm.store.retention import (
     Retention,
     copy_archive,
@@ -95,7 +96,7 @@ def test_an_old_file_with_a_whole_copy_goes_and_its_row_stays(
     assert files_of(workspace.archive.folder) == [Path(str(young.file.archived_as)).name]
     assert len(files_of(copies.folder)) == 3
     assert store.recordings.get(old.id) == old
-    assert store.upkeep.removed_to() == {old.id: str(copies.folder)}
+    assert list_removed(store) == {old.id: str(copies.folder)}
     assert found(workspace, store) == Retention((), {})
 
 
@@ -154,7 +155,7 @@ def test_a_copy_that_vanishes_between_the_look_and_the_removal_saves_the_file(
     (copies.folder / str(old.file.archived_as)).unlink()
     assert remove(store, workspace.archive, removals, NOW) == 0
     assert workspace.archive.holds(old.file)
-    assert store.upkeep.removed_to() == {}
+    assert list_removed(store) == {}
 
 
 def test_what_is_not_through_stays(workspace: Workspace, store: Store, copies: Archive) -> None:

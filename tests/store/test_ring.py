@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import errno
-import math
 import os
 import random
 import resource
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
 from itertools import pairwise
@@ -21,12 +20,8 @@ from shm.documents import format_time
 from shm.errors import BadInput, DoubledChunk, ShmError, StoreBusy, StoreError
 from shm.read import read, ring_segment
 from shm.read.chunk_document import chunk_document
-from shm.read.ring_segment import ChunkKey, microseconds
 from shm.store import ring as ring_module
 from shm.store.ring import Ring
-from shm.store.ring_files import PERIOD
-from shm.store.ring_notices import find_misplaced
-from shm.store.ring_pieces import recording_of
 from shm.values import Recording
 from shm.values.stream import Chunk, Stream, StreamChannel, StreamEvent
 from tests.helpers.nouns import NOW
@@ -34,7 +29,6 @@ from tests.helpers.stream_killing import assert_none_lost_none_doubled, killed_a
 from tests.helpers.streams import STREAM, a_chunk
 
 HOUR = timedelta(hours=1)
-NUMBERS = {NOW: (1, 3), NOW + 6 * PERIOD: (20, 22)}
 FOR_EVER = timedelta(days=3650)
 
 
@@ -94,17 +88,6 @@ def test_chunks_are_joined_whether_they_are_sealed_or_not(logger: Logger) -> Non
     assert logger.events == []
 
 
-def test_a_part_of_it_is_cut_to_the_sample(logger: Logger) -> None:
-    logger.send(*minutes(*range(12)))
-    start = NOW + timedelta(minutes=9, seconds=59.985)
-    (piece,) = logger.ring.read("h3", start, start + timedelta(seconds=1))
-    begin = 10 * 6000 - 1
-    assert np.array_equal(piece.values, samples(minutes(*range(12)))[:, begin : begin + 100])
-    assert piece.start == start + timedelta(seconds=0.005)
-    assert logger.ring.read("h3", NOW - HOUR, NOW) == ()
-    assert logger.ring.read("h4", NOW, NOW + HOUR) == ()
-
-
 def test_a_segment_is_read_by_others_and_by_us(logger: Logger) -> None:
     chunks = minutes(*range(10))
     logger.send(*chunks)
@@ -129,14 +112,6 @@ def test_a_chunk_that_comes_again_is_kept_once(logger: Logger) -> None:
     assert not Ring(logger.ring.folder).append(content).is_new
     (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
     assert piece.values.shape == (2, 6000)
-
-
-def test_a_few_minutes_of_a_broken_thermometer_are_no_part_of_a_mean(logger: Logger) -> None:
-    said = [11.0, -127.0, 12.0, math.nan, -127.0, 11.5, 12.0]
-    chunks = minutes(*range(len(said)))
-    logger.send(*(replace(each, temperature_c=c) for each, c in zip(chunks, said, strict=True)))
-    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
-    assert piece.temperature_c == 11.5
 
 
 @pytest.mark.parametrize("is_sealed", [False, True])
@@ -228,19 +203,6 @@ def test_a_clock_that_was_set_ahead_takes_no_time_from_the_true_samples(
     assert np.array_equal(pieces[-1].values, samples(true[20:]))
 
 
-@pytest.mark.parametrize("again", [1, 3])
-def test_a_few_samples_that_come_again_are_noted(logger: Logger, again: int) -> None:
-    """Within the jitter of stamps, and with the next number: only the samples tell."""
-    first, second = minutes(0, 1)
-    values = np.concatenate([first.values[:, -again:], second.values], axis=1)
-    start = second.start - timedelta(seconds=again / 100)
-    logger.send(first, replace(second, start=start, values=values))
-    assert logger.kinds == ["overlap"]
-    assert f"{again} samples of chunk 1 are" in logger.events[0].detail
-    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
-    assert np.array_equal(piece.values, samples([first, second]))
-
-
 @pytest.mark.parametrize("is_same", [True, False])
 def test_a_late_chunk_that_overlaps_fills_the_gap_where_it_contradicts_nothing(
     logger: Logger, is_same: bool
@@ -271,25 +233,6 @@ def test_values_that_are_missing_are_noted_and_do_not_count(logger: Logger) -> N
     assert sum(logger.ring.state("h3").received_s.values()) == pytest.approx(4.8)
 
 
-def test_what_a_logger_says_was_done_to_it_is_noted_once(logger: Logger) -> None:
-    told = replace(minutes(1)[0], event="gain of acc_1 set to 2")
-    logger.send(*minutes(0), told)
-    logger.send(told)
-    (event,) = logger.events
-    assert (event.kind, event.detail) == ("logger", "gain of acc_1 set to 2")
-    assert event.start == told.start
-
-
-def test_a_rate_within_a_crystals_tolerance_is_the_described_one(logger: Logger) -> None:
-    near = replace(a_chunk(0), sampling_rate_hz=100.009)
-    logger.send(near, a_chunk(1))
-    recording = recording_of(logger.ring, STREAM, NOW, NOW + HOUR, 10**6)
-    assert (recording.sampling_rate_hz, recording.samples) == (100.0, 1000)
-    with pytest.raises(BadInput, match=r"100.05 Hz where bridge.toml says 100; 100 ppm") as caught:
-        logger.send(replace(a_chunk(2), sampling_rate_hz=100.05))
-    assert "sampling_rate_hz = 100.05" in caught.value.remedy
-
-
 def test_values_beyond_what_the_sensor_measures_are_refused(logger: Logger) -> None:
     chunk = a_chunk(0)
     chunk.values[:, 3] = 39.0  # acc_2 clips at 20: a converter may go on for a while
@@ -312,14 +255,6 @@ def test_segments_of_before_the_time_of_arrival_was_kept_are_read(
     logger.send(*minutes(9))
     (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
     assert np.array_equal(piece.values, samples(minutes(*range(10))))
-
-
-def test_a_new_session_may_count_from_nought(logger: Logger) -> None:
-    again = [replace(each, sequence=number) for number, each in enumerate(minutes(3, 4))]
-    logger.send(*minutes(0, 1, 2), *again)
-    assert logger.kinds == []  # no time is missing
-    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
-    assert piece.values.shape == (2, 5 * 6000)
 
 
 def test_a_gap_is_noted_and_filled_by_what_comes_late(logger: Logger) -> None:
@@ -431,15 +366,6 @@ def test_seal_accepts_restarted_numbers(
         start += timedelta(seconds=pause_s)
     logger.seal()
     assert "clock step" not in logger.kinds
-
-
-def test_seal_accepts_late_chunk_of_restarted_numbers(logger: Logger) -> None:
-    again = [replace(each, sequence=n) for n, each in enumerate(minutes(*range(20, 40)))]
-    logger.send(*minutes(*range(10, 20)), *again[:2], *again[12:])
-    logger.send(*again[2:12])
-    assert "clock step" not in logger.kinds
-    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
-    assert np.array_equal(piece.values, samples([*minutes(*range(10, 20)), *again]))
 
 
 @pytest.mark.slow
@@ -580,15 +506,6 @@ def test_what_does_not_fit_is_refused(
     assert not logger.ring.folder.exists()
 
 
-def test_channels_come_in_the_order_of_the_description(logger: Logger) -> None:
-    chunk = a_chunk(0)
-    turned = replace(chunk, channels=chunk.channels[::-1], values=chunk.values[::-1])
-    logger.send(turned)
-    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
-    assert piece.channels == ("acc_1", "acc_2")
-    assert np.array_equal(piece.values, chunk.values)
-
-
 def test_old_samples_go_but_for_those_that_are_kept(logger: Logger) -> None:
     logger.send(*minutes(*range(60)))
     logger.ring.keep("h3", NOW + timedelta(minutes=32), NOW + timedelta(minutes=33), "a train")
@@ -618,22 +535,6 @@ def test_sweep_keeps_last_day(logger: Logger, later: timedelta) -> None:
     assert logger.ring.last_sweep() == swept
 
 
-@pytest.mark.parametrize("kind", [list, iter, tuple])
-def test_find_misplaced_any_iterable(kind: Callable[..., Iterable[ChunkKey]]) -> None:
-    key = ChunkKey(microseconds(NOW + 2 * PERIOD), 41, "a", 1)
-    assert find_misplaced(kind([key]), kind([]), NUMBERS) == {key: (3, 20)}
-
-
-def test_find_misplaced_ties_by_time() -> None:
-    """Two keys of one arrival and number: their checksums, and so their hashes, decide nothing."""
-    for checksum in map(str, range(20)):
-        first, last = (
-            ChunkKey(microseconds(NOW + n * PERIOD), 7, f"{n}{checksum}", 1) for n in (2, 4)
-        )
-        found = find_misplaced([last, first], [], NUMBERS)
-        assert found == find_misplaced([first, last], [], NUMBERS) == {}
-
-
 def test_a_real_recording_in_chunks_is_the_same_recording(
     shared_data: Path, tmp_path: Path
 ) -> None:
@@ -655,15 +556,3 @@ def test_a_real_recording_in_chunks_is_the_same_recording(
     ring.seal(whole.time + FOR_EVER)
     (piece,) = ring.read("real", whole.time, whole.time + HOUR)
     assert np.array_equal(piece.values, values.astype(np.float32))
-
-
-def test_what_a_killed_process_left_half_written_goes(logger: Logger) -> None:
-    logger.send(*minutes(0), seals=False)
-    left = logger.ring.folder / "h3" / "incoming" / ".0-0-0-0.chunk.1.2.part"
-    left.write_bytes(b"half")
-    os.utime(left, (NOW.timestamp(), NOW.timestamp()))
-    logger.ring.sweep(NOW + timedelta(minutes=30))
-    assert left.exists()
-    logger.ring.sweep(NOW + timedelta(minutes=90))
-    assert not left.exists()
-    assert len(list(logger.ring.folder.glob("h3/incoming/*"))) == 1

@@ -20,6 +20,12 @@ from shm.errors import NothingThere, SchemaOutdated, StoreError
 from shm.resources import migrations_folder
 from shm.store import Acknowledgement, Decision, Stage, Store
 from shm.store.database import make_engine
+from shm.store.queries.hangers import list_selected_models
+from shm.store.queries.history import list_changes, list_events, list_former_tests, list_steps
+from shm.store.queries.judging import list_known_samples
+from shm.store.queries.recordings import count_stages, find_latest_hold, list_holds
+from shm.store.queries.tests import list_baseline_tests
+from shm.store.queries.trends import list_history
 from shm.store.schema import changed_objects
 from shm.store.tables import SCHEMA, metadata, tests
 from shm.values import Fingerprint
@@ -58,17 +64,17 @@ def test_a_released_database_upgrades_and_keeps_its_contents(
         assert compare_metadata(context, metadata) == []
         assert changed_objects(context.connection) == ()
         context.connection.close()
-        assert store.recordings.stage_counts()[Stage.DONE] >= 2
-        assert store.recordings.stage_counts()[Stage.REFUSED] == 1
+        assert count_stages(store)[Stage.DONE] >= 2
+        assert count_stages(store)[Stage.REFUSED] == 1
         assert [test.test.id for test in store.tests.list_all(3)][:2] == ["t1", "t2"]
-        (_, first), (_, second) = store.posteriors.history(3)[:2]
+        (_, first), (_, second) = list_history(store, 3)[:2]
         assert first.tension_n.mean() == pytest.approx(711e3, rel=0.02)
-        assert second.model == store.posteriors.selected_models()[3] == "beam1"
+        assert second.model == list_selected_models(store)[3] == "beam1"
         assert store.watch.baseline(3) is not None
         assert {drift.quantity for drift in store.watch.list_drifts(3)} == {"tension"}
         assert store.alerts.list_all()[0].alert.key == "hanger-3:tension-down"
         assert {delivery.hook for delivery in store.alerts.list_deliveries()} == {"mail"}
-        assert [event.kind for event in store.journal.list_events()][:2] == [
+        assert [event.kind for event in list_events(store)][:2] == [
             "duplicate",
             "refused",
         ]
@@ -92,7 +98,7 @@ def test_a_database_of_the_first_release_has_alerts_open_and_what_is_known_of_it
         baseline = store.watch.baseline(3)
         assert baseline is not None
         assert (baseline.since, baseline.posterior.tests) == (None, ("t1",))
-        steps = store.journal.list_steps(1)
+        steps = list_steps(store, 1)
         assert [(step.stage, step.test, step.version) for step in steps] == [
             ("received", None, None),
             ("identified", "t1", "0.1.0"),
@@ -116,32 +122,32 @@ def test_all_that_a_database_of_1_0_0_holds_is_kept(schema: int, tmp_path: Path)
         baseline = store.watch.baseline(3)
         assert baseline is not None
         assert (baseline.why, baseline.posterior.tests) == ("new pin", ("t2",))
-        assert [test.test.id for test in store.tests.of_baseline(baseline)] == ["t2"]
-        (test,) = store.tests.list_former(4)
+        assert [test.test.id for test in list_baseline_tests(store, baseline)] == ["t2"]
+        (test,) = list_former_tests(store, 4)
         assert [made.superseded_at for made in test.posteriors] == [NOW, None]
         assert store.posteriors.get(3, "t4").seed == 11
-        confirmed = store.recordings.latest_hold(5)
+        confirmed = find_latest_hold(store, 5)
         assert confirmed is not None
         assert (confirmed.decision, confirmed.who) == (Decision.CONFIRMED, "engineer")
         assert confirmed.time == confirmed.decided_at == NOW + timedelta(days=9)
-        (waits,) = store.recordings.list_holds()
+        (waits,) = list_holds(store)
         assert [(test.name, test.tension_shift) for test in waits.tests] == [("t6", -0.1)]
         assert [doubt.check for doubt in waits.doubts] == ["copy"]
-        known = store.tests.known_samples(7, 5, Fingerprint("0" * 64, np.ones((1, 256))))
+        known = list_known_samples(store, 7, 5, Fingerprint("0" * 64, np.ones((1, 256))))
         assert [each.fingerprint.shapes.shape for each in known] == [(1, 256)] * 2
         assert store.recordings.get(5).file.modified_at == NOW
 
 
 def test_four_histories_become_one_journal_in_which_a_refusal_is_one_entry(tmp_path: Path) -> None:
     with upgraded(1, tmp_path) as store:
-        steps = [(each.stage, each.test) for each in store.journal.list_steps(3)]
+        steps = [(each.stage, each.test) for each in list_steps(store, 3)]
         assert steps == [("archived", None), ("received", None), ("refused", None)]
-        assert store.journal.list_steps(3)[-1].version == "0.1.0"
-        events = [(each.kind, each.file_name) for each in store.journal.list_events()]
+        assert list_steps(store, 3)[-1].version == "0.1.0"
+        events = [(each.kind, each.file_name) for each in list_events(store)]
         assert events.count(("refused", "h3-3.csv")) == 1
-        held = [each.stage for each in store.journal.list_steps(6) if each.test is None]
+        held = [each.stage for each in list_steps(store, 6) if each.test is None]
         assert held.count("held") == 1
-        changes = {(each.who, each.action) for each in store.journal.list_changes()}
+        changes = {(each.who, each.action) for each in list_changes(store)}
         assert ("engineer", "recording confirmed") in changes
         assert ("engineer", "baseline set") in changes
 

@@ -14,6 +14,7 @@ import sqlalchemy as sa
 from shm.errors import BadInput, SchemaOutdated, StoreBusy, StoreError
 from shm.store import Outcome, Stage, Store, Workspace, database
 from shm.store.database import make_engine, shown, url_of
+from shm.store.queries.recordings import count_stages, list_recordings
 from tests.helpers.nouns import NOW, a_file
 from tests.helpers.postgres import Databases
 from tests.helpers.workspaces import make_workspace
@@ -47,7 +48,7 @@ def test_a_reader_sees_one_moment(store: Store) -> None:
         assert connection.scalar(count) == 0
         store.recordings.receive(a_file(1), NOW)
         assert connection.scalar(count) == 0
-    assert store.recordings.stage_counts()[Stage.RECEIVED] == 1
+    assert count_stages(store)[Stage.RECEIVED] == 1
 
 
 def test_a_reader_cannot_write(server_store: Store) -> None:
@@ -68,7 +69,7 @@ def test_a_writer_that_holds_on_keeps_others_waiting_and_then_busy(
         with pytest.raises(StoreBusy) as caught:
             server_store.recordings.receive(a_file(1), NOW)
         assert caught.value.retry_after_s == 1.0
-        assert server_store.recordings.list_all() == ()  # reading goes on meanwhile
+        assert list_recordings(server_store) == ()  # reading goes on meanwhile
     server_store.recordings.receive(a_file(1), NOW)
 
 
@@ -78,7 +79,7 @@ def test_a_connection_lost_between_verbs_is_not_even_noticed(
     server_store.recordings.receive(a_file(1), NOW)
     assert postgresql.cut_connections(server) >= 1
     server_store.recordings.receive(a_file(2), NOW)
-    assert len(server_store.recordings.list_all()) == 2
+    assert len(list_recordings(server_store)) == 2
 
 
 def test_a_connection_lost_within_a_verb_undoes_it_and_says_when_to_return(
@@ -116,7 +117,7 @@ def test_who_may_not_write_is_told_so(server: str, postgresql: Databases) -> Non
     name = str(url_of(server).database)
     postgresql.run("GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader", server)
     with Store.open(postgresql.url(name, user="reader")) as store:
-        assert store.recordings.list_all() == ()
+        assert list_recordings(store) == ()
         with pytest.raises(StoreError, match="Give this user write access"):
             store.recordings.receive(a_file(1), NOW)
 
@@ -133,7 +134,7 @@ def test_a_database_without_tables_says_how_to_make_them(unready: str) -> None:
         Store.open(unready)
     Store.upgrade(unready)
     with Store.open(unready) as store:
-        assert store.recordings.list_all() == ()
+        assert list_recordings(store) == ()
 
 
 def test_an_upgrade_that_fails_on_a_server_leaves_nothing_half_done(
@@ -186,7 +187,7 @@ def test_a_workspace_keeps_its_store_where_the_environment_says(
         assert lock.held()
     assert "hush" not in repr(workspace)
     with Store.open(unready) as store:
-        assert len(store.recordings.list_all()) == 1
+        assert len(list_recordings(store)) == 1
 
 
 def test_a_password_in_the_description_is_refused(tmp_path: Path) -> None:
@@ -201,7 +202,7 @@ def test_a_store_may_be_a_file_elsewhere(tmp_path: Path) -> None:
     make_workspace(tmp_path / "bridge", settings={"store": "../arch.db"})
     assert (tmp_path / "arch.db").is_file()
     with Workspace.open(tmp_path / "bridge").store() as store:
-        assert store.recordings.list_all() == ()
+        assert list_recordings(store) == ()
 
 
 def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,6 @@ import pytest
 from shm.errors import NothingThere, UsageError
 from shm.store import Store
 from shm.store.rows import Silence
-from shm.store.stored_alerts import silenced_until
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
 HOUR = timedelta(hours=1)
@@ -20,39 +19,6 @@ def one(first: int, last: int, hanger: int | None = 3, ended: int | None = None)
     return Silence(
         1, hanger, NOW + first * HOUR, NOW + last * HOUR, False, "Ada", "paint", NOW, ended_at
     )
-
-
-def test_a_silence_is_kept_as_it_was_made_and_ended(file_store: Store) -> None:
-    silences = file_store.silences
-    made = silences.make(3, (NOW, NOW + HOUR), "Ada", "paint", NOW, is_maintenance=True)
-    assert made == Silence(made.id, 3, NOW, NOW + HOUR, True, "Ada", "paint", NOW)
-    later = silences.make(None, (NOW + HOUR, NOW + 2 * HOUR), "Ben", "race", NOW)
-    assert not later.is_maintenance
-    assert silences.list_all() == (made, later)
-    half = NOW + HOUR / 2
-    ended = silences.end(made.id, "Ben", half)
-    assert ended == Silence(made.id, 3, NOW, NOW + HOUR, True, "Ada", "paint", NOW, half, "Ben")
-    assert silences.list_all() == (ended, later)
-    assert [ended.is_over(at) for at in (NOW, half)] == [False, True]
-    assert [ended.is_in_force(at) for at in (NOW, half)] == [True, False]
-    assert later.is_in_force(later.starts_at)
-    rows = file_store.journal.list_changes()
-    said = [(row.who, row.action, row.subject, row.detail) for row in rows]
-    assert said == [
-        ("Ben", "maintenance window ended", f"maintenance window {made.id}, hanger 3", ""),
-        (
-            "Ben",
-            "silence made",
-            f"silence {later.id}, all hangers, 2026-05-01 13:00 to 2026-05-01 14:00 UTC",
-            "race",
-        ),
-        (
-            "Ada",
-            "maintenance window made",
-            f"maintenance window {made.id}, hanger 3, 2026-05-01 12:00 to 2026-05-01 13:00 UTC",
-            "paint",
-        ),
-    ]
 
 
 def test_what_is_over_is_neither_made_nor_ended(file_store: Store) -> None:
@@ -90,11 +56,3 @@ def test_a_silence_holds_from_its_begin_to_before_its_end(
 ) -> None:
     at = NOW + hour * HOUR
     assert (silence.covers(3, at), silence.is_over(at)) == (covers, over)
-
-
-def test_silences_one_after_the_other_are_one() -> None:
-    chain = (one(0, 2), one(1, 3), one(3, 5), one(6, 9), one(0, 9, hanger=4))
-    assert silenced_until(chain, 3, NOW) == NOW + 5 * HOUR
-    assert silenced_until(chain, 3, NOW + 5 * HOUR) is None
-    assert silenced_until(chain, 3, NOW - HOUR) is None
-    assert silenced_until((), 3, NOW) is None

@@ -6,13 +6,17 @@ from dataclasses import replace
 from datetime import timedelta
 
 import pytest
-import sqlalchemy as sa
 
 from shm.errors import StoreError
-from shm.pipeline.streaming import last_modes
-from shm.store import DeliveryState, Reconciled, Store
-from shm.store.people_and_stream_tables import stream_windows
-from shm.store.stored_streams import KeptStreamWatch
+from shm.store import Reconciled, Store
+from shm.store.queries.streams import (
+    KeptStreamWatch,
+    find_first_unpooled,
+    list_pooled,
+    list_stream_events,
+    list_windows,
+    load_stream_watch,
+)
 from tests.helpers.comparing import assert_same
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import MODES, a_reading, a_window, an_event
@@ -24,40 +28,10 @@ def test_a_window_comes_back_and_is_replaced_where_it_is_done_anew(store: Store)
     store.streams.save_window(a_window(10, ()))
     store.streams.save_window(a_window(0))
     store.streams.save_window(a_window(10))
-    found = store.streams.list_windows(3, *EVER)
+    found = list_windows(store, 3, *EVER)
     assert_same(found, (a_window(0), a_window(10)))
-    assert store.streams.list_windows(4, *EVER) == ()
-    assert len(store.streams.list_windows(3, NOW, NOW + timedelta(minutes=10))) == 1
-
-
-def test_progress_never_goes_back(store: Store) -> None:
-    assert store.streams.progress("h3") is None
-    for minutes in (10, 0):
-        store.streams.save_window(a_window(minutes))
-        assert store.streams.progress("h3") == NOW + timedelta(minutes=20)
-
-
-def test_the_last_modes_are_those_of_the_latest_windows_each_as_it_was_seen_last(
-    store: Store,
-) -> None:
-    assert store.streams.latest_with_modes("h3") == ()
-    moved = replace(MODES[0], frequency_hz=MODES[0].frequency_hz * 1.01)
-    store.streams.save_window(a_window(10, (moved,)))
-    store.streams.save_window(a_window(20, ()))
-    store.streams.save_window(a_window(0))
-    latest = store.streams.latest_with_modes("h3")
-    assert [each.window.start for each in latest] == [NOW + timedelta(minutes=m) for m in (10, 0)]
-    assert_same(last_modes(latest), (moved, *MODES[1:]))
-    assert_same(store.streams.last_window("h3"), a_window(20, ()))
-    assert store.streams.last_window("h4") is None
-
-
-def test_modes_are_kept_without_what_is_not_known(store: Store) -> None:
-    store.streams.save_window(a_window())
-    with store.reading() as connection:
-        text = connection.scalar(sa.select(stream_windows.c.document))
-    assert "null" not in text.split('"modes"')[1]
-    assert len(text) < 600
+    assert list_windows(store, 4, *EVER) == ()
+    assert len(list_windows(store, 3, NOW, NOW + timedelta(minutes=10))) == 1
 
 
 def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) -> None:
@@ -66,14 +40,14 @@ def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) ->
     opens = Reconciled((alert,))
     (raised,) = store.streams.save_pooled(a_reading(), b"state", opens, ["mail"])
     assert raised.raised_at == NOW + timedelta(hours=1)
-    state = store.streams.watch(3)
+    state = load_stream_watch(store, 3)
     assert state is not None
     assert state.content == b"state"
-    assert_same(store.streams.list_pooled(3, "hour", *EVER), (a_reading(-1), a_reading()))
+    assert_same(list_pooled(store, 3, "hour", *EVER), (a_reading(-1), a_reading()))
     (owed,) = store.alerts.list_deliveries()
     assert (owed.hook, owed.stored.alert.key) == ("mail", "hanger-3:stream")
     again = store.streams.save_pooled(a_reading(1), b"later", opens, ["mail"], NOW)
-    state = store.streams.watch(3)
+    state = load_stream_watch(store, 3)
     assert state is not None
     assert (again, state.content) == ((), b"later")
     store.streams.save_pooled(a_reading(2), b"over", Reconciled((), {raised.id: "over"}))
@@ -82,30 +56,12 @@ def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) ->
     assert over.resolution.at == NOW + timedelta(hours=3)
 
 
-def test_an_alert_of_a_stream_is_delivered_though_no_test_raised_it(store: Store) -> None:
-    alert = replace(an_alert(), key="hanger-3:stream", test="", drifts=())
-    store.streams.save_pooled(a_reading(), None, Reconciled((alert,)), ["mail"], NOW)
-    assert [row.alert.hanger for row in store.alerts.list_page()] == [3]
-    (owed,) = store.alerts.list_due_deliveries(NOW, 10)
-    store.alerts.save_delivery(owed, NOW)
-    (told,) = store.alerts.list_deliveries()
-    assert (told.state, told.stored.alert.key) == (DeliveryState.DELIVERED, "hanger-3:stream")
-
-
 def test_nothing_of_a_reading_is_kept_where_its_alert_cannot_be(store: Store) -> None:
     alert = replace(an_alert(), key=None)  # type: ignore[arg-type]
     with pytest.raises(StoreError):
         store.streams.save_pooled(a_reading(), b"state", Reconciled((alert,)))
-    assert store.streams.watch(3) is None
-    assert store.streams.list_pooled(3, "hour", *EVER) == ()
-
-
-def test_an_event_is_noted_once(store: Store) -> None:
-    for event in (an_event(10), an_event(), an_event()):
-        store.streams.save_event(event)
-    assert store.streams.list_events(None, NOW) == (an_event(), an_event(10))
-    assert store.streams.list_events("h4", NOW) == ()
-    assert store.streams.list_events("h3", NOW + timedelta(minutes=5)) == (an_event(10),)
+    assert load_stream_watch(store, 3) is None
+    assert list_pooled(store, 3, "hour", *EVER) == ()
 
 
 def test_what_is_old_goes_but_days_stay(store: Store) -> None:
@@ -115,34 +71,11 @@ def test_what_is_old_goes_but_days_stay(store: Store) -> None:
         for period in ("hour", "six hours", "day"):
             store.streams.save_pooled(a_reading(-24 * days, period))  # type: ignore[arg-type]
     store.streams.sweep(NOW, 40)
-    assert len(store.streams.list_windows(3, *EVER)) == 2
-    assert len(store.streams.list_events(None, EVER[0])) == 3
+    assert len(list_windows(store, 3, *EVER)) == 2
+    assert len(list_stream_events(store, None, EVER[0])) == 3
     periods = ("hour", "six hours", "day")
-    counts = [len(store.streams.list_pooled(3, each, *EVER)) for each in periods]  # type: ignore[arg-type]
+    counts = [len(list_pooled(store, 3, each, *EVER)) for each in periods]  # type: ignore[arg-type]
     assert counts == [3, 3, 4]
-
-
-def test_a_stream_says_how_far_it_has_come(file_store: Store) -> None:
-    """Of its windows, its hours and days, each by its own start."""
-    streams = file_store.streams
-    assert streams.first_window("h3") is None
-    assert streams.pooled_range("h3") is streams.pooled_range("h3", "hour") is None
-    for minutes in (20, 0, 10):
-        streams.save_window(a_window(minutes))
-    for hours, period in ((1, "hour"), (2, "hour"), (-12, "day")):
-        streams.save_pooled(a_reading(hours, period))
-    assert streams.first_window("h3") == NOW
-    assert streams.first_window("h4") is None
-    starts = {NOW + timedelta(minutes=m) for m in (10, 20)}
-    assert streams.window_starts("h3", NOW + timedelta(minutes=10)) == starts
-    assert streams.window_starts("h4", NOW) == frozenset()
-    hours = NOW + timedelta(hours=1), NOW + timedelta(hours=2)
-    assert streams.pooled_range("h3", "hour") == hours
-    assert streams.pooled_range("h3") == (NOW - timedelta(hours=12), hours[1])
-    assert streams.pooled_range("h3", "six hours") is None
-    listed = streams.list_pooled(3, "hour", NOW + timedelta(hours=1), NOW + timedelta(hours=2))
-    assert listed == (a_reading(1),)
-    assert streams.list_pooled(4, "hour", NOW, NOW + timedelta(days=1)) == ()
 
 
 @pytest.mark.parametrize(
@@ -164,21 +97,23 @@ def test_a_window_whose_hour_was_left_out_is_found(
     for hour in hours:
         streams.save_pooled(a_reading(hour))
     expected = None if found is None else NOW + timedelta(hours=found)
-    assert streams.first_unpooled("h3", NOW + timedelta(hours=since)) == expected
-    assert streams.first_unpooled("h4", NOW) is None
+    assert find_first_unpooled(file_store, "h3", NOW + timedelta(hours=since)) == expected
+    assert find_first_unpooled(file_store, "h4", NOW) is None
 
 
 def test_the_watch_goes_back_to_a_day_before(file_store: Store) -> None:
     streams = file_store.streams
-    assert streams.watch(3) is streams.watch(3, NOW) is None
+    assert load_stream_watch(file_store, 3) is load_stream_watch(file_store, 3, NOW) is None
     for day in range(3):
         streams.save_pooled(a_reading(24 * day), b"day %d" % day)
     end = [NOW + timedelta(days=day, hours=1) for day in range(3)]
-    assert streams.watch(3) == KeptStreamWatch(end[2], b"day 2")
-    assert streams.watch(3, end[1]) == KeptStreamWatch(end[1], b"day 1")
-    assert streams.watch(3, end[1] - timedelta(seconds=1)) == KeptStreamWatch(end[0], b"day 0")
-    assert streams.watch(3, end[0] - timedelta(seconds=1)) is None
-    assert streams.watch(4, end[2]) is None
+    assert load_stream_watch(file_store, 3) == KeptStreamWatch(end[2], b"day 2")
+    assert load_stream_watch(file_store, 3, end[1]) == KeptStreamWatch(end[1], b"day 1")
+    assert load_stream_watch(file_store, 3, end[1] - timedelta(seconds=1)) == KeptStreamWatch(
+        end[0], b"day 0"
+    )
+    assert load_stream_watch(file_store, 3, end[0] - timedelta(seconds=1)) is None
+    assert load_stream_watch(file_store, 4, end[2]) is None
     streams.go_back(3, end[1], b"anew")
-    assert streams.watch(3) == KeptStreamWatch(end[1], b"anew")
-    assert streams.watch(3, end[2]) == KeptStreamWatch(end[1], b"day 1")
+    assert load_stream_watch(file_store, 3) == KeptStreamWatch(end[1], b"anew")
+    assert load_stream_watch(file_store, 3, end[2]) == KeptStreamWatch(end[1], b"day 1")

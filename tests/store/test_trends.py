@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable
 from dataclasses import fields, replace
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -23,8 +23,10 @@ from shm.store import (
     TrendPoint,
     trends,
 )
+from shm.store.queries.hangers import find_baseline_temperatures, list_baselines_in_force
+from shm.store.queries.trends import find_latest_trends, list_history, list_trend
 from shm.store.tables import posteriors
-from shm.values import EndPlate, Hanger, Limits, Posterior, Selection, Summary
+from shm.values import Hanger, Limits, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import posterior as modelled
@@ -72,7 +74,7 @@ def from_history(store: Store, hanger: Hanger) -> list[Told]:
             posterior.model,
             in_numbers(posterior, hanger, selection),
         )
-        for stored, posterior in store.posteriors.history(hanger.id)
+        for stored, posterior in list_history(store, hanger.id)
     ]
 
 
@@ -100,7 +102,7 @@ def from_trend(store: Store, hanger: Hanger) -> list[Told]:
             point.model,
             numbers_of(point),
         )
-        for point in store.posteriors.trend(hanger)
+        for point in list_trend(store, hanger)
     ]
 
 
@@ -167,8 +169,8 @@ def test_the_trend_is_what_the_history_says(
     store.posteriors.save_summaries(HANGER_3)
     without_samples(store)
     assert from_trend(store, HANGER_3) == expected
-    (latest,) = store.posteriors.latest_trends([HANGER_3]).values()
-    assert latest == store.posteriors.trend(HANGER_3)[-1]
+    (latest,) = find_latest_trends(store, [HANGER_3]).values()
+    assert latest == list_trend(store, HANGER_3)[-1]
 
 
 @pytest.mark.parametrize("happened", HAPPENINGS, ids=lambda each: each.__name__)
@@ -180,7 +182,7 @@ def test_the_baselines_in_force_are_those_of_each_hanger(
     updated(file_store, 3, 0.9)
     begun(file_store, 4, hanger=4)
     happened(file_store)
-    found = file_store.watch.baselines_in_force([HANGER_3, ANOTHER])
+    found = list_baselines_in_force(file_store, [HANGER_3, ANOTHER])
     assert list(found) == [3, 4]
     for hanger, glance in found.items():
         baseline = file_store.watch.baseline(hanger)
@@ -189,7 +191,7 @@ def test_the_baselines_in_force_are_those_of_each_hanger(
         assert (glance.since, glance.tests) == (baseline.since, baseline.posterior.tests)
         assert glance.temperature_c == 11.5
         assert glance.tension_n == Summary.of(baseline.posterior.tension_n)
-    assert file_store.watch.baseline_temperatures() == {3: 11.5, 4: 11.5}
+    assert find_baseline_temperatures(file_store) == {3: 11.5, 4: 11.5}
 
 
 def test_only_what_is_not_kept_is_made_from_samples(
@@ -208,49 +210,29 @@ def test_only_what_is_not_kept_is_made_from_samples(
 
     with monkeypatch.context() as patched:
         patched.setattr(trends, "summarised", noted)
-        assert [point.test for point in file_store.posteriors.trend(HANGER_3)] == ["t1", "t2"]
+        assert [point.test for point in list_trend(file_store, HANGER_3)] == ["t1", "t2"]
     assert made == [("t2",)]
     assert file_store.posteriors.save_summaries(HANGER_3) == 1
     without_samples(file_store)
-    assert [point.test for point in file_store.posteriors.trend(HANGER_3)] == ["t1", "t2"]
+    assert [point.test for point in list_trend(file_store, HANGER_3)] == ["t1", "t2"]
 
 
 def test_the_tension_over_all_classes_follows_the_selected_one(file_store: Store) -> None:
     begun(file_store)
-    (first,) = file_store.posteriors.trend(HANGER_3)
+    (first,) = list_trend(file_store, HANGER_3)
     found = file_store.posteriors.selection(3)
     assert found is not None
     assert first.averaged == found.selection.averaged_with(HANGER_3.limits)
     updated(file_store, 2, 0.9)
-    latest = file_store.posteriors.trend(HANGER_3)[-1]
+    latest = list_trend(file_store, HANGER_3)[-1]
     ratio = latest.tension_n.mean / first.tension_n.mean
     assert latest.averaged.tension_n.mean == pytest.approx(
         ratio * first.averaged.tension_n.mean, rel=2e-3
     )
     limited = replace(HANGER_3, limits=Limits(tension_max_n=latest.averaged.tension_n.q50))
-    assert file_store.posteriors.trend(limited)[
-        -1
-    ].averaged.probability_above_limit == pytest.approx(0.5, abs=0.02)
-
-
-def test_another_description_of_the_hanger_gives_another_stiffness(file_store: Store) -> None:
-    plate = EndPlate(1.0915, 0.04, 1.0644, 0.241, 0.562, 0.0425)
-    narrow, wide = (
-        replace(HANGER_3, plate=replace(plate, end_width_m=width)) for width in (0.9, 1.1)
+    assert list_trend(file_store, limited)[-1].averaged.probability_above_limit == pytest.approx(
+        0.5, abs=0.02
     )
-    prior = described("solid2", narrow).prior
-    posterior = modelled(list((prior.lower + prior.upper) / 2), "solid2", narrow)
-    first = identified(file_store, 1)
-    chosen = Selection((replace(posterior, tests=("t1",)),), (1.0,))
-    file_store.posteriors.save_selection(3, [first], chosen, LINEAGE, NOW)
-    file_store.posteriors.save_summaries(narrow)
-    for hanger in (wide, narrow):
-        assert from_trend(file_store, hanger) == from_history(file_store, hanger)
-    (before,), (after,) = file_store.posteriors.trend(narrow), file_store.posteriors.trend(wide)
-    assert before.tension_n == after.tension_n
-    name = "longitudinal_end_stiffness"
-    assert after.stiffness[name].mean - before.stiffness[name].mean > 0.05
-    assert file_store.posteriors.save_summaries(wide) == 1
 
 
 def test_summaries_are_kept_some_at_a_time_and_what_was_kept_is_not_done_again(
@@ -271,22 +253,6 @@ def test_summaries_are_kept_some_at_a_time_and_what_was_kept_is_not_done_again(
         file_store.posteriors.save_summaries(HANGER_3, killed)
     assert heard == pytest.approx([2 / 6, 4 / 6])
     assert file_store.posteriors.save_summaries(HANGER_3) == 2
-
-
-def test_a_trend_begins_where_it_is_asked_to(file_store: Store) -> None:
-    begun(file_store)
-    for number in (2, 3):
-        updated(file_store, number, 0.9)
-    since = NOW + timedelta(days=2)
-    assert [point.test for point in file_store.posteriors.trend(HANGER_3, since)] == ["t2", "t3"]
-
-
-def test_clamped_ends_have_no_stiffness(file_store: Store) -> None:
-    first = identified(file_store, 1)
-    chosen = Selection((a_posterior("beam1", ("t1",)),), (1.0,))
-    file_store.posteriors.save_selection(3, [first], chosen, LINEAGE, NOW)
-    file_store.posteriors.save_summaries(HANGER_3)
-    assert file_store.posteriors.trend(HANGER_3)[0].stiffness == {}
 
 
 def test_a_database_of_before_the_summaries_answers_the_same(tmp_path: Path) -> None:

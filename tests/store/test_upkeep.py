@@ -19,6 +19,8 @@ from shm.store.checking import (
     quick_troubles,
     unknown_files,
 )
+from shm.store.queries.recordings import list_recordings
+from shm.store.queries.upkeep import find_last_backup, find_newest_step
 from tests.helpers.contents import quiet
 from tests.helpers.nouns import NOW, a_file
 
@@ -27,12 +29,12 @@ HOUR = timedelta(hours=1)
 
 def test_the_last_backup_is_the_newest(file_store: Store) -> None:
     upkeep = file_store.upkeep
-    assert upkeep.last_backup() is upkeep.newest_row_at() is None
+    assert find_last_backup(file_store) is find_newest_step(file_store) is None
     for hours in (0, 2):
         upkeep.note_backup(Path(f"/backups/{hours}.db"), NOW + hours * HOUR)
-    assert upkeep.last_backup() == (NOW + 2 * HOUR, "/backups/2.db")
+    assert find_last_backup(file_store) == (NOW + 2 * HOUR, "/backups/2.db")
     file_store.recordings.receive(a_file(1), NOW + 3 * HOUR)
-    assert upkeep.newest_row_at() == NOW + 3 * HOUR
+    assert find_newest_step(file_store) == NOW + 3 * HOUR
 
 
 def test_an_archive_says_what_is_missing_changed_and_of_nobody(
@@ -47,7 +49,7 @@ def test_an_archive_says_what_is_missing_changed_and_of_nobody(
         kept = archive.keep(source)
         names = {"sha256": kept.sha256, "archived_as": kept.archived_as}
         file_store.recordings.receive(a_file(number, **names), NOW)
-    names = [each.file.archived_as or "" for each in file_store.recordings.list_all()]
+    names = [each.file.archived_as or "" for each in list_recordings(file_store)]
     told: list[float] = []
     whole = check_archive(file_store, archive, lambda _, share: told.append(share))
     assert (whole.whole, whole.troubles, whole.findings) == (3, (), ())

@@ -22,7 +22,7 @@ import requests
 from requests.adapters import HTTPAdapter
 
 from shm.bridge import WebhookHook
-from shm.documents import alert_document, dump
+from shm.documents import dump
 from shm.pipeline import DeliveryRefused
 from shm.values import Alert
 from shm_daemon.hooks.contract import SHOWN_CHARACTERS, HookFailed, Surroundings, one_line
@@ -44,7 +44,7 @@ class WebhookDeliverer:
 
     def __call__(self, hook: WebhookHook, alert: Alert) -> str:
         """Posts the alert; raises HookFailed, or DeliveryRefused where the server wants none."""
-        body = dump(alert_document(alert)).encode()
+        body = dump(self._surroundings.document(alert)).encode()
         headers = _headers(alert, body, self._secret(hook), int(time.time()))
         timeout_s = self._surroundings.timeout_s
         with self._lines.session(timeout_s) as (session, line):
@@ -107,7 +107,7 @@ class WebhookDeliverer:
 
 
 def signature(secret: bytes, timestamp: str, body: bytes) -> str:
-    """What stands in X-Shm-Signature: who listens makes it again and compares."""
+    """Return what stands in X-Shm-Signature: who listens makes it again and compares."""
     made = hmac.new(secret, timestamp.encode() + b"." + body, hashlib.sha256)
     return f"sha256={made.hexdigest()}"
 
@@ -123,7 +123,10 @@ def _headers(alert: Alert, body: bytes, secret: bytes, unix_s: int) -> dict[str,
 
 
 def _judged(response: requests.Response) -> str:
-    """What the server answered, if it took the alert; raises HookFailed or DeliveryRefused."""
+    """Return what the server answered, if it took the alert.
+
+    Raises HookFailed or DeliveryRefused.
+    """
     status = response.status_code
     if 200 <= status < 300:
         return f"{status} {one_line(response.reason or '')}".strip()

@@ -13,6 +13,8 @@ from shm.errors import ShmError
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report.formatting import counted, listed
 from shm.report.hanger_status import QUIET, Status, bridge_message
+from shm.store.queries.alerts import count_alerts
+from shm.store.queries.recordings import list_holds
 from shm.values.messages import URGENCIES, Lead, Urgency
 from shm_daemon.web.health import notices, troubles
 from shm_daemon.web.site import Site
@@ -63,8 +65,8 @@ def summary_of(site: Site, now: datetime) -> Summary:
         troubles=tuple(troubles(site)),
         hangers=len(lines),
         latest_test_at=max((each.latest.time for each in lines if each.latest), default=None),
-        open_alerts=store.alerts.counts()[0],
-        held=len(store.recordings.list_holds()),
+        open_alerts=count_alerts(store)[0],
+        held=len(list_holds(store)),
     )
 
 
@@ -124,9 +126,9 @@ class BridgeRow:
 
 
 def site_rows(site: Site, now: datetime) -> tuple[BridgeRow, ...]:
-    """The site's own bridge; empty where nothing of it is described, so that it only lists others.
+    """Return the row of the site's bridge; empty where it describes none and only lists others.
 
-    A store that is out is told like a bridge that is not reached.
+    A store that fails is shown like a bridge that is not reached.
     """
     bridge = site.workspace.bridge
     if not bridge.watched and bridge.other_bridges:
@@ -139,7 +141,7 @@ def site_rows(site: Site, now: datetime) -> tuple[BridgeRow, ...]:
 
 
 def row_document(row: BridgeRow) -> dict[str, object]:
-    """As `shm bridges --json` and `/api/bridges` give it."""
+    """Return a row as `shm bridges --json` and `/api/bridges` give it."""
     return {
         "name": row.name,
         "address": row.address,
@@ -155,7 +157,7 @@ _ORDER = [status.name.lower() for status in Status]
 
 
 def worst_first(rows: Sequence[BridgeRow]) -> tuple[BridgeRow, ...]:
-    """By urgency, then state, then whether they are watched; else in their order."""
+    """Sort rows by urgency, then state, then whether they are watched, then as given."""
 
     def rank(row: BridgeRow) -> tuple[int, int, bool]:
         status = row.summary and row.summary.status

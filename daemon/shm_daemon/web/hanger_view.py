@@ -24,6 +24,14 @@ from shm.store import (
     TrendPoint,
     Workspace,
 )
+from shm.store.queries.alerts import list_hanger_events
+from shm.store.queries.hangers import (
+    find_latest_diagnosis,
+    list_baselines_in_force,
+    list_detections,
+)
+from shm.store.queries.trends import list_trend
+from shm.store.queries.watching import list_watched_tests
 from shm.values import Hanger
 from shm.values.notes import Note
 from shm_daemon.web.access import AtSite
@@ -72,15 +80,15 @@ class HangerView:
     @cached_property
     def trend(self) -> tuple[TrendPoint, ...]:
         """One point a test that has been through updating, the oldest first."""
-        return self.store.posteriors.trend(self.hanger)
+        return list_trend(self.store, self.hanger)
 
     @cached_property
     def baseline(self) -> BaselineGlance | None:
-        return self.store.watch.baselines_in_force([self.hanger]).get(self.hanger.id)
+        return list_baselines_in_force(self.store, [self.hanger]).get(self.hanger.id)
 
     @cached_property
     def events(self) -> tuple[HangerEvent, ...]:
-        return self.store.alerts.list_hanger_events(self.hanger.id)
+        return list_hanger_events(self.store, self.hanger.id)
 
     @cached_property
     def notes(self) -> tuple[Note, ...]:
@@ -92,7 +100,7 @@ class HangerView:
         """The tests at which a change stood as called."""
         if self.baseline is None:
             return ()
-        found = self.store.watch.list_detected(self.hanger.id, self.baseline.id)
+        found = list_detections(self.store, self.hanger.id, self.baseline.id)
         return tuple(each for each in found if each.watched.change.called)
 
     @cached_property
@@ -105,7 +113,7 @@ class HangerView:
     @cached_property
     def sheet(self) -> DiagnosisSheet | None:
         """The latest diagnosis of the gap."""
-        stored = self.store.posteriors.latest_diagnosis(self.hanger.id)
+        stored = find_latest_diagnosis(self.store, self.hanger.id)
         if stored is None:
             return None
         return DiagnosisSheet(stored.diagnosis, self.hanger, self.workspace.bridge.name)
@@ -130,7 +138,7 @@ class HangerView:
             hanger=self.hanger,
             baseline_id=baseline.id,
             model=baseline.model,
-            tests=tuple(each.id for each in self.store.watch.list_watched(stored)),
+            tests=tuple(each.id for each in list_watched_tests(self.store, stored)),
             false_call_years=self.workspace.settings.false_call_years,
         )
 

@@ -21,6 +21,10 @@ from shm.report.formatting import Interval
 from shm.report.states import StatesOverTime, called_words
 from shm.store import DeliveryState, StoredWatch, TestRow
 from shm.store import TrendPoint as StoredPoint
+from shm.store.queries.alerts import count_alerts, count_deliveries, list_hanger_events
+from shm.store.queries.recordings import count_stages
+from shm.store.queries.tests import count_tests, list_test_rows
+from shm.store.queries.trends import list_trend
 from shm.values import Hanger
 from shm.values.rounding import ForceUnit
 from shm_daemon.heartbeat import seconds_since_beat
@@ -169,15 +173,15 @@ class TestLine:
 
 
 def headings(view: HangerView) -> tuple[str, ...]:
-    """Of the table of the lines."""
+    """Return the headings of the table of tests."""
     unit = tension_unit(view.trend)
     return ("test", "time", "temperature", "model", *formatting.tension_headings(unit))
 
 
 def lines_before(view: HangerView, limit: int, before: int | None = None) -> list[TestLine]:
-    """So many tests, the newest first; `before` is the number of the test to go on after."""
+    """Return `limit` tests, the newest first, that are older than the test number `before`."""
     points = {point.test_id: point for point in view.trend}
-    rows = view.store.tests.list_rows(view.hanger.id, limit, before)
+    rows = list_test_rows(view.store, view.hanger.id, limit, before)
     unit = tension_unit(view.trend)
     return [TestLine(row, points.get(row.id), unit) for row in rows]
 
@@ -196,11 +200,11 @@ def status(site: AtSite, _: Reader) -> Any:
     workspace, store = site.workspace, site.store
     return {
         "bridge": workspace.bridge.name,
-        "recordings": store.recordings.stage_counts(),
+        "recordings": count_stages(store),
         "spool": len(scan(workspace.spool)),
         "quarantine": quarantined(workspace),
-        "open_alerts": store.alerts.counts()[0],
-        "waiting_deliveries": store.alerts.delivery_counts()[DeliveryState.WAITING],
+        "open_alerts": count_alerts(store)[0],
+        "waiting_deliveries": count_deliveries(store)[DeliveryState.WAITING],
         "daemon_seen_seconds_ago": seconds_since_beat(workspace),
     }
 
@@ -223,10 +227,10 @@ def hanger(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Any:
 
 
 def _now(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
-    """Of many hangers in as many questions as of one."""
+    """Return the state of many hangers with as many queries as for one."""
     store = site.store
     known = HangersNow.of(site.workspace, store, hangers, utc_now())
-    tests = store.tests.latest()
+    tests = count_tests(store)
     set_at = {id_: each.set_at for id_, each in known.baselines.items()}
     return [
         {
@@ -252,8 +256,8 @@ def _tension(latest: StoredPoint | None) -> dict[str, Any]:
 
 
 def _watched(latest: StoredWatch | None) -> dict[str, Any]:
-    """Of the latest test that was compared with the baseline in force."""
-    drifts = latest.watched.told if latest else ()
+    """Return the result of the latest test compared with the current baseline."""
+    drifts = latest.watched.published_drifts if latest else ()
     creep = latest.watched.creep_per_year if latest else None
     return {
         "shifts": plain([{key: getattr(drift, key) for key in _SHIFT} for drift in drifts]),
@@ -270,8 +274,8 @@ def trend(
     since: Annotated[datetime | None, Query(description="ISO 8601; all tests without it.")] = None,
 ) -> Any:
     """Every test with its posterior in numbers, the oldest first, events and states over time."""
-    points = view.trend if since is None else view.store.posteriors.trend(view.hanger, since)
-    events = view.store.alerts.list_hanger_events(view.hanger.id, since)
+    points = view.trend if since is None else list_trend(view.store, view.hanger, since)
+    events = list_hanger_events(view.store, view.hanger.id, since)
     return JSONResponse(
         plain(
             {

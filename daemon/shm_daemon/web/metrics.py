@@ -31,8 +31,10 @@ from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.publishing import HANGER, summary_fields
 from shm.pipeline.stream_state import StreamCondition, stream_states
 from shm.store import Workspace
-from shm.store.list_rows import ON_THE_WAY
+from shm.store.queries.alerts import count_alerts, count_deliveries
+from shm.store.queries.recordings import count_stages, find_oldest_waiting, list_stage_seconds
 from shm.store.ring import ring_of
+from shm.store.rows import ON_THE_WAY
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
@@ -57,7 +59,7 @@ class Exposition(Collector):
         self._said: dict[str, str] = {}
 
     def page(self) -> bytes:
-        """In a registry of its own, as text of Prometheus."""
+        """Return the metrics of a separate registry as text of Prometheus."""
         registry = CollectorRegistry(auto_describe=False)
         registry.register(self)
         return generate_latest(registry)
@@ -102,34 +104,34 @@ def _of_workspace(
 
 
 def _usable(site: Site) -> Iterator[Metric]:
-    site.store.alerts.counts()
+    count_alerts(site.store)
     yield _store_up(is_up=True)
 
 
 def _queue(site: Site) -> Iterator[Metric]:
-    looks, counts = scan(site.workspace.spool), site.store.recordings.stage_counts()
+    looks, counts = scan(site.workspace.spool), count_stages(site.store)
     waiting = len(looks) + sum(counts[stage] for stage in ON_THE_WAY)
     text = "Files in the spool and recordings that are not through."
     yield GaugeMetricFamily("shm_queue_length", text, waiting)
     changed_s = [time.time() - look.modified_ns / 1e9 for look in looks.values()]
-    oldest = site.store.recordings.oldest_waiting()
+    oldest = find_oldest_waiting(site.store)
     stored_s = [(utc_now() - oldest).total_seconds()] if oldest else []
     text = "How long the oldest of the queue has waited; 0 where it is empty."
     yield GaugeMetricFamily("shm_queue_oldest_seconds", text, max([0.0, *changed_s, *stored_s]))
 
 
 def _recordings(site: Site) -> Iterator[Metric]:
-    counts = site.store.recordings.stage_counts()
+    counts = count_stages(site.store)
     yield _labelled("shm_recordings", "Recordings at a stage.", "stage", counts)
 
 
 def _alerts(site: Site) -> Iterator[Metric]:
-    counts = dict(zip(("open", "acknowledged"), site.store.alerts.counts(), strict=True))
+    counts = dict(zip(("open", "acknowledged"), count_alerts(site.store), strict=True))
     yield _labelled("shm_alerts", "Alerts raised.", "state", counts)
 
 
 def _deliveries(site: Site) -> Iterator[Metric]:
-    counts = site.store.alerts.delivery_counts()
+    counts = count_deliveries(site.store)
     yield _labelled("shm_deliveries", "Alerts to hooks.", "state", counts)
 
 
@@ -147,7 +149,7 @@ def _hangers(site: Site) -> Iterator[Metric]:
 
 
 def _stages(site: Site) -> Iterator[Metric]:
-    lately = site.store.recordings.stage_seconds(utc_now() - _LATELY)
+    lately = list_stage_seconds(site.store, utc_now() - _LATELY)
     text = "From the stage before to this one, over the last hour: quantiles."
     seconds = GaugeMetricFamily("shm_stage_seconds", text, labels=["stage", "quantile"])
     for stage, values in lately.items():
@@ -249,10 +251,12 @@ def health(site: AtSite) -> Any:
         **answers(400, 401, 403),
     },
     summary="Metrics for Prometheus",
+    description=(
+        "Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out, "
+        "and\n`shm_scrape_errors_total` counts what could not be told."
+    ),
 )
 def metrics(request: Request, _: Reader) -> Response:
-    """Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out, and
-    `shm_scrape_errors_total` counts what could not be told.
-    """
+    """Return the metrics, computed from store and spool at each scrape."""
     exposition: Exposition = request.app.state.exposition
     return Response(exposition.page(), headers={"Content-Type": CONTENT_TYPE})

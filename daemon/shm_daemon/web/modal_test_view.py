@@ -32,6 +32,7 @@ from shm.report.modal_test_report import advice, conditions, dropped, hits, summ
 from shm.report.paper import Table
 from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
 from shm.store.archive import MODES_SUFFIX
+from shm.store.queries.tests import load_frequency_response
 from shm_daemon.web import with_plotly
 from shm_daemon.web.background_work import BackgroundWorker
 
@@ -157,7 +158,7 @@ class TestView:
     def as_stored(self) -> ModalTestReport:
         """Return the stored results of a test: no records, hits, poles and fit."""
         stored, settings = self.stored, self.workspace.settings
-        response = self.store.tests.frequency_response(stored)
+        response = load_frequency_response(self.store, stored)
         found = Identification(
             test=stored.test,
             frequency_response=response,

@@ -1,5 +1,6 @@
-"""Recordings over HTTP: streamed to disk, landed in the spool, and asked after.
-Chunks of permanent sensors over HTTP: acknowledged once they are on disk.
+"""Receive recordings over HTTP, streamed to disk, and chunks of permanent sensors.
+
+Both are acknowledged once they are on disk.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from shm.pipeline import utc_now
 from shm.read.chunk_document import LARGEST_BYTES, refuse_long_chunk
 from shm.store import Stage, Store, StoredRecording
 from shm.store.archive import refuse_oversize
+from shm.store.queries.history import list_former_tests
+from shm.store.queries.recordings import find_by_checksum, find_discard
 from shm_daemon.spool import Incoming, Landed, landing_name
 from shm_daemon.streams import take_chunks
 from shm_daemon.web.access import AtSite, Reader, Uploader
@@ -156,7 +159,7 @@ def recordings(
     site: AtSite, _: Reader, sha256: Annotated[str, Query(pattern="^[0-9a-fA-F]{64}$")]
 ) -> Any:
     """One, or none while the file waits in the spool."""
-    found = site.store.recordings.with_checksum(sha256.lower())
+    found = find_by_checksum(site.store, sha256.lower())
     return {"recordings": [_row(site.store, found)] if found else []}
 
 
@@ -166,11 +169,10 @@ async def receive_body(
     max_bytes: int,
     refuse_large: Callable[[int, int], object] = refuse_oversize,
 ) -> None:
-    """Has the body of a request written, a piece at a time, beside the loop that serves the others;
-    `write` raises TooLarge before more is kept than is taken.
+    """Write the body of a request piece by piece, outside the loop that serves the others.
 
-    Refuses a form, and one that says it is too large, before a byte of it is sent, where the sender
-    waits for our word.
+    `write` raises TooLarge beyond its limit. Refuses a form, and a body whose header is too
+    large, before a byte of it is sent, where the sender waits for our response.
     """
     if request.headers.get("content-type", "").strip().lower().startswith("multipart/"):
         raise Refused(
@@ -210,18 +212,18 @@ def _land(
 
 def _outcome(store: Store, landed: Landed) -> Any:
     store.journal.note(utc_now(), "recording uploaded", landed.path.name)
-    known = store.recordings.with_checksum(landed.sha256)
+    known = find_by_checksum(store, landed.sha256)
     if known is None:
         return "new"
     if known.stage is not Stage.REFUSED:
         return "duplicate"
-    return "reopened" if store.recordings.discard_in_force(known.id) is None else "discarded before"
+    return "reopened" if find_discard(store, known.id) is None else "discarded before"
 
 
 def _recording(store: Store, key: str) -> StoredRecording:
     if len(key) < 64:
         return store.recordings.get(int(key))
-    found = store.recordings.with_checksum(key.lower())
+    found = find_by_checksum(store, key.lower())
     if found is None:
         raise NothingThere(
             "no recording of this checksum was taken in yet.", remedy="Ask again in some seconds."
@@ -233,7 +235,7 @@ def _tests(store: Store, recording: StoredRecording) -> list[dict[str, str]]:
     """Return the tests in force that came of a recording, but for those that are held."""
     if recording.hanger is None:
         return []
-    found = store.tests.list_former(recording.id)
+    found = list_former_tests(store, recording.id)
     shown = (each for each in found if each.stage is not Stage.HELD)
     names = [test.name for test in shown if test.superseded_at is None]
     return [{"name": name, "page": test_page(recording.hanger, name)} for name in names]
@@ -268,7 +270,7 @@ def _listed(text: str | None) -> list[str] | None:
 
 
 def _numbers(key: str, text: str | None) -> list[object] | None:
-    """Numbers, and empty texts where a channel has none."""
+    """Return numbers, and empty texts where a channel has none."""
     if text is None:
         return None
     parts = [part.strip() for part in text.split(",")]

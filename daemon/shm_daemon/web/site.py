@@ -16,6 +16,7 @@ from typing import Any
 from shm.errors import BadInput, NothingThere, ShmError, StoreError
 from shm.store import Store, Workspace
 from shm.store.people import same_name
+from shm.store.queries.recordings import list_holds
 from shm.values import Hanger
 from shm_daemon.web.address import Address, network_of
 
@@ -88,12 +89,12 @@ class Description:
         self._lock = threading.Lock()
 
     def forget(self) -> None:
-        """Has it read again: a setting was changed."""
+        """Have it read again: a setting was changed."""
         with self._lock:
             self._described_at = -1
 
     def now(self) -> tuple[Workspace, ShmError | None]:
-        """As it is described now or, where that has a fault, as it last was; and the fault."""
+        """Return the description or, where that has a fault, the last good one; and the fault."""
         with self._lock:
             modified = modified_ns(self._workspace)
             if modified != self._described_at:
@@ -117,7 +118,7 @@ class Site:
         self._lock = threading.Lock()
 
     def twin(self) -> Site:
-        """The same with connections of its own to the store: it need not wait for this one's."""
+        """Return a copy with separate connections to the store, which need not wait for these."""
         return Site(self._description, self.address)
 
     @property
@@ -131,7 +132,7 @@ class Site:
         return self._description.now()[1]
 
     def forget_description(self) -> None:
-        """Has the description read again: a setting was changed."""
+        """Have the description read again: a setting was changed."""
         self._description.forget()
 
     @property
@@ -175,7 +176,7 @@ def held_documents(site: Site, hanger: int | None = None) -> list[dict[str, Any]
             "held_at": hold.held_at,
             "message": hold.message,
         }
-        for hold in site.store.recordings.list_holds(hanger)
+        for hold in list_holds(site.store, hanger)
     ]
 
 

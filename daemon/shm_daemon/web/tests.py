@@ -16,6 +16,8 @@ from shm.report import formatting
 from shm.report.paper import Table
 from shm.report.shared_tables import overall
 from shm.store import FormerPosterior, FormerTest, Step
+from shm.store.queries.history import list_former_tests, list_steps
+from shm.store.queries.tests import find_neighbours
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import name_in
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
@@ -28,7 +30,7 @@ _AT_ONCE_S = 0.05  # what would be rounded to 0.0 s
 
 
 def origin(view: TestView) -> Table:
-    """File, checksums and version; a checksum is written out, for it is there to be compared."""
+    """Return file, checksums and version; a checksum is complete, for comparison."""
     file, lineage = view.recording.file, view.stored.lineage
     size, is_now = file.size_bytes, view.order.terms == lineage
     remedy = f"have changed since: `shm ingest --again {view.recording.id}` identifies it anew"
@@ -49,12 +51,12 @@ def origin(view: TestView) -> Table:
 
 def steps_of(view: TestView) -> tuple[Step, ...]:
     """Return the steps of the file, and those of this test of it."""
-    found = view.store.journal.list_steps(view.recording.id)
+    found = list_steps(view.store, view.recording.id)
     return tuple(step for step in found if step.test in (None, view.stored.test.id))
 
 
 def steps(view: TestView) -> Table:
-    """Each stage that was reached and when, with the time since the one before."""
+    """Return each stage that was reached and when, with the time since the one before."""
     found = steps_of(view)
     before: list[datetime | None] = [None, *(step.at for step in found)]
     rows = tuple(
@@ -71,8 +73,8 @@ def steps(view: TestView) -> Table:
 
 
 def formers_of(view: TestView) -> tuple[FormerTest, ...]:
-    """Every identification of this test, in force or superseded, oldest first."""
-    found = view.store.tests.list_former(view.recording.id)
+    """Return every identification of this test, in force or superseded, oldest first."""
+    found = list_former_tests(view.store, view.recording.id)
     return tuple(each for each in found if each.name == view.stored.test.id)
 
 
@@ -86,7 +88,7 @@ def _replaced(view: TestView) -> list[tuple[str | None, datetime, FormerTest | F
 
 
 def superseded(view: TestView) -> Table:
-    """Identifications and posteriors that later runs have replaced."""
+    """Return identifications and posteriors that later runs have replaced."""
     rows = tuple(
         (
             f"posterior, {formatting.model_class(model)}" if model else "identification",
@@ -279,7 +281,7 @@ def hits(_: Reader, view: View) -> Any:
 def test(_: Reader, view: View) -> Any:
     """Modes, quality, what was set aside, and where all that comes from."""
     sheet, stored, file = view.as_stored, view.stored, view.recording.file
-    before, after = view.store.tests.beside(stored)
+    before, after = find_neighbours(view.store, stored)
     response = sheet.identification.frequency_response
     return {
         "test": modes_document.test_document(stored.test),
@@ -324,5 +326,5 @@ def waiting() -> JSONResponse:
 
 
 def _known(row: dict[str, Any]) -> dict[str, Any]:
-    """NaN is what is not known."""
+    """Return a row without NaN, which means unknown."""
     return {key: None if value != value else value for key, value in row.items()}

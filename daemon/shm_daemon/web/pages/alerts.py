@@ -1,8 +1,4 @@
-"""Alerts: listed and taken note of over HTTP, and their page, some at a time: those that are open,
-then the others.
-
-Silences and maintenance windows: made and ended on the page of alerts.
-"""
+"""Show and acknowledge alerts; create and end silences and maintenance windows."""
 
 from __future__ import annotations
 
@@ -22,7 +18,8 @@ from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report import formatting
 from shm.report.hanger_status import HangerMessage
 from shm.store import Delivery, DeliveryState, News, Silence, StoredAlert
-from shm.store.stored_alerts import said_of, silenced_until
+from shm.store.queries.alerts import count_open_alerts, list_alert_page
+from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values.messages import Lead
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import test_page
@@ -56,13 +53,13 @@ def alerts_page(
     open_before: Before = None,
     noted_before: Before = None,
 ) -> Response:
-    """Alerts of all hangers or of one, the newest first.
+    """Return alerts of all hangers or of one, the newest first.
 
     `open_before` goes on among the open ones alone, `noted_before` among the others.
     """
     opened, older_open = _some(site, hanger, open_before, is_open=True)
     noted, older_noted = _some(site, hanger, noted_before, is_open=False)
-    counts, now = site.store.alerts.open_counts(), utc_now()
+    counts, now = count_open_alerts(site.store), utc_now()
     return page(
         request,
         "alerts.html.j2",
@@ -87,15 +84,15 @@ def alerts_page(
 
 
 def _sentence(silence: Silence) -> str:
-    words = f"{said_of(silence)}, from {silence.starts_at:%Y-%m-%d %H:%M} on."
+    words = f"{describe_silence(silence)}, from {silence.starts_at:%Y-%m-%d %H:%M} on."
     return words[0].upper() + words[1:]
 
 
 def _some(
     site: Site, hanger: int | None, before: int | None, *, is_open: bool
 ) -> tuple[list[dict[str, Any]], int | None]:
-    """Alerts as the page shows them, and the number to go on after, if there are more."""
-    rows = site.store.alerts.list_page(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
+    """Return a page of alerts, and the number to continue after, if there are more."""
+    rows = list_alert_page(site.store, hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
     shown, older = paged(rows, _SHOWN)
     documents, now = alert_documents(shown, site), _messages(shown, site)
     return [
@@ -171,9 +168,9 @@ def alerts(
     """
     is_open = True if open else None
     if limit is None:
-        found = site.store.alerts.list_page(hanger, is_open=is_open)[::-1]
+        found = list_alert_page(site.store, hanger, is_open=is_open)[::-1]
         return {"alerts": alert_documents(found, site), "next_before": None}
-    rows = site.store.alerts.list_page(hanger, is_open=is_open, limit=limit + 1, before=before)
+    rows = list_alert_page(site.store, hanger, is_open=is_open, limit=limit + 1, before=before)
     shown, older = paged(rows, limit)
     return {"alerts": alert_documents(shown, site), "next_before": older}
 
@@ -195,7 +192,7 @@ def acknowledge(site: AtSite, writer: Writer, alert_id: Row, comment: Acknowledg
 
 
 def alert_documents(found: Sequence[StoredAlert], site: Site) -> list[dict[str, Any]]:
-    """Alerts with what became of their deliveries, and what holds them back."""
+    """Return alerts with the state of their deliveries, and what holds these back."""
     silences, now = site.store.silences.list_all(), utc_now()
     hooks = {hook.name: hook for hook in site.workspace.bridge.hooks}
     owed = defaultdict[int, list[Delivery]](list)
@@ -235,9 +232,9 @@ def _delivery(row: Delivery, hook: Hook | None, message: str, now: datetime) -> 
     if hook is not None and row.state is DeliveryState.WAITING:
         until = hook.quiet_until(message, now, is_raised=row.news is News.RAISED)
     escalates = hook is not None and hook.escalation_after_seconds is not None
-    told = {name: getattr(row, name) for name in ("hook", "attempts", "last_error", "news")}
+    delivery = {name: getattr(row, name) for name in ("hook", "attempts", "last_error", "news")}
     state = {"state": row.state.value, "escalation": escalates, "waits_until": until}
-    return {**told, **state}
+    return {**delivery, **state}
 
 
 @router.post("/silences", include_in_schema=False)

@@ -19,6 +19,8 @@ from shm.report.figures.compared_hangers import MOST, Course, alt, caption, spec
 from shm.report.formatting import Interval
 from shm.report.hanger_summary import HangerSummary
 from shm.report.paper import Table
+from shm.store.queries.hangers import list_baselines_in_force
+from shm.store.queries.trends import list_trend
 from shm.values import Hanger
 from shm_daemon.web import with_plotly
 from shm_daemon.web.access import AtSite, Reader
@@ -45,7 +47,7 @@ def compare_page(
     hanger: _Chosen = None,
     since: Annotated[str, Query(max_length=10)] = "",
 ) -> HTMLResponse:
-    """Hangers to choose from, and those that were chosen, beside each other."""
+    """Show hangers to choose from, and the chosen ones next to each other."""
     every, day = site.workspace.bridge.hangers, _day(since)
     chosen = _chosen(site, hanger) if hanger else []
     rows = hanger_summaries(site.workspace, site.store, utc_now(), chosen)
@@ -89,7 +91,7 @@ def compare_figure(
 
 
 def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:
-    """Each once, in the order of the description; raises BadInput, NothingThere."""
+    """Return each once, in the order of the description; raises BadInput, NothingThere."""
     if len(set(numbers)) > MOST:
         raise BadInput(
             f"{len(set(numbers))} hangers are too many for one figure.",
@@ -111,7 +113,7 @@ def _begin(since: date | None) -> datetime:
 
 
 def _day(text: str) -> date | None:
-    """Of a form whose field may be left empty; raises BadInput."""
+    """Return the day of a form field, which may be empty; raises BadInput."""
     if not text:
         return None
     try:
@@ -121,12 +123,12 @@ def _day(text: str) -> date | None:
 
 
 def _courses(site: Site, chosen: Sequence[Hanger], since: date | None) -> list[Course]:
-    """Of those that have a baseline and tests since that day."""
+    """Return the courses of the hangers with a baseline and tests since that day."""
     begin = _begin(since) if since else None
-    baselines = site.store.watch.baselines_in_force(chosen)
+    baselines = list_baselines_in_force(site.store, chosen)
     found = []
     for hanger in chosen:
-        points = site.store.posteriors.trend(hanger, begin)
+        points = list_trend(site.store, hanger, begin)
         if hanger.id in baselines and points:
             base = Interval.of_averaged(baselines[hanger.id].averaged)
             found.append(

@@ -16,6 +16,7 @@ from shm.report.formatting import Interval
 from shm.report.modal_test_report import name
 from shm.report.paper import Table, filled
 from shm.report.shared_tables import headline, overall
+from shm.store.queries.tests import find_neighbours
 from shm.values.rounding import force_unit
 from shm_daemon.web.access import Reader
 from shm_daemon.web.address import test_json, test_page
@@ -41,7 +42,7 @@ def one_test(
             return HTMLResponse(f'<p class="note">{AT_WORK}</p>', 202, RETRY_AFTER)
         return page(request, "test_hits.html.j2", hits=_hit_tables(view))
     sheet, hanger_id, shown = view.sheet, view.stored.hanger, view.shown()
-    before, after = view.store.tests.beside(view.stored)
+    before, after = find_neighbours(view.store, view.stored)
     points = shown.spectrum.points if shown.spectrum else ()
     chosen = response if response is not None and response < len(points) else None
     if chosen is None:  # that which shows the modes best
@@ -64,7 +65,7 @@ def one_test(
         results=filled(
             modal_test_report.modes(sheet),
             modal_test_report.quality(sheet),
-            modal_test_report.set_aside(sheet),
+            modal_test_report.foreign_modes(sheet),
         ),
         charts=[(each, *_chart(view, each, chosen)) for each in view.figures()],
         points=[point_name(point) for point in points],
@@ -79,7 +80,7 @@ def one_test(
 
 
 def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
-    """None where they are not worked out."""
+    """Return the tables of hits; None where they are not computed."""
     whole = None if view.missing else view.background_worker.stored(view.order)
     return filled(whole.hits) if whole else None
 

@@ -1,6 +1,4 @@
-"""The page of operation: whether the work flows, what was refused, what `shm doctor` says; and what
-is held until a person decides whether it counts.
-"""
+"""Show the page of operation: state of the work, refused files, `shm doctor`, held recordings."""
 
 from __future__ import annotations
 
@@ -24,8 +22,10 @@ from shm.plausibility import refuse_impossible
 from shm.report import formatting
 from shm.report.paper import Table
 from shm.store import ENDED, DeliveryState, Workspace
+from shm.store.queries.alerts import count_deliveries
+from shm.store.queries.recordings import count_stages, find_latest_hold, find_oldest_waiting
 from shm_daemon.doctor import Finding, Level, examine
-from shm_daemon.heartbeat import seconds_since_beat, told
+from shm_daemon.heartbeat import duration_words, seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
@@ -71,16 +71,16 @@ class Examine:
 
 @router.get("/operation", include_in_schema=False)
 def operation_page(request: Request, site: AtSite, _: Reader, decided: Before = None) -> Response:
-    """Everything an operator asks first, and the full examination as soon as it is there.
+    """Show the state of operation, and the full examination as soon as it is available.
 
-    `decided` is a recording that was held, of which its decision is told.
+    `decided` is a held recording whose decision is shown.
     """
     state = _operation(site)
     return page(
         request,
         "health.html.j2",
         state=state,
-        decided=None if decided is None else site.store.recordings.latest_hold(decided),
+        decided=None if decided is None else find_latest_hold(site.store, decided),
         facts=_facts(state),
         stages=_stages(state["recordings"]),
         examination=_examination(request, site),
@@ -89,7 +89,7 @@ def operation_page(request: Request, site: AtSite, _: Reader, decided: Before = 
 
 @router.post("/held/{recording}", include_in_schema=False)
 def decide(site: AtSite, writer: Writer, recording: Row, form: Form) -> Response:
-    """Lets a recording count from now on, or takes it out; the daemon does what follows."""
+    """Accept a held recording or discard it; the daemon does the rest."""
     who, why, now = writer.actor, reason_in(form, "a decision"), utc_now()
     decisions = site.store.acting_as(who).recordings
     match form.get("action"):
@@ -113,8 +113,7 @@ def decide(site: AtSite, writer: Writer, recording: Row, form: Form) -> Response
 
 def _refuse_decided(site: Site, recording: int) -> None:
     """Raise UsageError where somebody has decided since the page was shown."""
-    recordings = site.store.recordings
-    hold = recordings.latest_hold(recordings.get(recording).id)
+    hold = find_latest_hold(site.store, site.store.recordings.get(recording).id)
     if hold is None or hold.decision is not None:
         now = "not held" if hold is None else f"not held: it was {hold.decision} by {hold.who}"
         raise UsageError(f"recording {recording} is {now}.", remedy="Load the page again.")
@@ -154,11 +153,11 @@ def _operation(site: Site) -> dict[str, Any]:
         "troubles": troubles(site),
         "daemon": workspace.holder(),
         "daemon_seen_seconds_ago": seconds_since_beat(workspace),
-        "recordings": store.recordings.stage_counts(),
+        "recordings": count_stages(store),
         "spool": len(scan(workspace.spool)),
-        "oldest_waiting_at": store.recordings.oldest_waiting(),
+        "oldest_waiting_at": find_oldest_waiting(store),
         "held": held_documents(site),
-        "deliveries": store.alerts.delivery_counts(),
+        "deliveries": count_deliveries(store),
         "quarantine": _refused(workspace),
         "quarantined": quarantined(workspace),
         "disk_free_bytes": disk.free,
@@ -209,7 +208,7 @@ def _facts(state: dict[str, Any]) -> list[tuple[str, str, str]]:
             "Daemon",
             "active" if state["daemon"] else "none active",
             "never seen here" if seen_s is None
-            else f"last seen {told(timedelta(seconds=seen_s))} ago",
+            else f"last seen {duration_words(timedelta(seconds=seen_s))} ago",
         ),
         (
             "Waiting",

@@ -10,7 +10,8 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.report import formatting
 from shm.report.paper import Table
-from shm.store.people import Role
+from shm.store.queries.history import list_changes
+from shm.store.rows import Role
 from shm_daemon.web.access import AtSite, Engineer, with_passwords
 from shm_daemon.web.forms import Form, done_or_again
 from shm_daemon.web.frame import page
@@ -65,7 +66,7 @@ def _page(request: Request, site: Site, message: str = "", status: int = 200) ->
 @router.get("/audit")
 def audit_page(request: Request, site: AtSite, _: Engineer, before: Before = None) -> Response:
     """Show the changes by people through page, API or command line, the newest first."""
-    shown, older = paged(site.store.journal.list_changes(_SHOWN + 1, before), _SHOWN)
+    shown, older = paged(list_changes(site.store, _SHOWN + 1, before), _SHOWN)
     table = Table(
         "Changes",
         ("time", "who", "by", "action", "of", "detail"),

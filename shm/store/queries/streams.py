@@ -1,0 +1,209 @@
+"""Read the windows, pooled readings and events of permanent sensors."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import Any, TypeVar
+
+import sqlalchemy as sa
+
+from shm.documents import parse_time
+from shm.store.database import Repository
+from shm.store.mapping import value_in
+from shm.store.rows import KeptStreamWatch
+from shm.store.tables import (
+    pooled_readings,
+    stream_events,
+    stream_progress,
+    stream_watch,
+    stream_watch_days,
+    stream_windows,
+)
+from shm.values import NAN, ShapePoint
+from shm.values.modes import Mode
+from shm.values.stream import (
+    PERIODS,
+    Period,
+    PooledReading,
+    StreamEvent,
+    Window,
+    WindowReading,
+    period_start,
+)
+
+_T = TypeVar("_T", WindowReading, PooledReading)
+_LATEST = 36
+"""Windows of a train-free night: a mode that traffic hides for some hours is not forgotten."""
+
+
+def list_windows(
+    store: Repository, hanger: int, since: datetime, until: datetime
+) -> tuple[WindowReading, ...]:
+    """List the windows of a hanger that began from `since` on and before `until`, by time."""
+    table = stream_windows
+    within = (table.c.hanger == hanger, table.c.start >= since, table.c.start < until)
+    query = sa.select(table).where(*within).order_by(table.c.start, table.c.id)
+    return _values(store, query, WindowReading)
+
+
+def list_spectra(
+    store: Repository, stream: str, since: datetime, until: datetime, most: int
+) -> tuple[tuple[datetime, Sequence[int]], ...]:
+    """List starts and spectra in dB of windows of a stream: at most so many, evenly chosen."""
+    table = stream_windows
+    within = (table.c.stream == stream, table.c.start >= since, table.c.start < until)
+    with store.reading() as connection:
+        ids = connection.scalars(sa.select(table.c.id).where(*within).order_by(table.c.start))
+        chosen = ids.all()
+        some = table.c.id.in_(chosen[:: max(1, -(-len(chosen) // most))])
+        rows = connection.execute(sa.select(table).where(some).order_by(table.c.start)).all()
+    spectra = ((row.start, json.loads(row.document)["spectrum_db"]) for row in rows)
+    return tuple(each for each in spectra if each[1])
+
+
+def find_last_window(store: Repository, stream: str) -> WindowReading | None:
+    """Return the latest window of a stream; None without one."""
+    table = stream_windows
+    query = sa.select(table).where(table.c.stream == stream).order_by(table.c.start.desc())
+    return next(iter(_values(store, query.limit(1), WindowReading)), None)
+
+
+def list_latest_with_modes(store: Repository, stream: str) -> tuple[WindowReading, ...]:
+    """Return the latest windows of a stream that have modes, the last first."""
+    table = stream_windows
+    query = sa.select(table).where(table.c.stream == stream, table.c.has_modes)
+    latest = query.order_by(table.c.start.desc()).limit(_LATEST)
+    return _values(store, latest, WindowReading)
+
+
+def find_first_window(store: Repository, stream: str) -> datetime | None:
+    """Return when the first window of a stream began; None without one."""
+    query = sa.select(sa.func.min(stream_windows.c.start)).where(stream_windows.c.stream == stream)
+    found: datetime | None = store.scalar(query)
+    return found
+
+
+def list_window_starts(store: Repository, stream: str, since: datetime) -> frozenset[datetime]:
+    """Return the starts of the windows of a stream that are done, from a time on."""
+    table = stream_windows
+    query = sa.select(table.c.start).where(table.c.stream == stream, table.c.start >= since)
+    return frozenset(store.scalars(query))
+
+
+def find_first_unpooled(store: Repository, stream: str, since: datetime) -> datetime | None:
+    """Return the first window with modes whose hour, six hours or day is not pooled.
+
+    From `since` on, and only where a later period is.
+    """
+    table, windows = pooled_readings, stream_windows
+    of_windows = sa.select(windows.c.start).where(
+        windows.c.stream == stream, windows.c.has_modes, windows.c.start >= since
+    )
+    starts: dict[str, set[datetime]] = {period: set() for period in PERIODS}
+    with store.reading() as connection:
+        for row in connection.execute(
+            sa.select(table.c.period, table.c.start).where(
+                table.c.stream == stream, table.c.start >= since - PERIODS["day"]
+            )
+        ):
+            starts[row.period].add(row.start)
+        found = connection.scalars(of_windows.order_by(windows.c.start)).all()
+    start: datetime
+    for start in found:
+        for period, length in PERIODS.items():
+            own = period_start(start, length)
+            if own not in starts[period] and own < max(starts[period], default=own):
+                return start
+    return None
+
+
+def find_pooled_range(
+    store: Repository, stream: str, period: Period | None = None
+) -> tuple[datetime, datetime] | None:
+    """Return when the first and the latest reading of a period, or of any, began."""
+    start = pooled_readings.c.start
+    query = sa.select(sa.func.min(start), sa.func.max(start))
+    query = query.where(pooled_readings.c.stream == stream)
+    if period is not None:
+        query = query.where(pooled_readings.c.period == period)
+    first, last = store.first(query)
+    return None if first is None else (first, last)
+
+
+def list_pooled(
+    store: Repository, hanger: int, period: Period, since: datetime, until: datetime
+) -> tuple[PooledReading, ...]:
+    """List the readings of a hanger that began from `since` on and before `until`, by time."""
+    table = pooled_readings
+    within = (table.c.start >= since, table.c.start < until)
+    query = sa.select(table).where(table.c.hanger == hanger, table.c.period == period, *within)
+    return _values(store, query.order_by(table.c.start, table.c.id), PooledReading)
+
+
+def list_hours_near(
+    store: Repository, stream: str, times: Sequence[datetime], within: timedelta
+) -> tuple[PooledReading, ...]:
+    """List the readings of an hour of a stream that began near any of these times, by time."""
+    table = pooled_readings
+    near = (table.c.start.between(at - within, at + within) for at in times)
+    of_hours = (table.c.stream == stream) & (table.c.period == "hour")
+    query = sa.select(table).where(of_hours, sa.or_(sa.false(), *near))
+    return _values(store, query.order_by(table.c.start), PooledReading)
+
+
+def load_stream_watch(
+    store: Repository, hanger: int, until: datetime | None = None
+) -> KeptStreamWatch | None:
+    """Return what the watch of a hanger's sensors goes on from; with `until` as it was at the
+    last kept time up to then."""
+    table = stream_watch if until is None else stream_watch_days
+    own = sa.select(table.c.reading_time, table.c.content).where(table.c.hanger == hanger)
+    if until is not None:
+        own = own.where(table.c.reading_time <= until)
+    row = store.first(own.order_by(table.c.reading_time.desc()).limit(1))
+    return None if row is None else KeptStreamWatch(*row)
+
+
+def list_stream_events(
+    store: Repository, stream: str | None, since: datetime
+) -> tuple[StreamEvent, ...]:
+    """List events from a time on, of one stream where named, by time."""
+    query = sa.select(stream_events).where(stream_events.c.end >= since)
+    if stream is not None:
+        query = query.where(stream_events.c.stream == stream)
+    rows = store.rows(query.order_by(stream_events.c.start, stream_events.c.id))
+    return tuple(value_in(row, StreamEvent) for row in rows)
+
+
+def find_progress(store: Repository, stream: str) -> datetime | None:
+    """Return up to when the windows of a stream are done; None where none is."""
+    progress = stream_progress
+    found: datetime | None = store.scalar(
+        sa.select(progress.c.done_until).where(progress.c.stream == stream)
+    )
+    return found
+
+
+def _values(store: Repository, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:
+    return tuple(_reading(kind, json.loads(row.document)) for row in store.rows(query))
+
+
+def _reading(kind: type[_T], document: dict[str, Any]) -> _T:
+    """Return a reading from its document, types unchecked: there are thousands at once."""
+    if kind is WindowReading:
+        document["window"] = Window(**_known(document["window"]))
+        document["spectrum_db"] = tuple(document["spectrum_db"])
+    document["modes"] = tuple(map(_mode, document["modes"]))
+    return kind(**_known(document))
+
+
+def _known(values: dict[str, Any]) -> dict[str, Any]:
+    known: dict[str, Any] = {k: NAN if value is None else value for k, value in values.items()}
+    return {**known, "start": parse_time(known["start"])} if "start" in known else known
+
+
+def _mode(values: dict[str, Any]) -> Mode:
+    shape = tuple(ShapePoint(**_known(each)) for each in values.pop("shape", ()))
+    return Mode(**_known(values), shape=shape)
