@@ -6,8 +6,10 @@ import json
 import logging
 import re
 import shutil
+import sqlite3
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import httpx
@@ -400,6 +402,27 @@ def test_publish_state_when_it_changes(workspace: Workspace, server: Server) -> 
         store.alerts.acknowledge(alert.id, "ann", "seen", utc_now())
     publish(workspace)
     assert len(states()) == 2
+
+
+def test_outbox_forgets_old_hours(workspace: Workspace, server: Server) -> None:
+    def hours(series: str) -> int:
+        with closing(sqlite3.connect(workspace.folder / "points.db")) as connection:
+            query = "SELECT count(*) FROM points WHERE key LIKE ?"
+            return int(connection.execute(query, (f"{series}%stream=h3 %",)).fetchone()[0])
+
+    with workspace.store() as store:
+        for day in range(1, 41):
+            store.streams.save_pooled(a_reading(24.0 * day), b"state")
+    publish(workspace)
+    assert sum(line.startswith("shm_hour") for line in server.taken) == 41
+    publish(workspace)
+    assert (hours("shm_hour"), hours("shm_mode")) == (15, 30)
+
+    with workspace.store() as store:
+        store.streams.save_pooled(a_reading(24.0 * 41), b"state")
+    publish(workspace)
+    assert sum(line.startswith("shm_hour") for line in server.taken) == 42
+    assert set(server.taken.values()) == {1}
 
 
 def test_running_daemon_goes_on(workspace: Workspace, server: Server) -> None:
