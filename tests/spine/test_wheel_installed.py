@@ -22,7 +22,7 @@ from tests.helpers.waiting import until
 def installed() -> Iterator[Path]:
     """Install the wheel and its web interface into an environment, as docs/install.md says."""
     subprocess.run(["make", "wheel"], cwd=ROOT, check=True, capture_output=True)
-    (wheel,) = (ROOT / "dist").glob("shm-*.whl")
+    wheel = max((ROOT / "dist").glob("shm-*.whl"), key=lambda path: path.stat().st_mtime)
     uv = Path(sys.executable).with_name("uv")
     with TemporaryDirectory() as made:
         environment = Path(made) / "environment"
