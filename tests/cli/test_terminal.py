@@ -53,7 +53,7 @@ LINES = (
 # They serve or work for long, or print nobody's words but ours.
 OTHERS = {
     "daemon", "demo", "web", "simulate", "completion", "db restore", "gap effects",
-    "notices", "settings",
+    "manual", "notices", "settings",
 }  # fmt: skip
 
 
