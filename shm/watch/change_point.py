@@ -35,7 +35,6 @@ SIZES = np.array([1.0, 6.0])
 
 # Judgement: nine of ten changes are just what may not be missed.
 LOG_SHARES = np.log([0.9, 0.1])
-_ABSENT = 1e8  # technical: the variance of a mode that was not measured; no log frequency is 1e4
 _A_WEEK_YEARS = 7 / 365.25
 
 
@@ -53,7 +52,8 @@ def sums_of(
 ) -> Sums:
     """Of tests with `columns` (T, n, z), `values` and `variances` (T, n), infinite where a mode was
     not measured, and the `covariance` (T, K, n, n) of their scatter beside that."""
-    its = np.where(np.isfinite(variances), variances, _ABSENT)
+    # Technical: the variance of a mode that was not measured; no log frequency is 1e4
+    its = np.where(np.isfinite(variances), variances, 1e8)
     n = values.shape[1]
     joint = covariance + its[:, None, :, None] * np.eye(n)
     weight = np.linalg.inv(joint)

@@ -279,7 +279,6 @@ _VERSION = "stream-watch-1"
 _DAY_SD = 1.25e-4  # of ln f: what a mode keeps for a day, by joints that seat anew. Judgement
 _EVENTS: dict[str, StreamEventKind] = {TIME_BASE: "clock drift", SWAPPED: "swapped"}
 _HOURS_OF_A_FAULT = 8  # judgement: of which a mistaken mode spoils one or two
-_CALLS_KEPT = 8  # technical: of changes that were told, so that what is kept stays bounded
 
 
 @dataclass(frozen=True)
@@ -465,7 +464,8 @@ class StreamWatch:
                 state = replace(state, called=state.called.after(now - evidence.shift, now))
         test = self._watched_test(state, evidence, moved, is_apart, unlike, reading, end)
         reported, alert = after(state.told, test, self.hanger)
-        reported = replace(reported, called=reported.called[-_CALLS_KEPT:])
+        # Technical: of changes that were told, so that what is kept stays bounded
+        reported = replace(reported, called=reported.called[-8:])
         standing = (*state.standing, alert.key) if alert else state.standing
         in_force = alert or reported.beyond or reported.called or state.bank.day < state.settled_day
         ended = () if in_force else standing

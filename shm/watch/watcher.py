@@ -41,7 +41,6 @@ from shm.watch.state_sums import StateSums, WatchState, begun_of, size_of
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
 _VERSION = 13
-_LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
 # Technical: what a test says goes nearly in proportion to its weight.
 _MOST_REPEATS, _NEARLY = 6, 0.5
 _CLEARLY_NATS = 3.0  # 20 to 1
@@ -180,7 +179,8 @@ class Watcher:
         self, state: WatchState, evidence: Evidence
     ) -> tuple[Evidence, Evidence, int]:
         """Return the bounded evidence, that for weighing causes, and tests against the baseline."""
-        if evidence.log_evidence <= math.log(_LOOKED_AT * self.options.limit_years):
+        # Technical: of the limit: below it nobody asks which cause it was
+        if evidence.log_evidence <= math.log(0.1 * self.options.limit_years):
             return evidence, evidence, 0
         # How sure it is that anything changed is bounded; which cause it was is for all to say.
         rows = _counting(state)

@@ -109,22 +109,6 @@ def test_a_loss_of_tension_is_told_from_a_loosened_end() -> None:
     assert tension[0].shift_mean == pytest.approx(-0.04, abs=0.01)
 
 
-def test_ends_that_no_test_tells_apart_are_said_to_be_alike() -> None:
-    step = [0.0, -3 * SPRING_STEP, 0.0, 0.0, 0.0]
-    history = History(BOTH_ENDS, tests=CHANGE_AT + 8, change_at=CHANGE_AT, step=step)
-
-    first, second, third = watch(history).calls[0][1].moved[:3]
-
-    assert {first.quantity, second.quantity} == {"log10_k1", "log10_k3"}
-    assert {first.end, second.end} == {"deck", "arch"}
-    assert first.alike == (second.quantity,)
-    assert second.alike == (first.quantity,)
-    assert first.probability == pytest.approx(second.probability, abs=0.02)
-    assert first.probability + second.probability > 0.9 > 0.1 > third.probability
-    # -0.9 decades by the slope at the baseline, a little more by the curve
-    assert first.shift_mean == pytest.approx(-0.97, abs=0.2)
-
-
 def test_both_planes_of_an_end_that_loosen_together_are_called_and_named_together() -> None:
     history = History(BOTH_ENDS, tests=CHANGE_AT + 3, change_at=CHANGE_AT, outliers=0)
     step = [0.0, -1.6 * SPRING_STEP, -2 * SPRING_STEP, 0.0, 0.0]
@@ -164,16 +148,6 @@ def test_springs_that_loosen_while_a_part_is_read_as_tension_are_called_in_five_
     assert change.moved[0].quantity != "tension"
 
 
-@pytest.mark.parametrize("gained", [0.0, 0.01, -0.02])
-def test_the_first_test_since_the_baseline_tells_no_less_than_it_leaves_open(gained: float) -> None:
-    for seed in range(3):
-        history = History(tests=2, change_at=1, step=[math.log(1 + gained)], outliers=0)
-        drift = last(watch(history, seed).tests).drifts[0]
-        assert drift.probability < 0.05
-        assert drift.shift_mean == pytest.approx(gained, abs=3 * drift.shift_sd)
-        assert 0.002 < drift.shift_sd < 0.03
-
-
 def test_the_drift_is_the_state_with_the_swing_of_the_temperature_taken_out() -> None:
     history = History(tests=26, seasons_k=25, change_at=16, step=lost(0.08), outliers=0)
 
@@ -183,16 +157,6 @@ def test_the_drift_is_the_state_with_the_swing_of_the_temperature_taken_out() ->
     assert drift.baseline == 700e3
     assert drift.threshold == HANGER_3.thresholds.tension_shift_fraction
     assert drift.probability > 0.99
-
-
-def test_a_result_rests_on_the_readings_up_to_it_alone() -> None:
-    readings = History(tests=14, change_at=8, step=lost(0.05)).readings(0)
-
-    early = watch_of(readings[:11], TENSION_ALONE).tests
-    late = watch_of(readings, TENSION_ALONE).tests[:11]
-
-    assert [test.change for test in early[1:]] == [test.change for test in late[1:]]
-    assert [test.drifts for test in early] == [test.drifts for test in late]
 
 
 def test_readings_out_of_order_or_of_other_quantities_are_refused() -> None:
