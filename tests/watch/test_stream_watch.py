@@ -23,7 +23,6 @@ from shm.watch.stream_watch import (
     StreamState,
     StreamWatch,
     StreamWatched,
-    daily_shift,
     watch_reading,
     windows_as_mounted,
 )
@@ -196,8 +195,6 @@ def test_planes_that_are_exchanged_are_told_as_such_within_hours(lacking: int) -
         to_bytes(state), [WindowReading(window, off[-1].modes, "tracked")]
     )
     assert right.modes == exchanged(off[-1].modes)
-    shift, sd = daily_shift(to_bytes(state), off[6:])
-    assert abs(shift) < 4 * sd < 0.01
 
 
 def test_a_mode_that_went_astray_moves_nothing() -> None:
