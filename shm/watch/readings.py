@@ -403,6 +403,8 @@ _FREQUENCY_ALLOWANCE = 1e-4
 # Mode by mode two tests of one state differ by more than is stated: the sensors' mass and place, a
 # joint that gives. Judgement, the better end of what repeated tests of real hangers show.
 _MODE_SCATTER = 1e-3
+_LOOSENED_STEPS = 6.0  # judgement: of the largest change of an end that is looked for
+_LOOSENED = 0.5  # of tests with a mode that seems mistaken, judgement: an end has loosened
 # Of a log frequency: a mode that is off by less may be so by its joint or its sensor.
 _LEAST_MISTAKE = 0.006
 _ROUNDS = 3  # technical: of "which modes are sound" and "where they lie"
@@ -452,6 +454,7 @@ class Reader:
         self._unstated_sd = hanger.assumptions.unstated_frequency_sd.value
         sensors_kg = mounted_kg(hanger)
         self._scatter = math.hypot(_MODE_SCATTER, sensors_kg / mass_kg / math.sqrt(8))
+        self._loosening = np.vstack(self.columns.loosening).T
         self._known: dict[int, tuple[ModalTest, Reading]] = {}
         self._residual = np.zeros(len(self.modes))
         self._residual = self._own_residual([self._seen(test) for test in usable])
@@ -524,23 +527,34 @@ class Reader:
         every = np.ones(len(seen.own), bool)
         if len(seen.own) < len(self.quantities) + 2:
             return every
-        found = self._sound_by(seen, np.zeros(len(self.quantities)))
+        still, none = np.zeros(len(self.quantities)), self._loosening[:, :0]
+        found = self._sound_by(seen, none, still)
         if found.sound.all():
             return every
-        slack = self._sound_by(seen, self._likelihood.far_start(seen))
-        sound = max(found, slack, key=lambda each: each.log_evidence).sound
-        return sound if (~sound).sum() <= MOST_MISTAKEN * len(every) else every
+        slack = self._sound_by(seen, none, self._likelihood.far_start(seen))
+        if slack.log_evidence > found.log_evidence:
+            found = slack
+        if self._loosening.size:
+            loose = self._sound_by(seen, self._loosening, still)
+            if loose.log_evidence + math.log(_LOOSENED) > found.log_evidence:
+                found = loose
+        return found.sound if (~found.sound).sum() <= MOST_MISTAKEN * len(every) else every
 
-    def _sound_by(self, seen: SeenModes, x: FloatArray) -> SoundModes:
-        """Find the sound modes, the quantities being sought from `x` (q,) on."""
-        variance = seen.variance + self._scatter**2
+    def _sound_by(self, seen: SeenModes, more: FloatArray, start: FloatArray) -> SoundModes:
+        """Find the sound modes where the quantities, and `more` (modes, k), may have moved.
+
+        The quantities are sought from `start` (q,) on.
+        """
+        variance, more = seen.variance + self._scatter**2, more[seen.own]
         wide, sd = replace(seen, variance=variance), np.sqrt(variance)
+        pull = np.append(self._likelihood.pull, np.full(more.shape[1], 1 / _LOOSENED_STEPS**2))
+        x = start
         for _ in range(_ROUNDS):
             linear = self._likelihood.linear(x, wide)
             off = sd * (linear.residual + linear.slopes @ x)
-            slopes = sd[:, None] * linear.slopes
-            found = sound_modes(off, slopes, variance, self._likelihood.pull)
-            x = self._likelihood.inside(found.x)
+            slopes = np.hstack([sd[:, None] * linear.slopes, more])
+            found = sound_modes(off, slopes, variance, pull)
+            x = self._likelihood.inside(found.x[: len(x)])
         is_near = np.abs(off - slopes @ found.x) < _LEAST_MISTAKE
         return replace(found, sound=found.sound | is_near)
 

@@ -110,6 +110,7 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
     "a start from slack": [
         (Likelihood, "far_start", lambda self, _: np.zeros(len(self._quantities)))
     ],
+    "mistaken modes: loosened ends": [(readings, "_LOOSENED", 1e-300)],
     "mistaken modes: tests of another bar": [(mistaken_modes, "_MISFIT", 1e-300)],
     "stated errors by the misfit": [(readings, "_PRIOR_FREEDOM", 1e12)],
     "patterns of loosening": [(readings, "loosening_of", find_no_pattern)],
