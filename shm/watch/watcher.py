@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,6 +46,13 @@ _MOST_REPEATS, _NEARLY = 6, 0.5
 _CLEARLY_NATS = 3.0  # 20 to 1
 
 
+class Call(NamedTuple):
+    """A change that was called after the test at `index` of the watch; `change` as it was then."""
+
+    index: int
+    change: Change
+
+
 @dataclass(frozen=True, eq=False)
 class Watch:
     """The result after each reading, in the order of time."""
@@ -53,10 +60,10 @@ class Watch:
     tests: tuple[WatchedTest, ...]
 
     @property
-    def calls(self) -> tuple[tuple[int, Change], ...]:
-        """The changes that were called on the way, each with the index of its test."""
-        called = ((n, test.change) for n, test in enumerate(self.tests))
-        return tuple((n, change) for n, change in called if change.called)
+    def calls(self) -> tuple[Call, ...]:
+        """The changes that were called on the way."""
+        every = (Call(n, test.change) for n, test in enumerate(self.tests))
+        return tuple(each for each in every if each.change.called)
 
 
 @dataclass(frozen=True, eq=False)
