@@ -835,16 +835,6 @@ _CHANGES = (
         most=10.0,
     ),
     Assumption(
-        "joints_give_probability",
-        0.15,
-        "of tests",
-        JUDGEMENT,
-        "That joints give on the day of a test, as in the wind: its ends then differ by as much as "
-        "the change that is looked for.",
-        least=1e-6,
-        most=0.5,
-    ),
-    Assumption(
         "bending_scatter",
         0.003,
         "fraction",

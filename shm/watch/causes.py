@@ -217,8 +217,7 @@ class Structure:
     """The hypotheses of a hanger: the layout of columns, directions of change, and scatters.
 
     Tests scatter along the quantities' slopes and along `scattering` (n, c) by variances (q + c,)
-    that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that. Where
-    joints give in a test it is more by `giving_variance`. Along
+    that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that. Along
     `wander` (n, w) they differ slowly: all tests within `wander_years` of one have it alike.
     Quantities go with the temperature by `thermal_laws` coefficients each.
     """
@@ -230,7 +229,6 @@ class Structure:
     stiffening: FloatArray
     scatter_variance: FloatArray
     scales: FloatArray
-    giving_variance: FloatArray = field(default_factory=lambda: np.zeros(1))
     wander: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))
     wander_years: float = 0.0
     thermal_laws: int = 1
@@ -283,7 +281,6 @@ def structure_of(
         stiffening=stiffer[:, 0] / _STIFFER,
         scatter_variance=scatter_sd**2,
         scales=np.array(options.scatter_scales),
-        giving_variance=np.append(each_sd(0.0, 1.0), np.zeros(len(scatter_sd) - len(steps))) ** 2,
     )
 
 

@@ -35,7 +35,6 @@ class WatchOptions:
     outlier_probability: float = DEFAULTS.outlier_probability.value
     tension_scatter: float = DEFAULTS.tension_scatter.value
     spring_scatter_of_step: float = DEFAULTS.spring_scatter_of_step.value
-    joints_give_probability: float = DEFAULTS.joints_give_probability.value
     bending_scatter: float = DEFAULTS.bending_scatter.value
     clock_scatter: float = DEFAULTS.clock_scatter.value
     mode_scatter: float = DEFAULTS.mode_scatter.value

@@ -9,13 +9,11 @@ Rubin 1977), about a prior worth a few tests.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
 import numpy as np
-import scipy
 
 from shm.values import BoolArray, Change, FloatArray, IntArray, WatchedQuantity, is_ratio
 from shm.watch.causes import DetectedChange, Structure
@@ -204,18 +202,10 @@ class StateSums:
         unknown[np.isfinite(state.log_amplitude[rows])] = 0.0
         doubt = self._doubt(state, of_season=True)[rows]
         open_left = np.concatenate([unknown, doubt], axis=2)
-        common = _squared(open_left)
-        factors = self._factors(state)[rows]
-        spread = _squared(factors * np.sqrt(state.scatter_variance))
+        common = open_left @ np.swapaxes(open_left, 1, 2)
+        factors = self._factors(state)[rows] * np.sqrt(state.scatter_variance)
+        spread = factors @ np.swapaxes(factors, 1, 2)
         scatter = structure.scales[:, None, None] ** 2 * spread[:, None]
-        if structure.giving_variance.any():
-            more = _squared(factors * np.sqrt(structure.giving_variance))
-            gives = self._gives(state, rows, spread + common, more)[:, None]
-            # Of a mixture the mean precision counts: a test that may be sound says nearly all.
-            usual = np.maximum(state.scatter_variance, 1e-12)
-            mixed = 1 / ((1 - gives) / usual + gives / (usual + structure.giving_variance))
-            extra = np.sqrt(np.maximum(mixed - usual, 0.0))[:, None]
-            scatter = scatter + _squared(factors * extra)[:, None]
         covariance = of_a_day[:, None, None, None] * (common[:, None] + scatter)
         if structure.wander.size:
             together = (apart < structure.wander_years).sum(axis=1)
@@ -228,30 +218,6 @@ class StateSums:
             wider[:, None] * state.variances[rows],
             wider[:, None, None, None] * covariance,
         )
-
-    def _gives(
-        self, state: WatchState, rows: IntArray, usual: FloatArray, more: FloatArray
-    ) -> FloatArray:
-        """Return the probabilities (T,) that joints gave: a test agrees with neither next to it.
-
-        By covariances (T, n, n) of usual tests, and by what is more where joints give.
-        """
-        variances = state.variances[rows]
-        # Technical: a mode that was not measured; no log frequency is 1e4.
-        apart = np.where(np.isfinite(variances), variances, 1e8)
-        known = np.isfinite(variances[1:] + variances[:-1])
-        off = np.where(known, np.diff(self._at_rest(state)[rows], axis=0), 0.0)[:, :, None]
-        alike = (apart[1:] + apart[:-1])[:, :, None] * np.eye(apart.shape[1])
-        alike = alike + usual[1:] + usual[:-1]
-        log_alike, log_given = (
-            -((off * np.linalg.solve(each, off)).sum(axis=(1, 2)) + np.linalg.slogdet(each)[1]) / 2
-            for each in (alike, alike + more[1:])
-        )
-        # The newest test has none after it that could agree: of it nobody can tell yet.
-        pairs = np.concatenate([[-np.inf], log_alike - log_given, [np.inf]])
-        prior = self.options.joints_give_probability
-        odds = math.log(prior / (1 - prior)) - np.maximum(pairs[1:], pairs[:-1])
-        return np.asarray(scipy.special.expit(odds))
 
     def course(self, state: WatchState, rows: IntArray, called: Sequence[DetectedChange]) -> Course:
         """Return the tests `rows` with what the null says of each, called changes included."""
@@ -286,11 +252,6 @@ class StateSums:
         of_planes = [of_modes[planes == plane] for plane in dict.fromkeys(planes.tolist())]
         rows = np.vstack([row for its in of_planes for row in (its[0], its.mean(axis=0))])
         return rows, of_modes
-
-
-def _squared(factors: FloatArray) -> FloatArray:
-    """Return the covariances (T, n, n) of factors (T, n, c)."""
-    return np.asarray(factors @ np.swapaxes(factors, 1, 2))
 
 
 def _levels(log_amplitude: FloatArray) -> FloatArray:
