@@ -130,8 +130,9 @@ def _against_each_other(tests: Sequence[ModalTest], model: Model) -> BaselineChe
         measured = {(mode.plane, mode.order): mode.frequency_hz for mode in known_modes(test)}
         for at, expected, is_sound in zip(each.at, each.expected, each.modes.sound, strict=True):
             if not is_sound:
-                key = comparison.keys[at]
-                modes.append(MistakenMode(test.id, *key, measured[key], math.exp(expected)))
+                plane, order = key = comparison.keys[at]
+                wrong = MistakenMode(test.id, plane, order, measured[key], math.exp(expected))
+                modes.append(wrong)
     count, misfit = sum(len(known_modes(test)) for test, _ in rest), ""
     if len(out) > MOST_MISTAKEN * len(tests):
         misfit = f"{len(out)} of its {len(tests)} tests do not agree with the others"

@@ -307,7 +307,7 @@ class _NullSums:
 
         def from_on(values: FloatArray, power: int) -> FloatArray:
             """Return sums over the tests from each beginning on, by powers of a ramp's years."""
-            found = 0.0
+            found: FloatArray = np.zeros(())
             for k in range(power + 1):
                 weight = years.reshape(-1, *[1] * (values.ndim - 1)) ** k
                 total = np.cumsum((values * weight)[::-1], axis=0)[::-1][beginnings]

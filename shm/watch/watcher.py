@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +46,8 @@ _MOST_REPEATS, _NEARLY = 6, 0.5
 _CLEARLY_NATS = 3.0  # 20 to 1
 
 
-class Call(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Call:
     """A change that was called after the test at `index` of the watch; `change` as it was then."""
 
     index: int
@@ -111,14 +112,17 @@ class Watcher:
             )
         time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
         coefficients = q * self.structure.thermal_laws
+        none: dict[str, Any] = {
+            **dict.fromkeys(("values", "variances", "per_kelvin"), np.zeros((0, n))),
+            **dict.fromkeys(("years", "temperature_c", "log_amplitude", "weight"), np.zeros(0)),
+        }
         state = WatchState(
             key=self.key,
             start=time,
             last_time=time,
             reference_c=reference_of([reading.temperature_c for reading in readings]),
             slopes=np.zeros((0, n, q)),
-            **dict.fromkeys(("values", "variances", "per_kelvin"), np.zeros((0, n))),
-            **dict.fromkeys(("years", "temperature_c", "log_amplitude", "weight"), np.zeros(0)),
+            **none,
             counted=np.zeros(0, bool),
             coefficients=np.zeros(coefficients),
             coefficient_sd=self.structure.layout.prior_sd[n + q :][:coefficients],
