@@ -440,16 +440,14 @@ class StreamWatch:
                 else:
                     state = _absorbed(state, cause)
                 evidence, unlike = NOTHING, 0.0
-            elif cause.plane:
+            elif cause.plane or is_apart:
                 before = _contrast(state)[0]
-                state = _absorb_plane(state, cause, apart, None if is_apart else evidence)
+                if cause.plane:
+                    state = _absorb_plane(state, cause, apart, None if is_apart else evidence)
+                else:
+                    state = replace(state, contrast=state.contrast.changed(apart))
                 state = replace(state, apart=state.apart.after(before, _contrast(state)[0]))
                 moved, unlike, is_apart = cause.moved, 0.0, True
-            elif is_apart:
-                before = _contrast(state)[0]
-                state = replace(state, contrast=state.contrast.changed(apart))
-                state = replace(state, apart=state.apart.after(before, _contrast(state)[0]))
-                moved, unlike = cause.moved, 0.0
             else:
                 evidence = _sized(evidence, cause, state)
                 moved = tuple(
