@@ -25,6 +25,7 @@ from shm.watch.stream_watch import (
     StreamWatched,
     watch_reading,
     windows_as_mounted,
+    with_believed,
 )
 
 AREA = math.pi * 0.07**2 / 4
@@ -314,6 +315,12 @@ def test_what_it_cannot_read_or_watch_is_said() -> None:
 
 
 # ---------------------------------------------------------------- parts
+
+
+def test_with_believed_drops_a_state_that_cannot_be_read() -> None:
+    kept, found = with_believed(b'{"of": "another version"}', [])
+    assert kept is None
+    assert found.windows == ()
 
 
 def test_ambient_frequencies_are_compared_with_hammer_tests() -> None:
