@@ -20,7 +20,7 @@ from shm.pipeline.streaming import Streaming
 from shm.store import Stage, Store, Workspace
 from shm.values import Mode
 from shm.values.stream import PooledReading, Window, WindowReading
-from shm.watch.kept_state import from_bytes
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.stream_thermometer import Thermometer
 from shm.watch.stream_watch import StreamState, watch_reading
 from tests.helpers.flows import Clock, ingest
@@ -122,7 +122,7 @@ def test_what_was_offline_is_watched_in_its_place_and_its_alert_raised_once(
     kept = store.streams.watch(3)
     assert kept is not None
     state = from_bytes(StreamState, kept.content)
-    assert replace(state, settled_day=0.0, thermometer=Thermometer()).to_bytes() == found[-1].kept
+    assert to_bytes(replace(state, settled_day=0.0, thermometer=Thermometer())) == found[-1].kept
     assert days_of(workspace) == [1, 2, 3, 4]
 
 
