@@ -244,7 +244,7 @@ class Streaming:
 
     def _watched_until(self, stream: Stream) -> datetime | None:
         watch = load_stream_watch(self.store, stream.hanger)
-        return None if watch is None else watch.time
+        return None if watch is None else watch.reading_time
 
     def _next_window(self, name: str) -> datetime | None:
         """The next ten minutes that are whole, or not waited for any more; late ones last."""
@@ -339,7 +339,7 @@ class Streaming:
                 None if watch is None else watch.content,
                 self.workspace.settings.false_call_years,
                 self._recent_events(stream, start) if period == "hour" else (),
-                is_watched=period == "hour" and (watch is None or start >= watch.time),
+                is_watched=period == "hour" and (watch is None or start >= watch.reading_time),
             ),
             partial(self._keep_pooled, stream, period, start),
             partial(self._give_up_pool, stream, period, start),

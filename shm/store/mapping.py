@@ -78,7 +78,7 @@ def row_of(value: object, table: sa.Table) -> dict[str, Any]:
 def insert_value(connection: Connection, table: sa.Table, value: T, **others: Any) -> T:
     """Insert a value with other columns; return it with its number."""
     number = insert(connection, table, row_of(value, table) | others)
-    return replace(value, id=number)  # type: ignore[type-var, call-arg, misc]
+    return replace(value, id=number)  # type: ignore[type-var]
 
 
 def _value(row: Mapping[Any, Any], kind: type[T], given: Mapping[str, Any]) -> T:
@@ -111,7 +111,7 @@ def _flat(kind: type, without: Collection[str] = ()) -> list[tuple[str, Any]]:
 
 
 @cache
-def _fields(kind: type) -> tuple[tuple[str, type | None], ...]:
+def _fields(kind: Any) -> tuple[tuple[str, Any], ...]:
     """Return the stored fields of a dataclass, each with its own dataclass if it is one."""
     hints = get_type_hints(kind)
     stored = [each.name for each in fields(kind) if each.metadata.get("stored", True)]
