@@ -59,7 +59,7 @@ lock: .venv/uv
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 		--extra build pyproject.toml --output-file requirements.txt
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
-		--extra build --extra dev --extra alerts --extra campbell --extra distributed --extra export --extra miniseed --extra mqtt --extra postgres --extra sso --extra tdms --extra web \
+		--extra build --extra dev --extra alerts --extra campbell --extra distributed --extra export --extra miniseed --extra mqtt --extra postgres --extra seedlink --extra sso --extra tdms --extra web \
 		--constraint requirements.txt pyproject.toml --output-file requirements-dev.txt
 	echo "uv==0.13.8" | $(BIN)/uv pip compile --quiet --universal --python-version 3.11 \
 		--generate-hashes - --output-file requirements-uv.txt

@@ -43,7 +43,7 @@ DOCS = Path(__file__).parent
 
 
 def commands_page() -> str:
-    """docs/commands.md from the help texts."""
+    """Return docs/commands.md from the help texts."""
     parts = [
         "# Commands\n\nMade by `make docs` from the help texts; `shm VERB --help` says the same."
     ]
@@ -75,7 +75,7 @@ def _prose(text: str) -> str:
 
 
 def thesis_page() -> str:
-    """docs/thesis.md: every item of the thesis and where ours stands."""
+    """Return docs/thesis.md: every item of the thesis and its counterpart here."""
     said = (
         "# The thesis, item by item\n\nMade by `make docs`; "
         "`python tests/benchmarks/validate.py --list` says the same."
@@ -85,7 +85,7 @@ def thesis_page() -> str:
 
 
 def _linked(where: str) -> str:
-    """A command as code, a page as a link, a reason as it stands."""
+    """Return a command as code, a page as a link, a reason unchanged."""
     if where.startswith(("shm ", "python ")):
         return f"`{where}`"
     page = where.removeprefix("docs/")
@@ -93,7 +93,7 @@ def _linked(where: str) -> str:
 
 
 def classes_table() -> str:
-    """The model classes of docs/physics.md: what they are, their parameters and ranges."""
+    """Return the model classes of docs/physics.md: title, parameters and ranges."""
     head = ("class", "what it is", "parameters, each with its range")
     rows = [
         (f"[`{name}`](#{_heading(name)})", model.title.partition(": ")[2], _ranges(model.bounds))
@@ -171,7 +171,7 @@ def _heading(name: str) -> str:
 
 
 def _ranges(bounds: Mapping[str, tuple[float, float]]) -> str:
-    """Parameters with the same range are named together."""
+    """Return the ranges of parameters; those with the same range are named together."""
     alike: dict[tuple[float, float], list[str]] = {}
     for name, both in bounds.items():
         alike.setdefault(both, []).append(f"`{name}`")
@@ -181,7 +181,7 @@ def _ranges(bounds: Mapping[str, tuple[float, float]]) -> str:
 
 
 def main() -> None:
-    """Writes the pages."""
+    """Write the pages."""
     (DOCS / "commands.md").write_text(commands_page(), encoding="utf-8")
     (DOCS / "settings.md").write_text(settings_page(), encoding="utf-8")
     (DOCS / "effects.md").write_text(effects_page(), encoding="utf-8")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def fill_in(path: Path, name: str, text: str) -> None:
-    """Replaces what stands between `<!-- name -->` and `<!-- /name -->`."""
+    """Replace what is between `<!-- name -->` and `<!-- /name -->`."""
     begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
     before, rest = path.read_text(encoding="utf-8").split(begin)
     after = rest.split(end)[1]
@@ -16,7 +16,7 @@ def fill_in(path: Path, name: str, text: str) -> None:
 
 
 def write_csv(path: Path, rows: Iterable[Sequence[str]]) -> None:
-    """A table with its head as the first row; long tables are read better so than in a page."""
+    """Write a table with its head as the first row, for tables too long for a page."""
     path.parent.mkdir(exist_ok=True)
     with path.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)

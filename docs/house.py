@@ -16,7 +16,7 @@ _FOLDERS = {"shm": "shm", "shm_daemon": "daemon/shm_daemon", "shm_cli": "cli/shm
 
 
 def house() -> str:
-    """The floors, the highest first, and below them the contracts beside that of the floors."""
+    """Return the floors, the highest first, and below them the other contracts."""
     contracts = _contracts()
     (layers,) = [each["layers"] for each in contracts if each["type"] == "layers"]
     floors = [layer.split(" | ") for layer in layers]
@@ -37,7 +37,7 @@ def _contracts() -> list[dict[str, str]]:
 
 
 def _path(room: str) -> Path:
-    """The package's or module's file; a layer that has none is refused."""
+    """Return the package's or module's file; a layer without one is refused."""
     root, *parts = room.split(".")
     base = ROOT.joinpath(_FOLDERS[root], *parts)
     package, module = base / "__init__.py", base.with_suffix(".py")

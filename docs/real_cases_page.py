@@ -77,7 +77,7 @@ def data_folder() -> Path:
 
 
 def roving_beam(data: Path) -> tuple[Hanger, list[ModalTest]]:
-    """The bar and its one test, identified from nine frequency responses."""
+    """Return the bar and its one test, identified from nine frequency responses."""
     files = sorted((data / "modelab_roving_beam").glob("*.txt.gz"))
     responses = [_response(file, x_m) for file, x_m in zip(files, HAMMER_X_M, strict=True)]
     hanger = load_hanger(HANGERS / "roving_beam.toml")
@@ -97,7 +97,7 @@ def _response(file: Path, x_m: float) -> FrequencyResponse:
 
 
 def string(data: Path, orders: tuple[int, ...] = (1,)) -> tuple[Hanger, list[ModalTest]]:
-    """The string and a test at each tension that was read, with the modes of `orders`."""
+    """Return the string and a test at each tension that was read, with the modes of `orders`."""
     with (data / "danish_string" / "string_T_f1.csv").open(newline="") as file:
         rows = sorted(csv.DictReader(file), key=lambda row: float(row["tension_N"]))
     tests = []
@@ -153,7 +153,7 @@ def arrangements(data: Path) -> Iterator[Arrangement]:
 
 
 def _rod(row: dict[str, str], direction: str) -> Hanger:
-    """A steel rod, hinged above, with the mass at its lower end and that mass's weight in it."""
+    """Return a steel rod, hinged above, with the mass at its lower end and its weight in it."""
     radius_m, mass_kg = float(row["rod_radius_m"]), float(row["suspended_mass_kg"])
     area_m2 = math.pi * radius_m**2
     return Hanger(
@@ -245,7 +245,7 @@ def _span(values: Sequence[float], digits: int) -> str:
 
 
 def _hinge(found: Diagnosis) -> EffectEstimate | None:
-    """The stiffness of a hinge that resists turning, were that the cause alone."""
+    """Return the rotational stiffness of a hinge, were that the only cause."""
     alone = next((cause for cause in found.causes if cause.effect == END), None)
     return alone.parameters[0] if alone and alone.parameters else None
 
@@ -301,7 +301,7 @@ def _cause_row(cause: Cause) -> tuple[str, ...]:
 
 
 def main(data: Path) -> None:
-    """Fills in the answers."""
+    """Fill in the answers."""
     if not data.is_dir():
         print(f"docs/trials/real_cases.md is left as it is: no real data in {data} (SHM_DATA).")
         return

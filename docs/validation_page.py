@@ -25,7 +25,7 @@ def write(tables: Sequence[Cells], chosen: Sequence[Cells], page: Path = PAGE) -
 
 
 def kept(name: str, page: Path = PAGE) -> list[Cells]:
-    """The rows of a whole table as it was last computed, without its head."""
+    """Return the rows of a table as it was last computed, without its head."""
     with _csv_of(name, page).open(newline="", encoding="utf-8") as file:
         return list(csv.reader(file))[1:]
 

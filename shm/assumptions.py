@@ -526,6 +526,16 @@ _STRANDS = (
         most=1.0,
     ),
     Assumption(
+        "strand_bending_per_amplitude_sd",
+        0.3,
+        "1/ln(amplitude)",
+        JUDGEMENT,
+        "As bending_per_amplitude_sd, of a strand: from wires that stick to wires that slip within "
+        "four e-folds of the motion.",
+        least=1e-6,
+        most=10.0,
+    ),
+    Assumption(
         "strand_bending_log_sd",
         0.3,
         "of the logarithm",
@@ -910,7 +920,7 @@ _CHANGES = (
         0.05,
         "1/ln(amplitude)",
         JUDGEMENT,
-        "Of the bending stiffness's dependence on the level of motion, about 0: wires slip.",
+        "Of a bar's bending stiffness, by which it goes with the level of motion, about 0.",
         least=1e-6,
         most=10.0,
     ),

@@ -47,7 +47,7 @@ def compact(document: object) -> str:
 
 
 def _clean(node: object) -> object:
-    """`node` with what JSON cannot hold replaced: NaN by null, times by ISO texts."""
+    """Return `node` with NaN as null and times as ISO texts, which JSON can hold."""
     if isinstance(node, Mapping):
         return {str(key): _clean(value) for key, value in node.items()}
     if isinstance(node, list | tuple):
@@ -67,7 +67,7 @@ def format_time(time: datetime | None) -> str | None:
 
 
 def parse_time(text: str) -> datetime:
-    """An ISO 8601 text as a UTC time; a text without zone is taken as UTC. Raises ValueError."""
+    """Return an ISO 8601 text as a UTC time; without zone it is UTC. Raises ValueError."""
     time = datetime.fromisoformat(text)
     return time.astimezone(UTC) if time.tzinfo else time.replace(tzinfo=UTC)
 
@@ -152,7 +152,7 @@ def _time(node: Any) -> datetime:
 
 
 def _plain(kind: type, what: str) -> _Hook:
-    """Lets through what is of a kind; true and false are no whole numbers."""
+    """Return a hook that accepts values of a type; booleans are no integers."""
 
     def hook(node: Any, _: Any) -> Any:
         if isinstance(node, kind) and isinstance(node, bool) <= (kind is bool):
@@ -174,7 +174,7 @@ def _one_of(literal: Any) -> _Hook:
 
 
 def _only(of: Any, what: str, make: Callable[..., _Hook]) -> Callable[..., _Hook]:
-    """Refuses what is not of a kind before cattrs takes it apart."""
+    """Return a factory of hooks that check the type before cattrs structures the value."""
 
     def hook_for(kind: Any, by: cattrs.Converter) -> _Hook:
         take = make(kind, by)
@@ -220,7 +220,7 @@ def key_meant(key: str, known: Sequence[str]) -> str | None:
 
 
 def summary(samples: FloatArray, most_probable: float) -> dict[str, float]:
-    """Mean, standard deviation, quantiles and most probable value of samples (samples,)."""
+    """Return mean, standard deviation, quantiles and most probable value of samples (samples,)."""
     return {**asdict(Summary.of(samples)), "map": float(most_probable)}
 
 
@@ -292,12 +292,12 @@ def averaged_document(averaged: Averaged) -> dict[str, Any]:
 
 
 def drift_document(drift: Drift) -> dict[str, Any]:
-    """One row of `shm drift --json`."""
+    """Return one row of `shm drift --json`."""
     return asdict(drift)
 
 
 def creep_document(creep: CreepRate | None) -> dict[str, Any] | None:
-    """The rate of creep, a fraction a year, and its sentence; None where no test shows it."""
+    """Return the rate of creep, a fraction a year, and its sentence; None if unknown."""
     if creep is None or not creep.is_known:
         return None
     return {"mean": creep.mean, "sd": creep.sd, "words": creep.words}

@@ -51,7 +51,7 @@ def modes_document(tests: Sequence[ModalTest]) -> dict[str, Any]:
 
 
 def test_document(test: ModalTest) -> dict[str, Any]:
-    """One entry of a modal-tests document."""
+    """Return one entry of a modal-tests document."""
     document = asdict(test)
     document.pop("hanger")
     if test.added_mass is None:

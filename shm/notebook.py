@@ -35,7 +35,7 @@ _WIDTH = 88  # technical: characters of a line in a notebook's cell
 
 
 def load_ipython_extension(shell: Any) -> None:
-    """Tells a shell of IPython how to show a figure; values show themselves."""
+    """Register the display of figures in IPython; values show themselves."""
     png = shell.display_formatter.formatters["image/png"]
     before = png.for_type_by_name("matplotlib.figure", "Figure", figure_png)
     if before is not None:

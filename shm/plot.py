@@ -117,9 +117,10 @@ def stiffness(
 def frequencies(
     posterior: Posterior, test: ModalTest | Identification, hanger: Hanger, *, ax: Ax = None
 ) -> Figure:
-    """Predicted over measured frequency of every mode of `test`, with what each leaves open.
+    """Draw predicted over measured frequency of every mode of `test`, with uncertainties.
 
-    The light band is the model error sigma: a mode outside is one that the model does not explain.
+    The light band is the model error sigma: a mode outside is one that the model does not
+    explain.
 
     Example:
         >>> figure = shm.plot.frequencies(posterior, test, hanger)

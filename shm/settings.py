@@ -17,7 +17,10 @@ from shm.errors import BadInput, suggest
 
 @dataclass(frozen=True)
 class Setting:
-    """One row of the table; `low` and `high` bound numbers, both included, `choices` texts."""
+    """One row of the table; `low` and `high` bound numbers, both included, `choices` texts.
+
+    A text with `beginnings` is empty or has one of these.
+    """
 
     name: str
     default: float | int | str
@@ -26,13 +29,14 @@ class Setting:
     low: float | None = None
     high: float | None = None
     choices: tuple[str, ...] = ()
+    beginnings: tuple[str, ...] = ()
 
     @property
     def environment_variable(self) -> str:
         return f"SHM_{self.name.upper()}"
 
     def parse(self, raw: Any, source: str) -> Any:
-        """`raw` as a value of this setting's type; raises BadInput naming `source`.
+        """Return `raw` as a value of this setting's type; raises BadInput naming `source`.
 
         A list of texts is the same as these parted by commas.
         """
@@ -47,6 +51,12 @@ class Setting:
             raise self._refusal(raw, source) from None
         if self.choices and value not in self.choices:
             raise self._not_chosen(raw, source)
+        if self.beginnings and value and not str(value).startswith(self.beginnings):
+            raise BadInput(
+                f"setting {self.name} = {raw!r} begins with none of {', '.join(self.beginnings)}.",
+                file=source,
+                remedy="Write the whole address, or leave it out.",
+            )
         rounded = isinstance(raw, float) and value != raw
         if rounded or (isinstance(value, int | float) and not self._holds(value)):
             raise self._refusal(raw, source)
@@ -85,6 +95,14 @@ def _row(
 def _choice(help_text: str, *choices: str) -> Any:
     """Declare a text setting that is one of `choices`; the first is the default."""
     return field(default=choices[0], metadata={"unit": "", "help": help_text, "choices": choices})
+
+
+def _address(help_text: str) -> Any:
+    """Declare a web address, empty by default."""
+    return field(
+        default="",
+        metadata={"unit": "", "help": help_text, "beginnings": ("https://", "http://")},
+    )
 
 
 _OTHER_LEVELS = ("debug", "warning", "error")
@@ -129,6 +147,9 @@ class Settings:
     )
     estimator: str = _choice("of frequency responses", "h1", "h2", "hv")
     reference_force_n: float = _row(1000.0, "N", "a hit this hard has amplitude 1", 1, None)
+    reference_level: float = _row(
+        0.0, "", "reports state the tension at this level of the hits as well; 0: not", 0, 100
+    )
     frequency_allowance: float = _row(
         1e-4, "", "part of a frequency that differs from test to test unseen", 0, 0.01
     )
@@ -168,6 +189,9 @@ class Settings:
     web_hosts: str = _row(
         "", "", "names, parted by commas, by which the web interface may be called", None, None
     )
+    pages_address: str = _address(
+        "where the web interface answers, as https://shm.example.org: alerts link to it"
+    )
     web_proxies: str = _row(
         "127.0.0.1,::1",
         "",
@@ -204,6 +228,9 @@ class Settings:
     )
     quiet_days: float = _row(
         400.0, "days", "`shm doctor` warns of hangers without a test for so long", 0.01, 36500
+    )
+    campaign_days: float = _row(
+        1.0, "days", "tests so near to one of a control hanger are of its campaign", 0.01, 365
     )
 
     @property

@@ -198,7 +198,7 @@ def use_single_sign_on(ctx: click.Context, name: str) -> None:
 
 
 def _asked() -> str:
-    """Never an argument: those stand in the list of processes and the shell's history."""
+    """Ask for a secret: an argument would be in the list of processes and the shell's history."""
     if not sys.stdin.isatty():
         return sys.stdin.readline().rstrip("\r\n")
     return str(click.prompt("Password", hide_input=True, confirmation_prompt=True, err=True))

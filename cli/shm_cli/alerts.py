@@ -6,20 +6,18 @@ A person takes note of an alert, or silences the hooks for a time, on the record
 from __future__ import annotations
 
 import os
-import time
 from datetime import datetime
 from typing import Any
 
 import rich_click as click
 
 from shm.bridge import Bridge, Hook
-from shm.documents import alert_document, format_time
-from shm.errors import NothingThere, UsageError, suggest
+from shm.documents import alert_document
+from shm.errors import UsageError, suggest
 from shm.pipeline import utc_now
 from shm.pipeline.telling import quiet_until
 from shm.store import Delivery, DeliveryState, Silence, StoredAlert
 from shm.store.stored_alerts import hangers_of, silenced_until
-from shm.values import Alert
 from shm_cli import completion, flags
 from shm_cli.common import answer, open_workspace, opened_store, paragraph, show_rows
 
@@ -150,7 +148,7 @@ def silence_row(silence: Silence, now: datetime) -> dict[str, object]:
 
 
 def state_of(silence: Silence, now: datetime) -> str:
-    """`in force`, `to come` or `over`."""
+    """Return `in force`, `to come` or `over`."""
     if silence.is_over(now):
         return "over"
     return "to come" if silence.starts_at > now else "in force"
@@ -199,7 +197,7 @@ def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
 
 
 def acknowledgement_words(stored: StoredAlert) -> str:
-    """`open`, or who took note of it, when and why; that it is resolved."""
+    """Return `open`, or who acknowledged it, when and why; or that it is resolved."""
     noted, ended = stored.acknowledgement, stored.resolution
     if noted is None:
         return "open" if ended is None else f"resolved {ended.at:%Y-%m-%d}: {ended.why}"
@@ -249,38 +247,13 @@ def test(ctx: click.Context, name: str) -> None:
     \b
     Example: shm alerts test --hook mail
     """
-    from shm_daemon import HookNotifier
+    from shm_daemon.hooks.trial import send_test_alert
 
     workspace = open_workspace(ctx)
     hook = _described(workspace.bridge, name)
-    alert = a_test_alert(workspace.bridge, hook, utc_now())
-    timeout_s = workspace.settings.hook_timeout_seconds
-    notifier, began = HookNotifier(workspace.folder, timeout_s, os.environ), time.monotonic()
-    try:
-        response = notifier(hook, alert)
-    finally:
-        notifier.close()
-    seconds = time.monotonic() - began
-    document = {"hook": name, "kind": hook.kind, "key": alert.key, "answer": response}
-    answer(
-        {**document, "seconds": round(seconds, 3)},
-        f"The hook {name} took the test alert in {seconds:.1f} s: {response}.",
-    )
-
-
-def a_test_alert(bridge: Bridge, hook: Hook, now: datetime) -> Alert:
-    """Return an alert that says it is none, of the bridge's first hanger; raises NothingThere."""
-    if not bridge.hangers:
-        raise NothingThere(
-            "bridge.toml describes no hanger.", remedy="Describe one: an alert is of a hanger."
-        )
-    hanger = bridge.hangers[0].id
-    message = (
-        f"This is a test of the hook {hook.name} of {bridge.name}. Nothing has happened to hanger "
-        f"{hanger} or any other."
-    )
-    key = f"test:{hook.name}:{format_time(now)}"
-    return Alert(key, hanger, "", now, message, drifts=(), kinds=("test",))
+    found = send_test_alert(workspace, hook, os.environ, utc_now())
+    document = {"hook": name, "kind": hook.kind, "key": found.alert.key, "answer": found.answer}
+    answer({**document, "seconds": round(found.seconds, 3)}, found.sentence(hook))
 
 
 def _described(bridge: Bridge, name: str) -> Hook:

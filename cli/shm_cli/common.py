@@ -32,7 +32,7 @@ from rich.text import Text
 
 from shm.bridge import load_hanger
 from shm.documents import dump
-from shm.errors import NothingThere, UsageError
+from shm.errors import UsageError
 from shm.modes_document import load_modes
 from shm.values import Hanger, ModalTest
 from shm_cli import errors
@@ -42,7 +42,7 @@ from shm_cli.terminal import Terminal, escape_controls
 if TYPE_CHECKING:
     from shm.report.figures.specification import Illustration
     from shm.report.paper import Table as Texts
-    from shm.store import Store, StoredTest, Workspace
+    from shm.store import Store, Workspace
 
 # Technical: columns of a file, of no terminal at all, and of lines that are read with ease.
 _WIDTH_OF_A_FILE, _BEYOND_ANY = 120, 100_000
@@ -120,7 +120,7 @@ def _is_one_word(column: Column) -> bool:
 
 
 def _as_lists(table: Table) -> Group:
-    """Each row as lines `heading  value`, empty values left out, an empty line between rows."""
+    """Return each row as lines `heading value` without empty values, blank lines between."""
     headings = [str(column.header) for column in table.columns]
     rows = zip(*(column.cells for column in table.columns), strict=True)
     return Group(*(Padding(_listed(headings, row), (0, 0, 1, 0)) for row in rows))
@@ -153,7 +153,7 @@ def show_texts(texts: Texts) -> None:
 
 
 def readable_width() -> int:
-    """Columns of the terminal, or as many as one likes to read; those of a file too."""
+    """Return the columns of the terminal, limited to a readable width; for files, too."""
     return min(_READABLE, shutil.get_terminal_size((_READABLE, 24)).columns)
 
 
@@ -204,33 +204,26 @@ def one_hanger(ctx: click.Context, hanger_file: Path | None, hanger_id: int | No
 def tests_and_hanger(
     ctx: click.Context, modes_file: Path | None, hanger_file: Path | None, hanger_id: int | None
 ) -> tuple[tuple[ModalTest, ...], Hanger]:
-    """Tests of a MODES.json with their hanger, or the latest test of a hanger of the workspace."""
+    """Return tests of a MODES.json with their hanger, or the latest of the workspace."""
     if modes_file is not None:
         tests = load_modes(modes_file)
         if hanger_id is None and hanger_file is None:
             hanger_id = tests[0].hanger
         hanger = one_hanger(ctx, hanger_file, hanger_id)
         return tests, hanger
+    from shm.pipeline.diagnosing import latest_tests
+
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     with opened_store(ctx) as (_, store):
         return (latest_tests(store, hanger, 1)[0].test,), hanger
 
 
-def latest_tests(store: Store, hanger: Hanger, count: int) -> Sequence[StoredTest]:
-    """So many at most, the latest last; raises NothingThere where there is none."""
-    if not (stored := store.tests.list_all(hanger.id)[-count:]):
-        raise NothingThere(
-            f"no test of hanger {hanger.id} is stored.", remedy="Take one in with `shm ingest`."
-        )
-    return stored
-
-
 def show_doubts(
     tests: Sequence[ModalTest], hanger: Hanger, *, apart: bool = True
 ) -> tuple[str, ...]:
-    """Says, before any result, which tests are probably not of the described hanger.
+    """Print, before any result, which tests are probably not of the described hanger.
 
-    On stderr, or with the answer where they do not stand `apart` from it.
+    On stderr, or with the answer unless they are `apart` from it.
     """
     from shm.plausibility.bars import Known, doubt_of
 
@@ -250,7 +243,7 @@ def show_doubts(
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[str, float], None]]:
-    """A bar on stderr; it is told a label and the fraction done, and draws one line a label."""
+    """Yield a bar on stderr that takes a label and a fraction, and draws one line a label."""
     with _fraction_bar() as bar:
         tasks: dict[str, Any] = {}
 
@@ -264,7 +257,7 @@ def progress_bar(title: str) -> Iterator[Callable[[str, float], None]]:
 
 @contextmanager
 def advancing_bar() -> Iterator[Callable[[str, float], None]]:
-    """One bar on stderr for a job of many steps; it is told the step and the fraction of all."""
+    """Yield one bar on stderr for a job of many steps; takes the step and the total fraction."""
     with _fraction_bar() as bar:
         task, done = bar.add_task("", total=1.0), 0.0
 
@@ -300,7 +293,7 @@ def _bar(done: ProgressColumn) -> Progress:
 
 @contextmanager
 def waiting(label: str) -> Iterator[None]:
-    """A turning sign and the time gone, on stderr, where nobody can tell how much is left."""
+    """Show a spinner and the elapsed time on stderr, where the remaining time is unknown."""
     console = Terminal(stderr=True)
     with Progress(
         SpinnerColumn(),
@@ -315,7 +308,7 @@ def waiting(label: str) -> Iterator[None]:
 
 
 def write_pictures(drawn: Iterable[Illustration], folder: Path, start: str = "") -> None:
-    """Each figure as a PNG in the folder, under its name after `start`."""
+    """Write each figure as a PNG into the folder, under its name after `start`."""
     folder.mkdir(parents=True, exist_ok=True)
     for each in drawn:
         (folder / f"{start}{each.name}.png").write_bytes(each.png())

@@ -1,5 +1,6 @@
-"""`shm completion`: the script by which a shell completes `shm`, and what it offers after an
-option: hangers, classes, effects, hooks of the workspace.
+"""Complete `shm` in a shell: its script, and the values of options.
+
+These are hangers, classes, effects and hooks of the workspace.
 """
 
 from __future__ import annotations
@@ -45,23 +46,23 @@ def command(ctx: click.Context, shell: str) -> None:
 def hangers(
     ctx: click.Context, parameter: click.Parameter, incomplete: str
 ) -> list[CompletionItem]:
-    """Numbers of the bridge's hangers, with their names."""
+    """Return numbers of the bridge's hangers, with their names."""
     bridge = _bridge(ctx)
-    described = bridge.hangers if bridge else ()
+    described = bridge.bars if bridge else ()
     return _beginning(incomplete, ((str(each.id), each.name) for each in described))
 
 
 def streams(
     ctx: click.Context, parameter: click.Parameter, incomplete: str
 ) -> list[CompletionItem]:
-    """Names of the bridge's streams, with their hangers."""
+    """Return names of the bridge's streams, with their hangers."""
     bridge = _bridge(ctx)
     described = bridge.streams if bridge else ()
     return _beginning(incomplete, ((each.name, f"hanger {each.hanger}") for each in described))
 
 
 def hooks(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Names of the bridge's hooks, with their kinds."""
+    """Return names of the bridge's hooks, with their kinds."""
     bridge = _bridge(ctx)
     return _beginning(
         incomplete, ((each.name, each.kind) for each in (bridge.hooks if bridge else ()))
@@ -69,7 +70,7 @@ def hooks(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> li
 
 
 def models(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Names of model classes; after a comma the next one."""
+    """Return names of model classes; after a comma the next one."""
     from shm.models.registry import MODELS
 
     *chosen, last = incomplete.split(",")
@@ -81,7 +82,7 @@ def models(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> l
 def effects(
     ctx: click.Context, parameter: click.Parameter, incomplete: str
 ) -> list[CompletionItem]:
-    """Names of the catalogue's effects, with their titles."""
+    """Return names of the catalogue's effects, with their titles."""
     from shm.models.effects import EFFECTS
 
     return _beginning(incomplete, ((name, effect.title) for name, effect in EFFECTS.items()))
@@ -96,7 +97,7 @@ def _beginning(start: str, offered: Iterable[tuple[str, str]]) -> list[Completio
 
 
 def _bridge(ctx: click.Context) -> Bridge | None:
-    """The bridge of the workspace that is named so far; None where there is none to be read."""
+    """Return the bridge of the workspace given so far; None where it cannot be read."""
     folder = ctx.obj or ctx.find_root().params.get("workspace") or "."
     try:
         return load_bridge(Path(folder) / "bridge.toml")

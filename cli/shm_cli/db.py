@@ -75,7 +75,7 @@ def upgrade(ctx: click.Context) -> None:
         with waiting("upgrading the store"):
             Store.upgrade(workspace.location)
         with workspace.store() as store, counting_bar() as bar:
-            hangers = bar.track(workspace.bridge.hangers, description="summing up hangers")
+            hangers = bar.track(workspace.bridge.bars, description="summing up hangers")
             made = sum(store.posteriors.save_summaries(hanger) for hanger in hangers)
             location = store.location
     answer(
@@ -315,12 +315,12 @@ def _raise_troubles(troubles: Sequence[str], remedy: str) -> None:
 
 
 def _raise_lines(summary: str, findings: Iterable[object]) -> None:
-    """One finding a line, after what they amount to: for the eye, and for grep."""
+    """Raise an error with its summary, and one finding a line: for the eye, and for grep."""
     raise StoreError("\n".join((summary, *map(str, findings))))
 
 
 def _counted(count: int, what: str) -> str:
-    """`1 damaged row`, `3 faults of the file`."""
+    """Return `1 damaged row`, `3 faults of the file`."""
     if count == 1:
         return f"1 {what}"
     head, of, rest = what.partition(" of ")

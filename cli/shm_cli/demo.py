@@ -54,7 +54,7 @@ _WINDOWS_A_DAY = 144
 
 
 def live_description() -> str:
-    """`bridge.toml` of the bridge, its hangers and their streams."""
+    """Return `bridge.toml` of the bridge, its hangers and their streams."""
     tables = [
         '[bridge]\nname = "Bridge that lives"',
         '[[hook]]\nname = "file"\ncommand = ["tee", "-a", "alerts.jsonl"]',
@@ -160,7 +160,7 @@ def bridge_description() -> str:
         '[bridge]\nname = "Arch bridge of the demo"',
         '[[hook]]\nname = "file"\ncommand = ["tee", "-a", "alerts.jsonl"]',
         '[settings]\nworkers = 2\nmodels = "beam1,beam2"\n'
-        "spool_scan_seconds = 0.5\nspool_stable_seconds = 0.5",
+        "spool_scan_seconds = 0.5\nspool_stable_seconds = 0.5\nalert_grouping_seconds = 5",
     ]
     for number in range(1, HANGERS + 1):
         name = 'name = "measured for the thesis"\n' if number == MEASURED else ""
@@ -285,7 +285,7 @@ def command(folder: Path, live: bool) -> None:
 
 
 def _live(folder: Path) -> None:
-    """Four days of permanent sensors; then the alert of a loss of 2 %."""
+    """Simulate four days of permanent sensors, and print the alert of a loss of 2 %."""
     workspace = _fresh_workspace(folder, live_description())
     click.echo(f"Workspace {workspace.folder}: 3 hangers with permanent sensors.", err=True)
     with workspace.store() as store, _daemon(workspace) as daemon:
@@ -360,7 +360,7 @@ def _await_alert(store: Store, daemon: subprocess.Popen[bytes]) -> Sequence[Stor
 
 
 def _conclude(workspace: Workspace, alerts: Sequence[StoredAlert]) -> None:
-    """Says what was found and where the reports are; raises ShmError without the alert."""
+    """Print the result and the paths of the reports; raises ShmError without the alert."""
     for stored in alerts:
         click.echo(f"ALERT {stored.alert.message}")
     if LOSING not in {stored.alert.hanger for stored in alerts}:

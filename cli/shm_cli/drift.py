@@ -204,7 +204,7 @@ if TYPE_CHECKING:
 
 
 def _without_a_test(store: Store, hangers: Sequence[int]) -> list[Baseline]:
-    """The baselines that were set by a person and with which no test has been compared yet."""
+    """Return baselines set by a person with which no test has been compared yet."""
     baselines = [store.watch.baseline(hanger) for hanger in hangers]
     return [
         each for each in baselines if each and each.since and not latest_drifts(store, each.hanger)

@@ -94,7 +94,7 @@ def effects(name: str | None) -> None:
 
 
 def _print(text: str) -> None:
-    """Markdown for a terminal; what a link leads to is no use there."""
+    """Print Markdown in a terminal, without the targets of links."""
     Terminal().print(Markdown(re.sub(r"\[([^\]]+)\]\([^)]+\)", r"\1", text)))
 
 
@@ -103,7 +103,7 @@ def _print_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
 
 
 def _document(effect: Effect) -> dict[str, object]:
-    """One effect for JSON: names, texts, and each parameter once."""
+    """Return one effect for JSON: names, texts, and each parameter once."""
     return {
         "effect": effect.name,
         "title": effect.title,
@@ -171,7 +171,7 @@ def _parameters(effect: Effect) -> dict[str, Parameter]:
 
 
 def _parameter_rows(parameters: Sequence[Parameter]) -> list[tuple[str, ...]]:
-    """One row a parameter; those of the other end or plane, which only repeat it, in one row."""
+    """Return one row a parameter; equal ones of the other end or plane share it."""
     same_prior: dict[tuple[float, float, str], list[Parameter]] = {}
     for parameter in parameters:
         key = (parameter.lower, parameter.upper, parameter.reason)

@@ -65,7 +65,7 @@ def command(
 def _write(
     posterior: Posterior, out: Path, form: str | None, tests: list[ModalTest], hanger: Hanger
 ) -> None:
-    """With the likelihood of each measurement where that is still to be had."""
+    """Write a posterior, with the likelihood of each measurement where available."""
     try:
         export.write(posterior, out, form, tests=tests, hanger=hanger)
     except BadInput as changed:

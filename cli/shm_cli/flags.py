@@ -173,7 +173,7 @@ log_file = click.option(
 
 
 def tls(function: F) -> F:
-    """`--certificate PEM --key PEM` of whatever serves the web interface."""
+    """Add `--certificate PEM --key PEM` to a command that serves the web interface."""
     texts = {"key": "The key of the certificate.", "certificate": "Serve HTTPS with this."}
     for name, text in texts.items():
         function = click.option(f"--{name}", type=FILE, metavar="PEM", help=text)(function)
@@ -181,7 +181,7 @@ def tls(function: F) -> F:
 
 
 def hanger(required: bool = False) -> Callable[[F], F]:
-    """`--hanger N`: a hanger of the workspace, or one of several in --hanger-file."""
+    """Add `--hanger N`: a hanger of the workspace, or one of several in --hanger-file."""
     return click.option(
         "--hanger",
         "hanger_id",

@@ -20,6 +20,7 @@ from shm.gap.diagnose import examined
 from shm.gap.measurement_plan import PlannedMeasurement, Race, nothing_planned, planned
 from shm.gap.shared_causes import LEAST
 from shm.pipeline import utc_now
+from shm.pipeline.diagnosing import LATEST_TESTS, diagnose_stored, latest_tests
 from shm.pipeline.lineage import diagnosis_lineage
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
@@ -39,7 +40,6 @@ from shm_cli.common import (
     advancing_bar,
     answer,
     drawing,
-    latest_tests,
     one_hanger,
     open_workspace,
     opened_store,
@@ -60,7 +60,6 @@ _without = click.option(
     help="Take an effect out of the catalogue; may be given again.",
 )
 
-_LATEST = 20  # as `shm gap diagnose`
 _HEADS = ("measurement", "hours", "in all", "promised log odds", "then", "probability")
 
 
@@ -145,12 +144,12 @@ def plan(
 def _measured(
     ctx: click.Context, file: Path | None, hanger_file: Path | None, hanger_id: int | None
 ) -> tuple[Sequence[ModalTest], Hanger]:
-    """The tests and their hanger, those of the workspace as `shm gap diagnose` takes them."""
+    """Return the tests and their hanger, as `shm gap diagnose` takes them."""
     if file is not None:
         return tests_and_hanger(ctx, file, hanger_file, hanger_id)
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     with opened_store(ctx) as (_, store):
-        return [each.test for each in latest_tests(store, hanger, _LATEST)], hanger
+        return [each.test for each in latest_tests(store, hanger, LATEST_TESTS)], hanger
 
 
 def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
@@ -238,10 +237,8 @@ def _of_workspace(
     """Return the diagnosis of the latest tests, which the store keeps."""
     with opened_store(ctx) as (workspace, store):
         stored = latest_tests(store, hanger, count)
-        found = _diagnosis([each.test for each in stored], hanger, options)
-        store.posteriors.save_diagnosis(
-            hanger.id, found, diagnosis_lineage(stored, hanger, asdict(options)), utc_now()
-        )
+        with advancing_bar() as progress:
+            found = diagnose_stored(store, stored, hanger, options, utc_now(), progress)
         sensors = _stored_sensors(store, stored)
     return DiagnosisSheet(found, hanger, workspace.bridge.name, sensors)
 
@@ -270,7 +267,7 @@ def _jointly(
     count: int,
     options: GapOptions,
 ) -> BridgeDiagnosisSheet:
-    """Several hangers together: of files, or all of the workspace, which keeps each one's own."""
+    """Diagnose several hangers together: of files, or all of the workspace, which stores each."""
     if (bridge and files) or any(each is not None for each in one):
         raise UsageError(
             "--bridge takes all hangers of the workspace, several files name theirs.",
@@ -298,7 +295,7 @@ def _pairs(files: tuple[Path, ...]) -> list[tuple[Path, Path]]:
 
 
 def _of_bridge(ctx: click.Context, count: int, options: GapOptions) -> BridgeDiagnosisSheet:
-    """All hangers of the workspace that have tests and that the baseline can describe."""
+    """Return all hangers of the workspace that have tests and that the baseline can describe."""
     with opened_store(ctx) as (workspace, store):
         stored = {
             hanger: tests

@@ -130,7 +130,7 @@ def _refuse_without_reason(store: Store, recording_id: int, decision: Decision, 
 
 
 def _refuse_copy_without_reason(hold: Hold | None, why: str) -> None:
-    """One impact that counts twice confirms itself: that is not done by one word."""
+    """Refuse to accept a copy without a reason: an impact that counts twice confirms itself."""
     copies = [d for test in (hold.tests if hold else ()) for d in test.doubts if d.check == "copy"]
     if copies and not why and hold is not None and hold.decision is None:
         raise UsageError(

@@ -171,8 +171,8 @@ def command(
     if hits is not None:
         found = sheets[0].identification
         hits.write_text(as_csv(found.each_hit, found.test.modes), encoding="utf-8")
-    said = [as_text(modal_test_paper(sheet), readable_width()).rstrip() for sheet in sheets]
-    answer(_document(sheets), "\n".join(said))
+    papers = [as_text(modal_test_paper(sheet), readable_width()).rstrip() for sheet in sheets]
+    answer(_document(sheets), "\n".join(papers))
 
 
 def _identified(
@@ -181,7 +181,7 @@ def _identified(
     options: IdentifyOptions,
     workspace: Workspace | None,
 ) -> ModalTestReport:
-    """One test; it is of the described hanger where its records do not say."""
+    """Identify one test; it is of the described hanger where its records name none."""
     records = [record for path in group for record in _read(path, workspace)]
     for doubt in signal_doubts([r for r in records if isinstance(r, Recording)], hanger):
         click.echo(f"Doubtful: {doubt.text}", err=True)
@@ -201,7 +201,7 @@ def _identified(
 
 
 def _read(path: Path, workspace: Workspace | None) -> tuple[Recording | FrequencyResponse, ...]:
-    """As the workspace would take it in, by the profile of its logger."""
+    """Read a file as the workspace would, by the profile of its logger."""
     if workspace is None:
         return read_test(path)
     from shm.pipeline.intake import as_taken_in

@@ -220,7 +220,7 @@ def _is_described(found: Import) -> bool:
 
 
 def _modes_in(file: Path, workspace: Workspace) -> ForeignModes | None:
-    """Modes of another program, where a UFF file holds nothing else that is read."""
+    """Return modes of another program, where a UFF file holds nothing else that is read."""
     is_universal = any(part in file.name.lower() for part in UFF_SUFFIXES)
     return foreign_modes(file, read_limits(workspace.settings)) if is_universal else None
 
@@ -275,7 +275,7 @@ def _accelerations(found: Import, tables: dict[str, dict[str, object]]) -> list[
 def _named(
     option: str, values: Sequence[str], names: Sequence[str], in_order: Sequence[str]
 ) -> list[tuple[str, str]]:
-    """Names and values: NAME=VALUE, or values in the order of the sensors, or one for all."""
+    """Return names and values: NAME=VALUE, or in the order of the sensors, or one for all."""
     found: list[tuple[str, str]] = []
     plain: list[str] = []
     for value in values:
@@ -308,7 +308,7 @@ def _answer(found: Import, question: Question, text: str) -> dict[str, object]:
 
 
 def _land(file: Path, workspace: Workspace, found: Import) -> Landed:
-    """Lays the file into the spool with its sidecar, for the daemon to take as any other."""
+    """Put the file into the spool with its sidecar, for the daemon to take."""
     with incoming(workspace.spool, workspace.settings.max_file_bytes) as coming:
         with file.open("rb") as stream:
             while piece := stream.read(1 << 20):

@@ -55,8 +55,8 @@ def _prompt(question: Question, take: Callable[[str], T]) -> T:
         except (UsageError, BadInput) as error:
             raise click.UsageError(str(error)) from error
 
-    told = f" [{', '.join(question.choices)}]" if question.choices else ""
-    answer: T = click.prompt(f"{question.text}{told}", value_proc=taken)
+    choices_words = f" [{', '.join(question.choices)}]" if question.choices else ""
+    answer: T = click.prompt(f"{question.text}{choices_words}", value_proc=taken)
     return answer
 
 

@@ -182,7 +182,7 @@ def _again(workspace: Workspace, which: str, stage: Stage) -> int:
 def _ingest(
     workspace: Workspace, files: Sequence[Path]
 ) -> tuple[dict[Path, Receipt], list[dict[str, object]]]:
-    """Receipts of the files that could be taken in, rows of those that could not."""
+    """Return receipts of the files taken in, and rows of the refused ones."""
     with working(workspace) as flow:
         receipts, unreadable = _received(flow, files)
         finish(flow, [receipt.recording.id for receipt in receipts.values()])
@@ -231,7 +231,7 @@ _REFUSED = "refused"
 
 
 def _sentence(reason: Mapping[str, Any]) -> str:
-    """Line and channel where they are known, what is wrong, what to do."""
+    """Return line and channel where known, the error and the remedy."""
     line = f"line {reason['line']}: " if reason["line"] is not None else ""
     channel = f"channel {reason['channel']}: " if reason["channel"] else ""
     return f"{line}{channel}{reason['message']} {reason['remedy']}".strip()

@@ -128,7 +128,7 @@ def notices_command() -> None:
 
 
 def notices() -> Sequence[Notice]:
-    """Every installed package that shm requires, directly or not, and those of its extras."""
+    """Return every installed package that shm requires, directly or not, with its extras."""
     found: dict[str, Notice] = {}
     _gather("shm", (), "", found)
     for extra in metadata.metadata("shm").get_all("Provides-Extra") or ():

@@ -74,6 +74,7 @@ GROUPS: dict[str, dict[str, Verb]] = {
         "token": Verb("shm_cli.access", "Manage tokens for access over the network.", "token"),
     },
     "Files alone": {
+        "acquire": Verb("shm_cli.acquire", "Record a hammer test, guided hit by hit."),
         "identify": Verb("shm_cli.identify", "Identify the modes of recordings."),
         "select": Verb(
             "shm_cli.update",
@@ -169,7 +170,7 @@ def cli(ctx: click.Context, workspace: str, debug: bool) -> None:
 
 
 def _take_workspace(command: click.Command) -> None:
-    """Lets `--workspace` stand after the verb too."""
+    """Let `--workspace` follow the verb, too."""
     if isinstance(command, click.Group):
         for member in command.commands.values():
             _take_workspace(member)

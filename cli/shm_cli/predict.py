@@ -124,7 +124,7 @@ def _show_one(model: Model, values: dict[str, float], modes: int) -> None:
 def _swept(
     model: Model, values: dict[str, float], name: str, points: FloatArray, modes: int
 ) -> FloatArray:
-    """Frequencies in Hz, points by planes by modes."""
+    """Return frequencies in Hz, points by planes by modes."""
     theta = np.array([model.pack({**values, name: float(point)}) for point in points])
     with progress_bar("solving") as progress:
         rows_hz = []
@@ -159,7 +159,7 @@ def _show_sweep(
 
 
 def _solved(model: Model, theta: FloatArray, modes: int) -> FloatArray:
-    """Frequencies in Hz, planes by modes; raises UsageError where the parameters have none."""
+    """Return frequencies in Hz, planes by modes; raises UsageError where there are none."""
     with np.errstate(invalid="ignore", divide="ignore"):
         found: FloatArray = model.reference_frequencies_hz(theta[None], modes)[0]
     of = dict(zip(model.parameter_names, theta, strict=True))

@@ -61,7 +61,7 @@ class Chosen(TypedDict):
 
 
 def _springs(function: flags.F) -> flags.F:
-    """`--k1` to `--k4`."""
+    """Add `--k1` to `--k4`."""
     planes = ("Transverse", "Longitudinal")
     for number in (4, 3, 2, 1):
         where = f"{planes[(number - 1) % 2]}, {'deck' if number < 3 else 'arch'} end"

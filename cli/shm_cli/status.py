@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime, timedelta
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import rich_click as click
@@ -19,13 +20,16 @@ from shm.documents import creep_document
 from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
+from shm.pipeline.controls import control_charts
 from shm.pipeline.telling import quiet_until
 from shm.pipeline.unheard import stream_leads
+from shm.report.control_report import chart_document
 from shm.report.formatting import Interval, model_class, with_half
 from shm.report.hanger_status import Status, bridge_message
 from shm.report.hanger_summary import HangerSummary
 from shm.report.open_warnings import dated_by_receipt
 from shm.store import ENDED, Decision, DeliveryState, Store, Workspace
+from shm.store.point_outbox import PointOutbox
 from shm.store.queries.alerts import count_deliveries, count_open_alerts
 from shm.store.queries.hangers import (
     find_latest_watches,
@@ -42,14 +46,14 @@ from shm.store.queries.recordings import (
     list_holds,
 )
 from shm.store.queries.tests import count_tests, list_baseline_tests, list_undated_names
-from shm.store.stored_alerts import said_of
+from shm.store.stored_alerts import describe_silence
 from shm.values import Summary
 from shm.values.rounding import ForceUnit, force_unit, rounded_percent
-from shm.watch.change_words import frequency_words
+from shm.watch.alert_text import frequency_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document
-from shm_daemon.heartbeat import seconds_since_beat, told, why_turn_failed
+from shm_daemon.heartbeat import duration_words, seconds_since_beat, why_turn_failed
 from shm_daemon.spool import never_taken, scan
 
 if TYPE_CHECKING:
@@ -101,6 +105,8 @@ def command(ctx: click.Context, which: str | None) -> None:
         if row["left_out"]:
             text = "; ".join(row["left_out"])
             click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {text}"))
+    for row in document["controls"]:
+        click.echo(paragraph(f"{row['state']} {row['action']}"))
     for row in document["structures"]:
         click.echo(paragraph(_structure_line(row)))
 
@@ -109,7 +115,9 @@ def _show(document: dict[str, Any]) -> None:
     recordings = ", ".join(f"{n} {stage}" for stage, n in document["recordings"].items() if n)
     daemon, deliveries, now = document["daemon"], document["deliveries"], utc_now()
     ago = (
-        f", last seen {told(now - daemon['seen_at'])} ago" if daemon["seen_at"] else ", never seen"
+        f", last seen {duration_words(now - daemon['seen_at'])} ago"
+        if daemon["seen_at"]
+        else ", never seen"
     )
     oldest = document["oldest_waiting_at"]
     since = f", the oldest since {oldest:%Y-%m-%d %H:%M}" if oldest else ""
@@ -132,7 +140,8 @@ def _show(document: dict[str, Any]) -> None:
         f"alerts: {document['alerts']}, {document['open_alerts']} open; "
         f"deliveries: {owed or 'none'}"
     )
-    for text in (*document["quiet_hours"], *document["silences"], *document["streams"]):
+    lines = (document[key] for key in ("quiet_hours", "silences", "streams", "publications"))
+    for text in chain.from_iterable(lines):
         click.echo(text)
     click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
     _show_hangers(document)
@@ -187,7 +196,7 @@ def _structure_line(row: Mapping[str, Any]) -> str:
 
 
 def _held_lines(held: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Of each hanger how many are held, and the one whose modes say most."""
+    """Return for each hanger the number held, and the one whose modes show most."""
     of_hangers: dict[int, list[Mapping[str, Any]]] = {}
     for each in held:
         of_hangers.setdefault(each["hanger"], []).append(each)
@@ -268,11 +277,19 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
         "quiet_hours": _quiet(workspace, store, now),
-        "silences": [said_of(each) for each in store.silences.list_all() if each.is_in_force(now)],
+        "silences": [
+            describe_silence(each) for each in store.silences.list_all() if each.is_in_force(now)
+        ],
         "streams": [each.words for each in stream_leads(workspace, store, now)],
+        "publications": [
+            f"publish {each.name}: {words}"
+            for each in workspace.bridge.publications
+            if (words := PointOutbox(workspace.folder).state(each.name).words)
+        ],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
         "changed_settings": [str(each) for each in store.settings.list_current().values()],
+        "controls": [chart_document(each) for each in control_charts(workspace, store)],
         "structures": _structures(workspace, store, open_at),
         "message": {**message.document, "others": message.others},
         "hangers": _hangers(workspace, store, lines, open_at, of_hangers),
@@ -364,7 +381,7 @@ _OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
 
 
 def show_stages(ctx: click.Context, which: str) -> None:
-    """Raise NothingThere where there is no such recording or test."""
+    """Print the stages of a recording or test; raises NothingThere where there is none."""
     with opened_store(ctx) as (_, store):
         recording_id, _ = find_recording(store, which)
         recording = store.recordings.get(recording_id)
@@ -388,7 +405,8 @@ def show_stages(ctx: click.Context, which: str) -> None:
                     for event in noticed
                 ],
                 "results": [asdict(test) for test in tests],
-            }
+            },
+            "recording_stages",
         )
         return
     also = f" (also came as {', '.join(other_names)})" if other_names else ""

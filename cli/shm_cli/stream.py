@@ -29,7 +29,7 @@ from shm.values import NAN
 from shm.watch.ambient_hammer import AmbientBias
 from shm_cli import completion, flags
 from shm_cli.common import answer, open_workspace, opened_store, show, show_rows
-from shm_daemon.heartbeat import told
+from shm_daemon.heartbeat import duration_words
 
 _from = click.argument("start", type=flags.Time(), metavar="FROM")
 _to = click.argument("end", type=flags.Time(), metavar="TO")
@@ -147,7 +147,7 @@ def _cells(state: StreamCondition) -> tuple[str, ...]:
         str(state.stream.hanger),
         state.state,
         _time(state.last_sample),
-        "" if state.lag is None else told(state.lag),
+        "" if state.lag is None else duration_words(state.lag),
         number(state.received_hz, ".4g", "") + (" Hz" if math.isfinite(state.received_hz) else ""),
         number(state.lost_share, ".2%", ""),
         f"{state.apart_s:.0f} s" if state.apart_s else "",

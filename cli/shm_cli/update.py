@@ -47,9 +47,39 @@ _sampler = click.option(
 )
 
 
+_level = click.option(
+    "--at-level",
+    "level",
+    type=click.FloatRange(min=0),
+    metavar="LEVEL",
+    help="Give the tension at this level of the hits (1: the reference force), not at rest.",
+)
+
+
+def tests_at(tests: Sequence[ModalTest], level: float | None) -> tuple[ModalTest, ...]:
+    """Return the tests at a level of motion, and say so; as they are where none is stated."""
+    if level is None:
+        return tuple(tests)
+    from shm.inference.reference_level import at_level  # it opens what identifies: not before
+
+    moved = tuple(at_level(test, level) for test in tests)
+    depend = sum(mode.depends_on_amplitude for test in tests for mode in test.modes)
+    click.echo(
+        f"At level {level:g} of the hits: {depend} of {sum(len(each.modes) for each in tests)} "
+        "frequencies depend on it.",
+        err=flags.wants_json(),
+    )
+    return moved
+
+
+def _at(level: float | None) -> dict[str, float]:
+    """Return the level that a document holds at; nothing of one at small amplitude."""
+    return {} if level is None else {"at_level": level}
+
+
 def _updating(function: flags.F) -> flags.F:
     """Return the options that both have."""
-    updating = (flags.seed, flags.samples, flags.priors, _sampler, _calibrated_by)
+    updating = (flags.seed, flags.samples, flags.priors, _sampler, _calibrated_by, _level)
     for option in reversed((flags.hanger(), flags.hanger_file, *updating, flags.json)):
         function = option(function)
     return function
@@ -92,6 +122,7 @@ def command(
     priors: str,
     sampler: str,
     calibrated_by: Path | None,
+    level: float | None,
 ) -> None:
     """Infer tension and end stiffness with one model class.
 
@@ -102,6 +133,7 @@ def command(
     """
     options = UpdateOptions(samples, seed, sampler=sampler)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
+    tests = tests_at(tests, level)
     doubts = show_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
     with progress_bar("updating") as progress:
@@ -109,7 +141,8 @@ def command(
         options = calibrated(options, calibrated_by, [chosen], progress)
         posterior = update(tests, chosen, options, progress)
     if flags.wants_json():
-        show(with_assumptions({**posterior_document(posterior), "doubts": doubts}, hanger))
+        document = {**posterior_document(posterior), **_at(level), "doubts": doubts}
+        show(with_assumptions(document, hanger))
         return
     show_posterior(posterior, hanger.limits)
     tell_assumptions(hanger)
@@ -122,7 +155,7 @@ def tell_assumptions(hanger: Hanger) -> None:
 
 
 def tell_irregular(tests: Sequence[ModalTest]) -> None:
-    """Says on stderr which modes are left out, and what to do."""
+    """Print on stderr which modes are left out, and what to do."""
     for test in tests:
         for mode in test.modes:
             if mode.irregular:
@@ -208,6 +241,7 @@ def select_command(
     priors: str,
     sampler: str,
     calibrated_by: Path | None,
+    level: float | None,
 ) -> None:
     """Infer the tension with all model classes, and compare them.
 
@@ -230,6 +264,7 @@ def select_command(
         from shm.inference.updating import check_class_priors
 
         check_class_priors(stated, [model.name for model in chosen])
+    tests = tests_at(tests, level)
     doubts = show_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
     with progress_bar("updating") as progress:
@@ -237,7 +272,7 @@ def select_command(
         selection = select(tests, chosen, options, progress, stated)
     if flags.wants_json():
         document = selection_document(selection, hanger.limits)
-        complete = {**document, "not_applicable": not_applicable, "doubts": doubts}
+        complete = {**document, **_at(level), "not_applicable": not_applicable, "doubts": doubts}
         show(with_assumptions(complete, hanger))
         return
     show_selection(selection, hanger.limits)
@@ -247,7 +282,7 @@ def select_command(
 
 
 def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tuple[str, ...]:
-    """The classes asked for, or those of the setting and, of a workspace's hanger, the adopted."""
+    """Return the requested classes, or those of the setting and the hanger's adopted ones."""
     if models is not None:
         return load_settings({"models": models}, environment={}).model_names
     if hanger_id is None:
@@ -258,7 +293,7 @@ def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tup
 
 
 def _stated_priors(text: str) -> dict[str, float]:
-    """beam1=0.25,beam2=0.75 as numbers by class."""
+    """Parse beam1=0.25,beam2=0.75 into numbers by class."""
     pairs = [part.partition("=") for part in text.split(",")]
     try:
         return {name.strip(): float(value) for name, _, value in pairs}
@@ -270,7 +305,7 @@ def _stated_priors(text: str) -> dict[str, float]:
 
 
 def show_selection(selection: Selection, limits: Limits | None = None) -> None:
-    """The tension over all classes in words, and the classes as a table, most probable first."""
+    """Print the tension over all classes, and the classes as a table, most probable first."""
     show_stated(selection.averaged_with(limits))
     unit = force_unit(*(float(each.tension_n.mean()) for each in selection.posteriors))
     headings = (

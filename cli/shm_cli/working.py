@@ -30,7 +30,12 @@ def working(workspace: Workspace) -> Iterator[Flow]:
         stack.enter_context(children_ended())
         executor = executor_of(settings)
         stack.callback(executor.shutdown, wait=False, cancel_futures=True)
-        notifier = HookNotifier(workspace.folder, settings.hook_timeout_seconds, os.environ)
+        notifier = HookNotifier(
+            workspace.folder,
+            settings.hook_timeout_seconds,
+            os.environ,
+            settings.pages_address,
+        )
         stack.callback(notifier.close)
         flow = Flow(workspace, store, executor, notifier=notifier, lanes=settings.workers)
         stack.callback(flow.close)
@@ -38,7 +43,7 @@ def working(workspace: Workspace) -> Iterator[Flow]:
 
 
 def finish(flow: Flow, ids: Sequence[int]) -> None:
-    """Works until nothing waits, and counts the recordings that are through."""
+    """Work until no recording waits, and print how many are done."""
     with counting_bar() as bar:
         task = bar.add_task("ingesting", total=len(ids))
 
@@ -56,7 +61,7 @@ def finish(flow: Flow, ids: Sequence[int]) -> None:
 
 
 def finish_now(workspace: Workspace, recording_id: int) -> None:
-    """Works until a recording is through, or leaves that to the daemon at work."""
+    """Work until a recording is done, or leave that to the daemon at work."""
     try:
         with working(workspace) as flow:
             finish(flow, [recording_id])
@@ -65,10 +70,10 @@ def finish_now(workspace: Workspace, recording_id: int) -> None:
 
 
 def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
-    """Supersedes what was made of it and does it again, or leaves that to the daemon at work.
+    """Supersede results and recompute them, or leave that to the daemon at work.
 
-    `which` is a recording's number or a test's name. Raises NothingThere, UsageError; then nothing
-    is superseded.
+    `which` is a recording's number or a test's name. Raises NothingThere, UsageError; then
+    nothing is superseded.
     """
     with workspace.store() as store:
         recording_id, test = find_recording(store, which)

@@ -36,7 +36,7 @@ from shm.store.stored_alerts import silenced_until
 from shm.store.workspace import FOLDERS
 from shm_daemon import doctor_checks as of_store
 from shm_daemon.doctor_checks import Finding, Level, fault, ok, some, unknown, warning
-from shm_daemon.heartbeat import NEARLY_FULL, told
+from shm_daemon.heartbeat import NEARLY_FULL, duration_words
 from shm_daemon.hooks import HookFailed, HookNotifier
 from shm_daemon.web.other_bridges import ask_all
 
@@ -128,7 +128,7 @@ def check_deliveries(examined: of_store.Examined) -> Iterator[Finding]:
         last = lost[-1]
         yield warning(
             "deliveries",
-            f"{len(lost)} were given up in the last {told(_REMEMBERED)}; {last.hook}: "
+            f"{len(lost)} were given up in the last {duration_words(_REMEMBERED)}; {last.hook}: "
             f"{last.last_error}",
             "See `shm alerts` for what nobody was told of, and mend the hook.",
         )
@@ -180,6 +180,7 @@ _CHECKS: Sequence[tuple[str, of_store.Check]] = (
     ("deliveries", check_deliveries),
     ("hangers", of_store.check_hangers),
     ("streams", of_store.check_streams),
+    ("publish", of_store.check_publications),
     ("settings", of_store.check_changed_settings),
 )
 _REPORT = "This is a fault of shm; please report it."
@@ -244,6 +245,7 @@ _MODULES = {
     "distributed": ("distributed",),
     "mqtt": ("paho",),
     "postgres": ("psycopg",),
+    "seedlink": ("seedlink_client",),
     "sso": ("authlib",),
     "web": ("fastapi", "prometheus_client", "uvicorn"),
 }
@@ -269,6 +271,7 @@ def check_extras(workspace: Workspace) -> Iterator[Finding]:
         "distributed": bool(settings.scheduler),
         "mqtt": bool(settings.mqtt_url),
         "postgres": "://" in settings.store,
+        "seedlink": any(each.feed is not None for each in workspace.bridge.streams),
         "sso": workspace.bridge.single_sign_on is not None,
     }
     missing = [extra for extra, wanted in needed.items() if wanted and extra not in installed]

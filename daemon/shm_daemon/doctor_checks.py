@@ -19,11 +19,12 @@ from shm.pipeline.unheard import REMEDIES, backlog_leads, heard, ring_leads
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
+from shm.store.point_outbox import PointOutbox
 from shm.store.queries.hangers import list_selected_models
 from shm.store.queries.recordings import count_stages, list_holds, list_recordings, list_under_way
 from shm.store.queries.tests import count_tests
 from shm.store.queries.upkeep import find_last_backup, find_newest_step, list_copies, list_removed
-from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
+from shm_daemon.heartbeat import duration_words, patience_s, seconds_since_beat, why_turn_failed
 from shm_daemon.spool import is_sidecar, left_alone, never_taken, scan
 
 # Judgement: a step takes seconds to minutes, so that work which stands for longer than these is
@@ -105,7 +106,11 @@ def check_daemon(examined: Examined) -> Iterator[Finding]:
     """Check whether a daemon is active, and its loop goes round."""
     workspace = examined.workspace
     holder, ago_s = workspace.holder(), seconds_since_beat(workspace)
-    seen = "never seen here" if ago_s is None else f"last seen {told(timedelta(seconds=ago_s))} ago"
+    seen = (
+        "never seen here"
+        if ago_s is None
+        else f"last seen {duration_words(timedelta(seconds=ago_s))} ago"
+    )
     if holder is None:
         yield warning("daemon", f"none is active, {seen}", _BEGIN)
     elif ago_s is None or ago_s > patience_s(workspace):
@@ -127,7 +132,9 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
     if not ages:
         yield ok("spool", "empty")
     else:
-        found = f"{counted(len(ages), 'file')} in the queue, the oldest for {told(max(ages))}"
+        found = (
+            f"{counted(len(ages), 'file')} in the queue, the oldest for {duration_words(max(ages))}"
+        )
         late = max(ages) > WAITS_LONG
         remedy = "Is a daemon active, and what does its log say of these files?"
         yield warning("spool", found, remedy) if late else ok("spool", found)
@@ -173,7 +180,7 @@ def check_under_way(examined: Examined) -> Iterator[Finding]:
     waits, idle = now - oldest.since, now - newest_at
     found = (
         f"{len(standing)} on their way; {oldest.file_name} (recording {oldest.id}) has been "
-        f"{oldest.stage} for {told(waits)}"
+        f"{oldest.stage} for {duration_words(waits)}"
     )
     if waits > _STUCK_BEHIND_OTHERS or (waits > _STUCK and idle > _NOTHING_MOVES):
         remedy = f"See the daemon's log, then `shm ingest --again {oldest.id}`."
@@ -197,7 +204,8 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
         why = reasons[-1].name
     yield warning(
         "quarantine",
-        f"{counted(len(reasons), 'file')} since {told(first)}, the latest {told(last)} ago: {why}",
+        f"{counted(len(reasons), 'file')} since {duration_words(first)},"
+        f" the latest {duration_words(last)} ago: {why}",
         "Mend and drop them again, or `shm archive prune --quarantine-days 90`.",
     )
 
@@ -208,7 +216,7 @@ def check_held(examined: Examined) -> Iterator[Finding]:
     if not found:
         yield ok("held", "nothing waits for you to decide")
         return
-    since = told(max(examined.now - found[0].held_at, timedelta(0)))
+    since = duration_words(max(examined.now - found[0].held_at, timedelta(0)))
     yield warning(
         "held",
         f"{counted(len(found), 'recording')}, the first for {since}: {found[0].file_name}",
@@ -277,7 +285,7 @@ def check_backup(examined: Examined) -> Iterator[Finding]:
     if last is None:
         yield warning("backup", "never made here", remedy)
     else:
-        found = f"{last[1]}, {told(now - last[0])} ago"
+        found = f"{last[1]}, {duration_words(now - last[0])} ago"
         late = now - last[0] > timedelta(days=examined.workspace.settings.backup_days)
         yield warning("backup", found, remedy) if late else ok("backup", found)
     copied = {copy.recording_id for copy in list_copies(store)}
@@ -292,7 +300,8 @@ def check_clock(examined: Examined) -> Iterator[Finding]:
     if newest is not None and newest - now > _CLOCK_TOLERANCE:
         yield fault(
             "clock",
-            f"it says {now:%Y-%m-%d %H:%M} UTC, {told(newest - now)} before the newest row",
+            f"it says {now:%Y-%m-%d %H:%M} UTC, "
+            f"{duration_words(newest - now)} before the newest row",
             "Set it; tests without a time of their own are dated by it.",
         )
     said = _synchronised()
@@ -372,6 +381,18 @@ def check_streams(examined: Examined) -> Iterator[Finding]:
         yield warning("ring", lead.state, lead.action)
     if found and not behind and not any(each.state in REMEDIES for each in found):
         yield ok("streams", f"{counted(len(found), 'stream')}, heard within the hour")
+
+
+def check_publications(examined: Examined) -> Iterator[Finding]:
+    """Find databases that do not take the results; nothing where `bridge.toml` names none."""
+    outbox = PointOutbox(examined.workspace.folder)
+    for each in examined.workspace.bridge.publications:
+        check, state = f"publish {each.name}", outbox.state(each.name)
+        if state.refused or state.why:
+            remedy = "The daemon tries again each minute, and sends what waits once it is taken."
+            yield warning(check, state.words or state.why, remedy)
+        else:
+            yield ok(check, f"{each.url}: {state.waiting} points wait")
 
 
 def check_changed_settings(examined: Examined) -> Iterator[Finding]:

@@ -99,8 +99,8 @@ def patience_s(workspace: Workspace) -> float:
     return _PATIENCE_S + 2 * workspace.settings.spool_scan_seconds
 
 
-def told(age: timedelta) -> str:
-    """A duration as people say it."""
+def duration_words(age: timedelta) -> str:
+    """Return a duration in words: `3 d`, `5 h`, `12 min`, `7 s`."""
     seconds = age.total_seconds()
     for size, unit in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 2 * size:

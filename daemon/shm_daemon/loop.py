@@ -30,6 +30,8 @@ from shm_daemon.heartbeat import Pulse, longest_wait_s, tell_systemd, turn_faile
 from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
+from shm_daemon.publishing import Publisher, results_published
+from shm_daemon.seedlink import StreamAskers, streams_asked
 from shm_daemon.spool import FileStabilityTracker, scan
 from shm_daemon.streams import StreamKeeper, streams_kept
 from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
@@ -114,7 +116,12 @@ def _begin(
     store = stack.enter_context(workspace.store())
     stack.enter_context(children_ended())
     if notifier is None:
-        notifier = HookNotifier(workspace.folder, settings.hook_timeout_seconds, os.environ)
+        notifier = HookNotifier(
+            workspace.folder,
+            settings.hook_timeout_seconds,
+            os.environ,
+            settings.pages_address,
+        )
         stack.callback(notifier.close)
     executor = make_executor(settings)
     flow = Flow(
@@ -137,7 +144,10 @@ def _begin(
     keeper = stack.enter_context(
         streams_kept(workspace, clock, until_done=once, sealed=streaming.note_sealed)
     )
-    daemon = Daemon(flow, streaming, keeper, wakeup, lock, pulse, lambda: make_executor(settings))
+    publisher = stack.enter_context(results_published(workspace, clock, when_done=once))
+    askers = stack.enter_context(streams_asked(workspace, clock, begun=not once))
+    parts = flow, streaming, keeper, publisher, askers
+    daemon = Daemon(*parts, wakeup, lock, pulse, lambda: make_executor(settings))
     stack.callback(daemon.close)
     log.info("watching %s", workspace.spool)
     return daemon
@@ -151,12 +161,15 @@ class Daemon:
         flow: Flow,
         streaming: Streaming,
         keeper: StreamKeeper,
+        publisher: Publisher,
+        askers: StreamAskers,
         wakeup: Wakeup,
         lock: ActiveLock,
         pulse: Pulse,
         make_executor: Callable[[], Executor],
     ):
-        self._flow, self._streaming, self._keeper = flow, streaming, keeper
+        self._flow, self._streaming = flow, streaming
+        self._keeper, self._publisher, self._askers = keeper, publisher, askers
         self._wakeup, self._lock, self._pulse = wakeup, lock, pulse
         self._make_executor = make_executor
         settings = flow.workspace.settings
@@ -335,6 +348,8 @@ class Daemon:
             self._flow.use(self._flow.workspace.reopened())
             self._streaming.use(self._flow.workspace)
             self._keeper.use(self._flow.workspace)
+            self._publisher.use(self._flow.workspace)
+            self._askers.use(self._flow.workspace)
         except ShmError as error:
             log.error("bridge.toml is not taken over: %s", error)
         else:

@@ -18,7 +18,7 @@ hanger = shm.round_bar(
 
 
 def selected(spring_n_m_rad: float) -> shm.Selection:
-    """The choice for a bar of 600 kN whose deck end turns in a spring, in both planes."""
+    """Return the choice for a bar of 600 kN with a rotational spring at its deck end."""
     recording = shm.simulate(
         hanger,
         k1_n_m_rad=spring_n_m_rad,

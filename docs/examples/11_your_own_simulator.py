@@ -10,7 +10,7 @@ import shm
 
 
 def spring(p, at):
-    """The force of a spring, in newtons, with whatever effects `p` holds."""
+    """Return the force of a spring, in newtons, with the effects that `p` holds."""
     x_m = at["x_m"]
     force_n = p["k_n_m"] * x_m * (1 + p.get("hardening_m2", 0.0) * x_m**2)
     return {"force_n": force_n * (1 + p.get("per_kelvin", 0.0) * at["warm_k"]) + p.get("f0_n", 0.0)}

@@ -65,7 +65,7 @@ def _block(writer: Any, node: nodes.math_block) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Registers the renderer `drawn`."""
+    """Register the renderer `drawn`."""
     app.add_html_math_renderer("drawn", (_inline, None), (_block, None))
     app.add_css_file("manual.css")
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -319,7 +319,7 @@ def select(
     calibrated_by: Tests = (),
     class_priors: Mapping[str, float] | None = None,
 ) -> Selection:
-    """Model classes compared by their evidence, the most probable first.
+    """Compare model classes by their evidence, the most probable first.
 
     The classes are equally probable beforehand, thesis (4.15) to (4.17), but for clamped ones
     beside one with springs unless the `priors` are the thesis's; `class_priors` say otherwise, such

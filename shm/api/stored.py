@@ -54,11 +54,11 @@ class Store:
         return self._workspace.bridge.hangers
 
     def hanger(self, hanger_id: int) -> Hanger:
-        """One hanger; raises BadInput when the bridge has none such."""
+        """Return one hanger; raises BadInput when the bridge has none such."""
         return self._workspace.bridge.hanger(hanger_id)
 
     def tests(self, hanger_id: int) -> tuple[ModalTest, ...]:
-        """The modal tests of a hanger, oldest first; empty before the first."""
+        """Return the modal tests of a hanger, oldest first; empty before the first."""
         self.hanger(hanger_id)
         return tuple(stored.test for stored in self._store.tests.list_all(hanger_id))
 
@@ -175,7 +175,7 @@ class Store:
         return found
 
     def close(self) -> None:
-        """Lets go of the database."""
+        """Let go of the database."""
         self._store.close()
 
     def _stored(self, hanger_id: int, test_id: str) -> StoredTest:

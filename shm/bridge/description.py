@@ -22,10 +22,11 @@ from shm.bridge.assumed import assumptions_of
 from shm.bridge.changes import overlaid
 from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, escalations_s, hook_of, zone_of
+from shm.bridge.publish import Publication, publication_of
 from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table, is_loopback, web_address
 from shm.errors import BadInput, NotDescribed, suggest
-from shm.values import MEASUREMENT_HOURS, Hanger, MonitoredHanger
+from shm.values import MEASUREMENT_HOURS, ControlHanger, Hanger, MonitoredHanger
 from shm.values.stream import Stream
 
 _LETTERHEAD = ("organisation", "prepared_by", "checked_by", "logo")
@@ -164,7 +165,8 @@ class Bridge:
     """The description of a bridge by `bridge.toml`; `built` is None if it is not stated.
 
     `structures` are those without a model, of which frequencies alone are watched: a deck, a pylon.
-    Their numbers are none of a hanger. `measurement_hours` is what each kind of measurement costs.
+    Their numbers are none of a hanger. `controls` are hangers of known tension, which check each
+    campaign and are none of `hangers`. `measurement_hours` is what each kind of measurement costs.
     `as_in_file` is the bridge without what the page Settings
     has changed; None where it has changed nothing. `time_zone` is that of clocks that name none.
     """
@@ -185,6 +187,8 @@ class Bridge:
     single_sign_on: SingleSignOn | None = None
     assumptions: Assumptions = DEFAULTS
     time_zone: tzinfo = UTC
+    publications: tuple[Publication, ...] = ()
+    controls: tuple[ControlHanger, ...] = ()
 
     @property
     def escalation_s(self) -> dict[str, float]:
@@ -192,12 +196,17 @@ class Bridge:
         return escalations_s(self.hooks)
 
     @property
+    def bars(self) -> tuple[Hanger, ...]:
+        """Return all that have a tension: hangers, then control hangers."""
+        return (*self.hangers, *self.controls)
+
+    @property
     def watched(self) -> tuple[Hanger, ...]:
         """All that tests may be of."""
-        return (*self.hangers, *self.structures)
+        return (*self.bars, *self.structures)
 
     def tested(self, number: int) -> Hanger:
-        """The hanger or structure of that number; raises BadInput when there is none such."""
+        """Return the hanger or structure of that number; raises BadInput where there is none."""
         return next((each for each in self.structures if each.id == number), None) or self.hanger(
             number
         )
@@ -208,7 +217,7 @@ class Bridge:
 
     def hanger(self, hanger_id: int) -> Hanger:
         """Return the hanger of that number; raises BadInput when the bridge has none such."""
-        for hanger in self.hangers:
+        for hanger in self.bars:
             if hanger.id == hanger_id:
                 return hanger
         if any(each.id == hanger_id for each in self.structures):
@@ -217,7 +226,7 @@ class Bridge:
                 remedy="See `shm status`, `shm alerts` and `shm report --hanger "
                 f"{hanger_id}` for its frequencies.",
             )
-        known = ", ".join(str(hanger.id) for hanger in self.hangers) or "none"
+        known = ", ".join(str(hanger.id) for hanger in self.bars) or "none"
         raise NotDescribed(
             f"hanger {hanger_id} is not described in {Path(self.source).name} (known: {known}).",
             remedy="Add a [[hanger]] table with this id, or correct the number.",
@@ -238,7 +247,7 @@ def load_bridge(path: Path, changed: Mapping[str, object] = MappingProxyType({})
 
 _TABLES = (
     "bridge", "hanger", "structure", "hook", "other_bridge", "stream", "settings", "disturbance",
-    "report", "measurement_hours", "single_sign_on", "assumptions",
+    "report", "measurement_hours", "single_sign_on", "assumptions", "publish",
 )  # fmt: skip
 _OF_BRIDGE = ("name", "built", "time_zone")
 
@@ -263,6 +272,10 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
     _refuse_doubles([hook.name for hook in hooks], "hook name", path)
     others = tuple(other_bridge_of(each, path) for each in _tables(document, "other_bridge", path))
     _refuse_doubles([other.name for other in others], "other_bridge name", path)
+    publications = tuple(publication_of(each, path) for each in _tables(document, "publish", path))
+    _refuse_doubles([each.name for each in publications], "publish name", path)
+    controls = tuple(each for each in hangers if isinstance(each, ControlHanger))
+    hangers = tuple(each for each in hangers if not each.is_control)
     described = {each.id: each for each in hangers}
     streams = streams_of(_tables(document, "stream", path), path, described)
     watched = {stream.hanger for stream in streams}
@@ -285,21 +298,23 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
         single_sign_on=single_sign_on_of(document, path),
         assumptions=assumed,
         time_zone=zone,
+        publications=publications,
+        controls=controls,
     )
 
 
 def load_hanger(path: Path, hanger_id: int | None = None) -> Hanger:
-    """One hanger of a file (`--hanger-file`); `hanger_id` is needed where the file has several."""
+    """Return one hanger of a file (`--hanger-file`), by `hanger_id` where it has several."""
     bridge = load_bridge(path)
     if hanger_id is not None:
         return bridge.hanger(hanger_id)
-    if len(bridge.hangers) != 1:
+    if len(bridge.bars) != 1:
         raise BadInput(
-            f"{len(bridge.hangers)} [[hanger]] tables where one is expected.",
+            f"{len(bridge.bars)} [[hanger]] tables where one is expected.",
             file=path,
             remedy="Keep one table, or say which with --hanger N.",
         )
-    return bridge.hangers[0]
+    return bridge.bars[0]
 
 
 def _parse(path: Path) -> dict[str, Any]:

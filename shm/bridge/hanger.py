@@ -17,6 +17,7 @@ from shm.bridge.assumed import assumptions_of
 from shm.bridge.table import Table
 from shm.values import (
     NAN,
+    ControlHanger,
     EffectPrior,
     EndKind,
     EndPlate,
@@ -32,13 +33,15 @@ from shm.values import (
     Turnbuckle,
 )
 
-_REQUIRED = ("id", "length_m", "elastic_modulus_pa", "nominal_tension_n")
+_NOMINAL = "nominal_tension_n"
+_REQUIRED = ("id", "length_m", "elastic_modulus_pa", _NOMINAL)
 _SECTION = ("area_m2", "second_moment_m4", "mass_per_length_kg_m")
+_CONTROL = ("control", "known_tension_n", "known_tension_sd_n")
 _OPTIONAL = (
     "name", "diameter_m", "density_kg_m3", "poissons_ratio", "bending_stiffness_factor", "models",
     "plate", "turnbuckle", "thresholds", "scatter", "effects", "supports", "kind", "family",
     "limits", "fittings_m", "ends", "inclination_deg", "length_by", "length_measured",
-    "measured_by", "assumptions",
+    "measured_by", "assumptions", *_CONTROL,
 )  # fmt: skip
 _KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
 _LARGEST_POISSONS_RATIO = 0.499
@@ -66,7 +69,9 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
     area, second_moment, mass = _section(table)
     diameter = table.positive("diameter_m") if "diameter_m" in table else NAN
     _refuse_length(table, length_m, max(diameter, math.sqrt(area)))
-    nominal_tension_n = table.not_negative("nominal_tension_n")
+    control = _control(table)
+    nominal = "known_tension_n" if control and "nominal_tension_n" not in table else _NOMINAL
+    nominal_tension_n = table.not_negative(nominal)
     origin = f"{FILE}, hanger {values.get('id', '?')}"
     assumed = assumptions_of(table.table("assumptions"), assumed, origin)
     usual_ratio = assumed.poissons_ratio.value
@@ -104,7 +109,20 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
         assumptions=assumed,
     )
     _refuse_less_than_weight(table, hanger)
-    return hanger
+    if control is None:
+        return hanger
+    described = {each.name: getattr(hanger, each.name) for each in fields(hanger)}
+    return ControlHanger(**described, known_tension_n=control[0], known_tension_sd_n=control[1])
+
+
+def _control(table: Table) -> tuple[float, float] | None:
+    """Return the known tension of a control hanger and its sd in N; None of any other hanger."""
+    remedy = "Write control = true of a hanger whose tension is known, or leave the key out."
+    if table.value("control", bool, "is neither true nor false", remedy, usual=False):
+        return table.positive("known_tension_n", "N"), table.positive("known_tension_sd_n", "N")
+    if stated := [key for key in _CONTROL[1:] if key in table]:
+        raise table.refusal(f"{stated[0]} is that of a control hanger alone", remedy)
+    return None
 
 
 def _refuse_length(table: Table, length_m: float, widest_m: float) -> None:
@@ -218,7 +236,7 @@ def _kind(table: Table) -> Kind:
 
 
 def _fittings(table: Table, length_m: float) -> tuple[float, float]:
-    """Lengths of the deck-end and the arch-end fitting; none where nothing is said."""
+    """Return lengths of the deck-end and the arch-end fitting; 0 where not given."""
     deck_m, arch_m = table.value(
         "fittings_m",
         tuple[float, float],
@@ -272,7 +290,7 @@ def _limits(table: Table | None) -> Limits:
 
 
 def _section(table: Table) -> tuple[float, float, float]:
-    """Area, second moment and mass per length, given or those of a round bar."""
+    """Return area, second moment and mass per length, given or those of a round bar."""
     if "diameter_m" not in table:
         area, second_moment, mass = (table.positive(key) for key in _SECTION)
         return area, second_moment, mass

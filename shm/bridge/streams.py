@@ -10,10 +10,14 @@ from typing import Any
 from shm.bridge.table import Table
 from shm.errors import BadInput, NotDescribed
 from shm.values import NAN, PLANES, Hanger
-from shm.values.stream import Stream, StreamChannel
+from shm.values.stream import SeedLinkFeed, Stream, StreamChannel
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 """What is at once a folder, a level of an MQTT topic and a part of an address."""
+
+_FEED_KEYS = ("kind", "server", "channels", "calibration")
+_SERVER = re.compile(r"([A-Za-z0-9][A-Za-z0-9.-]*)(?::([1-9][0-9]{0,4}))?")
+_SEED_ID = re.compile(r"[A-Z0-9]{1,8}_[A-Z0-9]{1,8}_[A-Z0-9]{0,8}_[A-Z0-9]{3}")
 
 
 def is_stream_name(text: str) -> bool:
@@ -24,7 +28,8 @@ def is_stream_name(text: str) -> bool:
 def stream_of(values: dict[str, Any], path: Path, hangers: Mapping[int, Hanger]) -> Stream:
     """Return the stream of a `[[stream]]` table; raises BadInput naming table and key at fault."""
     table = Table(values, f"stream {values.get('name', '?')}", path)
-    table.refuse_unknown(("name", "hanger", "sampling_rate_hz", "channel"))
+    asked = _FEED_KEYS if "kind" in table else ()
+    table.refuse_unknown(("name", "hanger", "sampling_rate_hz", "channel", *asked))
     name = _name(table, "h7")
     number = table.value("hanger", int, "is not a whole number", "Give the id of its hanger.")
     if number not in hangers:
@@ -37,7 +42,38 @@ def stream_of(values: dict[str, Any], path: Path, hangers: Mapping[int, Hanger])
     if not channels:
         raise table.refusal("it has no channels", "Write a [[stream.channel]] for each sensor.")
     _refuse_doubles([channel.name for channel in channels], table)
-    return Stream(name, number, table.positive("sampling_rate_hz"), channels)
+    feed = _feed(table, len(channels)) if "kind" in table else None
+    return Stream(name, number, table.positive("sampling_rate_hz"), channels, feed)
+
+
+def _feed(table: Table, n_channels: int) -> SeedLinkFeed:
+    """Return the server that is asked for the samples of a stream; raises BadInput."""
+    remedy = 'Write kind = "seedlink", or leave it out for a logger that sends.'
+    table.value("kind", str, "is not known", remedy, holds=lambda kind: kind == "seedlink")
+    wrong, remedy = "is no host and port", 'Write server = "logger.example.org:18000".'
+    server = _SERVER.fullmatch(
+        table.value("server", str, wrong, remedy, holds=lambda text: bool(_SERVER.fullmatch(text)))
+    )
+    assert server is not None
+    each = f"one for each of the {n_channels} [[stream.channel]] tables, in their order"
+    ids = table.value(
+        "channels",
+        tuple[str, ...],
+        f"is not {each}",
+        'Write network, station, location and code: channels = ["XX_HGR3_00_HN1"].',
+        holds=lambda found: len(found) == n_channels and all(map(_SEED_ID.fullmatch, found)),
+    )
+    if len(set(ids)) < len(ids):
+        raise table.refusal("channels names one twice", "Name each channel once.")
+    calibrations = table.value(
+        "calibration",
+        tuple[float, ...],
+        f"is not {each}",
+        "Give what a count of each is worth in m/s2: calibration = [2.4e-6].",
+        holds=lambda found: len(found) == n_channels and all(found),
+    )
+    parts = tuple(tuple(text.split("_")) for text in ids)
+    return SeedLinkFeed(server[1], int(server[2] or 18000), parts, calibrations)
 
 
 def _channel(table: Table, hanger: Hanger) -> StreamChannel:
@@ -99,7 +135,7 @@ def _refuse_second(streams: Sequence[Stream], path: Path) -> None:
 
 
 def _same_names(names: Sequence[str]) -> tuple[str, str] | None:
-    """Two names that are the same but for capitals."""
+    """Return two names that differ in capitals only."""
     seen: dict[str, str] = {}
     for name in names:
         if name.lower() in seen:

@@ -78,7 +78,7 @@ if TYPE_CHECKING:
 
 
 def columns(posterior: Posterior) -> dict[str, FloatArray]:
-    """Equally weighted draws by name, each (samples,): parameters, tension, log likelihood."""
+    """Return equally weighted draws by name, each (samples,): parameters, tension, likelihood."""
     parameters = dict(zip(posterior.names, posterior.samples.T, strict=True))
     return {
         **parameters,

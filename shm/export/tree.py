@@ -144,7 +144,7 @@ def _hertz(values: Sequence[float]) -> tuple[tuple[str, ...], FloatArray, str]:
 
 
 def _coordinates(posterior: Posterior, tests: Sequence[ModalTest]) -> dict[str, Any]:
-    """Of every dimension; a measurement has its plane, its order and, where known, its test."""
+    """Return coordinates of every dimension; of a measurement plane, order and test."""
     rows = posterior.predicted
     named: dict[str, Any] = {
         "chain": [0],

@@ -187,6 +187,7 @@ def _compare_with_string(problem: GapProblem) -> tuple[str, ...]:
         frequency_hz.tolist(), design.frequency_order.tolist(), hanger
     )
     return (
-        f"A taut string with these frequencies carries {force_unit(tension_n).told(tension_n)}, "
-        f"{tension_n / hanger.nominal_tension_n:.2g} times the nominal tension.",
+        "A taut string with these frequencies carries "
+        f"{force_unit(tension_n).with_unit(tension_n)},"
+        f" {tension_n / hanger.nominal_tension_n:.2g} times the nominal tension.",
     )

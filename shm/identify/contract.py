@@ -115,8 +115,10 @@ class FoundMode:
 
 @dataclass(frozen=True)
 class Drift:
-    """The relative `change` from first to last hit that all `modes` have in common, its `sd`;
-    `sure` where chance does not make it."""
+    """Hold the relative `change` of frequency from first to last hit that all `modes` share.
+
+    `sd` is its standard deviation; `sure` is False where chance may explain it.
+    """
 
     change: float
     sd: float
@@ -126,10 +128,10 @@ class Drift:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """What an identifier found, by rising frequency, and what it dropped.
+    """Hold the modes that an identifier found, by rising frequency, and the poles that it dropped.
 
-    `doubtful` are those of the dropped that may be modes: one hit or one order says otherwise. An
-    identifier leaves `drift` out.
+    `doubtful` are dropped ones that may be modes: one hit or one order disagrees. An identifier
+    leaves `drift` out.
     """
 
     modes: tuple[FoundMode, ...]

@@ -24,8 +24,10 @@ _SAME_MODE = 0.005  # judgement: set-ups and the end of softening see one mode a
 
 @dataclass(frozen=True)
 class HitModes:
-    """A hit with the frequency in Hz and damping ratio of each numbered mode, in their order; NaN
-    where the mode does not stand out of it."""
+    """Hold the frequency in Hz and damping ratio of each numbered mode after one hit.
+
+    They are in the order of the modes; NaN where a mode is below the noise of that hit.
+    """
 
     hit: Hit
     frequency_hz: tuple[float, ...]
@@ -40,13 +42,13 @@ def modes_of_each_hit(
     """Return all hits in time; `found` are each set-up's modes, shapeless where it saw none."""
     rows = []
     for measurement, seen in zip(measurements, found, strict=True):
-        own = [mode for mode in seen if len(mode.shape) == len(measurement.points)]
+        measured = [mode for mode in seen if len(mode.shape) == len(measurement.points)]
         decays = iter(measurement.decays)
         for hit in measurement.hits:
             known = [(NAN, NAN)] * len(modes)
-            if hit.used and (decay := next(decays, None)) is not None and own:
-                course = course_of(decay, own, measurement.sampling_rate_hz)
-                known = [_in_course(course, own, mode) for mode in modes]
+            if hit.used and (decay := next(decays, None)) is not None and measured:
+                course = course_of(decay, measured, measurement.sampling_rate_hz)
+                known = [_in_course(course, measured, mode) for mode in modes]
             rows.append(HitModes(hit, tuple(f for f, _ in known), tuple(z for _, z in known)))
     return tuple(sorted(rows, key=lambda row: (row.hit.record, row.hit.start)))
 
@@ -55,8 +57,8 @@ def _in_course(course: Course, found: Sequence[FoundMode], mode: Mode) -> tuple[
     """Return frequency and damping ratio of a mode in one ring-down, by weighted straight lines."""
     away = [abs(each.frequency_hz / mode.frequency_hz - 1) for each in found]
     index = int(np.argmin(away))
-    own = found[index]
-    decay = 2 * math.pi * own.frequency_hz * own.damping_ratio
+    of_course = found[index]
+    decay = 2 * math.pi * of_course.frequency_hz * of_course.damping_ratio
     row = phases_of(course, index, decay) if away[index] < _SAME_MODE else None
     if row is None:
         return NAN, NAN
@@ -64,7 +66,7 @@ def _in_course(course: Course, found: Sequence[FoundMode], mode: Mode) -> tuple[
     size = np.abs(course.motion[: len(time_s), index])
     turn = np.polyfit(time_s, phase, 1, w=1 / sd)[0]
     fall = -np.polyfit(time_s, np.log(size), 1, w=1 / sd)[0]
-    frequency_hz = own.frequency_hz + turn / (2 * math.pi)
+    frequency_hz = of_course.frequency_hz + turn / (2 * math.pi)
     return float(frequency_hz), float((decay + fall) / (2 * math.pi * frequency_hz))
 
 

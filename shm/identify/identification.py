@@ -22,21 +22,34 @@ from shm.identify.contract import (
     Tone,
 )
 from shm.identify.each_hit import HitModes, modes_of_each_hit
-from shm.identify.estimation.finished import finished, without_sidebands
-from shm.identify.estimation.pyoma import own_identification
+from shm.identify.estimation.postprocess import postprocess, without_sidebands
+from shm.identify.estimation.pyoma import identify_with_pyoma2
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
-from shm.identify.estimation.ssi import looked_at_again, summed_hankel_ssi
-from shm.identify.estimation.stabilise import completed
-from shm.identify.measuring.setups import measured, refuse_off_the_hanger, without_unused_force
-from shm.identify.mode_ordering.placement import STATE_PLANES, Placement, placed
+from shm.identify.estimation.ssi import search_windows, summed_hankel_ssi
+from shm.identify.estimation.stabilise import merge_findings
+from shm.identify.measuring.setups import (
+    measure_set_ups,
+    refuse_off_the_hanger,
+    without_unused_force,
+)
+from shm.identify.mode_ordering.placement import STATE_PLANES, Placement, place_modes
 from shm.identify.mode_ordering.planes import directions
 from shm.identify.options import AUTO_CROSS_CHECK, NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
 from shm.identify.quality.of_modes import first_orders
 from shm.identify.quality.of_sensors import sensor_gain, sensor_places
-from shm.identify.setup_merging.calm_part import LEFT_OUT, calmed, free_below, level_left_at
-from shm.identify.setup_merging.hit_directions import alike, sharpened, together
-from shm.identify.setup_merging.joined import Joined, joined
+from shm.identify.setup_merging.calm_part import (
+    LEFT_OUT,
+    late_part_level,
+    late_parts,
+    linear_below_level,
+)
+from shm.identify.setup_merging.hit_directions import (
+    have_same_sensors,
+    pool_hits,
+    refine_by_direction,
+)
+from shm.identify.setup_merging.join_set_ups import Joined, join_set_ups
 from shm.identify.setup_merging.modal_participation import fitted
 from shm.identify.setup_merging.products import joined_response
 from shm.values import (
@@ -79,7 +92,7 @@ class Identification:
     each_hit: tuple[HitModes, ...] = ()
 
     def with_orders(self, source: str) -> Identification:
-        """Itself, where modes have orders; else NotIdentifiable, which lists what was found."""
+        """Return self, where modes have orders; else raise NotIdentifiable listing the modes."""
         if self.test.modes:
             return self
         checks = [each for each in self.quality if each.verdict == "refused"]
@@ -102,20 +115,20 @@ def identify(
     test_id: str,
     hanger: Hanger | None = None,
 ) -> Identification:
-    """The modes of one test from its records: time records with hits, or frequency responses.
+    """Identify the modes of one test from its records: time records with hits, or responses.
 
     The description of the `hanger`, where known, helps to number the modes. Raises BadInput
-    where the records cannot be used together, NotIdentifiable where no mode can be trusted. Modes
-    whose orders are not known are set aside: the test is without modes where all are.
+    where the records cannot be used together, NotIdentifiable where no mode can be trusted.
+    Modes of unknown order are foreign: the test is without modes where all are.
     """
     refuse_off_the_hanger(records, hanger)
     recordings = [record for record in records if isinstance(record, Recording)]
-    measurements = measured(records, options)
+    measurements = measure_set_ups(records, options)
     recordings = without_unused_force(recordings, measurements)
     steady = tones(measurements, recordings, options)
     found = _found(measurements, options.identifier, options)
     placement = _placed(found, measurements, hanger, steady, options)
-    if not placement.modes and (closer := _closer(found, measurements, options)):
+    if not placement.modes and (closer := _windowed_pass(found, measurements, options)):
         found, placement = closer, _placed(closer, measurements, hanger, steady, options)
     second = _cross_check(measurements, options, hanger)
     quality = assess(Inspection(recordings, measurements, options, steady, found.finding, second))
@@ -131,7 +144,7 @@ def identify(
         placement, level_left, noted = calm or (placement, 1.0, noted)
         free = level_left
     else:
-        free = free_below(measurements, placement.modes)
+        free = linear_below_level(measurements, placement.modes)
         noted = (*noted, *_strange(free))
     hits = sorted(
         (hit for measurement in measurements for hit in measurement.hits),
@@ -150,7 +163,7 @@ def identify(
         notes=(*placement.notes, *noted, *_few_hits(measurements), *_no_force(measurements)),
         window_time_constant_s=measurements[0].window_time_constant_s,
         quality=(*quality, *_of_placed(measurements, found, placement, hanger, options)),
-        set_aside=placement.set_aside,
+        set_aside=placement.foreign_modes,
         fit=fitted(measurements, found.apart, options) if level_left == 1 else None,
         each_hit=modes_of_each_hit(measurements, found.apart, placement.modes),
     )
@@ -164,20 +177,22 @@ def _placed(
     options: IdentifyOptions,
 ) -> Placement:
     look = partial(_looked_at, measurements, found.finding, options)
-    return placed(found.finding.modes, found.points, hanger, steady, look)
+    return place_modes(found.finding.modes, found.points, hanger, steady, look)
 
 
-def _closer(
+def _windowed_pass(
     found: Joined, measurements: Sequence[Measurement], options: IdentifyOptions
 ) -> Joined | None:
-    """With what windows over the whole band show of one set-up; None where they show no more."""
+    """Return the finding completed by windows over the band; None where they show no more."""
     if len(measurements) > 1 or options.identifier != "ssi":
         return None
-    again = looked_at_again(measurements[0], options)
+    again = search_windows(measurements[0], options)
     if again is None or not again.modes:
         return None
-    more = _allowed_for(finished(again, measurements[0], options), options.shape_allowance)
-    return _of_modes_alone(joined(measurements, [completed(found.finding, more)], options))
+    more = _allowed_for(postprocess(again, measurements[0], options), options.shape_allowance)
+    return _of_modes_alone(
+        join_set_ups(measurements, [merge_findings(found.finding, more)], options)
+    )
 
 
 def _looked_at(
@@ -186,13 +201,13 @@ def _looked_at(
     options: IdentifyOptions,
     at_hz: Sequence[float],
 ) -> tuple[tuple[FoundMode, ...], tuple[FoundMode, ...]]:
-    """What windows show about the frequencies `at_hz`, of one set-up, and what may be a mode."""
+    """Return the modes that windows show around `at_hz` of one set-up, and weak candidates."""
     again = None
     if len(measurements) == 1 and options.identifier == "ssi":
-        again = looked_at_again(measurements[0], options, at_hz)
+        again = search_windows(measurements[0], options, at_hz)
     if again is None:
         return (), found.doubtful
-    again = finished(again, measurements[0], options)
+    again = postprocess(again, measurements[0], options)
     return again.modes, (*found.doubtful, *again.doubtful)
 
 
@@ -203,7 +218,7 @@ def _of_placed(
     hanger: Hanger | None,
     options: IdentifyOptions,
 ) -> list[QualityCheck]:
-    """What numbered modes say of their numbers and of the sensors."""
+    """Return the quality checks of numbered modes, their numbers and the sensors."""
     checks = [placement.check]
     if hanger and hanger.as_hanger and placement.modes:
         if any(point.plane for point in found.points):  # else no plane can lack a mode
@@ -219,17 +234,17 @@ def _once_calm(
     hanger: Hanger | None,
     steady: Sequence[Tone],
 ) -> tuple[Placement, float, tuple[str, ...]] | None:
-    """What the ring-downs say once they have died away so far that they are a bar's, with what is
-    left of their level by then, and a note; None where they never are.
+    """Return the result of the late parts of ring-downs, once they are a bar's; None if never.
 
-    Of the parts that shows most modes counts.
+    With it come the fraction of their level that is left by then, and a note. The parts that
+    show most modes count.
     """
     if not all(m.driven for m in measurements):
         return None
     found = []
     for left_out in LEFT_OUT:
-        later = _found(calmed(measurements, left_out), options.identifier, options)
-        found.append((placed(later.finding.modes, later.points, hanger, steady), left_out))
+        later = _found(late_parts(measurements, left_out), options.identifier, options)
+        found.append((place_modes(later.finding.modes, later.points, hanger, steady), left_out))
     placement, left_out = max(found, key=lambda each: (len(each[0].modes), each[1]))
     if len(placement.modes) < _FEWEST_CALM:
         return None
@@ -237,7 +252,7 @@ def _once_calm(
         f"the first {left_out:.0%} of each ring-down are left out: there the hanger does not ring "
         "as a bar; something knocks (a guide with play), slips or opens while it swings far"
     )
-    return placement, level_left_at(measurements, left_out), (note,)
+    return placement, late_part_level(measurements, left_out), (note,)
 
 
 def _strange(free: float) -> tuple[str, ...]:
@@ -267,22 +282,22 @@ def _cross_check(
 
 
 def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOptions) -> Joined:
-    """What the identifier of that name finds in each set-up, as one finding."""
+    """Run the identifier of that name on each set-up and return its findings joined."""
     function = identifier(name)
     # What tests differ by is allowed for once, not set-up by set-up.
     alone = options if len(measurements) == 1 else replace(options, frequency_allowance=0.0)
-    findings = [finished(function(m, alone), m, options) for m in measurements]
-    found = joined(measurements, findings, options)
-    if name == "ssi" and alike(measurements):
-        every = together(measurements)
-        whole = finished(function(every, options), every, options)
-        found = sharpened(measurements, found, whole)
+    findings = [postprocess(function(m, alone), m, options) for m in measurements]
+    found = join_set_ups(measurements, findings, options)
+    if name == "ssi" and have_same_sensors(measurements):
+        every = pool_hits(measurements)
+        whole = postprocess(function(every, options), every, options)
+        found = refine_by_direction(measurements, found, whole)
     found = _of_modes_alone(found)
     return replace(found, finding=_allowed_for(found.finding, options.shape_allowance))
 
 
 def _of_modes_alone(found: Joined) -> Joined:
-    """Without the sidebands of modes."""
+    """Return the finding without the sidebands of modes."""
     finding = without_sidebands(found.finding)
     kept = [any(mode is own for own in finding.modes) for mode in found.finding.modes]
     apart = tuple(tuple(compress(modes, kept)) for modes in found.apart)
@@ -290,7 +305,7 @@ def _of_modes_alone(found: Joined) -> Joined:
 
 
 def _allowed_for(found: Finding, shape_allowance: float) -> Finding:
-    """With what shapes differ by from test to test in their standard deviations."""
+    """Add the scatter of shapes from test to test to their standard deviations."""
     modes = tuple(
         replace(mode, shape_sd=np.hypot(mode.shape_sd, shape_allowance)) for mode in found.modes
     )
@@ -303,7 +318,7 @@ def _test(
     modes: tuple[Mode, ...],
     amplitude: float,
 ) -> ModalTest:
-    """The test with the earliest time and the mean temperature of its records."""
+    """Return the test with the earliest time and the mean temperature of its records."""
     temperatures = [r.temperature_c for r in records if not math.isnan(r.temperature_c)]
     return ModalTest(
         id=as_test_id(test_id),
@@ -321,7 +336,7 @@ def _nothing_found(
 ) -> NotIdentifiable:
     """Return the refusal of a test without a mode, missing planes before all that is dropped."""
     reasons = [f"{d.count} {d.what}: {d.reason}" for d in found.dropped if d.count]
-    reasons += [f"{mode.frequency_hz:.4g} Hz: {mode.reason}" for mode in placement.set_aside]
+    reasons += [f"{mode.frequency_hz:.4g} Hz: {mode.reason}" for mode in placement.foreign_modes]
     remedy = (
         "Check that hits ring down undisturbed, that the band holds modes and that nothing knocks "
         "while the hanger swings far: hit softer."
@@ -358,19 +373,19 @@ def _no_force(measurements: Sequence[Measurement]) -> tuple[str, ...]:
 
 
 def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
-    """Median peak force of the used hits over that of the reference level."""
+    """Return the median peak force of the used hits over that of the reference level."""
     forces = [hit.peak_force_n for hit in hits if hit.used and math.isfinite(hit.peak_force_n)]
     return float(np.median(forces)) / options.reference_force_n if forces else NAN
 
 
 IDENTIFIERS: dict[str, Identifier] = {
     "ssi": summed_hankel_ssi,
-    "pyoma2": own_identification,
+    "pyoma2": identify_with_pyoma2,
 }
 
 
 def identifier(name: str) -> Identifier:
-    """The identifier of that name; raises UsageError for an unknown one."""
+    """Return the identifier of that name; raises UsageError for an unknown one."""
     if name not in IDENTIFIERS:
         raise UsageError(
             f"unknown identifier {name!r}.", remedy=f"Known: {', '.join(IDENTIFIERS)}."

@@ -1,5 +1,6 @@
-"""What an identification may be told; every default suits a hanger hit by a soft hammer, and others
-suit records that were made for their whole band.
+"""Define the options of an identification.
+
+Defaults suit a hanger hit by a soft hammer; others suit records made for their complete band.
 """
 
 from __future__ import annotations
@@ -88,11 +89,11 @@ class IdentifyOptions:
                 )
 
     def at_best(self, frequency_hz: float, damping_ratio: float) -> tuple[float, float]:
-        """Least standard deviations of frequency and damping, as fractions; 0 where somebody hit.
+        """Return the least relative standard deviations of frequency and damping; 0 with hits.
 
-        The Cramer-Rao bounds of a mode that white noise moves, damping small: sqrt(z / (w T)) and
-        1 / sqrt(z w T) (W. Gersch, J. Sound Vib. 36, 1974; S. K. Au, Mech. Syst. Signal Process.
-        48, 2014).
+        The Cramer-Rao bounds of a mode that white noise moves, damping small: sqrt(z / (w
+        T)) and 1 / sqrt(z w T) (W. Gersch, J. Sound Vib. 36, 1974; S. K. Au, Mech. Syst.
+        Signal Process. 48, 2014).
         """
         if self.ambient_s <= 0 or not damping_ratio > 0:
             return 0.0, 0.0

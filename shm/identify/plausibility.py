@@ -1,9 +1,10 @@
-"""Whether the signals of a test can be what their channels say: "right unit?", "right channel?".
+"""Check that signals can be what their channels state: "right unit?", "right channel?".
 
 A hit's impulse J (N s) over the velocity v (m/s) with which the hanger swings right after it is a
-mass: v is that of some N modes, each J/(M/2) times its shape at hammer and sensor, so that J/v lies
-near the hanger's mass M, whatever tension and ends. A unit that is wrong by 1000 puts it at grams
-or kilotonnes. A hammer's signal is over when it has left the bar, an accelerometer's rings on.
+mass: v is that of some N modes, each J/(M/2) times its shape at hammer and sensor, so that J/v is
+close to the hanger's mass M, whatever tension and ends. A unit that is wrong by 1000 puts it at
+grams or kilotonnes. A hammer's signal is over when it has left the bar, an accelerometer's rings
+on.
 """
 
 from __future__ import annotations
@@ -52,9 +53,10 @@ class SignalDoubt:
 def signal_doubts(
     records: Sequence[Recording], hanger: Hanger | None = None
 ) -> tuple[SignalDoubt, ...]:
-    """What is doubtful of the records of one test; none where nobody hit.
+    """Return what is doubtful in the records of one test; empty without hits.
 
-    g for m/s^2, a factor of 9.81, holds no test: no tension depends on it; the check `gain` warns.
+    g for m/s^2, a factor of 9.81, holds no test: no tension depends on it; the check `gain`
+    warns.
     """
     found: dict[tuple[str, str], SignalDoubt] = {}
     for record in records:
@@ -65,7 +67,7 @@ def signal_doubts(
 
 
 def apparent_mass_kg(record: Recording) -> float:
-    """J/v by the sensor that moves most, the median over the hits; NaN where there is no hit."""
+    """Return J/v by the sensor that moves most, the median over the hits; NaN without hits."""
     velocities = _velocities(record)
     fastest = max(velocities[np.isfinite(velocities)], default=NAN)
     if math.isnan(fastest):
@@ -117,7 +119,7 @@ def _outside_bounds(channel: Channel) -> list[SignalDoubt]:
 
 
 def _unlike_its_neighbours(record: Recording) -> list[SignalDoubt]:
-    """A sensor that moves 100 times as much, or as little, as all others of its plane."""
+    """Return sensors that move 100 times as much, or as little, as all others of their plane."""
     velocities, channels = _velocities(record), record.accelerations
     found = []
     for row, channel in enumerate(channels if len(velocities) else ()):
@@ -143,9 +145,9 @@ def _unlike_its_neighbours(record: Recording) -> list[SignalDoubt]:
 
 
 def _velocities(record: Recording) -> FloatArray:
-    """Velocity for an impulse of 1 N s (channels,), root mean square over 0.5 s after a hit.
+    """Return the velocity for an impulse of 1 N s (channels,), rms over 0.5 s after a hit.
 
-    The median over the hits after which a channel has samples, NaN without; empty where nobody hit.
+    The median over the hits after which a channel has samples, NaN without; empty without hits.
     """
     force = record.force
     pulses = [] if force is None else find_pulses(force.values, record.sampling_rate_hz)
@@ -178,7 +180,7 @@ def _velocity(record: Recording, pulse: Pulse) -> FloatArray:
 
 
 def _not_a_hammer(record: Recording) -> list[SignalDoubt]:
-    """The force channel rings on more than an accelerometer does: that one is the hammer."""
+    """Return doubts where the force channel rings on longer than an accelerometer."""
     force, rate = record.force, record.sampling_rate_hz
     if force is None:
         return []
@@ -194,7 +196,7 @@ def _not_a_hammer(record: Recording) -> list[SignalDoubt]:
 
 
 def ringing(values: FloatArray, sampling_rate_hz: float) -> float:
-    """Root mean square from 0.02 to 0.5 s after the largest excursion, over it; inf where dead."""
+    """Return the rms from 0.02 to 0.5 s after the largest excursion, over it; inf where dead."""
     above = np.nan_to_num(values - np.nanmedian(values)) if np.isfinite(values).any() else values
     peak = int(np.abs(np.nan_to_num(above)).argmax())
     first = peak + int(_AFTER_S * sampling_rate_hz)

@@ -23,6 +23,7 @@ loads U: the covariance is phi^2 S + tau^2 R + U U' with S = diag(s^2).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -100,16 +101,30 @@ class FieldLikelihood(MeasuredFrequencies):
             self._constant -= np.log(tension)
         self.shapes = MeasuredShapes(tests if model.has_shapes else (), model.hanger)
         self._shapes_factor = SHAPES.loose
+        # Of no shape there are no places, and none costs anything.
+        self._places_m = self.shapes.places_m if self.shapes.size else np.empty(0)
+        self._modes = max(self.highest_order, self.shapes.highest_order)
+        self._tension = model.parameter_names.index(TENSION)
         self._together = self._goes_together()
         self._shift, self._loads = self._systematic(model, self._typical(model))
 
     def predict(self, model: Model, theta: FloatArray) -> FloatArray:
-        """The model's frequency for each datum (n, frequencies), in Hz, its ends as they usually
-        are.
+        """Return predictions of all data (n, data).
+
+        Frequencies in Hz with ends as they usually are, a tension that was read in N, and misfits
+        of shapes.
         """
-        bare = predicted_hz(model, theta, self._conditions, self._plane, self._order)
+        if isinstance(model, AsMade) and model.has_slopes and self.alike_conditions:
+            modes = model.modes_at(theta, self._modes, self._places_m)
+            bare, shapes = modes.frequency[:, self._plane, self._order], modes.deflection
+            misfits = self.shapes.misfits_of(shapes)
+        else:
+            bare = predicted_hz(model, theta, self._conditions, self._plane, self._order)
+            misfits = self.shapes.misfits(model, theta)
         ends = model.end_waves(theta, bare, self._plane)
-        return bare * np.exp(mean_of_ends(ends, model.stiff_ends_m, self._assumed))
+        found = bare * np.exp(mean_of_ends(ends, model.stiff_ends_m, self._assumed))
+        read = theta[:, [self._tension] * self.has_reading] * model.hanger.nominal_tension_n
+        return np.hstack([found, read, misfits])
 
     @property
     def alike_conditions(self) -> bool:
@@ -117,14 +132,20 @@ class FieldLikelihood(MeasuredFrequencies):
         return len(set(self._conditions)) == 1 and self._conditions[0].added_mass is None
 
     def changes(self, model: AsMade, theta: FloatArray, others: Sequence[FloatArray]) -> FloatArray:
-        """Return changes (n, frequencies, others) of ln of frequencies to near parameter sets.
+        """Return changes (n, data, others) of misfits to near parameter sets.
 
         To first order, and those of supports and sensors left out.
         """
-        found, near = model.frequencies_near(theta, others, self.highest_order)
+        found, near = model.modes_near(theta, others, self._modes, self._places_m)
+        here, column = self.shapes.misfits_of(found.deflection), [self._tension] * self.has_reading
+        changes = []
         with np.errstate(divide="ignore", invalid="ignore"):
-            change = np.log(near / found)[:, :, self._plane, self._order]
-        return np.moveaxis(change, 0, -1)
+            for other, modes in zip(others, near, strict=True):
+                ratio = (modes.frequency / found.frequency)[:, self._plane, self._order]
+                read = other[:, column] / theta[:, column]
+                moved = self.shapes.misfits_of(modes.deflection) - here
+                changes.append(np.hstack([np.log(np.hstack([ratio, read])), moved]))
+        return np.stack(changes, axis=2)
 
     def settle(self, model: Model, theta: FloatArray) -> None:
         super().settle(model, theta)
@@ -186,7 +207,7 @@ class FieldLikelihood(MeasuredFrequencies):
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.hstack([np.log(scalars / self.frequency_hz) + self._shift, shapes])
 
-    def nodes(self, step_in_sd: float) -> list[NoiseNode]:
+    def frequency_nodes(self, step_in_sd: float) -> list[NoiseNode]:
         part = slice(self.frequencies)
         own, together, always = np.zeros((3, len(self.frequency_hz), len(self.frequency_hz)))
         own[part, part] = np.diag(self.identification_error[part] ** 2)
@@ -196,18 +217,31 @@ class FieldLikelihood(MeasuredFrequencies):
             always[-1, -1] = self.identification_error[-1] ** 2
         return [
             NoiseNode(
-                Covariance(
-                    phi**2 * own + tau**2 * together + always,
-                    np.full(self.shapes.size, of_shapes**2),
-                    np.empty((self.shapes.size, 0)),
-                ),
-                float(self._constant + share + log_phi + log_of_shapes),
+                Covariance.of_frequencies(phi**2 * own + tau**2 * together + always),
+                float(self._constant + share + log_phi),
                 float(tau),
             )
             for tau, share in zip(*self.sigma_grid(step_in_sd), strict=True)
             for phi, log_phi in zip(self._phi, self._log_phi, strict=True)
-            for of_shapes, log_of_shapes in self.shapes.factors
         ]
+
+    def nodes(self, step_in_sd: float) -> list[NoiseNode]:
+        return [
+            replace(
+                node,
+                covariance=replace(
+                    node.covariance,
+                    shape=np.full(self.shapes.size, factor**2),
+                    shape_loads=np.empty((self.shapes.size, 0)),
+                ),
+                log_weight=node.log_weight + log_weight,
+            )
+            for node in self.frequency_nodes(step_in_sd)
+            for factor, log_weight in self.shapes.factors
+        ]
+
+    def log_shapes(self, misfit: FloatArray) -> FloatArray:
+        return self.shapes.log_likelihood(misfit[:, len(self.frequency_hz) :])
 
     def explained(self, predicted: FloatArray) -> FloatArray:
         """Predictions (n, frequencies) from those of the data (n, data), with the sensors,

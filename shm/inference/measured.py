@@ -50,8 +50,16 @@ class MeasuredFrequencies(ABC):
         """Return values of sigma (k,), and the log of the prior probability of each (k,)."""
 
     @abstractmethod
+    def frequency_nodes(self, step_in_sd: float) -> list[NoiseNode]:
+        """Return the possible errors of frequencies, those of one sigma of the grid together."""
+
     def nodes(self, step_in_sd: float) -> list[NoiseNode]:
-        """Return the possible errors, those of one sigma together, as the grid has them."""
+        """Return the possible errors of all data."""
+        return self.frequency_nodes(step_in_sd)
+
+    def log_shapes(self, misfit: FloatArray) -> FloatArray:
+        """Return the log likelihood (n,) of what is no frequency in misfits (n, data)."""
+        return np.zeros(len(misfit))
 
     @property
     @abstractmethod
@@ -69,24 +77,30 @@ class MeasuredFrequencies(ABC):
         return Likelihood(self.nodes(self.steps[0]))
 
     @cached_property
-    def _to_draw(self) -> Likelihood:
-        return Likelihood(self.nodes(self.steps[1]))
+    def _coarse(self) -> Likelihood:
+        return Likelihood(self.frequency_nodes(self.steps[0]))
+
+    @cached_property
+    def _fine(self) -> Likelihood:
+        return Likelihood(self.frequency_nodes(self.steps[1]))
 
     def marginal(self, predicted: FloatArray) -> FloatArray:
         """Return the log likelihood (n,) of predictions (n, data), all unknowns integrated out."""
-        return self.likelihood.log(-self.misfit(predicted))
+        misfit = self.misfit(predicted)
+        of_frequencies = self._coarse.log(-misfit[:, : self._coarse.frequencies])
+        return np.asarray(of_frequencies + self.log_shapes(misfit))
 
     def joint(self, predicted: FloatArray, sigma: FloatArray) -> FloatArray:
         """Return the log likelihood (n,) of predictions (n, data), each with its sigma (n,)."""
         grid, share = self.sigma_grid(self.steps[1])
-        found = self._by_sigma(self._to_draw, predicted, len(grid)) - share
+        found = self._by_sigma(self._fine, predicted, len(grid)) - share
         at = np.log(sigma.clip(grid[0], grid[-1]) / grid[0]) / np.log(grid[1] / grid[0])
         return np.asarray(found[np.arange(len(found)), np.round(at).astype(int)])
 
     def draw_sigma(self, predicted: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Draw sigma (n,) from its posterior given each prediction (n, data)."""
         grid, _ = self.sigma_grid(self.steps[1])
-        joint = self._by_sigma(self._to_draw, predicted, len(grid))
+        joint = self._by_sigma(self._fine, predicted, len(grid))
         share = scipy.special.softmax(joint, axis=1).cumsum(axis=1)
         node = (share < rng.random((len(joint), 1))).sum(axis=1).clip(0, len(grid) - 1)
         jitter = np.log(grid[1] / grid[0]) * (rng.random(len(node)) - 0.5)
@@ -95,13 +109,15 @@ class MeasuredFrequencies(ABC):
     def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
         """Return the node of the grid with the largest joint likelihood (n,)."""
         grid, share = self.sigma_grid(self.steps[0])
-        found = self._by_sigma(self.likelihood, predicted, len(grid)) - share
+        found = self._by_sigma(self._coarse, predicted, len(grid)) - share
         return np.asarray(grid[found.argmax(axis=1)])
 
     def _by_sigma(self, by: Likelihood, predicted: FloatArray, count: int) -> FloatArray:
         """Return the log likelihood with the prior of each sigma (n, count)."""
-        found = by.by_node(-self.misfit(predicted)).reshape(len(predicted), count, -1)
-        return np.asarray(scipy.special.logsumexp(found, axis=2))
+        misfit = self.misfit(predicted)
+        found = by.by_node(-misfit[:, : by.frequencies]).reshape(len(predicted), count, -1)
+        of_frequencies = scipy.special.logsumexp(found, axis=2)
+        return np.asarray(of_frequencies + self.log_shapes(misfit)[:, None])
 
     def explained(self, predicted: FloatArray) -> FloatArray:
         """Return predictions (n, data) with the errors that are shared: here none is."""
@@ -113,8 +129,8 @@ class MeasuredFrequencies(ABC):
 
     def settle(self, model: Model, theta: FloatArray) -> None:
         """Take what is systematic from `theta` (parameters,); the likelihood is made anew."""
-        self.__dict__.pop("likelihood", None)
-        self.__dict__.pop("_to_draw", None)
+        for each in ("likelihood", "_coarse", "_fine"):
+            self.__dict__.pop(each, None)
 
 
 def measured(tests: Sequence[ModalTest]) -> list[Mode]:

@@ -18,7 +18,6 @@ from shm.inference.priors import Calibration, reading_of
 from shm.inference.shapes import swaps_of
 from shm.inference.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, AsMade, Model
-from shm.models.as_made import TENSION
 from shm.values import FloatArray, ModalTest
 
 
@@ -70,24 +69,13 @@ class Problem(Density):
         return problem
 
     def predict(self, z: FloatArray) -> FloatArray:
-        """Return predicted frequencies (n, measurements) at `z` (n, d)."""
+        """Return predictions (n, data) at `z` (n, d)."""
         return self.run(self.coordinates.theta(z))
 
     def run(self, theta: FloatArray) -> FloatArray:
-        """Return predicted frequencies (n, measurements) of parameter sets (n, d)."""
+        """Return predictions (n, data) of parameter sets (n, d)."""
         self.evaluations += len(theta)
-        found = self.measured.predict(self.model, theta)
-        if isinstance(self.measured, FieldLikelihood) and self.measured.has_reading:
-            ratio = theta[:, self.model.parameter_names.index(TENSION)]
-            tension_n = ratio * self.model.hanger.nominal_tension_n
-            found = np.column_stack([found, tension_n])
-        return self._with_shapes(found, theta)
-
-    def _with_shapes(self, found: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return `found` (n, data) with the misfits of shapes behind."""
-        if not isinstance(self.measured, FieldLikelihood) or not self.measured.shapes.size:
-            return found
-        return np.hstack([found, self.measured.shapes.misfits(self.model, theta)])
+        return self.measured.predict(self.model, theta)
 
     @property
     def likelihood(self) -> Likelihood:
@@ -151,15 +139,7 @@ class Problem(Density):
         theta = self.coordinates.theta(z)
         others = [self.coordinates.theta(z + step) for step in steps]
         model, likelihood = cast(AsMade, self.model), cast(FieldLikelihood, self.measured)
-        found = likelihood.changes(model, theta, others)
-        if likelihood.has_reading:
-            column = self.model.parameter_names.index(TENSION)
-            ratio = np.stack([each[:, column] / theta[:, column] for each in others], axis=1)
-            found = np.concatenate([found, np.log(ratio)[:, None]], axis=1)
-        if likelihood.shapes.size:
-            moved = likelihood.shapes.changes(model, theta, others)
-            found = np.concatenate([found, moved], axis=1)
-        return np.nan_to_num(found)
+        return np.nan_to_num(likelihood.changes(model, theta, others))
 
 
 _NO_MODE = 10.0  # of ln f: beyond any data

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.models import AsMade, Model
+from shm.models import Model
 from shm.models.base import Swap
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode, ShapePoint
 
@@ -65,8 +65,8 @@ class MeasuredShapes:
         self._order = _repeat([each.order for each in shapes], shapes)
         self._of: IntArray = _repeat(range(len(shapes)), shapes)
         x_m = np.concatenate([np.zeros(0), *(each.x_m for each in shapes)])
-        self._highest = int(self._order.max(initial=0))
-        self._places_m, self._place = np.unique(x_m, return_inverse=True)
+        self.highest_order = int(self._order.max(initial=0))
+        self.places_m, self._place = np.unique(x_m, return_inverse=True)
         self._value = np.concatenate([np.zeros(0), *(each.value for each in shapes)])
         sd = np.concatenate([np.zeros(0), *(each.sd for each in shapes)])
         self.size = len(self._value) - len(shapes)
@@ -85,17 +85,13 @@ class MeasuredShapes:
         """Return the misfits (n, size) of parameter sets `theta` (n, parameters)."""
         if not self.size:
             return np.zeros((len(theta), 0))
-        return self._misfits_of(model.shapes(theta, self._highest, self._places_m))
+        return self.misfits_of(model.shapes(theta, self.highest_order, self.places_m))
 
-    def changes(self, model: AsMade, theta: FloatArray, others: Sequence[FloatArray]) -> FloatArray:
-        """Return changes (n, size, others) of misfits to near parameter sets, to first order."""
-        found, near = model.shapes_near(theta, others, self._highest, self._places_m)
-        here = self._misfits_of(found)
-        return np.stack([self._misfits_of(each) - here for each in near], axis=2)
-
-    def _misfits_of(self, found: FloatArray) -> FloatArray:
+    def misfits_of(self, deflection: FloatArray) -> FloatArray:
         """Return the misfits (n, size) of shapes (n, 2, modes, places)."""
-        raw = found[:, self._plane, self._order - 1, self._place]
+        if not self.size:
+            return np.zeros((len(deflection), 0))
+        raw = deflection[:, self._plane, self._order - 1, self._place]
         own = self._of == np.arange(self._of[-1] + 1)[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
             size = (raw * self._value) @ own.T / (raw**2 @ own.T)
@@ -108,6 +104,13 @@ class MeasuredShapes:
             return [(1.0, 0.0)]
         weight = self._log_weight + self._log_scale
         return list(zip(np.exp(self._log_phi).tolist(), weight.tolist(), strict=True))
+
+    def log_likelihood(self, misfits: FloatArray) -> FloatArray:
+        """Return the log likelihood (n,) of misfits (n, size), all factors integrated out."""
+        if not self.size:
+            return np.zeros(len(misfits))
+        constant = self._log_scale - self.size * np.log(2 * np.pi) / 2
+        return np.asarray(scipy.special.logsumexp(self._joint(misfits), axis=1) + constant)
 
     def factor(self, misfits: FloatArray) -> float:
         """Return the most probable phi of misfits (1, size)."""
@@ -147,7 +150,7 @@ class MeasuredShapes:
         same_place = np.equal.outer(self._place, self._place)
         same_channel = same_place & np.equal.outer(self._plane, self._plane)
         wave = self._order * np.pi / length_m
-        x_m = self._places_m[self._place]
+        x_m = self.places_m[self._place]
         sine, slope = np.sin(wave * x_m), wave * np.cos(wave * x_m)
         own = np.equal.outer(self._of, self._of)
         size = (own @ (self._value * sine)) / np.maximum(own @ sine**2, np.finfo(float).tiny)

@@ -56,7 +56,7 @@ class ThesisLikelihood(MeasuredFrequencies):
     def fit_error(self) -> FloatArray:
         return self.identification_error
 
-    def nodes(self, step_in_sd: float) -> list[NoiseNode]:
+    def frequency_nodes(self, step_in_sd: float) -> list[NoiseNode]:
         own = self.identification_error**2
         return [
             NoiseNode(

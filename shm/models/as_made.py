@@ -30,6 +30,7 @@ from shm.models.bar_of_terms import BarValues, bar_of_terms
 from shm.models.base import DESCRIPTION, Conditions, Model, radius_m, silent
 from shm.models.beam import Beam, Beam1, Beam3
 from shm.models.hanger import PhysicalHanger, Zone
+from shm.models.reduced_bar import Modes
 from shm.models.solid import S2
 from shm.values import PLANES, FloatArray, Hanger, ModalTest
 
@@ -103,7 +104,7 @@ class AsMade(Model):
 
     @property
     def has_slopes(self) -> bool:
-        """Return True where `frequencies_near` and `shapes_near` apply."""
+        """Return True where `modes_at` and `modes_near` apply."""
         return self.has_terms
 
     @property
@@ -176,28 +177,32 @@ class AsMade(Model):
         found = bar.frequencies_hz(self._values(theta), kilograms)
         return found * self._factor(theta)[:, None, None]
 
-    def frequencies_near(
-        self, theta: FloatArray, others: Sequence[FloatArray], modes: int
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return frequencies (n, 2, modes) and, to first order, those of near parameter sets.
+    def modes_at(self, theta: FloatArray, modes: int, x_m: FloatArray) -> Modes:
+        """Return the modes of parameter sets (n, parameters), their frequencies in Hz.
 
-        `others` are (n, parameters) each, the second answer is (others, n, 2, modes). Only for a
-        class with terms.
+        Only for a class with terms, as `modes_near`.
         """
         bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes)
-        found, near = bar.frequencies_about(
-            self._values(theta), [self._values(each) for each in others]
-        )
-        factors = [self._factor(each)[:, None, None] for each in (theta, *others)]
-        return found * factors[0], near * np.array(factors[1:])
+        found = bar.modes_at(self._values(theta), self._places_of_described(theta, x_m))
+        return self._of_real(theta, found)
 
-    def shapes_near(
+    def modes_near(
         self, theta: FloatArray, others: Sequence[FloatArray], modes: int, x_m: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return shapes (n, 2, modes, points) and, to first order, those of near parameter sets."""
+    ) -> tuple[Modes, list[Modes]]:
+        """Return the same and, to first order, the modes of near parameter sets (n, parameters)."""
         bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes)
-        near = [self._values(each) for each in others]
-        return bar.shapes_about(self._values(theta), near, self._places_of_described(theta, x_m))
+        found, near = bar.modes_about(
+            self._values(theta),
+            [self._values(each) for each in others],
+            self._places_of_described(theta, x_m),
+        )
+        moved = [self._of_real(*each) for each in zip(others, near, strict=True)]
+        return self._of_real(theta, found), moved
+
+    def _of_real(self, theta: FloatArray, described: Modes) -> Modes:
+        """Return the modes of the real bars from those of the described ones."""
+        factor = self._factor(theta)[:, None, None]
+        return replace(described, frequency=described.frequency * factor)
 
     def physical(self, theta: FloatArray, sensors: int = 0) -> PhysicalHanger:
         """Return the real bars (n) of `theta`, as the general model takes them.
@@ -312,10 +317,9 @@ class AsMade(Model):
         self.model.prepare(modes, progress)
 
     def shapes(self, theta: FloatArray, modes: int, x_m: FloatArray) -> FloatArray:
-        described_m = self._places_of_described(theta, x_m)
         if self.has_terms:
-            bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes)
-            return bar.shapes(self._values(theta), described_m)
+            return self.modes_at(theta, modes, x_m).deflection
+        described_m = self._places_of_described(theta, x_m)
         return self.model.shapes(self.as_described(theta)[0], modes, described_m)
 
     def _places_of_described(self, theta: FloatArray, x_m: FloatArray) -> FloatArray:

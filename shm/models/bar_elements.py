@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.polynomial import Legendre
 
 from shm.values import FloatArray
 
@@ -182,20 +181,33 @@ def _functions(
     slope += [(6 * x - 6 * x**2) / length, 3 * x**2 - 2 * x]
     curvature = [(12 * x - 6) / length**2, (6 * x - 4) / length]
     curvature += [(6 - 12 * x) / length**2, (6 * x - 2) / length]
-    for degree in range(2, bubbles + 2):
-        second = Legendre.basis(degree, domain=[0, 1]) * np.sqrt(2 * degree + 1)
-        first = second.integ(1, lbnd=0)
-        w.append(first.integ(1, lbnd=0)(x) * length**2)
-        slope.append(first(x) * length)
-        curvature.append(second(x))
+    second, first, itself = _legendre(x, 2, bubbles + 2)
+    w += list(itself * length**2)
+    slope += list(first * length)
+    curvature += list(second)
     return np.array(w), np.array(slope), np.array(curvature)
 
 
 def _strains(x: FloatArray, length: float, bubbles: int) -> tuple[FloatArray, FloatArray]:
     """Return the strains and their derivatives (functions, points)."""
     strain, change = [1 - x, x], [-np.ones_like(x) / length, np.ones_like(x) / length]
-    for degree in range(1, bubbles + 2):
-        first = Legendre.basis(degree, domain=[0, 1]) * np.sqrt(2 * degree + 1)
-        strain.append(first.integ(1, lbnd=0)(x) * length)
-        change.append(first(x))
+    change_of, of, _ = _legendre(x, 1, bubbles + 2)
+    strain += list(of * length)
+    change += list(change_of)
     return np.array(strain), np.array(change)
+
+
+def _legendre(x: FloatArray, lowest: int, end: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return Legendre polynomials, normalised on 0 to 1, their integral from 0 and its integral.
+
+    Of the degrees from `lowest` on and below `end`, each (degrees, points). The integral of P_n is
+    (P_n+1 - P_n-1) / (2n + 1); the second integral vanishes at both ends from degree 2 on.
+    """
+    n = np.arange(lowest, end)
+    table = np.polynomial.legendre.legvander(2 * x - 1, end + 1).T
+    lower, below, here, above, upper = (table[np.maximum(n + k, 0)] for k in (-2, -1, 0, 1, 2))
+    n = n[:, None]
+    size = np.sqrt(2 * n + 1)
+    once = (above - below) / (2 * size)
+    twice = ((upper - here) / (2 * n + 3) - (here - lower) / (2 * n - 1)) / (4 * size)
+    return size * here, once, twice

@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from shm.models.reduced_bar import STIFFEST, BarTerms, ReducedBar
+from shm.models.reduced_bar import STIFFEST, BarTerms, Modes, ReducedBar
 from shm.values import FloatArray, Hanger
 
 GRAVITY_M_S2 = 9.81
@@ -87,24 +87,20 @@ class BarOfTerms:
         """Return frequencies (n, 2, modes), with known masses (n, places) on the bar."""
         return self._unit_hz * self._bar.frequencies(self.terms(values, masses_kg))
 
-    def frequencies_about(
-        self, values: BarValues, near: Sequence[BarValues]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return frequencies (n, 2, modes) and, to first order, those of near bars (s, ...)."""
-        terms, others = self.terms(values), [self.terms(each) for each in near]
-        found, moved = self._bar.frequencies_about(terms, others)
-        return self._unit_hz * found, self._unit_hz * moved
+    def modes_at(self, values: BarValues, x_m: FloatArray) -> Modes:
+        """Return the modes, their frequencies in Hz, with deflections at `x_m`."""
+        return self._in_hz(self._bar.modes_at(self.terms(values), x_m / self.hanger.length_m))
 
-    def shapes(self, values: BarValues, x_m: FloatArray) -> FloatArray:
-        """Return shapes (n, 2, modes, points) at `x_m`, each of any size."""
-        return self._bar.shapes(self.terms(values), x_m / self.hanger.length_m)
-
-    def shapes_about(
+    def modes_about(
         self, values: BarValues, near: Sequence[BarValues], x_m: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return shapes (n, 2, modes, points) and, to first order, those of near bars (s, ...)."""
+    ) -> tuple[Modes, list[Modes]]:
+        """Return the same, and to first order the modes of near bars."""
         terms, others = self.terms(values), [self.terms(each) for each in near]
-        return self._bar.shapes_about(terms, others, x_m / self.hanger.length_m)
+        found, moved = self._bar.modes_about(terms, others, x_m / self.hanger.length_m)
+        return self._in_hz(found), [self._in_hz(each) for each in moved]
+
+    def _in_hz(self, modes: Modes) -> Modes:
+        return replace(modes, frequency=self._unit_hz * modes.frequency)
 
     def terms(self, values: BarValues, masses_kg: FloatArray | None = None) -> BarTerms:
         """Return the factors of the matrices, in units of each bar's own length and stiffness."""
@@ -181,10 +177,11 @@ class BarOfTerms:
         )
         mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
         masses_kg = mass_kg * rng.uniform(0, 0.2, (n, places))
+        shorter = rng.uniform(1 - 2 * plate_m / hanger.length_m, 1.0, n)
         values = replace(
             values,
-            section=rng.uniform(1 - 2 * plate_m / hanger.length_m, 1.0, n) ** -2,
             shear=np.exp(rng.uniform(math.log(flexible[0]), math.log(flexible[1]), n)),
+            section=np.exp(hanger.scatter.section * rng.standard_normal(n)) / shorter**2,
         )
         return self.terms(values, masses_kg)
 

@@ -90,41 +90,54 @@ class ReducedBar:
         """Return the same by all elements."""
         return self._whole.frequencies(terms, self.modes)
 
-    def frequencies_about(
-        self, terms: BarTerms, shifted: Sequence[BarTerms]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return frequencies (n, 2, modes) and, to first order, those of near hangers (s, ...)."""
-        found = np.empty((len(terms.tension), 2, self.modes))
-        near = np.empty((len(shifted), *found.shape))
-        for first in range(0, len(found), _BLOCK):
-            block = slice(first, first + _BLOCK)
-            found[block], near[:, block] = self._reduced.frequencies_about(
-                terms.take(block), [each.take(block) for each in shifted], self.modes
-            )
-        return found, near
-
-    def shapes(self, terms: BarTerms, x: FloatArray) -> FloatArray:
-        """Return deflections (n, 2, modes, points) at places `x` from 0 to 1, of any size."""
+    def modes_at(self, terms: BarTerms, x: FloatArray) -> Modes:
+        """Return the modes of the hangers, with deflections at places `x` from 0 to 1."""
         table = self._elements.deflection(x) @ self.basis
-        found = np.empty((len(terms.tension), 2, self.modes, len(x)))
-        for first in range(0, len(found), _BLOCK):
-            block = slice(first, first + _BLOCK)
-            found[block] = self._reduced.deflections(terms.take(block), self.modes, table)
-        return found
+        return _joined(
+            [
+                self._reduced.modes_at(terms.take(block), self.modes, table)
+                for block in _blocks(len(terms.tension))
+            ]
+        )
 
-    def shapes_about(
+    def modes_about(
         self, terms: BarTerms, shifted: Sequence[BarTerms], x: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the same, and to first order those of near hangers (s, n, 2, modes, points)."""
+    ) -> tuple[Modes, list[Modes]]:
+        """Return the same, and to first order the modes of near hangers."""
         table = self._elements.deflection(x) @ self.basis
-        found = np.empty((len(terms.tension), 2, self.modes, len(x)))
-        near = np.empty((len(shifted), *found.shape))
-        for first in range(0, len(found), _BLOCK):
-            block = slice(first, first + _BLOCK)
-            found[block], near[:, block] = self._reduced.deflections_about(
+        found = [
+            self._reduced.modes_about(
                 terms.take(block), [each.take(block) for each in shifted], self.modes, table
             )
-        return found, near
+            for block in _blocks(len(terms.tension))
+        ]
+        near = [_joined([each[1][index] for each in found]) for index in range(len(shifted))]
+        return _joined([each[0] for each in found]), near
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Hold modes of n hangers in both planes.
+
+    Circular `frequency` (n, 2, modes), and `deflection` (n, 2, modes, points), each of any size.
+    """
+
+    frequency: FloatArray
+    deflection: FloatArray
+
+
+def _blocks(count: int) -> list[slice]:
+    return [slice(first, first + _BLOCK) for first in range(0, max(count, 1), _BLOCK)]
+
+
+def _joined(parts: Sequence[Modes]) -> Modes:
+    """Return the modes of several blocks of hangers as one."""
+    if len(parts) == 1:
+        return parts[0]
+    return Modes(
+        np.concatenate([each.frequency for each in parts]),
+        np.concatenate([each.deflection for each in parts]),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,13 +172,11 @@ class _Matrices:
         return _Matrices(stiffness, mass, self.zones, self.shears)
 
     def diagonalised(self, usual: BarTerms) -> FloatArray:
-        """Return a change of basis (d, d) in which all masses like `usual` are diagonal.
+        """Return a change of basis (d, d) in which masses like `usual` are as diagonal as can be.
 
-        The identity where they are combinations of more than two matrices.
+        Two matrices are made so at once: the mean mass and what it varies by.
         """
         factors = self.factors(usual, 0)[1]
-        if _rank(factors) > _TWO:
-            return np.eye(self.mass.shape[1])
         mean, spread = factors.mean(axis=0), factors.std(axis=0)
         _, vectors = scipy.linalg.eigh(
             np.tensordot(spread, self.mass, 1), np.tensordot(mean, self.mass, 1)
@@ -174,7 +185,10 @@ class _Matrices:
 
     def with_masses_of(self, usual: BarTerms) -> _Matrices:
         """Return the same, with the note whether masses like `usual` are diagonal."""
-        return replace(self, diagonal_mass=_rank(self.factors(usual, 0)[1]) <= _TWO)
+        mass = _sum(self.factors(usual, 0)[1], self.mass)
+        size = np.sqrt(np.einsum("nii->ni", mass))
+        beside = np.abs(mass / size[:, :, None] / size[:, None, :] - np.eye(mass.shape[1]))
+        return replace(self, diagonal_mass=bool(beside.max() < _BESIDE))
 
     def factors(self, terms: BarTerms, plane: int) -> tuple[FloatArray, FloatArray]:
         """Return the factors (n, terms) of stiffness and mass in one plane."""
@@ -210,65 +224,63 @@ class _Matrices:
             found[:, plane] = np.sqrt(square.clip(min=0.0))
         return found
 
-    def deflections(self, terms: BarTerms, modes: int, table: FloatArray) -> FloatArray:
-        """Return deflections (n, 2, modes, points), `table` (points, d) being the basis's."""
-        found = np.empty((len(terms.tension), 2, modes, len(table)))
+    def modes_at(self, terms: BarTerms, modes: int, table: FloatArray) -> Modes:
+        """Return the modes, with deflections where the basis has those of `table` (points, d)."""
+        found = []
         for plane in (0, 1):
             whitened, back = self._whitened(*self.factors(terms, plane))
-            vectors = back(np.linalg.eigh(whitened)[1][:, :, :modes])
-            found[:, plane] = np.swapaxes(table @ vectors, 1, 2)
-        return found
+            if len(table):
+                square, vectors = np.linalg.eigh(whitened)
+            else:
+                square, vectors = np.linalg.eigvalsh(whitened), whitened
+            found.append(_modes(square[:, :modes], table @ back(vectors[:, :, :modes])))
+        return _of_planes(found)
 
-    def deflections_about(
+    def modes_about(
         self, terms: BarTerms, shifted: Sequence[BarTerms], modes: int, table: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the same, and those of near hangers (s, n, 2, modes, points).
+    ) -> tuple[Modes, list[Modes]]:
+        """Return the same, and to first order the modes of near hangers.
 
-        By the other modes' shares in the change of each (Fox and Kapoor 1968, AIAA J. 6, 2426).
+        Frequencies by Rayleigh's quotient, deflections by the other modes' shares in the change of
+        each (Fox and Kapoor 1968, AIAA J. 6, 2426).
         """
-        found = np.empty((len(terms.tension), 2, modes, len(table)))
-        near = np.empty((len(shifted), *found.shape))
+        found: list[Modes] = []
+        near: list[list[Modes]] = [[] for _ in shifted]
         for plane in (0, 1):
             stiff, heavy = self.factors(terms, plane)
             whitened, back = self._whitened(stiff, heavy)
             square, vectors = np.linalg.eigh(whitened)
+            lowest = square[:, :modes]
+            if not len(table):
+                shape = back(vectors[:, :, :modes])
+                by_stiffness, by_mass = (
+                    _energies(each, shape) for each in (self.stiffness, self.mass)
+                )
+                found.append(_modes(lowest, table @ shape))
+                for index, each in enumerate(shifted):
+                    stiffer, heavier = self.factors(each, plane)
+                    change = np.einsum("nt,ntk->nk", stiffer - stiff, by_stiffness)
+                    change -= lowest * np.einsum("nt,ntk->nk", heavier - heavy, by_mass)
+                    near[index].append(_modes(lowest + change, table @ shape))
+                continue
             shape = back(vectors)
-            stiffness = _products(self.stiffness, shape, modes)
-            mass = _products(self.mass, shape, modes)
+            stiffness, mass = (
+                _products(each, shape, modes) for each in (self.stiffness, self.mass)
+            )
             apart = square[:, None, :modes] - square[:, :, None]
             own = np.eye(square.shape[1], modes, dtype=bool)
             share = np.where(own, 0.0, 1 / np.where(own | (apart == 0), np.inf, apart))
             seen = table @ shape
-            found[:, plane] = np.swapaxes(seen[:, :, :modes], 1, 2)
+            found.append(_modes(lowest, seen[:, :, :modes]))
             for index, each in enumerate(shifted):
                 stiffer, heavier = self.factors(each, plane)
                 heavier_by = np.einsum("nt,ntjm->njm", heavier - heavy, mass)
                 change = np.einsum("nt,ntjm->njm", stiffer - stiff, stiffness)
                 change -= square[:, None, :modes] * heavier_by
                 moved = seen @ (share * change - 0.5 * own * heavier_by)
-                near[index, :, plane] = found[:, plane] + np.swapaxes(moved, 1, 2)
-        return found, near
-
-    def frequencies_about(
-        self, terms: BarTerms, shifted: Sequence[BarTerms], modes: int
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the same, and those of near hangers (s, n, 2, modes) by Rayleigh's quotient."""
-        found = np.empty((len(terms.tension), 2, modes))
-        near = np.empty((len(shifted), *found.shape))
-        for plane in (0, 1):
-            stiff, heavy = self.factors(terms, plane)
-            whitened, back = self._whitened(stiff, heavy)
-            square, vectors = np.linalg.eigh(whitened)
-            square, shape = square[:, :modes], back(vectors[:, :, :modes])
-            stiffness = _energies(self.stiffness, shape)
-            mass = _energies(self.mass, shape)
-            found[:, plane] = np.sqrt(square.clip(min=0.0))
-            for index, each in enumerate(shifted):
-                stiffer, heavier = self.factors(each, plane)
-                change = np.einsum("nt,ntk->nk", stiffer - stiff, stiffness)
-                change -= square * np.einsum("nt,ntk->nk", heavier - heavy, mass)
-                near[index, :, plane] = np.sqrt((square + change).clip(min=0.0))
-        return found, near
+                by = np.einsum("nmm->nm", change[:, :modes])
+                near[index].append(_modes(lowest + by, seen[:, :, :modes] + moved))
+        return _of_planes(found), [_of_planes(each) for each in near]
 
     def _whitened(
         self, stiff: FloatArray, heavy: FloatArray
@@ -289,13 +301,21 @@ class _Matrices:
         return inverse @ stiffness @ across, lambda vectors: across @ vectors
 
 
-def _rank(factors: FloatArray) -> int:
-    """Return of how many combinations of columns all rows of factors (n, terms) are made."""
-    size = np.linalg.svd(factors, compute_uv=False)
-    return int(np.sum(size > _SMALL * size[0]))
+def _modes(square: FloatArray, seen: FloatArray) -> Modes:
+    """Return modes of one plane of squared frequencies and deflections (n, points, modes)."""
+    return Modes(np.sqrt(square.clip(min=0.0)), np.swapaxes(seen, 1, 2))
 
 
-_TWO, _SMALL = 2, 1e-9
+def _of_planes(planes: Sequence[Modes]) -> Modes:
+    """Return the modes of both planes together."""
+    return Modes(
+        np.stack([each.frequency for each in planes], axis=1),
+        np.stack([each.deflection for each in planes], axis=1),
+    )
+
+
+_BESIDE = 1e-4
+"""Numerical: of the diagonal, off it; a frequency changes by its square."""
 
 
 def _energies(matrices: FloatArray, shapes: FloatArray) -> FloatArray:

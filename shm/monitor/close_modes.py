@@ -121,9 +121,9 @@ class CloseModes:
         """After a step in frequencies (half bandwidths), log decay rates, log powers, slopes,
         tilts, correlations (real, imaginary) and log floors."""
         count = len(self.power)
-        own = step[: 5 * count].reshape(5, count)
-        decay = self.decay_1_s * np.exp(own[1])
-        radians = self.radians_s + self.decay_1_s * own[0]
+        its = step[: 5 * count].reshape(5, count)
+        decay = self.decay_1_s * np.exp(its[1])
+        radians = self.radians_s + self.decay_1_s * its[0]
         coherence = self.coherence.copy()
         for place, (one, two) in enumerate(combinations(range(count), 2)):
             real, imaginary = step[5 * count + 2 * place : 5 * count + 2 * place + 2]
@@ -136,9 +136,9 @@ class CloseModes:
         return CloseModes(
             radians,
             decay,
-            self.power * np.exp(own[2]),
-            self.slope + own[3],
-            self.tilt + own[4],
+            self.power * np.exp(its[2]),
+            self.slope + its[3],
+            self.tilt + its[4],
             coherence,
             self.floor * np.exp(step[-2:]),
         )
@@ -268,7 +268,7 @@ class Band:
         return response, by_pole
 
     def _from_before(self, modes: CloseModes) -> tuple[FloatArray, FloatArray]:
-        """How far the parameters are off what was known, and its precision."""
+        """Return how far the parameters are off what was known, and its precision."""
         number, zero = len(modes.power), np.zeros(len(modes.power))
         pairs = [modes.coherence[pair] for pair in combinations(range(number), 2)]
         offset = [

@@ -42,22 +42,22 @@ def pooled(
         (each for each in readings if start <= each.window.start < end),
         key=lambda each: each.window.start,
     )
-    kept = _without_outlying([each for each in inside if each.modes])
-    least = max(1, math.ceil(_LEAST_SHARE * len(kept)))
-    keys = sorted({(mode.plane, mode.order) for each in kept for mode in each.modes}, key=_place)
-    series = [_Series.of(kept, *key) for key in keys]
+    chosen = _without_outlying([each for each in inside if each.modes])
+    least = max(1, math.ceil(_LEAST_SHARE * len(chosen)))
+    keys = sorted({(mode.plane, mode.order) for each in chosen for mode in each.modes}, key=_place)
+    series = [_Series.of(chosen, *key) for key in keys]
     modes = tuple(each.mode() for each in series if len(each.modes) >= least)
     if not modes:
         return None
-    windows = [each.window for each in kept]
+    windows = [each.window for each in chosen]
     return PooledReading(
         stream=windows[0].stream,
         hanger=windows[0].hanger,
         start=start,
         period=period,
         modes=modes,
-        windows=len(kept),
-        left_out=len(inside) - len(kept),
+        windows=len(chosen),
+        left_out=len(inside) - len(chosen),
         level_m_s2=_mean([each.level_m_s2 for each in windows]),
         temperature_c=_mean([each.temperature_c for each in windows]),
         wind_m_s=_mean([each.wind_m_s for each in windows]),
@@ -104,8 +104,8 @@ def _without_outlying(readings: list[WindowReading]) -> list[WindowReading]:
             off[number].append(float(value))
     return [
         each
-        for each, own in zip(readings, off, strict=True)
-        if not own or np.median(own) <= _OUTLYING
+        for each, its in zip(readings, off, strict=True)
+        if not its or np.median(its) <= _OUTLYING
     ]
 
 
@@ -151,18 +151,18 @@ class _Series:
     def mode(self) -> Mode:
         """Return the mode of all these windows."""
         hz, sd, used = self._regressed()
-        kept = [mode for mode, use in zip(self.modes, used, strict=True) if use]
+        chosen = [mode for mode, use in zip(self.modes, used, strict=True) if use]
         damping, damping_sd = _weighted(
-            [mode.damping_ratio for mode in kept], [mode.damping_sd for mode in kept]
+            [mode.damping_ratio for mode in chosen], [mode.damping_sd for mode in chosen]
         )
         return replace(
-            kept[-1],
+            chosen[-1],
             frequency_hz=hz,
             frequency_sd_hz=math.hypot(sd, _REPEATS * hz),
             damping_ratio=damping,
             damping_sd=damping_sd,
-            shape=_mean_shape(kept),
-            acceleration_m_s2=_mean([mode.acceleration_m_s2 for mode in kept]),
+            shape=_mean_shape(chosen),
+            acceleration_m_s2=_mean([mode.acceleration_m_s2 for mode in chosen]),
         )
 
     def _regressed(self) -> tuple[float, float, BoolArray]:
@@ -224,15 +224,15 @@ def _weighted(values: Sequence[float], sds: Sequence[float]) -> tuple[float, flo
 def _mean_shape(modes: Sequence[Mode]) -> tuple[ShapePoint, ...]:
     """Medians by position, of the shapes that have all positions of the last one."""
     positions = [point.x_m for point in modes[-1].shape]
-    alike = [mode for mode in modes if [point.x_m for point in mode.shape] == positions]
+    similar = [mode for mode in modes if [point.x_m for point in mode.shape] == positions]
     if not positions:
         return ()
-    values = np.array([[(p.value, p.cross, p.sd) for p in mode.shape] for mode in alike])
+    values = np.array([[(p.value, p.cross, p.sd) for p in mode.shape] for mode in similar])
     middle = np.median(values, axis=0)
     scatter = _USUAL_SD * np.median(np.abs(values - middle), axis=0)[:, 0]
     formal = middle[:, 2]
-    sd = np.maximum(formal, scatter) / math.sqrt(len(alike))
+    sd = np.maximum(formal, scatter) / math.sqrt(len(similar))
     return tuple(
-        ShapePoint(x_m, float(value), float(cross), float(own))
-        for x_m, (value, cross, _), own in zip(positions, middle, sd, strict=True)
+        ShapePoint(x_m, float(value), float(cross), float(its))
+        for x_m, (value, cross, _), its in zip(positions, middle, sd, strict=True)
     )

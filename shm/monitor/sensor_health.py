@@ -126,9 +126,9 @@ def find_lost_planes(
     for plane, other in (PLANES, PLANES[::-1]):
         usual = _usual([each[other] for each in counts])
         rows = [
-            _Row(each.window, own[plane])
-            for each, own in zip(windows, counts, strict=True)
-            if 2 * own[other] > usual
+            _Row(each.window, its[plane])
+            for each, its in zip(windows, counts, strict=True)
+            if 2 * its[other] > usual
         ]
         for channel in stream.channels:
             if channel.plane == plane:
@@ -255,12 +255,12 @@ def exchanged(
     """
     rows = [shape_on(channels, mode) for mode in known]
     shapes = np.array(rows).reshape(len(known), len(channels))
-    told = np.all(np.isfinite(shapes), axis=1) & np.any(shapes != 0, axis=1)
-    if told.sum() < _LEAST_MODES or not stretches:
+    reported = np.all(np.isfinite(shapes), axis=1) & np.any(shapes != 0, axis=1)
+    if reported.sum() < _LEAST_MODES or not stretches:
         return None
-    hz = np.array([mode.frequency_hz for mode in known])[told]
+    hz = np.array([mode.frequency_hz for mode in known])[reported]
     seen = [power_near(stretches, each, within=_WITHIN) for each in hz]
-    shapes = shapes[told]
+    shapes = shapes[reported]
     straight = _likeness(seen, hz, shapes)
     changes: list[tuple[float, str, str]] = [
         (_likeness(seen, hz, changed), name, words)

@@ -147,7 +147,7 @@ def power_near(stretches: Sequence[Stretch], frequency_hz: float, within: float)
 
 @dataclass(frozen=True, eq=False)
 class Peaks:
-    """Where the known modes' peaks are; arrays (modes,), `shapes` (channels, modes).
+    """Peaks of the known modes; arrays (modes,), `shapes` (channels, modes).
 
     `expected_hz` is where a change common to all puts them; `height_db` is over the floor;
     `damping` as it was known; `noise` (channels,) in m/s^2/sqrt(Hz). A mode that no sensor sees has

@@ -45,10 +45,8 @@ places to look make 10 by chance."""
 _NARROWER = 10.0
 """judgement: than the mode as it was known, or than a line: a tone, of trains or machines, near it.
 Two close modes that were taken for one had up to seven times the damping of each."""
-_LEAK = 0.01  # judgement: of the power; sensors that are 6 degrees off
 _FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
 _STEPS_WITHOUT = 6  # technical: from the fit with the mode; what is gained later is small
-_SAME = 3.0  # standard deviations
 _REVIEW_S, _REVIEW_FEW_S, _FEW = 12 * 3600, 3600, 2
 """judgement: how often modes are sought that were missed at first, by day and by night; each hour
 where so few are known, or most are lost. From scratch costs as much as twenty windows that are
@@ -106,7 +104,7 @@ def _is(mode: Mode, known: Mode) -> bool:
 
 
 def _is_reviewed(known: Sequence[Mode], window: Window) -> bool:
-    """Where an order lacks in a plane, each stream at ten minutes of its own."""
+    """Return where an order lacks in a plane, each stream at ten minutes of its own."""
     orders = [{m.order for m in known if m.plane == plane} for plane in PLANES]
     highest = max(mode.order for mode in known)
     if all(len(each) == highest for each in orders):
@@ -193,13 +191,13 @@ def _missed(
     """
 
     def is_between(mode: Mode) -> bool:
-        own = [each for each in known if each.plane == mode.plane]
-        if own and 2 * sum(_has(modes, each) for each in own) <= len(own):
+        its = [each for each in known if each.plane == mode.plane]
+        if its and 2 * sum(_has(modes, each) for each in its) <= len(its):
             return False
         return all(
             (each.frequency_hz - mode.frequency_hz) * (each.order - mode.order) > 0
             and abs(each.frequency_hz / mode.frequency_hz - 1) > _OTHER_PLANE
-            for each in own
+            for each in its
         )
 
     return tuple(mode for mode in fresh if not _has(known, mode) and is_between(mode))
@@ -240,14 +238,14 @@ def tracked(found: Judged, known: Sequence[Mode], options: IdentifyOptions) -> t
         return ()
     modes = _prove(found, found.peaks, known, options)
     for plane in PLANES:
-        own = [index for index, mode in enumerate(known) if mode.plane == plane]
-        lost = 2 * sum(_has(modes, known[index]) for index in own) <= len(own)
+        its = [index for index, mode in enumerate(known) if mode.plane == plane]
+        lost = 2 * sum(_has(modes, known[index]) for index in its) <= len(its)
         stays = any(mode.plane != plane for mode in modes)
         if lost and stays:
-            moved = _move_plane(found, found.peaks, known, own)
+            moved = _move_plane(found, found.peaks, known, its)
             apart = _prove(found, moved, known, options)
             if len(apart) > len(modes) and _are_moved_alike(
-                [(known[index], mode) for index in own for mode in apart if _is(mode, known[index])]
+                [(known[index], mode) for index in its for mode in apart if _is(mode, known[index])]
             ):
                 modes = apart
     return modes
@@ -340,35 +338,35 @@ class _Group:
         self.start = self._start(hz[group], peaks.damping[group])
 
     def modes(self) -> dict[int, Mode]:
-        """Those that are proven, by their place among the known ones."""
+        """Return those that are proven, by their place among the known ones."""
         proven = self._proven()
         if proven is None:
             return {}
-        fit, kept = proven
+        fit, chosen = proven
         made = {}
-        for place, index in enumerate(kept):
+        for place, index in enumerate(chosen):
             mode = self._mode(fit, place, self.group[index])
             if mode is not None:
                 made[self.group[index]] = mode
-        return self._at_home(made)
+        return made
 
     def _proven(self) -> tuple[BandFit, list[int]] | None:
         """Return the fit of the modes without each of which the lines are far less likely."""
-        kept = list(range(len(self.group)))
+        chosen = list(range(len(self.group)))
         start = self.start
-        while kept:
-            shapes = self.shapes[:, kept]
-            band = Band(self.lines, directions(shapes), shapes, self.start.only(kept))
+        while chosen:
+            shapes = self.shapes[:, chosen]
+            band = Band(self.lines, directions(shapes), shapes, self.start.only(chosen))
             fit = band.fitted(start)
             gains = []
-            for place in range(len(kept)):
-                rest = [other for other in range(len(kept)) if other != place]
+            for place in range(len(chosen)):
+                rest = [other for other in range(len(chosen)) if other != place]
                 without = band.only(rest).fitted(fit.modes.only(rest), _STEPS_WITHOUT)
                 gains.append(fit.log_likelihood - without.log_likelihood)
             weakest = int(np.argmin(gains))
             if gains[weakest] >= _LEAST_GAIN:
-                return fit, kept
-            del kept[weakest]
+                return fit, chosen
+            del chosen[weakest]
             start = fit.modes.only([p for p in range(len(gains)) if p != weakest])
         return None
 
@@ -403,8 +401,7 @@ class _Group:
         options = replace(self.options, ambient_s=sum(s.seconds for s in self.found.stretches))
         best = options.ambient_width * options.at_best(hz, damping)[0]
         if (
-            _is_leak(modes, place)
-            or damping < self.peaks.damping[index] / _NARROWER
+            damping < self.peaks.damping[index] / _NARROWER
             or decay * max(each.seconds for each in self.found.stretches) < 1.0
             or damping > self.options.max_damping_ratio
             or sd_hz > hz * max(2 * self.options.max_frequency_sd, best)
@@ -439,33 +436,6 @@ class _Group:
         seen = [weight @ each.values[:, each.between(*band)] for each in self.found.stretches]
         strength = np.concatenate([np.abs(np.fft.ifft(each)) ** 2 * len(each) for each in seen])
         return max(1.0, float(np.mean(strength**2) / np.mean(strength) ** 2) / 2)
-
-    def _at_home(self, made: dict[int, Mode]) -> dict[int, Mode]:
-        """Those that are not in the place of another mode, unless that one is there, too.
-
-        Planes do not exchange their modes between two windows; sensors that see both planes let
-        one pass for the other where that one is faint.
-        """
-        expected = self.peaks.expected_hz
-        kept = {}
-        for index, mode in made.items():
-            away = np.abs(expected - mode.frequency_hz)
-            place = int(np.argmin(away))
-            nearest = away[index] <= away[place]
-            stayed = away[index] < _SAME * mode.frequency_sd_hz
-            there = place in made and bool(
-                abs(made[place].frequency_hz - expected[place]) < away[place]
-            )
-            if nearest or stayed or there:
-                kept[index] = mode
-        return kept
-
-
-def _is_leak(modes: CloseModes, place: int) -> bool:
-    """Whether a mode is what sensors that are not quite straight see of a stronger one."""
-    away = np.abs(modes.radians_s - modes.radians_s[place])
-    near = away < 2 * (modes.decay_1_s + modes.decay_1_s[place])
-    return bool(np.any(near & (modes.power[place] < _LEAK * modes.power)))
 
 
 def _bands(hz: FloatArray, half_hz: FloatArray, group: list[int]) -> list[tuple[float, float]]:

@@ -182,7 +182,7 @@ def _level(stretches: Sequence[Stretch], band_hz: tuple[float, float]) -> float:
 
 
 def _has_strong_peaks(stretches: Sequence[Stretch], band_hz: tuple[float, float]) -> bool:
-    """Whether several peaks of the spectrum stand out, at whatever frequency."""
+    """Return True if several peaks of the spectrum stand out, at whatever frequency."""
     longest = max(stretches, key=lambda each: each.seconds)
     power = np.sum(np.abs(longest.values[:, longest.between(*band_hz)]) ** 2, axis=0)
     many = 8  # technical: lines averaged, whose sum by chance is 10 dB up once in 1e14
@@ -194,7 +194,7 @@ def _has_strong_peaks(stretches: Sequence[Stretch], band_hz: tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class _Events:
-    """What disturbs a window: `loud` marks blocks of `block` samples, part after part."""
+    """Events that disturb a window: `loud` marks blocks of `block` samples, part after part."""
 
     kind: Literal["wind", "traffic", "knock"]
     unrest: float
@@ -213,18 +213,18 @@ class _Events:
             slow.append(np.abs(_blocks(centred, 2 * block).mean(axis=2)).max(axis=0).repeat(2))
         loud, kinds = [], set()
         level, sway = _median(inside), _median(slow)
-        for own, below in zip(inside, slow, strict=True):
-            below = np.pad(below, (0, len(own) - len(below)), "edge")
-            marked = (own > LOUDER * level) | (below > 2 * LOUDER * sway)
+        for its, below in zip(inside, slow, strict=True):
+            below = np.pad(below, (0, len(its) - len(below)), "edge")
+            marked = (its > LOUDER * level) | (below > 2 * LOUDER * sway)
             loud.append(_with_edges(marked))
-            kinds |= {_kind_of(own[first:end]) for first, end in _runs(marked, _AFTER_S)}
+            kinds |= {_kind_of(its[first:end]) for first, end in _runs(marked, _AFTER_S)}
         kind: Literal["wind", "traffic", "knock"] = "wind"
         kind = "traffic" if "traffic" in kinds else "knock" if kinds else kind
         return cls(kind, _unrest(inside), block, tuple(loud))
 
     @property
     def seconds(self) -> float:
-        """How long the disturbed parts are."""
+        """Return how long the disturbed parts are."""
         return _BLOCK_S * float(sum(np.sum(each) for each in self.loud))
 
     def undisturbed(self, parts: Sequence[FloatArray]) -> list[FloatArray]:

@@ -122,7 +122,7 @@ def adopt(
     chosen = [test for test in tests if test.test.id in baseline.posterior.tests]
     terms, lineage = update_terms(hanger, [str(name)], chosen, workspace.settings)
     check = baseline.posterior.baseline_check or BaselineCheck()
-    measured = check.kept_of([test.test for test in chosen])
+    measured = check.accepted_tests([test.test for test in chosen])
     posterior = update(
         measured,
         build(str(name), hanger, terms.priors),

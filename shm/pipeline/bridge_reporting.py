@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import shm
 from shm.errors import NothingThere
+from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.lineage import discarded_of_baselines, redescribed, settings_words, software
 from shm.pipeline.unheard import blind_hangers, heard
 from shm.report.contents import BridgeReport
@@ -48,11 +49,12 @@ from shm.store.queries.hangers import (
 )
 from shm.store.queries.tests import list_undated_names, load_frequency_response
 from shm.store.queries.trends import find_latest_trends, list_trend
-from shm.store.stored_alerts import said_of, silenced_until
+from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
-from shm.watch.change_words import look_again
+from shm.watch.alert_text import look_again
+from shm.watch.control_chart import ControlChart
 
 if TYPE_CHECKING:
     from shm.watch.neighbours import BridgePattern, HangerShift
@@ -79,9 +81,9 @@ def warnings_from(
         if hanger.id not in now or watched is None:
             return ""
         level = hanger.thresholds.alert_probability
-        is_told = any(d.quantity == TENSION and d.probability >= level for d in watched.drifts)
+        is_reported = any(d.quantity == TENSION and d.probability >= level for d in watched.drifts)
         of_test = now[hanger.id].averaged.tension_n
-        return nearly_slack(hanger, tensions[hanger.id], of_test, is_told=is_told)
+        return nearly_slack(hanger, tensions[hanger.id], of_test, is_reported=is_reported)
 
     def of_works(hanger: Hanger) -> str:
         point, watched = now.get(hanger.id), latest.get(hanger.id)
@@ -90,7 +92,7 @@ def warnings_from(
         if watched is not None and watched.watched.time >= point.time:
             return ""
         windows = [each for each in works if each.covers(hanger.id, point.time)]
-        return passed_over(hanger, said_of(windows[-1])) if windows else ""
+        return passed_over(hanger, describe_silence(windows[-1])) if windows else ""
 
     return {
         hanger.id: open_warnings(
@@ -133,6 +135,7 @@ def bridge_report(
             remedy=f"The latest is {newest.test} of hanger {newest.hanger}, "
             f"{newest.time:%Y-%m-%d}: ask for a longer period.",
         )
+    charts = control_charts(workspace, store)
     pattern, why_not = _pattern_or_why(store, [hanger.id for hanger in hangers])
     return BridgeReport(
         workspace.bridge.name,
@@ -151,6 +154,7 @@ def bridge_report(
         period,
         {"software": software()},
         settings_words(workspace.settings),
+        charts,
     )
 
 
@@ -215,6 +219,7 @@ class HangersNow:
     warnings: Mapping[int, tuple[str, ...]]
     blind: Mapping[int, Lead]
     undated: Mapping[int, tuple[str, ...]]
+    charts: tuple[ControlChart, ...]
 
     @classmethod
     def of(
@@ -244,6 +249,7 @@ class HangersNow:
             ),
             blind_hangers(heard(workspace, store, now)),
             list_undated_names(store),
+            control_charts(workspace, store),
         )
 
     def summary(self, hanger: Hanger) -> HangerSummary:
@@ -252,22 +258,26 @@ class HangersNow:
         found = self.watches.get(hanger.id)
         watched, called = found.watched if found else None, self.called.get(hanger.id, ())
         standing, blind = self.standing.get(hanger.id, ()), self.blind.get(hanger.id)
+        control = next((each for each in self.charts if each.hanger.id == hanger.id), None)
+        days, at = self.workspace.settings.campaign_days, point.time if point else None
+        doubts = () if control else campaign_warnings(self.charts, hanger.id, at, days)
         return HangerSummary(
             hanger,
             LatestTest(point.test, point.time, point.averaged, point.model) if point else None,
             baseline.averaged if baseline else None,
             is_first=point is not None and (baseline is None or point.test in baseline.tests),
-            drifts=watched.told if watched else (),
+            drifts=watched.published_drifts if watched else (),
             called=still_detected(called, watched, hanger),
             detected="; ".join(called_words(change) for change in called),
             standing=findings(each.alert for each in standing),
             open_alerts=self.open_alerts.get(hanger.id, 0),
-            warnings=self.warnings.get(hanger.id, ()),
+            warnings=(*doubts, *self.warnings.get(hanger.id, ())),
             notes=notes_of(standing, self.silences, hanger.id, self.now),
             unwatched=unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
             if point
             else blind,
             undated=self.undated.get(hanger.id, ()),
+            control=control,
         )
 
 
@@ -308,7 +318,7 @@ def latest_drifts(store: Store, hanger: int) -> tuple[Drift, ...]:
     """
     baseline = store.watch.baseline(hanger)
     told = list_detections(store, baseline.hanger, baseline.id) if baseline else ()
-    return told[-1].watched.told if told else ()
+    return told[-1].watched.published_drifts if told else ()
 
 
 def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
@@ -336,8 +346,8 @@ def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]
 
 def _known_drifts(store: Store, latest: StoredWatch) -> Sequence[Drift]:
     """Return those of the latest test; of all, where its shift of the tension is not known."""
-    drifts = latest.watched.told
+    drifts = latest.watched.published_drifts
     if any(each.quantity == TENSION and math.isfinite(each.shift_mean) for each in drifts):
         return drifts
     watches = store.watch.list_all(latest.hanger, latest.baseline_id)
-    return [drift for watch in watches for drift in watch.watched.told]
+    return [drift for watch in watches for drift in watch.watched.published_drifts]

@@ -29,7 +29,7 @@ from shm.read.base import Survey, SurveyedColumn
 from shm.read.header import CHANNEL_KEYS, Entry, Header
 from shm.read.profiles import Profile, completed, profile_for, save_profile, with_day_order
 from shm.read.sandbox import survey
-from shm.read.sidecar import Described, document_beside
+from shm.read.sidecar import Described, sidecar_document
 from shm.read.stamps import DayOrder, in_zone, order_of_choice
 from shm.store import Workspace
 from shm.values import NAN, PLANES, Channel, Plane, Quantity, Recording
@@ -160,7 +160,7 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     """The same of a file that was looked into before."""
     path = Path(found.source)
     profile = profile_for(found.layout, workspace.folder)
-    own = _joined(document_beside(path), answers.said)
+    own = _joined(sidecar_document(path), answers.said)
     own, order = _with_chosen_time(own, found, workspace.bridge.time_zone)
     _refuse_unknown(own, found, path)
     known = profile.described if profile is not None else {}
@@ -259,7 +259,7 @@ def _place_problems(
     found: Survey, described: Described, hanger: object, workspace: Workspace
 ) -> list[str]:
     """Sensors that are said to be off the hanger, where it is one of the bridge."""
-    tested = next((each for each in workspace.bridge.hangers if each.id == hanger), None)
+    tested = next((each for each in workspace.bridge.bars if each.id == hanger), None)
     if tested is None:
         return []
     columns = [_told(column, described) for column in found.columns]

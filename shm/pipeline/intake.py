@@ -23,7 +23,7 @@ from shm.read import sidecar_path
 from shm.read.base import Layout
 from shm.read.profiles import Profile, any_profile, completed, learn_day_order, profile_for
 from shm.read.sandbox import layout_of
-from shm.read.sidecar import Described, document_beside, sidecar_text
+from shm.read.sidecar import Described, sidecar_document, sidecar_text
 from shm.read.stamps import may_hold_days, order_of_choice
 from shm.store import Hold, Receipt, ReceivedFile, Store, Workspace
 from shm.store.archive import (
@@ -179,7 +179,7 @@ def _layout_and_sidecar(path: Path, workspace: Workspace) -> tuple[Layout, Descr
     if path.name.lower().endswith(MODES_SUFFIX):
         return None
     try:
-        return layout_of(path, read_limits(workspace.settings)), document_beside(path)
+        return layout_of(path, read_limits(workspace.settings)), sidecar_document(path)
     except BadInput:
         return None  # it is refused with its reason where it is read
 

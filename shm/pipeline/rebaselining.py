@@ -144,7 +144,7 @@ def rebaseline(
     measured = [test.test for test in chosen]
     check = checked(measured, hanger, terms)
     posterior = update(
-        check.kept_of(measured),
+        check.accepted_tests(measured),
         build(model, hanger, terms.priors),
         options_of(terms, hanger),
         progress,

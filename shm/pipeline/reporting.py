@@ -10,6 +10,9 @@ from datetime import datetime
 import shm
 from shm.errors import NothingThere, ShmError
 from shm.identify import identify
+from shm.inference import UpdateOptions, refresh
+from shm.inference.reference_level import at_level
+from shm.models import build
 from shm.pipeline.adopting import gap_watch
 from shm.pipeline.bridge_reporting import hanger_summaries, stored_pattern
 from shm.pipeline.lineage import (
@@ -24,7 +27,7 @@ from shm.pipeline.lineage import (
 from shm.pipeline.steps import identify_options
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import peek_test, read_test
-from shm.report.contents import HangerReport, ModalTestReport, TrendRow
+from shm.report.contents import HangerReport, ModalTestReport, TensionAtLevel, TrendRow
 from shm.report.formatting import Interval
 from shm.report.hanger_report import StructureReport
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
@@ -39,9 +42,9 @@ from shm.store.queries.tests import (
 )
 from shm.store.queries.trends import find_latest_trends, list_trend
 from shm.values import Hanger, ResponsePoint, WatchedTest
+from shm.values.stated_tension import averaged_now
 from shm.watch import WatchOptions, watch_hanger
-from shm.watch.alert_text import watch_words
-from shm.watch.change_words import frequency_words
+from shm.watch.alert_text import frequency_words, watch_words
 from shm.watch.neighbours import BridgePattern
 
 log = logging.getLogger(__name__)
@@ -73,7 +76,25 @@ def hanger_report(
         ),
         neighbours=_neighbours(workspace, store) if report.now.called else None,
         period=period,
+        at_level=_at_level(workspace, report),
     )
+
+
+def _at_level(workspace: Workspace, report: HangerReport) -> TensionAtLevel | None:
+    """Return the tension by the latest test at the reference level; None where none is set."""
+    settings, known = workspace.settings, report.posterior
+    level = settings.reference_level
+    if not level:
+        return None
+    at = TensionAtLevel(level, level * settings.reference_force_n)
+    try:
+        test = at_level(report.latest, level)
+        model = build(known.model, report.hanger, settings.priors)
+        moved = refresh([test], model, known, UpdateOptions(settings.samples, settings.seed))
+    except ShmError as reason:
+        return replace(at, reason=str(reason))
+    averaged = averaged_now(moved, report.selection, report.hanger.limits)
+    return replace(at, tension_n=Interval.of_averaged(averaged))
 
 
 def _hit_places(workspace: Workspace, store: Store, test: StoredTest) -> tuple[ResponsePoint, ...]:

@@ -153,7 +153,7 @@ def select_model(
         return Selection((measured_levels(tests, terms.seed),), (1.0,))
     models = [build(name, hanger, terms.priors) for name in names]
     check = checked(tests, hanger, terms)
-    found = select(check.kept_of(tests), models, options_of(terms, hanger))
+    found = select(check.accepted_tests(tests), models, options_of(terms, hanger))
     posteriors = tuple(replace(each, baseline_check=check) for each in found.posteriors)
     return replace(found, posteriors=posteriors)
 

@@ -14,6 +14,7 @@ import logging
 from collections import defaultdict, deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
@@ -21,7 +22,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from shm.documents import format_time
-from shm.errors import ShmError, StoreError
+from shm.errors import BadInput, ShmError, StoreError
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.reconcile import Condition, is_same_event, reconcile
 from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day
@@ -57,7 +58,7 @@ from shm.values.stream import (
     WindowReading,
     period_start,
 )
-from shm.watch.stream_state import gone_back
+from shm.watch.stream_watch import gone_back
 
 if TYPE_CHECKING:
     from shm.pipeline.stream_steps import Pooled, WindowFound
@@ -232,12 +233,13 @@ class Streaming:
         newest = load_stream_watch(self.store, stream.hanger)
         before = load_stream_watch(self.store, stream.hanger, starts["hour"])
         if newest and before and starts["hour"] < newest.reading_time:
-            content = gone_back(before.content, newest.content)
-            streams.go_back(stream.hanger, before.reading_time, content)
-            starts["hour"] = before.reading_time
-            self._settled[name] = max(
-                newest.reading_time, self._settled.get(name, newest.reading_time)
-            )
+            with suppress(BadInput):  # states of before an upgrade cannot be read
+                content = gone_back(before.content, newest.content)
+                streams.go_back(stream.hanger, before.reading_time, content)
+                starts["hour"] = before.reading_time
+                self._settled[name] = max(
+                    newest.reading_time, self._settled.get(name, newest.reading_time)
+                )
         for period, start in starts.items():
             former = self._pooled.get((name, period), start)
             self._pooled[name, period] = min(former, start)

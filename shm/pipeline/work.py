@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 from shm.errors import NothingThere
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline import Clock
+from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.judging import judge
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
@@ -29,7 +30,7 @@ from shm.store.queries.hangers import list_detected_changes, list_selected_model
 from shm.store.queries.recordings import list_waiting_recordings
 from shm.store.queries.tests import list_waiting_tests
 from shm.store.queries.watching import find_latest_weighed, list_weighed
-from shm.values import WITHOUT_MODEL, Hanger
+from shm.values import NAN, WITHOUT_MODEL, Hanger, ModalTest
 from shm.values.stated_tension import averaged_now
 
 Work: TypeAlias = "Generator[Callable[[], Any], Any, Sequence[StoredAlert] | None]"
@@ -89,12 +90,13 @@ class Queue:
             waiting[test.hanger].append(test)
         selected = list_selected_models(self.store)
         oldest = min((each.id for each in received), default=None)
-        for hanger in self.workspace.bridge.watched:
+        # Control hangers first: what they say of a campaign goes into its alerts.
+        for hanger in sorted(self.workspace.bridge.watched, key=lambda each: not each.is_control):
             tests = waiting[hanger.id]
             if hanger.id in selected:
                 yield from self._list_later(hanger, selected[hanger.id], tests, oldest)
-            elif not received and len(tests) >= needed:
-                first = tests[:needed]
+            elif not received and len(tests) >= (count := 1 if hanger.is_control else needed):
+                first = tests[:count]
                 yield _make_task("select", hanger.id, partial(self._select, hanger, first), first)
 
     def _list_later(
@@ -134,7 +136,7 @@ class Queue:
             names = competing_names(hanger, settings.model_names)
         taught = self._find_taught(hanger, min(test.time for test in tests))
         terms, lineage = update_terms(hanger, names, tests, settings, taught=taught)
-        plain = [test.test for test in tests]
+        plain = [_to_infer(test.test, hanger) for test in tests]
         found = yield partial(run_step, registered().select, plain, hanger, names, terms)
         self.store.posteriors.save_selection(hanger.id, tests, found, lineage, self.clock())
         self._summarise(hanger)
@@ -149,9 +151,10 @@ class Queue:
         terms, lineage = update_terms(hanger, [model], [test], settings, known, taught)
         # A test of the baseline, done again, would be compared with what it has made itself.
         own = store.watch.baseline(hanger.id, model, test.time)
-        to_watch = own is None or test.test.id not in own.posterior.tests
-        step = registered().update
-        found = yield partial(run_step, step, test.test, hanger, model, known, terms)
+        of_baseline = own is not None and test.test.id in own.posterior.tests
+        to_watch = not (of_baseline or hanger.is_control)
+        step, plain = registered().update, _to_infer(test.test, hanger)
+        found = yield partial(run_step, step, plain, hanger, model, known, terms)
         store.posteriors.save(test, found, lineage, self.clock(), to_watch=to_watch)
         self._summarise(hanger)
         return None
@@ -188,7 +191,7 @@ class Queue:
                 hanger,
                 LatestTest(test.test.id, test.time, tension, current.model),
                 averaged_now(baseline.posterior, compared, hanger.limits),
-                drifts=watched.told,
+                drifts=watched.published_drifts,
                 called=(*called, *([watched.change] if watched.change.called else ())),
                 standing=(alert,),
             )
@@ -197,6 +200,10 @@ class Queue:
             earlier = [each.alert for each in store.alerts.list_all(hanger.id)]
             works = works_before(alert, silences, earlier)
             alert = alert if works is None else after_works(alert, works)
+        if alert is not None and self.workspace.bridge.controls:
+            charts, days = control_charts(self.workspace, store), settings.campaign_days
+            doubts = campaign_warnings(charts, hanger.id, test.time, days)
+            alert = replace(alert, message=" ".join((alert.message, *doubts)))
         changes = reconciled(store, hanger, baseline, test, (watched, alert))
         stored = (test, baseline, watched, alert, hooks, self.clock())
         state, level = KeptWatch(needed.key, test.time, kept), hanger.thresholds.alert_probability
@@ -205,11 +212,12 @@ class Queue:
     def _summarise(self, hanger: Hanger) -> None:
         if hanger.is_modelled:
             self.store.posteriors.save_summaries(hanger)
+        if hanger.is_modelled and not hanger.is_control:
             heed_limits(self.workspace, self.store, [hanger], self.clock())
 
     def _find_taught(self, hanger: Hanger, before: datetime) -> Taught | None:
         """Return the last time before then that its tension was read, else a sibling's."""
-        if self.workspace.settings.priors != DESCRIPTION:
+        if self.workspace.settings.priors != DESCRIPTION or hanger.is_control:
             return None
         siblings = [
             each.id
@@ -225,6 +233,12 @@ class Queue:
         except NothingThere:  # not through updating yet
             return None
         return Taught(posterior, own is not None)
+
+
+def _to_infer(test: ModalTest, hanger: Hanger) -> ModalTest:
+    """Return a test to infer a tension from: of a control hanger without what was read."""
+    unread = replace(test, tension_read_n=NAN, tension_read_sd_n=NAN)
+    return unread if hanger.is_control else test
 
 
 def _make_task(kind: str, id_: int, work: Callable[[], Work], tests: Sequence[TestRow]) -> Task:

@@ -1,4 +1,4 @@
-"""Whether a test can be what it says it is, before it counts: what is implausible is held.
+"""Check a test before it counts: one that is implausible is held.
 
 A check is one function `Candidate -> Doubt | None` and one line of `CHECKS`. It is asked once the
 modes of a test are identified, and before anything is computed from them.
@@ -31,12 +31,14 @@ CHECKS: tuple[Check, ...] = (
 )
 
 _WITHOUT_MODEL = tuple(each for each in CHECKS if each not in (of_another_bar, of_other_signals))
-"""Of a structure that no bar describes."""
+"""Of a structure that no bar describes, and of a control hanger: what its frequencies say against a
+test is what it is there to show (record 0028)."""
 
 
 def doubts_about(candidate: Candidate) -> tuple[Doubt, ...]:
     """Return the reasons to hold a test, in the order of `CHECKS`; none where it is plausible."""
-    checks = CHECKS if candidate.hanger.is_modelled else _WITHOUT_MODEL
+    by_bar = candidate.hanger.is_modelled and not candidate.hanger.is_control
+    checks = CHECKS if by_bar else _WITHOUT_MODEL
     found = [doubt for check in checks if (doubt := check(candidate)) is not None]
     if any(doubt.check == "copy" for doubt in found):  # that explains the same time
         found = [doubt for doubt in found if doubt.check != "clock stuck"]

@@ -1,4 +1,4 @@
-"""What modes say of a bar: its fit to them, and how probable a shift of them is.
+"""Fit bars to modes, and weigh shifts of them.
 
 Each hanger that a test may come from is fitted to its modes (`shm.plausibility.bars`), and misfits
 are weighed with what may have changed and with what tests and bars err by.
@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from shm.plausibility.bar_solver import SHARE, SPRINGS, Solver
+from shm.models.tensioned_beam import timoshenko_frequencies_hz
 from shm.values import NAN, PLANES, BoolArray, FloatArray, Hanger, ModalTest
 
 OriginKind: TypeAlias = Literal["hanger", "unknown bar", "time base", "planes"]
@@ -24,10 +24,11 @@ LATEST = 5
 _MOST_ORDER, LEAST_MODES = 20, 3
 """Two frequencies fit any bar, by its tension and its ends."""
 
-_PARAMETERS = 7
+_PARAMETERS, _SPRINGS, _SHARE = 7, slice(2, 6), 6
 """ln of the tension ratio, ln c (shm.models.as_made), log10 k L/EI of springs k1 to k4, and shear
 over that of a solid section."""
-
+_LIMITS = np.array([(-7, 4), (-3, 3), *[(-2.5, 4)] * 4, (0.01, 3)]).T
+"""Technical: of the parameters in a fit."""
 
 _STARTS = (-1.0, 0.75, 2.5)
 """log10 k L/EI near a pin, in the middle and near a clamp, from where fits begin."""
@@ -83,7 +84,7 @@ _MASS_PLACES = np.linspace(0.05, 0.5, 10)
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a test may come from; the hanger it is filed under where `kind` is empty."""
+    """An origin of a test; the hanger it is filed under where `kind` is empty."""
 
     kind: OriginKind | Literal[""] = ""
     hanger: int | None = None
@@ -132,12 +133,12 @@ def seen_in(tests: Sequence[ModalTest], hanger: Hanger) -> Seen:
     count = np.isfinite(log_f).sum(axis=0)
     some = np.maximum(count, 1)
     mean = np.where(count, np.nansum(log_f, axis=0) / some, NAN)
-    own = np.where(np.isfinite(log_f), variance, 0.0).sum(axis=0)
-    return Seen(mean, own / some**2)
+    its = np.where(np.isfinite(log_f), variance, 0.0).sum(axis=0)
+    return Seen(mean, its / some**2)
 
 
 def _by_mass(share: FloatArray, place: FloatArray) -> FloatArray:
-    """What a mass, as a share of the bar's, at a share of its length does to ln f (..., orders)."""
+    """Return what a mass, as a share of the bar's, at a place does to ln f (..., orders)."""
     moves = np.sin(np.pi * np.arange(1, _MOST_ORDER + 1) * place[..., None]) ** 2
     return np.asarray(-0.5 * np.log1p(2 * share[..., None] * moves))
 
@@ -176,14 +177,14 @@ class Evidence:
 
     def _alike(self, mask: BoolArray) -> FloatArray:
         """Correlation (modes, modes) of the errors: what a bar model lacks is of no mode alone."""
-        own = np.eye(int(mask.sum()))
+        its = np.eye(int(mask.sum()))
         if self.errors is _TEST_ERRORS:
-            return own
+            return its
         plane, order = mask.nonzero()
         log = np.log(order + 1.0)
         along = np.exp(-0.5 * (np.subtract.outer(log, log) / _ALONG_ORDERS) ** 2)
         across = np.where(np.equal.outer(plane, plane), 1.0, 0.5)
-        return np.asarray((1 - _TOGETHER) * own + _TOGETHER * along * across)
+        return np.asarray((1 - _TOGETHER) * its + _TOGETHER * along * across)
 
     def _with_mass(self, mask: BoolArray) -> float:
         """With something of any mass at any place hung on it."""
@@ -230,113 +231,150 @@ def changes_of(*classes: tuple[float, ...]) -> tuple[tuple[float, FloatArray], .
     return tuple((w, np.array([t, c, *(k,) * 4, 1e-3, clock])) for w, t, c, k, clock in classes)
 
 
-class Bars:
-    """Bars to be fitted to modes, each about the middle of its description's prior."""
+@dataclass(frozen=True, eq=False)
+class Bar:
+    """A bar to be fitted to the modes `seen`, with its parameters' means and sds (7,) before."""
 
-    def __init__(self) -> None:
-        self.origins: list[Origin] = []
-        self.hangers: list[Hanger] = []
-        self.seen: list[Seen] = []
-        self.mean: list[FloatArray] = []
-        self.sd: list[FloatArray] = []
+    hanger: Hanger
+    seen: Seen
+    mean: FloatArray
+    sd: FloatArray
 
-    def add(self, origin: Origin, hanger: Hanger, seen: Seen, any_bar: bool = False) -> None:
+    @classmethod
+    def described(cls, hanger: Hanger, seen: Seen, *, any_bar: bool = False) -> Bar:
+        """Return the bar of a description; its tension and section may be any."""
         mean, sd = _prior(hanger)
         if any_bar:
             sd[:2] = _ANY_BAR
-        self.append(origin, hanger, seen, mean, sd)
+        return cls(hanger, seen, mean, sd)
 
-    def append(
-        self, origin: Origin, hanger: Hanger, seen: Seen, mean: FloatArray, sd: FloatArray
-    ) -> None:
-        self.origins.append(origin)
-        self.hangers.append(hanger)
-        self.seen.append(seen)
-        self.mean.append(mean)
-        self.sd.append(sd)
 
-    def fitted(self, start: FloatArray | None = None) -> Fits:
-        """Each bar's likeliest parameters, by Gauss-Newton steps with Student's weights.
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A bar's likeliest parameters `theta` (7,), their ln f (2, orders) and slopes.
 
-        From `start` (7,) where it is given.
-        """
-        starts, rows = 1 if start is not None else len(_STARTS), len(self.hangers)
-        log_f = np.repeat([each.log_f for each in self.seen], starts, axis=0)
-        stated = np.repeat([each.variance for each in self.seen], starts, axis=0)
-        mean, sd = (np.repeat(each, starts, axis=0) for each in (self.mean, self.sd))
-        orders = int(np.isfinite(log_f).any(axis=(0, 1)).nonzero()[0].max()) + 1
-        solver = Solver([h for h in self.hangers for _ in range(starts)], orders)
-        y = log_f[..., :orders].reshape(len(mean), -1)
-        measured = np.isfinite(y)
-        theta = mean.copy()
-        if start is None:
-            theta[:, SPRINGS] = np.tile(_STARTS, rows)[:, None]
-            theta[:, 0] = solver.string_tension(log_f)
-        else:
-            theta[:] = start
-        for step in range(_STEPS):
-            wide = max(_FIT_SD, _WIDE * _NARROWS**step)
-            variance = stated[..., :orders].reshape(y.shape) + wide**2
-            found, way = solver.with_slopes(theta)
-            off = np.where(measured, y - found, 0.0)
-            weight = measured * 4 / (3 + off**2 / variance) / variance
-            normal = np.einsum("nki,nk,nkj->nij", way, weight, way)
-            normal += np.eye(_PARAMETERS) / sd[:, None, :] ** 2
-            slope = np.einsum("nki,nk->ni", way, weight * off) + (mean - theta) / sd**2
-            move = np.linalg.solve(normal, slope[..., None])[..., 0]
-            theta = theta + move.clip(-1, 1)
-            theta[:, 0], theta[:, 1] = theta[:, 0].clip(-7, 4), theta[:, 1].clip(-3, 3)
-            theta[:, SPRINGS] = theta[:, SPRINGS].clip(-2.5, 4)
-            theta[:, SHARE] = theta[:, SHARE].clip(0.01, 3)
+    `way` (2, orders, 8) is how ln f goes with the parameters and the time base.
+    """
+
+    bar: Bar
+    theta: FloatArray
+    log_f: FloatArray
+    way: FloatArray
+
+    def described(self) -> Evidence:
+        """Return the modes by the priors of the description."""
+        bar = self.bar
+        away = self.theta - bar.mean
+        off = bar.seen.log_f - self.log_f + self.way[..., :_PARAMETERS] @ away
+        more = 3.0 if bar.hanger.turnbuckles else 1.0
+        errors = tuple((weight, more * sd) for weight, sd in _BAR_ERRORS)
+        changes = ((1.0, np.append(bar.sd, 0.0)),)
+        return Evidence(replace(bar.seen, log_f=off), self.way, changes, errors)
+
+    def changed(self, shift: Seen) -> Evidence:
+        """Return the hanger of earlier tests with whatever may have changed since."""
+        changes = changes_of(ORDINARY, TIGHTER, _LOOSER, _ALTERED)
+        moved = replace(shift, log_f=self.log_f + shift.log_f)
+        sd = changes[-1][1][:_PARAMETERS]
+        (fit,) = fit_bars([Bar(self.bar.hanger, moved, self.theta, sd)], self.theta)
+        expected = fit.log_f - self.log_f
+        off = shift.log_f - expected + fit.way[..., :_PARAMETERS] @ (fit.theta - self.theta)
+        variance = shift.variance + np.nan_to_num(_OFF_SHIFT * expected) ** 2
+        return Evidence(Seen(off, variance), fit.way, changes, masses=True)
+
+
+def fit_bars(bars: Sequence[Bar], start: FloatArray | None = None) -> list[Fit]:
+    """Fit each bar by Gauss-Newton steps with Student's weights, from `start` (7,) or three."""
+    starts, rows = 1 if start is not None else len(_STARTS), len(bars)
+    log_f, stated, mean, sd = (
+        np.repeat(each, starts, axis=0)
+        for each in (
+            [bar.seen.log_f for bar in bars],
+            [bar.seen.variance for bar in bars],
+            [bar.mean for bar in bars],
+            [bar.sd for bar in bars],
+        )
+    )
+    orders = int(np.isfinite(log_f).any(axis=(0, 1)).nonzero()[0].max()) + 1
+    solver = _Solver([bar.hanger for bar in bars for _ in range(starts)], orders)
+    y = log_f[..., :orders].reshape(len(mean), -1)
+    stated = stated[..., :orders].reshape(y.shape)
+    measured = np.isfinite(y)
+    theta = mean.copy()
+    if start is None:
+        theta[:, _SPRINGS] = np.tile(_STARTS, rows)[:, None]
+        theta[:, 0] = solver.string_tension(log_f)
+    else:
+        theta[:] = start
+    for step in range(_STEPS):
+        variance = stated + max(_FIT_SD, _WIDE * _NARROWS**step) ** 2
         found, way = solver.with_slopes(theta)
         off = np.where(measured, y - found, 0.0)
-        variance = stated[..., :orders].reshape(y.shape) + _FIT_SD**2
-        cost = 2 * np.log1p(off**2 / variance / 3).sum(axis=1)
-        cost += 0.5 * (((theta - mean) / sd) ** 2).sum(axis=1)
-        best = cost.reshape(rows, starts).argmin(axis=1) + starts * np.arange(rows)
-        return Fits(self, theta[best], found[best], way[best])
+        weight = measured * 4 / (3 + off**2 / variance) / variance
+        normal = np.einsum("nki,nk,nkj->nij", way, weight, way)
+        normal += np.eye(_PARAMETERS) / sd[:, None, :] ** 2
+        slope = np.einsum("nki,nk->ni", way, weight * off) + (mean - theta) / sd**2
+        move = np.linalg.solve(normal, slope[..., None])[..., 0]
+        theta = np.clip(theta + move.clip(-1, 1), *_LIMITS)
+    found, way = solver.with_slopes(theta)
+    off = np.where(measured, y - found, 0.0)
+    cost = 2 * np.log1p(off**2 / (stated + _FIT_SD**2) / 3).sum(axis=1)
+    cost += 0.5 * (((theta - mean) / sd) ** 2).sum(axis=1)
+    best = cost.reshape(rows, starts).argmin(axis=1) + starts * np.arange(rows)
+    full_f = np.full((rows, 2, _MOST_ORDER), NAN)
+    full_f[..., :orders] = found[best].reshape(rows, 2, orders)
+    full_way = np.zeros((rows, 2, _MOST_ORDER, _PARAMETERS + 1))
+    full_way[..., :orders, :_PARAMETERS] = way[best].reshape(rows, 2, orders, _PARAMETERS)
+    full_way[..., _PARAMETERS] = 1.0
+    return [Fit(*each) for each in zip(bars, theta[best], full_f, full_way, strict=True)]
 
 
-class Fits:
-    def __init__(self, bars: Bars, theta: FloatArray, log_f: FloatArray, way: FloatArray):
-        self._bars, self._theta = bars, theta
-        rows, orders = len(theta), log_f.shape[1] // 2
-        self._log_f = np.full((rows, 2, _MOST_ORDER), NAN)
-        self._log_f[..., :orders] = log_f.reshape(rows, 2, orders)
-        self._way = np.zeros((rows, 2, _MOST_ORDER, _PARAMETERS + 1))
-        self._way[..., :orders, :_PARAMETERS] = way.reshape(rows, 2, orders, _PARAMETERS)
-        self._way[..., _PARAMETERS] = 1.0
+class _Solver:
+    """Frequencies of several Timoshenko beams on end springs at once, a parameter set (7,) each."""
 
-    def sensitivity(self, origin: Origin) -> FloatArray:
-        """How ln f goes with the parameters and the time base (2, orders, 8)."""
-        return np.asarray(self._way[self._bars.origins.index(origin)])
+    def __init__(self, hangers: Sequence[Hanger], orders: int):
+        self._orders = orders
+        self._length = np.array([h.length_m for h in hangers])
+        self._nominal = np.array([h.nominal_tension_n for h in hangers])
+        self._stiffness = np.array([h.bending_stiffness_n_m2 for h in hangers])
+        self._mass = np.array([h.mass_per_length_kg_m for h in hangers])
+        self._shear = np.array([h.shear_stiffness_n for h in hangers])
+        self._gyration = np.sqrt([h.second_moment_m4 / h.area_m2 for h in hangers])
 
-    def described(self, origin: Origin) -> Evidence:
-        """Return the modes by the priors of the description."""
-        row, bars = self._bars.origins.index(origin), self._bars
-        away = self._theta[row] - bars.mean[row]
-        seen, way = bars.seen[row], self._way[row]
-        off = seen.log_f - self._log_f[row] + way[..., :_PARAMETERS] @ away
-        sds = np.append(bars.sd[row], 0.0)
-        more = 3.0 if bars.hangers[row].turnbuckles else 1.0
-        errors = tuple((weight, more * sd) for weight, sd in _BAR_ERRORS)
-        return Evidence(replace(seen, log_f=off), way, ((1.0, sds),), errors)
+    def string_tension(self, log_f: FloatArray) -> FloatArray:
+        """Return ln of the tension ratio (bars,) by the lowest mode of each, as of a string."""
+        either = np.nanmin(np.where(np.isfinite(log_f), log_f, np.inf), axis=1)
+        lowest = np.isfinite(either).argmax(axis=1)
+        hz = np.exp(either[np.arange(len(either)), lowest])
+        pull = self._mass * (2 * self._length * hz / (lowest + 1)) ** 2
+        bends = self._stiffness * ((lowest + 1) * np.pi / self._length) ** 2
+        ratio = np.maximum(pull - bends, 0.1 * pull) / self._nominal
+        return np.asarray(np.log(ratio.clip(0.02, 5)))
 
-    def changed(self, origin: Origin, shift: Seen) -> Evidence:
-        """Return the hanger of earlier tests with whatever may have changed since."""
-        row, bars = self._bars.origins.index(origin), self._bars
-        changes = changes_of(ORDINARY, TIGHTER, _LOOSER, _ALTERED)
-        start = self._theta[row]
-        again = Bars()
-        moved = replace(shift, log_f=self._log_f[row] + shift.log_f)
-        again.append(origin, bars.hangers[row], moved, start, changes[-1][1][:_PARAMETERS])
-        fit = again.fitted(start)
-        expected = fit._log_f[0] - self._log_f[row]
-        way = fit._way[0]
-        away = fit._theta[0] - start
-        off = shift.log_f - expected + way[..., :_PARAMETERS] @ away
-        variance = shift.variance + np.nan_to_num(_OFF_SHIFT * expected) ** 2
-        return Evidence(Seen(off, variance), way, changes, masses=True)
+    def with_slopes(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ln f (bars, 2 orders) and its derivatives (bars, 2 orders, 7)."""
+        steps = np.array([1e-4, 1e-4, *(1e-3,) * 5])
+        found = self._log_f(np.stack([theta, *(theta + step for step in np.diag(steps))]))
+        slopes = (found[1:] - found[0]) / steps[:, None, None]
+        return found[0], np.moveaxis(slopes, 0, -1)
+
+    def _log_f(self, theta: FloatArray) -> FloatArray:
+        """Return ln f (sets, bars, 2 orders) of parameters (sets, bars, 7)."""
+        stiffer = np.exp(2 * theta[..., 1])
+        stiffness = self._stiffness * stiffer
+        springs = 10 ** theta[..., _SPRINGS] * (stiffness / self._length)[..., None]
+        hz = timoshenko_frequencies_hz(
+            self._length[:, None],
+            (self._nominal * np.exp(theta[..., 0]))[..., None],
+            stiffness[..., None],
+            self._mass[:, None],
+            (self._shear * stiffer / theta[..., _SHARE])[..., None],
+            self._gyration[:, None],
+            springs[..., :2],
+            springs[..., 2:],
+            self._orders,
+        )
+        return np.asarray(np.log(hz).reshape(*theta.shape[:2], -1))
 
 
 def _uniform(lower: float, upper: float) -> tuple[float, float]:
@@ -355,20 +393,20 @@ def _prior(hanger: Hanger) -> tuple[FloatArray, FloatArray]:
     sd = np.array([_TENSION[1], _MODEL_C, *(end_sd,) * 4, shear_sd])
     if math.isfinite(scatter.tension):
         mean[0], sd[0] = 0.0, math.hypot(scatter.tension, scatter.section)
-    own = [scatter.section / 2, scatter.density / 2, scatter.modulus / 2, 2 * scatter.length]
+    its = [scatter.section / 2, scatter.density / 2, scatter.modulus / 2, 2 * scatter.length]
     plates_m = 2 * hanger.plate.length_m if hanger.plate is not None else 0.0
     # The length that swings lies anywhere between the taped one and that without fittings.
     open_share = (sum(hanger.fittings_m) + plates_m) / hanger.length_m
     mean[1] += open_share
-    own.append(2 * open_share / math.sqrt(12))
+    its.append(2 * open_share / math.sqrt(12))
     if math.isfinite(scatter.effective_length):
-        own.append(2 * scatter.effective_length)
+        its.append(2 * scatter.effective_length)
     if hanger.kind == "strand":
         if math.isfinite(scatter.bending_factor):
-            own.append(scatter.bending_factor / 2)
+            its.append(scatter.bending_factor / 2)
         else:
             slip, slip_sd = _uniform(*map(math.log, assumed.strand_bending_factor.bounds))
             mean[1] += (slip - math.log(hanger.bending_stiffness_factor)) / 2
-            own.append(slip_sd / 2)
-    sd[1] = math.hypot(sd[1], *own)
+            its.append(slip_sd / 2)
+    sd[1] = math.hypot(sd[1], *its)
     return mean, sd

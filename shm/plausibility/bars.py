@@ -1,4 +1,4 @@
-"""Whether a test is of the hanger whose number it bears: "right hanger?", "right sampling rate?".
+"""Check that a test is of its hanger: "right hanger?", "right sampling rate?".
 
 Bayes' rule over what may be behind the modes of a test that is filed under one hanger:
 
@@ -32,12 +32,13 @@ from shm.plausibility.bar_evidence import (
     ORDINARY,
     OTHER_CLOCK,
     TIGHTER,
-    Bars,
+    Bar,
     Evidence,
     Origin,
     OriginKind,
     Seen,
     changes_of,
+    fit_bars,
     log_sum,
     seen_in,
 )
@@ -90,7 +91,7 @@ OWN = Origin()
 
 
 def doubt_of(test: ModalTest, own: Known, others: Sequence[Known]) -> OtherOrigin | None:
-    """Why `test`, filed under hanger `own`, is probably not of it; None where it well may be.
+    """Say why `test`, filed under hanger `own`, is probably not of it; None where it well may be.
 
     `own.tests` are its earlier accepted tests, `others` the other hangers of the bridge. None also
     where nothing can be said: fewer than three modes, or a description that is no hanger's (free or
@@ -164,7 +165,7 @@ def _said(origin: Origin, probability: float, own: Hanger) -> OtherOrigin:
 
 
 def _twins(one: Hanger, other: Hanger) -> bool:
-    """Whether two descriptions differ by less than tape and mill do."""
+    """Return True if two descriptions differ by less than tape and mill do."""
     near = 2 * math.sqrt(2) * one.scatter.length
     stiffness = one.bending_stiffness_n_m2 / other.bending_stiffness_n_m2
     mass = one.mass_per_length_kg_m / other.mass_per_length_kg_m
@@ -184,32 +185,32 @@ def _candidates(
     test: ModalTest, own: Known, others: Sequence[Known]
 ) -> tuple[Evidence, dict[Origin, tuple[float, Evidence]]]:
     """Return the hanger of that number, and what else the test may come from with its prior."""
-    rows = Bars()
-    now = {each.hanger.id: seen_in([test], each.hanger) for each in (own, *others)}
+    every = (own, *others)
+    now = {each.hanger.id: seen_in([test], each.hanger) for each in every}
     before = {
-        each.hanger.id: seen_in(each.tests[-LATEST:], each.hanger)
-        for each in (own, *others)
-        if each.tests
+        each.hanger.id: seen_in(each.tests[-LATEST:], each.hanger) for each in every if each.tests
     }
-    for each in (own, *others):
-        id_ = each.hanger.id
-        rows.add(Origin("hanger", id_), each.hanger, before.get(id_, now[id_]))
-    seen, id_ = now[own.hanger.id], own.hanger.id
-    rows.add(Origin("unknown bar"), own.hanger, seen, any_bar=True)
-    if not own.tests:
-        for factor in COARSE_FACTORS:
-            origin = Origin("time base", factor=factor)
-            rows.add(origin, own.hanger, seen.times(1 / factor))
-    fits = rows.fitted()
-    mine = Origin("hanger", id_)
-    rivals = {origin: fits.described(origin) for origin in rows.origins if origin != mine}
-    for each in others:
-        origin, at = Origin("hanger", each.hanger.id), each.hanger.id
-        if at in before:
-            rivals[origin] = _as_before(now[at].over(before[at]), fits.sensitivity(origin))
+    bars = {
+        Origin("hanger", each.hanger.id): Bar.described(
+            each.hanger, before.get(each.hanger.id, now[each.hanger.id])
+        )
+        for each in every
+    }
+    id_ = own.hanger.id
+    seen = now[id_]
+    bars[Origin("unknown bar")] = Bar.described(own.hanger, seen, any_bar=True)
+    for factor in COARSE_FACTORS if not own.tests else ():
+        origin = Origin("time base", factor=factor)
+        bars[origin] = Bar.described(own.hanger, seen.times(1 / factor))
+    fits = dict(zip(bars, fit_bars(list(bars.values())), strict=True))
+    mine = fits.pop(Origin("hanger", id_))
+    rivals = {origin: fit.described() for origin, fit in fits.items()}
+    for origin, fit in fits.items():
+        if origin.kind == "hanger" and (at := origin.hanger) in before:
+            rivals[origin] = _as_before(now[at].over(before[at]), fit.way)
     if id_ not in before:
-        return replace(fits.described(mine), masses=True), _with_priors(rivals, len(others))
-    shift, way = seen.over(before[id_]), fits.sensitivity(mine)
+        return replace(mine.described(), masses=True), _with_priors(rivals, len(others))
+    shift, way = seen.over(before[id_]), mine.way
     for factor in FACTORS:
         rivals[Origin("time base", factor=factor)] = _as_before(shift.times(1 / factor), way)
     if shift.mask.any():
@@ -217,7 +218,7 @@ def _candidates(
         rivals[Origin("time base", factor=factor)] = _as_before(shift, way, OTHER_CLOCK)
     crossed = seen.over(before[id_].exchanged())
     rivals[Origin("planes")] = _as_before(crossed, way[::-1])
-    return fits.changed(mine, shift), _with_priors(rivals, len(others))
+    return mine.changed(shift), _with_priors(rivals, len(others))
 
 
 def _with_priors(
@@ -241,9 +242,9 @@ _ACTIONS = {
 
 def of_another_bar(candidate: Candidate) -> Doubt | None:
     """Modes of another hanger, of a wrong time base or of exchanged planes."""
-    own = Known(candidate.hanger, tuple(candidate.earlier))
+    its = Known(candidate.hanger, tuple(candidate.earlier))
     others = [Known(hanger, tuple(tests)) for hanger, tests in candidate.others]
-    found = doubt_of(candidate.test, own, others)
+    found = doubt_of(candidate.test, its, others)
     if found is None or found.kind == "unknown bar":
         return None  # of such a bar the first line of its posterior says that it does not fit
     why = f"The probability that it is not what it is filed as is {found.probability:.2f}."

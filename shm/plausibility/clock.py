@@ -1,4 +1,4 @@
-"""Whether the time of a test can be that of the test: loggers lose their clocks, files keep them.
+"""Check the time of a test: loggers lose their clocks, files keep them.
 
 Only what cannot be, or what the watch could not see through, is a doubt. An hour off (summer time)
 or a day off between two tests moves nothing that is computed from them, and passes.

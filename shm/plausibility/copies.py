@@ -1,4 +1,4 @@
-"""Whether the samples were here before: one impact must not confirm itself under another name.
+"""Find copies of samples: one impact must not confirm itself under another name.
 
 The digest finds the same numbers again in whatever file; the shapes find them rescaled, rounded,
 in another order, or cut to a part.
@@ -102,8 +102,7 @@ def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerpr
 
 @dataclass(frozen=True)
 class Common:
-    """What two recordings have in common, as a share of the samples of each (of all its channels
-    that move)."""
+    """The samples that two recordings have in common, as a share of those of each."""
 
     of_own: float
     of_other: float
@@ -128,24 +127,24 @@ def copied(candidate: Candidate) -> Doubt | None:
     Of several recordings those that count are named first, and of these the one that has most of
     it: a copy may have been copied.
     """
-    own = candidate.fingerprint
-    if own is None:
+    its = candidate.fingerprint
+    if its is None:
         twin = next((t for t in candidate.same_time if t.modes == candidate.test.modes), None)
         return None if twin is None else _again(f"it holds the modes of test {twin.id} again")
-    found = [(each, shared(own, each.fingerprint)) for each in candidate.copies]
-    alike = [(known, common) for known, common in found if common is not None]
-    if not alike:
+    found = [(each, shared(its, each.fingerprint)) for each in candidate.copies]
+    similar = [(known, common) for known, common in found if common is not None]
+    if not similar:
         return None
-    alike.sort(key=lambda each: (not each[0].counts, -round(each[1].of_own, 2)))
-    known, common = alike[0]
+    similar.sort(key=lambda each: (not each[0].counts, -round(each[1].of_own, 2)))
+    known, common = similar[0]
     if not common.own_is_longer:
         return _again(_what_of(known, common, candidate.hanger.id))
-    shorter = [each for each in alike if each[1].own_is_longer and each[0].counts == known.counts]
-    told = [_what_it_has(*each, candidate.hanger.id) for each in shorter[:_MOST_NAMED]]
-    more = len(shorter) - len(told)
+    shorter = [each for each in similar if each[1].own_is_longer and each[0].counts == known.counts]
+    reported = [_what_it_has(*each, candidate.hanger.id) for each in shorter[:_MOST_NAMED]]
+    more = len(shorter) - len(reported)
     return Doubt(
         "copy",
-        f"it holds {' and '.join(told)}" + (f" and of {more} more recordings" if more else ""),
+        f"it holds {' and '.join(reported)}" + (f" and of {more} more recordings" if more else ""),
         "It is the longer one: usually discard the part and confirm the whole",
         _WHY,
         instead_of=tuple(each.recording_id for each, _ in shorter),
@@ -153,14 +152,16 @@ def copied(candidate: Candidate) -> Doubt | None:
 
 
 def is_copy(own: Fingerprint, other: Fingerprint) -> bool:
-    """Whether one recording holds the other's impacts."""
+    """Return True if one recording holds the other's impacts."""
     return shared(own, other) is not None
 
 
 def shared(own: Fingerprint, other: Fingerprint) -> Common | None:
-    """What two recordings have in common where one holds the other's impacts: in at least half of
-    the channels of the smaller one, lest a dead channel that always hums alike condemns a test.
-    None where it does not."""
+    """Return what two recordings have in common where one holds the other's impacts.
+
+    In at least half of the channels of the smaller one, lest a dead channel that always hums alike
+    condemns a test. None where it does not.
+    """
     if own.digest == other.digest:
         return Common(1.0, 1.0)
     if not len(own.marks) or not len(other.marks):
@@ -176,8 +177,8 @@ def shared(own: Fingerprint, other: Fingerprint) -> Common | None:
             moved = _channels(own.marks[here[by]], other.marks[there[by]], own, other)
             for pair, samples in moved.items():
                 pairs[pair] = max(samples, pairs.get(pair, 0))
-    alike = min(len({pair[side] for pair in pairs}) for side in (0, 1))
-    if 2 * alike < min(len(np.unique(each.marks[:, 0])) for each in (own, other)):
+    similar = min(len({pair[side] for pair in pairs}) for side in (0, 1))
+    if 2 * similar < min(len(np.unique(each.marks[:, 0])) for each in (own, other)):
         return None
     return Common(_share(pairs, _lengths(own.marks), 0), _share(pairs, _lengths(other.marks), 1))
 
@@ -188,7 +189,7 @@ def _lengths(rows: IntArray) -> dict[int, int]:
 
 
 def _share(pairs: Mapping[tuple[int, int], int], samples: Mapping[int, int], side: int) -> float:
-    """How much of a recording, of so many samples a channel, lies in pairs that are copies.
+    """Return how much of a recording, of so many samples a channel, lies in pairs that are copies.
 
     A channel of the one may hold several of the other, as that of a whole its cuts.
     """
@@ -200,8 +201,7 @@ def _share(pairs: Mapping[tuple[int, int], int], samples: Mapping[int, int], sid
 
 
 def _alike(own: Fingerprint, other: Fingerprint) -> tuple[IntArray, IntArray]:
-    """Which shapes of the one equal which of the other: roughly first, as hundreds of recordings
-    are looked through."""
+    """Return the shapes that are equal: roughly first, as hundreds are looked through."""
     rough = [each.shapes.astype(np.float32) for each in (own, other)]
     mine, its = (each / np.linalg.norm(each, axis=1, keepdims=True) for each in rough)
     here, there = np.nonzero(np.abs(mine @ its.T) > 1 - _ROUGHLY)

@@ -1,4 +1,4 @@
-"""What each named array of a file is for: a channel, a frequency response, times, or nothing."""
+"""Give each named array of a file its role: a channel, a frequency response, times, or none."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from shm.errors import BadInput
-from shm.read.arrays import Arrays, Variable, arranged
+from shm.read.arrays import Arrays, Variable, flatten_tables
 from shm.read.base import Format
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, quantity_named
 from shm.read.limits import guarded, refuse_large
-from shm.read.logger_words import UNSAID, unit_of
+from shm.read.logger_words import UNIT_MISSING, unit_of
 from shm.read.stamps import moment
 from shm.read.table import Column, Role, Table, is_accelerance
 from shm.values import ComplexArray, FloatArray
@@ -53,7 +53,7 @@ def format_of_arrays(
     def open_tables(path: Path) -> Iterator[tuple[Table, ...]]:
         with opened(path) as arrays:
             with guarded(path):
-                whole = arranged(arrays)
+                whole = flatten_tables(arrays)
             yield (_table(whole, path, name),)
 
     return Format(name, suffixes, recognises, open_tables, library=library)
@@ -92,7 +92,7 @@ def _column(variable: Variable, path: Path) -> Column:
         partial(_loaded, variable, path),
         unit_in(variable),
         role(variable),
-        _said(variable, path),
+        _channel_entries(variable, path),
         _entries(facts(variable.attributes), path),
         is_complex=variable.kind == "c",
         may_be_chosen=variable.is_series and variable.kind != "c",
@@ -117,11 +117,11 @@ def _entries(found: Mapping[str, object], path: Path) -> dict[str, Entry]:
     return {key: Entry(value, path) for key, value in found.items() if key in KEYS}
 
 
-def _said(variable: Variable, path: Path) -> dict[str, Entry]:
-    said = {key: variable.attributes[key] for key in CHANNEL_KEYS if key in variable.attributes}
+def _channel_entries(variable: Variable, path: Path) -> dict[str, Entry]:
+    stated = {key: variable.attributes[key] for key in CHANNEL_KEYS if key in variable.attributes}
     # A name such as force promises newtons in our own CSV alone.
-    unit = unit_in(variable) or ("" if variable.kind == "c" else UNSAID)
-    return {k: Entry(v, path) for k, v in {**said, "unit": unit}.items()}
+    unit = unit_in(variable) or ("" if variable.kind == "c" else UNIT_MISSING)
+    return {k: Entry(v, path) for k, v in {**stated, "unit": unit}.items()}
 
 
 def role(variable: Variable) -> Role:

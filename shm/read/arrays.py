@@ -1,19 +1,19 @@
-"""Named arrays, as HDF5, MATLAB, TDMS and NumPy files hold them, before they are loaded, and the
-one layout in which they are looked for and NumPy's are written.
+"""Describe the named arrays of HDF5, MATLAB, TDMS and NumPy files before they are loaded.
+
+This is the one layout that readers look for and that NumPy files are written in:
 
     force, acc_1, ...                     time records, N and m/s^2, float64 (samples,)
     frequency_hz                          of frequency responses, float64 (lines,)
     NAME, NAME_coherence                  accelerance, m/s^2/N, complex128; coherence, float64
-    hanger, time, temperature_c, sampling_rate_hz     of the whole, as far as they are known
+    hanger, time, temperature_c, sampling_rate_hz     of the recording, as far as they are known
     unit, plane, x_m, full_scale          of each channel, as far as they are known
 
-HDF5 and TDMS keep what belongs to the whole or to a channel as attributes (properties); NumPy and
+HDF5 and TDMS hold the facts of the recording and of a channel as attributes (properties); NumPy and
 MATLAB files as further arrays, NAME_unit and so on.
 """
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from shm.documents import format_time
 from shm.errors import UsageError
 from shm.read.base import names_in
-from shm.read.header import CHANNEL_KEYS, KEYS, mass_entries
+from shm.read.header import CHANNEL_KEYS, KEYS, known_values, mass_entries
 from shm.read.logger_words import ACCELERANCE, SI
 from shm.values import (
     Channel,
@@ -66,12 +66,12 @@ class Variable:
 
     @property
     def is_series(self) -> bool:
-        """Whether it can be a channel: numbers in one row."""
+        """Return whether it can be a channel: numbers in one row."""
         return self.kind in "iufc" and len(self.shape) == 1 and self.size > 1
 
     @property
     def is_fact(self) -> bool:
-        """Whether it is a single number or a short text."""
+        """Return whether it is a single number or a short text."""
         return self.size <= _MOST_TEXT if self.kind == "U" else self.size == 1
 
 
@@ -84,28 +84,28 @@ class Arrays:
     left_out: tuple[str, ...] = ()
 
 
-def arranged(arrays: Arrays) -> Arrays:
-    """The same with single numbers and texts as attributes, and tables as single rows.
+def flatten_tables(arrays: Arrays) -> Arrays:
+    """Return arrays with single numbers and texts as attributes, and tables as single rows.
 
-    `acc_1_unit` becomes the attribute `unit` of `acc_1`, other facts those of the whole. The rows
-    or columns of a table DATA, whichever are longer, become DATA_1, DATA_2, ...
+    `acc_1_unit` becomes the attribute `unit` of `acc_1`; other facts become general attributes.
+    The rows or columns of a table DATA, whichever are longer, become DATA_1, DATA_2, ...
     """
     facts = {v.name: _fact(v) for v in arrays.variables if v.is_fact}
     series = [part for v in arrays.variables if not v.is_fact for part in _parts(v)]
-    own = {v.name: own_facts(v.name, facts) for v in series}
-    taken = {f"{name}_{key}" for name, said in own.items() for key in said}
+    facts_of = {v.name: facts_about(v.name, facts) for v in series}
+    taken = {f"{name}_{key}" for name, about in facts_of.items() for key in about}
     general = {name: value for name, value in facts.items() if name not in taken}
-    variables = (replace(v, attributes={**own[v.name], **v.attributes}) for v in series)
+    variables = (replace(v, attributes={**facts_of[v.name], **v.attributes}) for v in series)
     return Arrays(tuple(variables), {**general, **arrays.attributes}, arrays.left_out)
 
 
-def own_facts(name: str, facts: Mapping[str, object]) -> dict[str, object]:
-    """What facts such as acc_1_unit say about acc_1."""
+def facts_about(name: str, facts: Mapping[str, object]) -> dict[str, object]:
+    """Return the facts about `name` by channel key: `acc_1_unit` is the unit of acc_1."""
     return {key: facts[f"{name}_{key}"] for key in CHANNEL_KEYS if f"{name}_{key}" in facts}
 
 
 def plain(value: object) -> object:
-    """An attribute as text, number or time; None for anything else."""
+    """Return an attribute as text, number or time; None for any other type."""
     if isinstance(value, np.ndarray):
         return plain(value.ravel()[0]) if value.size == 1 else None
     if isinstance(value, np.datetime64):
@@ -118,19 +118,19 @@ def plain(value: object) -> object:
 
 
 def attributes_of(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
-    """Attributes that have a plain value, by lower-case name."""
+    """Return attributes that have a plain value, by lower-case name."""
     found = {str(key).lower(): plain(value) for key, value in pairs}
     return {key: value for key, value in found.items() if value is not None}
 
 
-def natural(name: str) -> list[tuple[int, int, str]]:
-    """Sorts acc_2 before acc_10."""
+def natural_sort_key(name: str) -> list[tuple[int, int, str]]:
+    """Return a sort key that places acc_2 before acc_10."""
     pieces = re.split(r"(\d+)", name.lower())
     return [(1, int(p), "") if p.isdecimal() and p.isascii() else (0, 0, p) for p in pieces]
 
 
-def named_apart(paths: Sequence[tuple[str, ...]]) -> list[str]:
-    """The last part of each path where that is unique, else the path with slashes."""
+def unique_names(paths: Sequence[tuple[str, ...]]) -> list[str]:
+    """Return the last part of each path where that is unique, else the path with slashes."""
     last = [path[-1] for path in paths]
     return [path[-1] if last.count(path[-1]) == 1 else "/".join(path) for path in paths]
 
@@ -143,7 +143,7 @@ def _fact(variable: Variable) -> object:
 
 
 def _parts(variable: Variable) -> list[Variable]:
-    """The variable itself in one row, or the rows of a table."""
+    """Return the variable itself in one row, or the rows of a table."""
     lengths = [length for length in variable.shape if length != 1]
     if variable.kind not in "iufc" or len(lengths) < 2:
         shape = tuple(lengths) or (1,)
@@ -194,7 +194,7 @@ class Layout:
 
 
 def layout_of(described: Recording | FrequencyResponse) -> Layout:
-    """The arrays of a recording or of frequency responses.
+    """Return the arrays of a recording or of frequency responses.
 
     Raises UsageError for names that some program could not take or take apart.
     """
@@ -212,9 +212,9 @@ def layout_of(described: Recording | FrequencyResponse) -> Layout:
         **mass_entries(described.added_mass),
     }
     if isinstance(described, FrequencyResponse):
-        return Layout(_response(described), _known(known))
+        return Layout(_response(described), known_values(known))
     known["sampling_rate_hz"] = described.sampling_rate_hz
-    return Layout(tuple(map(_channel, described.channels)), _known(known))
+    return Layout(tuple(map(_channel, described.channels)), known_values(known))
 
 
 def _suffixes() -> tuple[str, ...]:
@@ -222,15 +222,15 @@ def _suffixes() -> tuple[str, ...]:
 
 
 def _channel(channel: Channel) -> NamedArray:
-    said = {"unit": SI[channel.quantity], **_place(channel), "full_scale": channel.full_scale}
-    return NamedArray(channel.name, channel.values, _known(said))
+    facts = {"unit": SI[channel.quantity], **_place(channel), "full_scale": channel.full_scale}
+    return NamedArray(channel.name, channel.values, known_values(facts))
 
 
 def _response(response: FrequencyResponse) -> tuple[NamedArray, ...]:
     arrays = [NamedArray(_FREQUENCY, response.frequency_hz, {"unit": "Hz"})]
     for row, point in enumerate(response.points):
-        said = _known({"unit": ACCELERANCE, **_place(point)})
-        arrays.append(NamedArray(point.name, response.accelerance[row], said))
+        facts = known_values({"unit": ACCELERANCE, **_place(point)})
+        arrays.append(NamedArray(point.name, response.accelerance[row], facts))
         if response.coherence is not None:
             arrays.append(NamedArray(f"{point.name}{_COHERENCE}", response.coherence[row], {}))
     return tuple(arrays)
@@ -238,11 +238,3 @@ def _response(response: FrequencyResponse) -> tuple[NamedArray, ...]:
 
 def _place(point: Channel | ResponsePoint) -> dict[str, str | float | None]:
     return {"plane": point.plane, "x_m": point.x_m}
-
-
-def _known(said: Mapping[str, str | float | None]) -> dict[str, str | float]:
-    return {
-        key: value
-        for key, value in said.items()
-        if value is not None and not (isinstance(value, float) and math.isnan(value))
-    }

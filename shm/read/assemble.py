@@ -87,12 +87,12 @@ def assemble(table: Table, described: Description | None = None) -> Recording | 
     if not found.used:
         raise _no_channel(found)
     _samples(found)
-    rate = _told_rate(found, with_times=False)
+    rate = _measured_rate(found, with_times=False)
     values = _rows(found.used, path)
     if found.times is not None:
         seconds = found.seconds * np.asarray(found.times.load(), float)
         values, by_times = on_even_grid(seconds, values, table.uneven(found.times))
-        rate = _beside_said(by_times, header, path)
+        rate = _unless_same(by_times, header, path)
     made = replace(recording(header, values, path, rate), source=table.source)
     possible = tuple(dict.fromkeys(each.time for each in table.possible_times))
     return made if made.time else replace(made, possible_times=possible)
@@ -106,14 +106,14 @@ def peek(table: Table, file_format: str) -> Peek:
         return Peek(table.source, file_format, (), 0, problems=(*problems, str(table.refusal)))
     found = attempt(lambda: describe(table), None)
     if found is None:
-        found = describe(table, with_beside=False)
+        found = describe(table, with_sidecars=False)
     header, path = found.header, table.path
     if found.is_response:
         listed = _listed_hz(found)
         look = _peeked_response(header, file_format, lambda: listed.load(), path, attempt)
     else:
         samples = attempt(lambda: _samples(found), 0)
-        rate = partial(_told_rate, found, with_times=True)
+        rate = partial(_measured_rate, found, with_times=True)
         look = _peeked(header, file_format, samples, rate, path, attempt)
         for column in found.used or table.columns:
             attempt(partial(_refuse_raw, column, header, path), None)
@@ -150,7 +150,7 @@ def _rows(used: Sequence[Column], path: Path) -> FloatArray:
     return np.array([column.load() for column in used], dtype=np.float64)
 
 
-def _told_rate(found: Description, *, with_times: bool) -> float:
+def _measured_rate(found: Description, *, with_times: bool) -> float:
     """Return the rate that the data tell, NaN where nothing does or it agrees with what is said.
 
     The times are loaded only where they are asked for and nothing else says the rate.
@@ -164,21 +164,21 @@ def _told_rate(found: Description, *, with_times: bool) -> float:
     if found.times is not None and with_times and math.isnan(header.sampling_rate_hz):
         seconds = found.seconds * np.asarray(found.times.load(), float)
         rate = rate_of(seconds, table.uneven(found.times))
-    return _beside_said(rate, header, table.path)
+    return _unless_same(rate, header, table.path)
 
 
-def _beside_said(rate_hz: float, header: Header, path: Path) -> float:
+def _unless_same(rate_hz: float, header: Header, path: Path) -> float:
     """Return a rate of times, NaN where it agrees with the one that the same file says.
 
     A column of times is rounded to its last digit, and a preamble's rate is the one that was set.
     """
-    entry, said = header.entries.get("sampling_rate_hz"), header.sampling_rate_hz
-    agree = abs(rate_hz - said) <= _ROUNDED * said
+    entry, stated_hz = header.entries.get("sampling_rate_hz"), header.sampling_rate_hz
+    agree = abs(rate_hz - stated_hz) <= _ROUNDED * stated_hz
     return NAN if agree and entry is not None and entry.file == path else rate_hz
 
 
 def _refuse_different_rates(found: Description) -> None:
-    path, told = found.table.path, found.header.entries.get("sampling_rate_hz")
+    path, stated_rate = found.table.path, found.header.entries.get("sampling_rate_hz")
     first = found.used[0] if found.used else None
     for column in found.used:
         if first is not None and str(column.rate_hz) != str(first.rate_hz):
@@ -191,7 +191,7 @@ def _refuse_different_rates(found: Description) -> None:
     silent = [column for column in found.used if math.isnan(column.rate_hz)]
     stated = [column.facts.get("sampling_rate_hz") for column in silent]
     rates = {entry.text if entry is not None else "" for entry in stated}
-    if len(rates) > 1 and (told is None or told.file == path):
+    if len(rates) > 1 and (stated_rate is None or stated_rate.file == path):
         raise BadInput(
             f"the channels have different sampling rates ({', '.join(sorted(rates))}).",
             file=path,
@@ -243,9 +243,9 @@ def _coherence(found: Description) -> FloatArray | None:
     """Return coherences (points, lines) where there is one for each response, else None."""
     known = {c.name: c for c in found.table.columns if not c.is_complex}
     wanted = []
-    for name, said in found.header.channels.items():
+    for name, stated in found.header.channels.items():
         wanted.append(
-            known.get(said["coherence"].text if "coherence" in said else f"{name}_coherence")
+            known.get(stated["coherence"].text if "coherence" in stated else f"{name}_coherence")
         )
     rows = [c for c in wanted if c is not None and c.size == found.used[0].size]
     whole = rows and len(rows) == len(wanted)
@@ -262,7 +262,9 @@ def recording(header: Header, values: FloatArray, path: Path, file_rate_hz: floa
     """
     look = _peeked(header, "", values.shape[1], lambda: file_rate_hz, path, strictly)
     rows = dict(zip(header.channels, values, strict=True))
-    channels = tuple(_channel(header, said, rows[said.name], path) for said in look.channels)
+    channels = tuple(
+        _channel(header, described, rows[described.name], path) for described in look.channels
+    )
     return Recording(str(path), channels, look.sampling_rate_hz, **header.of_test)
 
 
@@ -287,22 +289,23 @@ def _peeked(
 
 def checked_rate(header: Header, file_rate_hz: float, path: Path) -> float:
     """Return the sampling rate; raises BadInput where neither header nor data say it, or differ."""
-    said = header.sampling_rate_hz
-    if math.isnan(said) and math.isnan(file_rate_hz):
+    stated_hz = header.sampling_rate_hz
+    if math.isnan(stated_hz) and math.isnan(file_rate_hz):
         raise BadInput(
             "the sampling rate is missing.",
             file=path,
             remedy="Add a header line `# sampling_rate_hz: 512`, or to the sidecar"
             " sampling_rate_hz = 512, or say it once for this logger: `shm import FILE`.",
         )
-    if math.isnan(said):
+    if math.isnan(stated_hz):
         return file_rate_hz
-    if abs(file_rate_hz - said) > _SAME_RATE * said:
+    if abs(file_rate_hz - stated_hz) > _SAME_RATE * stated_hz:
         raise header.entries["sampling_rate_hz"].refusal(
-            f"sampling_rate_hz = {said:g}, but the times in the data give {file_rate_hz:.6g} Hz.",
+            f"sampling_rate_hz = {stated_hz:g}, but the times in the data give"
+            f" {file_rate_hz:.6g} Hz.",
             "Correct the one that is wrong.",
         )
-    return said
+    return stated_hz
 
 
 def refuse_quantities(quantities: Sequence[str], path: Path) -> None:
@@ -349,14 +352,16 @@ def _refuse_few(count: int, what: str, path: Path) -> None:
         )
 
 
-def _channel(header: Header, said: PeekChannel, raw: FloatArray, path: Path) -> Channel:
-    quantity, unit = header.quantity_and_unit(said.name)
-    calibration = 1.0 if math.isnan(said.calibration) else said.calibration
+def _channel(header: Header, described: PeekChannel, raw: FloatArray, path: Path) -> Channel:
+    quantity, unit = header.quantity_and_unit(described.name)
+    calibration = 1.0 if math.isnan(described.calibration) else described.calibration
     with np.errstate(invalid="ignore"):
         values = raw * (unit.si * calibration)
-    refuse_implausible(values, said.name, path)
-    scale, states_unit = said.full_scale * unit.si, header.says(said.name, "unit")
-    return Channel(said.name, quantity, values, said.plane, said.x_m, scale, states_unit)
+    refuse_implausible(values, described.name, path)
+    scale, states_unit = described.full_scale * unit.si, header.has_entry(described.name, "unit")
+    return Channel(
+        described.name, quantity, values, described.plane, described.x_m, scale, states_unit
+    )
 
 
 def _peek_channel(header: Header, name: str, attempt: Attempt) -> PeekChannel:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def replace_file(path: Path, write: Callable[[Path], None]) -> None:
-    """Lets `write` fill a hidden file beside `path`, then renames it to `path`."""
+    """Let `write` fill a hidden file in the folder of `path`, then rename it to `path`."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     temporary.unlink(missing_ok=True)
     try:
@@ -19,7 +19,7 @@ def replace_file(path: Path, write: Callable[[Path], None]) -> None:
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Writes a text as UTF-8 with plain line ends, whole or not at all."""
+    """Write a text as UTF-8 with plain line ends; an interrupted write leaves the old file."""
     content = text.encode("utf-8")
     replace_file(path, lambda temporary: _fill(temporary, content))
 

@@ -1,8 +1,7 @@
-"""What a format is, and what a look into a file gives: its headers, and every column of it before
-anybody has said what it does not say.
+"""Define what a format is, and what a look into a file returns: its headers and all its columns.
 
-Files of one logger have one layout: the words of its heading and of its columns, not what they hold
-this time. By its fingerprint a logger's profile is found (`shm.read.profiles`).
+Files of one logger have one layout: the words of the heading and of the columns, without their
+values. The fingerprint of the layout finds the logger's profile (`shm.read.profiles`).
 """
 
 from __future__ import annotations
@@ -99,7 +98,7 @@ def at_once(
 
 
 def names_in(described: Recording | FrequencyResponse) -> list[str]:
-    """The names of the channels, or of the points of frequency responses."""
+    """Return the names of the channels, or of the points of frequency responses."""
     if isinstance(described, FrequencyResponse):
         return [point.name for point in described.points]
     return [channel.name for channel in described.channels]
@@ -161,7 +160,7 @@ class Layout:
     format: str
     columns: tuple[str, ...]
     hanger: int | None = None
-    says_rate: bool = False
+    has_rate: bool = False
     day_order: DayOrder | None = None
     possible_times: tuple[PossibleTime, ...] = ()
     local_time: datetime | None = None

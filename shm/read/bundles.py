@@ -15,14 +15,14 @@ from pathlib import Path, PurePosixPath
 from typing import TypeVar
 
 from shm.errors import BadInput, UsageError
-from shm.read.arrays import natural
+from shm.read.arrays import natural_sort_key
 from shm.read.atomic import replace_file
 from shm.read.content import MOST_MEMBERS, checked_members, refusal, unpack, unpacking_folder
 from shm.read.header import CHANNEL_KEYS, Entry, Header
 from shm.read.limits import guarded, limits
 from shm.read.sidecar import (
     SIDECAR_SUFFIX,
-    document_beside,
+    sidecar_document,
     sidecar_path,
     sidecar_text,
     with_sidecar,
@@ -40,7 +40,7 @@ T = TypeVar("T")
 
 
 def holds_test(path: Path) -> bool:
-    """Whether a name is that of an archive with the files of one test."""
+    """Return whether a name is that of an archive with the files of one test."""
     return path.suffix.lower() == SUFFIX
 
 
@@ -56,7 +56,7 @@ def unpacked(path: Path) -> Iterator[tuple[Path, ...]]:
         with guarded(path, "the archive"), zipfile.ZipFile(path) as archive:
             files = _unpack_all(archive, members, folder)
         sidecars = {file for file in files if file.suffix == SIDECAR_SUFFIX}
-        recordings = sorted(set(files) - sidecars, key=lambda file: natural(str(file)))
+        recordings = sorted(set(files) - sidecars, key=lambda file: natural_sort_key(str(file)))
         _refuse_alone(sidecars, recordings, path)
         if not recordings:
             raise BadInput(
@@ -64,11 +64,11 @@ def unpacked(path: Path) -> Iterator[tuple[Path, ...]]:
                 file=path,
                 remedy="Pack the files of one test with `shm ingest --together`.",
             )
-        shared = {key: v for key, v in document_beside(path).items() if key in _OF_EACH}
+        shared = {key: v for key, v in sidecar_document(path).items() if key in _OF_EACH}
         for file in recordings if shared else ():
-            own = document_beside(file)
-            tables = {**shared.get("channel", {}), **own.get("channel", {})}
-            text = sidecar_text({**shared, **own, "channel": tables})
+            of_file = sidecar_document(file)
+            tables = {**shared.get("channel", {}), **of_file.get("channel", {})}
+            text = sidecar_text({**shared, **of_file, "channel": tables})
             sidecar_path(file).write_text(text, encoding="utf-8")
         yield tuple(recordings)
 
@@ -93,17 +93,17 @@ def _start_of_phyphox(path: Path) -> dict[str, Entry]:
 
 
 def each_member(path: Path, verb: Callable[[Path, str], T]) -> tuple[T, ...]:
-    """What `verb` gives for each recording of an archive and its name to the outside."""
+    """Return the results of `verb` for each recording of an archive and its member name."""
     with unpacked(path) as files:
         return tuple(verb(file, str(path / file.name)) for file in files)
 
 
 def entries_of_test(path: Path) -> Header:
-    """What the sidecar of the archive says of the whole test.
+    """Return the header that the sidecar of an archive gives for the complete test.
 
-    Raises BadInput where it lists something of channels by their order.
+    Raises BadInput for lists of channel values, as their order is undefined in an archive.
     """
-    for key in document_beside(path).keys() & {*CHANNEL_KEYS}:
+    for key in sidecar_document(path).keys() & {*CHANNEL_KEYS}:
         raise BadInput(
             f"{key!r} is said of a whole test.",
             file=sidecar_path(path),
@@ -115,11 +115,11 @@ def entries_of_test(path: Path) -> Header:
 
 
 def bundle(paths: Sequence[Path], archive: Path) -> Path:
-    """Writes the files of one test, with their sidecars, to a .zip, whole or not at all.
+    """Write the files of one test, with their sidecars, to a .zip, and return its path.
 
-    Gives the path of the archive.
-    The same files give the same bytes: names are sorted, times fixed and nothing is compressed.
-    Raises UsageError for two files of one name, an archive among them, or too many.
+    The same files give the same bytes: names are sorted, times fixed, contents stored
+    uncompressed. An interrupted write leaves no archive. Raises UsageError for two files of one
+    name, an archive among them, or too many.
     """
     files = sorted({*paths, *(s for p in paths if (s := sidecar_path(p)).is_file() and s != p)})
     names = [file.name for file in files]
@@ -146,7 +146,10 @@ def _pack(files: Sequence[Path], target: Path) -> None:
 def _unpack_all(
     archive: zipfile.ZipFile, members: Sequence[zipfile.ZipInfo], folder: Path
 ) -> list[Path]:
-    """All members in one folder; raises BadInput where two have one name or all are too large."""
+    """Unpack all members into one folder and return their paths.
+
+    Raises BadInput where two have one name or all are too large.
+    """
     files: list[Path] = []
     left = limits().bytes_at_once
     for member in members:

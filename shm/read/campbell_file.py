@@ -16,8 +16,8 @@ from shm.errors import BadInput
 from shm.read.base import Format, at_once
 from shm.read.header import Entry
 from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples, too_large
-from shm.read.logger_heading import unlike
-from shm.read.logger_text import is_measured, said_of
+from shm.read.logger_heading import distinct_names
+from shm.read.logger_text import is_measured, stated_entries
 from shm.read.logger_words import hanger_numbered, name_and_unit
 from shm.read.table import Column, Role, Table
 from shm.values import FloatArray
@@ -47,7 +47,7 @@ def open_tables(path: Path) -> tuple[Table, ...]:
     refuse_large((len(seconds), min(len(named), _MOST_COLUMNS)), 8, "", path)
     places = [place for place, name in enumerate(named) if name.lower() not in _NUMBERS]
     split = [name_and_unit(named[place]) for place in places[:_MOST_COLUMNS]]
-    names = unlike([name for name, _ in split])
+    names = distinct_names([name for name, _ in split])
     columns = [
         _column(name, unit, _values(frame.iloc[:, place]), path)
         for name, (_, unit), place in zip(names, split, places, strict=False)
@@ -64,8 +64,8 @@ def open_tables(path: Path) -> tuple[Table, ...]:
 
 def _column(name: str, unit: str, values: FloatArray, path: Path) -> Column:
     role: Role = "channel" if is_measured(name, unit, None) else "other"
-    said = said_of(name, unit, None, None, path)
-    return Column(name, len(values), values.copy, unit, role, said)
+    stated = stated_entries(name, unit, None, None, path)
+    return Column(name, len(values), values.copy, unit, role, stated)
 
 
 def _values(series: Any) -> FloatArray:

@@ -62,7 +62,7 @@ class _Header:
 
 
 def chunk_document(chunk: Chunk) -> bytes:
-    """A chunk as the bytes that a logger sends."""
+    """Return a chunk as the bytes that a logger sends."""
     names = ("stream", "sequence", "sampling_rate_hz", "channels", "temperature_c", "wind_m_s")
     header = {"schema": CHUNK_SCHEMA, "time": chunk.start, "encoding": "float32"}
     header |= {name: getattr(chunk, name) for name in names}
@@ -72,12 +72,12 @@ def chunk_document(chunk: Chunk) -> bytes:
 
 
 def numbered(sequence: int) -> str:
-    """A chunk as people know it: by its number, if a logger gave it one."""
+    """Return a chunk as people know it: by its number, if a logger gave it one."""
     return "a file's chunk" if sequence >= BY_TIME else f"chunk {sequence}"
 
 
 def refuse_long_chunk(size_bytes: int, most_bytes: int = LARGEST_BYTES) -> None:
-    """Raises TooLarge for a chunk of more bytes than are taken."""
+    """Raise TooLarge for a chunk of more bytes than are taken."""
     if size_bytes > most_bytes:
         raise TooLarge(
             f"a chunk of {size_bytes} bytes is more than the {most_bytes} that are taken.",
@@ -87,7 +87,7 @@ def refuse_long_chunk(size_bytes: int, most_bytes: int = LARGEST_BYTES) -> None:
 
 
 def parse_chunk(content: bytes) -> Chunk:
-    """The chunk of such bytes; raises BadInput that says what is wrong."""
+    """Return the chunk that such bytes encode; raises BadInput with the error."""
     header, body = _header(content)
     _refuse_header(header)
     channels, values = _samples(header, body)
@@ -97,9 +97,9 @@ def parse_chunk(content: bytes) -> Chunk:
             f"it has {values.shape[1]} samples, which is none or over ten minutes",
             f"Send 1 to {LONGEST.total_seconds() * rate:.0f} samples of each channel.",
         )
-    told = header.temperature_c, header.wind_m_s, header.event[:_LONGEST_EVENT]
+    conditions = header.temperature_c, header.wind_m_s, header.event[:_LONGEST_EVENT]
     start = header.time
-    return Chunk(header.stream, header.sequence, start, rate, channels, values, *told)
+    return Chunk(header.stream, header.sequence, start, rate, channels, values, *conditions)
 
 
 def _refuse_header(header: _Header) -> None:
@@ -166,9 +166,9 @@ def _samples(header: _Header, body: bytes) -> tuple[tuple[str, ...], NDArray[np.
     else:
         rows = [_of_list(header, name) for name in channels]
         if len({len(row) for row in rows}) > 1:
-            told = ", ".join(f"{n} has {len(r)}" for n, r in zip(channels, rows, strict=True))
+            counts = ", ".join(f"{n} has {len(r)}" for n, r in zip(channels, rows, strict=True))
             raise _wrong(
-                f"its values are not as many of each channel: {told}",
+                f"its values are not as many of each channel: {counts}",
                 "Write null for a missing one.",
             )
         values = np.array(rows)
@@ -189,7 +189,7 @@ def _of_body(body: bytes, channels: int) -> NDArray[np.float32]:
 
 
 def _of_list(header: _Header, channel: str) -> FloatArray:
-    """The numbers of a channel; null and NaN are missing ones."""
+    """Return the numbers of a channel; null and NaN are missing ones."""
     found = header.values[channel]
     for place, value in enumerate(found):
         if not (value is None or (isinstance(value, int | float) and not isinstance(value, bool))):

@@ -83,7 +83,7 @@ def open_text(text: str, path: Path, preamble: Sequence[str] = ()) -> tuple[Tabl
     at = next((i for i, line in enumerate(lines[:_FREE_LINES]) if _names_frequency(line)), None)
     if at is not None:
         return (_Text(lines, path, at).responses(),)
-    logged = None if logger_text.is_ours(text) else logger_text.table_in(text, path, preamble)
+    logged = None if logger_text.is_shm_csv(text) else logger_text.table_in(text, path, preamble)
     return (logged if logged is not None else _Text(lines, path).record(),)
 
 
@@ -115,11 +115,11 @@ class _Text:
         rows = cache(partial(self._numbers, body))  # a peek does without, but for times
         columns = []
         for at, name in enumerate(self.names):
-            said = header.channels.get(name, {})
-            unit = said["unit"].text if "unit" in said else ""
+            stated = header.channels.get(name, {})
+            unit = stated["unit"].text if "unit" in stated else ""
             role: Role = "times" if timed and at == 0 else "channel"
             load = partial(lambda at: rows()[at], at)
-            columns.append(Column(name, len(body), load, unit, role, said))
+            columns.append(Column(name, len(body), load, unit, role, stated))
         return Table(
             self.path,
             tuple(columns),
@@ -140,18 +140,18 @@ class _Text:
             cells = [cell for cell in cells_of(self.lines[i], self.mark) if cell]
             if len(cells) > 1 and cells[0] == "Hz":
                 unit = {"unit": Entry(cells[1], self.path, i + 1)}
-                channels = {name: {**unit, **said} for name, said in header.channels.items()}
+                channels = {name: {**unit, **stated} for name, stated in header.channels.items()}
                 header = Header(self.path, channels, header.entries)
         rows = self._numbers(self._body(body))
         columns = [Column(self.names[0], rows[0].size, rows[0].copy, "Hz", "frequencies")]
-        for name, own in places.items():
-            values = rows[own["real"]] + 1j * rows[own["imaginary"]]
-            said = header.channels[name]
+        for name, parts in places.items():
+            values = rows[parts["real"]] + 1j * rows[parts["imaginary"]]
+            stated = header.channels[name]
             columns.append(
-                Column(name, values.size, values.copy, "", "response", said, is_complex=True)
+                Column(name, values.size, values.copy, "", "response", stated, is_complex=True)
             )
-            if "coherence" in own:
-                share, both = rows[own["coherence"]], f"{name}_coherence"
+            if "coherence" in parts:
+                share, both = rows[parts["coherence"]], f"{name}_coherence"
                 columns.append(Column(both, share.size, share.copy, "", "coherence"))
         return Table(
             self.path, tuple(columns), header.entries, tuple(places), problems=remarks,
@@ -159,7 +159,7 @@ class _Text:
         )  # fmt: skip
 
     def _points(self) -> dict[str, dict[str, int]]:
-        """The columns of each point; a point without a name is point_1, point_2, ..."""
+        """Return the columns of each point; a point without a name is point_1, point_2, ..."""
         places: dict[str, dict[str, int]] = {}
         for place, column in enumerate(self.names[1:], start=1):
             found = _PART.fullmatch(column)
@@ -167,11 +167,11 @@ class _Text:
                 raise self._no_response(f"the column {column!r} is no part of a response")
             part = _PARTS[found[2].lower()]
             nameless = sum(name.startswith("point_") for name in places) + (part == "real")
-            own = places.setdefault(found[1] or f"point_{nameless}", {})
-            if part in own:
+            parts = places.setdefault(found[1] or f"point_{nameless}", {})
+            if part in parts:
                 raise self._no_response(f"the column {column!r} stands twice")
-            own[part] = place
-        if not all({"real", "imaginary"} <= set(own) for own in places.values()):
+            parts[part] = place
+        if not all({"real", "imaginary"} <= set(parts) for parts in places.values()):
             raise self._no_response("a real or an imaginary part is missing")
         return places
 
@@ -185,7 +185,7 @@ class _Text:
                 raise self._refusal(what, "Give each column its own name", self.at, name)
 
     def _header(self, names: Sequence[str]) -> tuple[Header, tuple[str, ...]]:
-        """What the lines before the names say, and remarks on keys not known."""
+        """Return the header of the lines above the names, and remarks on unknown keys."""
         channels: dict[str, dict[str, Entry]] = {name: {} for name in names}
         keys = {f"{a}{dot}{b}": (n, k) for n in names for k in CHANNEL_KEYS for dot in "._ "
                 for a, b in ((n.lower(), k), (k, n.lower()))}  # fmt: skip
@@ -207,19 +207,19 @@ class _Text:
                 for name, each in spread(key, listed, names, entry).items():
                     channels[name][key] = each
             elif key in keys:
-                name, own = keys[key]
-                channels[name][own] = entry
+                name, channel_key = keys[key]
+                channels[name][channel_key] = entry
             else:
                 remarks.append(f"line {line}: {key!r} is not a key of recordings; left out.")
         return Header(self.path, channels, entries), tuple(remarks)
 
     def _body(self, start: int) -> list[tuple[int, str]]:
-        """The lines with numbers, each with its number."""
+        """Return the lines with numbers, each with its number."""
         body = [(i + 1, self.lines[i]) for i in range(start, len(self.lines))]
         return [(i, line) for i, line in body if line.strip(" \t\x1a") and not _is_remark(line)]
 
     def _numbers(self, body: list[tuple[int, str]]) -> FloatArray:
-        """All columns (columns, rows), empty cells as NaN."""
+        """Return all columns (columns, rows), empty cells as NaN."""
         if self.mark != ",":
             body = [(i, line.replace(",", ".")) for i, line in body]
         lines = [line for _, line in body]
@@ -290,32 +290,32 @@ def _write(described: Recording | FrequencyResponse, path: Path) -> None:
 
 
 def recording_text(recording: Recording) -> str:
-    """Rows of nine digits, one more than a 24-bit converter gives."""
+    """Return rows of nine digits, one more than a 24-bit converter gives."""
     channels = recording.channels
-    said = {
+    facts = {
         "sampling_rate_hz": recording.sampling_rate_hz,
         **_places(channels),
         "unit": [SI[c.quantity] if c.states_unit else "" for c in channels],
         "full_scale": [channel.full_scale for channel in channels],
     }
-    return _text(recording, said, {c.name: c.values for c in channels}, "%.9g")
+    return _text(recording, facts, {c.name: c.values for c in channels}, "%.9g")
 
 
 def response_text(response: FrequencyResponse) -> str:
-    """A column of frequencies, then of each point real and imaginary part and coherence."""
+    """Return a column of frequencies, then of each point real and imaginary part and coherence."""
     columns = {"frequency": response.frequency_hz}
     for row, point in enumerate(response.points):
         columns[f"{point.name}_real"] = response.accelerance[row].real
         columns[f"{point.name}_imaginary"] = response.accelerance[row].imag
         if response.coherence is not None:
             columns[f"{point.name}_coherence"] = response.coherence[row]
-    said = {**_places(response.points), "unit": [ACCELERANCE] * len(response.points)}
-    return _text(response, said, columns, "%.15g")
+    facts = {**_places(response.points), "unit": [ACCELERANCE] * len(response.points)}
+    return _text(response, facts, columns, "%.15g")
 
 
 def _text(
     described: Recording | FrequencyResponse,
-    said: Mapping[str, object],
+    facts: Mapping[str, object],
     columns: Mapping[str, FloatArray],
     digits: str,
 ) -> str:
@@ -324,10 +324,12 @@ def _text(
         "time": format_time(described.time),
         "temperature_c": described.temperature_c,
         **mass_entries(described.added_mass),
-        **said,
+        **facts,
     }
     head = [
-        f"# {key}: {text}\n" for key, value in whole.items() if (text := _said(value)).strip(", ")
+        f"# {key}: {text}\n"
+        for key, value in whole.items()
+        if (text := _as_text(value)).strip(", ")
     ]
     rows = np.column_stack(list(columns.values()))
     row = ",".join([digits] * len(columns)) + "\n"
@@ -339,10 +341,10 @@ def _places(points: Sequence[Channel] | Sequence[ResponsePoint]) -> dict[str, ob
     return {"plane": [point.plane for point in points], "x_m": [point.x_m for point in points]}
 
 
-def _said(value: object) -> str:
-    """A value, or one a column, as text; what is not known is empty."""
+def _as_text(value: object) -> str:
+    """Return a value, or a list of one for each column, as text; empty where unknown."""
     if isinstance(value, list):
-        return ", ".join(map(_said, value))
+        return ", ".join(map(_as_text, value))
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     return repr(float(value)) if isinstance(value, float) else str(value)

@@ -1,5 +1,6 @@
-"""The bytes of a file: there at all, of the kind its name says, unpacked with nothing believed that
-headers of ZIP archives say, and as text.
+"""Read the bytes of a file: check that it exists and is of its kind, unpack it, decode text.
+
+Nothing that the headers of ZIP archives state is relied on.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ _PACK_AGAIN = "Pack the plain files of one test anew."
 
 
 def head_of(path: Path) -> bytes:
-    """The first bytes of a file; raises BadInput where it cannot be read or is empty."""
+    """Return the first bytes of a file; raises BadInput where it cannot be read or is empty."""
     head = _bytes(path, _HEAD_BYTES)
     if not head.strip():
         raise BadInput("the file is empty.", file=path, remedy="Export or send it again.")
@@ -59,7 +60,7 @@ def head_of(path: Path) -> bytes:
 
 
 def unreadable(path: Path, error: OSError) -> BadInput:
-    """The refusal of a file that the system does not hand out."""
+    """Return the refusal of a file that the system does not hand out."""
     reason = error.strerror or str(error)
     return BadInput(f"cannot be read: {reason}.", file=path, remedy="Check path and permissions.")
 
@@ -67,7 +68,7 @@ def unreadable(path: Path, error: OSError) -> BadInput:
 def refuse_unreadable_suffix(
     path: Path, suffixes: list[str], recognised: Format | None
 ) -> BadInput:
-    """The refusal of a file whose suffix belongs to no format."""
+    """Return the refusal of a file whose suffix belongs to no format."""
     suffix = f"the suffix {path.suffix}" if path.suffix else "a name without suffix"
     remedy = f"Export as one of {', '.join(suffixes)}."
     if recognised is not None:
@@ -78,7 +79,7 @@ def refuse_unreadable_suffix(
 def refuse_unless_readable(
     path: Path, head: bytes, claimed: Format, recognised: Format | None
 ) -> None:
-    """Raises BadInput where the first bytes are not of the format that the suffix claims."""
+    """Raise BadInput where the first bytes are not of the format that the suffix claims."""
     known = next((what for magic, what in _MAGIC if head.startswith(magic)), None)
     if recognised is not None and recognised.recognises is not is_text:
         known = None
@@ -97,14 +98,14 @@ def refuse_unless_readable(
 
 
 def is_text(head: bytes) -> bool:
-    """Whether the first bytes of a file are text, that is, hold no control characters."""
+    """Return whether the first bytes of a file are text, that is, hold no control characters."""
     if head.startswith(_UTF16) or _unmarked_utf16(head):
         return True
     return not any(byte < 32 and byte not in _TEXT_CONTROLS for byte in head)
 
 
 def text_of(path: Path) -> str:
-    """A whole file as text: UTF-8, UTF-16 with a mark, or else Western European (for m/s²)."""
+    """Return a file as text: UTF-8, UTF-16 with a mark, or else Western European (for m/s²)."""
     content = bytes_of(path)
     try:
         if content.startswith(_UTF16):
@@ -128,7 +129,7 @@ def cells_of(line: str, mark: str) -> list[str]:
 
 
 def _unmarked_utf16(head: bytes) -> str | None:
-    """The encoding of a text in UTF-16 without its mark: every other byte is zero."""
+    """Return the encoding of a text in UTF-16 without its mark: every other byte is zero."""
     even, odd = head[: len(head) // 2 * 2 : 2], head[1::2]
     if len(odd) < 8 or len(odd) != len(even):
         return None
@@ -140,7 +141,7 @@ def _unmarked_utf16(head: bytes) -> str | None:
 
 
 def bytes_of(path: Path) -> bytes:
-    """A whole file, unpacked where it is gzipped; raises BadInput where it cannot be read."""
+    """Return the bytes of a file, unpacked if gzipped; raises BadInput where it cannot be read."""
     most = limits().bytes_at_once
     content = _bytes(path, most + 1)
     if len(content) > most:
@@ -149,13 +150,13 @@ def bytes_of(path: Path) -> bytes:
 
 
 def is_gzipped(path: Path) -> bool:
-    """Whether a name claims a gzipped file, as NAME.csv.gz does."""
+    """Return whether a name claims a gzipped file, as NAME.csv.gz does."""
     return path.suffix.lower() == ".gz"
 
 
 @contextmanager
 def plain_file(path: Path, content: bytes) -> Iterator[Path]:
-    """The file itself or, where it is gzipped, a file of its unpacked content for a while."""
+    """Yield the file itself or, where it is gzipped, a file of its unpacked content for a while."""
     if not is_gzipped(path):
         yield path
         return
@@ -167,7 +168,7 @@ def plain_file(path: Path, content: bytes) -> Iterator[Path]:
 
 
 def _bytes(path: Path, most: int) -> bytes:
-    """At most so many bytes of a file, unpacked where its name ends in .gz."""
+    """Return at most so many bytes of a file, unpacked where its name ends in .gz."""
     try:
         with gzip.open(path) if is_gzipped(path) else path.open("rb") as stream:
             return bytes(stream.read(most))
@@ -184,7 +185,7 @@ _given: ContextVar[Path | None] = ContextVar("given", default=None)
 
 @contextmanager
 def unpacking_in(folder: Path | None) -> Iterator[None]:
-    """Whatever is unpacked within the context goes into a folder that somebody else removes."""
+    """Unpack everything within the context into a folder that the caller removes."""
     before = _given.set(folder)
     try:
         yield
@@ -194,7 +195,7 @@ def unpacking_in(folder: Path | None) -> Iterator[None]:
 
 @contextmanager
 def unpacking_folder() -> Iterator[Path]:
-    """A new folder to unpack in, which goes with the context unless somebody else removes it."""
+    """Yield a new folder to unpack in, removed with the context unless the caller removes it."""
     given = _given.get()
     if given is not None:
         yield Path(tempfile.mkdtemp(dir=given))
@@ -204,10 +205,10 @@ def unpacking_folder() -> Iterator[Path]:
 
 
 def checked_members(path: Path) -> list[zipfile.ZipInfo]:
-    """The files in an archive, hidden ones left out; raises BadInput naming the member at fault.
+    """Return the files in an archive, without hidden ones.
 
-    Refused: too many members, paths that lead outside, links, encryption, archives in the archive,
-    two members of one name.
+    Raises BadInput naming the member at fault. Refused: too many members, paths that lead
+    outside, links, encryption, archives in the archive, two members of one name.
     """
     if path.stat().st_size > limits().bytes_at_once:
         raise too_large(path)
@@ -224,7 +225,7 @@ def checked_members(path: Path) -> list[zipfile.ZipInfo]:
 
 
 def unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo, target: Path, left: int) -> int:
-    """Writes a member to a file, and gives its size; raises BadInput beyond `left` bytes.
+    """Write a member to a file, and return its size; raises BadInput beyond `left` bytes.
 
     What comes out is counted; the sizes in the archive's headers are not believed.
     """
@@ -240,7 +241,7 @@ def unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo, target: Path, left
 
 
 def refusal(member: str, what: str, path: Path) -> BadInput:
-    """The refusal of an archive for one of its members."""
+    """Return the refusal of an archive for one of its members."""
     return BadInput(f"the member {member!r} {what}.", file=path, remedy=_PACK_AGAIN)
 
 
@@ -265,6 +266,6 @@ def _leads_outside(name: str) -> bool:
 
 
 def _is_hidden(name: str) -> bool:
-    """What systems add by themselves: .DS_Store, __MACOSX/..."""
+    """Return whether the operating system added the member: .DS_Store, __MACOSX/..."""
     parts = PurePosixPath(name.replace("\\", "/")).parts
     return any(part.startswith(".") or part == "__MACOSX" for part in parts)

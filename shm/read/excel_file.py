@@ -24,12 +24,12 @@ _SHARE_OF_LARGEST = 0.5  # judgement: a sheet of half as many rows holds a recor
 
 
 def recognises(head: bytes) -> bool:
-    """Whether the first bytes of a file are those of an office document."""
+    """Return whether the first bytes of a file are those of an office document."""
     return head.startswith(b"PK\x03\x04") and any(part in head for part in _PARTS)
 
 
 def text_of_workbook(path: Path) -> tuple[str, tuple[str, ...]]:
-    """The sheet of numbers as tab-separated lines, and the lines of all smaller sheets.
+    """Return the sheet of numbers as tab-separated lines, and the lines of all smaller sheets.
 
     Raises BadInput where several sheets hold numbers, or where the workbook is damaged.
     """

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from shm.errors import BadInput
 from shm.read.array_reading import format_of_arrays
-from shm.read.arrays import Arrays, Variable, attributes_of, named_apart, natural
+from shm.read.arrays import Arrays, Variable, attributes_of, natural_sort_key, unique_names
 from shm.read.limits import guarded, refuse_large
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -53,7 +53,7 @@ def _opened(path: Path) -> Iterator[Arrays]:
 
 
 def _general(nodes: list[Node]) -> dict[str, object]:
-    """Attributes of the groups, those nearest to the root first."""
+    """Return the attributes of the groups; those closest to the root take precedence."""
     groups = sorted((n for n in nodes if n.dataset is None), key=lambda n: -len(n.path))
     return {key: value for group in groups for key, value in group.attributes.items()}
 
@@ -72,7 +72,7 @@ class Node:
 
 @contextmanager
 def opened_nodes(path: Path) -> Iterator[list[Node]]:
-    """All groups and datasets of a file; raises BadInput for what could lead out of it."""
+    """Yield all groups and datasets of a file; raises BadInput for links and external storage."""
     with guarded(path, "the HDF5 file"):
         file = h5py.File(path, "r", locking=False)
     with file:
@@ -82,9 +82,9 @@ def opened_nodes(path: Path) -> Iterator[list[Node]]:
 
 
 def variables(nodes: list[Node]) -> tuple[Variable, ...]:
-    """The datasets of nodes, named by their last part where that is unique."""
+    """Return the datasets of nodes, named by their last part where that is unique."""
     found = [node for node in nodes if node.dataset is not None]
-    names = named_apart([node.path for node in found])
+    names = unique_names([node.path for node in found])
     return tuple(_variable(name, node) for name, node in zip(names, found, strict=True))
 
 
@@ -108,16 +108,16 @@ def _walk(
 
 
 def _ordered(group: h5g.GroupID) -> list[bytes]:
-    """The names in a group: as created where the file knows, else acc_2 before acc_10."""
+    """Return the names in a group: as created where the file knows, else acc_2 before acc_10."""
     names = list(group)
     links = {name: group.links.get_info(name) for name in names}
     if names and all(link.corder_valid for link in links.values()):
         return sorted(names, key=lambda name: links[name].corder)
-    return sorted(names, key=lambda name: natural(name.decode("utf-8", errors="replace")))
+    return sorted(names, key=lambda name: natural_sort_key(name.decode("utf-8", errors="replace")))
 
 
 def _refuse_storage(dataset: h5d.DatasetID, place: tuple[str, ...], path: Path) -> None:
-    """Raises BadInput for data that stand elsewhere, foreign filters, and impossible sizes."""
+    """Raise BadInput for data in other files, foreign filters, and impossible sizes."""
     made = dataset.get_create_plist()
     if made.get_layout() == h5d.VIRTUAL or made.get_external_count():
         raise _refusal(place, "takes its data from other files", path)
@@ -130,7 +130,7 @@ def _refuse_storage(dataset: h5d.DatasetID, place: tuple[str, ...], path: Path) 
 
 
 def _attributes(owner: h5g.GroupID | h5d.DatasetID) -> dict[str, object]:
-    """Small attributes that are numbers or texts."""
+    """Return the small attributes that are numbers or texts."""
     manager = h5py.AttributeManager(h5py.Group(owner) if isinstance(owner, h5g.GroupID)
                                     else h5py.Dataset(owner))  # fmt: skip
     return attributes_of((name, manager[name]) for name in manager if _is_small(manager, name))

@@ -1,4 +1,4 @@
-"""What a file and its sidecar say about a recording, each entry with the place where it says so."""
+"""Collect the entries of a file and its sidecar about a recording, each with its file and line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,15 @@ from typing import Any
 
 from shm.documents import parse_time
 from shm.errors import BadInput
-from shm.read.logger_words import ACCELERANCE, KNOWN, SI, UNSAID, Unit, accelerance_si, unit_of
+from shm.read.logger_words import (
+    ACCELERANCE,
+    KNOWN,
+    SI,
+    UNIT_MISSING,
+    Unit,
+    accelerance_si,
+    unit_of,
+)
 from shm.values import NAN, PLANES, AddedMass, Plane, Quantity, outdoor_c
 
 KEYS = (
@@ -56,16 +64,17 @@ class Header:
     channels: Mapping[str, Mapping[str, Entry]]
     entries: Mapping[str, Entry] = field(default_factory=dict)
 
-    def overridden_by(self, other: Header) -> Header:
-        """This header with what `other` says in its place."""
+    def merged_with(self, other: Header) -> Header:
+        """Return this header with the entries of `other` in place of its equal keys."""
         channels = {
-            name: {**own, **other.channels.get(name, {})} for name, own in self.channels.items()
+            name: {**stated, **other.channels.get(name, {})}
+            for name, stated in self.channels.items()
         }
         return Header(self.file, channels, {**self.entries, **other.entries})
 
     @property
     def of_test(self) -> dict[str, Any]:
-        """What it says of the whole test: hanger, time, temperature, known mass."""
+        """Return the entries about the complete test: hanger, time, temperature, known mass."""
         return {key: getattr(self, key) for key in OF_TEST}
 
     @property
@@ -137,7 +146,7 @@ class Header:
         return rate
 
     def quantity_and_unit(self, name: str) -> tuple[Quantity, Unit]:
-        """What a channel measures, by its unit; by its name, in SI, where no unit is given."""
+        """Return the quantity and unit of a channel: by its unit, else by its name, in SI."""
         entry = self.channels[name].get("unit")
         named = quantity_named(name)
         if entry is None or not entry.text:
@@ -149,7 +158,7 @@ class Header:
                     remedy=f"Name it force or acc_1, or give its unit: {KNOWN}.",
                 )
             return named, Unit(named, 1.0)
-        if entry.text == UNSAID:
+        if entry.text == UNIT_MISSING:
             raise entry.refusal("nothing says its unit.", f"Give one of {KNOWN}.", name)
         unit = unit_of(entry.text)
         if unit is None or named not in (None, unit.quantity):
@@ -158,7 +167,7 @@ class Header:
         return unit.quantity, unit
 
     def unit_text(self, name: str) -> str:
-        """The unit as written; the SI unit of what the name says where none is written."""
+        """Return the unit as written, else the SI unit of the quantity that the name gives."""
         entry = self.channels[name].get("unit")
         named = quantity_named(name)
         if entry is not None and entry.text:
@@ -166,8 +175,8 @@ class Header:
         return SI[named] if named else ""
 
     def accelerance_si(self, name: str) -> float:
-        """Factor of a frequency response to m/s^2/N, by its unit; 1 where none is given."""
-        text = self.unit_text(name) if self.says(name, "unit") else ACCELERANCE
+        """Return the factor of a frequency response to m/s^2/N by its unit; 1 without a unit."""
+        text = self.unit_text(name) if self.has_entry(name, "unit") else ACCELERANCE
         factor = accelerance_si(text, "")
         if factor is None or unit_of(text) is not None:
             raise self.channels[name]["unit"].refusal(
@@ -178,8 +187,8 @@ class Header:
         return factor
 
     def calibration(self, name: str) -> float:
-        """Units of `unit` per recorded unit, NaN where the values are recorded in `unit`."""
-        if not self.says(name, "calibration"):
+        """Return the units of `unit` per recorded unit, NaN where values are recorded in `unit`."""
+        if not self.has_entry(name, "calibration"):
             return NAN
         entry = self.channels[name]["calibration"]
         factor = _number(entry, "calibration", _FACTOR_REMEDY, name)
@@ -188,8 +197,8 @@ class Header:
         return factor
 
     def full_scale(self, name: str) -> float:
-        """The largest value that can be recorded, in `unit`; NaN where nobody says."""
-        if not self.says(name, "full_scale"):
+        """Return the largest value that can be recorded, in `unit`; NaN if unknown."""
+        if not self.has_entry(name, "full_scale"):
             return NAN
         entry = self.channels[name]["full_scale"]
         largest = _number(entry, "full_scale", _SCALE_REMEDY, name)
@@ -198,11 +207,11 @@ class Header:
         return largest
 
     def leaves_out(self, name: str) -> bool:
-        """Whether a channel is not to be used."""
-        return self.says(name, "leave_out") and says_yes(self.channels[name]["leave_out"])
+        """Return whether a channel is not to be used."""
+        return self.has_entry(name, "leave_out") and is_true(self.channels[name]["leave_out"])
 
-    def says(self, name: str, key: str) -> bool:
-        """Whether anything is given for a key of a channel."""
+    def has_entry(self, name: str, key: str) -> bool:
+        """Return whether anything is given for a key of a channel."""
         entry = self.channels[name].get(key)
         return entry is not None and bool(entry.text)
 
@@ -229,15 +238,15 @@ class Header:
 
 
 def quantity_named(name: str) -> Quantity | None:
-    """What a channel measures by its name: force..., hammer..., acc..."""
+    """Return the quantity that a channel's name gives: force..., hammer..., acc...; else None."""
     lowered = name.lower()
     if lowered.startswith(("force", "hammer")):
         return "force"
     return "acceleration" if lowered.startswith("acc") else None
 
 
-def says_yes(entry: Entry) -> bool:
-    """The truth of `leave_out`; raises BadInput for anything but true and false."""
+def is_true(entry: Entry) -> bool:
+    """Return the truth of `leave_out`; raises BadInput for anything but true and false."""
     if entry.text.lower() not in ("true", "false"):
         raise entry.refusal(
             f"leave_out = {entry.text!r} is neither true nor false.", "Give leave_out = true."
@@ -248,7 +257,7 @@ def says_yes(entry: Entry) -> bool:
 def spread(
     key: str, values: Sequence[Entry], names: Sequence[str], where: Entry
 ) -> dict[str, Entry]:
-    """The values of a list, one a channel, by channel name.
+    """Return the values of a list, one a channel, by channel name.
 
     One value alone, and a list as long as the accelerations, goes to the accelerations, except
     that units, calibrations and full scales must be given for all channels.
@@ -267,7 +276,7 @@ def spread(
 
 
 def _number(entry: Entry, key: str, remedy: str, channel: str = "") -> float:
-    """A finite number, or NaN where it is written as such."""
+    """Return a finite number, or NaN where it is written as such."""
     text = entry.text
     if "," in text and "." not in text:
         text = text.replace(",", ".")
@@ -288,11 +297,23 @@ def _radius_m(entry: Entry) -> float:
     return radius_m
 
 
+def known_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values that are neither None, nor NaN, nor an empty text."""
+    return {
+        key: value for key, value in values.items() if value not in (None, "") and value == value
+    }
+
+
+def entries_of(values: Mapping[str, Any], path: Path) -> dict[str, Entry]:
+    """Return the known values of a file as entries."""
+    return {key: Entry(value, path) for key, value in known_values(values).items()}
+
+
 def mass_entries(added_mass: AddedMass | None) -> dict[str, float]:
-    """The entries that say of a known mass; none where there is none."""
+    """Return the entries that describe a known mass; empty where there is none."""
     if added_mass is None:
         return {}
-    said = {"added_mass_kg": added_mass.mass_kg, "added_mass_at_m": added_mass.x_m}
+    entries = {"added_mass_kg": added_mass.mass_kg, "added_mass_at_m": added_mass.x_m}
     if added_mass.radius_of_gyration_m is not None:
-        said["added_mass_radius_m"] = added_mass.radius_of_gyration_m
-    return said
+        entries["added_mass_radius_m"] = added_mass.radius_of_gyration_m
+    return entries

@@ -17,9 +17,9 @@ import numpy as np
 from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read import logger_text
-from shm.read.header import Entry
+from shm.read.header import entries_of
 from shm.read.limits import guarded, refuse_large, refuse_long_header, refuse_many_samples
-from shm.read.logger_heading import unlike, unrounded
+from shm.read.logger_heading import distinct_names, unrounded
 from shm.read.stamps import moment
 from shm.read.table import Column, Role, Table
 from shm.read.time_axis import rate_of
@@ -74,9 +74,11 @@ def _joined(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _goes_on(before: Mapping[str, Any], record: Mapping[str, Any]) -> bool:
     """Return whether a record is the next piece of another: by its x column, else by its start."""
-    alike = all(before.get(key) == record.get(key) for key in ("Channel names", "Y_Unit_Label"))
+    same_layout = all(
+        before.get(key) == record.get(key) for key in ("Channel names", "Y_Unit_Label")
+    )
     step, first, second = _number(_first(record, "Delta_X")), before["data"], record["data"]
-    if not (alike and step > 0 and first.shape[1] == second.shape[1]):
+    if not (same_layout and step > 0 and first.shape[1] == second.shape[1]):
         return False
     if record["Channel names"][0] == _X:
         return bool(abs(second[0, 0] - first[-1, 0] - step) < step / 2)
@@ -105,9 +107,7 @@ def _table(
         by_times = rate_of(times.load(), Table(path, ()).uneven(times))
         rate = unrounded(rate, by_times, [("Delta_X", repr(step))], ".")
         columns = (*columns, times)
-    said = {"time": format_time(time), "sampling_rate_hz": rate}
-    known = {key: value for key, value in said.items() if value is not None and value == value}
-    entries = {key: Entry(value, path) for key, value in known.items()}
+    entries = entries_of({"time": format_time(time), "sampling_rate_hz": rate}, path)
     layout = _layout([column for column in columns if column is not times], text, path)
     return Table(path, columns, entries, layout, remarks=remarks, record=name, local_time=time)
 
@@ -133,7 +133,7 @@ def _columns(
 ) -> tuple[tuple[Column, ...], tuple[str, ...]]:
     units = _of_channels(record, "Y_Unit_Label", places)
     counts = [_number(each) for each in _of_channels(record, "Samples", places)]
-    names = unlike([str(record["Channel names"][place]) for place in places])
+    names = distinct_names([str(record["Channel names"][place]) for place in places])
     columns, remarks = [], []
     for place, name, unit, count in zip(places, names, units, counts, strict=True):
         values = data[:, place]
@@ -148,9 +148,9 @@ def _columns(
 
 def _column(name: str, unit: str, values: FloatArray, path: Path) -> Column:
     measured = logger_text.is_measured(name, unit, None)
-    said = logger_text.said_of(name, unit, None, None, path)
+    stated = logger_text.stated_entries(name, unit, None, None, path)
     role: Role = "channel" if measured else "other"
-    return Column(name, len(values), lambda: values, unit, role, said)
+    return Column(name, len(values), lambda: values, unit, role, stated)
 
 
 def _of_channels(record: Mapping[str, Any], key: str, places: Sequence[int]) -> list[Any]:

@@ -1,5 +1,6 @@
-"""How much one file may hold, stated once and checked before it is allocated, and what parsers of
-others raise on damaged files, as one refusal.
+"""State how much one file may hold, checked before memory is allocated.
+
+Errors that a library's parser raises on damaged files become one refusal here, too.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ _SPLIT = "Split the record, or leave out what is not needed."
 
 @dataclass(frozen=True)
 class Limits:
-    """What one file may hold and what reading it may cost; each is a setting of that name.
+    """Limit what one file may hold and what reading it may cost; each is a setting of its name.
 
-    `max_channels` are accelerations, `max_samples` those of one channel (or lines of a frequency
-    response), `max_header_bytes` what a text file says before its numbers, and a sidecar.
+    `max_channels` are accelerations, `max_samples` those of one channel (or lines of a
+    frequency response), `max_header_bytes` the text before the numbers of a file, and a
+    sidecar.
     """
 
     max_channels: int = Settings.max_channels
@@ -41,7 +43,7 @@ class Limits:
 
     @property
     def values_at_once(self) -> int:
-        """How many numbers of double precision that is."""
+        """Return the largest number of values in double precision that may be in memory."""
         return self.bytes_at_once // 8
 
 
@@ -49,13 +51,13 @@ _in_force: ContextVar[Limits] = ContextVar("limits", default=Limits())  # noqa: 
 
 
 def limits() -> Limits:
-    """The limits in force for what is read now."""
+    """Return the limits that apply to reading now."""
     return _in_force.get()
 
 
 @contextmanager
 def limited(to: Limits) -> Iterator[None]:
-    """Puts limits in force for the context."""
+    """Put limits in force for the context."""
     before = _in_force.set(to)
     try:
         yield
@@ -64,7 +66,7 @@ def limited(to: Limits) -> Iterator[None]:
 
 
 def refuse_large(shape: Sequence[int], item_bytes: int, what: str, path: Path) -> None:
-    """Raises BadInput where an array of this shape would outgrow the memory set aside for it."""
+    """Raise BadInput where an array of this shape would outgrow the memory available to it."""
     most = limits().bytes_at_once
     if any(length < 0 for length in shape) or math.prod(shape) * item_bytes > most:
         size = "x".join(str(length) for length in shape)[:80]
@@ -77,7 +79,7 @@ def refuse_large(shape: Sequence[int], item_bytes: int, what: str, path: Path) -
 
 
 def refuse_many_samples(samples: int, path: Path) -> None:
-    """Raises BadInput for a record longer than the setting max_samples."""
+    """Raise BadInput for a record longer than the setting max_samples."""
     if samples > limits().max_samples:
         raise BadInput(
             f"{samples} samples are more than the {limits().max_samples} of setting max_samples.",
@@ -87,7 +89,7 @@ def refuse_many_samples(samples: int, path: Path) -> None:
 
 
 def refuse_long_header(size_bytes: int, path: Path) -> None:
-    """Raises BadInput for a heading or sidecar beyond the setting max_header_bytes."""
+    """Raise BadInput for a heading or sidecar beyond the setting max_header_bytes."""
     if size_bytes > limits().max_header_bytes:
         raise BadInput(
             f"{size_bytes} bytes say what the numbers are, more than the"
@@ -98,7 +100,7 @@ def refuse_long_header(size_bytes: int, path: Path) -> None:
 
 
 def too_large(path: Path) -> BadInput:
-    """The refusal of a file that is, or unpacks to, more than may be read at once."""
+    """Return the refusal of a file that is, or unpacks to, more than may be read at once."""
     return BadInput(
         f"holds more than the {limits().bytes_at_once >> 20} MB that are read at once.",
         file=path,
@@ -108,7 +110,7 @@ def too_large(path: Path) -> BadInput:
 
 @contextmanager
 def guarded(path: Path, what: str = "the file") -> Iterator[None]:
-    """Turns whatever a parser raises or warns of within the context into a BadInput."""
+    """Turn errors and warnings of a parser within the context into a BadInput."""
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("error")

@@ -1,7 +1,7 @@
-"""What stands above the numbers of a logger's text: names, units, rate, time, hanger.
+"""Parse the heading above the numbers of a logger's text: names, units, rate, time, hanger.
 
-Names and units may stand in one row (`Kraft [N]`), in two, or in rows that begin with a label
-(`Einheit;s;N;g`). All else is lines of a key and its value.
+Names and units may be in one row (`Kraft [N]`), in two, or in rows that begin with a label
+(`Einheit;s;N;g`). All other lines are a key and its value.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from shm.read import logger_words as words
-from shm.read.logger_rows import Script, is_number, number_of
+from shm.read.logger_rows import Dialect, is_number, number_of
 from shm.read.stamps import parsed
 from shm.values import NAN
 
@@ -47,34 +47,34 @@ class Heading:
     names_line: int
 
 
-def heading_of(above: Sequence[str], script: Script) -> Heading:
-    """What the lines above the numbers say."""
+def heading_of(above: Sequence[str], dialect: Dialect) -> Heading:
+    """Return the heading that the lines above the numbers give."""
     rows = {
         place: cells
         for place, line in enumerate(above)
-        if (cells := _cells(line, script)) and len(cells) <= len(script.kinds) + 1
+        if (cells := _cells(line, dialect)) and len(cells) <= len(dialect.kinds) + 1
     }
     wide = {
-        place: _padded(_axes_named(cells), script)
+        place: _padded(_axes_named(cells), dialect)
         for place, cells in rows.items()
         if len(cells) > 1
     }
-    at = _names_at(wide, script)
-    split = [words.name_and_unit(cell) for cell in wide.get(at, [""] * len(script.kinds))]
+    at = _names_at(wide, dialect)
+    split = [words.name_and_unit(cell) for cell in wide.get(at, [""] * len(dialect.kinds))]
     if at in wide and _label(wide[at][0]) in _NAME_LABELS:
         split[0] = ("", "")
     others = {place: cells for place, cells in wide.items() if place != at}
-    units_at = _units_at(others, at, script)
+    units_at = _units_at(others, at, dialect)
     below = [_no_label(cell, place == 0) for place, cell in enumerate(others.get(units_at, []))]
-    units = [(below[i] if below else "") or own for i, (_, own) in enumerate(split)]
+    units = [(below[i] if below else "") or in_name for i, (_, in_name) in enumerate(split)]
     taken = {at, units_at}
     facts = [
         fact
         for place, line in enumerate(above)
-        if place not in taken and (fact := _fact_at(place, above, script)) is not None
+        if place not in taken and (fact := _fact_at(place, above, dialect)) is not None
     ]
-    names = unlike(tuple(name for name, _ in split))
-    return Heading(names, tuple(units), _sensitivities(others, script), tuple(facts), at + 1)
+    names = distinct_names(tuple(name for name, _ in split))
+    return Heading(names, tuple(units), _sensitivities(others, dialect), tuple(facts), at + 1)
 
 
 def _axes_named(cells: list[str]) -> list[str]:
@@ -91,25 +91,25 @@ def _axes_named(cells: list[str]) -> list[str]:
     return named
 
 
-def _cells(line: str, script: Script) -> list[str]:
-    """The cells of a line without empty ones at its end, and without a sign of remarks."""
+def _cells(line: str, dialect: Dialect) -> list[str]:
+    """Return the cells of a line without empty ones at its end, and without a sign of remarks."""
     plain = line.lstrip("\ufeff#%! ") if line.strip() else ""
-    cells = _blank_parted(plain, script) if script.mark == " " else script.cells(plain)
+    cells = _blank_parted(plain, dialect) if dialect.mark == " " else dialect.cells(plain)
     while cells and not cells[-1]:
         cells.pop()
     return [cell.strip().strip('"').strip() for cell in cells]
 
 
-def _blank_parted(line: str, script: Script) -> list[str]:
-    """The names above columns that blanks part: a name may hold one, before its unit."""
+def _blank_parted(line: str, dialect: Dialect) -> list[str]:
+    """Return the names above columns that blanks part: a name may hold one, before its unit."""
     wide = [cell for cell in re.split(r"\s{2,}|\t", line.strip()) if cell]
-    if len(wide) == len(script.kinds):
+    if len(wide) == len(dialect.kinds):
         return wide
     return [cell.strip() for cell in _WITH_UNIT.findall(line)]
 
 
-def _padded(cells: list[str], script: Script) -> list[str]:
-    return (cells + [""] * len(script.kinds))[: max(len(script.kinds), 1)]
+def _padded(cells: list[str], dialect: Dialect) -> list[str]:
+    return (cells + [""] * len(dialect.kinds))[: max(len(dialect.kinds), 1)]
 
 
 def _label(text: str) -> str:
@@ -120,20 +120,20 @@ def _no_label(text: str, is_first: bool) -> str:
     return "" if is_first and _label(text) in _UNIT_LABELS else text.strip("[]() ")
 
 
-def _names_at(rows: dict[int, list[str]], script: Script) -> int:
-    """The row that names the columns, -1 where none does: what is understood, then the last."""
-    scored = {place: _score(cells, script) for place, cells in rows.items()}
+def _names_at(rows: dict[int, list[str]], dialect: Dialect) -> int:
+    """Return the index of the row that names the columns, the last of the best; -1 for none."""
+    scored = {place: _score(cells, dialect) for place, cells in rows.items()}
     best = max(scored, key=lambda place: (scored[place], place), default=-1)
     return best if best >= 0 and scored[best] > 0 else -1
 
 
-def _score(cells: Sequence[str], script: Script) -> float:
-    """How well a row names the columns of numbers; 0 where it leaves one without a name."""
-    needed = [c for c, kind in zip(cells, script.kinds, strict=True) if kind == "number"]
-    named = [cell for cell in needed if cell and not is_number(cell, script.decimal)]
+def _score(cells: Sequence[str], dialect: Dialect) -> float:
+    """Return the score of a row as column names; 0 where it leaves numbers without a name."""
+    needed = [c for c, kind in zip(cells, dialect.kinds, strict=True) if kind == "number"]
+    named = [cell for cell in needed if cell and not is_number(cell, dialect.decimal)]
     if not named or all(map(words.is_unit, named)) or cells[0].endswith(":"):
         return 0.0
-    if any(not cell or is_number(cell, script.decimal) for cell in needed[1:]):
+    if any(not cell or is_number(cell, dialect.decimal) for cell in needed[1:]):
         return 0.0
     labelled = _label(cells[0]) in _NAME_LABELS
     if not labelled and (_label(cells[0]) in _UNIT_LABELS or any(map(parsed, named))):
@@ -147,31 +147,33 @@ def _is_understood(cell: str) -> bool:
     return bool(unit) or words.means_time(name) or words.quantity_meant(name) is not None
 
 
-def _units_at(rows: dict[int, list[str]], names_at: int, script: Script) -> int:
-    """The row of units nearest to the names, -1 where there is none."""
-    fitting = [place for place, cells in rows.items() if _are_units(cells, script)]
+def _units_at(rows: dict[int, list[str]], names_at: int, dialect: Dialect) -> int:
+    """Return the row of units nearest to the names, -1 where there is none."""
+    fitting = [place for place, cells in rows.items() if _are_units(cells, dialect)]
     return min(fitting, key=lambda place: abs(place - names_at), default=-1)
 
 
-def _are_units(cells: Sequence[str], script: Script) -> bool:
+def _are_units(cells: Sequence[str], dialect: Dialect) -> bool:
     labelled = _label(cells[0]) in _UNIT_LABELS
-    said = [_no_label(cell, place == 0) for place, cell in enumerate(cells) if cell]
-    said = [cell for cell in said if cell]
-    measured = [cell for cell in said if words.unit_of(cell) or words.volts_of(cell)]
+    texts = [_no_label(cell, place == 0) for place, cell in enumerate(cells) if cell]
+    texts = [cell for cell in texts if cell]
+    measured = [cell for cell in texts if words.unit_of(cell) or words.volts_of(cell)]
     if labelled:
         return bool(measured)
-    known = sum(map(words.is_unit, said))
-    return bool(measured) and len(said) > 1 and (known == len(said) or _MOSTLY * len(said) <= known)
+    known = sum(map(words.is_unit, texts))
+    return (
+        bool(measured) and len(texts) > 1 and (known == len(texts) or _MOSTLY * len(texts) <= known)
+    )
 
 
 def _sensitivities(
-    rows: dict[int, list[str]], script: Script
+    rows: dict[int, list[str]], dialect: Dialect
 ) -> tuple[words.Sensitivity | None, ...]:
     for cells in rows.values():
         found = tuple(words.sensitivity_of(cell) for cell in cells)
         if any(found):
             return found
-    return (None,) * len(script.kinds)
+    return (None,) * len(dialect.kinds)
 
 
 _CHANNEL_UNIT = re.compile(
@@ -190,8 +192,8 @@ def with_channel_units(heading: Heading, above: Sequence[str]) -> Heading:
     return replace(heading, units=tuple(units))
 
 
-def unlike(names: Sequence[str]) -> tuple[str, ...]:
-    """Names of printable characters, each once; a column without one by its number."""
+def distinct_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names of printable characters, each once; a column without one by its number."""
     taken: list[str] = []
     for place, name in enumerate(names, start=1):
         plain = "".join(c for c in name if c.isprintable() and ord(c) < 0x10000)[:60].strip()
@@ -203,21 +205,21 @@ def unlike(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(taken)
 
 
-def _fact_at(place: int, above: Sequence[str], script: Script) -> tuple[str, str] | None:
-    """The fact of a line; where that is a key alone, `dt:`, its value is the line below."""
+def _fact_at(place: int, above: Sequence[str], dialect: Dialect) -> tuple[str, str] | None:
+    """Return the fact of a line; where that is a key alone, `dt:`, its value is the line below."""
     plain = above[place].strip()
     if plain.endswith(":") and plain.count(":") == 1 and place + 1 < len(above):
-        below = _cells(above[place + 1], script)
+        below = _cells(above[place + 1], dialect)
         return (plain[:-1], below[0]) if below else None
-    return _fact(above[place], script)
+    return _fact(above[place], dialect)
 
 
-def _fact(line: str, script: Script) -> tuple[str, str] | None:
-    """Key and value of a line of the preamble; its unit, where the key has one, after the value."""
+def _fact(line: str, dialect: Dialect) -> tuple[str, str] | None:
+    """Return key and value of a line of the preamble; a unit of the key is put after the value."""
     plain = line.strip().lstrip("\ufeff#%!* ").strip()
-    cells = [cell for cell in _cells(line, script) if cell] if script.mark != " " else [plain]
+    cells = [cell for cell in _cells(line, dialect) if cell] if dialect.mark != " " else [plain]
     if len(cells) > 1 and not cells[0].rstrip().endswith(("=",)):
-        key, value = cells[0].rstrip(":= "), _joined(cells[1:], script)
+        key, value = cells[0].rstrip(":= "), _joined(cells[1:], dialect)
         if ":" not in key and "=" not in key:
             return _with_unit(key, value)
     parts = _KEY.split(plain.strip('"'), maxsplit=1)
@@ -226,9 +228,9 @@ def _fact(line: str, script: Script) -> tuple[str, str] | None:
     return ("", plain) if plain else None
 
 
-def _joined(cells: Sequence[str], script: Script) -> str:
-    """A value with its unit, or the first of several."""
-    more = cells[1] if len(cells) > 1 and not is_number(cells[1], script.decimal) else ""
+def _joined(cells: Sequence[str], dialect: Dialect) -> str:
+    """Return a value with its unit, or the first of several."""
+    more = cells[1] if len(cells) > 1 and not is_number(cells[1], dialect.decimal) else ""
     return (
         f"{cells[0]} {more}".strip() if words.is_unit(more) or _HERTZ.fullmatch(more) else cells[0]
     )
@@ -242,10 +244,10 @@ def _with_unit(key: str, value: str) -> tuple[str, str]:
 # ---------------------------------------------------------------- what the facts say
 
 
-def rate_said(facts: Sequence[tuple[str, str]], decimal: str) -> float:
-    """The sampling rate that a preamble says, in Hz; NaN where it says none."""
+def stated_rate(facts: Sequence[tuple[str, str]], decimal: str) -> float:
+    """Return the sampling rate of a preamble in Hz; NaN where it gives none."""
     for key, value in facts:
-        number, unit = quantity_said(value, decimal)
+        number, unit = leading_quantity(value, decimal)
         if not number > 0:
             continue
         hertz = _HERTZ.fullmatch(unit)
@@ -258,7 +260,7 @@ def rate_said(facts: Sequence[tuple[str, str]], decimal: str) -> float:
     for key, value in facts:
         found = _RATE_IN_WORDS.search(f"{key} {value}")
         if found is not None and "filter" not in f"{key} {value}".lower():
-            number, _ = quantity_said(found[1], decimal)
+            number, _ = leading_quantity(found[1], decimal)
             return number * (1e3 if found[2] else 1.0)
     return NAN
 
@@ -266,9 +268,9 @@ def rate_said(facts: Sequence[tuple[str, str]], decimal: str) -> float:
 def unrounded(
     rate_hz: float, times_hz: float, facts: Sequence[tuple[str, str]], decimal: str
 ) -> float:
-    """The rate that is said, or that of the times where a step as rounded as that means both."""
+    """Return `rate_hz`, or `times_hz` where the rounded step of the preamble means both."""
     for key, value in facts:
-        number, unit = quantity_said(value, decimal)
+        number, unit = leading_quantity(value, decimal)
         seconds = (words.seconds_of(unit) if unit else 1.0) or math.nan
         found = _VALUE.fullmatch(value.strip())
         if words.means_interval(key) and found and abs(number * seconds * rate_hz - 1) < 1e-9:
@@ -279,8 +281,8 @@ def unrounded(
     return rate_hz
 
 
-def quantity_said(text: str, decimal: str) -> tuple[float, str]:
-    """The number at the beginning of a text, and what follows it; NaN where there is none.
+def leading_quantity(text: str, decimal: str) -> tuple[float, str]:
+    """Return the number at the beginning of a text, and the text after it; NaN where there is none.
 
     A preamble does not always keep to the decimal mark of the numbers: 0.001 is a thousandth.
     """

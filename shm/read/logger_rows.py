@@ -1,8 +1,8 @@
-"""Where the numbers of a logger's text are, and how they are written.
+"""Find the rows of numbers in a logger's text, and how they are written.
 
-Found from lines in the midst of the file, where there is nothing but numbers: what separates the
-columns, which mark is decimal, what kind of cells each column has. From there up to the heading and
-down to the tail.
+Lines from the middle of the file, where there are only numbers, show the separator, the decimal
+mark and the kind of each column. From there the rows are followed up to the heading and down to the
+tail.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ _MARKS = ("\t", ";", "|", ", ", ",", " ")
 
 
 @dataclass(frozen=True)
-class Script:
-    """How the rows are written: `mark` between cells, decimal mark, kind of each column."""
+class Dialect:
+    """Describe how rows are written: `mark` between cells, decimal mark, kind of each column."""
 
     mark: str
     decimal: str
@@ -62,7 +62,7 @@ class Script:
     quoted: bool
 
     def cells(self, line: str) -> list[str]:
-        """The cells of a line, without blanks and quotes around them."""
+        """Return the cells of a line, without surrounding blanks and quotes."""
         if self.quoted and '"' in line:
             quoted = next(csv.reader([line], delimiter=self.mark[0], skipinitialspace=True), [])
             return [cell.strip() for cell in quoted]
@@ -71,7 +71,7 @@ class Script:
         return [cell.strip() for cell in line.split(self.mark)]
 
     def row(self, line: str) -> list[str] | None:
-        """The cells of a line as long as the columns; None where it cannot be a row of numbers."""
+        """Return the cells of a line, as many as columns; None where it is no row of numbers."""
         cells = self.cells(line)
         count = len(self.kinds)
         if len(cells) > count and not any(cells[count:]):
@@ -98,14 +98,14 @@ class Script:
 
 
 @dataclass(frozen=True)
-class Block:
+class DataRows:
     """The rows of numbers: `above` are the lines before them, `first_line` counts from 1.
 
     `rows` are cells by row, `lines` the number of the line of each; `seam` is the line at which a
     heading stands in their midst, 0 without: then times must run on over it.
     """
 
-    script: Script
+    dialect: Dialect
     above: tuple[str, ...]
     rows: list[list[str]]
     lines: list[int]
@@ -114,22 +114,22 @@ class Block:
 
 
 def is_number(text: str, decimal: str) -> bool:
-    """Whether a text is a number with that decimal mark, its thousands grouped or not."""
+    """Return whether a text is a number with that decimal mark, its thousands grouped or not."""
     return _NUMBERS[decimal].fullmatch(text) is not None
 
 
 def is_gap(text: str) -> bool:
-    """Whether a cell says that there is no value."""
+    """Return whether a cell marks a missing value."""
     return text.lower() in _MISSING or _NAN.fullmatch(text) is not None
 
 
 def is_over(text: str) -> bool:
-    """Whether a cell says that the value was beyond what the logger can record."""
+    """Return whether a cell marks a value beyond the range of the logger."""
     return _OVER.fullmatch(text) is not None
 
 
 def number_of(text: str, decimal: str) -> float:
-    """The number that a text with that decimal mark says; raises ValueError."""
+    """Return the number that a text with that decimal mark gives; raises ValueError."""
     plain = re.sub(_GROUPS, "", text)
     plain = plain.replace(".", "").replace(",", ".") if decimal == "," else plain.replace(",", "")
     return float(plain.replace("d", "e").replace("D", "e"))
@@ -138,8 +138,8 @@ def number_of(text: str, decimal: str) -> float:
 # ---------------------------------------------------------------- how it is written
 
 
-def script_of(lines: Sequence[str]) -> Script | None:
-    """How the rows in the midst of a text are written; None where there are none."""
+def dialect_of(lines: Sequence[str]) -> Dialect | None:
+    """Return how the rows in the middle of a text are written; None where there are none."""
     filled = [line for line in lines if line.strip()]
     if len(filled) < 2:
         return None
@@ -147,17 +147,17 @@ def script_of(lines: Sequence[str]) -> Script | None:
     sample = filled[middle : middle + _SAMPLE_LINES] or filled[-_SAMPLE_LINES:]
     quoted = any('"' in line for line in (*filled[:_SAMPLE_LINES], *sample))
     for mark in _MARKS:
-        found = _script(sample, mark, quoted)
+        found = _dialect(sample, mark, quoted)
         if found is not None:
             return found
     return None
 
 
-def _script(sample: Sequence[str], mark: str, quoted: bool) -> Script | None:
-    """How a sample is written if that is the mark; None where it is not."""
+def _dialect(sample: Sequence[str], mark: str, quoted: bool) -> Dialect | None:
+    """Return how a sample with that separator is written; None where it separates no columns."""
     if sum(mark in line for line in sample) < _SHARE * len(sample):
         return None
-    plain = Script(mark, ".", (), quoted)
+    plain = Dialect(mark, ".", (), quoted)
     rows = [plain.cells(line) for line in sample]
     count, times = Counter(map(len, rows)).most_common(1)[0]
     if count < 2 or times < _SHARE * len(rows):
@@ -170,11 +170,11 @@ def _script(sample: Sequence[str], mark: str, quoted: bool) -> Script | None:
     kinds = tuple(_kind(column, decimal) for column in columns)
     if "number" not in kinds or kinds.count("text") > kinds.count("number") + 1:
         return None
-    return Script(mark, decimal, kinds, quoted)
+    return Dialect(mark, decimal, kinds, quoted)
 
 
 def _decimal(columns: Sequence[Sequence[str]]) -> str:
-    """The decimal mark by which more cells are numbers; where both do, by how they are grouped."""
+    """Return the decimal mark that makes more cells numbers; if both do, decide by the grouping."""
     cells = [c for column in columns for c in column if c and ("," in c or "." in c)]
     cells = [cell for cell in cells if not is_stamp(cell)]
     by_point, by_comma = (sum(is_number(c, mark) for c in cells) for mark in ".,")
@@ -186,56 +186,56 @@ def _decimal(columns: Sequence[Sequence[str]]) -> str:
 
 
 def _kind(cells: Sequence[str], decimal: str) -> Kind:
-    said = [cell for cell in cells if not is_gap(cell) and not is_over(cell)]
-    if not said:
+    filled = [cell for cell in cells if not is_gap(cell) and not is_over(cell)]
+    if not filled:
         return "number" if any(map(is_over, cells)) else "empty"
-    if sum(is_number(cell, decimal) for cell in said) >= _SHARE * len(said):
+    if sum(is_number(cell, decimal) for cell in filled) >= _SHARE * len(filled):
         return "number"
-    return "stamp" if sum(map(is_stamp, said)) >= _SHARE * len(said) else "text"
+    return "stamp" if sum(map(is_stamp, filled)) >= _SHARE * len(filled) else "text"
 
 
 # ---------------------------------------------------------------- where it is
 
 
-def block_of(lines: Sequence[str], script: Script, path: Path) -> Block | None:
-    """The rows of a text, up from its heading and down to its tail; None where there are none.
+def block_of(lines: Sequence[str], dialect: Dialect, path: Path) -> DataRows | None:
+    """Return the rows between heading and tail of a text; None where there are none.
 
-    Raises BadInput for a line in their midst that is none.
+    Raises BadInput for a line among them that is no row.
     """
-    start = _first(lines, script)
+    start = _first(lines, dialect)
     if start is None:
         return None
-    stop, remarks = _last(lines, script, start)
+    stop, remarks = _last(lines, dialect, start)
     rows: list[list[str]] = []
     numbers: list[int] = []
-    keys = {cells[0] for line in lines[:start] if (cells := script.cells(line))[0]}
+    keys = {cells[0] for line in lines[:start] if (cells := dialect.cells(line))[0]}
     seam = 0
     for place in range(start, stop):
         line = lines[place]
         if not line.strip() or line.lstrip().startswith(_REMARK):
             continue
-        row = script.cells(line)
-        if len(row) != len(script.kinds):
-            row = script.row(line) or []
+        row = dialect.cells(line)
+        if len(row) != len(dialect.kinds):
+            row = dialect.row(line) or []
         if row and row[0] in keys:
             row = []
-        if not row and script.cells(line)[0] in keys:
+        if not row and dialect.cells(line)[0] in keys:
             seam = seam or place + 1
             continue
         if not row:
-            raise _no_row(script.cells(line), place + 1, script, path)
+            raise _no_row(dialect.cells(line), place + 1, dialect, path)
         rows.append(row)
         numbers.append(place + 1)
-    return Block(script, tuple(lines[:start]), rows, numbers, remarks, seam) if rows else None
+    return DataRows(dialect, tuple(lines[:start]), rows, numbers, remarks, seam) if rows else None
 
 
-def _first(lines: Sequence[str], script: Script) -> int | None:
-    """The first line of two running that are rows."""
+def _first(lines: Sequence[str], dialect: Dialect) -> int | None:
+    """Return the first line of two running that are rows."""
     before: int | None = None
     for place, line in enumerate(lines[:_MOST_PREAMBLE]):
         if not line.strip():
             continue
-        if script.row(line) is None:
+        if dialect.row(line) is None:
             before = None
         elif before is not None:
             return before
@@ -244,10 +244,10 @@ def _first(lines: Sequence[str], script: Script) -> int | None:
     return before
 
 
-def _last(lines: Sequence[str], script: Script, start: int) -> tuple[int, tuple[str, ...]]:
-    """The end of the rows, and a remark on what is left out behind it."""
+def _last(lines: Sequence[str], dialect: Dialect, start: int) -> tuple[int, tuple[str, ...]]:
+    """Return the end of the rows, and a remark on the lines left out after it."""
     stop = len(lines)
-    while stop > start and (not lines[stop - 1].strip() or script.row(lines[stop - 1]) is None):
+    while stop > start and (not lines[stop - 1].strip() or dialect.row(lines[stop - 1]) is None):
         stop -= 1
     left = [line for line in lines[stop:] if line.strip(" \t\x1a\x00")]
     if not left:
@@ -256,7 +256,7 @@ def _last(lines: Sequence[str], script: Script, start: int) -> tuple[int, tuple[
 
 
 def second_record(line: int, path: Path) -> BadInput:
-    """The refusal of a file in which a second record begins at a line."""
+    """Return the refusal of a file in which a second record starts at `line`."""
     return BadInput(
         "a second record begins here, with a heading of its own.",
         file=path,
@@ -265,41 +265,41 @@ def second_record(line: int, path: Path) -> BadInput:
     )
 
 
-def _no_row(cells: Sequence[str], line: int, script: Script, path: Path) -> BadInput:
-    """The refusal of a damaged line in the midst of the rows."""
+def _no_row(cells: Sequence[str], line: int, dialect: Dialect, path: Path) -> BadInput:
+    """Return the refusal of a damaged line in the midst of the rows."""
     return BadInput(
-        f"{' '.join(cells)[:60]!r} is no row of {len(script.kinds)} values.",
+        f"{' '.join(cells)[:60]!r} is no row of {len(dialect.kinds)} values.",
         file=path,
         line=line,
         remedy="Complete or remove the line, or export again; a bad value may be left empty.",
     )
 
 
-def values_of(block: Block, column: int, path: Path) -> tuple[FloatArray, int]:
-    """The numbers of a column, NaN where there are none, and how many were beyond the range.
+def values_of(block: DataRows, column: int, path: Path) -> tuple[FloatArray, int]:
+    """Return the numbers of a column, NaN where there are none, and how many were beyond the range.
 
     Raises BadInput for a cell that is none of these.
     """
     texts = [row[column] for row in block.rows]
-    plain = _plainly(texts, block.script.decimal)
+    plain = _plainly(texts, block.dialect.decimal)
     if plain is not None:
         return plain, 0
     over = 0
     values = np.full(len(texts), NAN)
     for place, text in enumerate(texts):
-        if is_number(text, block.script.decimal):
-            values[place] = number_of(text, block.script.decimal)
+        if is_number(text, block.dialect.decimal):
+            values[place] = number_of(text, block.dialect.decimal)
             if np.isinf(values[place]):
-                raise _no_row(block.rows[place], block.lines[place], block.script, path)
+                raise _no_row(block.rows[place], block.lines[place], block.dialect, path)
         elif is_over(text):
             over += 1
         elif not is_gap(text):
-            raise _no_row(block.rows[place], block.lines[place], block.script, path)
+            raise _no_row(block.rows[place], block.lines[place], block.dialect, path)
     return values, over
 
 
 def _plainly(texts: Sequence[str], decimal: str) -> FloatArray | None:
-    """The numbers of cells that hold nothing else, without grouped thousands; else None."""
+    """Return the numbers of cells that hold nothing else, without grouped thousands; else None."""
     if decimal == ",":
         if any("." in text for text in texts):
             return None

@@ -24,29 +24,29 @@ from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read import logger_words as words
 from shm.read.content import LINE_BREAK, cells_of, mark_between
-from shm.read.header import Entry, quantity_named
+from shm.read.header import Entry, entries_of, quantity_named
 from shm.read.limits import refuse_long_header
 from shm.read.logger_heading import (
     Heading,
+    distinct_names,
     heading_of,
-    quantity_said,
-    rate_said,
-    unlike,
+    leading_quantity,
+    stated_rate,
     unrounded,
     with_channel_units,
 )
 from shm.read.logger_rows import (
-    Block,
+    DataRows,
     block_of,
+    dialect_of,
     is_gap,
     is_number,
     is_over,
-    script_of,
     values_of,
 )
 from shm.read.logger_times import Clock, clock_of, day_order_of
-from shm.read.logger_words import UNSAID, Sensitivity
-from shm.read.stamps import DayOrder, PossibleTime, moment, parsed, possible_times, says_zone
+from shm.read.logger_words import UNIT_MISSING, Sensitivity
+from shm.read.stamps import DayOrder, PossibleTime, moment, names_zone, parsed, possible_times
 from shm.read.table import Column, Table
 from shm.values import NAN
 
@@ -56,8 +56,8 @@ _MOST_STACKED = 64  # judgement: four times the accelerations that are read
 _HEAD = 20_000  # characters in which a heading of our own says so
 
 
-def is_ours(text: str) -> bool:
-    """Whether a text is CSV as `comma_separated` describes it: our keys, or bare names we know."""
+def is_shm_csv(text: str) -> bool:
+    """Return whether a text is CSV as `comma_separated` defines it: our keys, or names we know."""
     filled = [line.strip() for line in LINE_BREAK.split(text[:_HEAD]) if line.strip()]
     for place, line in enumerate(filled):
         if not line.strip('"').startswith("#"):
@@ -69,7 +69,7 @@ def is_ours(text: str) -> bool:
 
 
 def _names_bare(line: str, below: str) -> bool:
-    """Whether a line names columns as our own do, and what is below it are not units."""
+    """Return whether a line names columns without units, and the line below holds no units."""
     mark = mark_between(line)
     cells, values = (cells_of(each.lower(), mark) for each in (line, below))
     bare = all(cell and set(cell) <= _PLAIN_NAME for cell in cells)
@@ -104,22 +104,22 @@ def table_in(text: str, path: Path, preamble: Sequence[str] = ()) -> Table | Non
 
 def _parsed(
     lines: Sequence[str], path: Path, preamble: Sequence[str] = ()
-) -> tuple[Heading, Block] | None:
+) -> tuple[Heading, DataRows] | None:
     """Return the heading and the rows of a text; None where it has no rows."""
-    script = script_of(lines)
-    block = None if script is None else block_of(lines, script, path)
-    if script is None or block is None:
+    dialect = dialect_of(lines)
+    block = None if dialect is None else block_of(lines, dialect, path)
+    if dialect is None or block is None:
         return None
     refuse_long_header(sum(map(len, block.above)), path)
-    heading = heading_of((*preamble, *block.above), script)
+    heading = heading_of((*preamble, *block.above), dialect)
     _refuse_split_decimals(heading, block, path)
     return heading, block
 
 
-def _table(heading: Heading, block: Block, path: Path, before: int = 0) -> Table:
+def _table(heading: Heading, block: DataRows, path: Path, before: int = 0) -> Table:
     """Return the table of a heading of which `before` lines are not in the file."""
-    decimal = block.script.decimal
-    rate = rate_said(heading.facts, decimal)
+    decimal = block.dialect.decimal
+    rate = stated_rate(heading.facts, decimal)
     order = day_order_of(_days(heading), block)
     clock = clock_of(heading, block, rate, order, path)
     time, is_local = clock.start, clock.is_local
@@ -131,20 +131,19 @@ def _table(heading: Heading, block: Block, path: Path, before: int = 0) -> Table
     line = max(0, heading.names_line - before) or None
     columns = tuple(
         _column(heading, block, clock, place, line, path)
-        for place, kind in enumerate(block.script.kinds)
+        for place, kind in enumerate(block.dialect.kinds)
         if kind == "number" and place not in clock.used
     )
-    said = {
+    facts = {
         "hanger": _hanger(heading),
         "time": format_time(time),
         "temperature_c": _temperature(heading, decimal, columns),
         "sampling_rate_hz": unrounded(rate, clock.rate_hz, heading.facts, decimal),
     }
-    known = {key: value for key, value in said.items() if value is not None and value == value}
     return Table(
         path,
         columns,
-        {key: Entry(value, path) for key, value in known.items()},
+        entries_of(facts, path),
         layout,
         clock.rate_hz,
         remarks=(*clock.remarks, *block.remarks),
@@ -176,7 +175,7 @@ def _stacked(lines: Sequence[str], path: Path) -> Table | None:
         return None
     columns = tuple(
         replace(table.columns[0], name=name)
-        for table, name in zip(tables, unlike(titles), strict=True)
+        for table, name in zip(tables, distinct_names(titles), strict=True)
     )
     units = [f"{column.name} [{column.unit}]" for column in columns]
     return replace(tables[0], columns=columns, layout=("stacked", *units))
@@ -188,10 +187,10 @@ def _rate_text(table: Table) -> str:
 
 
 def _column(
-    heading: Heading, block: Block, clock: Clock, place: int, line: int | None, path: Path
+    heading: Heading, block: DataRows, clock: Clock, place: int, line: int | None, path: Path
 ) -> Column:
     values, overloads = values_of(block, place, path)
-    values = clock.evened(values)
+    values = clock.resampled(values)
     name, sensitivity = heading.names[place], heading.sensitivities[place]
     unit = heading.units[place] or ("" if heading.names_line else _unit_of_one(heading))
     return Column(
@@ -200,20 +199,22 @@ def _column(
         lambda: values,
         unit,
         "channel" if is_measured(name, unit, sensitivity) else "other",
-        said_of(name, unit, sensitivity, line, path),
+        stated_entries(name, unit, sensitivity, line, path),
         overloads=overloads,
     )
 
 
-def _refuse_split_decimals(heading: Heading, block: Block, path: Path) -> None:
-    """Raises BadInput where commas part both the cells and the decimals of the numbers."""
-    script = block.script
-    if script.mark != "," or script.quoted or not block.above:
+def _refuse_split_decimals(heading: Heading, block: DataRows, path: Path) -> None:
+    """Raise BadInput where commas part both the cells and the decimals of the numbers."""
+    dialect = block.dialect
+    if dialect.mark != "," or dialect.quoted or not block.above:
         return
-    named = max((len([c for c in script.cells(line) if c]) for line in block.above[-3:]), default=0)
-    if named > 1 and len(script.kinds) in (2 * named, 2 * named - 1) and heading.names_line == 0:
+    named = max(
+        (len([c for c in dialect.cells(line) if c]) for line in block.above[-3:]), default=0
+    )
+    if named > 1 and len(dialect.kinds) in (2 * named, 2 * named - 1) and heading.names_line == 0:
         raise BadInput(
-            f"{len(script.kinds)} values in a row under {named} names: commas part the columns and"
+            f"{len(dialect.kinds)} values in a row under {named} names: commas part the columns and"
             " the decimals too.",
             file=path,
             line=block.lines[0],
@@ -221,13 +222,13 @@ def _refuse_split_decimals(heading: Heading, block: Block, path: Path) -> None:
         )
 
 
-def _refuse_wrapped(block: Block, path: Path) -> None:
-    """Raises BadInput where a list of a seismic archive says another number of samples."""
-    said = next((int(found[1]) for line in block.above if (found := _LISTED.match(line))), None)
-    if said is not None and said != len(block.rows):
+def _refuse_wrapped(block: DataRows, path: Path) -> None:
+    """Raise BadInput where a seismic list gives another number of samples than follows."""
+    n_stated = next((int(found[1]) for line in block.above if (found := _LISTED.match(line))), None)
+    if n_stated is not None and n_stated != len(block.rows):
         raise BadInput(
-            f"its heading says {said} samples of one channel, where {len(block.rows)} rows of"
-            f" {len(block.script.kinds)} values follow.",
+            f"its heading says {n_stated} samples of one channel, where {len(block.rows)} rows of"
+            f" {len(block.dialect.kinds)} values follow.",
             file=path,
             line=block.lines[0],
             remedy="Export one column for each channel, or as miniSEED.",
@@ -242,7 +243,7 @@ def _of_one_signal(heading: Heading, means: Callable[[str], bool]) -> str:
 
 
 def _unit_of_one(heading: Heading) -> str:
-    """The unit of the signal of a text that has one signal and names no columns."""
+    """Return the unit of the signal of a text that has one signal and names no columns."""
     unit = _of_one_signal(heading, words.means_unit)
     return unit if words.is_unit(unit) else ""
 
@@ -252,8 +253,10 @@ def _hanger(heading: Heading) -> int | None:
     for key, value in heading.facts:
         if words.means_hanger(key) and value.strip().isdigit():
             return int(value)
-    said = {n for fact in heading.facts if (n := words.hanger_numbered(" ".join(fact))) is not None}
-    return said.pop() if len(said) == 1 else None
+    numbers = {
+        n for fact in heading.facts if (n := words.hanger_numbered(" ".join(fact))) is not None
+    }
+    return numbers.pop() if len(numbers) == 1 else None
 
 
 def _dates(heading: Heading) -> list[str]:
@@ -276,9 +279,9 @@ def _time(heading: Heading, order: DayOrder | None) -> tuple[datetime | None, bo
     days, clocks = _dates(heading), _moments(heading)
     whole = [v for v in clocks if moment("", v, order) is not None]
     if whole:
-        return moment("", whole[0], order), not says_zone(whole[0])
+        return moment("", whole[0], order), not names_zone(whole[0])
     clock = clocks[0] if clocks else ""
-    local = not says_zone(clock) and not any(map(says_zone, days[:1]))
+    local = not names_zone(clock) and not any(map(names_zone, days[:1]))
     return (moment(days[0], clock, order), local) if days else (None, False)
 
 
@@ -293,11 +296,11 @@ def _temperature(heading: Heading, decimal: str, columns: Sequence[Column]) -> f
     """Return the temperature that a preamble says, or the median of the column that is one."""
     for key, value in heading.facts:
         if words.means_temperature(key):
-            number, unit = quantity_said(value, decimal)
+            number, unit = leading_quantity(value, decimal)
             if unit.lower() in ("", "°c", "c", "degc", "grad"):
                 return number
-    told = [(words.temperature_meant(c.name), c) for c in columns if words.is_celsius(c.unit)]
-    best = [c for how_well, c in told if how_well and how_well == max(told, key=_first)[0]]
+    graded = [(words.temperature_meant(c.name), c) for c in columns if words.is_celsius(c.unit)]
+    best = [c for how_well, c in graded if how_well and how_well == max(graded, key=_first)[0]]
     values = best[0].load() if len(best) == 1 else []
     return float(np.nanmedian(values)) if np.isfinite(values).any() else NAN
 
@@ -306,16 +309,16 @@ def _first(pair: tuple[int, Column]) -> int:
     return pair[0]
 
 
-def _layout(heading: Heading, block: Block) -> tuple[str, ...]:
-    """What all files of one logger share: how they are written, keys, names and units; no values.
+def _layout(heading: Heading, block: DataRows) -> tuple[str, ...]:
+    """Return what files of one logger share: separator, decimal mark, keys, names and units.
 
-    But the serial numbers, as another device has other sensors.
+    Serial numbers are included, as another device has other sensors; other values are not.
     """
-    script = block.script
+    dialect = block.dialect
     keys = sorted({words.key_of(key) for key, _ in heading.facts if words.key_of(key)})
     serials = [value for key, value in heading.facts if words.means_serial(key)]
     columns = [f"{n} [{u}]" for n, u in zip(heading.names, heading.units, strict=True)]
-    return (f"{script.mark}{script.decimal}", *keys, *serials, *columns)
+    return (f"{dialect.mark}{dialect.decimal}", *keys, *serials, *columns)
 
 
 # ---------------------------------------------------------------- channels
@@ -334,17 +337,19 @@ def _is_doubtful(name: str, unit: str) -> bool:
     return in_g and words.means_force_alone(name)
 
 
-def said_of(
+def stated_entries(
     name: str, unit: str, sensitivity: Sensitivity | None, line: int | None, path: Path
 ) -> dict[str, Entry]:
     """Return what a logger's name and unit say of a channel, by the keys of a sidecar."""
-    said: dict[str, object] = {"unit": unit}
+    entries: dict[str, object] = {"unit": unit}
     volts = words.volts_of(unit)
     if volts is not None and sensitivity is not None:
-        said = {"unit": sensitivity.unit, "calibration": sensitivity.unit_per_volt * volts}
+        entries = {"unit": sensitivity.unit, "calibration": sensitivity.unit_per_volt * volts}
     elif _is_doubtful(name, unit) or (quantity_named(name) and not unit):
-        said["unit"] = UNSAID  # a name such as force promises newtons in our own files alone
+        entries["unit"] = (
+            UNIT_MISSING  # a name such as force promises newtons in our own files alone
+        )
     plane = words.plane_meant(name)
-    if plane is not None and (known := words.unit_of(str(said["unit"]))) is not None:
-        said |= {"plane": plane} if known.quantity == "acceleration" else {}
-    return {key: Entry(value, path, line) for key, value in said.items() if value}
+    if plane is not None and (known := words.unit_of(str(entries["unit"]))) is not None:
+        entries |= {"plane": plane} if known.quantity == "acceleration" else {}
+    return {key: Entry(value, path, line) for key, value in entries.items() if value}

@@ -1,9 +1,9 @@
-"""What the words of loggers mean, in German and English: units, names, keys of preambles.
+"""Interpret the words of loggers in German and English: units, names, keys of preambles.
 
-No word decides against a unit: a column is a force because it is in newtons. A name decides only
-where the unit is one of volts, and then says no more than which sensor to ask for.
+The unit decides: a column is a force because it is in newtons. A name decides only where the unit
+is one of volts, and then only which sensor to ask for.
 
-Units of force and acceleration, and their factors to N and m/s^2.
+Units of force and acceleration have their factors to N and m/s^2 here.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from shm.values import Plane, Quantity
 
 @dataclass(frozen=True)
 class Unit:
-    """What a unit measures, and how many N or m/s^2 it is."""
+    """Hold the quantity that a unit measures, and its factor to N or m/s^2."""
 
     quantity: Quantity
     si: float
@@ -58,20 +58,20 @@ _UNITS: dict[str, Unit] = {
 }
 KNOWN = "N, daN, kN, lbf for forces; m/s2, mm/s2, um/s2, g, mg for accelerations"
 ACCELERANCE = "m/s2/N"
-UNSAID = "unknown"
+UNIT_MISSING = "unknown"
 """The unit of a channel whose file says none, where its name alone promises nothing."""
 SI: dict[Quantity, str] = {"force": "N", "acceleration": "m/s2"}
 
 
 def unit_of(text: str) -> Unit | None:
-    """The unit that a text means, None where it is not known."""
+    """Return the unit that a text means, None where it is not known."""
     if text.strip() == "MN":  # the one unit of which the capital letter decides
         return Unit("force", 1e6)
     return _UNITS.get(plain_unit(text))
 
 
 def plain_unit(text: str) -> str:
-    """A unit in small letters, without brackets, blanks and signs of powers and products.
+    """Return a unit in small letters, without brackets, blanks and signs of powers and products.
 
     "Â²" is a ² that was decoded twice, U+FFFD one that was lost.
     """
@@ -81,9 +81,10 @@ def plain_unit(text: str) -> str:
 
 
 def accelerance_si(numerator: str, denominator: str) -> float | None:
-    """Factor to m/s^2/N of response over force; "" means SI; None where a unit is not known.
+    """Return the factor of response over force to m/s^2/N; None where a unit is unknown, "" is SI.
 
-    The numerator may also hold the whole fraction, as in "(m/s2)/N" or an analyser's "(m/s2)(N)".
+    The numerator may also be a complete fraction, as in "(m/s2)/N" or an analyser's
+    "(m/s2)(N)".
     """
     numerator = numerator.replace(")(", ")/(")
     if not denominator and unit_of(numerator) is None and "/" in numerator:
@@ -145,14 +146,14 @@ _SENSITIVITY = re.compile(
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What a sensor gives: `unit_per_volt` of `unit`, such as 10 g a volt at 100 mV/g."""
+    """Hold a sensor's sensitivity: `unit_per_volt` of `unit`, such as 10 g per volt at 100 mV/g."""
 
     unit: str
     unit_per_volt: float
 
 
 def sensitivity_of(text: str) -> Sensitivity | None:
-    """The sensitivity that a text such as "100 mV/g" or "2,25 mV/N" says; None for another text."""
+    """Return the sensitivity of a text such as "100 mV/g" or "2,25 mV/N"; None for another text."""
     found = _SENSITIVITY.fullmatch(text.strip().strip("[]"))
     if found is None or unit_of(found[3]) is None:
         return None
@@ -161,26 +162,27 @@ def sensitivity_of(text: str) -> Sensitivity | None:
 
 
 def volts_of(unit: str) -> float | None:
-    """How many volts a unit is; None where it is none of voltage."""
+    """Return the size of a unit in volts; None where it is none of voltage."""
     return _VOLTS.get(plain_unit(unit))
 
 
 def seconds_of(unit: str) -> float | None:
-    """How many seconds a unit is; None where it is none of time."""
+    """Return the size of a unit in seconds; None where it is none of time."""
     return _SECONDS.get(plain_unit(unit))
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is a unit of anything that loggers measure."""
+    """Return whether a text is a unit of anything that loggers measure."""
     plain = plain_unit(text)
     known = plain in _SECONDS or plain in _VOLTS or plain in _OTHERS
     return known or unit_of(text) is not None or sensitivity_of(text) is not None
 
 
 def name_and_unit(text: str) -> tuple[str, str]:
-    """The name of a column and its unit, "" where the text has none.
+    """Return the name of a column and its unit, "" where the text has none.
 
-    "Kraft [N]", "Force (N)", "Acc / g", "a in m/s²" and "acc_1_g" have one; "Acc (top)" has not.
+    "Kraft [N]", "Force (N)", "Acc / g", "a in m/s²" and "acc_1_g" have one; "Acc (top)" has
+    not.
     """
     text = " ".join(text.split())
     found = _BRACKETED.search(text)
@@ -194,13 +196,13 @@ def name_and_unit(text: str) -> tuple[str, str]:
         inner = name_and_unit(name) if name else ("", "")
         return (f"{inner[0]} {found[0].strip()}", inner[1]) if inner[1] else (text, "")
     for mark in _APART.finditer(text):
-        if mark.start() and _stands_apart(mark[1], text[mark.end() :]):
+        if mark.start() and _is_unit_mark(mark[1], text[mark.end() :]):
             return text[: mark.start()], text[mark.end() :]
     return text, ""
 
 
-def _stands_apart(mark: str, unit: str) -> bool:
-    """Whether the end of a name is a unit: after a mere blank or line, only a clear one."""
+def _is_unit_mark(mark: str, unit: str) -> bool:
+    """Return whether the end of a name is a unit; after a blank or underscore only a clear one."""
     known = unit_of(unit) is not None or volts_of(unit) is not None
     if mark in ("_", " ", ":"):  # a letter there may be a direction or a number
         return known or plain_unit(unit) in ("ms", "sec")
@@ -208,31 +210,31 @@ def _stands_apart(mark: str, unit: str) -> bool:
 
 
 def quantity_meant(name: str) -> Quantity | None:
-    """What a column probably measures by its name; None where the name says nothing."""
+    """Return the quantity that a column's name probably means; None where it means none."""
     if _FORCE.search(name) and not _ACCELERATION.match(name):
         return "force"
     return "acceleration" if _ACCELERATION.search(name) else None
 
 
 def means_force_alone(name: str) -> bool:
-    """Whether a name is that of a force, and holds no word of acceleration."""
+    """Return whether a name is that of a force, and holds no word of acceleration."""
     return _FORCE.search(name) is not None and _ACCELERATION.search(name) is None
 
 
 def plane_meant(name: str) -> Plane | None:
-    """The plane that a name says in words; None where it says a letter of an axis or nothing."""
+    """Return the plane that a name gives in words; None for the letter of an axis or no plane."""
     if _TRANSVERSE.search(name):
         return "transverse"
     return "longitudinal" if _LONGITUDINAL.search(name) else None
 
 
 def means_time(name: str) -> bool:
-    """Whether a name is that of a column of times."""
+    """Return whether a name is that of a column of times."""
     return _TIMES.fullmatch(name.strip()) is not None
 
 
 def means_counter(name: str) -> bool:
-    """Whether a name is that of a column that counts the samples."""
+    """Return whether a name is that of a column that counts the samples."""
     return _COUNTERS.fullmatch(name.strip()) is not None
 
 
@@ -240,12 +242,12 @@ def means_counter(name: str) -> bool:
 
 
 def key_of(text: str) -> str:
-    """A key of a preamble by its letters alone, in lower case."""
+    """Return a key of a preamble by its letters alone, in lower case."""
     return "".join(c for c in text.lower() if c.isalpha())
 
 
 def _meaning(letters: str) -> Callable[[str], bool]:
-    """Whether the letters of a key mean a thing."""
+    """Return a test of whether the letters of a key belong to one meaning."""
     meant = re.compile(letters)
     return lambda key: meant.fullmatch(key_of(key)) is not None
 
@@ -298,6 +300,6 @@ means_serial = _meaning(r".*(serial|serien|^sn)(number|nummer|nr|no)?.*")
 
 
 def hanger_numbered(text: str) -> int | None:
-    """The hanger that a text or a file's name numbers, as "Hänger 3"; None where none or two."""
+    """Return the hanger number in a text or file name, as "Hänger 3"; None where none or two."""
     found = {int(number) for number in _NUMBERED.findall(text)}
     return found.pop() if len(found) == 1 else None

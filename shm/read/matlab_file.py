@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from shm.errors import BadInput
 from shm.read.array_reading import format_of_arrays
-from shm.read.arrays import Arrays, Variable, named_apart
+from shm.read.arrays import Arrays, Variable, unique_names
 from shm.read.content import bytes_of
 from shm.read.hdf5_file import opened_nodes, variables
 from shm.read.limits import guarded, limits, refuse_large
@@ -64,7 +64,7 @@ def _opened(path: Path) -> Iterator[Arrays]:
 
 
 def _interpreted(variable: Variable) -> Variable:
-    """MATLAB keeps texts as numbers of their characters."""
+    """Return a variable with MATLAB's numbered characters as text."""
     if variable.attributes.get("matlab_class") != "char" or variable.kind not in "iu":
         return variable
     return replace(variable, kind="U", load=lambda: _text(variable.load()))
@@ -82,7 +82,7 @@ _MOST_VARIABLES = 1000
 _OF = "\0"  # between a struct and its field, until names are told apart
 _NAME_FIELDS = ("channel_names", "names", "channels", "labels")
 _UNIT_FIELDS = ("unit", "units")
-_MOST_BESIDE = 20  # judgement: a struct among more is settings of a program, no recording
+_MAX_FIELDS = 20  # judgement: a struct among more is settings of a program, no recording
 _KINDS = {
     "double": ("f", 8), "single": ("f", 4), "char": ("U", 4), "int8": ("i", 1), "uint8": ("u", 1),
     "int16": ("i", 2), "uint16": ("u", 2), "int32": ("i", 4), "uint32": ("u", 4),
@@ -91,7 +91,7 @@ _KINDS = {
 
 
 def arrays_in(path: Path) -> Arrays:
-    """Variables of numbers and texts, others left out; raises BadInput for sizes beyond limits."""
+    """Return the variables that are numbers or texts; raises BadInput beyond the limits."""
     content = bytes_of(path)
     with guarded(path):
         elements = tuple(elements_of(content))
@@ -107,13 +107,13 @@ def arrays_in(path: Path) -> Arrays:
     ):
         if kind in _KINDS:
             found.append(_variable(name, shape, kind, is_complex, element, content, path))
-        elif kind == "struct" and math.prod(shape) == 1 and len(listed) < _MOST_BESIDE:
+        elif kind == "struct" and math.prod(shape) == 1 and len(listed) < _MAX_FIELDS:
             fields = _fields(name, element, content, path)
             found += fields
             left_out += [] if fields else [f"{name} ({kind})"]
         else:
             left_out.append(f"{name} ({kind})")
-    names = named_apart([tuple(variable.name.split(_OF)) for variable in found])
+    names = unique_names([tuple(variable.name.split(_OF)) for variable in found])
     apart = [replace(v, name=name) for v, name in zip(found, names, strict=True)]
     return Arrays(tuple(apart), {}, tuple(left_out))
 
@@ -160,7 +160,7 @@ def _rows(
     """Return the records in a field: a row, or the columns of a table that another field names."""
     if value.ndim == 1 and value.size > 1:
         return [(key, value)]
-    if value.ndim != 2 or min(value.shape) > _MOST_BESIDE or max(value.shape) < 2:
+    if value.ndim != 2 or min(value.shape) > _MAX_FIELDS or max(value.shape) < 2:
         return []
     columns = value.T if value.shape[0] >= value.shape[1] else value
     names = _listed(fields, _NAME_FIELDS, len(columns))
@@ -233,14 +233,14 @@ class Element:
 
     @property
     def is_complex(self) -> bool:
-        """Whether its values are complex; ValueError where the head is damaged."""
+        """Return whether its values are complex; ValueError where the head is damaged."""
         (kind, flags), dimensions, name = self._head(next(self.pieces()))
         if (kind, len(flags), dimensions[0], name[0]) != (_UINT32, 8, _INT32, _INT8):
             raise ValueError("the head of a variable is damaged")
         return bool(self._number(flags, 0) & _COMPLEX_FLAG)
 
     def pieces(self) -> Iterator[bytes]:
-        """A matrix with its tag, unpacked piece by piece, until it outgrows the limit."""
+        """Yield a matrix with its tag, unpacked piece by piece, until it outgrows the limit."""
         if self.kind != _COMPRESSED:
             yield struct.pack(f"{self.byte_order}II", self.kind, len(self.packed)) + self.packed
             return
@@ -252,7 +252,7 @@ class Element:
             yield piece
 
     def refuse_damaged(self, shape: tuple[int, ...], is_text: bool) -> None:
-        """Raises ValueError where the values are not what the shape says, or far too many."""
+        """Raise ValueError where the values do not match the shape, or are far too many."""
         content = b"".join(self.pieces())
         if len(content) > limits().bytes_at_once:
             raise ValueError("a variable unpacks to more than is read at once")
@@ -298,12 +298,12 @@ class Element:
                 raise ValueError("a field's values are not as many as its shape says")
 
     def _head(self, piece: bytes) -> list[tuple[int, bytes]]:
-        """Flags, dimensions and name of a matrix, each with its type."""
+        """Return flags, dimensions and name of a matrix, each with its type."""
         parts = self._parts(piece)
         return [next(parts, (0, b"")) for _ in range(3)]
 
     def _parts(self, content: bytes) -> Iterator[tuple[int, bytes]]:
-        """Type and content of each part of a matrix."""
+        """Yield type and content of each part of a matrix."""
         if self._number(content, 0) != _MATRIX or len(content) < 8:
             raise ValueError("an element is no matrix")
         place, end = 8, min(len(content), 8 + self._number(content, 4))
@@ -322,7 +322,7 @@ class Element:
 
 
 def elements_of(content: bytes) -> Iterator[Element]:
-    """The elements of a file in memory; ValueError or struct.error where they do not fit in."""
+    """Yield the elements of a file in memory; raises ValueError or struct.error if cut off."""
     order = "<" if content[126:128] == b"IM" else ">"
     place = _HEADER_BYTES
     while place < len(content):

@@ -40,8 +40,9 @@ class _Trace:
 
 
 def recognises(head: bytes) -> bool:
-    """Whether the first bytes of a file are those of a record of version 3, or of 2: its number as
-    text, and its quality.
+    """Return whether the first bytes of a file are those of a record of version 3, or of 2.
+
+    A record of version 2 begins with its number as text, and its quality.
     """
     is_2 = head[:6].strip(b" \0").isdigit() and head[6:7] in b"DRQM" and head[7:8] in b" \0"
     return head[:3] == b"MS\x03" or (len(head) > 48 and is_2)
@@ -53,9 +54,9 @@ def open_tables(path: Path) -> tuple[Table, ...]:
     rates = [trace.sampling_rate_hz for trace in traces]
     rate, start_ns = rates[0], min(trace.start_ns for trace in traces)
     if max(rates) - min(rates) > _SAME_RATE * rate:
-        told = ", ".join(f"{each:g}" for each in sorted(set(rates)))
+        listed = ", ".join(f"{each:g}" for each in sorted(set(rates)))
         raise BadInput(
-            f"the channels have different sampling rates ({told}).",
+            f"the channels have different sampling rates ({listed}).",
             file=path,
             remedy="Export all channels of one recording with one rate.",
         )
@@ -75,13 +76,13 @@ def open_tables(path: Path) -> tuple[Table, ...]:
 
 
 def _fill(row: FloatArray, values: np.ndarray) -> None:
-    """What is there twice is taken from what began first."""
+    """Fill a row with values where it has none, so that overlaps keep the earlier trace."""
     is_free = np.isnan(row)
     row[is_free] = values[is_free]
 
 
 def _traces(path: Path) -> list[_Trace]:
-    """All traces by time; nothing is unpacked before its size is known."""
+    """Return all traces by time; nothing is unpacked before its size is known."""
     library = _library(path)
     with guarded(path):
         counts: dict[str, int] = {}

@@ -45,7 +45,7 @@ class ForeignModalMode:
 
     @property
     def half_waves(self) -> int:
-        """How often its shape changes sign, and one more; 0 where there are too few places."""
+        """Return the number of sign changes of the shape plus one; 0 with too few points."""
         values = [point.value for point in self.points]
         signs = [value > 0 for value in values if abs(value) > _NODE * max(map(abs, values))]
         return 1 + sum(a != b for a, b in pairwise(signs)) if signs else 0
@@ -64,7 +64,7 @@ class ForeignModes:
 
 
 def foreign_modes(path: Path) -> ForeignModes | None:
-    """The modes in a UFF file; None where it holds none. Raises BadInput where it is damaged."""
+    """Return the modes in a UFF file; None where it has none. Raises BadInput for damage."""
     raw = bytes_of(path)
     refuse_cut_off(raw, path)
     quiet = warnings.catch_warnings()
@@ -124,7 +124,7 @@ def _mode(
 
 
 def _frequency(found: dict[str, Any]) -> tuple[float, float]:
-    """Frequency in Hz and damping ratio, NaN where it is not said or no ratio."""
+    """Return frequency in Hz and damping ratio; NaN where missing, or where it is no ratio."""
     if int(found["analysis_type"]) == _NORMAL:
         viscous = float(found.get("modal_damp_vis") or NAN)
         hysteretic = float(found.get("modal_damp_his") or NAN)
@@ -140,7 +140,7 @@ def _frequency(found: dict[str, Any]) -> tuple[float, float]:
 def _shape(
     found: dict[str, Any], places: dict[int, FloatArray]
 ) -> tuple[str, tuple[ShapePoint, ...]]:
-    """The axis of the largest motion across the hanger, and the motion at each place."""
+    """Return the axis of the largest motion across the hanger, and the motion at each position."""
     rows = [np.asarray(found.get(f"r{k}"), dtype=complex).ravel() for k in (1, 2, 3)]
     nodes = [int(node) for node in np.asarray(found.get("node_nums"), dtype=float).ravel()]
     if not nodes or any(len(row) != len(nodes) for row in rows):
@@ -170,14 +170,14 @@ def _shape(
 
 
 def _axis_alone(motion: np.ndarray) -> str:
-    """The axis of the largest motion of a shape whose places nobody says."""
+    """Return the axis of the largest motion of a shape whose positions are unknown."""
     if not np.isfinite(motion).all() or not np.any(motion):
         return ""
     return _AXES[int(np.argmax(np.sum(_as_real(motion) ** 2, axis=1)))]
 
 
 def _as_real(motion: np.ndarray) -> FloatArray:
-    """A complex shape turned so that its largest part is real, and that part of it."""
+    """Return the real part of a complex shape, rotated so that its largest component is real."""
     largest = motion.ravel()[int(np.argmax(np.abs(motion)))]
     turned: FloatArray = (motion * np.conj(largest) / (abs(largest) or 1.0)).real
     return turned
@@ -189,5 +189,5 @@ def _refusal(what: str, number: int, path: Path) -> BadInput:
 
 
 def axes_of(modes: Sequence[ForeignModalMode]) -> tuple[str, ...]:
-    """The axes along which modes move, in the order of the alphabet."""
+    """Return the axes along which modes move, in the order of the alphabet."""
     return tuple(sorted({mode.axis for mode in modes if mode.axis}))

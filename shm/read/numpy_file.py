@@ -80,7 +80,7 @@ def _variable(name: str, opened: Callable[[], IO[bytes]], path: Path) -> Variabl
 
 
 def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    """Shape, whether in Fortran order, and type of the array that a stream begins with."""
+    """Return shape, Fortran order and type of the array at the beginning of a stream."""
     return _HEADERS[npy.read_magic(stream)](stream)
 
 

@@ -48,7 +48,7 @@ _COMMENT = (
     "# What the files of one logger do not say themselves, as `shm import` asked. It holds for\n"
     "# every file with these columns; correct it here, or import a file again.\n"
 )
-_WRITE_ANEW = "Correct it, or delete it and import a file of the logger again."
+_REWRITE = "Correct it, or delete it and import a file of the logger again."
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Profile:
 
 
 def profile_for(layout: Layout, workspace: Path) -> Profile | None:
-    """The profile of the logger whose files look so; None where there is none.
+    """Return the profile of the logger whose files look so; None where there is none.
 
     Raises BadInput naming a profile that is damaged.
     """
@@ -76,12 +76,16 @@ def profile_for(layout: Layout, workspace: Path) -> Profile | None:
 
 
 def any_profile(workspace: Path) -> bool:
-    """Whether any logger was imported into this workspace."""
+    """Return whether any logger was imported into this workspace."""
     return bool(_files(workspace))
 
 
 def completed(
-    profile: Described, layout: Layout, own: Described, file_name: str = "", zone: tzinfo = UTC
+    profile: Described,
+    layout: Layout,
+    in_sidecar: Described,
+    file_name: str = "",
+    zone: tzinfo = UTC,
 ) -> dict[str, Any]:
     """Return the sidecar of one file: what its own says, and what name and profile add to that.
 
@@ -99,18 +103,18 @@ def completed(
         added["hanger"] = named
     if layout.hanger is not None:
         added.pop("hanger", None)
-    if layout.says_rate:
+    if layout.has_rate:
         added.pop("sampling_rate_hz", None)
-    listed = own.keys() & set(CHANNEL_KEYS)  # lists in the order of the channels
-    names = {**added.get("channel", {}), **own.get("channel", {})}
+    listed = in_sidecar.keys() & set(CHANNEL_KEYS)  # lists in the order of the channels
+    names = {**added.get("channel", {}), **in_sidecar.get("channel", {})}
     channels = {
         name: {
             **{k: v for k, v in added.get("channel", {}).get(name, {}).items() if k not in listed},
-            **own.get("channel", {}).get(name, {}),
+            **in_sidecar.get("channel", {}).get(name, {}),
         }
         for name in names
     }
-    whole = {**added, **own}
+    whole = {**added, **in_sidecar}
     return {**whole, "channel": channels} if channels else whole
 
 
@@ -138,12 +142,12 @@ def learn_day_order(layout: Layout, order: DayOrder | None, workspace: Path) -> 
 def save_profile(
     described: Described, layout: Layout, workspace: Path, *, roams: bool = False
 ) -> Profile:
-    """Keeps what was said of the files of a layout, in the place of what was kept before."""
+    """Save the description of a logger's files as its profile, in place of an earlier one."""
     before = profile_for(layout, workspace)
-    kept = {key: described[key] for key in _OF_PROFILE if key in described}
-    moved = roams or (before is not None and _moved(before, kept))
+    stored = {key: described[key] for key in _OF_PROFILE if key in described}
+    moved = roams or (before is not None and _moved(before, stored))
     if moved:
-        kept.pop("hanger", None)
+        stored.pop("hanger", None)
     path = before.path if before is not None else _free_path(layout, workspace)
     head = {
         "fingerprint": layout.fingerprint,
@@ -152,14 +156,14 @@ def save_profile(
         **({"roams": True} if moved else {}),
     }
     path.parent.mkdir(exist_ok=True)
-    replace_text(path, _COMMENT + sidecar_text({**head, **kept}))
-    return Profile(path, layout.fingerprint, kept, moved)
+    replace_text(path, _COMMENT + sidecar_text({**head, **stored}))
+    return Profile(path, layout.fingerprint, stored, moved)
 
 
-def _moved(before: Profile, kept: Described) -> bool:
-    """Whether a logger has been at two hangers, so that no profile can know the next."""
+def _moved(before: Profile, stored: Described) -> bool:
+    """Return whether a logger was used at two hangers, so that no profile can know the next."""
     former = before.described.get("hanger")
-    return before.roams or (former is not None and kept.get("hanger", former) != former)
+    return before.roams or (former is not None and stored.get("hanger", former) != former)
 
 
 def _files(workspace: Path) -> list[Path]:
@@ -179,10 +183,10 @@ def _load(path: Path) -> Profile:
         raise unreadable(path, error) from error
     except (ValueError, RecursionError) as error:
         what = f"not a readable TOML file: {error}."
-        raise BadInput(what, file=path, remedy=_WRITE_ANEW) from error
+        raise BadInput(what, file=path, remedy=_REWRITE) from error
     channels = document.get("channel", {})
     if not isinstance(document.get("fingerprint"), str) or not isinstance(channels, dict):
-        raise BadInput("is no profile of a logger.", file=path, remedy=_WRITE_ANEW)
+        raise BadInput("is no profile of a logger.", file=path, remedy=_REWRITE)
     for name, table in channels.items():
         unknown = set(table) - set(CHANNEL_KEYS) if isinstance(table, dict) else {str(table)}
         if unknown:

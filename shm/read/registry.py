@@ -1,8 +1,7 @@
-"""The formats that are known, and the verbs for a single file: reading, a look at its headers, and
-a survey of all its columns before it is known which of them is what.
+"""Hold the known formats and the verbs for a file: read, peek at headers, survey all columns.
 
-A whole test: one file, or all files of an archive; a document of modal tests with the sidecar
-beside it, which goes before it.
+A complete test is one file, or all files of an archive. A sidecar of a document of modal tests
+overrides the document.
 """
 
 from __future__ import annotations
@@ -33,11 +32,12 @@ from shm.read.content import (
 )
 from shm.read.excel_file import FORMAT as EXCEL
 from shm.read.hdf5_file import FORMAT as HDF5
-from shm.read.header import CHANNEL_KEYS, Header
+from shm.read.header import CHANNEL_KEYS, Header, known_values
 from shm.read.matlab_file import FORMAT as MATLAB
 from shm.read.mini_seed_file import FORMAT as MINI_SEED
 from shm.read.numpy_file import FORMAT as NUMPY
-from shm.read.sidecar import document_beside, sidecar_path
+from shm.read.sep005 import FORMAT as SEP005
+from shm.read.sidecar import sidecar_document, sidecar_path
 from shm.read.table import Column, Table, describe
 from shm.read.tdms_file import FORMAT as TDMS
 from shm.read.universal_file import FORMAT as UFF
@@ -54,6 +54,7 @@ FORMATS: tuple[Format, ...] = (
     WAVE,
     MINI_SEED,
     CAMPBELL,
+    SEP005,
     UFF,
     CSV,
 )
@@ -92,10 +93,10 @@ def _looks(path: Path) -> tuple[Peek, ...]:
 
 
 def write(recording: Recording | FrequencyResponse, path: Path) -> None:
-    """Writes a file in the format of its suffix, whole or not at all.
+    """Write a file in the format of its suffix; an interrupted write leaves the old file.
 
     A format that cannot hold everything gets a sidecar, written first. Raises UsageError for a
-    suffix of no format that is written, and for what the format cannot hold.
+    suffix without a format that is written, and for data that the format cannot hold.
     """
     found = _format_of_suffix(path)
     if found is None or found.write is None:
@@ -108,7 +109,7 @@ def write(recording: Recording | FrequencyResponse, path: Path) -> None:
 
 
 def format_of(path: Path) -> Format:
-    """The format of the suffix, after a look at the content; raises BadInput."""
+    """Return the format of the suffix, after a look at the content; raises BadInput."""
     head = head_of(path)
     if holds_test(path):
         raise BadInput(
@@ -141,7 +142,7 @@ def _suffixes() -> list[str]:
 
 
 def libraries_for(path: Path) -> tuple[str, ...]:
-    """What reading a file loads, by its suffix; an archive may hold any format."""
+    """Return the libraries that reading a file loads, by its suffix; an archive may need all."""
     suffix = _unpacked_name(path).suffix.lower()
     formats = (
         FORMATS
@@ -152,7 +153,7 @@ def libraries_for(path: Path) -> tuple[str, ...]:
 
 
 def write_single(recording: Recording, path: Path) -> None:
-    """Writes an .npz file, not compressed: its size tells the numbers of samples and channels."""
+    """Write an uncompressed .npz file: its size gives the numbers of samples and channels."""
     write(replace(recording, channels=tuple(map(_single, recording.channels))), path)
 
 
@@ -170,8 +171,10 @@ def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
     if not holds_test(path):
         return _records(path)
     head_of(path)
-    said = entries_of_test(path).of_test
-    read_all = (_as_said(each, said) for found in each_member(path, _read_member) for each in found)
+    stated = entries_of_test(path).of_test
+    read_all = (
+        _with_stated(each, stated) for found in each_member(path, _read_member) for each in found
+    )
     return tuple(read_all)
 
 
@@ -188,8 +191,10 @@ def peek_test(path: Path) -> tuple[Peek, ...]:
         return _looks(path)
     head_of(path)
     problems: list[str] = []
-    said = read_of_test(entries_of_test(path), collecting(problems))
-    looks = (_as_said(each, said) for found in each_member(path, _peek_member) for each in found)
+    stated = read_of_test(entries_of_test(path), collecting(problems))
+    looks = (
+        _with_stated(each, stated) for found in each_member(path, _peek_member) for each in found
+    )
     return tuple(replace(each, problems=(*each.problems, *problems)) for each in looks)
 
 
@@ -201,7 +206,7 @@ def _peek_member(file: Path, name: str) -> tuple[Peek, ...]:
 
 
 def _named(verb: Callable[[Path], T], file: Path, name: str) -> T:
-    """What `verb` gives; its refusals name the member of the archive, not where it was unpacked."""
+    """Return the result of `verb`; refusals name the member, not its temporary file."""
     try:
         return verb(file)
     except BadInput as refusal:
@@ -216,26 +221,25 @@ def _named(verb: Callable[[Path], T], file: Path, name: str) -> T:
 
 
 def load_modes(path: Path) -> tuple[ModalTest, ...]:
-    """The tests of a `*.modes.json` file; raises BadInput with file, test, mode and remedy.
+    """Return the tests of a `*.modes.json` file; raises BadInput with file, test, mode and remedy.
 
     Hanger, time, temperature and the known mass of a sidecar are those of its tests.
     """
     tests = modes_document.load_modes(path)
     _refuse_channels(path)
-    said = entries_of_test(path)
-    _refuse_what_samples_have(said, tests, path)
-    return tuple(_as_said(test, said.of_test) for test in tests)
+    stated = entries_of_test(path)
+    _refuse_what_samples_have(stated, tests, path)
+    return tuple(_with_stated(test, stated.of_test) for test in tests)
 
 
-def _as_said(found: Found, said: Mapping[str, Any]) -> Found:
+def _with_stated(found: Found, stated: Mapping[str, Any]) -> Found:
     """Return a test with what a sidecar says of all of it; None and NaN change nothing."""
-    known = {key: value for key, value in said.items() if value is not None and value == value}
-    known = {key: value for key, value in known.items() if hasattr(found, key)}
-    return replace(found, **known)
+    known = known_values(stated)
+    return replace(found, **{key: value for key, value in known.items() if hasattr(found, key)})
 
 
 def _refuse_channels(path: Path) -> None:
-    for key in document_beside(path).keys() & {"channel", *CHANNEL_KEYS}:
+    for key in sidecar_document(path).keys() & {"channel", *CHANNEL_KEYS}:
         raise BadInput(
             f"{key!r} is said of modes, which have no channels.",
             file=sidecar_path(path),
@@ -243,15 +247,15 @@ def _refuse_channels(path: Path) -> None:
         )
 
 
-def _refuse_what_samples_have(said: Header, tests: tuple[ModalTest, ...], path: Path) -> None:
+def _refuse_what_samples_have(stated: Header, tests: tuple[ModalTest, ...], path: Path) -> None:
     sidecar = sidecar_path(path)
-    if not math.isnan(said.sampling_rate_hz):
+    if not math.isnan(stated.sampling_rate_hz):
         raise BadInput(
             "sampling_rate_hz is said of modes, whose frequencies are known.",
             file=sidecar,
             remedy=f"Correct the frequencies in {path.name} and send it again.",
         )
-    if said.time is not None and len(tests) > 1:
+    if stated.time is not None and len(tests) > 1:
         raise BadInput(
             f"one time is said of {len(tests)} tests.",
             file=sidecar,
@@ -275,7 +279,7 @@ def survey(path: Path) -> Survey:
             remedy="Unpack it and import one of its files of each.",
         )
     entries, several = entries_of_test(path), f"the first of {len(found)} files is shown"
-    first, remarks = _as_said(found[0], entries.of_test), [several] if len(found) > 1 else []
+    first, remarks = _with_stated(found[0], entries.of_test), [several] if len(found) > 1 else []
     orders = {each.layout.day_order for each in found} - {None}
     layout = replace(
         first.layout,
@@ -294,7 +298,7 @@ def _survey_file(path: Path) -> Survey:
 
 def _surveyed(tables: Sequence[Table], file_format: str, path: Path) -> Survey:
     table = tables[0]
-    seen, is_response = look(table, file_format), describe(table, with_beside=False).is_response
+    seen, is_response = look(table, file_format), describe(table, with_sidecars=False).is_response
     channels = {channel.name: channel for channel in seen.channels}
     columns: list[SurveyedColumn] = []
     problems = list(seen.problems)
@@ -372,19 +376,19 @@ def _layout(table: Table, file_format: str, columns: Sequence[SurveyedColumn]) -
     """Return the layout by what the file itself says, whatever a sidecar adds."""
     is_response = bool(columns) and columns[0].values is None
     names = tuple(column.name for column in columns)
-    said = names if is_response else table.layout
-    digest = hashlib.sha256("\n".join((file_format, *said)).encode()).hexdigest()
-    attempt, own = collecting([]), table.own_header
+    stated = names if is_response else table.layout
+    digest = hashlib.sha256("\n".join((file_format, *stated)).encode()).hexdigest()
+    attempt, in_file = collecting([]), table.file_header
     timed = any(column.role == "times" or column.rate_hz > 0 for column in table.columns)
-    says_rate = timed or table.clock_rate_hz > 0 or attempt(lambda: own.sampling_rate_hz, 0) > 0
+    has_rate = timed or table.clock_rate_hz > 0 or attempt(lambda: in_file.sampling_rate_hz, 0) > 0
     return Layout(
         digest[:_FINGERPRINT_DIGITS],
         file_format,
         names
         if is_response
         else tuple(f"{c.name} [{c.unit}]" if c.unit else c.name for c in columns),
-        attempt(lambda: own.hanger, None),
-        says_rate,
+        attempt(lambda: in_file.hanger, None),
+        has_rate,
         table.day_order,
         table.possible_times,
         table.local_time,

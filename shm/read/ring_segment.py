@@ -39,9 +39,10 @@ _MICROSECOND = timedelta(microseconds=1)
 
 @dataclass(frozen=True, order=True)
 class ChunkKey:
-    """What tells a chunk of a stream from all others: when it began, its number, its contents.
+    """Identify a chunk of a stream: its start, its number, its contents.
 
-    `arrived_us` is when it came: where two are of one time, the first counts. 0 in old segments.
+    `arrived_us` is the time of receipt: of two with one start, the first counts. 0 in old
+    segments.
     """
 
     start_us: int
@@ -51,19 +52,19 @@ class ChunkKey:
 
 
 def microseconds(time: datetime) -> int:
-    """Since 1970."""
+    """Return the microseconds since 1970."""
     return (time - _EPOCH) // _MICROSECOND
 
 
 def time_of(microseconds: int) -> datetime:
-    """The time so many microseconds after 1970."""
+    """Return the time so many microseconds after 1970."""
     return _EPOCH + microseconds * _MICROSECOND
 
 
 def write_segment(path: Path, chunks: Sequence[tuple[ChunkKey, Chunk]]) -> None:
-    """Writes chunks of one stream, which have the same channels, and forces them to disk.
+    """Write chunks of one stream with equal channels to a file, and force it to disk.
 
-    HDF5 makes the file in memory: it kills the process where it meets a full disk.
+    HDF5 makes the file in memory: a full disk would kill the process.
     """
     image = _image(chunks)
     with path.open("wb") as file:
@@ -73,7 +74,7 @@ def write_segment(path: Path, chunks: Sequence[tuple[ChunkKey, Chunk]]) -> None:
 
 
 def _image(chunks: Sequence[tuple[ChunkKey, Chunk]]) -> bytes:
-    """The contents of the file."""
+    """Return the contents of the file."""
     first = chunks[0][1]
     packed = {"compression": "gzip", "compression_opts": _LEVEL, "shuffle": True}
     with h5py.File(first.stream, "w", driver="core", backing_store=False) as file:
@@ -103,13 +104,13 @@ def _rows(chunks: Sequence[tuple[ChunkKey, Chunk]]) -> NDArray[np.void]:
 
 
 def read_spans(path: Path) -> dict[ChunkKey, int]:
-    """The chunks of a segment, each with its end in microseconds; raises BadInput."""
+    """Return the chunks of a segment, each with its end in microseconds; raises BadInput."""
     with guarded(path, "the segment"), h5py.File(path, "r", locking=False) as file:
         return {_key(row): int(row["end_us"]) for row in file[_TABLE][()]}
 
 
 def read_segment(path: Path) -> dict[ChunkKey, Chunk]:
-    """The chunks of a segment; raises BadInput where it is damaged."""
+    """Return the chunks of a segment; raises BadInput where it is damaged."""
     with guarded(path, "the segment"), h5py.File(path, "r", locking=False) as file:
         stream, rate = str(file.attrs["stream"]), float(file.attrs["sampling_rate_hz"])
         channels = tuple(str(name) for name in file.attrs["channels"])

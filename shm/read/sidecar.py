@@ -19,7 +19,6 @@ leave_out = true
 from __future__ import annotations
 
 import json
-import math
 import os
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
@@ -32,7 +31,7 @@ from shm.errors import BadInput
 from shm.read.atomic import replace_text
 from shm.read.base import PeekChannel
 from shm.read.content import unreadable
-from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, mass_entries, spread
+from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, known_values, mass_entries, spread
 from shm.read.limits import refuse_long_header
 from shm.values import FrequencyResponse, Recording
 
@@ -42,9 +41,9 @@ _SHAPE = "Write hanger = 3 and the like, and a table [channel.acc_1] for each ch
 
 
 def sidecar_path(path: Path) -> Path:
-    """Where the sidecar of a file stands, whether it exists or not.
+    """Return the path of a file's sidecar, which need not exist.
 
-    Beside a name so long that the sidecar's would be too long, it is the name cut to fit.
+    Where the sidecar's name would be too long, the file's name is cut to fit.
     """
     plain = path.with_suffix("") if path.suffix.lower() == ".gz" else path
     name = os.fsencode(plain.with_suffix(SIDECAR_SUFFIX).name)
@@ -62,7 +61,7 @@ def with_sidecar(
     says of channels is left alone where it is not asked for.
     """
     sidecar = sidecar_path(path)
-    document = document_beside(path)
+    document = sidecar_document(path)
     if not document:
         return header
     _refuse_misspelt(document, sidecar)
@@ -78,7 +77,7 @@ def with_sidecar(
         _refuse_unknown(tables, [*names, *others], sidecar)
     for name in [name for name in names if name in tables]:
         channels[name].update(_entries(tables[name], sidecar))
-    return header.overridden_by(Header(sidecar, channels, entries))
+    return header.merged_with(Header(sidecar, channels, entries))
 
 
 def _refuse_misspelt(document: Iterable[str], sidecar: Path) -> None:
@@ -91,9 +90,9 @@ def _refuse_misspelt(document: Iterable[str], sidecar: Path) -> None:
 
 
 def channels_described(path: Path) -> dict[str, dict[str, Entry]]:
-    """What the sidecar of a file says in tables of single channels; empty without a sidecar."""
+    """Return the tables of single channels in the sidecar of a file; empty without a sidecar."""
     sidecar = sidecar_path(path)
-    tables = _tables(document_beside(path), sidecar)
+    tables = _tables(sidecar_document(path), sidecar)
     return {name: _entries(table, sidecar) for name, table in tables.items()}
 
 
@@ -101,8 +100,8 @@ def _entries(table: dict[str, Any], sidecar: Path) -> dict[str, Entry]:
     return {key: Entry(table[key], sidecar) for key in CHANNEL_KEYS if key in table}
 
 
-def document_beside(path: Path) -> dict[str, Any]:
-    """All that the sidecar of a file says; empty without a sidecar."""
+def sidecar_document(path: Path) -> dict[str, Any]:
+    """Return the content of a file's sidecar; empty without a sidecar."""
     sidecar = sidecar_path(path)
     return _document(sidecar) if sidecar != path and sidecar.is_file() else {}
 
@@ -121,7 +120,7 @@ def _document(sidecar: Path) -> dict[str, Any]:
 
 
 def _refuse_link_outside(sidecar: Path) -> None:
-    """Raises BadInput for a link to another folder, whose text a refusal would show."""
+    """Raise BadInput for a link to another folder, whose text a refusal would show."""
     if sidecar.resolve().parent != sidecar.parent.resolve():
         raise BadInput(
             "is a link out of its folder.", file=sidecar, remedy="Lay the sidecar itself there."
@@ -166,7 +165,7 @@ def write_sidecar(
     sampling_rate_hz: float,
     path: Path,
 ) -> None:
-    """Writes the sidecar of `path`, whole or not at all."""
+    """Write the sidecar of `path`; an interrupted write leaves the old one."""
     whole = {
         "hanger": described.hanger,
         "time": described.time,
@@ -175,16 +174,8 @@ def write_sidecar(
         "sampling_rate_hz": sampling_rate_hz,
     }
     keys = ("unit", "plane", "x_m", "full_scale")
-    tables = {c.name: _known({key: getattr(c, key) for key in keys}) for c in channels}
-    replace_text(sidecar_path(path), sidecar_text({**_known(whole), "channel": tables}))
-
-
-def _known(said: Described) -> dict[str, Any]:
-    return {
-        key: value
-        for key, value in said.items()
-        if value not in (None, "") and not (isinstance(value, float) and math.isnan(value))
-    }
+    tables = {c.name: known_values({key: getattr(c, key) for key in keys}) for c in channels}
+    replace_text(sidecar_path(path), sidecar_text({**known_values(whole), "channel": tables}))
 
 
 Described = Mapping[str, Any]
@@ -192,7 +183,7 @@ Described = Mapping[str, Any]
 
 
 def sidecar_text(described: Described) -> str:
-    """The TOML of a sidecar: keys of the whole, then a table for each channel."""
+    """Return the TOML of a sidecar: general keys, then a table for each channel."""
     lines = [f"{key} = {_toml(value)}" for key, value in described.items() if key != "channel"]
     for name, table in described.get("channel", {}).items():
         lines += ["", f"[channel.{_quoted(name)}]"]
@@ -211,6 +202,6 @@ def _toml(value: object) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A text as TOML takes it: control characters and half pairs as blanks."""
+    """Return a text as TOML takes it: control characters and half pairs as blanks."""
     plain = "".join(c if c.isprintable() else " " for c in text)
     return json.dumps(plain, ensure_ascii=False)

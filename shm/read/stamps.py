@@ -51,7 +51,7 @@ class PossibleTime:
 
 
 def is_stamp(text: str) -> bool:
-    """Whether a text is a clock time, a day, or both."""
+    """Return whether a text is a clock time, a day, or both."""
     return parsed(text) is not None
 
 
@@ -73,7 +73,7 @@ def parsed(text: str, order: DayOrder | None = None) -> tuple[datetime, bool] | 
         return None
 
 
-def says_zone(text: str) -> bool:
+def names_zone(text: str) -> bool:
     """Return whether a time says of which zone it is."""
     found = _STAMP.fullmatch(text.strip())
     return found is not None and found["zone"] is not None
@@ -178,7 +178,7 @@ def _clocked(day: datetime, found: re.Match[str]) -> datetime:
 
 
 def _named(text: str) -> tuple[datetime, bool] | None:
-    """A time whose month is a word, in English."""
+    """Return a time whose month is a word, in English."""
     if _MONTH.search(text) is None:
         return None  # each form below is compiled anew for each text: strptime keeps five
     half = text.upper().endswith(("AM", "PM"))

@@ -1,7 +1,7 @@
-"""What a format finds in a file: its columns, and what the file itself says of them and of all.
+"""Define what a format finds in a file: its columns, and the file's entries about them.
 
-`open_table` of a format makes a `Table`; `describe` adds what a sidecar says; `assemble` makes the
-recording of it. A look, reading, the import and its survey are uses of these three.
+`open_table` of a format makes a `Table`; `describe` adds the sidecar; `assemble` makes the
+recording. Peek, reading, import and its survey are uses of these three.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Column:
     load: Callable[[], Any]
     unit: str = ""
     role: Role = "other"
-    said: Mapping[str, Entry] = field(default_factory=dict)
+    stated: Mapping[str, Entry] = field(default_factory=dict)
     facts: Mapping[str, Entry] = field(default_factory=dict)
     rate_hz: float = NAN
     overloads: int = 0
@@ -98,7 +98,7 @@ class Table:
         return [c for c in self.columns if c.may_be_chosen and c.role in ("channel", "other")]
 
     @property
-    def own_header(self) -> Header:
+    def file_header(self) -> Header:
         """Return what the file, or else its name, says of the whole."""
         measured = [c for c in self.columns if c.role in ("channel", "response")]
         return Header(self.path, {}, self._entries(measured))
@@ -128,10 +128,10 @@ class Description:
     left_out: tuple[str, ...]
 
 
-def describe(table: Table, *, with_beside: bool = True) -> Description:
+def describe(table: Table, *, with_sidecars: bool = True) -> Description:
     """Return the table with what its sidecar says; raises BadInput where that is faulty."""
-    beside = channels_described(table.path) if with_beside else {}
-    roles = {column.name: role_of(column, beside.get(column.name)) for column in table.columns}
+    in_sidecar = channels_described(table.path) if with_sidecars else {}
+    roles = {column.name: role_of(column, in_sidecar.get(column.name)) for column in table.columns}
     channels, responses = (
         [column for column in table.columns if roles[column.name] == role]
         for role in ("channel", "response")
@@ -141,8 +141,8 @@ def describe(table: Table, *, with_beside: bool = True) -> Description:
     is_response = bool(responses) and not recorded
     found = responses if is_response else channels
     others = [column for column in table.columns if column not in found]
-    header = Header(table.path, {c.name: c.said for c in found}, table._entries(found))
-    if with_beside:
+    header = Header(table.path, {c.name: c.stated for c in found}, table._entries(found))
+    if with_sidecars:
         known = [*(column.name for column in others), *table.left_out]
         header = with_sidecar(header, table.path, known)
     out = [column for column in found if header.leaves_out(column.name)]
@@ -151,12 +151,12 @@ def describe(table: Table, *, with_beside: bool = True) -> Description:
     fitting = [column for column in others if used and column.size == size]
     times = next((c for c in fitting if roles[c.name] == "times"), None)
     frequencies = next((c for c in fitting if roles[c.name] == "frequencies"), None)
-    unit = _text(beside.get(times.name, {}), "unit") or times.unit if times else ""
+    unit = _text(in_sidecar.get(times.name, {}), "unit") or times.unit if times else ""
     idle = [
         column
         for column in others
         if roles[column.name] == "other"
-        or (roles[column.name] in ("times", "frequencies") and column.name in beside)
+        or (roles[column.name] in ("times", "frequencies") and column.name in in_sidecar)
     ]
     named = [c.label or c.name for c in idle if c is not times and c is not frequencies]
     return Description(

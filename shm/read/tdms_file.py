@@ -16,7 +16,7 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read.array_reading import format_of_arrays
-from shm.read.arrays import Arrays, Variable, attributes_of, named_apart
+from shm.read.arrays import Arrays, Variable, attributes_of, unique_names
 from shm.read.limits import guarded, refuse_large
 
 _MAGIC = b"TDSm"
@@ -36,7 +36,7 @@ def _opened(path: Path) -> Iterator[Arrays]:
 
 
 def _library(path: Path) -> Any:
-    """The class that opens files, of npTDMS, which is LGPL and therefore an extra."""
+    """Return the class that opens files, of npTDMS, which is LGPL and therefore an extra."""
     try:
         from nptdms import TdmsFile
         from nptdms.log import log_manager
@@ -70,7 +70,7 @@ def _arrays(file: Any, path: Path) -> Arrays:
         )
     if len(channels) > _MOST_CHANNELS:
         raise ValueError("more channels than a recording can have")
-    names = named_apart([(channel.group_name, channel.name) for channel in channels])
+    names = unique_names([(channel.group_name, channel.name) for channel in channels])
     found = [_variable(n, channel, path) for n, channel in zip(names, channels, strict=True)]
     general = {k: v for g in file.groups() for k, v in attributes_of(g.properties.items()).items()}
     return Arrays(
@@ -90,9 +90,9 @@ def _variable(name: str, channel: Any, path: Path) -> Variable:
             remedy="The file is damaged: export or send it again.",
         )
     refuse_large((samples,), dtype.itemsize, name, path)
-    said = attributes_of(channel.properties.items())
+    attributes = attributes_of(channel.properties.items())
     return Variable(
-        name, (samples,), dtype.kind, dtype.itemsize, lambda: np.asarray(channel[:]), said
+        name, (samples,), dtype.kind, dtype.itemsize, lambda: np.asarray(channel[:]), attributes
     )
 
 

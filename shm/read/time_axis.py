@@ -22,7 +22,7 @@ Refusal = Callable[[int, str], BadInput]
 def on_even_grid(
     times_s: FloatArray, values: FloatArray, refusal: Refusal
 ) -> tuple[FloatArray, float]:
-    """Values (channels, samples) on an even grid, and the rate in Hz (NaN for a single time).
+    """Return values (channels, samples) on an even grid, and the rate in Hz (NaN for one time).
 
     Samples that the times skip become NaN. Raises the refusal of a time that is uneven.
     """
@@ -35,12 +35,12 @@ def on_even_grid(
 
 
 def rate_of(times_s: FloatArray, refusal: Refusal) -> float:
-    """The rate that times tell, in Hz; raises the refusal of a time that is uneven."""
+    """Return the rate of the times in Hz; raises the refusal of a time that is uneven."""
     return _places(times_s, refusal)[1] if len(times_s) > 1 else NAN
 
 
 def _places(times: FloatArray, refusal: Refusal) -> tuple[IntArray, float]:
-    """The sample that each time belongs to, and the rate in Hz.
+    """Return the sample that each time belongs to, and the rate in Hz.
 
     Two readings compete: times rounded but without gaps, and times exact but with gaps.
     """
@@ -64,7 +64,7 @@ def _places(times: FloatArray, refusal: Refusal) -> tuple[IntArray, float]:
 
 
 def _rounding(since: FloatArray) -> float:
-    """How far times may be off, in samples, by the rounding to the last digit of their clock.
+    """Return the largest rounding error of times in samples, by the last digit of their clock.
 
     At 800 Hz in ms the steps are 1, 1, 1, 2 ms. Half a digit is of the time itself, half of the
     first and the last, that the others are held to.

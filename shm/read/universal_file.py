@@ -20,7 +20,7 @@ from shm.errors import BadInput, UsageError
 from shm.read import universal_frf
 from shm.read.atomic import replace_file
 from shm.read.base import Format, PeekChannel, at_once
-from shm.read.logger_heading import unlike
+from shm.read.logger_heading import distinct_names
 from shm.read.logger_words import SI, unit_of
 from shm.read.sidecar import write_sidecar
 from shm.read.table import Column, Table
@@ -139,18 +139,18 @@ _TIME, _EVEN, _DOUBLE = 17, 1, 4
 
 
 def histories(content: Content) -> list[FunctionSet]:
-    """The sets over time, whatever they hold."""
+    """Return the sets over time, of any quantity."""
     return [found for found in content.functions if found.function == TIME_RESPONSE]
 
 
 def quantity(found: FunctionSet) -> Quantity | None:
-    """What a set measures, by its unit or else by its type; None for anything else."""
+    """Return the quantity of a set by its unit, else by its type; None for any other."""
     unit = unit_of(found.unit)
     return unit.quantity if unit is not None else _QUANTITIES.get(found.quantity)
 
 
 def sets_of(recording: Recording) -> list[dict[str, Any]]:
-    """The data sets of a recording for pyuff."""
+    """Return the data sets of a recording for pyuff."""
     places = [channel.x_m for channel in recording.channels]
     nodes = universal_frf.number_nodes(places)
     rate = recording.sampling_rate_hz
@@ -184,11 +184,11 @@ def sets_of(recording: Recording) -> list[dict[str, Any]]:
 
 
 def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
-    """The names of forces and accelerations, and the titles of all else."""
+    """Return the names of forces and accelerations, and the titles of all else."""
     measured = [found for found in sets if quantity(found) is not None]
     known = iter(_names_of_measured(measured, path))
     return list(
-        unlike(
+        distinct_names(
             [
                 next(known) if quantity(found) is not None else found.lines[0] or found.label
                 for found in sets
@@ -198,11 +198,11 @@ def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
 
 
 def _names_of_measured(sets: Sequence[FunctionSet], path: Path) -> list[str]:
-    """The names that we wrote; else force, acc_1, acc_2, ... in the order of the file."""
-    own = [found.lines[0] for found in sets if universal_frf.facts(found)]
-    if len(own) == len(sets):
-        _refuse_doubles(own, sets, path)
-        return own
+    """Return the names that we wrote; else force, acc_1, acc_2, ... in the order of the file."""
+    names = [found.lines[0] for found in sets if universal_frf.facts(found)]
+    if len(names) == len(sets):
+        _refuse_doubles(names, sets, path)
+        return names
     _refuse_doubles([_sensor(found) for found in sets if found.response[1] != 0], sets, path)
     forces, accelerations = count(2), count(1)
     names = []
@@ -215,14 +215,16 @@ def _names_of_measured(sets: Sequence[FunctionSet], path: Path) -> list[str]:
 
 
 def _sensor(found: FunctionSet) -> tuple[object, ...]:
-    """What tells one sensor from another; loggers give one node to several accelerometers."""
+    """Return what identifies a sensor; loggers give one node to several accelerometers."""
     title = "" if quantity(found) == "force" else found.lines[0]
     return quantity(found), *found.response[1:], title
 
 
 def _refuse_doubles(keys: Sequence[object], sets: Sequence[FunctionSet], path: Path) -> None:
-    alike = len({(found.points, found.step) for found in sets}) == 1  # else it is refused for that
-    if alike and len(set(keys)) < len(keys):
+    same_grid = (
+        len({(found.points, found.step) for found in sets}) == 1
+    )  # else it is refused for that
+    if same_grid and len(set(keys)) < len(keys):
         raise BadInput(
             f"{len(sets)} time histories, several of one sensor.",
             file=path,

@@ -50,14 +50,14 @@ def response_sets(content: Content) -> list[FunctionSet]:
 def table_in(content: Content, values: Callable[[FunctionSet], Any], path: Path) -> Table:
     """Return the accelerances of a file, roving sensor or roving hammer; raises BadInput."""
     sets = response_sets(content)
-    said = _points(sets, content, path)
+    points = _points(sets, content, path)
     coherences = {
         (found.response, found.reference): found
         for found in content.functions
         if found.function == COHERENCE and found.points == sets[0].points
     }
     columns = []
-    for found, (name, entries_of) in zip(sets, said.items(), strict=True):
+    for found, (name, entries_of) in zip(sets, points.items(), strict=True):
         load = partial(_accelerance, found, name, values, path)
         facts_of, title = entries(found, path), found.title
         columns.append(
@@ -70,7 +70,7 @@ def table_in(content: Content, values: Callable[[FunctionSet], Any], path: Path)
             columns.append(Column(both, share.points, shares, "", "coherence"))
     listed = partial(_frequencies, sets, path)
     columns.append(Column("frequency_hz", sets[0].points, listed, "Hz", "frequencies"))
-    return Table(path, tuple(columns), layout=tuple(said))
+    return Table(path, tuple(columns), layout=tuple(points))
 
 
 def _real(found: FunctionSet, values: Callable[[FunctionSet], Any]) -> FloatArray:
@@ -78,17 +78,17 @@ def _real(found: FunctionSet, values: Callable[[FunctionSet], Any]) -> FloatArra
 
 
 def sets_of(response: FrequencyResponse) -> list[dict[str, Any]]:
-    """The data sets of frequency responses, and their coherences, for pyuff."""
+    """Return the data sets of frequency responses, and their coherences, for pyuff."""
     places = [point.x_m for point in response.points]
     nodes = number_nodes(places)
     sets = node_set(places, nodes)
     for index, node in enumerate(nodes):
-        own = _set(response, index, node)
-        sets.append({**own, "func_type": FREQUENCY_RESPONSE, "data": response.accelerance[index]})
+        facts = _set(response, index, node)
+        sets.append({**facts, "func_type": FREQUENCY_RESPONSE, "data": response.accelerance[index]})
         if response.coherence is not None:
             share = {"ordinate_axis_units_lab": "NONE", "ordinate_spec_data_type": 0}
             data = response.coherence[index].copy()
-            sets.append({**own, **share, "func_type": COHERENCE, "data": data})
+            sets.append({**facts, **share, "func_type": COHERENCE, "data": data})
     return sets
 
 
@@ -136,8 +136,8 @@ def _points(
     for number, found in enumerate(sets, start=1):
         name = found.lines[0] if facts(found) else f"point_{number}"
         _, node, direction = found.reference if roving_hammer else found.response
-        said = channel_entries(found, node, direction, content, path)
-        channels[name] = {key: entry for key, entry in said.items() if key != "unit"}
+        entries = channel_entries(found, node, direction, content, path)
+        channels[name] = {key: entry for key, entry in entries.items() if key != "unit"}
     if len(channels) < len(sets):
         raise BadInput(
             "several frequency responses have one name.",
@@ -161,12 +161,12 @@ def _frequencies(sets: Sequence[FunctionSet], path: Path) -> FloatArray:
 
 
 def _step(found: FunctionSet) -> float:
-    """The step in Hz, with all its digits where the file is ours."""
+    """Return the step in Hz, with all its digits where the file is ours."""
     try:
-        own = float(facts(found).get(_STEP, math.nan))
+        step = float(facts(found).get(_STEP, math.nan))
     except ValueError:
         return found.step
-    return own if abs(own - found.step) < _SAME_STEP * found.step else found.step
+    return step if abs(step - found.step) < _SAME_STEP * found.step else found.step
 
 
 def _accelerance(
@@ -187,38 +187,38 @@ def _accelerance(
 
 
 def facts(found: FunctionSet) -> dict[str, str]:
-    """The pairs of a set's id lines; empty for files of others."""
+    """Return the pairs of a set's id lines; empty for files of others."""
     words = [word for line in found.lines if line.startswith(f"{_MARK} ") for word in line.split()]
     return dict(word.split("=", 1) for word in words if "=" in word)
 
 
 def entries(found: FunctionSet, path: Path) -> dict[str, Entry]:
-    """Hanger, time, temperature and sampling rate, as far as a set says them."""
-    own = {key: Entry(value, path) for key, value in facts(found).items() if key in KEYS}
+    """Return hanger, time, temperature and sampling rate, as far as a set gives them."""
+    listed = {key: Entry(value, path) for key, value in facts(found).items() if key in KEYS}
     moment = _date(found.lines[2])
-    if "time" in own or moment is None:
-        return own
-    return {**own, "time": Entry(moment.isoformat(), path)}
+    if "time" in listed or moment is None:
+        return listed
+    return {**listed, "time": Entry(moment.isoformat(), path)}
 
 
 def channel_entries(
     found: FunctionSet, node: int, direction: int, content: Content, path: Path
 ) -> dict[str, Entry]:
-    """Unit, and in our own files place and plane, of the set at a node."""
-    said: dict[str, Any] = {"unit": found.unit}
+    """Return the unit, and in our files position and plane, of the set at a node."""
+    entries: dict[str, Any] = {"unit": found.unit}
     if facts(found):
-        said["plane"] = _AXES.get(abs(direction), "")
-        said["x_m"] = content.nodes[node][0] if node in content.nodes else ""
-    return {key: Entry(value, path) for key, value in said.items()}
+        entries["plane"] = _AXES.get(abs(direction), "")
+        entries["x_m"] = content.nodes[node][0] if node in content.nodes else ""
+    return {key: Entry(value, path) for key, value in entries.items()}
 
 
 def sign(*directions: int) -> float:
-    """-1 where an odd number of directions runs against its axis."""
+    """Return -1 where an odd number of directions is opposite to its axis, else 1."""
     return float(np.prod([-1.0 if direction < 0 else 1.0 for direction in directions]))
 
 
 def id_lines(
-    described: Recording | FrequencyResponse, name: str, own: dict[str, float]
+    described: Recording | FrequencyResponse, name: str, facts: dict[str, float]
 ) -> dict[str, str]:
     """Return the id lines of a set of ours, none longer than 80 characters."""
     time = described.time
@@ -226,7 +226,7 @@ def id_lines(
     mass = [f"{key}={value:g}" for key, value in mass_entries(described.added_mass).items()]
     size_and_place, radius = mass[:2], mass[2:]
     moment += size_and_place
-    known = {"hanger": described.hanger, "temperature_c": described.temperature_c, **own}
+    known = {"hanger": described.hanger, "temperature_c": described.temperature_c, **facts}
     pairs = [f"{key}={value}" for key, value in known.items() if _is_known(value)]
     return {
         "id1": name,
@@ -246,14 +246,14 @@ def direction(plane: Plane | None) -> int:
 
 
 def number_nodes(places_m: Sequence[float]) -> list[int]:
-    """A node number for each place, the same for equal places, from 1."""
+    """Return a node number for each place, the same for equal places, from 1."""
     numbers: dict[object, int] = {}
     keys = [("unknown", i) if math.isnan(x) else x for i, x in enumerate(places_m)]
     return [numbers.setdefault(key, len(numbers) + 1) for key in keys]
 
 
 def node_set(places_m: Sequence[float], nodes: Sequence[int]) -> list[dict[str, Any]]:
-    """The data set of nodes whose place is known; none where no place is."""
+    """Return the data set of nodes whose place is known; none where no place is."""
     known = {node: x for node, x in zip(nodes, places_m, strict=True) if not math.isnan(x)}
     if not known:
         return []
@@ -273,7 +273,7 @@ def node_set(places_m: Sequence[float], nodes: Sequence[int]) -> list[dict[str, 
 
 
 def _date(text: str) -> datetime | None:
-    """A date such as 18-Apr-16 13:49:58, taken as UTC; None for any other text."""
+    """Return a date such as 18-Apr-16 13:49:58, taken as UTC; None for any other text."""
     day, _, clock = text.partition(" ")
     parts = day.split("-")
     if len(parts) != 3 or parts[1].title() not in _MONTHS:

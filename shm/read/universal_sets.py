@@ -78,7 +78,7 @@ def recognises(head: bytes) -> bool:
 
 
 def load(path: Path, *, headers_only: bool) -> Content:
-    """All functions and nodes of a file; raises BadInput naming the data set and its line."""
+    """Return all functions and nodes of a file; raises BadInput naming data set and line."""
     raw = bytes_of(path)
     refuse_cut_off(raw, path)
     quiet = warnings.catch_warnings()
@@ -88,7 +88,7 @@ def load(path: Path, *, headers_only: bool) -> Content:
 
 
 def refuse_cut_off(raw: bytes, path: Path) -> None:
-    """Raises BadInput where a file ends within a data set."""
+    """Raise BadInput where a file ends within a data set."""
     if not raw.rstrip().endswith(b"-1"):
         raise BadInput(
             "the file ends within a data set.",
@@ -99,7 +99,7 @@ def refuse_cut_off(raw: bytes, path: Path) -> None:
 
 
 def save(path: Path, sets: Sequence[dict[str, Any]]) -> None:
-    """Writes data sets to a new file, in ASCII (what pyuff writes as binary cannot be read)."""
+    """Write data sets to a new file in ASCII, as pyuff's binary sets cannot be read."""
     import pyuff  # it is slow to load, and few files are of this format
 
     file = pyuff.UFF(str(path))
@@ -120,7 +120,7 @@ def _content(file: Any, path: Path, raw: bytes, headers_only: bool) -> Content:
 
 
 def opened(plain: Path, path: Path) -> Any:
-    """The file as pyuff has it; raises BadInput where its sets cannot be told apart."""
+    """Return the file as pyuff opens it; raises BadInput where its sets cannot be separated."""
     import pyuff
 
     try:
@@ -132,7 +132,7 @@ def opened(plain: Path, path: Path) -> Any:
 
 
 def read_set(file: Any, index: int, path: Path, raw: bytes, headers_only: bool) -> dict[str, Any]:
-    """One data set as pyuff has it; raises BadInput naming it."""
+    """Return one data set as pyuff reads it; raises BadInput naming it."""
     try:
         found: dict[str, Any] = file.read_sets([index], header_only=headers_only)
     except Exception as error:
@@ -155,7 +155,7 @@ def _refusal(what: str, number: int, path: Path, raw: bytes) -> BadInput:
 
 
 def _line_of_set(number: int, raw: bytes) -> int | None:
-    """The line at which a data set begins, where the file is text."""
+    """Return the line at which a data set starts, where the file is text."""
     marks = [match.start() for match in _MARK.finditer(raw)]
     if b"\x00" in raw or len(marks) < 2 * number - 1:
         return None
@@ -197,7 +197,7 @@ def _function(found: dict[str, Any], number: int, path: Path, raw: bytes) -> Fun
 
 
 def _kind(found: dict[str, Any]) -> int:
-    """The function's type; a general function over time is a time response."""
+    """Return the function's type; a general function over time is a time response."""
     kind = int(found["func_type"])
     return TIME_RESPONSE if kind == 0 and found["abscissa_spec_data_type"] == 17 else kind
 
@@ -207,7 +207,7 @@ def _plain(text: str) -> str:
 
 
 def _abscissa(found: dict[str, Any], number: int, path: Path, raw: bytes) -> tuple[float, float]:
-    """First value and step, the latter checked where the file lists every value."""
+    """Return first value and step, checked where the file lists every value."""
     if found["abscissa_spacing"] != 0:
         return float(found["abscissa_min"]), _whole(float(found["abscissa_inc"]))
     x = np.asarray(found["x"], dtype=float)
@@ -219,9 +219,9 @@ def _abscissa(found: dict[str, Any], number: int, path: Path, raw: bytes) -> tup
 
 
 def _whole(step: float) -> float:
-    """The step whose inverse is whole, where the six digits of the file cannot tell them apart.
+    """Return the step with an integer inverse where the file's six digits allow it, else `step`.
 
-    0 where the step cannot be one.
+    Returns 0 where the value cannot be a step.
     """
     if not _LEAST_STEP < step < _LARGEST_STEP:
         return 0.0

@@ -27,7 +27,7 @@ _MOST_CHANNELS = 64  # judgement: four times what is read of a recording
 
 
 def recognises(head: bytes) -> bool:
-    """Whether the first bytes of a file are those of a WAV file."""
+    """Return whether the first bytes of a file are those of a WAV file."""
     return head[:4] in _FORMS and head[8:12] == b"WAVE"
 
 
@@ -59,7 +59,7 @@ def open_tables(path: Path) -> tuple[Table, ...]:
 
 
 def _closed(content: bytes) -> bytes:
-    """A streamed file, whose recorder never wrote how long it is, with its sizes put in."""
+    """Return a streamed file, whose recorder never wrote how long it is, with its sizes put in."""
     order: Literal["little", "big"] = "big" if content.startswith(b"RIFX") else "little"
     place = 12
     while place + 8 <= len(content) and content[:4] != b"RF64":
@@ -75,7 +75,7 @@ def _closed(content: bytes) -> bytes:
 
 
 def _shares(values: np.ndarray) -> np.ndarray:
-    """Whole numbers as shares of the largest that the file can hold; others as they are."""
+    """Return integers as fractions of the largest that the file can hold; others unchanged."""
     with np.errstate(invalid="ignore"):  # signalling NaNs of damaged files
         found = values.astype(np.float64)
     if values.dtype.kind == "u":

@@ -30,7 +30,7 @@ def with_code(text: str) -> Markup:
 
 
 def _anchor(title: str) -> str:
-    """`In short` as `in-short`."""
+    """Return a title as anchor: `In short` as `in-short`."""
     return "-".join(re.findall(r"\w+", title.lower()))
 
 

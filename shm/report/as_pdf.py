@@ -120,7 +120,7 @@ def as_pdf(paper: Paper) -> bytes:
 
 
 def _around(canvas: Canvas, paper: Paper) -> None:
-    """Header and footer of one page; how many there are is filled in at the last."""
+    """Draw header and footer of one page; the number of pages is filled in at the end."""
     made = paper.generated_at
     dated = f"D:{made.astimezone(UTC):%Y%m%d%H%M%S}Z" if made else _UNDATED
     canvas.setDateFormatter(lambda *_: dated)
@@ -142,7 +142,7 @@ def _around(canvas: Canvas, paper: Paper) -> None:
 
 
 def _counted() -> Flowable:
-    """Stands last and fills in how many pages there are."""
+    """Return the last flowable, which fills in the number of pages."""
 
     def fill_in(macro: Any) -> None:
         canvas: Canvas = macro.canv
@@ -157,7 +157,7 @@ def _counted() -> Flowable:
 
 
 def _cut(text: str) -> str:
-    """As much of `text` as stands on its half of the line."""
+    """Cut `text` to its half of the line."""
     room = WIDTH / 2 - 4 * mm
     if _width(text, _PLAIN, _LINE_SIZE) <= room:
         return text
@@ -194,7 +194,7 @@ def _flowables(paper: Paper) -> list[Flowable]:
 
 
 def _logo(paper: Paper) -> list[Flowable]:
-    """At the right of the first head, as high as its two lines."""
+    """Return the logo at the right of the first head, as high as its two lines."""
     logo = paper.logo
     if not logo.content:
         return []
@@ -204,7 +204,7 @@ def _logo(paper: Paper) -> list[Flowable]:
 
 
 def _signature(paper: Paper) -> Flowable:
-    """Lines for those who answer for the report, with their names where they are given."""
+    """Return lines for those who sign the report, with their names where given."""
     signed = paper.signatures
     room = WIDTH / len(signed)
     rules: list[tuple[object, ...]] = [
@@ -310,8 +310,10 @@ def _figure(item: Illustration, number: int) -> list[Flowable]:
 
 
 def _table(table: Table, number: int) -> list[Flowable]:
-    """With title and note; rows break over pages, under repeated headings, only where one does not
-    hold them all."""
+    """Return a table with title and note.
+
+    It breaks over pages, under repeated headings, only where one page does not hold it.
+    """
     table = table.folded() if table.is_folded else table
     # What is kept with a table keeps the table in one piece, too.
     style = _LOOSE_SUBHEADING if table.may_break else _SUBHEADING
@@ -331,7 +333,7 @@ def _table(table: Table, number: int) -> list[Flowable]:
 
 
 def _widths(table: Table) -> list[float]:
-    """Points of each column; the one with its row's mark has room for it."""
+    """Return points of each column; the one with its row's mark has room for it."""
     mark = _PADDING if table.marks else 0.0
     found = widths(table, WIDTH - mark, _CELL_SIZE, 2 * _PADDING)
     found[_marked(table)] += mark
@@ -367,7 +369,7 @@ _SLACK_POINTS = 1.0
 
 
 def widths(table: Table, room: float, size: float, padding: float) -> list[float]:
-    """Points of each column, together at most `room`.
+    """Return points of each column, together at most `room`.
 
     Narrow columns stand on one line; the wide ones share what is left, none narrower than its
     longest word as far as there is room. Words longer than a column are broken.
@@ -383,7 +385,7 @@ def widths(table: Table, room: float, size: float, padding: float) -> list[float
 
 
 def _shared(whole: Sequence[float], least: Sequence[float], room: float) -> list[float]:
-    """The narrow first: each gets an equal share of what is left, or less if it wants less."""
+    """Share `room` equally among columns, the narrow first; none gets more than it needs."""
     given = list(least)
     left = room - sum(least)
     ascending = sorted(range(len(whole)), key=lambda column: whole[column] - least[column])

@@ -81,9 +81,9 @@ def in_terminal(table: Table) -> Table:
 
 
 def laid_out(table: Table, width: int = WIDTH) -> str:
-    """The table for a terminal of `width` columns: those of the table fold, the widest first.
+    """Lay out a table for a terminal of `width` columns; its columns fold, the widest first.
 
-    No word is cut. Where there is no room for that, each row stands as a list.
+    No word is cut. Where there is no room for that, each row becomes a list.
     """
     title = textwrap.fill(table.title.upper(), width)
     note = [textwrap.fill(table.note, width)] if table.note else []
@@ -103,7 +103,7 @@ def _columns(table: Table, widths: list[int]) -> list[str]:
 
 
 def _lists(table: Table, width: int) -> list[str]:
-    """Each row as lines of heading and value, empty values left out, and an empty line."""
+    """Return each row as lines of heading and value, empty values left out, and an empty line."""
     widest = max(map(len, table.headings))
     widths = [widest, max(width - widest - len(_GAP), _LEAST)]
     lines: list[str] = []
@@ -115,7 +115,7 @@ def _lists(table: Table, width: int) -> list[str]:
 
 
 def _widths(table: Table, width: int) -> list[int]:
-    """Of each column; none where they do not fit."""
+    """Return the width of each column; empty where they do not fit."""
     columns = list(zip(table.headings, *table.rows, strict=True))
     widths = [max(len(cell) for cell in column) for column in columns]
     room = width - len(_GAP) * (len(widths) - 1)
@@ -128,7 +128,7 @@ def _widths(table: Table, width: int) -> list[int]:
 
 
 def _longest_word(cell: str, longest: int) -> int:
-    """Of its words; of names of tests, files and checksums only so much as `longest`."""
+    """Return the length of the longest word; names of tests and files count up to `longest`."""
     words = cell.split()
     return max((min(len(e), longest) if _is_name(e) else len(e) for e in words), default=0)
 
@@ -138,7 +138,7 @@ def _is_name(word: str) -> bool:
 
 
 def _lines(cells: tuple[str, ...], widths: list[int]) -> list[str]:
-    """One row as one line or several."""
+    """Return one row as one line or several."""
     wrapped = [textwrap.wrap(cell, width) for cell, width in zip(cells, widths, strict=True)]
     return [
         _GAP.join(part.ljust(width) for part, width in zip(parts, widths, strict=True)).rstrip()

@@ -71,7 +71,7 @@ def bridge_diagnosis_json(sheet: BridgeDiagnosisSheet) -> dict[str, Any]:
 
 
 def shared_verdict(diagnosis: BridgeDiagnosis) -> str:
-    """`Rotational end flexibility (deck end) is shared by hangers 3, 5 and 7 (0.97).`"""
+    """Return `Rotational end flexibility is shared by hangers 3, 5 and 7 (0.97)` or its like."""
     apart, leading = diagnosis.each_for_itself_probability, diagnosis.leading
     if leading is not None:
         claim = formatting.spoken_probability(diagnosis.claim(leading))

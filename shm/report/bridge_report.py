@@ -10,7 +10,10 @@ from shm.documents import drift_document
 from shm.report import formatting
 from shm.report.bar_table import bar_document, bars_table
 from shm.report.contents import BridgeReport, hangers_unit
+from shm.report.control_report import chart_document, control_lead
+from shm.report.figures.control_chart import FIGURE as CONTROL
 from shm.report.figures.every_figure import bridge_figures
+from shm.report.figures.specification import drawn
 from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
 from shm.report.hanger_summary import Course, HangerSummary
@@ -22,11 +25,12 @@ from shm.values import Drift
 from shm.values.messages import NEXT_TEST
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm.values.stated_tension import stated
+from shm.watch.control_chart import ControlChart
 from shm.watch.neighbours import BridgePattern
 
 
 def bridge_paper(data: BridgeReport) -> Paper:
-    """Summary, figures along the bridge, numbers."""
+    """Return the report of a bridge: summary, figures along the bridge, numbers."""
     return Paper(
         title=data.bridge,
         period=str(data.period) if data.period else "",
@@ -42,6 +46,7 @@ def bridge_paper(data: BridgeReport) -> Paper:
                 brief=[_glance(data)],
             ),
             Part("Along the bridge", figures=lambda: bridge_figures(data)),
+            *(_control_part(each) for each in data.controls),
             Part("Numbers", tables=tables(data)),
             *appendices(Part("Settings", tables=filled(settings(data.settings)))),
         ),
@@ -49,6 +54,15 @@ def bridge_paper(data: BridgeReport) -> Paper:
         version=data.version,
         closing=f"{CREDIBLE}; times are UTC.",
         more="All of it: `shm report --bridge --full`, or `--out bridge.pdf`.",
+    )
+
+
+def _control_part(chart: ControlChart) -> Part:
+    """Return the state of a control hanger and its chart."""
+    return Part(
+        f"Control hanger {chart.hanger.id}",
+        paragraphs=[control_lead(chart).words],
+        figures=lambda: drawn((CONTROL,), chart),
     )
 
 
@@ -108,7 +122,8 @@ def summary(data: BridgeReport) -> str:
 def details(data: BridgeReport) -> str:
     """Return the reasons, and how sure they are."""
     pattern = data.pattern.sentence if data.pattern else data.why_no_pattern
-    sentences = (_extremes(data), _in_period(data), pattern, *advice(data)[1:])
+    controls = (control_lead(each).words for each in data.controls)
+    sentences = (*controls, _extremes(data), _in_period(data), pattern, *advice(data)[1:])
     return " ".join(sentence for sentence in sentences if sentence)
 
 
@@ -132,7 +147,7 @@ def of_status(lines: Sequence[HangerSummary], status: Status | None) -> list[Han
 
 
 def named(lines: Sequence[HangerSummary]) -> str:
-    """`hanger 3`, `hangers 3, 4 and 7`."""
+    """Return `hanger 3` or `hangers 3, 4 and 7`."""
     numbers = formatting.listed([str(line.hanger.id) for line in lines])
     return f"hanger {numbers}" if len(lines) == 1 else f"hangers {numbers}"
 
@@ -190,7 +205,7 @@ _NEXT_TO = {"repeatability": "repeatability", "above": "above limit", "slack": "
 
 
 def tables(data: BridgeReport) -> tuple[Table, ...]:
-    """All tables that this report can fill."""
+    """Return all tables that this report can fill."""
     return filled(
         _hangers(data),
         _since_baseline(data),
@@ -220,7 +235,7 @@ def _hangers(data: BridgeReport) -> Table:
 
 
 def _stated(line: HangerSummary, name: str, unit: ForceUnit) -> str:
-    """One of `_BESIDE` of a hanger; empty where it is not known."""
+    """Return one of `_BESIDE` of a hanger; empty where it is not known."""
     return str(getattr(stated(line.tension, unit), name)) if line.tension else ""
 
 
@@ -356,6 +371,7 @@ def bridge_json(data: BridgeReport) -> dict[str, Any]:
             }
             for line in data.hangers
         ],
+        "controls": [chart_document(each) for each in data.controls],
         "pattern": pattern_json(data.pattern) if data.pattern else None,
         "why_no_pattern": data.why_no_pattern,
         "lineage": dict(data.lineage),

@@ -41,6 +41,7 @@ from shm.values.stated_tension import averaged_now, selection_now
 
 if TYPE_CHECKING:  # `shm status` lists hangers and identifies nothing
     from shm.identify import Dropped, Hit, Identification
+    from shm.watch.control_chart import ControlChart
     from shm.watch.neighbours import BridgePattern
 
 
@@ -64,7 +65,7 @@ class TrendRow:
 def trend_row(
     posterior: Posterior, test: ModalTest, hanger: Hanger, selection: Selection | None = None
 ) -> TrendRow:
-    """The row of one test of `hanger` and its posterior, averaged over the classes compared."""
+    """Return the row of one test of `hanger`, its posterior averaged over the classes."""
     return TrendRow(
         test=test.id,
         model=posterior.model,
@@ -76,6 +77,16 @@ def trend_row(
         time=test.time,
         temperature_c=test.temperature_c,
     )
+
+
+@dataclass(frozen=True)
+class TensionAtLevel:
+    """The tension by the latest test at a level of its hits, in N, or why it is not known."""
+
+    level: float
+    force_n: float
+    tension_n: Interval | None = None
+    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +106,7 @@ class HangerReport:
     in it. `settings` are those that decide the numbers, each with its unit. `redescribed` says what
     of the hanger's description has changed since the baseline, where that moves results;
     `discarded` names the tests of the baseline that count no more. `inspections` are what people
-    wrote, the latest first.
+    wrote, the latest first. `at_level` is None where no reference level is set.
     """
 
     bridge: str
@@ -124,6 +135,7 @@ class HangerReport:
     redescribed: tuple[str, ...] = ()
     discarded: tuple[str, ...] = ()
     inspections: tuple[Note, ...] = ()
+    at_level: TensionAtLevel | None = None
     letterhead: Letterhead = NO_LETTERHEAD
 
     @property
@@ -256,6 +268,7 @@ class BridgeReport:
     period: Period | None = None
     lineage: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, str] = field(default_factory=dict)
+    controls: tuple[ControlChart, ...] = ()
 
     @property
     def message(self) -> BridgeMessage:

@@ -36,13 +36,13 @@ def is_of_the_measurement(claim: Claim) -> bool:
 
 
 def label(cause: Cause) -> str:
-    """`rotational end flexibility (both ends)`, for tables and figures."""
+    """Return `rotational end flexibility (both ends)`, for tables and figures."""
     parts = zip(cause.effects, cause.places, strict=True)
     return joined(effect_label(effect, at) for effect, at in parts)
 
 
 def phrase(cause: Cause) -> str:
-    """`a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7)`; a pair joined by `and`."""
+    """Return `a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7)`; `and` joins a pair."""
     clauses = [
         effect_phrase(effect, at, separate_estimates(cause, number))
         for number, (effect, at) in enumerate(zip(cause.effects, cause.places, strict=True))
@@ -72,7 +72,7 @@ def effect_phrase(effect: str, at: str, estimates: Sequence[EffectEstimate]) -> 
 
 
 def _place(at: str) -> str:
-    """`deck end, transverse` as `at the deck end in the transverse plane`."""
+    """Return `deck end, transverse` as `at the deck end in the transverse plane`."""
     return " ".join(filter(None, (_place_part(part) for part in at.split(", "))))
 
 
@@ -97,17 +97,17 @@ their probabilities."""
 
 
 def tension_unit(diagnosis: Diagnosis) -> ForceUnit:
-    """One unit for both tensions, so that they can be compared at a glance."""
+    """Return one unit for both tensions, so that they can be compared at a glance."""
     return force_unit(diagnosis.tension_before_n.mean, diagnosis.tension_after_n.mean)
 
 
 def tension_of(estimate: TensionEstimate) -> Interval:
-    """Mean and 90 % interval in N."""
+    """Return mean and 90 % interval in N."""
     return Interval(estimate.mean, estimate.q05, estimate.q95)
 
 
 def tension_words(estimate: TensionEstimate, unit: ForceUnit) -> str:
-    """`702 kN (90 % interval 690 to 714 kN)`; the mean alone where nothing else is known."""
+    """Return `702 kN (90 % interval 690 to 714 kN)`; the mean alone where no interval is known."""
     tension_n = tension_of(estimate)
     if math.isnan(tension_n.width):
         return formatting.rounded_tension(estimate.mean, unit)

@@ -45,23 +45,23 @@ class Interval:
 
     @classmethod
     def of_samples(cls, samples: FloatArray) -> Interval:
-        """From equally weighted draws, shape (samples,)."""
+        """Return the interval of equally weighted draws, shape (samples,)."""
         low, high = np.quantile(samples, [0.05, 0.95])
         return cls(float(samples.mean()), float(low), float(high))
 
     @classmethod
     def normal(cls, mean: float, sd: float) -> Interval:
-        """From a mean and a standard deviation, taken as normal."""
+        """Return the interval of a normal distribution."""
         return cls(mean, mean - NORMAL_90 * sd, mean + NORMAL_90 * sd)
 
     @classmethod
     def of_summary(cls, summary: Summary) -> Interval:
-        """From what was kept of samples."""
+        """Return the interval of a summary of samples."""
         return cls(summary.mean, summary.q05, summary.q95)
 
     @classmethod
     def of_averaged(cls, averaged: Averaged) -> Interval:
-        """Of a tension over all model classes, in N."""
+        """Return the interval of a tension over all model classes, in N."""
         return cls.of_summary(averaged.tension_n).repeating(averaged.repeatability_sd_n)
 
     def repeating(self, sd: float) -> Interval:
@@ -145,18 +145,18 @@ _MEANINGS = {
 
 
 def decimals(width: float) -> int:
-    """Decimals that show two significant digits of half an interval's `width`."""
+    """Return decimals that show two significant digits of half an interval's `width`."""
     return stated_tension.decimals(width / 2)
 
 
 def with_interval(interval: Interval, unit: str) -> str:
-    """`655 kN (90 % interval 640 to 671 kN)`."""
+    """Return `655 kN (90 % interval 640 to 671 kN)`."""
     space = unit and f" {unit}"
     return f"{mean(interval)}{space} (90 % interval {span(interval)}{space})"
 
 
 def tension(tension_n: Interval, unit: ForceUnit) -> str:
-    """`655 kN (90 % interval 640 to 671 kN)` of a tension in N."""
+    """Return `655 kN (90 % interval 640 to 671 kN)` of a tension in N."""
     return with_interval(tension_n.in_unit(unit), unit.name)
 
 
@@ -164,8 +164,10 @@ _LOPSIDED = 2.5  # judgement: a half width then says neither end
 
 
 def with_half(interval: Interval, unit: ForceUnit) -> str:
-    """`655 ± 16 kN` of a tension in N: the half width of its 90 % interval; where that is much
-    farther on one side, `13 to 490 kN`."""
+    """Return `655 ± 16 kN` of a tension in N: the half width of its 90 % interval.
+
+    Where that is much farther on one side: `13 to 490 kN`.
+    """
     this = interval.in_unit(unit)
     above, below = this.high - this.mean, this.mean - this.low
     if max(above, below) > _LOPSIDED * min(above, below):
@@ -174,17 +176,17 @@ def with_half(interval: Interval, unit: ForceUnit) -> str:
 
 
 def rounded_tension(tension_n: float, unit: ForceUnit) -> str:
-    """`711 kN` of a tension in N that stands without an interval: to three digits at least."""
+    """Return `711 kN` of a tension in N without an interval: at least three digits."""
     return f"{plain(unit.of(tension_n))} {unit.name}"
 
 
 def tension_headings(unit: ForceUnit) -> tuple[str, str]:
-    """Of the columns that `mean` and `span` of tensions stand in."""
+    """Return the headings of the columns with `mean` and `span` of tensions."""
     return f"tension, {unit.name}", f"90 % credible interval, {unit.name}"
 
 
 def span(interval: Interval, signed: bool = False) -> str:
-    """`640 to 671`, for a table whose heading names the unit."""
+    """Return `640 to 671`, for a table whose heading names the unit."""
     how = interval.width / 2, "+" if signed else ""
     return f"{to_two_digits(interval.low, *how)} to {to_two_digits(interval.high, *how)}"
 
@@ -195,18 +197,18 @@ def mean(interval: Interval, signed: bool = False) -> str:
 
 
 def with_span(interval: Interval, signed: bool = False) -> str:
-    """`650 (640 to 671)`, for a table whose heading names unit and interval."""
+    """Return `650 (640 to 671)`, for a table whose heading names unit and interval."""
     return f"{mean(interval, signed)} ({span(interval, signed)})"
 
 
 def signed_percent(fraction: Interval) -> str:
-    """`-8.0 % (90 % interval -9.9 to -6.1 %)`."""
+    """Return `-8.0 % (90 % interval -9.9 to -6.1 %)`."""
     percent = fraction.scaled(100)
     return f"{mean(percent, signed=True)} % (90 % interval {span(percent, signed=True)} %)"
 
 
 def change(percent: float) -> str:
-    """`+3.1 %`; beyond a factor of 2 `a factor of 5 up`: a person makes nothing of +50368 %."""
+    """Return `+3.1 %`; beyond a factor of 2 `a factor of 5 up` instead of +50368 %."""
     ratio = 1 + percent / 100
     if ratio <= 0:  # taken as linear far beyond where it is
         return "more than a factor of 2 down"
@@ -216,12 +218,12 @@ def change(percent: float) -> str:
 
 
 def number(value: float, form: str, absent: str = "not known") -> str:
-    """`value` in format `form`; the words `absent` where it is NaN."""
+    """Return `value` in format `form`; the words `absent` where it is NaN."""
     return format(value, form) if math.isfinite(value) else absent
 
 
 def plain(value: float, digits: int = 3, absent: str = "not known") -> str:
-    """`value` with so many significant digits, never as a power of ten: `0.00021`, `1872`."""
+    """Return `value` with so many significant digits, never as a power of ten: `0.00021`."""
     if not math.isfinite(value):
         return absent
     rounded = float(f"{value:.{digits}g}")
@@ -249,7 +251,7 @@ def temperature(celsius: float) -> str:
 
 
 def moment(time: datetime | None) -> str:
-    """`2026-05-01 10:00 UTC`."""
+    """Return `2026-05-01 10:00 UTC`."""
     return f"{time.astimezone(UTC):%Y-%m-%d %H:%M} UTC" if time else "time not recorded"
 
 
@@ -258,7 +260,7 @@ def hanger_name(hanger_id: int, name: str) -> str:
 
 
 def quantity(name: str) -> str:
-    """`transverse_end_stiffness` as `transverse end stiffness`."""
+    """Return `transverse_end_stiffness` as `transverse end stiffness`."""
     return name.replace("_", " ")
 
 
@@ -283,7 +285,7 @@ def meaning(posterior: Posterior, name: str, *, with_unit: bool = True) -> str:
 
 
 def model_class(name: str) -> str:
-    """`beam1 + point mass (deck end)` of an adopted class's name, whose ranges are left out."""
+    """Return `beam1 + point mass (deck end)` for an adopted class, without its ranges."""
     baseline, *effects = name.split("+")
     return joined([baseline, *(_adopted(effect.partition(":")[0]) for effect in effects)])
 
@@ -294,29 +296,29 @@ def _adopted(effect: str) -> str:
 
 
 def place(name: str, plane: str | None, x_m: float) -> str:
-    """`acc_1, transverse, 2.52 m` of a sensor, as far as it is known."""
+    """Return `acc_1, transverse, 2.52 m` of a sensor, as far as it is known."""
     known = (_shortened(name), plane or "", f"{x_m:.2f} m" if math.isfinite(x_m) else "")
     return ", ".join(word for word in known if word)
 
 
 def _shortened(name: str) -> str:
-    """Both ends of a long name, since serial numbers stand last."""
+    """Return both ends of a long name, since serial numbers are at the end."""
     half = _LONGEST_NAME // 2
     return name if len(name) <= _LONGEST_NAME else f"{name[:half]}…{name[-half + 1 :]}"
 
 
 def some(shown: int, there: int, what: str) -> str:
-    """` 4 of 16 measured points are drawn.`; nothing where all are."""
+    """Return ` 4 of 16 measured points are drawn.`; empty where all are."""
     return f" {shown} of {there} {what} are drawn." if shown < there else ""
 
 
 def counted(count: int, what: str) -> str:
-    """`1 hit`, `5 hits`, `no hit`."""
+    """Return `1 hit`, `5 hits`, `no hit`."""
     if count == 0:
         return f"no {what}"
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def listed(items: Sequence[str]) -> str:
-    """`a, b and c`."""
+    """Return `a, b and c`."""
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"

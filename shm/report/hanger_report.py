@@ -14,8 +14,10 @@ from shm.report.assumed import assumptions_line, assumptions_table, with_assumpt
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.bridge_report import pattern_json
 from shm.report.contents import DiagnosisSheet, HangerReport
+from shm.report.control_report import chart_document, control_table
 from shm.report.diagnosis_report import causes, diagnosis_json, diagnosis_part
 from shm.report.figures.bar_sketch import FIGURE as SKETCH
+from shm.report.figures.control_chart import FIGURE as CONTROL
 from shm.report.figures.every_figure import OF_HANGER_NAMES, hanger_figures
 from shm.report.figures.specification import drawn
 from shm.report.formatting import Interval
@@ -25,10 +27,10 @@ from shm.report.open_warnings import dated_by_receipt
 from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, appendices, filled
 from shm.report.shared_tables import settings
 from shm.report.states import period_json, temperature_documents
-from shm.values import Alert, Drift, FrequencyResponse, Hanger
-from shm.values.rounding import NINETY_PERCENT, rounded_percent
+from shm.values import Alert, ControlHanger, Drift, FrequencyResponse, Hanger
+from shm.values.rounding import NINETY_PERCENT, force_unit, rounded_percent
 from shm.values.stated_tension import StatedTension, stated
-from shm.watch.change_words import structure_words
+from shm.watch.alert_text import structure_words
 
 
 def hanger_paper(data: HangerReport) -> Paper:
@@ -52,16 +54,7 @@ def hanger_paper(data: HangerReport) -> Paper:
                 figures=lambda: drawn((SKETCH,), data.bar),
                 tables=filled(tables.practice(data)),
             ),
-            Part(
-                "Tension over time",
-                figures=lambda: hanger_figures(data, TREND),
-                tables=filled(
-                    tables.results(data),
-                    tables.period(data),
-                    tables.temperatures(data),
-                    tables.neighbours(data),
-                ),
-            ),
+            _trend_part(data),
             Part(
                 "Fit of the model",
                 paragraphs=[further(data)],
@@ -79,6 +72,22 @@ def hanger_paper(data: HangerReport) -> Paper:
         closing=f"{CREDIBLE}; times are UTC.",
         more=f"All of it: `shm report --hanger {data.hanger.id} --full`, or "
         f"`--out hanger{data.hanger.id}.pdf`.",
+    )
+
+
+def _trend_part(data: HangerReport) -> Part:
+    """Return the tension over time; of a control hanger its control chart first."""
+    chart = data.now.control
+    return Part(
+        "Tension over time",
+        figures=lambda: (*drawn((CONTROL,), chart), *hanger_figures(data, TREND)),
+        tables=filled(
+            *([control_table(chart)] if chart else []),
+            tables.results(data),
+            tables.period(data),
+            tables.temperatures(data),
+            tables.neighbours(data),
+        ),
     )
 
 
@@ -169,9 +178,10 @@ def facts(data: HangerReport) -> tuple[Fact, ...]:
     return (
         _tension(data),
         *_limits(data, stated(data.averaged, data.tension_unit)),
-        _since_baseline(data),
+        _against_known(data.hanger) or _since_baseline(data),
         _of_nominal(data),
         *_by_latest_test(data),
+        *_at_level(data),
         _latest_test(data),
     )
 
@@ -200,6 +210,17 @@ def _by_latest_test(data: HangerReport) -> tuple[Fact, ...]:
     return (("Latest test alone", value, f"test {data.latest.id}; 90 % interval"),)
 
 
+def _at_level(data: HangerReport) -> tuple[Fact, ...]:
+    """Return the tension at the reference level; nothing where none is set."""
+    if (known := data.at_level) is None:
+        return ()
+    what = f"At hits of {known.force_n:.4g} N"
+    if known.tension_n is None:
+        return ((what, "not known", known.reason),)
+    value = formatting.with_half(known.tension_n, data.tension_unit)
+    return ((what, value, f"90 % interval; test {data.latest.id} at level {known.level:g}"),)
+
+
 def _limits(data: HangerReport, statement: StatedTension) -> tuple[Fact, ...]:
     """Return the probabilities that the owner's limits ask for."""
     limits, unit = data.hanger.limits, data.tension_unit
@@ -226,6 +247,14 @@ def _of_nominal(data: HangerReport) -> Fact:
         rounded_percent(share.mean / 100, share.width / 200),
         f"90 % interval; nominal {nominal}",
     )
+
+
+def _against_known(hanger: Hanger) -> Fact | None:
+    """Return the known tension of a control hanger; None of any other."""
+    if not isinstance(hanger, ControlHanger):
+        return None
+    known = Interval.normal(hanger.known_tension_n, hanger.known_tension_sd_n)
+    return ("Known tension", formatting.with_half(known, force_unit(known.mean)), "as described")
 
 
 def _since_baseline(data: HangerReport) -> Fact:
@@ -286,6 +315,10 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         "version": data.version,
         "generated_at": data.generated_at,
     }
+    if data.now.control is not None:
+        document["control"] = chart_document(data.now.control)
+    if data.at_level is not None:
+        document["at_level"] = asdict(data.at_level)
     return with_assumptions(document, data.hanger)
 
 

@@ -110,10 +110,10 @@ def _further_advice(data: HangerReport) -> tuple[str, ...]:
 
 
 def misfits_percent(data: HangerReport) -> list[tuple[PredictedFrequency, Interval]]:
-    """Predicted over measured frequency less one of each measured mode, in percent.
+    """Return predicted over measured frequency less one of each measured mode, in percent.
 
-    The interval is that of prediction and measurement together; of the prediction alone where the
-    measurement came without a standard deviation.
+    The interval is that of prediction and measurement together; of the prediction alone where
+    the measurement came without a standard deviation.
     """
     sds_hz = {(mode.plane, mode.order): mode.frequency_sd_hz for mode in data.latest.modes}
     return [
@@ -163,6 +163,8 @@ def _against_nominal(data: HangerReport) -> str:
 
 def _against_baseline(data: HangerReport) -> str:
     change = data.now.change
+    if data.now.control is not None:
+        return ""
     if data.baseline is None or data.baseline_tension_n is None:
         return "There is no earlier test to compare with: this one is the baseline."
     if change is None:
@@ -180,7 +182,7 @@ def _against_baseline(data: HangerReport) -> str:
 
 
 def counted_tests(tests: tuple[str, ...]) -> str:
-    """`test t001`, `5 tests`."""
+    """Return `test t001`, `5 tests`."""
     return f"test {tests[0]}" if len(tests) == 1 else f"{len(tests)} tests"
 
 
@@ -230,14 +232,16 @@ def _model(data: HangerReport) -> str:
 
 
 def _rms_percent(data: HangerReport) -> float:
-    """Root mean square of the misfits; NaN where no mode was measured."""
+    """Return the root mean square of the misfits; NaN where no mode was measured."""
     residuals = [off.mean for _, off in misfits_percent(data)]
     return float(np.sqrt(np.mean(np.square(residuals)))) if residuals else math.nan
 
 
 def _misses(data: HangerReport) -> bool:
-    """Return True if the class is so far off that its posterior doubts the description: what it
-    predicts with the model's error learnt from the same modes fits them all the same."""
+    """Return True if the class is so far off that its posterior doubts the description.
+
+    Its predictions fit the modes all the same, with the model error learnt from them.
+    """
     return not data.posterior.fits
 
 
@@ -250,7 +254,7 @@ def _gap(data: HangerReport) -> str:
 
 
 def _outside(data: HangerReport) -> str:
-    """The modes that the model class misses by more than the uncertainty of both explains."""
+    """Name the modes that the model class misses by more than both uncertainties."""
     misfits = [] if _misses(data) else misfits_percent(data)
     outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
     if not misfits:
@@ -267,7 +271,7 @@ def _outside(data: HangerReport) -> str:
 
 
 def _outliers(modes: Sequence[PredictedFrequency]) -> str:
-    """`Transverse 2 and longitudinal 4 lie outside the 90 % interval`, `5 modes lie ...`."""
+    """Return `Transverse 2 and longitudinal 4 lie outside the 90 % interval`, `5 modes lie ...`."""
     wording = formatting.listed([f"{each.plane} {each.order}" for each in modes])
     named = f"{wording[0].upper()}{wording[1:]}"
     who = named if len(modes) <= _MOST_NAMED else formatting.counted(len(modes), "mode")

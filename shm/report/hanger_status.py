@@ -14,12 +14,12 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from shm.report import formatting
+from shm.report.control_report import control_lead
 from shm.report.formatting import Interval
 from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedTest
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
-from shm.watch.alert_text import lead_of
-from shm.watch.change_words import look_again, quantity_words, size_words
+from shm.watch.alert_text import lead_of, look_again, quantity_words, size_words
 
 if TYPE_CHECKING:
     from shm.report.hanger_summary import HangerSummary
@@ -252,6 +252,8 @@ def hanger_message(known: HangerSummary) -> HangerMessage:
 def _decide(known: HangerSummary) -> tuple[Status | None, Lead]:
     if known.latest is None and not known.standing:
         return None, _lead("untested", known.hanger)
+    if known.control is not None and (latest := known.control.latest) is not None:
+        return Status.CHECK if latest.is_out else Status.STEADY, control_lead(known.control)
     faults = known.tension.faults if known.tension else ()
     status = status_of(
         known.drifts,
@@ -303,7 +305,7 @@ def still_detected(
 
 
 def findings(alerts: Iterable[Alert]) -> tuple[Alert, ...]:
-    """Alerts but for trials of the hooks, which say nothing of a hanger."""
+    """Return alerts without trials of the hooks, which do not concern the hanger."""
     return tuple(each for each in alerts if each.kinds != ("test",))
 
 
@@ -451,7 +453,7 @@ def _off_limits(known: HangerSummary) -> Lead | None:
 
 
 def _tension(tension: Averaged | None) -> str:
-    """`654 ± 16 kN`, rounded by its interval."""
+    """Return `654 ± 16 kN`, rounded by its interval."""
     if tension is None:
         return "not known"
     interval = Interval.of_averaged(tension)

@@ -26,6 +26,7 @@ from shm.values import (
 )
 from shm.values.bar_description import BarDescription, describe_bar
 from shm.values.messages import Lead
+from shm.watch.control_chart import ControlChart
 
 LATEST_TEST = "the latest test"
 BASELINE_TESTS = "the tests of the baseline"
@@ -67,7 +68,7 @@ class HangerSummary:
     first, `open_alerts` how many nobody took note of; `notes` say what people did about them.
     `unwatched` says that nothing has looked at the hanger for too long; `undated` names the tests
     dated by their receipt; `sensors` are those of the latest test, or those that stay. `course`
-    is None without a period.
+    is None without a period; `control` is the chart of a control hanger, None of any other.
     """
 
     hanger: Hanger
@@ -85,6 +86,7 @@ class HangerSummary:
     undated: Sequence[str] = ()
     sensors: tuple[ResponsePoint, ...] = ()
     course: Course | None = None
+    control: ControlChart | None = None
 
     @cached_property
     def message(self) -> HangerMessage:
@@ -152,7 +154,8 @@ class HangerSummary:
 
         It is the baseline's tension, moved by the change since: both intervals go into its own.
         Where the tests since do not show a change, it is the baseline's. Before there is a
-        baseline, and where the watch has not compared the latest test, it is that test's.
+        baseline, and where the watch has not compared the latest test, it is that test's. The
+        repeatability is always the latest test's.
         """
         if self.latest is None or self.baseline is None:
             return self.latest.tension if self.latest else None
@@ -160,7 +163,11 @@ class HangerSummary:
         if drift is None and not self.is_baseline:
             return of_test
         caveats = of_test.caveats if of_test.faults else (*of_test.caveats, *self.baseline.faults)
-        known = replace(self.baseline, caveats=tuple(dict.fromkeys(caveats)))
+        known = replace(
+            self.baseline,
+            caveats=tuple(dict.fromkeys(caveats)),
+            repeatability_sd_n=of_test.repeatability_sd_n,
+        )
         if drift is None or not self._follows_change:
             return known
         moved = _moved(known.tension_n, drift.shift_mean, drift.shift_sd)

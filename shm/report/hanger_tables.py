@@ -25,7 +25,7 @@ from shm.values import PLANES, WITHOUT_MODEL, Alert, Mode, Posterior, PredictedF
 from shm.values.messages import Lead
 from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import stated
-from shm.watch.change_words import factor
+from shm.watch.alert_text import factor
 
 
 def results(data: HangerReport) -> Table:
@@ -122,7 +122,7 @@ def frequencies(data: HangerReport) -> Table:
 
 
 def _irregular(data: HangerReport) -> list[Mode]:
-    """Irregular modes of the latest test that the posterior does not follow."""
+    """Return irregular modes of the latest test that the posterior does not follow."""
     predicted = {(mode.plane, mode.order) for mode in data.predicted}
     return [m for m in data.latest.modes if m.irregular and (m.plane, m.order) not in predicted]
 
@@ -257,7 +257,7 @@ def practice(data: HangerReport) -> Table:
 
 
 def period(data: HangerReport) -> Table:
-    """The period's last test beside its first; empty where there is no period, or one test."""
+    """Return the comparison of the period's first and last test; empty where there are not two."""
     if data.period is None or len(data.trend) < 2:
         return Table("The period", (), ())
     first, last = data.trend[0], data.trend[-1]

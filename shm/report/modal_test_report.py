@@ -24,7 +24,7 @@ from shm.values.rounding import force_unit
 
 
 def modal_test_paper(sheet: ModalTestReport) -> Paper:
-    """Summary, modes and quality, figures, how it came about."""
+    """Return the report of a test: summary, modes and quality, figures, origin."""
     verdict = overall(sheet.identification.quality)
     return Paper(
         title=name(sheet),
@@ -83,7 +83,7 @@ def name(sheet: ModalTestReport) -> str:
 
 
 def summary(sheet: ModalTestReport) -> str:
-    """One paragraph in plain words."""
+    """Return one paragraph in plain words."""
     sentences = (
         measured(sheet),
         _what_was_found(sheet),
@@ -158,7 +158,7 @@ def _group(sheet: ModalTestReport, plane: Plane) -> str:
 
 
 def _orders(modes: Sequence[Mode]) -> str:
-    """`1 to 3, 5, 7 to 9`."""
+    """Return `1 to 3, 5, 7 to 9`."""
     runs: list[list[int]] = []
     for order in sorted(mode.order for mode in modes):
         if runs and order == runs[-1][-1] + 1:
@@ -217,11 +217,11 @@ def advice(sheet: ModalTestReport) -> str:
 
 def results(sheet: ModalTestReport) -> tuple[Table, ...]:
     """Return the tables of the results, as far as there are any."""
-    return filled(modes(sheet), _doubts_in_terminal(quality(sheet)), set_aside(sheet))
+    return filled(modes(sheet), _doubts_in_terminal(quality(sheet)), foreign_modes(sheet))
 
 
 def _doubts_in_terminal(checks: Table) -> Table:
-    """In a terminal the checks that are not good, and how many are."""
+    """Return for a terminal the checks that are not good, and the number of good ones."""
     doubts = tuple(row for row, verdict in enumerate(checks.marks) if verdict != "good")
     good = len(checks.rows) - len(doubts)
     note = f"{{}} {'further ' if doubts else ''}{'check' if good == 1 else 'checks'} good."
@@ -252,7 +252,7 @@ MODE_HEADINGS = (
 
 
 def mode_row(mode: Mode) -> tuple[str, ...]:
-    """One mode under `MODE_HEADINGS`."""
+    """Return one mode under `MODE_HEADINGS`."""
     places = min(6, max(3, formatting.decimals(2 * mode.frequency_sd_hz)))
     return (
         mode.plane,
@@ -269,7 +269,7 @@ def quality(sheet: ModalTestReport) -> Table:
     return quality_table(sheet.identification.quality)
 
 
-def set_aside(sheet: ModalTestReport) -> Table:
+def foreign_modes(sheet: ModalTestReport) -> Table:
     return Table(
         "Set aside: not known as modes of the hanger",
         ("what", "frequency, Hz", "sd, Hz", "damping, %", "why"),
@@ -296,7 +296,7 @@ def dropped(sheet: ModalTestReport) -> Table:
 
 
 def hits(sheet: ModalTestReport) -> Table:
-    """Each hit with its time in s and peak force in N, and whether it was used."""
+    """Return each hit with its time in s and peak force in N, and whether it was used."""
     records = sheet.recordings
     return Table(
         "Hits",

@@ -16,9 +16,8 @@ from shm.report.formatting import counted, listed
 from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
 from shm.values.messages import WEEK
 from shm.values.rounding import rounded_percent
-from shm.watch.alert_text import against_baseline_words
-from shm.watch.change_words import look_again
-from shm.watch.repeated_mistakes import warning_words
+from shm.watch.alert_text import against_baseline_words, look_again
+from shm.watch.notices import warning_words
 
 # Judgement: hangers of sound bridges are within a quarter of their nominal tension, or all are off.
 _OFF_NOMINAL = 0.25
@@ -36,10 +35,10 @@ def open_warnings(
     latest: WatchedTest | None = None,
     now: Sequence[str] = (),
 ) -> tuple[str, ...]:
-    """Each a state, what to do, and why; empty where nothing is wrong.
+    """Return warnings, each a state, an action and a reason; empty where there are none.
 
-    `check` is that of the baseline, `neighbours` what `standing_out` says of it, `latest` what the
-    watch says after the newest test, `now` what `nearly_slack` and `passed_over` say of that.
+    `check` is that of the baseline, `neighbours` the result of `standing_out`, `latest` the
+    watch after the newest test, `now` the results of `nearly_slack` and `passed_over`.
     """
     found = [each for each in now if each]
     if check is not None and check.misfit:
@@ -79,15 +78,15 @@ def passed_over(hanger: Hanger, window: str) -> str:
     )
 
 
-def nearly_slack(hanger: Hanger, baseline: Summary, now: Summary, *, is_told: bool) -> str:
+def nearly_slack(hanger: Hanger, baseline: Summary, now: Summary, *, is_reported: bool) -> str:
     """Return that the latest test alone reads most of the tension lost; "" where it does not.
 
     A bar that carries next to nothing is as stiff as before, and the watch may put its frequencies
-    down to something else, or be unsure for want of tests. Where it `is_told` of the tension that
-    it is beyond its threshold, nobody need be told twice.
+    down to something else, or be unsure for want of tests. Empty where it `is_reported` that the
+    tension is beyond its threshold.
     """
     nominal_n = hanger.nominal_tension_n
-    if is_told or not nominal_n > 0 or not now.q95 < _MOST_LOST * baseline.q05:
+    if is_reported or not nominal_n > 0 or not now.q95 < _MOST_LOST * baseline.q05:
         return ""
     half = (now.q95 - now.q05) / 2 / nominal_n
     return (
@@ -131,7 +130,7 @@ def standing_out(hanger: Hanger, hangers: Sequence[Hanger], tensions: Mapping[in
 
 
 def _share(hanger: Hanger, tensions: Mapping[int, Summary]) -> tuple[float, float, float] | None:
-    """Mean and 90 % interval of the baseline's tension over the nominal one."""
+    """Return mean and 90 % interval of the baseline's tension over the nominal one."""
     found, nominal_n = tensions.get(hanger.id), hanger.nominal_tension_n
     if found is None or not nominal_n > 0:
         return None

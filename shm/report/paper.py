@@ -90,7 +90,10 @@ class Table:
     is_folded: bool = False
 
     def shortened(self, most: int, last: int = 0) -> Table:
-        """With so many rows in a terminal, of which so many are the last; one more may stay."""
+        """Return the table with `most` rows in a terminal, `last` of them from the end.
+
+        One more may stay.
+        """
         count = len(self.rows)
         if count <= most + 1:
             return self
@@ -105,7 +108,7 @@ class Table:
         return replace(self, headings=self.headings * 2, rows=rows, is_folded=False)
 
     def not_in_terminal(self) -> Table:
-        """Left out in a terminal."""
+        """Return the table, left out in a terminal."""
         return replace(self, terminal_rows=(), hidden_note="")
 
 

@@ -19,7 +19,7 @@ _GRAVEST: tuple[Verdict, ...] = ("refused", "warning", "unknown", "good")
 
 
 def verdict_label(verdict: Verdict) -> str:
-    """`✓ good`."""
+    """Return `✓ good`."""
     return f"{SYMBOLS[verdict]} {verdict}"
 
 
@@ -53,7 +53,7 @@ def with_unit(value: float, unit: str) -> str:
 
 
 def quality_table(checks: Sequence[QualityCheck], title: str = "Quality") -> Table:
-    """Each check in its order: verdict by symbol and word, figure beside limit, what to do."""
+    """Return the checks in order: verdict by symbol and word, figure and limit, action."""
     return Table(
         title,
         ("check", "verdict", "figure", "limit", "what was found", "what to do"),

@@ -9,14 +9,14 @@ from shm.report.formatting import Interval
 from shm.report.paper import Table, fold_improbable
 from shm.values import NAN, Drift, is_ratio, kind_of
 from shm.values.rounding import ForceUnit, force_unit
-from shm.watch.change_words import factor
+from shm.watch.alert_text import factor
 from shm.watch.neighbours import BridgePattern, HangerRow
 
 _UNMOVED = 0.01  # of the threshold: no test tells so little
 
 
 def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
-    """Quantity, shift, 90 % interval, threshold, probability beyond it."""
+    """Return quantity, shift, 90 % interval, threshold, probability beyond it."""
     if not math.isfinite(row.shift_mean + row.shift_sd):
         unknown = ("not known", "not known", threshold_cell(row), formatting.probability(NAN))
         return (formatting.quantity(row.quantity), *unknown)
@@ -44,7 +44,7 @@ def shift_unit(pattern: BridgePattern) -> tuple[ForceUnit, int]:
 
 
 def threshold_cell(row: Drift) -> str:
-    """`5 %` of a tension or a frequency, `0.32 or 3.2 times` of a stiffness."""
+    """Return `5 %` of a tension or a frequency, `0.32 or 3.2 times` of a stiffness."""
     if is_ratio(row.quantity):
         return f"{100 * row.threshold:.3g} %"
     return f"{factor(-row.threshold)} or {factor(row.threshold)} times"
@@ -67,7 +67,7 @@ _PERCENT_DECIMALS = 1
 
 
 def pattern_tables(pattern: BridgePattern) -> tuple[Table, Table]:
-    """Each hanger's shift, and the explanations of all shifts together."""
+    """Return each hanger's shift, and the explanations of all shifts together."""
     return shift_table(pattern), Table(
         "What explains them",
         ("explanation", "probability"),
@@ -80,7 +80,7 @@ def pattern_tables(pattern: BridgePattern) -> tuple[Table, Table]:
 
 
 def shift_table(pattern: BridgePattern) -> Table:
-    """Shifts of the tension since each hanger's baseline; those not compared stand last."""
+    """Return shifts of the tension since each hanger's baseline; not compared ones last."""
     unit, places = shift_unit(pattern)
     rows = [_shift(row, unit, places) for row in pattern.rows]
     rows += [
@@ -103,7 +103,7 @@ def shift_table(pattern: BridgePattern) -> Table:
 
 
 def _shares(pattern: BridgePattern) -> list[float]:
-    """Of the largest shift."""
+    """Return shifts as fractions of the largest."""
     widest = max(abs(row.shift_fraction) for row in pattern.rows) or 1.0
     return [row.shift_fraction / widest for row in pattern.rows]
 

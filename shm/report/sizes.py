@@ -37,7 +37,7 @@ class Size:
         return -1 if self.interval.high < 0 else 0
 
     def directed(self, up: str, down: str) -> str:
-        """`0.12 m (0.10 to 0.14) longer`; signed numbers where either direction is possible."""
+        """Return `0.12 m (0.10 to 0.14) longer`; signed numbers if both directions are possible."""
         if self.sure_sign > 0:
             return f"{self} {up}"
         if self.sure_sign < 0:
@@ -46,7 +46,7 @@ class Size:
         return f"{self.in_words(self.interval, '+')} {up}"
 
     def __format__(self, directions: str) -> str:
-        """As text; with `up|down` as `directed` says it."""
+        """Return the size as text; `up|down` as for `directed`."""
         up, bar, down = directions.partition("|")
         return self.directed(up, down) if bar else str(self)
 
@@ -79,7 +79,7 @@ def size_of(name: str, unit: str, interval: Interval) -> Size:
 
 
 def _texts(interval: Interval, sign: str, logarithmic: bool) -> tuple[str, str, str]:
-    """Mean and bounds with digits that the width deserves; empty bounds where they are unknown."""
+    """Return mean and bounds with the digits of the width; empty bounds where unknown."""
     half = interval.width / 2
     if logarithmic or _lopsided(interval) or not (math.isfinite(half) and half > 0):
         mean, low, high = (_significant(v, sign) for v in _three(interval))
@@ -96,7 +96,7 @@ def _lopsided(interval: Interval) -> bool:
 
 
 def _most_places(mean: float) -> int:
-    """Decimals beyond which nobody measures: four significant digits."""
+    """Return the decimals of four significant digits, more than anybody measures."""
     return 3 - math.floor(math.log10(abs(mean))) if mean else 6
 
 
@@ -105,7 +105,7 @@ def _three(interval: Interval) -> tuple[float, float, float]:
 
 
 def _significant(value: float, sign: str) -> str:
-    """Two significant digits, never as a power of ten."""
+    """Return two significant digits, never as a power of ten."""
     if not math.isfinite(value):
         return "of unknown size" if math.isnan(value) else "unbounded"
     if value == 0:

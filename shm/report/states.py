@@ -27,8 +27,8 @@ from shm.values import (
     WatchedQuantity,
     kind_of,
 )
-from shm.watch.change_words import group_words, is_stiffness, probable_groups, quantity_words
-from shm.watch.repeated_mistakes import off_the_baseline
+from shm.watch.alert_text import group_words, is_stiffness, probable_groups, quantity_words
+from shm.watch.notices import off_the_baseline
 from shm.watch.state import Band, StateHistory, StateOptions, set_free, states
 
 if TYPE_CHECKING:
@@ -51,15 +51,15 @@ class Period:
         return time is not None and time >= self.since
 
     def __str__(self) -> str:
-        """`2026-03-01 to 2026-05-25`."""
+        """Return `2026-03-01 to 2026-05-25`."""
         return f"{_day(self.since)} to {_day(self.until)}"
 
 
 def period_since(wording: str, now: datetime) -> Period:
-    """The period that a person writes: `2026-03-01`, `2026-03-01T10:00`, `90d`, `12w`, `6m`, `1y`.
+    """Parse the period that a person writes: `2026-03-01`, `2026-03-01T10:00`, `90d`, `12w`, `6m`.
 
-    A date is taken in UTC, a month as the twelfth of a year. Raises UsageError where it is neither,
-    or lies ahead of `now`.
+    A date is taken in UTC, a month as the twelfth of a year (`1y`). Raises UsageError where it
+    is neither, or is after `now`.
     """
     since = _since(wording.strip(), now)
     if since >= now:
@@ -174,10 +174,10 @@ NOTHING_WATCHED = StatesOverTime((), np.empty(0), NAN, np.empty(0, bool), ())
 
 
 def states_over_time(watched: Watched, hanger: Hanger) -> StatesOverTime:
-    """The states of a hanger at all tests of its watch, at the baseline's mean temperature."""
+    """Return the states of a hanger at all tests, at the baseline's mean temperature."""
     outlier = np.array([each.change.outlier_probability for each in watched.watch.tests])
     explained = np.array([not off_the_baseline(each).any() for each in watched.readings])
-    calls = [call.change for call in watched.watch.calls]
+    calls = [change for _, change in watched.watch.calls]
     reference_c = watched.reader.reference_temperature_c
     options = StateOptions.of(hanger.assumptions, reference_temperature_c=reference_c)
     changes = set_free(calls, watched.readings)
@@ -218,8 +218,11 @@ def _over_time(
 
 
 def called_words(change: Change) -> str:
-    """`sudden: tension -6.3 %`; of a stiffness how many times what it was, of another cause what it
-    does to the frequencies on average."""
+    """Describe a change: `sudden: tension -6.3 %`.
+
+    Of a stiffness it is the ratio to before, of another cause the mean effect on the
+    frequencies.
+    """
     kind = "sudden" if change.sudden > 0.5 else "slow"
     groups = probable_groups(change)
     if not groups:
@@ -240,7 +243,7 @@ _FEWEST = 3
 
 
 def temperature_table(states: StatesOverTime) -> Table:
-    """Each quantity's change per kelvin in percent of itself, or why it is not known."""
+    """Return each quantity's change per kelvin in percent of itself, or why it is not known."""
     why = _why_not_known(states)
     titles = {quantity.name: quantity.title for quantity in states.quantities}
     known = [_is_known(each, states) for each in states.temperature_coefficients]
@@ -263,7 +266,7 @@ def temperature_table(states: StatesOverTime) -> Table:
 
 
 def temperature_documents(states: StatesOverTime) -> list[dict[str, Any]]:
-    """Of each quantity its change per kelvin; `known` is false where no test says anything."""
+    """Return the change of each quantity per kelvin; `known` is false without any test."""
     return [
         {
             "quantity": each.quantity,

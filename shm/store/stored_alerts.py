@@ -166,7 +166,7 @@ def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> 
     return None if until == at else until
 
 
-def said_of(silence: Silence) -> str:
+def describe_silence(silence: Silence) -> str:
     """A silence or a maintenance window in words: what it keeps from whom, until when, and why."""
     of = hangers_of(silence.hanger)
     kept = f"hooks are told nothing of {of}"

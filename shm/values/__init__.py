@@ -58,6 +58,7 @@ from shm.values.gap_check import (
     PlantedParameter,
 )
 from shm.values.hanger import (
+    ControlHanger,
     EffectPrior,
     EndKind,
     EndPlate,

@@ -22,13 +22,13 @@ NO_GAP = "no gap"
 
 
 def effect_label(effect: str, at: str) -> str:
-    """`sag (longitudinal)` of an effect and where it acts; everywhere goes without saying."""
+    """Return `sag (longitudinal)` for an effect and its place; everywhere is not named."""
     place = at.removeprefix("everywhere").removeprefix(", ")
     return effect.replace("_", " ") + (f" ({place})" if place else "")
 
 
 def joined(names: Iterable[str]) -> str:
-    """Names of the effects of a pair, or places of them, as one text."""
+    """Return the effects of a pair, or their places, as one text."""
     return _AND.join(names)
 
 

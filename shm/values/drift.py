@@ -318,7 +318,7 @@ class WatchedTest:
         return any(each.is_misfit and not each.fits for each in self.mistaken)
 
     @property
-    def told(self) -> tuple[Drift, ...]:
+    def published_drifts(self) -> tuple[Drift, ...]:
         """Return the drifts as they are reported.
 
         What is clearly beyond its threshold where a change is called is as probable as that it

@@ -280,6 +280,11 @@ class Hanger(Shown):
         return False
 
     @property
+    def is_control(self) -> bool:
+        """Return True if its tension is known and checks the measurement: see `ControlHanger`."""
+        return False
+
+    @property
     def as_hanger(self) -> bool:
         """Return True if it is clamped at both ends and in tension."""
         return self.supports.clamped and self.nominal_tension_n > 0
@@ -294,4 +299,19 @@ class MonitoredHanger(Hanger):
 
     @property
     def has_sensors(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True)
+class ControlHanger(Hanger):
+    """A hanger of known tension, which checks each campaign and is never watched (record 0028).
+
+    `known_tension_sd_n` is the standard uncertainty of the known tension, in N like it.
+    """
+
+    known_tension_n: float = NAN
+    known_tension_sd_n: float = NAN
+
+    @property
+    def is_control(self) -> bool:
         return True

@@ -60,7 +60,7 @@ class BaselineCheck:
     misfit: str = ""
     unchecked: str = ""
 
-    def kept(self, test: ModalTest) -> ModalTest:
+    def without_mistakes(self, test: ModalTest) -> ModalTest:
         """Return a test of the baseline without the modes that are left out."""
         out = {(each.plane, each.order) for each in self.modes if each.test == test.id}
         if not out:
@@ -70,9 +70,9 @@ class BaselineCheck:
         )
         return replace(test, modes=modes)
 
-    def kept_of(self, tests: Sequence[ModalTest]) -> tuple[ModalTest, ...]:
+    def accepted_tests(self, tests: Sequence[ModalTest]) -> tuple[ModalTest, ...]:
         """Return the tests without the modes and the tests that are left out."""
-        return tuple(self.kept(test) for test in tests if not self.leaves_out(test.id))
+        return tuple(self.without_mistakes(test) for test in tests if not self.leaves_out(test.id))
 
     def leaves_out(self, test: str) -> bool:
         """Return True if a test is excluded completely."""
@@ -147,7 +147,7 @@ class Summary:
 
     @classmethod
     def of(cls, samples: FloatArray) -> Self:
-        """Of equally weighted draws, shape (samples,)."""
+        """Return the summary of equally weighted draws, shape (samples,)."""
         q05, q50, q95 = np.quantile(samples, [0.05, 0.5, 0.95])
         spread = float(samples.std(ddof=1))
         return cls(float(samples.mean()), spread, float(q05), float(q50), float(q95))
@@ -292,7 +292,7 @@ class Posterior(Shown):
             other_n = self.tension_of_other_orders_n
             found.append(
                 f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit as well, with a "
-                f"tension of {force_unit(other_n).told(other_n)}, nearer to the nominal one. "
+                f"tension of {force_unit(other_n).with_unit(other_n)}, nearer to the nominal one. "
                 "Find the first mode of each plane."
             )
         found += [each for each in self.remarks if not each.startswith(_NO_FAULTS)]
@@ -321,8 +321,9 @@ class Posterior(Shown):
         if 1 / FAR_FROM_NOMINAL < ratio < FAR_FROM_NOMINAL:
             return ""
         return (
-            f" A taut string would need {force_unit(string_n).told(string_n)}, {two_digits(ratio)} "
-            "times the nominal: check nominal_tension_n, its unit, the orders."
+            f" A taut string would need {force_unit(string_n).with_unit(string_n)},"
+            f" {two_digits(ratio)} times the nominal: check nominal_tension_n, its unit, the "
+            "orders."
         )
 
     @property
@@ -381,8 +382,8 @@ class Posterior(Shown):
             modes = "1 measured frequency" if n_modes == 1 else f"{n_modes} measured frequencies"
             return line("Posterior", self.hanger, f"{modes}, no model")
         tension = Selection((self,), (1.0,)).averaged.tension_n
-        said = f"{self.model}, {tension_words(tension.mean, tension.q05, tension.q95)}"
-        return line("Posterior", self.hanger, said)
+        text = f"{self.model}, {tension_words(tension.mean, tension.q05, tension.q95)}"
+        return line("Posterior", self.hanger, text)
 
     def to_dataframe(self) -> DataFrame:
         """Return the draws, a row a draw: the table of `shm.export.samples`."""
@@ -475,7 +476,7 @@ class Selection(Shown):
 
 
 def _distinct(caveats: Sequence[str]) -> tuple[str, ...]:
-    """Each once, in order; of these every class says the same with a number of its own."""
+    """Return each caveat once, in order; of those that differ in a number, the first."""
     found: dict[str, str] = {}
     for each in caveats:
         head = each.partition(":")[0].partition(", by ")[0]

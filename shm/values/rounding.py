@@ -29,14 +29,14 @@ class ForceUnit:
         return force_n / self.newtons
 
     def decimals(self, force_n: float) -> int:
-        """Decimals that show four significant digits of a force in N, one at the least."""
+        """Return decimals that show four significant digits of a force in N, one at the least."""
         size = abs(self.of(force_n))
         if not (math.isfinite(size) and size > 0):
             return 1
         return min(MOST_DECIMALS, max(1, _DIGITS - 1 - math.floor(math.log10(size))))
 
-    def told(self, force_n: float) -> str:
-        """`654.1 kN` of a force in N: four significant digits, never as a power of ten."""
+    def with_unit(self, force_n: float) -> str:
+        """Return `654.1 kN` of a force in N: four significant digits, never as a power of ten."""
         value = self.of(force_n)
         digits = np.format_float_positional(
             value, precision=_DIGITS, fractional=False, unique=False, trim="-"
@@ -63,7 +63,7 @@ NINETY_PERCENT = 1.645  # sds on either side that hold 90 % of a normal law
 
 
 def rounded(value: float, half: float, sign: str = "", most_decimals: int = 6) -> str:
-    """`8.2 ± 1.1`, `1040 ± 130`: both to two significant digits of the half width."""
+    """Return `8.2 ± 1.1`, `1040 ± 130`: both to two significant digits of the half width."""
     if not (math.isfinite(half) and half > 0):
         return f"{value:{sign}.1f}"
     places = min(most_decimals, 1 - math.floor(math.log10(half)))
@@ -73,7 +73,7 @@ def rounded(value: float, half: float, sign: str = "", most_decimals: int = 6) -
 
 
 def to_two_digits(value: float, half: float, sign: str = "") -> str:
-    """`650`, `8.2`: a value to two significant digits of its interval's half width."""
+    """Return `650`, `8.2`: a value to two significant digits of its interval's half width."""
     if not (math.isfinite(half) and half > 0):
         return f"{value:{sign}z.1f}"
     places = min(MOST_DECIMALS, 1 - math.floor(math.log10(half)))
@@ -86,7 +86,7 @@ def two_digits(value: float) -> str:
 
 
 def rounded_percent(fraction: float, half: float, sign: str = "") -> str:
-    """`8.2 ± 1.1 %` of fractions: two digits of the half width, two decimals at most."""
+    """Return `8.2 ± 1.1 %` of fractions: two digits of the half width, at most two decimals."""
     return f"{rounded(100 * fraction, 100 * half, sign, most_decimals=2)} %"
 
 

@@ -30,7 +30,7 @@ _front: Any = None
 
 
 def hand_over_to(package: Any) -> None:
-    """Tells values of the package whose `notebook` and `export` show them."""
+    """Set the package whose `notebook` and `export` show values."""
     global _front
     _front = package
 
@@ -41,13 +41,13 @@ def front() -> Any:
 
 
 def line(what: str, hanger: int | None, text: str) -> str:
-    """`<Posterior of hanger 3: 654 kN (90 % credible interval 640 to 671 kN)>`."""
+    """Return `<Posterior of hanger 3: 654 kN (90 % credible interval 640 to 671 kN)>`."""
     whose = "" if hanger is None else f" of hanger {hanger}"
     return f"<{what}{whose}: {text}>"
 
 
 def tension_words(mean_n: float, low_n: float, high_n: float) -> str:
-    """`654 kN (90 % credible interval 640 to 671 kN)`; the mean alone without an interval."""
+    """Return `654 kN (90 % credible interval 640 to 671 kN)`; the mean without an interval."""
     from shm.values.posterior import Averaged, Summary
     from shm.values.rounding import force_unit
     from shm.values.stated_tension import stated
@@ -55,5 +55,5 @@ def tension_words(mean_n: float, low_n: float, high_n: float) -> str:
     if not math.isfinite(mean_n):
         return "tension not known"
     if not math.isfinite(high_n - low_n):
-        return force_unit(mean_n).told(mean_n)
+        return force_unit(mean_n).with_unit(mean_n)
     return stated(Averaged(Summary(mean_n, math.nan, low_n, math.nan, high_n), math.nan)).headline

@@ -97,14 +97,14 @@ def stated(averaged: Averaged, unit: ForceUnit | None = None) -> StatedTension:
 
 
 def decimals(size: float) -> int:
-    """Decimals that show two significant digits."""
+    """Return decimals that show two significant digits."""
     if not (math.isfinite(size) and size > 0):
         return 1
     return min(MOST_DECIMALS, max(0, 1 - math.floor(math.log10(size))))
 
 
 def _probability(value: float) -> str:
-    """As many digits as a thousand draws can tell; empty where there is no limit."""
+    """Return as many digits as a thousand draws can tell; empty where there is no limit."""
     if math.isnan(value):
         return ""
     if value < _MIN_STATED:

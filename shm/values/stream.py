@@ -47,13 +47,28 @@ class StreamChannel:
 
 
 @dataclass(frozen=True)
+class SeedLinkFeed:
+    """A SeedLink server that is asked for a stream's samples.
+
+    `ids` are network, station, location (which may be empty) and code of each channel of the
+    stream, in its order; `calibrations` what a count of each is worth in m/s^2.
+    """
+
+    host: str
+    port: int
+    ids: tuple[tuple[str, str, str, str], ...]
+    calibrations: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Stream:
-    """A logger that sends for good, as `bridge.toml` describes it."""
+    """A logger that sends for good, as `bridge.toml` describes it; `feed` where it is asked."""
 
     name: str
     hanger: int
     sampling_rate_hz: float
     channels: tuple[StreamChannel, ...]
+    feed: SeedLinkFeed | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,9 +29,9 @@ from shm.values.drift import threshold_of
 from shm.watch.alert_text import alert_of, message_of_agreeing
 from shm.watch.options import WatchOptions
 from shm.watch.persistence import LARGE
-from shm.watch.quantities import shift_of, value_at
+from shm.watch.posterior_summary import beyond, drift_of, shift_of_mixture
+from shm.watch.quantities import shift_of
 from shm.watch.readings import Reader
-from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
 
 CLEAR = 3.0
 """Standard deviations from the baseline, temperature and scatter included: one good test in 740
@@ -57,8 +57,7 @@ Way = Literal["up", "down"]
 
 @dataclass(frozen=True)
 class Shown:
-    """What one test says of one quantity by itself: its coordinate, the variance of that, and what
-    it moves the mean log frequency by."""
+    """A quantity by one test: coordinate, variance, and its effect on the mean log frequency."""
 
     mean: float
     variance: float
@@ -79,9 +78,9 @@ def agreement(
     clocks say that it was a later visit, one of a visit before shows the same, or the shift is
     `told` already.
     """
-    own = _shown(reader, newest[0], hanger, options)
+    its = _shown(reader, newest[0], hanger, options)
     unwatched = {*beside.held, *beside.of_works}
-    if not any(own):
+    if not any(its):
         return None
     near = [
         [(test, _shown(reader, test, hanger, options)) for test in tests]
@@ -89,7 +88,7 @@ def agreement(
     ]
     are_later = (False, True, False, True)
     known = _known_before(reader, newest[0], beside, options)
-    for j, (quantity, mine) in enumerate(zip(reader.quantities, own, strict=True)):
+    for j, (quantity, mine) in enumerate(zip(reader.quantities, its, strict=True)):
         if mine is None or (quantity.name, way_of(mine.mean)) in told:
             continue
         runs = [_run(tests, mine, j) for tests in near]
@@ -109,14 +108,14 @@ def agreement(
             drift = _drift(quantity, newest, (mine, shown), hanger)
             what = f"two-tests-agree:{drift.quantity}-{way_of(drift.shift_mean)}"
             tests = (other.id, newest[0].id)
-            said = message_of_agreeing(drift, hanger, tests, is_held=other.id in beside.held)
+            words = message_of_agreeing(drift, hanger, tests, is_held=other.id in beside.held)
             of_test = (newest[0].id, newest[1])
-            return alert_of(hanger, of_test, what, said, ("beyond threshold",), (drift,))
+            return alert_of(hanger, of_test, what, words, ("beyond threshold",), (drift,))
     return None
 
 
 def is_no_load(quantity: WatchedQuantity, shown: Shown) -> bool:
-    """Whether a quantity is further off than by any load that stands on the deck."""
+    """Return True if a quantity is further off than by any load that stands on the deck."""
     if quantity.name == TENSION:
         return bool(abs(shift_of(quantity, shown.mean)) > BY_A_LOAD)
     return shown.moves > LARGE
@@ -125,8 +124,7 @@ def is_no_load(quantity: WatchedQuantity, shown: Shown) -> bool:
 def _known_before(
     reader: Reader, newest: ModalTest, beside: Beside, options: WatchOptions
 ) -> list[list[Shown]]:
-    """What the last tests of visits before the newest say: what these show already is not new, and
-    the watch's to judge."""
+    """Return the readings of the last visits before the newest: these shifts are not new."""
     earlier = {
         test.id: test
         for tests in (beside.came[0], beside.dated[0])
@@ -137,7 +135,7 @@ def _known_before(
 
 
 def _is_later(newest: ModalTest, other: ModalTest) -> bool:
-    """Whether the newest was a later visit than the other, by their own clocks."""
+    """Return True if the newest was a later visit than the other, by their own clocks."""
     return newest.time is not None and other.time is not None and newest.time - other.time >= _APART
 
 
@@ -160,8 +158,10 @@ def _run(
 
 
 def _have_told(beside: Beside, run: Sequence[tuple[ModalTest, Shown]], are_later: bool) -> bool:
-    """Whether two tests of a run told that they agree: when the second of them came, unless works
-    were on then. The run goes away from the newest test: which are second depends on the side."""
+    """Return True if two tests of a run were reported to agree: as the second came, but for works.
+
+    The run goes away from the newest test: which are second depends on the side.
+    """
     names = [test.id for test, _ in run]
     second = names[1:] if are_later else names[:-1]
     return any(name not in beside.of_works for name in second)
@@ -175,7 +175,7 @@ def _agree(one: Shown, other: Shown) -> bool:
 def _shown(
     reader: Reader, test: ModalTest, hanger: Hanger, options: WatchOptions
 ) -> list[Shown | None]:
-    """What a test shows of each quantity; None where that is not clear, or below its threshold."""
+    """Return each quantity by a test; None where it is not clear, or below its threshold."""
     found: list[Shown | None] = []
     for quantity, each in zip(reader.quantities, read_alone(reader, test, options), strict=True):
         is_beyond = abs(shift_of(quantity, each.mean)) >= threshold_of(quantity.name, hanger)
@@ -219,8 +219,7 @@ def scatter_of(quantity: WatchedQuantity) -> float:
 def drifts_of(
     reader: Reader, tests: Sequence[tuple[ModalTest, datetime]], hanger: Hanger
 ) -> tuple[Drift, ...]:
-    """What tests of one state show by themselves, whatever was known before: how far each quantity
-    is off the baseline of `reader`."""
+    """Return how far each quantity is off the baseline of `reader` by tests of one state alone."""
     options = WatchOptions.of(hanger.assumptions)
     read = [read_alone(reader, test, options) for test, _ in tests]
     return tuple(
@@ -235,30 +234,10 @@ def _drift(
     alike: Sequence[Shown],
     hanger: Hanger,
 ) -> Drift:
-    """Of tests that agree, as if what they share in error were of each alone: the larger."""
+    """Return what tests that agree show, as if their errors were all of each alone: the larger."""
     weights = [1 / each.variance for each in alike]
-    x = float(np.average([each.mean for each in alike], weights=weights))
-    sd = math.sqrt(max(each.variance for each in alike))
-    return drift_of(quantity, newest, Shift(x, sd), hanger)
-
-
-def drift_of(
-    quantity: WatchedQuantity, newest: tuple[ModalTest, datetime], read: Shift, hanger: Hanger
-) -> Drift:
-    """Return what tests `read` of a quantity, in the coordinate, as a shift from the baseline."""
-    alone = np.ones(1)
-    at = alone * read.mean, alone * read.sd
-    shift = shift_of_mixture(quantity, alone, *at)
-    threshold = threshold_of(quantity.name, hanger)
-    return Drift(
-        hanger=hanger.id,
-        test=newest[0].id,
-        time=newest[1],
-        quantity=quantity.name,
-        baseline=quantity.baseline,
-        value=value_at(quantity, read.mean),
-        shift_mean=shift.mean,
-        shift_sd=shift.sd,
-        threshold=threshold,
-        probability=beyond(quantity, alone, *at, threshold),
-    )
+    mean, alone = np.average([each.mean for each in alike], weights=weights), np.ones(1)
+    at = alone * mean, alone * math.sqrt(max(each.variance for each in alike))
+    chance = beyond(quantity, alone, *at, threshold_of(quantity.name, hanger))
+    of_test = newest[0].id, newest[1]
+    return drift_of(quantity, hanger, of_test, shift_of_mixture(quantity, alone, *at), chance)

@@ -1,4 +1,4 @@
-"""What the frequencies of wind and traffic differ by from those of hammer tests, on one hanger.
+"""The bias of frequencies by wind and traffic against those of hammer tests, on one hanger.
 
 A hammer makes joints slip that small motions do not, its crew brings sensors of some mass, and its
 logger has a clock of its own. Where a stream runs on the days of hammer tests, the difference is
@@ -45,12 +45,12 @@ class AmbientBias:
 
     @property
     def is_known(self) -> bool:
-        """Whether a hammer test ever came within three hours of a reading of the stream."""
+        """Return True if a hammer test ever came within three hours of a reading of the stream."""
         return bool(self.modes)
 
     @property
     def most_tests(self) -> int:
-        """How many tests the mode rests on that was compared most often."""
+        """Return how many tests the mode rests on that was compared most often."""
         return max(self.tests, default=0)
 
     def text(self) -> str:
@@ -64,11 +64,11 @@ class AmbientBias:
         most = int(np.argmax(np.abs(self.mean) / self.sd))
         plane, order = self.modes[most]
         tests = self.most_tests
-        own = rounded_percent(self.mean[most], NINETY_PERCENT * self.sd[most], "+")
+        its = rounded_percent(self.mean[most], NINETY_PERCENT * self.sd[most], "+")
         return (
             f"Hanger {self.hanger}: frequencies by wind and traffic differ from those of hammer "
             f"tests by {rounded_percent(self.common, half, '+')} ({tests} "
-            f"test{'s' if tests > 1 else ''}). Most of all {plane} {order} does, by {own}."
+            f"test{'s' if tests > 1 else ''}). Most of all {plane} {order} does, by {its}."
         )
 
 
@@ -92,8 +92,8 @@ def ambient_bias(
     off, weight = np.array([row[1] for row in rows]), 1 / np.array([row[2] for row in rows])
     # The common bias first, then what each mode differs by.
     design = np.hstack([np.ones((n, 1)), np.eye(n)])
-    own = np.diag(np.bincount(at, weight, n))
-    covariance = np.linalg.inv(design.T @ own @ design + np.eye(n + 1) / _BIAS_SD**2)
+    its = np.diag(np.bincount(at, weight, n))
+    covariance = np.linalg.inv(design.T @ its @ design + np.eye(n + 1) / _BIAS_SD**2)
     found = covariance @ design.T @ np.bincount(at, weight * off, n)
     of_modes = design @ covariance @ design.T
     # What all modes have on the average says more than the law that they are drawn from.
@@ -127,10 +127,10 @@ def _pairs(
     return [
         (
             key,
-            math.log(ambient[key].frequency_hz / own.frequency_hz),
-            _variance(ambient[key]) + _variance(own) + _TEST_SCATTER**2,
+            math.log(ambient[key].frequency_hz / its.frequency_hz),
+            _variance(ambient[key]) + _variance(its) + _TEST_SCATTER**2,
         )
-        for key, own in hammer.items()
+        for key, its in hammer.items()
         if key in ambient
     ]
 

@@ -1,4 +1,4 @@
-"""What may have moved a hanger's frequencies: the hypotheses of the diagnosis, over time.
+"""Causes of a change of a hanger's frequencies: the hypotheses of the diagnosis, over time.
 
 Tension and end stiffness move the frequencies as the model class says, where the hanger is now.
 Beside them stand what the catalogue of effects knows and a comparison with the baseline can show: a
@@ -59,7 +59,7 @@ class DetectedChange:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """What stands where in the columns of a test: `n` modes, `q` quantities, then covariates.
+    """The order of the columns of a test: `n` modes, `q` quantities, then covariates.
 
     `prior_sd` (columns,) are those of the null's parameters; the quantities' own columns are no
     part of it, since the modes' levels hold them.
@@ -120,8 +120,9 @@ _CORRELATION = 0.8
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What causes do to the log frequencies of the baseline's `modes` (n,), one unit or one sd of
-    each: (places, r, n) by name.
+    """The effects of causes on the log frequencies of the baseline's `modes` (n,).
+
+    One unit or one sd of each: (places, r, n) by name.
 
     `sensors` (n, n) is the covariance that a test's sensors, put elsewhere each time, give,
     `loosening` the patterns (r, n) of each watched quantity that its step may have beside its mean.
@@ -213,7 +214,7 @@ def _columns_on(
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """What is watched: the layout of columns, directions of change, and scatters.
+    """The hypotheses of a hanger: the layout of columns, directions of change, and scatters.
 
     Tests scatter along the quantities' slopes and along `scattering` (n, c) by variances (q + c,)
     that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that. Along
@@ -279,19 +280,21 @@ def structure_of(
 def _scattering(
     quantities: Sequence[WatchedQuantity], columns: Columns, options: WatchOptions
 ) -> tuple[FloatArray, FloatArray]:
-    """What tests of one state scatter along beside the quantities (n, c), and the standard
-    deviations (q + c,) of both before any test."""
+    """Return what tests of one state scatter along (n, c) besides the quantities.
+
+    And the standard deviations (q + c,) of both before any test.
+    """
     n = len(columns.modes)
     steps = np.array([each.step_sd for each in quantities])
     is_tension = np.array([each.name == TENSION for each in quantities])
     strength, axes = np.linalg.eigh(columns.sensors)
-    kept = strength > _SEEN_OF_SENSORS * strength[-1]
+    chosen = strength > _SEEN_OF_SENSORS * strength[-1]
     # A joint that gives for a day does so along what it does as it loosens.
     loosening = np.vstack([np.zeros((0, n)), *columns.loosening])
     scattering = np.hstack(
         [
             options.spring_scatter_of_step * loosening.T,
-            axes[:, kept] * np.sqrt(strength[kept]),
+            axes[:, chosen] * np.sqrt(strength[chosen]),
             columns.by_cause[BENDING_STIFFNESS][0].T,
             np.ones((n, 1)),
             np.eye(n),
@@ -300,7 +303,7 @@ def _scattering(
     sds = np.concatenate(
         [
             np.where(is_tension, options.tension_scatter, options.spring_scatter_of_step * steps),
-            np.ones(len(loosening) + int(kept.sum())),
+            np.ones(len(loosening) + int(chosen.sum())),
             [options.bending_scatter / _STIFFER, options.clock_scatter],
             np.full(n, options.mode_scatter),
         ]
@@ -311,19 +314,19 @@ def _scattering(
 def _directions(quantities: Sequence[WatchedQuantity], columns: Columns) -> list[Direction]:
     n, q = len(columns.modes), len(quantities)
     steps = np.array([each.step_sd for each in quantities])
-    own = _joint_moves(quantities)
+    its = _joint_moves(quantities)
     found = []
-    for members, root in own:
+    for members, root in its:
         patterns = [columns.loosening[j] for j in members if columns.loosening]
-        beside = np.vstack([np.zeros((0, n)), *patterns]).T
-        factor = np.zeros((n + q, len(members) + beside.shape[1]))
+        nearby = np.vstack([np.zeros((0, n)), *patterns]).T
+        factor = np.zeros((n + q, len(members) + nearby.shape[1]))
         factor[n:, : len(members)] = steps[:, None] * root
-        factor[:n, len(members) :] = beside
+        factor[:n, len(members) :] = nearby
         alone = members == (0,) and quantities[0].name == TENSION
-        share = _SHARES[TENSION] if alone else _SHARES[SPRINGS] / max(len(own) - 1, 1)
+        share = _SHARES[TENSION] if alone else _SHARES[SPRINGS] / max(len(its) - 1, 1)
         name = TENSION if alone else SPRINGS
         found.append(Direction(name, factor, members, float(np.log(share))))
-    if len(own) == 1:
+    if len(its) == 1:
         found[0] = replace(found[0], log_prior=float(np.log(_SHARES[TENSION] + _SHARES[SPRINGS])))
     for cause in (POINT_MASS, SECTION_LOSS, BENDING_STIFFNESS, TIMEBASE):
         places = columns.by_cause[cause]
@@ -334,9 +337,9 @@ def _directions(quantities: Sequence[WatchedQuantity], columns: Columns) -> list
             may_ramp = cause != TIMEBASE
             found.append(Direction(cause, factor, (), log_prior, may_ramp))
     strength, axes = np.linalg.eigh(2 * columns.sensors)
-    kept = strength > _SEEN_OF_SENSORS * strength[-1]
-    moved = np.zeros((n + q, int(kept.sum())))
-    moved[:n] = axes[:, kept] * np.sqrt(strength[kept])
+    chosen = strength > _SEEN_OF_SENSORS * strength[-1]
+    moved = np.zeros((n + q, int(chosen.sum())))
+    moved[:n] = axes[:, chosen] * np.sqrt(strength[chosen])
     sensor = Direction(SENSOR_MASS, moved, (), float(np.log(_SHARES[SENSOR_MASS])), False)
     free = np.zeros((n + q, n))
     free[:n] = _UNEXPLAINED * np.eye(n)
@@ -364,8 +367,8 @@ def _root(members: tuple[int, ...], springs: Sequence[int], q: int) -> FloatArra
     """A factor (q, members) of the covariance of shifts, in steps, of which `springs` are alike."""
     n = len(members)
     among = np.eye(n)
-    alike = np.isin(members, springs)
-    among[np.ix_(alike, alike)] += _CORRELATION * (1 - np.eye(int(alike.sum())))
+    similar = np.isin(members, springs)
+    among[np.ix_(similar, similar)] += _CORRELATION * (1 - np.eye(int(similar.sum())))
     root = np.zeros((q, n))
     root[list(members)] = np.linalg.cholesky(among)
     return root

@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import scipy
 
 from shm.values import FloatArray, IntArray
 from shm.watch.causes import DetectedChange, Direction, Layout
@@ -52,9 +53,9 @@ def sums_of(
 ) -> Sums:
     """Of tests with `columns` (T, n, z), `values` and `variances` (T, n), infinite where a mode was
     not measured, and the `covariance` (T, K, n, n) of their scatter beside that."""
-    own = np.where(np.isfinite(variances), variances, _ABSENT)
+    its = np.where(np.isfinite(variances), variances, _ABSENT)
     n = values.shape[1]
-    joint = covariance + own[:, None, :, None] * np.eye(n)
+    joint = covariance + its[:, None, :, None] * np.eye(n)
     weight = np.linalg.inv(joint)
     weighted = weight @ columns[:, None]
     of_values = np.einsum("tkij,tj->tki", weight, values)
@@ -68,7 +69,7 @@ def sums_of(
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What all tests say: of each change (beginnings, K, kinds, D, sizes) its log mass in years.
+    """The evidence of all tests: log masses (beginnings, K, kinds, D, sizes) of changes, in years.
 
     `log_most` bounds what all masses together are worth (`persistence`).
     `log_null` (K,) is the log probability of each scatter without change. `beginnings` are numbers
@@ -120,8 +121,10 @@ class Evidence:
 
     @property
     def of_last_visit(self) -> tuple[float, float]:
-        """What the last visit alone speaks for: the largest log Bayes factor of any change, and the
-        log mass in years of all. Visits in haste count as a week apart, as far as this goes."""
+        """Return the last visit's largest log Bayes factor of any change, and the log mass of all.
+
+        In years. Visits in haste count as a week apart, as far as this goes.
+        """
         at = int(np.searchsorted(self.years[self.beginnings], self.years[-1] - OF_ONE_VISIT_YEARS))
         if at == len(self.beginnings):
             return 0.0, -math.inf
@@ -165,7 +168,7 @@ class Evidence:
 
     @cached_property
     def _factors(self) -> FloatArray:
-        """Those of all directions (D, n + q, r), with zeros where one has fewer columns."""
+        """Return those of all directions (D, n + q, r), with zeros where one has fewer columns."""
         columns = max(each.factor.shape[1] for each in self.directions)
         return np.stack(
             [
@@ -184,7 +187,8 @@ class Evidence:
     def of_null(
         self, indices: Sequence[tuple[int, ...]], loadings: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """What `loadings` (rows, null) of the null's parameters are, given each of some changes.
+        """Return what `loadings` (rows, null) of the null's parameters are, given each of some
+        changes.
 
         Means and variances, both (changes, rows).
         """
@@ -210,12 +214,11 @@ def evidence_of(
     Changes that were `called` are part of the null, each with a level of its own from there on; a
     new one is looked for after the last of them.
     """
-    tests = len(years)
-    suffix, pulls = _suffix_moments(sums, years)
-    mean, covariance, log_null = _null(sums, years, layout, called, suffix, pulls)
+    null = _NullSums.of(sums, years, layout, called)
+    mean, covariance, log_null = null.fitted()
     log_null = log_null - _total(log_null)
     first = max([baseline_tests, *(each.first + 1 for each in called)])
-    beginnings = _chosen(np.arange(first, tests), most_beginnings)
+    beginnings = _chosen(np.arange(first, len(years)), most_beginnings)
     if not len(beginnings):
         nothing = np.zeros((0, len(log_null), 2, len(directions), len(SIZES)))
         empty = np.zeros((2, 0))
@@ -223,9 +226,7 @@ def evidence_of(
             layout, tuple(directions), years, beginnings, tuple(called),
             log_null, nothing, mean, covariance, (empty, empty, empty),
         )  # fmt: skip
-    seen = _change_information(
-        years, beginnings, layout, called, (suffix, pulls), (mean, covariance)
-    )
+    seen = null.seen(years, beginnings, mean, covariance)
     waited = np.log(np.maximum(_onset_interval_years(years, beginnings), 1e-12))
     log_mass = _log_factors(directions, seen) + log_null[None, :, None, None, None]
     log_mass = log_mass + waited[:, None, None, None, None]
@@ -239,104 +240,90 @@ def log_probability_of_called(
     sums: Sums, years: FloatArray, layout: Layout, called: Sequence[DetectedChange]
 ) -> float:
     """Of all tests, if nothing changed beyond what was `called`, over all scatters."""
-    suffix, pulls = _suffix_moments(sums, years)
-    return _total(_null(sums, years, layout, called, suffix, pulls)[2])
+    return _total(_NullSums.of(sums, years, layout, called).fitted()[2])
 
 
-def _change_information(
-    years: FloatArray,
-    beginnings: IntArray,
-    layout: Layout,
-    called: Sequence[DetectedChange],
-    sums: tuple[Sequence[FloatArray], Sequence[FloatArray]],
-    of_null: tuple[FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """J and v of a change at each beginning, and what the null's parameters have in common with it.
+@dataclass(frozen=True, eq=False)
+class _NullSums:
+    """Sums of tests (T, K, ...) by the columns of the null (p), called changes among them.
 
-    Each (2, beginnings, K, ...), a step's and a ramp's; `sums` are those of each power of the years
-    from each test on, `of_null` the mean and covariance without change.
+    `square` (p, p), `cross` (p,) and `constant` () are those of the null, `response` (p, c) those
+    of the null and a change, `own` (c, c) and `pull` (c,) those of a change. `prior` (p, p) is the
+    null's precision.
     """
-    null, part = layout.null, layout.change
-    mean, covariance = of_null
-    at = [each[beginnings] for each in sums[0]]
-    crossed = [each[beginnings] for each in sums[1]]
-    since = _ramp_from(years, beginnings)[:, None, None, None]
-    informations, cross, responses = [], [], []
-    for kind in (STEP, RAMP):
-        if kind == STEP:
-            own = at[0][:, :, part, part]
-            pull = crossed[0][:, :, part]
-            blocks = [at[0][:, :, null, part]]
-            for each in called:
-                blocks.append(at[0][:, :, part, part])
-                if each.is_ramp:
-                    blocks.append((at[1] - each.years * at[0])[:, :, part, part])
-        else:
-            own = (at[2] - 2 * since * at[1] + since**2 * at[0])[:, :, part, part]
-            pull = (crossed[1] - since[..., 0] * crossed[0])[:, :, part]
-            ramp = at[1] - since * at[0]
-            blocks = [ramp[:, :, null, part]]
-            for each in called:
-                blocks.append(ramp[:, :, part, part])
-                if each.is_ramp:
-                    both = at[2] - (since + each.years) * at[1] + since * each.years * at[0]
-                    blocks.append(both[:, :, part, part])
-        response = np.concatenate(blocks, axis=2)
-        moved = covariance @ response
-        informations.append(own - np.swapaxes(response, 2, 3) @ moved)
-        cross.append(pull - np.einsum("bkzc,kz->bkc", response, mean))
-        responses.append(response)
-    return np.array(informations), np.array(cross), np.array(responses)
 
+    square: FloatArray
+    cross: FloatArray
+    constant: FloatArray
+    response: FloatArray
+    own: FloatArray
+    pull: FloatArray
+    prior: FloatArray
 
-def _null(
-    sums: Sums,
-    years: FloatArray,
-    layout: Layout,
-    called: Sequence[DetectedChange],
-    suffix: Sequence[FloatArray],
-    pulls: Sequence[FloatArray],
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mean (K, p), covariance (K, p, p) and log evidence (K,) of no (further) change."""
-    null, part = layout.null, layout.change
-    total, pull = suffix[0][0], pulls[0][0]
-    pieces = [(each, power) for each in called for power in ((0, 1) if each.is_ramp else (0,))]
-    size = part.stop
-    count = len(null) + size * len(pieces)
-    joint, vector = np.zeros((len(total), count, count)), np.zeros((len(total), count))
-    prior = np.zeros((count, count))
-    joint[:, : len(null), : len(null)] = total[:, null][:, :, null]
-    vector[:, : len(null)] = pull[:, null]
-    prior[range(len(null)), range(len(null))] = layout.prior_sd[null] ** -2.0
-    for a, (told, power) in enumerate(pieces):
-        columns = slice(len(null) + a * size, len(null) + (a + 1) * size)
-        prior[columns, columns] = told.precision
-        lifted = _time_weighted_sum([each[told.first] for each in suffix], told.years, power)
-        joint[:, : len(null), columns] = lifted[:, null][:, :, part]
-        joint[:, columns, : len(null)] = np.swapaxes(lifted[:, null][:, :, part], 1, 2)
-        vector[:, columns] = _time_weighted_sum(
-            [each[told.first] for each in pulls], told.years, power
-        )[:, part]
-        for b, (other, other_power) in enumerate(pieces):
-            late = max(told.first, other.first)
-            moments = [each[late] for each in suffix]
-            shifted = _time_weighted_sum(moments, told.years, power)
-            if other_power:
-                further = _time_weighted_sum(moments[1:], told.years, power)
-                shifted = further - other.years * shifted
-            others = slice(len(null) + b * size, len(null) + (b + 1) * size)
-            joint[:, columns, others] = shifted[:, part, part]
-    joint += prior
-    covariance = np.linalg.inv(joint)
-    mean = np.einsum("kij,kj->ki", covariance, vector)
-    log_evidence = sums.constant.sum(axis=0) + (vector * mean).sum(axis=1) / 2
-    log_evidence += (np.linalg.slogdet(prior)[1] - np.linalg.slogdet(joint)[1]) / 2
-    return mean, covariance, np.asarray(log_evidence)
+    @classmethod
+    def of(
+        cls, sums: Sums, years: FloatArray, layout: Layout, called: Sequence[DetectedChange]
+    ) -> _NullSums:
+        part, every = layout.change, np.eye(sums.square.shape[-1])
+        columns = [np.tile(every[:, layout.null], (len(years), 1, 1))]
+        priors = [np.diag(layout.prior_sd[layout.null] ** -2.0)]
+        for each in called:
+            since = (np.arange(len(years)) >= each.first)[:, None, None] * every[:, part]
+            columns.append(since)
+            if each.is_ramp:
+                columns.append((years - each.years)[:, None, None] * since)
+            priors += [each.precision] * (2 if each.is_ramp else 1)
+        taken = np.concatenate(columns, axis=2)[:, None]
+        turned = np.swapaxes(taken, 2, 3)
+        weighted = turned @ sums.square
+        return cls(
+            weighted @ taken,
+            (turned @ sums.cross[..., None])[..., 0],
+            sums.constant,
+            weighted[..., part],
+            sums.square[..., part, part],
+            sums.cross[..., part],
+            np.asarray(scipy.linalg.block_diag(*priors)),
+        )
 
+    def fitted(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return mean (K, p), covariance (K, p, p), log evidence (K,) of no (further) change."""
+        joint, vector = self.square.sum(axis=0), self.cross.sum(axis=0)
+        joint = (joint + np.swapaxes(joint, 1, 2)) / 2 + self.prior
+        covariance = np.linalg.inv(joint)
+        mean = np.einsum("kij,kj->ki", covariance, vector)
+        log_evidence = self.constant.sum(axis=0) + (vector * mean).sum(axis=1) / 2
+        log_evidence += (np.linalg.slogdet(self.prior)[1] - np.linalg.slogdet(joint)[1]) / 2
+        return mean, covariance, np.asarray(log_evidence)
 
-def _time_weighted_sum(moments: Sequence[FloatArray], since: float, power: int) -> FloatArray:
-    """Return sums weighed by nothing, or by the years since, of `moments` in years from 0 on."""
-    return moments[1] - since * moments[0] if power else moments[0]
+    def seen(
+        self, years: FloatArray, beginnings: IntArray, mean: FloatArray, covariance: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return J and v of a change at each beginning, and what the null has in common with it.
+
+        Each (2, beginnings, K, ...), a step's and a ramp's, by mean and covariance of the null.
+        """
+        since = _ramp_from(years, beginnings)
+
+        def from_on(values: FloatArray, power: int) -> FloatArray:
+            """Return sums over the tests from each beginning on, by powers of a ramp's years."""
+            found = 0.0
+            for k in range(power + 1):
+                weight = years.reshape(-1, *[1] * (values.ndim - 1)) ** k
+                total = np.cumsum((values * weight)[::-1], axis=0)[::-1][beginnings]
+                by = math.comb(power, k) * (-since) ** (power - k)
+                found = found + by.reshape(-1, *[1] * (values.ndim - 1)) * total
+            return np.asarray(found)
+
+        parts = []
+        for kind in (STEP, RAMP):
+            response = from_on(self.response, kind)
+            its = from_on(self.own, 2 * kind)
+            information = its - np.swapaxes(response, 2, 3) @ (covariance @ response)
+            pull = from_on(self.pull, kind) - np.einsum("bkpc,kp->bkc", response, mean)
+            parts.append((information, pull, response))
+        information, pull, response = (np.array(each) for each in zip(*parts, strict=True))
+        return information, pull, response
 
 
 def _log_factors(
@@ -360,7 +347,7 @@ def _log_factors(
 
 
 def _ramp_from(years: FloatArray, beginnings: IntArray) -> FloatArray:
-    """When a ramp began (beginnings,): at the test before the first that shows it."""
+    """Return when a ramp began (beginnings,): at the test before the first that shows it."""
     return np.asarray(years[beginnings - 1])
 
 
@@ -378,23 +365,6 @@ def _chosen(beginnings: IntArray, most: int) -> IntArray:
     old = beginnings[:-recent]
     picked = np.unique(np.linspace(0, len(old) - 1, most - recent).round().astype(int))
     return np.concatenate([old[picked], beginnings[-recent:]])
-
-
-def _suffix_moments(sums: Sums, years: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Z'WZ and Z'Wy of all tests from each on, weighed by powers of the years."""
-    return (
-        [_suffix(_times(sums.square, years**k)) for k in range(3)],
-        [_suffix(_times(sums.cross, years**k)) for k in range(2)],
-    )
-
-
-def _suffix(values: FloatArray) -> FloatArray:
-    """Return sums over all tests from each on, along the first axis."""
-    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
-
-
-def _times(values: FloatArray, weight: FloatArray) -> FloatArray:
-    return np.asarray(values * weight.reshape(-1, *([1] * (values.ndim - 1))))
 
 
 def _total(log_mass: FloatArray) -> float:

@@ -75,7 +75,7 @@ class FrequencyReader:
         return {each.name: each.baseline for each in self.quantities}
 
     def reading(self, tests: Sequence[ModalTest], time: datetime) -> Reading:
-        """What `tests`, pooled, say: of each mode the median; their mean temperature and level."""
+        """Return the pooled `tests`: medians of each mode, their mean temperature and level."""
         n = len(self.modes)
         rows = [self._matched(test) for test in tests]
         values, variances = np.zeros(n), np.full(n, np.inf)
@@ -85,8 +85,8 @@ class FrequencyReader:
                 values[j] = float(np.median([value for value, _ in seen]))
                 # The median of m has pi / 2 times the variance of the mean, of up to two the same.
                 wider = math.pi / 2 if len(seen) > 2 else 1.0
-                own = wider * float(np.mean([sd**2 for _, sd in seen])) / len(seen)
-                variances[j] = own + _ALLOWANCE**2
+                its = wider * float(np.mean([sd**2 for _, sd in seen])) / len(seen)
+                variances[j] = its + _ALLOWANCE**2
         levels = [math.log(test.amplitude) for test in tests if test.amplitude > 0]
         return Reading(
             test=tests[-1].id,
@@ -112,8 +112,8 @@ class FrequencyReader:
         named = np.array([[key == mode for mode in self.modes] for key in seen])
         cost = cost + np.where(named, 0.0, _RENAMED)
         # A name that the baseline does not know may be none of its modes.
-        beside = np.where(named.any(axis=1), np.inf, _RENAMED + 0.5 * _RENAMED)
-        nothing = np.where(np.eye(len(seen), dtype=bool), beside[:, None], 1e6)
+        nearby = np.where(named.any(axis=1), np.inf, _RENAMED + 0.5 * _RENAMED)
+        nothing = np.where(np.eye(len(seen), dtype=bool), nearby[:, None], 1e6)
         nothing[~np.isfinite(nothing)] = 1e3
         at, to = scipy.optimize.linear_sum_assignment(np.hstack([cost, nothing]))
         sds = [sd for _, sd in seen.values()]
@@ -157,14 +157,14 @@ def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
             [1.0, _CREEP_PER_YEAR_SD],  # nothing stiffens with the excitation beside the modes
         ]
     )
-    own = np.vstack([np.zeros((n, n)), _STEP * np.eye(n)])
+    its = np.vstack([np.zeros((n, n)), _STEP * np.eye(n)])
     each = np.vstack([_STEP * np.eye(n), np.zeros((n, n))])
     directions = [
-        Direction("alike", own.sum(axis=1, keepdims=True), tuple(range(n)), math.log(_ALIKE_SHARE))
+        Direction("alike", its.sum(axis=1, keepdims=True), tuple(range(n)), math.log(_ALIKE_SHARE))
     ]
     if n > 1:
         directions += [
-            Direction("alone", own[:, [j]], (j,), math.log(_ALONE_SHARE / n)) for j in range(n)
+            Direction("alone", its[:, [j]], (j,), math.log(_ALONE_SHARE / n)) for j in range(n)
         ]
         directions.append(Direction(UNEXPLAINED, each, (), math.log(_EACH_SHARE)))
     wander = np.hstack([_WANDER * ones[:, None], _WANDER_OF_A_MODE * np.eye(n)])
@@ -184,7 +184,7 @@ def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
 
 @dataclass(frozen=True, eq=False)
 class FrequencySums(StateSums):
-    """What the tests of such a structure are to the evidence."""
+    """The sums of tests of such a structure."""
 
     def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
         return self._warmth(state), frost_of(state.temperature_c, self.options.thermometer_sd_k)
@@ -208,7 +208,7 @@ class FrequencyWatcher(Watcher):
 
     @cached_property
     def sums(self) -> StateSums:
-        """What the tests of a state are to the evidence."""
+        """Return what the tests of a state are to the evidence."""
         return FrequencySums(self.quantities, self.columns.modes, self.structure, self.options)
 
     def _creep(self, evidence: Evidence) -> None:

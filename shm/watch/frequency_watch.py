@@ -7,22 +7,19 @@ structure that is tested once a month waits for nothing. Tests between decide no
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 import numpy as np
 
-from shm.documents import dump, value_of
 from shm.errors import BadInput
-from shm.modes_document import modes_document, parse_modes
 from shm.values import NAN, WITHOUT_MODEL, Alert, Hanger, ModalTest, Posterior, Reading, WatchedTest
-from shm.watch.alert_state import AlertState
 from shm.watch.frequencies import POOLED_DAYS, FrequencyReader, FrequencyWatcher
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.options import WatchOptions
 from shm.watch.state_sums import WatchState
-from shm.watch.watching import DatedTest, Newest, after, options_of
+from shm.watch.watching import AlertState, DatedTest, Newest, after, options_of
 
 _POOL = timedelta(days=POOLED_DAYS)
 
@@ -64,14 +61,15 @@ class FrequencyWatch:
             hanger,
             options_of(hanger, len(self._pools), options),
         )
+        self.key = self._watcher.key
 
     def begin(self) -> _Watching:
         """After the baseline."""
         state, watch = self._watcher.begin([self._reading(each) for each in self._pools])
-        told = AlertState()
+        reported = AlertState()
         for found in watch.tests:
-            told, _ = after(told, found, self._hanger)
-        return _Watching(state, told, _Pool(), watch.tests[-1])
+            reported, _ = after(reported, found, self._hanger)
+        return _Watching(state, reported, _Pool(), watch.tests[-1])
 
     def after(self, now: _Watching, dated: DatedTest) -> tuple[_Watching, Alert | None]:
         """After one more test, and the alert that it calls for.
@@ -80,7 +78,7 @@ class FrequencyWatch:
         is older than another.
         """
         test, time = dated[0], max(dated[1], self._since)
-        state, told, pool, alert = now.state, now.told, now.pool, None
+        state, reported, pool, alert = now.state, now.told, now.pool, None
         if pool.tests and time < pool.tests[-1][1]:
             raise BadInput(
                 f"The watch was given test {test.id} after one that is later.",
@@ -96,48 +94,15 @@ class FrequencyWatch:
                 state, complete = self._watcher.after(state, self._reading(pool.tests))
                 if not is_looked_at:
                     found = complete
-                    told, alert = after(told, _as_of(found, test, time), self._hanger)
+                    reported, alert = after(reported, _as_of(found, test, time), self._hanger)
             pool = _Pool(((test, time),))
             if is_looked_at or not is_dense:
                 with_it, found = self._watcher.after(state, self._reading(pool.tests))
-                told, later = after(told, _as_of(found, test, time), self._hanger)
+                reported, later = after(reported, _as_of(found, test, time), self._hanger)
                 pool, alert = replace(pool, seen=1), later or alert
                 if found.change.called:  # once: the pool ends with the test that called it
                     state, pool = with_it, _Pool()
-        return _Watching(state, told, pool, _as_of(found, test, time)), alert
-
-    def keep(self, now: _Watching) -> bytes:
-        """From which `resume` goes on."""
-        beside = {
-            "told": now.told.to_text(),
-            "pool": json.loads(dump(modes_document([test for test, _ in now.pool.tests]))),
-            "times": [time for _, time in now.pool.tests],
-            "seen": now.pool.seen,
-            "last": asdict(now.last),
-        }
-        text = json.dumps(beside, default=datetime.isoformat)
-        return replace(now.state, told=text).to_bytes()
-
-    def resume(self, kept: bytes) -> _Watching | None:
-        """None where it was another watch that kept it."""
-        state = WatchState.from_bytes(kept)
-        if state.key != self._watcher.key:
-            return None
-        try:
-            beside = json.loads(state.told)
-            tests = parse_modes(beside["pool"]) if beside["times"] else ()
-            times = value_of(tuple[datetime, ...], beside["times"])
-            return _Watching(
-                state,
-                AlertState.from_text(beside["told"]),
-                _Pool(tuple(zip(tests, times, strict=True)), int(beside["seen"])),
-                value_of(WatchedTest, beside["last"]),
-            )
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise BadInput(
-                f"A kept state of the watch cannot be read: {error!r}.",
-                remedy="Drop it: the watch then goes over all tests again.",
-            ) from error
+        return _Watching(state, reported, pool, _as_of(found, test, time)), alert
 
     def _reading(self, pool: Sequence[DatedTest]) -> Reading:
         return self._reader.reading([test for test, _ in pool], pool[-1][1])
@@ -152,18 +117,20 @@ def watch_newest_frequencies(
 ) -> Newest | None:
     """Return what `watch_newest` says of a hanger, of a structure without a model."""
     watch = FrequencyWatch(baseline, hanger, options)
-    now = watch.begin() if kept is None else watch.resume(kept)
-    if now is None:
+    now = watch.begin() if kept is None else from_bytes(_Watching, kept)
+    if now.state.key != watch.key:
         return None
     alert = None
     for dated in later:
         now, alert = watch.after(now, dated)
-    return Newest(now.last, alert, watch.keep(now))
+    return Newest(now.last, alert, to_bytes(now))
 
 
 def measured_levels(tests: Sequence[ModalTest], seed: int) -> Posterior:
-    """What the store keeps of tests of a structure without a model in place of a posterior: the
-    median frequency (Hz) of each mode, as two equal draws. Nothing is sampled."""
+    """Return what stands for a posterior of a structure without a model.
+
+    The median frequency (Hz) of each mode, as two equal draws. Nothing is sampled.
+    """
     levels = FrequencyReader(tests).levels_hz
     values = np.array([list(levels.values())] * 2)
     return Posterior(
@@ -190,7 +157,7 @@ def measured_levels(tests: Sequence[ModalTest], seed: int) -> Posterior:
 
 @dataclass(frozen=True, eq=False)
 class WatchedFrequencies:
-    """What the watch says after each test since the baseline's, and the alerts it calls for."""
+    """Results of the watch after each test since the baseline's, and the alerts it calls for."""
 
     tests: tuple[WatchedTest, ...]
     alerts: tuple[Alert, ...]

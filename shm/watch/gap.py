@@ -28,7 +28,7 @@ def gap_percent(posterior: Posterior) -> float:
 
 
 def has_grown(before_percent: float, now_percent: float) -> bool:
-    """Whether a gap is more than three times what it was, and more than 0.1 %.
+    """Return True if a gap is more than three times what it was, and more than 0.1 %.
 
     Two gaps of one cause with eight degrees of freedom each, twelve modes less what is fitted, lie
     apart by a factor of three once in 370 tests, by two once in 30 (F distribution). Below 0.1 % a

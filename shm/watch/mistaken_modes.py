@@ -1,4 +1,4 @@
-"""Which modes of a test are mistaken: another order, the other plane's, a machine's tone.
+"""Find mistaken modes of a test: another order, the other plane's, a machine's tone.
 
 Log frequencies lie about a linear function of a few coordinates, which have a normal prior, each
 with an error; or, seldom, anywhere. For a given set of mistaken modes all is normal, and its
@@ -43,7 +43,7 @@ def _log_good(off: FloatArray, variance: FloatArray | float) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class SoundModes:
-    """Which modes (n,) are likelier good than mistaken, and the coordinates (q,) by these.
+    """The modes (n,) that are more probably good than mistaken, and the coordinates (q,) by these.
 
     `log_evidence` is that of the whole test over all sets that were compared. Where the test
     `is_misfit`, it is likelier that its modes fit no coordinates, all of them, than that some are
@@ -118,14 +118,14 @@ class _Problem:
 
     def scores(self, sets: BoolArray) -> FloatArray:
         """Return the log evidence (sets,) of sets of mistaken modes, less that of all modes."""
-        kept = (~sets).astype(float)
-        matrix = np.tensordot(kept, self.information, 1) + np.diag(self.precision)
-        pull = kept @ self.pull
+        chosen = (~sets).astype(float)
+        matrix = np.tensordot(chosen, self.information, 1) + np.diag(self.precision)
+        pull = chosen @ self.pull
         lower = np.linalg.cholesky(matrix)
         whitened = np.linalg.solve(lower, pull[:, :, None])[:, :, 0]
         log_det = 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
         gain = (whitened**2).sum(axis=1) - log_det + np.log(self.precision).sum()
-        return np.asarray(kept @ self.log + gain / 2)
+        return np.asarray(chosen @ self.log + gain / 2)
 
     def most_probable(self, mistaken: BoolArray) -> FloatArray:
         """Return the coordinates (q,), `mistaken` modes (n,) left out."""

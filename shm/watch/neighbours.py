@@ -1,4 +1,4 @@
-"""Which hangers of a bridge gained and lost tension together, and what explains it best.
+"""Find the hangers of a bridge that gained and lost tension together, and the best explanation.
 
 The tension shifts y (n,) of the compared hangers are y = x + e, e ~ N(0, D): each hanger's own
 variance and a small part common to all. An explanation is a set of hypotheses x ~ N(0, U U') with a
@@ -45,7 +45,7 @@ _CHANCE, _CHANCE_WEIGHT = np.polynomial.legendre.leggauss(16)
 
 @dataclass(frozen=True)
 class HangerShift:
-    """How far a hanger's tension lies from its baseline at its latest test, by itself.
+    """The shift of a hanger's tension from its baseline at its latest test, individually.
 
     `place` counts the hangers along the bridge, those without a test too; two rows of hangers stand
     in one count if three places or more are left free between them. `temperature_change_k` is that
@@ -64,7 +64,7 @@ class HangerShift:
 
 @dataclass(frozen=True)
 class NeighbourOptions:
-    """What is taken for granted before any data.
+    """Priors and limits of the pattern over a bridge.
 
     - `prior`: most looks at a bridge find nothing; a hanger that slackens is what one watches for;
       one that gains was tightened, and somebody would know; faults of a whole campaign and of
@@ -160,7 +160,7 @@ class HangerRow:
 
 @dataclass(frozen=True)
 class SumKept:
-    """Whether the tensions of `hangers` add to what they did.
+    """The probability that the tensions of `hangers` add to what they did.
 
     `probability` is that of the explanations which keep the sum. `complete` is false where a hanger
     among them has no shift, or where the bridge's end may have taken a share.
@@ -185,7 +185,7 @@ class NotCompared:
 
 @dataclass(frozen=True)
 class BridgePattern:
-    """What moved over the bridge: five explanations, the likeliest first, and each hanger.
+    """The changes over a bridge: five explanations, the most probable first, and each hanger.
 
     `suspects` are the likeliest hangers to have shed or gained load. `alike_fraction` and its sd
     are the common shift if all moved alike, and `alike_cause` what that would be put down to.
@@ -373,11 +373,11 @@ def independent(bridge: Bridge, options: NeighbourOptions) -> tuple[float, Float
     uniform between 0 and 1, so that any number of hangers is as likely as another. Given it and the
     common part of the noise the hangers are independent: two quadratures.
     """
-    own, n = bridge.sd_n**2, len(bridge.shift_n)
+    its, n = bridge.sd_n**2, len(bridge.shift_n)
     left = bridge.shift_n - _COMMON[:, None] * bridge.common_sd_n
     moves = (np.array(options.sizes_fraction)[:, None] * bridge.baseline_n) ** 2
-    still = _log_normal(left, own)
-    by_size = _log_normal(left[:, None], own + moves) - np.log(len(moves))
+    still = _log_normal(left, its)
+    by_size = _log_normal(left[:, None], its + moves) - np.log(len(moves))
     moved = scipy.special.logsumexp(by_size, axis=1)
     chance = ((1 + _CHANCE) / 2)[:, None, None]
     no, yes = np.log1p(-chance) + still, np.log(chance) + moved  # (chances, commons, n)
@@ -392,9 +392,9 @@ def independent(bridge: Bridge, options: NeighbourOptions) -> tuple[float, Float
         "qc,qcn->cn", np.exp(weight + either.sum(axis=2) - log_some), np.exp(yes - either)
     )
     of_size = moving[:, None] * np.exp(by_size - moved[:, None])
-    pull = moves / (moves + own)
+    pull = moves / (moves + its)
     least = options.negligible_fraction * bridge.baseline_n
-    ways = _beyond(left[:, None] * pull, np.sqrt(pull * own), least)
+    ways = _beyond(left[:, None] * pull, np.sqrt(pull * its), least)
     gained, lost = (np.einsum("csn,csn->n", of_size, way) for way in ways)
     return float(log_some - np.log(n / (n + 1))), gained, lost
 
@@ -418,12 +418,12 @@ def common_causes(shifts: Sequence[HangerShift]) -> list[CommonCause]:
     A rate that is off by e moves frequencies by e, tensions by 2e.
     """
     kelvin = np.array([each.temperature_change_k for each in shifts])
-    swing = float(np.sqrt(np.mean(kelvin**2)))  # NaN, and so in no range, where one is unknown
+    variation = float(np.sqrt(np.mean(kelvin**2)))  # NaN, and so in no range, where one is unknown
     name, clocks = "a temperature or a clock", "compare the loggers' clocks and sampling rates"
-    if swing < _SWING_K:
+    if variation < _SWING_K:
         name = "a clock or a load on the whole deck"
         remedy = f"the temperatures hardly changed; {clocks}, and ask for new surfacing or works"
-    elif kelvin.std() <= _UNLIKE * swing:
+    elif kelvin.std() <= _UNLIKE * variation:
         remedy = (
             f"all tests lie about {kelvin.mean():+.0f} K from their baselines; "
             f"check the temperature readings, and {clocks}"
@@ -431,7 +431,7 @@ def common_causes(shifts: Sequence[HangerShift]) -> list[CommonCause]:
     else:
         remedy = f"{clocks}, and the temperatures of the tests"
     causes = [CommonCause(np.ones(len(shifts)), name, remedy)]
-    if swing >= _SWING_K and kelvin.std() > _UNLIKE * swing:
+    if variation >= _SWING_K and kelvin.std() > _UNLIKE * variation:
         remedy = "the shifts go with the temperatures of the tests; check those readings"
         causes.append(CommonCause(kelvin / np.abs(kelvin).max(), "the temperature", remedy))
     return causes
@@ -486,7 +486,7 @@ def _at_one_scale(
     bridge: Bridge, causes: Sequence[CommonCause], options: NeighbourOptions
 ) -> list[Hypotheses]:
     n, prior = len(bridge.shift_n), options.prior
-    nobody, each = np.empty((1, 0), np.int64), np.arange(n)[:, None]
+    no_member, each = np.empty((1, 0), np.int64), np.arange(n)[:, None]
     least = options.negligible_fraction * bridge.baseline_n
 
     def normal(
@@ -503,7 +503,7 @@ def _at_one_scale(
         sizes = options.sizes_fraction
         return np.concatenate([size * factors for size in sizes]), np.tile(members, (len(sizes), 1))
 
-    alike = np.array([cause.fractions * bridge.baseline_n for cause in causes])[:, :, None]
+    similar = np.array([cause.fractions * bridge.baseline_n for cause in causes])[:, :, None]
     shed, of_two = shed_factors(bridge, options), options.two_hangers
     one = normal(
         "load redistribution",
@@ -516,11 +516,11 @@ def _at_one_scale(
     both = np.concatenate([shed[pairs[:, 0]], shed[pairs[:, 1]]], axis=2)
     share = 2 * len(pairs) / (n * (n - 1))  # of all pairs
     return [
-        normal("no change", prior["no change"], np.zeros((1, n, 1)), nobody),
+        normal("no change", prior["no change"], np.zeros((1, n, 1)), no_member),
         normal(
             "common shift",
             prior["common shift"],
-            *sized(alike, np.arange(len(causes))[:, None]),
+            *sized(similar, np.arange(len(causes))[:, None]),
         ),
         one,
         normal("load gain", prior["load gain"], *sized(shed, each), sign=1),
@@ -626,16 +626,16 @@ def _common_shift(
     shifts: Sequence[HangerShift], found: Sequence[Hypotheses], causes: Sequence[CommonCause]
 ) -> tuple[float, float, CommonCause]:
     """The mean fraction of the hangers that the likeliest common cause moves, its sd, the cause."""
-    alike = next(each for each in found if each.name == "common shift")
-    cause = alike.members[:, 0]
-    best = int(np.bincount(cause, np.exp(alike.log_weight - alike.log_weight.max())).argmax())
+    similar = next(each for each in found if each.name == "common shift")
+    cause = similar.members[:, 0]
+    best = int(np.bincount(cause, np.exp(similar.log_weight - similar.log_weight.max())).argmax())
     rows, touched = cause == best, causes[best].fractions != 0
     baseline = np.array([each.baseline_n for each in shifts])
     mean, sd = _mixed(
-        alike.log_weight[rows],
+        similar.log_weight[rows],
         *(
             (v[rows] / baseline)[:, touched].mean(axis=1, keepdims=True)
-            for v in (alike.mean_n, alike.sd_n)
+            for v in (similar.mean_n, similar.sd_n)
         ),
     )
     return float(mean[0]), float(sd[0]), causes[best]

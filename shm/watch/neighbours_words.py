@@ -55,14 +55,14 @@ def _each_by_itself(pattern: BridgePattern) -> str:
 
 
 def _moved(pattern: BridgePattern) -> str:
-    """Who shed or gained load, how much of it the neighbours took up or gave, and any doubt."""
+    """Say who shed or gained load, how much of it the neighbours took up or gave, and any doubt."""
     name = pattern.explanations[0].name
     suspects = [each for each in pattern.suspects if each.name == name]
     movers = [row for hanger in suspects[0].hangers for row in pattern.rows if row.hanger == hanger]
     lost, one = name == "load redistribution", len(movers) == 1
     whose = f"{_hangers(suspects[0].hangers).lower()} to {'its' if one else 'their'}"
-    said = [f"Load has moved from {whose} neighbours."] if lost else []
-    said += [f"Hanger {row.hanger} {_way(row)}." for row in movers]
+    words = [f"Load has moved from {whose} neighbours."] if lost else []
+    words += [f"Hanger {row.hanger} {_way(row)}." for row in movers]
     near = [
         row
         for row in pattern.rows
@@ -76,31 +76,31 @@ def _moved(pattern: BridgePattern) -> str:
         taken = sum(row.shift_n for row in near)
         half = sum((row.high_n - row.shift_n) ** 2 for row in near) ** 0.5
         names, did = _hangers([row.hanger for row in near]), "took up" if lost else "gave up"
-        said.append(
+        words.append(
             f"{names} beside {'it' if one else 'them'} {did} {_force(abs(taken), half)} of it."
         )
     else:
-        said.append(f"{'Its' if one else 'Their'} neighbours have no test to compare.")
+        words.append(f"{'Its' if one else 'Their'} neighbours have no test to compare.")
     if len(suspects) > 1 and suspects[0].probability <= _SURE_WHICH * pattern.probability(name):
-        said.append(
+        words.append(
             f"It may also be {_hangers(suspects[1].hangers).lower()} (probability "
             f"{suspects[1].probability:.2f})."
         )
-    return " ".join(said)
+    return " ".join(words)
 
 
 def remarks_of(pattern: BridgePattern) -> tuple[str, ...]:
     """Return what qualifies the sentence: the sum, and who was not compared."""
-    kept, hangers = pattern.sum_kept, pattern.sum_kept.hangers
+    chosen, hangers = pattern.sum_kept, pattern.sum_kept.hangers
     places = [row.place for row in pattern.rows if row.hanger in hangers]
     group = _hangers(hangers).lower()
     if len(hangers) == len(pattern.rows):
         group = "all hangers compared"
     elif len(hangers) > 2 and places[-1] - places[0] == len(places) - 1:
         group = f"hangers {hangers[0]} to {hangers[-1]}"
-    change = _force(kept.sum_n, NINETY_PERCENT * kept.sum_sd_n, "+")
+    change = _force(chosen.sum_n, NINETY_PERCENT * chosen.sum_sd_n, "+")
     remarks = [f"The sum of the tensions of {group} changed by {change}."]
-    if not kept.complete:
+    if not chosen.complete:
         remarks.append("A hanger without a test, or the bridge's end, may carry a part of it.")
     if pattern.not_compared:
         names = _hangers([each.hanger for each in pattern.not_compared])

@@ -1,4 +1,4 @@
-"""What the watch takes for granted before any test, and what conditions of tests leave open."""
+"""Options of the watch, and what the temperatures of tests leave open."""
 
 from __future__ import annotations
 

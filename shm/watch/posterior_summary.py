@@ -1,4 +1,4 @@
-"""What the evidence says after a test: what changed, since when, and how far each quantity is.
+"""Summary of the evidence after a test: the change, its onset, and the shift of each quantity.
 
 Shifts in the units that people read, of mixtures of normal distributions in the coordinate.
 """
@@ -28,8 +28,7 @@ from shm.values import (
 from shm.values.drift import threshold_of
 from shm.watch.change_point import LOG_SHARES, SIZES, STEP, Evidence
 from shm.watch.options import DAYS_PER_YEAR, WatchOptions
-from shm.watch.quantities import value_at
-from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
+from shm.watch.quantities import coordinate_of, shift_of, value_at
 
 _ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
 _TAIL = 0.05  # 90 % lie between
@@ -37,14 +36,20 @@ _DIGITS = 3  # probabilities that read alike are ordered by tension first
 _TRADED = 0.25  # judgement: of what an end does, that looks like another tension
 _BEYOND_DOUBT = 1e4  # judgement: times what a detection takes
 _MOST = 24  # technical: changes that a mixture is made of, the likeliest
+# Technical: exact for polynomials of degree 13.
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
+_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+_NEGLIGIBLE = 1e-7  # technical: less than the least probability that is told
 
 
 @dataclass(frozen=True, eq=False)
 class SummaryContext:
-    """What all tests of one hanger share; `start` is the time of the first reading, and
-    `baseline_years` from it the mean of the baseline's. `effects` (r, n + q) are what a change does
-    to what owners look at: of each plane the first frequency, then the mean; `by_mode` (n, n + q)
-    to every mode."""
+    """The facts that all tests of one hanger share.
+
+    `start` is the time of the first reading, `baseline_years` from it the mean of the baseline's.
+    `effects` (r, n + q) are what a change does to what owners look at: of each plane the first
+    frequency, then the mean; `by_mode` (n, n + q) to every mode.
+    """
 
     quantities: tuple[WatchedQuantity, ...]
     hanger: Hanger
@@ -63,14 +68,14 @@ class SummaryContext:
 
         A share of each, as the baseline's own values are open; some of what ends do may be
         tension's."""
-        own = means * [each.scale_sd for each in self.quantities]
+        its = means * [each.scale_sd for each in self.quantities]
         is_tension = np.array([each.name == TENSION for each in self.quantities])
         if is_tension.any() and not is_tension.all():
             of_ends = np.abs(means[:, ~is_tension]).sum(axis=1, keepdims=True)
             first = len(self.effects.T) - len(self.quantities)
             of_tension = self.effects[1::2, first:][:, is_tension].mean()
-            own[:, is_tension] = np.hypot(own[:, is_tension], _TRADED * of_ends / of_tension)
-        return np.asarray(own)
+            its[:, is_tension] = np.hypot(its[:, is_tension], _TRADED * of_ends / of_tension)
+        return np.asarray(its)
 
 
 def probability_of_change(evidence: Evidence, options: WatchOptions) -> float:
@@ -196,7 +201,7 @@ def _as_changed(
     weights, changes = _leading(evidence, part)
     found = evidence.changes_at(changes)
     n = evidence.layout.n
-    together, alike = _find_company(evidence, part, names, names[j])
+    together, similar = _find_company(evidence, part, names, names[j])
     if j < len(subject.quantities):
         quantity = subject.quantities[j]
         means = np.array([each[0][n:] for each in found])
@@ -209,15 +214,15 @@ def _as_changed(
         square = np.array([float((each[1][:n].mean(axis=0) ** 2).sum()) for each in found])
         mean_all = float(weights @ means)
         spread = float(weights @ (square + (means - mean_all) ** 2))
-        shift, end, plane = Shift(mean_all, math.sqrt(max(spread, 0.0))), None, None
+        shift, end, plane = (mean_all, math.sqrt(max(spread, 0.0))), None, None
     return Moved(
         quantity=names[j],
         probability=probability,
-        shift_mean=shift.mean,
-        shift_sd=shift.sd,
+        shift_mean=shift[0],
+        shift_sd=shift[1],
         end=end,
         plane=plane,
-        alike=alike,
+        alike=similar,
         together=together,
     )
 
@@ -244,7 +249,7 @@ def _leading(
 def _find_company(
     evidence: Evidence, part: FloatArray, names: Sequence[str], itself: str
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What moves with `itself` in the likeliest direction of `part`; what does as well without.
+    """Return what moves with `itself` in the best direction of `part`, and what fits without it.
 
     The latter are what directions without it have whose evidence is as good, those aside that only
     add to another such.
@@ -257,16 +262,16 @@ def _find_company(
     joined: dict[frozenset[str], float] = {}
     for each, log_mass in zip(sets, mass.tolist(), strict=True):
         joined[each] = float(np.logaddexp(joined.get(each, -math.inf), log_mass))
-    likeliest = sets[int(np.argmax(np.where(part, mass, -np.inf)))]
+    best = sets[int(np.argmax(np.where(part, mass, -np.inf)))]
     close = [
         each
         for each, log_mass in joined.items()
-        if joined[likeliest] - log_mass < _ALIKE_NATS and not each & likeliest
+        if joined[best] - log_mass < _ALIKE_NATS and not each & best
     ]
     fewest = [each for each in close if not any(other < each for other in close)]
-    own = {n for j, n in enumerate(names) if n in likeliest}
-    chosen = set().union(*fewest) - own
-    together = tuple(name for name in names if name in own and name != itself)
+    its = {n for j, n in enumerate(names) if n in best}
+    chosen = set().union(*fewest) - its
+    together = tuple(name for name in names if name in its and name != itself)
     return together, tuple(name for name in names if name in chosen)
 
 
@@ -307,17 +312,17 @@ def summarize_drifts(
     all_sds = np.hypot(
         np.concatenate([sds_of_null.reshape(-1, q), sds]), subject.model_uncertainty(all_means)
     )
-    told = np.ones(len(all_weights))
+    reported = np.ones(len(all_weights))
     if len(changes) and not evidence.called:
-        told[len(none) :] = _materials(subject, evidence, changes)
+        reported[len(none) :] = _materials(subject, evidence, changes)
     found = []
     for j, quantity in enumerate(subject.quantities):
         chosen = (all_weights, all_means, all_sds)
         if not evidence.called and len(evidence.beginnings):
             part = np.array([j in each.members for each in evidence.directions])
-            own = _shifts(evidence, part, loadings, alone=len(evidence.beginnings) == 1)
-            if len(own[0]):
-                chosen = (*own[:2], np.hypot(own[2], subject.model_uncertainty(own[1])))
+            its = _shifts(evidence, part, loadings, alone=len(evidence.beginnings) == 1)
+            if len(its[0]):
+                chosen = (*its[:2], np.hypot(its[2], subject.model_uncertainty(its[1])))
         elif not evidence.called and not is_baseline:
             sd = quantity.step_sd * math.sqrt(float(np.exp(LOG_SHARES) @ SIZES**2))
             chosen = np.ones(1), np.zeros((1, q)), np.full((1, q), sd)
@@ -326,28 +331,29 @@ def summarize_drifts(
         threshold = threshold_of(quantity.name, subject.hanger)
         chance = beyond(
             quantity,
-            (told * all_weights)[moving],
+            (reported * all_weights)[moving],
             all_means[moving, j],
             all_sds[moving, j],
             threshold,
             subject.options.least_frequency_shift,
         )
-        found.append(_drift(subject, quantity, reading, shift, threshold, chance))
+        at = reading.test, reading.time
+        found.append(drift_of(quantity, subject.hanger, at, shift, chance))
     return tuple(found)
 
 
 def _of_null(evidence: Evidence, subject: SummaryContext) -> FloatArray:
     """Loadings (q, null) of slow creep and called changes on the shift of each quantity by now."""
     layout, now = evidence.layout, float(evidence.years[-1])
-    own = np.hstack([np.zeros((layout.q, layout.n)), np.eye(layout.q)])
+    its = np.hstack([np.zeros((layout.q, layout.n)), np.eye(layout.q)])
     creep = np.zeros((layout.q, len(layout.null)))
     creeping = [is_ratio(each.name) for each in subject.quantities]
     creep[creeping, -1] = now - subject.baseline_years
     blocks = [creep]
     for each in evidence.called:
-        blocks.append(own)
+        blocks.append(its)
         if each.is_ramp:
-            blocks.append((now - each.years) * own)
+            blocks.append((now - each.years) * its)
     return np.hstack(blocks)
 
 
@@ -371,24 +377,74 @@ def _shifts(
     return weights, means, np.sqrt(np.maximum(variance, 0)), changes
 
 
-def _drift(
-    subject: SummaryContext,
+def drift_of(
     quantity: WatchedQuantity,
-    reading: Reading,
-    shift: Shift,
-    threshold: float,
+    hanger: Hanger,
+    at: tuple[str, datetime],
+    shift: tuple[float, float],
     probability: float,
 ) -> Drift:
-    at_rest = value_at(quantity, 0.0)
+    """Return a shift (mean, sd) by a test, its name and time, with that of being beyond."""
+    still, mean = value_at(quantity, 0.0), shift[0]
     return Drift(
-        hanger=subject.hanger.id,
-        test=reading.test,
-        time=reading.time,
+        hanger=hanger.id,
+        test=at[0],
+        time=at[1],
         quantity=quantity.name,
         baseline=quantity.baseline,
-        value=at_rest * (1 + shift.mean) if is_ratio(quantity.name) else at_rest + shift.mean,
-        shift_mean=shift.mean,
-        shift_sd=shift.sd,
-        threshold=threshold,
+        value=still * (1 + mean) if is_ratio(quantity.name) else still + mean,
+        shift_mean=mean,
+        shift_sd=shift[1],
+        threshold=threshold_of(quantity.name, hanger),
         probability=probability,
     )
+
+
+def shift_of_mixture(
+    quantity: WatchedQuantity, weights: FloatArray, mean: FloatArray, sd: FloatArray
+) -> tuple[float, float]:
+    """Return mean and sd of a shift: of normal distributions (B,) in the coordinate.
+
+    There is none with what `weights` leave. By Gauss-Hermite quadrature of seven nodes in each.
+    """
+    chosen = weights > _NEGLIGIBLE
+    weights = weights[chosen]
+    mean, sd = mean[chosen], sd[chosen]
+    shifts = shift_of(quantity, mean[:, None] + sd[:, None] * _NODES)
+    first = float(weights @ shifts @ _WEIGHTS)
+    second = float(weights @ (shifts - first) ** 2 @ _WEIGHTS)
+    second += (1 - float(weights.sum())) * first**2
+    return first, math.sqrt(max(second, 0.0))
+
+
+def beyond(
+    quantity: WatchedQuantity,
+    weights: FloatArray,
+    mean: FloatArray,
+    sd: FloatArray,
+    threshold: float,
+    least: float = 0.0,
+) -> float:
+    """Return the probability of a shift beyond a threshold, the likelier way, by the mixture.
+
+    Decades of an end that is as good as clamped move nothing: what moves the frequencies' mean by
+    less than `least`, a spring's coordinate, is not beyond.
+    """
+    chosen = weights > _NEGLIGIBLE
+    weights, mean = weights[chosen], mean[chosen]
+    sd = np.maximum(sd[chosen], 1e-12)
+    low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
+    if not is_ratio(quantity.name):
+        low, high = min(low, -least), max(high, least)
+    down = float(weights @ scipy.special.ndtr((low - mean) / sd))
+    up = float(weights @ scipy.special.ndtr((mean - high) / sd))
+    return min(max(down, up), 1.0)
+
+
+def _coordinate(quantity: WatchedQuantity, shift: float) -> float:
+    """Return the coordinate of a shift; infinite where the quantity's table ends before it."""
+    is_fraction = is_ratio(quantity.name)
+    value = quantity.baseline * (1 + shift) if is_fraction else quantity.baseline + shift
+    if not min(quantity.values) < value < max(quantity.values):
+        return math.copysign(math.inf, shift)
+    return coordinate_of(quantity, value)

@@ -1,4 +1,4 @@
-"""What is watched of a hanger, and the coordinates in which frequencies follow it nearly linearly.
+"""Watched quantities of a hanger, and coordinates that frequencies follow nearly linearly.
 
 Base point of all is the baseline's most probable parameter set: the parameters of a posterior go
 together along curved valleys, in which a mean of each by itself need not lie. The tension that
@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -74,7 +73,7 @@ _PLANES_OF_BEAMS: dict[str, Plane] = {
 def watched_quantities(
     baseline: Posterior, hanger: Hanger, modes: Sequence[MeasuredMode]
 ) -> tuple[WatchedQuantity, ...]:
-    """The tension, then the stiffness of each end of the baseline's class that `modes` can see.
+    """Return the tension, then the stiffness of each end of the baseline's class that modes see.
 
     A stiffness's coordinate is the change of the mean log frequency over `modes` as it goes through
     its prior range, all else at the base point. Left out are those whose whole range moves no
@@ -83,22 +82,17 @@ def watched_quantities(
     """
     model = class_of(baseline, hanger)
     base = base_point(baseline, model)
-    responses = _responses(model, base, _held(model, base, modes), modes)
-    springs = (_spring(each, baseline, model) for each in responses if each.largest > _INVISIBLE)
-    return (_tension(baseline, model, base), *springs)
-
-
-def _held(model: Model, base: FloatArray, modes: Sequence[MeasuredMode]) -> list[tuple[str, ...]]:
-    """Return the springs of the class, those together that can be exchanged."""
-    pairs = exchangeable(model, base, modes)
+    pairs = _exchangeable(model, base, modes)
     paired = {name for pair in pairs for name in pair}
-    return [*pairs, *((name,) for name in _springs(model) if name not in paired)]
+    held = [*pairs, *((name,) for name in _springs(model) if name not in paired)] if modes else []
+    springs = (_spring(baseline, model, base, names, modes) for names in held)
+    return (_tension(baseline, model, base), *(each for each in springs if each))
 
 
-def exchangeable(
+def _exchangeable(
     model: Model, base: FloatArray, modes: Sequence[MeasuredMode]
 ) -> list[tuple[str, str]]:
-    """Pairs of springs of which the frequencies of `modes` do not say which is at which end.
+    """Return pairs of springs of which the frequencies do not say which is at which end.
 
     Those that the class declares, although its own weight tells them apart by less than absolute
     frequencies are known. Of an adopted class those of its baseline, where with a decade between
@@ -107,21 +101,18 @@ def exchangeable(
     """
     if not modes or not is_adopted(model.name):
         return list(model.swaps) if modes else []
-    pairs = MODELS[_baseline_class(model)].swaps
-    return [pair for pair in pairs if _is_exchangeable(model, base, modes, pair)]
-
-
-def _is_exchangeable(
-    model: Model, base: FloatArray, modes: Sequence[MeasuredMode], pair: tuple[str, str]
-) -> bool:
-    columns = [model.parameter_names.index(name) for name in pair]
-    middle = (model.prior.lower[columns] + model.prior.upper[columns]).mean() / 2
-    # Clamped ends always look alike: it is as they come loose that they are told apart.
-    softer = min(base[columns].min(), middle - 1)
-    theta = np.tile(base, (2, 1))
-    theta[:, columns] = [[softer, softer + 1], [softer + 1, softer]]
-    one, other = log_frequencies(model, theta, modes)
-    return bool(np.abs(one - other).max() < _INVISIBLE)
+    pairs = []
+    for pair in MODELS[_baseline_class(model)].swaps:
+        columns = [model.parameter_names.index(name) for name in pair]
+        middle = (model.prior.lower[columns] + model.prior.upper[columns]).mean() / 2
+        # Clamped ends always look alike: it is as they come loose that they are told apart.
+        softer = min(base[columns].min(), middle - 1)
+        theta = np.tile(base, (2, 1))
+        theta[:, columns] = [[softer, softer + 1], [softer + 1, softer]]
+        one, other = log_frequencies(model, theta, modes)
+        if np.abs(one - other).max() < _INVISIBLE:
+            pairs.append(pair)
+    return pairs
 
 
 def base_point(baseline: Posterior, model: Model) -> FloatArray:
@@ -200,47 +191,6 @@ def _tension(baseline: Posterior, model: Model, base: FloatArray) -> WatchedQuan
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Response:
-    """How log frequencies go with springs that move together, of the parameters `names`.
-
-    `log10_k` (n,) is their common stiffness, ascending, `mean` (n,) that of the log frequencies, 0
-    at `base`. `largest` is what the whole range moves that frequency by which it moves most.
-    """
-
-    names: tuple[str, ...]
-    base: float
-    log10_k: FloatArray
-    mean: FloatArray
-    largest: float
-    plane: Plane | None
-
-
-def common_stiffness(log10_k: FloatArray) -> FloatArray:
-    """log10 (n,) of the stiffness of springs alike that give as much as those of (n, springs)."""
-    return np.asarray(-np.log10(np.mean(10.0**-log10_k, axis=1)))
-
-
-def _responses(
-    model: Model, base: FloatArray, held: Sequence[tuple[str, ...]], modes: Sequence[MeasuredMode]
-) -> list[_Response]:
-    """How the mean log frequency of `modes` goes with each of the springs `held` together."""
-    if not held or not modes:
-        return []
-    columns = [[model.parameter_names.index(name) for name in names] for names in held]
-    centres = [float(common_stiffness(base[None, each])[0]) for each in columns]
-    grids = [_grid(model, *each) for each in zip(columns, centres, strict=True)]
-    theta = np.vstack(
-        [
-            moved(model, base, each, grid - centre)
-            for each, grid, centre in zip(columns, grids, centres, strict=True)
-        ]
-    )
-    starts = np.cumsum([len(grid) for grid in grids])[:-1]
-    parts = np.split(log_frequencies(model, theta, modes), starts)
-    return [_response(model, *each) for each in zip(held, centres, grids, parts, strict=True)]
-
-
 def moved(
     model: Model, base: FloatArray, columns: Sequence[int], decades: FloatArray
 ) -> FloatArray:
@@ -259,43 +209,10 @@ def log_frequencies(model: Model, theta: FloatArray, modes: Sequence[MeasuredMod
     return np.asarray(np.log(frequencies[:, planes, orders]))
 
 
-def _response(
-    model: Model,
-    names: tuple[str, ...],
-    base: float,
-    log10_k: FloatArray,
-    log_frequency: FloatArray,
-) -> _Response:
-    """Of log frequencies (n, modes) at `log10_k` (n,), the n made more where the curve bends."""
-    at = int(np.searchsorted(log10_k, base))
-    mean = (log_frequency - log_frequency[at]).mean(axis=1)
-    fine, refined = _refined(log10_k, np.maximum.accumulate(mean))
-    return _Response(
-        names=names,
-        base=base,
-        log10_k=fine,
-        mean=refined - refined[at * _FINER],
-        largest=float(np.ptp(log_frequency, axis=0).max()),
-        plane=(_PLANES | _PLANES_OF_BEAMS if _is_beam(model) else _PLANES).get(_bare(names[0])),
-    )
-
-
-def _refined(log10_k: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """More nodes, by a curve that rises where the model's do.
-
-    Users go straight from node to node. Towards the clamped end the response falls tenfold in a
-    decade: at 40 nodes a decade the slope is right within 3 %, at two within 70 %.
-    """
-    share = np.arange(_FINER) / _FINER
-    between = (log10_k[:-1, None] + np.diff(log10_k)[:, None] * share).ravel()
-    fine = np.append(between, log10_k[-1])
-    return fine, np.asarray(scipy.interpolate.PchipInterpolator(log10_k, mean)(fine))
-
-
 def _springs(model: Model) -> list[str]:
     """Return the springs of the class, or of the baseline of an adopted one."""
-    own = MODELS[_baseline_class(model)].bounds
-    return [each for each in model.parameter_names if each in own and each.startswith(_STIFFNESS)]
+    its = MODELS[_baseline_class(model)].bounds
+    return [each for each in model.parameter_names if each in its and each.startswith(_STIFFNESS)]
 
 
 def _baseline_class(model: Model) -> str:
@@ -303,42 +220,65 @@ def _baseline_class(model: Model) -> str:
     return AdoptedName.parse(model.name).baseline if is_adopted(model.name) else model.name
 
 
-def _is_beam(model: Model) -> bool:
-    """Whether each spring holds one plane alone, as those of the beam classes do."""
-    return issubclass(MODELS[_baseline_class(model)], Beam)
-
-
-def _bare(name: str) -> str:
-    return name.removeprefix("log10_")
-
-
-def _grid(model: Model, columns: Sequence[int], base: float) -> FloatArray:
-    """Nodes of log10 k (n,) over the prior's range, ascending, that of the base point among them.
-
-    A node so near the base that both would be one by rounding gives way to it.
-    """
+def _spring(
+    baseline: Posterior,
+    model: Model,
+    base: FloatArray,
+    names: tuple[str, ...],
+    modes: Sequence[MeasuredMode],
+) -> WatchedQuantity | None:
+    """Return springs that move together as one quantity; None where no mode sees them."""
+    columns = [model.parameter_names.index(name) for name in names]
+    centre = float(common_stiffness(base[None, columns])[0])
     lower, upper = model.prior.lower[columns[0]], model.prior.upper[columns[0]]
     nodes = np.linspace(lower, upper, round((upper - lower) * _NODES_PER_DECADE) + 1)
-    return np.sort(np.append(nodes[np.abs(nodes - base) > 0.01], base))
+    # A node so near the base that both would be one by rounding gives way to it.
+    grid = np.sort(np.append(nodes[np.abs(nodes - centre) > 0.01], centre))
+    found = log_frequencies(model, moved(model, base, columns, grid - centre), modes)
+    if np.ptp(found, axis=0).max() <= _INVISIBLE:
+        return None
+    at = int(np.searchsorted(grid, centre))
+    # Users go straight from node to node. Towards the clamped end the response falls tenfold in a
+    # decade: at 40 nodes a decade the slope is right within 3 %, at two within 70 %.
+    rising = np.maximum.accumulate((found - found[at]).mean(axis=1))
+    log10_k = np.interp(np.arange((len(grid) - 1) * _FINER + 1) / _FINER, range(len(grid)), grid)
+    mean = np.asarray(scipy.interpolate.PchipInterpolator(grid, rising)(log10_k))
+    mean = mean - mean[at * _FINER]
 
+    def step_at(stiffness: FloatArray) -> FloatArray:
+        """Return what 0.3 decades do, the larger of up and down."""
+        steps = (0.0, -_STIFFNESS_STEP_DECADES, _STIFFNESS_STEP_DECADES)
+        here, down, up = (np.interp(stiffness + step, log10_k, mean) for step in steps)
+        return np.asarray(np.maximum(here - down, up - here))
 
-def _spring(response: _Response, baseline: Posterior, model: Model) -> WatchedQuantity:
-    kept = _rising(response.mean, int(np.searchsorted(response.log10_k, response.base)))
-    samples = np.column_stack([baseline.parameter(name) for name in response.names])
-    alone = len(response.names) == 1
-    of_samples = np.maximum(_step_at(response, common_stiffness(samples)), _INVISIBLE)
+    samples = step_at(common_stiffness(np.column_stack([baseline.parameter(n) for n in names])))
+    at_base = step_at(np.array([centre]))
+    chosen = _rising(mean, at * _FINER)
+    planes = _PLANES | _PLANES_OF_BEAMS if _is_beam(model) else _PLANES
+    bare, alone = names[0].removeprefix("log10_"), len(names) == 1
+    plane = planes.get(bare)
     return WatchedQuantity(
-        name=response.names[0] if alone else f"{response.plane}_end_stiffness",
-        baseline=response.base,
-        coordinates=response.mean[kept],
-        values=response.log10_k[kept],
-        step_sd=_spring_step(response, common_stiffness(samples)),
-        end=_ENDS.get(_bare(response.names[0])) if alone else None,
-        plane=response.plane,
-        parameters=response.names,
-        scale_sd=_off_by(_step_at(response, np.array([response.base])) / of_samples),
-        unit=model.units.get(response.names[0], ""),
+        name=names[0] if alone else f"{plane}_end_stiffness",
+        baseline=centre,
+        coordinates=mean[chosen],
+        values=log10_k[chosen],
+        step_sd=float(max(at_base[0], np.sqrt(np.mean(samples**2)))),
+        end=_ENDS.get(bare) if alone else None,
+        plane=plane,
+        parameters=names,
+        scale_sd=_off_by(at_base / np.maximum(samples, _INVISIBLE)),
+        unit=model.units.get(names[0], ""),
     )
+
+
+def common_stiffness(log10_k: FloatArray) -> FloatArray:
+    """Return log10 (n,) of the stiffness of alike springs that give as much as (n, springs)."""
+    return np.asarray(-np.log10(np.mean(10.0**-log10_k, axis=1)))
+
+
+def _is_beam(model: Model) -> bool:
+    """Return True if each spring holds one plane alone, as those of the beam classes do."""
+    return issubclass(MODELS[_baseline_class(model)], Beam)
 
 
 def _rising(mean: FloatArray, at: int) -> list[int]:
@@ -356,18 +296,3 @@ def _rising(mean: FloatArray, at: int) -> list[int]:
 def _off_by(ratios: FloatArray) -> float:
     """Root mean square of ratios (n,) less 1; off by all of itself is not known at all."""
     return min(math.hypot(float(np.sqrt(np.mean((ratios - 1) ** 2))), _MODEL_OFF), 1.0)
-
-
-def _spring_step(response: _Response, samples: FloatArray) -> float:
-    """Return what 0.3 decades do, the larger of up and down: at the base point or typically."""
-    at_base = _step_at(response, np.array([response.base]))
-    typical = np.sqrt(np.mean(_step_at(response, samples) ** 2))
-    return float(max(at_base[0], typical))
-
-
-def _step_at(response: _Response, log10_k: FloatArray) -> FloatArray:
-    here, down, up = (
-        np.interp(log10_k + shift, response.log10_k, response.mean)
-        for shift in (0.0, -_STIFFNESS_STEP_DECADES, _STIFFNESS_STEP_DECADES)
-    )
-    return np.asarray(np.maximum(here - down, up - here))

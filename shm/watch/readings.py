@@ -1,4 +1,4 @@
-"""What one test says of the watched quantities: Gauss-Newton of the model class, without a prior.
+"""Read the watched quantities from one test: Gauss-Newton of the model class, without a prior.
 
 The model's error, 0.1 to 1 % of a frequency, is the same in every test of a hanger, and so are the
 deviations of the bar as made. Each mode's own residual at the baseline is therefore taken off
@@ -18,21 +18,34 @@ alike shows in the square of the difference only, and no normal distribution cou
 of the two that moves alone is read as a move of both, and a part of it as tension: for a loss of
 30 % up to 0.5 % of it where the softer spring has 1e7 N m/rad and both planes are measured, more
 where it is softer still.
+
+Amplitude: identification gives the frequency of small amplitude where the slope is sure, and so
+tests at any amplitude compare. Where it is not sure in a test but was in the baseline, so much of
+the baseline's slope is taken off, at the test's own amplitude, as such a frequency holds.
+
+Loosening: the baseline tells what the ends give together and hardly which of them gives how much: a
+fork plate or a turnbuckle stiffens what a pin softens, and an end that gives looks clamped. As it
+loosens, the modes go by how soft it is: all alike where it is stiff, the lower ones more where it
+is soft, nearly as they go with tension. Without this the rest would be read as tension: an end
+whose spring falls to a third as 3 to 6 % of it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
+import scipy
 
 from shm.errors import BadInput
-from shm.models import Model, class_of
+from shm.models import Model, class_of, described
+from shm.models.base import Conditions
 from shm.values import (
     PLANES,
+    TENSION,
     BoolArray,
     FloatArray,
     Hanger,
@@ -42,12 +55,348 @@ from shm.values import (
     ModeReading,
     Posterior,
     Reading,
+    WatchedQuantity,
 )
 from shm.watch.causes import columns_of, mounted_kg
-from shm.watch.linear_reading import Likelihood, LinearReading, SeenModes
 from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
-from shm.watch.quantities import MeasuredMode, base_point, watched_quantities
-from shm.watch.reading_corrections import AmplitudeSlopes, loosening_of, softening
+from shm.watch.quantities import (
+    MeasuredMode,
+    base_point,
+    log_frequencies,
+    moved,
+    shift_of,
+    watched_quantities,
+)
+
+_SELDOM = 1e-3
+"""Of good tests, by their misfit (judgement): a worse one has larger errors than stated."""
+_SLOPE_STEP = 0.1  # technical: of a quantity's step, over which frequencies go nearly straight
+# Far above the rounding of a log frequency, far below what a test can tell.
+_LEAST_SLOPE_STEP = 1e-7
+_PULL_SD_IN_STEPS = 10.0
+_MOST_STEPS = 12
+_STARTS = 24  # technical: of a tension from a fiftieth to five times the nominal one
+# In units of the reading's variance: a last step of a tenth of its standard deviation is taken
+# along with the reading, which is linear about the place before it.
+_SETTLED = 1e-2
+# Information, per step_sd, of which 10,000 tests together say as much as the prior of a change.
+_UNSEEN = 1e-4
+# How far a search leaves the tables, in log frequency: more than noise, less than a blunder.
+_BEYOND = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class SeenModes:
+    """The modes (n,) of a test that the baseline has too: what is measured less its own residual.
+
+    `plane` and `order` index the model's frequencies, `own` the reader's modes; `log_frequency`
+    and its `variance` are (n,).
+    """
+
+    conditions: Conditions
+    plane: IntArray
+    order: IntArray
+    own: IntArray
+    log_frequency: FloatArray
+    variance: FloatArray
+
+    def taken(self, rows: BoolArray) -> SeenModes:
+        """Return some of the modes."""
+        arrays = ("plane", "order", "own", "log_frequency", "variance")
+        return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
+
+
+@dataclass(frozen=True, eq=False)
+class LinearReading:
+    """The likelihood about coordinates `x` (q,): residuals (n,) and slopes (n, q), both over sd."""
+
+    x: FloatArray
+    residual: FloatArray
+    slopes: FloatArray
+    pull: FloatArray
+
+    @property
+    def information(self) -> FloatArray:
+        return self.slopes.T @ self.slopes
+
+    @property
+    def cost(self) -> float:
+        """Return the cost that is minimised: the misfit and the pull to the baseline."""
+        return float(self.residual @ self.residual + self.x @ (self.pull * self.x))
+
+    @property
+    def step(self) -> FloatArray:
+        """To where the cost is least, were it all linear."""
+        downhill = self.slopes.T @ self.residual - self.pull * self.x
+        return np.asarray(np.linalg.solve(self.information + np.diag(self.pull), downhill))
+
+    def gain(self, step: FloatArray) -> float:
+        """Of a step, in units of the variance."""
+        return float(step @ self.information @ step)
+
+
+def _credible_share(misfit: FloatArray, fitted: int) -> float:
+    """Return the share of its stated information that a test deserves, by its misfit over sd (n,).
+
+    1 where the misfit is one that a thousandth of good tests exceed, or less. Where the modes fit
+    no state of the hanger, their errors are larger than stated by as much (Birge 1932).
+    """
+    free = len(misfit) - fitted
+    if free < 1:
+        return 1.0
+    most = float(scipy.special.chdtri(free, _SELDOM))
+    return most / max(most, float(misfit @ misfit))
+
+
+class Likelihood:
+    """The likelihood of a test over the coordinates (q,) of a hanger's `quantities`.
+
+    About the parameters `base` of the model, whose first `orders` modes of each plane are asked.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        base: FloatArray,
+        quantities: Sequence[WatchedQuantity],
+        orders: int,
+    ):
+        self._model, self._base, self._quantities, self._orders = model, base, quantities, orders
+        names = model.parameter_names
+        self._columns = [[names.index(name) for name in each.parameters] for each in quantities]
+        self._scale: FloatArray = np.array([each.step_sd for each in quantities])
+        self.pull: FloatArray = 1 / (_PULL_SD_IN_STEPS * self._scale) ** 2
+        self._lowest = np.array([each.coordinates[0] for each in quantities])
+        self._highest = np.array([each.coordinates[-1] for each in quantities])
+
+    def inside(self, x: FloatArray) -> FloatArray:
+        """Coordinates (q,) no further beyond the tables than a search may go."""
+        return np.clip(x, self._lowest - _BEYOND, self._highest + _BEYOND)
+
+    def far_start(self, seen: SeenModes) -> FloatArray:
+        """Return where the tension alone fits best: half of the modes may be anywhere."""
+        first = np.linspace(self._lowest[0], self._highest[0], _STARTS)
+        places = np.zeros((_STARTS, len(self._quantities)))
+        places[:, 0] = first
+        off = np.abs(seen.log_frequency - self.predicted(places, seen))
+        return np.asarray(places[int(np.median(off, axis=1).argmin())])
+
+    def settled(self, seen: SeenModes) -> LinearReading:
+        """Return the likelihood about where it is largest, or very nearly.
+
+        Sought from the baseline on; where that fits badly, from where the tension alone fits best,
+        too: on the way to a slack hanger a descent may lose itself among stiffnesses.
+        """
+        near = self._descended(np.zeros(len(self._quantities)), seen)
+        misfit = float(near.residual @ near.residual)
+        if misfit <= scipy.special.chdtri(len(near.residual), _SELDOM):
+            return near
+        far = self._descended(self.far_start(seen), seen)
+        return far if far.cost < near.cost else near
+
+    def _descended(self, start: FloatArray, seen: SeenModes) -> LinearReading:
+        """Return the same from `start` (q,) on; steps that overshoot halve."""
+        best = self.linear(start, seen)
+        step = best.step
+        for _ in range(_MOST_STEPS):
+            if best.gain(step) < _SETTLED:
+                break
+            near = self.inside(best.x + step)
+            tried = self.linear(near, seen)
+            if tried.cost <= best.cost:
+                best, step = tried, tried.step
+            else:
+                step = step / 2
+        return best
+
+    def linear(self, x: FloatArray, seen: SeenModes) -> LinearReading:
+        """One call of the model: at `x` and to both sides of it along each coordinate.
+
+        Beyond the end of a table the model stands still, and frequencies go on straight.
+        """
+        count, inside = len(x), np.clip(x, self._lowest, self._highest)
+        half = np.maximum(_SLOPE_STEP * self._scale, _LEAST_SLOPE_STEP)
+        low = np.maximum(inside - half, self._lowest)
+        high = np.minimum(inside + half, self._highest)
+        places = np.vstack([inside, *(_with_diagonal(inside, ends) for ends in (low, high))])
+        predicted = self.predicted(places, seen)
+        rise = predicted[1 + count :] - predicted[1 : 1 + count]
+        slopes = (rise / (high - low)[:, None]).T
+        sd = np.sqrt(seen.variance)
+        residual = seen.log_frequency - predicted[0] - slopes @ (x - inside)
+        return LinearReading(x, residual / sd, slopes / sd[:, None], self.pull)
+
+    def read(self, linear: LinearReading, off: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what moves of the modes `off` (k, n), over sd, make of the coordinates (k, q).
+
+        And the information (q, q) of the likelihood alone, 0 along what is not seen.
+        """
+        slopes = linear.slopes * self._scale
+        shares, axes = np.linalg.eigh(slopes.T @ slopes)
+        seen = shares > _UNSEEN
+        steps = (off @ slopes @ axes)[:, seen] / shares[seen]
+        share = _credible_share(linear.residual, int(seen.sum()))
+        chosen = shares[seen] * share > _UNSEEN
+        shares, axes = shares[seen][chosen] * share, axes[:, seen][:, chosen]
+        information = (axes * shares) @ axes.T / np.outer(self._scale, self._scale)
+        return self._scale * (steps[:, chosen] @ axes.T), np.asarray(
+            information + information.T
+        ) / 2
+
+    def predicted(self, x: FloatArray, seen: SeenModes) -> FloatArray:
+        """Log frequencies (n, modes) of the model at coordinates (n, q) within the tables."""
+        theta = np.tile(self._base, (len(x), 1))
+        for quantity, columns, values in zip(self._quantities, self._columns, x.T, strict=True):
+            shift = shift_of(quantity, values)
+            if quantity.name == TENSION:
+                theta[:, columns] *= 1 + shift[:, None]
+            else:
+                theta[:, columns] = moved(self._model, self._base, columns, shift)[:, columns]
+        found = self._model.frequencies_at(theta, self._orders, seen.conditions)
+        return np.asarray(np.log(found[:, seen.plane, seen.order]))
+
+
+def _with_diagonal(row: FloatArray, diagonal: FloatArray) -> FloatArray:
+    """`row` (q,) once for each entry of `diagonal` (q,), which replaces its own: (q, q)."""
+    return np.where(np.eye(len(row), dtype=bool), diagonal, row)
+
+
+_STIFFER = 0.01
+_CLAMPED = "beam1"
+
+
+def softening(
+    model: Model, base: FloatArray, hanger: Hanger, modes: Sequence[MeasuredMode]
+) -> FloatArray:
+    """By what the log frequency of each mode (modes,) goes with a kelvin, as steel softens.
+
+    Nothing where the class follows the temperature itself: it was fitted to what softens, too.
+    Where the class is expensive, that of a clamped beam: it differs by a few percent.
+    """
+    mild, warm = (
+        model.frequencies_at(base[None], 1, Conditions(temperature_shift_k=kelvin))
+        for kelvin in (0.0, 1.0)
+    )
+    if not np.array_equal(mild, warm):
+        return np.zeros(len(modes))
+    if model.expensive:
+        known = dict(zip(model.parameter_names, base.tolist(), strict=True))
+        model = described(_CLAMPED, hanger)
+        base = np.array([known.get(each, 1.0) for each in model.parameter_names])
+    stiffer = replace(hanger, elastic_modulus_pa=hanger.elastic_modulus_pa * (1 + _STIFFER))
+    stiff = described(model.name, stiffer, model.priors)
+    change = log_frequencies(stiff, base[None], modes)
+    change = change - log_frequencies(model, base[None], modes)
+    return np.asarray(hanger.assumptions.modulus_per_kelvin.value * change[0] / _STIFFER)
+
+
+# Of the slope, in a frequency that is not of small amplitude. The mean weighted with the energy of
+# a ring-down, while the amplitude falls as exp(-t), has 2/3 of it: the integral of exp(-3t) over
+# that of exp(-2t). Measured of softening and hardening hangers: median 0.5, quartiles 0.2 and 1.1
+# (tests/benchmarks/identify_ablation.py); the sd is half of their distance over 0.674.
+SHARE, SHARE_SD = 0.5, 0.65
+
+
+@dataclass(frozen=True, eq=False)
+class AmplitudeSlopes:
+    """Of the baseline, by mode (modes,): change of the log frequency by unit amplitude, its sd, and
+    the usual amplitude; 0 of a mode of which no test is sure."""
+
+    slope: FloatArray
+    sd: FloatArray
+    usual: FloatArray
+
+    @classmethod
+    def of(cls, tests: Sequence[ModalTest], modes: Sequence[MeasuredMode]) -> AmplitudeSlopes:
+        """From those tests that are sure, weighted by their errors."""
+        found = np.zeros((3, len(modes)))
+        for column, key in enumerate(modes):
+            seen = [
+                (mode.amplitude_slope, mode.amplitude_slope_sd, test.amplitude)
+                for test in tests
+                for mode in test.regular_modes
+                if (mode.plane, mode.order) == key and mode.depends_on_amplitude
+            ]
+            if seen:
+                slope, sd, level = np.array(seen).T
+                level = np.where(level > 0, level, 1.0)
+                # A slope that is known to 1 % is known well enough; none is known exactly.
+                weight = (level / np.maximum(sd, 0.01 * np.abs(slope))) ** 2
+                mean = weight @ (slope / level) / weight.sum()
+                found[:, column] = mean, weight.sum() ** -0.5, level.mean()
+        return cls(*found)
+
+    def at(
+        self, test: ModalTest, modes: Sequence[Mode], own: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the shifts of log frequencies (n,) from those of small amplitude, and the sds.
+
+        `own` (n,) are the columns of the test's `modes`. An amplitude not known is the baseline's.
+        """
+        level = test.amplitude if test.amplitude > 0 else self.usual[own]
+        level = np.where([mode.depends_on_amplitude for mode in modes], 0.0, level)
+        slope, sd = level * self.slope[own], level * self.sd[own]
+        return SHARE * slope, np.hypot(SHARE * sd, SHARE_SD * np.hypot(slope, sd))
+
+
+_A_LITTLE_DECADES = 0.3  # technical: half of its stiffness
+# Judgement: how stiff an end may be that is found to be stiffer, in units of the bending stiffness
+# over its length of decay, sqrt(EI / T): a clamp is infinite, and at 1 an end is half way.
+_MAY_BE = (20.0, 7.0, 2.5, 1.0)
+_SEEN = 1e-6  # of a mean log frequency: below it a pattern is rounding
+_OF_A_STEP = 0.05  # technical: patterns that add less are within a mode's own scatter
+
+
+def loosening_of(
+    model: Model,
+    base: FloatArray,
+    hanger: Hanger,
+    modes: Sequence[MeasuredMode],
+    quantities: Sequence[WatchedQuantity],
+) -> tuple[FloatArray, ...]:
+    """Of each quantity patterns (r, modes): what one step may do beside its mean, of one sd each.
+
+    None of the tension.
+    """
+    tension_n = base[model.parameter_names.index("theta_F")] * hanger.nominal_tension_n
+    of_decay = math.log10(math.sqrt(hanger.bending_stiffness_n_m2 * tension_n))
+    levels = [of_decay + math.log10(each) for each in _MAY_BE]
+    return tuple(
+        np.zeros((0, len(modes)))
+        if each.name == TENSION
+        else _patterns(model, base, modes, each, levels)
+        for each in quantities
+    )
+
+
+def _patterns(
+    model: Model,
+    base: FloatArray,
+    modes: Sequence[MeasuredMode],
+    quantity: WatchedQuantity,
+    levels: Sequence[float],
+) -> FloatArray:
+    columns = [model.parameter_names.index(name) for name in quantity.parameters]
+    before, after = [], []
+    for each in (columns, *([column] for column in columns)):
+        its = float(base[each].min())
+        for level in (its, *(level for level in levels if level < its)):
+            start = base.copy()
+            start[each] = np.minimum(start[each], level)
+            before.append(start)
+            after.append(moved(model, start, each, np.array([-_A_LITTLE_DECADES]))[0])
+    shifts = log_frequencies(model, np.array(after), modes)
+    shifts = shifts - log_frequencies(model, np.array(before), modes)
+    mean = shifts.mean(axis=1, keepdims=True)
+    if abs(mean[0, 0]) < _SEEN:
+        return np.zeros((0, len(modes)))
+    is_seen = np.abs(mean[:, 0]) > _SEEN
+    like = quantity.step_sd * shifts[is_seen] / mean[is_seen]
+    _, strength, axes = np.linalg.svd(like[1:] - like[0], full_matrices=False)
+    strength = strength / math.sqrt(max(len(like) - 1, 1))
+    chosen = strength > _OF_A_STEP * np.linalg.norm(like[0])
+    return np.asarray(strength[chosen, None] * axes[chosen])
+
 
 _FREQUENCY_ALLOWANCE = 1e-4
 
@@ -218,13 +567,13 @@ class Reader:
         The weighted mean; of three tests or more the median of what is left of each once its own
         state is taken off, so that a mistaken mode of one of them moves nothing.
         """
-        own = np.concatenate([seen.own for seen in tests])
+        its = np.concatenate([seen.own for seen in tests])
         base = np.zeros((1, len(self.quantities)))
         off = [seen.log_frequency - self._likelihood.predicted(base, seen)[0] for seen in tests]
         if len(tests) < _ROUNDS:
             weight = 1 / np.concatenate([seen.variance for seen in tests])
-            total = np.bincount(own, weight * np.concatenate(off), len(self.modes))
-            return np.asarray(total / np.bincount(own, weight, len(self.modes)))
+            total = np.bincount(its, weight * np.concatenate(off), len(self.modes))
+            return np.asarray(total / np.bincount(its, weight, len(self.modes)))
         table = np.full((len(tests), len(self.modes)), np.nan)
         for row, seen, each in zip(table, tests, off, strict=True):
             row[seen.own] = each
@@ -237,22 +586,22 @@ class Reader:
     def _seen(self, test: ModalTest) -> SeenModes:
         read = (mode for mode in test.regular_modes if _is_measured(mode))
         modes = [mode for mode in read if _key(mode) in self.modes]
-        own = np.array([self.modes.index(_key(mode)) for mode in modes], dtype=int)
+        its = np.array([self.modes.index(_key(mode)) for mode in modes], dtype=int)
         frequency_hz = np.array([mode.frequency_hz for mode in modes], dtype=float)
         sd_hz = np.array([mode.frequency_sd_hz for mode in modes], dtype=float)
         sd = np.where(sd_hz > 0, sd_hz / frequency_hz, self._unstated_sd)
-        swing = (
-            (test.temperature_c - self.reference_temperature_c) * self._per_kelvin[own]
+        variation = (
+            (test.temperature_c - self.reference_temperature_c) * self._per_kelvin[its]
             if self._is_warmth_known(test)
             else 0.0
         )
-        slip, slip_sd = self._per_amplitude.at(test, modes, own)
+        slip, slip_sd = self._per_amplitude.at(test, modes, its)
         return SeenModes(
             conditions=self._model.conditions(test),
             plane=np.array([PLANES.index(mode.plane) for mode in modes], dtype=int),
             order=np.array([mode.order - 1 for mode in modes], dtype=int),
-            own=own,
-            log_frequency=np.log(frequency_hz) - self._residual[own] - swing - slip,
+            own=its,
+            log_frequency=np.log(frequency_hz) - self._residual[its] - variation - slip,
             variance=sd**2 + slip_sd**2 + self._allowance**2,
         )
 
@@ -268,7 +617,7 @@ def _key(mode: Mode) -> MeasuredMode:
 
 
 def _is_measured(mode: Mode) -> bool:
-    """Whether the mode has a frequency whose error is not endless."""
+    """Return True if the mode has a frequency whose error is not endless."""
     return (
         bool(np.isfinite(mode.frequency_hz))
         and mode.frequency_hz > 0
@@ -277,7 +626,7 @@ def _is_measured(mode: Mode) -> bool:
 
 
 def _is_described(test: ModalTest, model: Model) -> bool:
-    """Whether the class can describe the conditions of a test."""
+    """Return True if the class can describe the conditions of a test."""
     try:
         model.refuse(test)
     except BadInput:

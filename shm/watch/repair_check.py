@@ -1,4 +1,4 @@
-"""Whether tests after works on a hanger show that what was told of it before is put right.
+"""Check that tests after works on a hanger show what was reported before to be put right.
 
 A person who says "repaired" may be wrong, or may give the day of a test from before the works. A
 new baseline would make the loss the normal state, and nobody would hear of it again.
@@ -21,8 +21,8 @@ import numpy as np
 from shm.values import TENSION, Alert, Drift, Hanger, ModalTest
 from shm.values.rounding import NINETY_PERCENT
 from shm.watch.agreement import drifts_of
-from shm.watch.baseline_state import known_modes
-from shm.watch.change_words import is_stiffness, probable_groups, quantity_words, size_words
+from shm.watch.alert_text import is_stiffness, probable_groups, quantity_words, size_words
+from shm.watch.baseline_check import known_modes
 from shm.watch.readings import Reader
 
 _HALF = 0.5  # judgement: of what was told, so much may be left where it is repaired
@@ -30,7 +30,7 @@ _HALF = 0.5  # judgement: of what was told, so much may be left where it is repa
 
 @dataclass(frozen=True)
 class Unrepaired:
-    """What still stands of one alert after works: in words, `tension fell by 8.0 ± 1.1 %`."""
+    """An alert that is in force after works: in words, `tension fell by 8.0 ± 1.1 %`."""
 
     alert: int
     words: str
@@ -44,7 +44,7 @@ def unrepaired(
     *,
     restores: bool,
 ) -> tuple[Unrepaired, ...]:
-    """What stands of `alerts` (number, alert, its test) in the tests `since` the works, by time.
+    """Return what is in force of `alerts` (number, alert, its test) in the tests `since` the works.
 
     `before` reads tests against the baseline of then, and holds its tests. Where works are to
     restore it (`restores`), more than half of what was told must be gone, with the probability that
@@ -57,12 +57,12 @@ def unrepaired(
     for number, alert, test in alerts:
         drifts = [each for each in alert.drifts if each.quantity in now]
         if drifts:
-            stands = [
+            in_force = [
                 now[each.quantity]
                 for each in drifts
                 if _stands(each, now[each.quantity], hanger, restores=restores)
             ]
-            words = [f"{quantity_words(each.quantity)} {size_words(each)}" for each in stands]
+            words = [f"{quantity_words(each.quantity)} {size_words(each)}" for each in in_force]
         elif alert.change is not None and test is not None:
             share = share_left(of_baseline, test, [each for each, _ in since])
             words = [f"{100 * share:.0f} % of what the frequencies had moved by is left"]
@@ -142,7 +142,7 @@ _OF_OTHERS = {"gap", "held", "limit", "silent"}
 
 
 def is_explained(alert: Alert, kind: EventKind, since: datetime) -> bool:
-    """Whether an event of that time explains an alert of the watch.
+    """Return True if an event of that time explains an alert of the watch.
 
     Of what is beyond its threshold the event must change all; of causes that the tests do not tell
     apart it must be one. Tests that agree with none need no further explanation.

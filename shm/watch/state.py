@@ -141,14 +141,14 @@ class StateHistory:
         j = self._index(name)
         mean, sd = np.full((2, len(self.readings)), np.nan)
         for t, reading in enumerate(self.readings):
-            row, own = np.delete(reading.information[j], j), reading.information[j, j]
-            if own > 0 and np.all(np.isfinite(reading.mean)):
+            row, its = np.delete(reading.information[j], j), reading.information[j, j]
+            if its > 0 and np.all(np.isfinite(reading.mean)):
                 warmth = np.nan_to_num(reading.temperature_c - self.reference_temperature_c)
                 rest = reading.mean - self.coefficient_mean * warmth  # at the reference
                 others = np.delete(np.delete(self.smoothed_covariance[t], j, 0), j, 1)
                 off = np.delete(self.smoothed_mean[t] - rest, j)
-                mean[t] = rest[j] - row @ off / own
-                sd[t] = math.sqrt(1 / own + row @ others @ row / own**2)
+                mean[t] = rest[j] - row @ off / its
+                sd[t] = math.sqrt(1 / its + row @ others @ row / its**2)
         return Band.of(self.quantities[j], mean, sd)
 
     def temperature_coefficients(self) -> tuple[TemperatureCoefficient, ...]:
@@ -353,8 +353,8 @@ class LocalLevels:
         steps = _SLOPE_STEP * np.eye(2 * self.q)
 
         def misfit_and_slope(z: FloatArray) -> tuple[float, FloatArray]:
-            here, *beside = self.misfit(z + np.vstack([0 * steps[:1], steps, -steps]))
-            ahead, behind = np.split(np.array(beside), 2)
+            here, *nearby = self.misfit(z + np.vstack([0 * steps[:1], steps, -steps]))
+            ahead, behind = np.split(np.array(nearby), 2)
             return float(here), (ahead - behind) / (2 * _SLOPE_STEP)
 
         found = scipy.optimize.minimize(

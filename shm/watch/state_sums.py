@@ -1,4 +1,4 @@
-"""What the watch of one hanger goes on from, and what its tests are to the evidence.
+"""The state of the watch of one hanger, and the sums of its tests for the evidence.
 
 By how much tests of one state differ, and along what: a joint that gives in the wind, wires that
 slip, sensors put elsewhere. What differs from test to test goes along a few known columns, each by
@@ -9,22 +9,17 @@ Rubin 1977), about a prior worth a few tests.
 
 from __future__ import annotations
 
-import io
-import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
 import numpy as np
 
-from shm.errors import BadInput
 from shm.values import BoolArray, Change, FloatArray, IntArray, WatchedQuantity, is_ratio
 from shm.watch.causes import DetectedChange, Structure
 from shm.watch.change_point import SIZES, Evidence, Sums, sums_of
-from shm.watch.isolated_tests import Seen
 from shm.watch.options import OF_ONE_VISIT_YEARS, Warmth, WatchOptions, temperature_offsets
-from shm.watch.persistence import Course
+from shm.watch.persistence import Course, Seen
 from shm.watch.quantities import MeasuredMode
 
 
@@ -32,8 +27,8 @@ from shm.watch.quantities import MeasuredMode
 class WatchState:
     """All that the next result rests on, of T tests so far, in plain arrays.
 
-    It goes on only where `key` is that of the watch which is to go on. `told` is text that goes
-    with it, `still_same` the probability that nothing had changed before the last call.
+    It goes on only where `key` is that of the watch which is to go on. `still_same` is the
+    probability that nothing had changed before the last call.
     `weight` (T,) is what is left of tests that alone would say more than one test may.
     `called` (calls, 3) are the first test, years, and whether it is a ramp, `called_precision`
     (calls, n + q, n + q) what called it. `scatter_variance` is what tests scatter by.
@@ -58,74 +53,10 @@ class WatchState:
     called: FloatArray
     called_precision: FloatArray
     still_same: float = 1.0
-    told: str = ""
-
-    @classmethod
-    def before_any(
-        cls,
-        key: str,
-        start: datetime,
-        reference_c: float,
-        sizes: tuple[int, int],
-        coefficient_sd: FloatArray,
-        scatter_variance: FloatArray,
-    ) -> WatchState:
-        """Of no test yet; `sizes` are how many modes and quantities there are."""
-        n, q = sizes
-        return cls(
-            key=key,
-            start=start,
-            last_time=start,
-            reference_c=reference_c,
-            values=np.zeros((0, n)),
-            variances=np.zeros((0, n)),
-            slopes=np.zeros((0, n, q)),
-            per_kelvin=np.zeros((0, n)),
-            years=np.zeros(0),
-            temperature_c=np.zeros(0),
-            log_amplitude=np.zeros(0),
-            weight=np.zeros(0),
-            counted=np.zeros(0, bool),
-            coefficients=np.zeros(len(coefficient_sd)),
-            coefficient_sd=coefficient_sd,
-            scatter_variance=scatter_variance,
-            called=np.zeros((0, 3)),
-            called_precision=np.zeros((0, n + q, n + q)),
-        )
 
     @property
     def tests(self) -> int:
         return len(self.years)
-
-    def to_bytes(self) -> bytes:
-        """Return the state as a file of numpy arrays, without any pickled object."""
-        kept = io.BytesIO()
-        plain: dict[str, Any] = {
-            each.name: np.asarray(value.isoformat() if isinstance(value, datetime) else value)
-            for each in fields(self)
-            for value in [getattr(self, each.name)]
-        }
-        np.savez_compressed(kept, **plain)
-        return kept.getvalue()
-
-    @classmethod
-    def from_bytes(cls, content: bytes) -> WatchState:
-        """Return the state back; raises BadInput where the content is no such state."""
-        try:
-            with np.load(io.BytesIO(content), allow_pickle=False) as kept:
-                found = dict(kept)
-            for name in ("key", "told"):
-                found[name] = str(found[name])
-            for name in ("start", "last_time"):
-                found[name] = datetime.fromisoformat(str(found[name]))
-            for name in ("reference_c", "still_same"):
-                found[name] = float(found[name])
-            return cls(**found)
-        except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile) as error:
-            raise BadInput(
-                f"A kept state of the watch cannot be read: {error}.",
-                remedy="Drop it: the watch then goes over all tests again.",
-            ) from error
 
 
 _LEAST_SHARE = 1e-6  # judgement: of a cause in a call, which later tests may yet speak for
@@ -159,8 +90,7 @@ class StateSums:
         )
 
     def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
-        """What quantities go with, each by a coefficient of its own: kelvin, and as many further
-        laws as the structure has."""
+        """Return the kelvin that quantities go with, and as many further laws as there are."""
         return (self._warmth(state),)
 
     def _by_law(self, values: FloatArray) -> FloatArray:
@@ -171,9 +101,9 @@ class StateSums:
         """Factors (T, n, laws (1 + q)) of what a temperature that is not known, or not well, leaves
         open: what a kelvin does as far as that is known, and as far as it is not. Tests `of_season`
         share what they miss."""
-        own, sds = self._by_law(state.coefficients), self._by_law(state.coefficient_sd)
+        its, sds = self._by_law(state.coefficients), self._by_law(state.coefficient_sd)
         softening, parts = state.per_kelvin, []
-        for law, mean, sd in zip(self._thermal(state), own, sds, strict=True):
+        for law, mean, sd in zip(self._thermal(state), its, sds, strict=True):
             known = softening + state.slopes @ mean
             per_kelvin = np.concatenate([known[:, :, None], state.slopes * sd], axis=2)
             off = law.sd * np.sqrt(law.shared) if of_season else law.sd
@@ -195,23 +125,47 @@ class StateSums:
         )
 
     def _at_rest(self, state: WatchState) -> FloatArray:
-        laws, own = self._thermal(state), self._by_law(state.coefficients)
-        swing = laws[0].kelvin[:, None] * state.per_kelvin
-        for law, mean in zip(laws, own, strict=True):
-            swing = swing + law.kelvin[:, None] * (state.slopes @ mean)
-        return np.asarray(state.values - swing)
+        laws, its = self._thermal(state), self._by_law(state.coefficients)
+        variation = laws[0].kelvin[:, None] * state.per_kelvin
+        for law, mean in zip(laws, its, strict=True):
+            variation = variation + law.kelvin[:, None] * (state.slopes @ mean)
+        return np.asarray(state.values - variation)
 
     def scatter(self, state: WatchState) -> FloatArray:
-        """What the counted tests so far say of the scatter (q + c,); of a day one alone does."""
+        """Return the variances (q + c,) along each factor by the counted tests, one of each day.
+
+        Of one test, half of those of a difference; a mode that one of two lacks says nothing.
+        """
         rows = np.flatnonzero(state.counted)
         rows = rows[np.diff(state.years[rows], prepend=-1.0) > OF_ONE_VISIT_YEARS]
-        found = differences(
-            self._at_rest(state)[rows],
-            state.variances[rows],
-            self._factors(state)[rows],
-            self._doubt(state)[rows],
-        )
-        return learnt(found, self.structure.scatter_variance, state.scatter_variance)
+        prior = self.structure.scatter_variance
+        if len(rows) < 2:
+            return prior
+        variances, doubt = state.variances[rows], self._doubt(state)[rows]
+        spread = variances[1:] + variances[:-1]
+        known = np.isfinite(spread)[:, :, None]
+        values = np.where(known, np.diff(self._at_rest(state)[rows], axis=0)[:, :, None], 0.0)
+        factors = np.where(known, self._factors(state)[rows[1:]], 0.0)
+        open_left = np.concatenate([doubt[1:], doubt[:-1]], axis=2) * known
+        its = np.where(np.isfinite(spread), spread, _ABSENT)[:, :, None] * np.eye(len(spread.T))
+        covariance = its + open_left @ np.swapaxes(open_left, 1, 2)
+        there = np.abs(factors).max(axis=1) > 0
+        variance = np.maximum(state.scatter_variance, 1e-12)
+        for _ in range(_ROUNDS):
+            scaled = factors * np.sqrt(2 * variance)
+            weight = np.linalg.inv(scaled @ np.swapaxes(scaled, 1, 2) + covariance)
+            weighted = weight @ scaled
+            # Of a unit normal along each factor: its mean given the difference, what that explains.
+            along = (weighted * values).sum(axis=1)
+            explained = (scaled * weighted).sum(axis=1)
+            far = np.abs(along) / np.sqrt(np.maximum(explained, 1e-12))
+            left = np.clip((_CHANGE_FROM - far) / (_CHANGE_FROM - _SCATTER_UP_TO), 0.0, 1.0)
+            square = explained * np.minimum(far, _SCATTER_UP_TO) ** 2
+            expected = there * (left * square + (1 - left) * explained + 1 - explained)
+            variance = (_PRIOR_TESTS * prior + variance * expected.sum(axis=0)) / (
+                _PRIOR_TESTS + there.sum(axis=0)
+            )
+        return np.asarray(variance)
 
     def _columns(self, state: WatchState, rows: IntArray) -> FloatArray:
         """Of the tests `rows` (T, n, columns): modes, quantities, covariates."""
@@ -276,25 +230,27 @@ class StateSums:
             for _ in range(2 if each.is_ramp else 1):
                 parts.append(changing * since[:, None, None])
                 since = since * (years - each.years)
-        own = self.options.mode_scatter**2
+        its = self.options.mode_scatter**2
         return Course(
             np.concatenate(parts, axis=2),
             changing,
             self._softened(state, rows),
-            state.variances[rows] + own,
+            state.variances[rows] + its,
             int((rows < self.options.baseline_tests).sum()),
         )
 
     def effects(self, state: WatchState) -> tuple[FloatArray, FloatArray]:
-        """What a change does to each plane's first frequency and to its mean (r, n + q), and to
-        every mode (n, n + q)."""
+        """Return what a change does to each plane's first frequency and mean, and to every mode.
+
+        Arrays (r, n + q) and (n, n + q).
+        """
         measured = np.isfinite(state.variances)
         count = np.maximum(measured.sum(axis=0), 1)[:, None]
         slopes = np.where(measured[:, :, None], state.slopes, 0.0).sum(axis=0) / count
         of_modes = np.hstack([np.eye(self.structure.layout.n), slopes])
         planes = np.array([plane for plane, _ in self.modes])
         of_planes = [of_modes[planes == plane] for plane in dict.fromkeys(planes.tolist())]
-        rows = np.vstack([row for own in of_planes for row in (own[0], own.mean(axis=0))])
+        rows = np.vstack([row for its in of_planes for row in (its[0], its.mean(axis=0))])
         return rows, of_modes
 
 
@@ -324,54 +280,3 @@ def size_of(evidence: Evidence) -> FloatArray:
         for share, size in zip(by_size, SIZES, strict=True):
             covariance += share * size**2 * direction.factor @ direction.factor.T
     return np.asarray(np.linalg.inv(covariance))
-
-
-@dataclass(frozen=True, eq=False)
-class Differences:
-    """Of tests that follow each other: `values` (d, n), `factors` (d, n, c), along which they
-    scatter, and `covariance` (d, n, n) of what is known to differ beside that."""
-
-    values: FloatArray
-    covariance: FloatArray
-    factors: FloatArray
-
-
-def differences(
-    values: FloatArray, variances: FloatArray, factors: FloatArray, doubt: FloatArray
-) -> Differences:
-    """Of tests (T, n) with `factors` (T, n, c); a mode that one of two lacks says nothing.
-
-    `doubt` (T, n, m) are the factors of what conditions leave open, unit normals a test.
-    """
-    spread = variances[1:] + variances[:-1]
-    known = np.isfinite(spread)
-    of_both = np.concatenate([doubt[1:], doubt[:-1]], axis=2) * known[:, :, None]
-    own = np.where(known, spread, _ABSENT)
-    return Differences(
-        np.where(known, np.diff(values, axis=0), 0.0),
-        own[:, :, None] * np.eye(values.shape[1]) + of_both @ np.swapaxes(of_both, 1, 2),
-        np.where(known[:, :, None], factors[1:], 0.0),
-    )
-
-
-def learnt(found: Differences, prior_variance: FloatArray, begun: FloatArray) -> FloatArray:
-    """Variance (c,) along each factor: of one test, half of that of a difference."""
-    variance = np.maximum(begun, 1e-12)
-    if not len(found.values):
-        return prior_variance
-    there = np.abs(found.factors).max(axis=1) > 0
-    for _ in range(_ROUNDS):
-        scaled = found.factors * np.sqrt(2 * variance)
-        weight = np.linalg.inv(scaled @ np.swapaxes(scaled, 1, 2) + found.covariance)
-        weighted = weight @ scaled
-        # Of a unit normal along each factor: its mean given the difference, and what that explains.
-        along = np.einsum("dic,di->dc", weighted, found.values)
-        explained = np.einsum("dic,dic->dc", scaled, weighted)
-        far = np.abs(along) / np.sqrt(np.maximum(explained, 1e-12))
-        left = np.clip((_CHANGE_FROM - far) / (_CHANGE_FROM - _SCATTER_UP_TO), 0.0, 1.0)
-        square = explained * np.minimum(far, _SCATTER_UP_TO) ** 2
-        expected = there * (left * square + (1 - left) * explained + 1 - explained)
-        variance = (_PRIOR_TESTS * prior_variance + variance * expected.sum(axis=0)) / (
-            _PRIOR_TESTS + there.sum(axis=0)
-        )
-    return np.asarray(variance)

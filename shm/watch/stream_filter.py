@@ -173,8 +173,8 @@ class Bank:
         """After a reading `value` of ln T's shift under `conditions` (p - FEATURES,)."""
         design = self.design(conditions)
         missed = value - self.mean @ design
-        own = variance + (_UNSTEADY * _FAST_SD) ** 2
-        spread = np.einsum("i,mij,j->m", design, self.covariance, design) + own
+        its = variance + (_UNSTEADY * _FAST_SD) ** 2
+        spread = np.einsum("i,mij,j->m", design, self.covariance, design) + its
         clipped = np.maximum(spread, missed**2 / CLIP**2)
         gain = self.covariance @ design / clipped[:, None]
         # The loss is bounded as the gain of a change is: else a large wander would explain it.
@@ -232,13 +232,13 @@ class Bank:
         first, last = np.searchsorted(began, [0.05, 0.95 * began[-1]])
         at, kind = np.unravel_index(int(chance.sum(axis=0).argmax()), chance.shape[1:])
         # Sizes of the likeliest beginning: those of others are of other days.
-        share, each, own_sd = (part[:, at, kind] for part in (chance, shift, sd))
+        share, each, its_sd = (part[:, at, kind] for part in (chance, shift, sd))
         share = share / share.sum()
         mean = float(share @ each)
         return Evidence(
             years=math.exp(min(total, 100.0)) / DAYS_PER_YEAR / _OVERSTATED,
             shift=mean,
-            shift_sd=math.sqrt(float(share @ (own_sd**2 + (each - mean) ** 2))),
+            shift_sd=math.sqrt(float(share @ (its_sd**2 + (each - mean) ** 2))),
             material=float((chance * beyond).sum()),
             sudden=float(chance[:, :, 0].sum()),
             after_day=float(self.after_day[first]),

@@ -1,4 +1,4 @@
-"""Whether a stream's thermometer is believed: by what it says and how that moves.
+"""Judge a stream's thermometer by its values and how they move.
 
 A sensor at fault says what no bridge can be. One that came loose or was exchanged jumps, and would
 have the watch explain a jump of the tension that never was. It is believed again once it jumps
@@ -99,10 +99,10 @@ def believed(
         thermometer = thermometer.learnt()
     found, absurd, doubted = [], [], []
     for each in readings:
-        told = each.window.temperature_c
-        if math.isfinite(told) and math.isnan(outdoor_c(told)):
+        reported = each.window.temperature_c
+        if math.isfinite(reported) and math.isnan(outdoor_c(reported)):
             absurd.append(each)
-        elif math.isfinite(told) and thermometer.is_doubted(each.window.start.timestamp()):
+        elif math.isfinite(reported) and thermometer.is_doubted(each.window.start.timestamp()):
             doubted.append(each)
         else:
             found.append(each)
@@ -129,14 +129,14 @@ def disagreeing(hours: Mapping[str, Sequence[PooledReading]]) -> tuple[StreamEve
 
     Of two none can be told to be right: both are named.
     """
-    said = {
-        name: {each.start: each.temperature_c for each in own if math.isfinite(each.temperature_c)}
-        for name, own in hours.items()
+    words = {
+        name: {each.start: each.temperature_c for each in its if math.isfinite(each.temperature_c)}
+        for name, its in hours.items()
     }
-    starts = sorted({start for own in said.values() for start in own})
-    table = np.array([[own.get(start, NAN) for start in starts] for own in said.values()])
+    starts = sorted({start for its in words.values() for start in its})
+    table = np.array([[its.get(start, NAN) for start in starts] for its in words.values()])
     found = []
-    for row, name in enumerate(said):
+    for row, name in enumerate(words):
         others = table if len(table) > 2 else np.delete(table, row, axis=0)
         shared = np.isfinite(table[row]) & (np.isfinite(table).sum(axis=0) > 1)
         if shared.sum() < _HOURS_COMPARED:

@@ -17,12 +17,14 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
+from itertools import pairwise
 
 import numpy as np
 import scipy
 
+from shm.assumptions import DEFAULTS, Assumptions
 from shm.errors import BadInput
 from shm.values import (
     NAN,
@@ -33,29 +35,245 @@ from shm.values import (
     Drift,
     FloatArray,
     Hanger,
+    Mode,
     Moved,
     Posterior,
     WatchedTest,
 )
 from shm.values.rounding import NINETY_PERCENT
-from shm.values.stream import PERIODS, PooledReading, StreamEvent, StreamEventKind
-from shm.watch.stream_cause import EXCHANGED, MODEL_OFF, SWAPPED, TIME_BASE, Cause, cause_of
-from shm.watch.stream_filter import CLIP, FAST, LEVEL, NOTHING, SLOW, Bank, Evidence
-from shm.watch.stream_reading import ModeTable, SeenReading, exchanged, planes_of, usable
-from shm.watch.stream_state import (
-    HOURS_A_DAY,
-    HOURS_EXCHANGED,
-    NO_CONDITIONS,
-    OLD_READINGS,
-    TOGETHER,
-    StreamState,
-    as_mounted,
-    condition_sd,
-    warmth,
-    with_conditions,
-    with_ring,
+from shm.values.stream import PERIODS, PooledReading, StreamEvent, StreamEventKind, WindowReading
+from shm.watch.kept_state import from_bytes, to_bytes
+from shm.watch.stream_filter import CLIP, FAST, FEATURES, LEVEL, NOTHING, SLOW, Bank, Evidence
+from shm.watch.stream_reading import (
+    EXCHANGED,
+    MODEL_OFF,
+    SWAPPED,
+    TIME_BASE,
+    Cause,
+    ModeTable,
+    SeenReading,
+    cause_of,
+    exchanged,
+    planes_of,
+    usable,
 )
-from shm.watch.watching import after
+from shm.watch.stream_thermometer import Believed, Thermometer, believed
+from shm.watch.watching import AlertState, after
+
+HOURS_A_DAY = 24.0  # by definition
+# Of the temperature: 3 hours' mean, a day's, ten days'.
+_LAGS_DAYS = np.array([2.0, 14.0, 240.0]) / HOURS_A_DAY
+# Judgement: by what an hour's temperature differs from ten days' mean, and that the errors of some
+# ten hours without a thermometer are one error: an hour counts for a third of what it would.
+_UNKNOWN_K, TOGETHER = 4.0, 3.0
+HOURS_EXCHANGED, _SURELY_EXCHANGED = 3, 8
+"""Judgement: until it is told, as mistaken modes look like it for an hour; and until it is over."""
+NO_CONDITIONS = np.zeros(0)
+"""Of the contrast of the planes: what the weather does to one more than the other is its wander."""
+_RING = 24  # readings: a change is told within a day or is slow
+OLD_READINGS = 120.0  # judgement: five days, as what a mode differs by is learnt over
+
+
+def condition_sd(assumed: Assumptions) -> FloatArray:
+    """Return the prior sds of what the conditions do to ln T.
+
+    A kelvin now, of 3 hours', a day's and ten days' mean; the square of a kelvin (judgement: 0.2 %
+    at 10 K); an e-fold of the excitation; a m/s of wind (judgement: a storm of 20 m/s moves a
+    deck's loads by 0.4 %); and the sun's round (judgement).
+    """
+    kelvin, e_fold = assumed.tension_per_kelvin_sd.value, assumed.tension_per_amplitude_sd.value
+    return np.array([kelvin] * 4 + [2e-5, e_fold, 2e-4] + [1e-3] * 6)
+
+
+@dataclass(frozen=True)
+class Reported:
+    """A change that was told: by how much, and from where on; 0 where none is in force."""
+
+    shift: float = 0.0
+    since: float = 0.0
+
+    def after(self, before: float, now: float) -> Reported:
+        """Return what is in force after a change; what was told is until half of it is back."""
+        if self.shift and (now - self.since) / self.shift < 0.5:
+            return self
+        since = self.since if self.shift else before
+        return Reported(now - since, since)
+
+
+@dataclass(frozen=True, eq=False)
+class StreamState:
+    """The state from reading to reading. Days count from `start`.
+
+    `lagged_c` are the temperature's exponential means, `reference` its first value, that of the
+    log level and of the wind; `known_day` is the last with a temperature. `ring` (24, n) are the
+    newest readings' modes with the conditions taken off, `ring_day` their days, `old` (n,) the mean
+    of those before. Shifts count from `zero`, compensated ones from `compensated_zero`; a change
+    that was told of the tension is `called`, of one plane `apart`. `contrast` are the filters of
+    what one plane says more than the other, less what was `absorbed` into the modes' levels.
+    So many hours the planes were exchanged. `unknown_sd` of ln T is what an unknown temperature may
+    do, 0 where it is known. Up to `settled_day` readings are gone over again: no
+    alert ends before.
+    """
+
+    key: str
+    start: datetime
+    table: ModeTable
+    bank: Bank
+    contrast: Bank
+    lagged_c: FloatArray
+    reference: FloatArray
+    ring: FloatArray
+    ring_day: FloatArray
+    old: FloatArray
+    known_day: float = 0.0
+    zero: float = 0.0
+    compensated_zero: float = 0.0
+    readings: int = 0
+    is_learning: bool = True
+    called: Reported = Reported()
+    apart: Reported = Reported()
+    absorbed: float = 0.0
+    told: AlertState = field(default_factory=AlertState)
+    standing: tuple[str, ...] = ()
+    exchanged_hours: int = 0
+    settled_day: float = 0.0
+    unknown_sd: float = 0.0
+    thermometer: Thermometer = field(default_factory=Thermometer)
+
+    @classmethod
+    def begun(
+        cls, key: str, start: datetime, table: ModeTable, assumed: Assumptions = DEFAULTS
+    ) -> StreamState:
+        n = len(table.modes)
+        return cls(
+            key,
+            start,
+            table,
+            Bank.begun(0.0, condition_sd(assumed)),
+            Bank.begun(0.0, NO_CONDITIONS),
+            lagged_c=np.full(3, NAN),
+            reference=np.full(3, NAN),
+            ring=np.zeros((0, n)),
+            ring_day=np.zeros(0),
+            old=np.full(n, NAN),
+        )
+
+
+def gone_back(earlier: bytes, newest: bytes) -> bytes:
+    """An earlier state, from which to go over the readings up to the newest again, with those that
+    came late. What stands by now stands until then: it is not told and not ended twice.
+    """
+    state, last = from_bytes(StreamState, earlier), from_bytes(StreamState, newest)
+    ahead = (last.start - state.start).total_seconds() / 86400
+    settled = max(state.settled_day, ahead + last.bank.day, ahead + last.settled_day)
+    standing = tuple(dict.fromkeys((*state.standing, *last.standing)))
+    return to_bytes(replace(state, settled_day=settled, standing=standing))
+
+
+def as_mounted(state: StreamState, modes: tuple[Mode, ...]) -> tuple[StreamState, tuple[Mode, ...]]:
+    """The modes in the planes that were always theirs, where those of the sensors are exchanged."""
+    found = None if state.is_learning else state.table.are_exchanged(modes)
+    hours = state.exchanged_hours
+    if found or (found is None and hours >= HOURS_EXCHANGED):
+        hours = hours + 1 if hours < HOURS_EXCHANGED else _SURELY_EXCHANGED
+    elif found is not None:
+        hours = hours - 1 if hours > HOURS_EXCHANGED + 1 else 0
+    return replace(state, exchanged_hours=hours), exchanged(modes) if hours else modes
+
+
+def with_believed(
+    kept: bytes | None, readings: Sequence[WindowReading]
+) -> tuple[bytes | None, Believed]:
+    """Return windows with the temperatures that are believed, and the state that goes on.
+
+    None where nothing was kept, or what cannot be read: the stream is then learnt again.
+    """
+    try:
+        state = None if kept is None else from_bytes(StreamState, kept)
+    except BadInput:
+        state = None
+    if state is None:
+        return None, believed(Thermometer(), readings, learning=True)
+    found = believed(state.thermometer, readings, learning=state.is_learning)
+    return to_bytes(replace(state, thermometer=found.thermometer)), found
+
+
+def windows_as_mounted(
+    kept: bytes | None, readings: Sequence[WindowReading]
+) -> Sequence[WindowReading]:
+    """The windows with each mode in the plane that was always its own, by what the watch knows."""
+    state = None if kept is None else from_bytes(StreamState, kept)
+    if state is None or state.is_learning:
+        return readings
+    return [
+        replace(each, modes=exchanged(each.modes))
+        if state.table.are_exchanged(each.modes)
+        else each
+        for each in readings
+    ]
+
+
+def warmth(state: StreamState) -> float:
+    """Of the steel: an hour or three behind the air's."""
+    warmth = float(state.lagged_c[0] - state.reference[0])
+    return warmth if math.isfinite(warmth) else 0.0
+
+
+def with_conditions(
+    state: StreamState, reading: PooledReading, day: float
+) -> tuple[StreamState, FloatArray, float]:
+    """Return the conditions of a reading, and the variance that unknown ones add to it."""
+    level = math.log(reading.level_m_s2) if reading.level_m_s2 > 0 else NAN
+    now = np.array([reading.temperature_c, level, reading.wind_m_s])
+    reference = np.where(np.isfinite(state.reference), state.reference, now)
+    lagged, known_day, extra = state.lagged_c, state.known_day, 0.0
+    if math.isfinite(reading.temperature_c):
+        share = -np.expm1((known_day - day) / _LAGS_DAYS)
+        lagged = np.where(np.isfinite(lagged), lagged + share * (now[0] - lagged), reference[0])
+        kelvin, known_day = np.array([now[0], *lagged, reference[0]]), day
+    else:  # as warm as it was in the last ten days, give or take what a day brings
+        kelvin = np.nan_to_num(np.append(np.full(4, lagged[-1]), reference[0]))
+        of_kelvin = range(FEATURES, FEATURES + len(_LAGS_DAYS))
+        square = sum(
+            sum(part**2 for part in state.bank.along(unit))
+            for unit in np.eye(state.bank.mean.shape[1])[of_kelvin]
+        )
+        extra = TOGETHER * square * _UNKNOWN_K**2 if math.isfinite(lagged[-1]) else 0.0
+    now = np.where(np.isfinite(now), now, reference)
+    steps = [before - behind for before, behind in pairwise(kelvin)]
+    hour = 2 * math.pi * ((state.start.hour + state.start.minute / 60) / HOURS_A_DAY + day)
+    others = np.nan_to_num(now[1:] - reference[1:])
+    warm = kelvin[2] - kelvin[4]
+    rounds = hour * np.arange(1, 4)
+    conditions = np.array([*steps, warm**2, *others, *np.sin(rounds), *np.cos(rounds)])
+    state = replace(
+        state,
+        lagged_c=lagged,
+        reference=reference,
+        known_day=known_day,
+        unknown_sd=math.sqrt(extra / TOGETHER),
+    )
+    return state, conditions, extra
+
+
+def with_ring(
+    state: StreamState, seen: SeenReading, conditions: FloatArray, day: float
+) -> StreamState:
+    """With the modes of one more reading, what the conditions do taken off."""
+    bank, n = state.bank, len(state.table.modes)
+    of_conditions = np.concatenate([np.zeros(len(bank.mean[0]) - len(conditions)), conditions])
+    now = seen.off - state.table.tension * bank.along(of_conditions)[0]
+    grown = np.full((len(state.ring), n), NAN)
+    grown[:, : state.ring.shape[1]] = state.ring
+    old = np.append(state.old, np.full(n - len(state.old), NAN))
+    ring, days = np.vstack([grown, now]), np.append(state.ring_day, day)
+    if len(ring) > _RING:
+        left, ring, days = ring[0], ring[1:], days[1:]
+        share = 1 / min(max(state.readings - _RING, 1), OLD_READINGS)
+        mixed = np.where(np.isfinite(left), old + share * (left - old), old)
+        old = np.where(np.isfinite(old), mixed, left)
+    return replace(state, ring=ring, ring_day=days, old=old)
+
 
 _VERSION = "stream-watch-1"
 _DAY_SD = 1.25e-4  # of ln f: what a mode keeps for a day, by joints that seat anew. Judgement
@@ -110,7 +328,7 @@ def watch_reading(
     kept: bytes | None,
     options: StreamOptions | None = None,
 ) -> StreamWatched:
-    """What one more reading of a hanger's stream says, by what was `kept` after those before.
+    """Return the result of one more reading of a stream, from the state `kept` before it.
 
     The sensitivities are those of the baseline's model class, else of the beam that fits the first
     reading. Where the hanger's description, its baseline or this watch itself have changed, it
@@ -123,10 +341,10 @@ def watch_reading(
             remedy="Watch its daily tests (`watch_frequencies`).",
         )
     key = _key(baseline, hanger, reading.stream)
-    state = None if kept is None else StreamState.from_bytes(kept)
+    state = None if kept is None else from_bytes(StreamState, kept)
     watch = StreamWatch(baseline, hanger, options or StreamOptions())
     found, state = watch.after(state if state and state.key == key else None, reading, key)
-    return replace(found, kept=state.to_bytes() if state else b"")
+    return replace(found, kept=to_bytes(state) if state else b"")
 
 
 def _key(baseline: Posterior | None, hanger: Hanger, stream: str) -> str:
@@ -225,14 +443,14 @@ class StreamWatch:
                     state = _absorbed(state, cause)
                 evidence, unlike = NOTHING, 0.0
             elif cause.plane:
-                before = state
+                before = _contrast(state)[0]
                 state = _absorb_plane(state, cause, apart, None if is_apart else evidence)
-                state = _stand_apart(before, state)
+                state = replace(state, apart=state.apart.after(before, _contrast(state)[0]))
                 moved, unlike, is_apart = cause.moved, 0.0, True
             elif is_apart:
-                before = state
+                before = _contrast(state)[0]
                 state = replace(state, contrast=state.contrast.changed(apart))
-                state = _stand_apart(before, state)
+                state = replace(state, apart=state.apart.after(before, _contrast(state)[0]))
                 moved, unlike = cause.moved, 0.0
             else:
                 evidence = _sized(evidence, cause, state)
@@ -242,19 +460,21 @@ class StreamWatch:
                     else each
                     for each in cause.moved
                 )
-                state, unlike = _changed(state, evidence), 0.0
+                state, unlike = replace(state, bank=state.bank.changed(evidence)), 0.0
+                now = _shift(state)[0]
+                state = replace(state, called=state.called.after(now - evidence.shift, now))
         test = self._watched_test(state, evidence, moved, is_apart, unlike, reading, end)
-        told, alert = after(state.told, test, self.hanger)
-        told = replace(told, called=told.called[-_CALLS_KEPT:])
+        reported, alert = after(state.told, test, self.hanger)
+        reported = replace(reported, called=reported.called[-_CALLS_KEPT:])
         standing = (*state.standing, alert.key) if alert else state.standing
-        stands = alert or told.beyond or told.called or state.bank.day < state.settled_day
-        ended = () if stands else standing
-        state = replace(state, told=told, standing=() if ended else standing)
+        in_force = alert or reported.beyond or reported.called or state.bank.day < state.settled_day
+        ended = () if in_force else standing
+        state = replace(state, told=reported, standing=() if ended else standing)
         if ended:
-            state = replace(state, called_shift=0.0, apart_shift=0.0)
+            state = replace(state, called=Reported(), apart=Reported())
         shift, sd = test.drifts[0].shift_mean, test.drifts[0].shift_sd
-        own, own_sd = shift_of_reading(state, seen)
-        return StreamWatched(b"", own, own_sd, shift, sd, test, alert, events, ended, ""), state
+        its, its_sd = shift_of_reading(state, seen)
+        return StreamWatched(b"", its, its_sd, shift, sd, test, alert, events, ended, ""), state
 
     def _weigh(self, state: StreamState) -> tuple[Evidence, Evidence, bool]:
         """Return the evidence of any change, that of one plane's, and whether it is mostly that."""
@@ -270,8 +490,8 @@ class StreamWatch:
 
     @property
     def _limit_years(self) -> float:
-        own = self.hanger.thresholds.false_call_years
-        return self.options.limit_years if own is None else own
+        its = self.hanger.thresholds.false_call_years
+        return self.options.limit_years if its is None else its
 
     def _watched_test(
         self,
@@ -292,12 +512,12 @@ class StreamWatch:
         sd = math.hypot(sd, unlike / NINETY_PERCENT)
         limits, table = self.hanger.thresholds, state.table
         chance = rate / (1 + rate)
-        of_tension = (mean - state.called_from, sd, state.called_shift)
+        of_tension = (mean - state.called.since, sd, state.called.shift)
         between, between_sd = _contrast(state)
-        of_plane = (between - state.apart_from, between_sd, state.apart_shift)
+        of_plane = (between - state.apart.since, between_sd, state.apart.shift)
         standing = [each for each in (of_tension, of_plane) if each[2]]
         if standing:
-            left = max(_beyond(now / size - 0.5, own / abs(size)) for now, own, size in standing)
+            left = max(_beyond(now / size - 0.5, its / abs(size)) for now, its, size in standing)
             chance = max(left, chance) if moved else left
             now, _, size = of_plane if is_apart else of_tension
             if moved and size and now / size < 0.5:  # it came back: the end of an alert
@@ -373,7 +593,7 @@ def daily_shift(kept: bytes, hours: Sequence[PooledReading]) -> tuple[float, flo
     The mean of what each hour says: the tension goes through the day by more than its mean is
     known to, and not all hours have all modes. Without thermometer's or watch's corrections.
     """
-    state = StreamState.from_bytes(kept)
+    state = from_bytes(StreamState, kept)
     seen, between = [], state.contrast.along(_compensated(state.contrast))
     for reading in hours:
         modes = usable(reading)
@@ -433,28 +653,9 @@ def _sized(evidence: Evidence, cause: Cause, state: StreamState) -> Evidence:
     if cause.name != TENSION or evidence.kind:
         return evidence
     later = max(int((state.ring_day >= evidence.by_day).sum()) / TOGETHER, 1.0)
-    own = cause.moved[0]
-    sd = math.hypot(own.shift_sd, state.bank.wander_sd / math.sqrt(later), state.unknown_sd)
-    return replace(evidence, shift=own.shift_mean, shift_sd=sd)
-
-
-def _changed(state: StreamState, evidence: Evidence) -> StreamState:
-    """With a change of the hanger in the filters. What was told stands until half of it is back."""
-    state = replace(state, bank=state.bank.changed(evidence))
-    now = _shift(state)[0]
-    since = state.called_from if state.called_shift else now - evidence.shift
-    if state.called_shift and (now - since) / state.called_shift < 0.5:
-        return state
-    return replace(state, called_from=since, called_shift=now - since)
-
-
-def _stand_apart(before: StreamState, state: StreamState) -> StreamState:
-    """With a change of one plane that was told: it stands until half of it is back."""
-    now, then = _contrast(state)[0], _contrast(before)[0]
-    if before.apart_shift and (now - before.apart_from) / before.apart_shift < 0.5:
-        return state
-    since = before.apart_from if before.apart_shift else then
-    return replace(state, apart_from=since, apart_shift=now - since)
+    its = cause.moved[0]
+    sd = math.hypot(its.shift_sd, state.bank.wander_sd / math.sqrt(later), state.unknown_sd)
+    return replace(evidence, shift=its.shift_mean, shift_sd=sd)
 
 
 def _absorb_plane(
@@ -464,10 +665,10 @@ def _absorb_plane(
 
     `of_tension` is what the filters of the tension took it for, if they did.
     """
-    table, own = state.table, planes_of(state.table.modes)[cause.plane]
-    other = np.nan_to_num(np.nanmedian((cause.by_mode / table.tension)[~own]))
-    moved = np.where(own, np.nan_to_num(cause.by_mode - other * table.tension), 0.0)
-    size = float(np.median((moved / table.tension)[own & np.isfinite(cause.by_mode)]))
+    table, its = state.table, planes_of(state.table.modes)[cause.plane]
+    other = np.nan_to_num(np.nanmedian((cause.by_mode / table.tension)[~its]))
+    moved = np.where(its, np.nan_to_num(cause.by_mode - other * table.tension), 0.0)
+    size = float(np.median((moved / table.tension)[its & np.isfinite(cause.by_mode)]))
     size = size if cause.plane == PLANES[0] else -size
     contrast = state.contrast
     if apart.beginning >= 0:

@@ -29,9 +29,8 @@ from shm.values import (
 from shm.values.drift import ENOUGH_AGAINST
 from shm.watch.causes import Columns, DetectedChange, Structure, structure_of
 from shm.watch.change_point import Evidence, evidence_of, log_probability_of_called
-from shm.watch.isolated_tests import outlier_probability, select_consistent_tests
 from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of, years_between
-from shm.watch.persistence import bound_by_recurrence
+from shm.watch.persistence import bound_by_recurrence, outlier_probability, select_consistent_tests
 from shm.watch.posterior_summary import (
     SummaryContext,
     probability_of_change,
@@ -49,19 +48,16 @@ _CLEARLY_NATS = 3.0  # 20 to 1
 
 
 @dataclass(frozen=True, eq=False)
-class Call:
-    """A change that was called after the test at `index` of the watch; `change` as it was then."""
-
-    index: int
-    change: Change
-
-
-@dataclass(frozen=True, eq=False)
 class Watch:
-    """The result after each reading, and the changes called on the way, in the order of time."""
+    """The result after each reading, in the order of time."""
 
     tests: tuple[WatchedTest, ...]
-    calls: tuple[Call, ...]
+
+    @property
+    def calls(self) -> tuple[tuple[int, Change], ...]:
+        """The changes that were called on the way, each with the index of its test."""
+        called = ((n, test.change) for n, test in enumerate(self.tests))
+        return tuple((n, change) for n, change in called if change.called)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +89,7 @@ class Watcher:
 
     @cached_property
     def sums(self) -> StateSums:
-        """What the tests of a state are to the evidence."""
+        """Return what the tests of a state are to the evidence."""
         return StateSums(self.quantities, self.columns.modes, self.structure, self.options)
 
     def begin(self, readings: Sequence[Reading]) -> tuple[WatchState, Watch]:
@@ -108,19 +104,27 @@ class Watcher:
                 f"{self.options.baseline_tests}."
             )
         time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
-        state = WatchState.before_any(
-            self.key,
-            time,
-            reference_of([reading.temperature_c for reading in readings]),
-            (n, q),
-            self.structure.layout.prior_sd[n + q :][: q * self.structure.thermal_laws],
-            self.structure.scatter_variance,
+        coefficients = q * self.structure.thermal_laws
+        state = WatchState(
+            key=self.key,
+            start=time,
+            last_time=time,
+            reference_c=reference_of([reading.temperature_c for reading in readings]),
+            slopes=np.zeros((0, n, q)),
+            **dict.fromkeys(("values", "variances", "per_kelvin"), np.zeros((0, n))),
+            **dict.fromkeys(("years", "temperature_c", "log_amplitude", "weight"), np.zeros(0)),
+            counted=np.zeros(0, bool),
+            coefficients=np.zeros(coefficients),
+            coefficient_sd=self.structure.layout.prior_sd[n + q :][:coefficients],
+            scatter_variance=self.structure.scatter_variance,
+            called=np.zeros((0, 3)),
+            called_precision=np.zeros((0, n + q, n + q)),
         )
         tests = []
         for reading in readings:
             state, found = self._advance(state, reading)
             tests.append(found)
-        return state, Watch(tuple(tests), ())
+        return state, Watch(tuple(tests))
 
     def after(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
         """Return the state after one more reading, and the result.
@@ -152,8 +156,8 @@ class Watcher:
             state = self._without_baseline(state)
             evidence = self._evidence(state, _counting(state))
             evidence, causes, _ = self._apply_recurrence_bound(state, evidence)
-        own = slice(self.options.baseline_tests)
-        if np.isfinite(state.variances[own]).any() and not state.counted[own].any():
+        its = slice(self.options.baseline_tests)
+        if np.isfinite(state.variances[its]).any() and not state.counted[its].any():
             against = int(state.counted.sum())
             # How far it is since the baseline stays open all the same.
             whole = self._with_baseline(state)
@@ -175,7 +179,7 @@ class Watcher:
     def _apply_recurrence_bound(
         self, state: WatchState, evidence: Evidence
     ) -> tuple[Evidence, Evidence, int]:
-        """As far as it stays, by which causes are weighed, and tests against the baseline."""
+        """Return the bounded evidence, that for weighing causes, and tests against the baseline."""
         if evidence.log_evidence <= math.log(_LOOKED_AT * self.options.limit_years):
             return evidence, evidence, 0
         # How sure it is that anything changed is bounded; which cause it was is for all to say.
@@ -184,9 +188,8 @@ class Watcher:
         if (state.weight[rows] != 1).any():
             causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
         course = self.sums.course(state, rows, causes.called)
-        stays = bound_by_recurrence(causes, course, self.options.limit_years)
-        bounded = replace(evidence, log_most=stays.log_years)
-        return bounded, causes, 0 if causes.called else stays.against_baseline
+        log_years, against = bound_by_recurrence(causes, course, self.options.limit_years)
+        return replace(evidence, log_most=log_years), causes, 0 if causes.called else against
 
     def _without_baseline(self, state: WatchState) -> WatchState:
         """Return the state in which a baseline that stands alone does not count."""
@@ -207,8 +210,11 @@ class Watcher:
         changes: tuple[Evidence, Evidence, int],
         shifts: tuple[Evidence, Evidence],
     ) -> WatchedTest:
-        """What people are told after the newest test: by the evidence of changes, that by which
-        causes are weighed, and tests against the baseline; and of shifts since the baseline."""
+        """Summarize the newest test.
+
+        By the evidence of changes, that by which causes are weighed, and tests against the
+        baseline; and that of shifts since the baseline.
+        """
         evidence, causes, against_baseline = changes
         of_baseline = float(state.years[: self.options.baseline_tests].mean())
         subject = SummaryContext(
@@ -249,7 +255,7 @@ class Watcher:
         evidence = self._evidence(state, rows)
         for _ in range(_MOST_REPEATS):
             factor, mass = evidence.of_last_visit
-            if mass <= most + _NEARLY:
+            if mass <= most + _NEARLY or factor <= 0:  # the latter at a limit of days
                 break
             weight = state.weight.copy()
             weight[visit] *= max(factor - (mass - most), _NEARLY) / factor
@@ -323,11 +329,11 @@ class Watcher:
         )
 
     def _coefficients(self, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
-        """How far each quantity goes with a kelvin (laws q,), its sd; by the likeliest scatter."""
+        """Return what a kelvin does to each quantity (laws q,), its sd, by the best scatter."""
         n, count = self.structure.layout.n, self.structure.layout.q * self.structure.thermal_laws
-        likeliest, own = int(evidence.log_null.argmax()), slice(n, n + count)
-        variance = np.diag(evidence.null_covariance[likeliest])[own]
-        return np.asarray(evidence.null_mean[likeliest, own]), np.sqrt(np.maximum(variance, 0.0))
+        best, its = int(evidence.log_null.argmax()), slice(n, n + count)
+        variance = np.diag(evidence.null_covariance[best])[its]
+        return np.asarray(evidence.null_mean[best, its]), np.sqrt(np.maximum(variance, 0.0))
 
     def _creep(self, evidence: Evidence) -> CreepRate | None:
         """The tension's creep if nothing but what was called changes; None where that is unlikely.
@@ -361,20 +367,14 @@ def watched(
     """
     watcher = Watcher(quantities, columns, hanger, options or WatchOptions.of(hanger.assumptions))
     if not readings:
-        return Watch((), ())
+        return Watch(())
     count = watcher.options.baseline_tests
     state, begun = watcher.begin(readings[:count])
     tests = list(begun.tests)
     for reading in readings[count:]:
         state, found = watcher.after(state, reading)
         tests.append(found)
-    return watch_of(tests)
-
-
-def watch_of(tests: Sequence[WatchedTest]) -> Watch:
-    """Return the results of a watch, with the changes that they call."""
-    calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
-    return Watch(tuple(tests), tuple(calls))
+    return Watch(tuple(tests))
 
 
 def _counting(state: WatchState) -> IntArray:

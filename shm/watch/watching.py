@@ -18,7 +18,7 @@ All is derived from the sequence of tests, so that the same tests give the same 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from types import MappingProxyType
 
@@ -30,24 +30,93 @@ from shm.values import (
     Drift,
     Hanger,
     ModalTest,
+    Plane,
     Posterior,
     Reading,
     RepeatedMistake,
     WatchedTest,
 )
-from shm.watch.agreement import agreement, way_of
-from shm.watch.alert_state import AlertState, conditions, still, with_beyond
-from shm.watch.alert_text import alert_of, message_of
-from shm.watch.change_words import CAUSES, suspects
-from shm.watch.odd_test_alerts import (
+from shm.values.drift import OF_ONE_VISIT
+from shm.watch.agreement import Way, agreement, way_of
+from shm.watch.alert_text import CAUSES, alert_of, message_of, suspects
+from shm.watch.kept_state import from_bytes, to_bytes
+from shm.watch.notices import (
     alert_of_baseline,
     message_of_odd,
+    news_of,
+    notice_of,
+    repeated_mistakes,
 )
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
-from shm.watch.repeated_mistakes import news_of, notice_of, repeated_mistakes
 from shm.watch.state_sums import WatchState
-from shm.watch.watcher import Watch, Watcher, watch_of, watched
+from shm.watch.watcher import Watch, Watcher, watched
+
+
+@dataclass(frozen=True)
+class AlertState:
+    """The conditions in force: when each quantity was reported beyond its threshold, and a call.
+
+    `called` are the changes that were called, told or not: after a call the sequential test speaks
+    of a further change, no longer of that one. `mistaken` are the modes that the last tests have
+    wrong, `noted` those of them that were told, `alone` whether it was told that the baseline
+    stands alone. `agreed` are those of `beyond` that two tests told which agree: to the watch they
+    were improbable all along. `fading` says since when those of `beyond` look over that must do so
+    on another day, too.
+    """
+
+    beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
+    call: datetime | None = None
+    called: tuple[Change, ...] = ()
+    odd: int = 0
+    mistaken: tuple[RepeatedMistake, ...] = ()
+    noted: frozenset[tuple[Plane, int]] = frozenset()
+    alone: bool = False
+    agreed: frozenset[tuple[str, Way]] = frozenset()
+    fading: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
+
+
+def still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
+    """Return what still stands at a test: all but what tests of two visits have below `end`.
+
+    A van that stands on the deck for a day ends nothing; neither do unknown shifts. What two tests
+    that agree have told was improbable to the watch all along: it ends once the shift has come
+    back, too.
+    """
+    over = {
+        (drift.quantity, way)
+        for drift in test.drifts
+        for way in ("up", "down")
+        if _probability(drift, way) < end
+        and not (
+            (drift.quantity, way) in told.agreed
+            and drift.may_be_beyond(-1.0 if way == "down" else 1.0)
+        )
+    }
+    fading = {each: told.fading.get(each, test.time) for each in told.beyond if each in over}
+    ended = {each for each, since in fading.items() if test.time - since > OF_ONE_VISIT}
+    beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
+    fading = {each: since for each, since in fading.items() if each in beyond}
+    agreed = told.agreed - ended
+    if test.change.probability < end:
+        return AlertState(beyond, odd=told.odd, alone=told.alone, agreed=agreed, fading=fading)
+    return replace(told, beyond=beyond, agreed=agreed, fading=fading)
+
+
+def _probability(drift: Drift, way: Way) -> float:
+    """That the shift is beyond its threshold in one way; nearly none is where it went the other."""
+    return drift.probability * (way_of(drift.shift_mean) == way)
+
+
+def with_beyond(told: AlertState, beyond: Sequence[Drift], at: datetime) -> AlertState:
+    """Return the state with shifts that were told at a test to be beyond their threshold."""
+    return replace(told, beyond={**told.beyond, **dict.fromkeys(conditions(beyond), at)})
+
+
+def conditions(drifts: Sequence[Drift]) -> frozenset[tuple[str, Way]]:
+    """Each quantity and the way that it went."""
+    return frozenset((each.quantity, way_of(each.shift_mean)) for each in drifts)
+
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
@@ -101,11 +170,11 @@ def watch_hanger(
     dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
     readings = tuple(reader.reading(test, time) for test, time in dated)
     options = options_of(hanger, len(baseline_tests), options)
-    said = [known[test.id] for test, _ in later if test.id in known]
-    begin = readings if len(said) < len(later) else readings[: len(baseline_tests)]
+    words = [known[test.id] for test, _ in later if test.id in known]
+    begin = readings if len(words) < len(later) else readings[: len(baseline_tests)]
     watch = watched(begin, reader.quantities, reader.columns, hanger, options)
     if begin is not readings:
-        watch = watch_of([*watch.tests, *said])
+        watch = Watch((*watch.tests, *words))
     tests = list(watch.tests)
     mistaken: tuple[RepeatedMistake, ...] = ()
     for n in range(len(baseline_tests), len(tests)):
@@ -119,12 +188,14 @@ def kept_of(baseline: Posterior, tests: Sequence[DatedTest]) -> tuple[DatedTest,
     check = baseline.baseline_check
     if check is None:
         return tuple(tests)
-    return tuple((check.kept(test), at) for test, at in tests if not check.leaves_out(test.id))
+    return tuple(
+        (check.without_mistakes(test), at) for test, at in tests if not check.leaves_out(test.id)
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class Newest:
-    """What the watch says after the newest test, the alert it calls for, and what to keep."""
+    """The result after the newest test, the alert it calls for, and the state to store."""
 
     test: WatchedTest
     alert: Alert | None
@@ -154,44 +225,37 @@ def watch_newest(
     if kept is None:
         readings = [reader.reading(test, time) for test, time in baseline_tests]
         state, watch = watcher.begin(readings)
-        told, alert = AlertState(), None
+        reported, alert = AlertState(), None
         for found in watch.tests:
-            told, alert = after(told, found, hanger)
+            reported, alert = after(reported, found, hanger)
     else:
-        state = WatchState.from_bytes(kept)
+        state, reported = from_bytes(tuple[WatchState, AlertState], kept)
         if state.key != watcher.key:
             return None
-        told = AlertState.from_text(state.told)
     since = max(time for _, time in baseline_tests)
     for test, time in later:
         reading = reader.reading(test, max(time, since))
         state, found = watcher.after(state, reading)
-        found = replace(found, mistaken=repeated_mistakes(told.mistaken, reading, reader.modes))
-        told, alert = after(told, found, hanger)
+        found = replace(found, mistaken=repeated_mistakes(reported.mistaken, reading, reader.modes))
+        reported, alert = after(reported, found, hanger)
     # A second test that agrees answers the notice that asks for one.
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
-        agreed = agreement(reader, later[-1], beside, hanger, options, told.beyond)
+        agreed = agreement(reader, later[-1], beside, hanger, options, reported.beyond)
         if agreed is not None:
             two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
-            alert, told = agreed, with_beyond(told, agreed.drifts, agreed.time)
-            told = replace(told, agreed=told.agreed | two_told)
-    kept = replace(state, told=told.to_text()).to_bytes()
-    return Newest(found, alert, kept)
+            alert, reported = agreed, with_beyond(reported, agreed.drifts, agreed.time)
+            reported = replace(reported, agreed=reported.agreed | two_told)
+    return Newest(found, alert, to_bytes((state, reported)))
 
 
 def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:
-    """How many tests precede every change, and how often this hanger may be called falsely."""
-    own = hanger.thresholds.false_call_years
-    limit_years = options.limit_years if own is None else own
+    """Return the options with a hanger's own: its baseline, its false calls, wires that slip."""
+    its = hanger.thresholds.false_call_years
+    if hanger.kind == "strand":
+        slip = hanger.assumptions.strand_bending_per_amplitude_sd.value
+        options = replace(options, bending_per_amplitude_sd=slip)
+    limit_years = options.limit_years if its is None else its
     return replace(options, baseline_tests=baseline_tests, limit_years=limit_years)
-
-
-@dataclass(frozen=True)
-class _News:
-    """What a test adds: shifts that are beyond their threshold by now, and whether it is a call."""
-
-    beyond: tuple[Drift, ...]
-    call: bool
 
 
 def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
@@ -200,9 +264,9 @@ def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
     `watched` are all its tests since the baseline, the oldest first. The alert's key names hanger,
     rules, quantity, way and test: the same whenever it is asked for.
     """
-    told, alert = AlertState(), None
+    reported, alert = AlertState(), None
     for test in watched:
-        told, alert = after(told, test, hanger)
+        reported, alert = after(reported, test, hanger)
     return alert
 
 
@@ -210,13 +274,12 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     """Return what stands after one more test, and the alert that it calls for, if any."""
     level = hanger.thresholds.alert_probability
     standing = still(told, test, hanger.thresholds.end_probability)
-    news = _news(standing, test, level)
-    call = test.time if news.call else standing.call
+    beyond, is_call = _news(standing, test, level)
+    call = test.time if is_call else standing.call
     called = (*standing.called, test.change) if test.change.called else standing.called
     odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
-    change = test.change if news.call else _explaining(news.beyond, called, test.change)
-    is_further = news.call and bool(standing.called)
-    alert = _alert(news, change, test, hanger, standing, is_further=is_further)
+    change = test.change if is_call else _explaining(beyond, called, test.change)
+    alert = _alert(beyond, is_call, change, test, hanger, standing)
     alone = told.alone
     since_baseline: tuple[Drift, ...] = ()
     if alert is None and test.change.is_baseline_alone and not (alone or standing.beyond):
@@ -229,8 +292,8 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     if alert is None and not explained and (new := news_of(test.mistaken, noted)):
         # It waits while there is worse to tell; a mass or lost section is why modes go astray.
         alert, noted = notice_of(test, hanger, new), wrong
-    stands = replace(
-        with_beyond(standing, (*news.beyond, *since_baseline), test.time),
+    in_force = replace(
+        with_beyond(standing, (*beyond, *since_baseline), test.time),
         call=call,
         called=called,
         odd=odd,
@@ -240,7 +303,7 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
         # Improbable to the watch, as what two tests tell: it ends once the shift has come back.
         agreed=standing.agreed | conditions(since_baseline),
     )
-    return stands, alert
+    return in_force, alert
 
 
 def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
@@ -248,37 +311,38 @@ def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
     if in_a_row not in (1, _ODD_IN_A_ROW):
         return None
     kind: AlertKind = _REPEAT if in_a_row == 1 else "tests disagree"
-    said = message_of_odd(test, hanger, in_a_row)
-    return alert_of(hanger, (test.test, test.time), kind.replace(" ", "-"), said, (kind,))
+    words = message_of_odd(test, hanger, in_a_row)
+    return alert_of(hanger, (test.test, test.time), kind.replace(" ", "-"), words, (kind,))
 
 
 def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
     """All alerts of a history, the oldest test first: what `new_alert` says after each test."""
-    told, alerts = AlertState(), []
+    reported, alerts = AlertState(), []
     for test in watched:
-        told, alert = after(told, test, hanger)
+        reported, alert = after(reported, test, hanger)
         alerts += [alert] if alert else []
     return tuple(alerts)
 
 
-def _news(standing: AlertState, test: WatchedTest, level: float) -> _News:
+def _news(standing: AlertState, test: WatchedTest, level: float) -> tuple[tuple[Drift, ...], bool]:
+    """Return the shifts that are beyond their threshold by now, and if a change is called."""
     call = test.change.called and not _is_known(standing, test.change)
-    drifts = test.told if call else test.drifts
+    drifts = test.published_drifts if call else test.drifts
     beyond = tuple(
         drift
         for drift in drifts
         if drift.probability >= level
         and (drift.quantity, way_of(drift.shift_mean)) not in standing.beyond
     )
-    return _News(beyond, call)
+    return beyond, call
 
 
 def _is_known(standing: AlertState, change: Change) -> bool:
-    """Whether a called change began before an alert that stands, and so is what that one told."""
-    told = [] if standing.call is None else [standing.call]
+    """Return True if an alert that is in force has reported a called change already."""
+    reported = [] if standing.call is None else [standing.call]
     named = _suspects(change)
-    told += [at for (quantity, _), at in standing.beyond.items() if quantity in named]
-    return any(change.began_by <= at for at in told)
+    reported += [at for (quantity, _), at in standing.beyond.items() if quantity in named]
+    return any(change.began_by <= at for at in reported)
 
 
 def _suspects(change: Change) -> tuple[str, ...]:
@@ -304,31 +368,35 @@ def _explaining(beyond: Sequence[Drift], called: Sequence[Change], now: Change) 
 
 
 def _alert(
-    news: _News,
+    beyond: tuple[Drift, ...],
+    is_call: bool,
     change: Change | None,
     test: WatchedTest,
     hanger: Hanger,
     standing: AlertState,
-    *,
-    is_further: bool,
 ) -> Alert | None:
-    kinds: tuple[AlertKind, ...] = ((_BEYOND,) if news.beyond else ()) + (
-        (_kind(test.change),) if news.call else ()
-    )
+    """Return the alert of what a test adds; None where it adds nothing."""
+    kinds: list[AlertKind] = [_BEYOND] if beyond else []
+    if is_call:
+        kinds.append("sudden change" if test.change.sudden >= 0.5 else "slow drift")
     if not kinds:
         return None
-    said = message_of(
+    words = message_of(
         test,
         hanger,
         change,
-        news.beyond,
-        is_call=news.call,
-        is_further=is_further,
+        beyond,
+        is_call=is_call,
+        is_further=is_call and bool(standing.called),
         standing=_standing(test, standing, hanger),
     )
-    what = f"{'+'.join(kinds).replace(' ', '-')}:{_first_moved(news, test).replace(' ', '-')}"
-    drifts = news.beyond or _suspected(test)
-    return alert_of(hanger, (test.test, test.time), what, said, kinds, drifts, change)
+    first = beyond[0] if beyond else test.change.moved[0] if test.change.moved else None
+    what = f"{first.quantity}-{way_of(first.shift_mean)}" if first else "unknown"
+    key = f"{'+'.join(kinds)}:{what}".replace(" ", "-")
+    by_name = {drift.quantity: drift for drift in test.drifts}
+    suspected = tuple(by_name[name] for name in _suspects(test.change) if name in by_name)
+    of_test = test.test, test.time
+    return alert_of(hanger, of_test, key, words, tuple(kinds), beyond or suspected, change)
 
 
 def _standing(test: WatchedTest, standing: AlertState, hanger: Hanger) -> list[Drift]:
@@ -339,23 +407,3 @@ def _standing(test: WatchedTest, standing: AlertState, hanger: Hanger) -> list[D
         for each in test.drifts
         if (each.quantity, way_of(each.shift_mean)) in standing.beyond.keys() - standing.agreed
     ]
-
-
-def _kind(change: Change) -> AlertKind:
-    return "sudden change" if change.sudden >= 0.5 else "slow drift"
-
-
-def _suspected(test: WatchedTest) -> tuple[Drift, ...]:
-    """Return the shifts of what may have changed."""
-    by_name = {drift.quantity: drift for drift in test.drifts}
-    return tuple(by_name[name] for name in _suspects(test.change) if name in by_name)
-
-
-def _first_moved(news: _News, test: WatchedTest) -> str:
-    """Return the quantity that is told first, and its way."""
-    if news.beyond:
-        return f"{news.beyond[0].quantity}-{way_of(news.beyond[0].shift_mean)}"
-    if test.change.moved:
-        first = test.change.moved[0]
-        return f"{first.quantity}-{way_of(first.shift_mean)}"
-    return "unknown"

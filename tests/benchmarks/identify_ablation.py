@@ -47,7 +47,7 @@ from shm.identify.contract import Finding  # noqa: E402
 from shm.identify.estimation import (  # noqa: E402
     amplitude_dependence,
     courses,
-    finished,
+    postprocess,
     stabilise,
 )
 from shm.identify.measuring import screening  # noqa: E402
@@ -120,7 +120,7 @@ def without_constants(cases: Iterator[world.Recording]) -> None:
                     shares.append((before.frequency_hz / at_rest - 1) / slope)
             return corrected
 
-        with patch.object(finished, "with_amplitude_dependence", all_ways):
+        with patch.object(postprocess, "with_amplitude_dependence", all_ways):
             _identified(case, {})
     for name, rows in errors.items():
         error, z = np.array(rows).T

@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.errors import ShmError
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.identify.estimation import finished
+from shm.identify.estimation import postprocess
 from tests.benchmarks.recordings_trial import as_record, described
 from tests.worlds import recordings as world
 from tests.worlds.recorded_kinds import KINDS
@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         warned = [each.name for each in found.quality if each.verdict == "warning"]
         counts.update(warned)
         wrongly += bool(set(warned) - OF_THE_CREW)
-        with patch.object(finished, "with_amplitude_dependence", lambda found, _: found):
+        with patch.object(postprocess, "with_amplitude_dependence", lambda found, _: found):
             ratios = widening(found, made(case))
         if {"amplitude", "drift", "tones"} & set(warned):
             wide += ratios

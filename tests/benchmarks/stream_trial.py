@@ -47,6 +47,7 @@ from shm.values.stream import (  # noqa: E402
     Window,
     WindowReading,
 )
+from shm.watch.kept_state import to_bytes  # noqa: E402
 from shm.watch.stream_watch import (  # noqa: E402
     StreamOptions,
     StreamState,
@@ -185,7 +186,7 @@ def solved(world: ModuleType, name: str, seed: int, years: float) -> dict[str, A
                 alerts.append(found.alert)
             events += found.events
         if state and not state.is_learning and len(hours) > 12:
-            daily.append((hours[0].start, *daily_shift(state.to_bytes(), hours)))
+            daily.append((hours[0].start, *daily_shift(to_bytes(state), hours)))
     seconds = time.process_time() - began
     return {
         "scenario": name, "seed": seed, "hanger": number, "readings": len(readings),
@@ -200,7 +201,7 @@ def solved(world: ModuleType, name: str, seed: int, years: float) -> dict[str, A
         "events": [{"hours": (e.end - at).total_seconds() / 3600, "kind": e.kind,
                     "detail": e.detail} for e in events],
         **daily_figures(world, seed, number, changes, start, daily, state),
-        "state_bytes": len(state.to_bytes()) if state else 0,
+        "state_bytes": len(to_bytes(state)) if state else 0,
     }  # fmt: skip
 
 

@@ -34,7 +34,6 @@ sys.path.insert(0, str(ROOT))
 from shm.values import BaselineCheck  # noqa: E402
 from shm.watch import (  # noqa: E402
     causes,
-    isolated_tests,
     mistaken_modes,
     options,
     persistence,
@@ -44,8 +43,7 @@ from shm.watch import (  # noqa: E402
     watching,
 )
 from shm.watch.change_point import Evidence  # noqa: E402
-from shm.watch.linear_reading import Likelihood  # noqa: E402
-from shm.watch.reading_corrections import AmplitudeSlopes  # noqa: E402
+from shm.watch.readings import AmplitudeSlopes, Likelihood  # noqa: E402
 from shm.watch.state_sums import StateSums, WatchState  # noqa: E402
 from shm.watch.watcher import Watcher  # noqa: E402
 from tests.benchmarks import watch_worlds  # noqa: E402
@@ -99,7 +97,7 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
     ],
     "bound on one visit": [(Watcher, "_limit_last_visit", weigh_all)],
     "tests that stand alone": [(watcher, "select_consistent_tests", count_all)],
-    "modes that stray": [(isolated_tests, "_has_outlying_mode", give(False))],
+    "modes that stray": [(persistence, "_has_outlying_mode", give(False))],
     "a baseline that stands alone": [(watcher, "ENOUGH_AGAINST", 10**9)],
     "two tests that agree": [(watch_worlds, "agreement", give(None))],
     "learnt scatter": [(StateSums, "scatter", lambda self, _: self.structure.scatter_variance)],

@@ -69,6 +69,14 @@ READING = (
 )
 
 
+@pytest.mark.parametrize(
+    ("line", "schema"), [("status", "shm.status/1"), ("status --of 1", "shm.recording_stages/1")]
+)
+def test_status_has_a_schema_per_shape(shm: Shm, bridge: Workspace, line: str, schema: str) -> None:
+    ended = shm("--workspace", bridge.folder, *line.split(), "--json")
+    assert parsed(ended.out)["schema"] == schema
+
+
 @pytest.mark.parametrize("line", READING)
 def test_a_reading_command_gives_one_json_document(shm: Shm, bridge: Workspace, line: str) -> None:
     ended = shm("--workspace", bridge.folder, *line.split(), "--json")

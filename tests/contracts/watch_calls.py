@@ -122,7 +122,7 @@ def document(tests: Sequence[WatchedTest], alerts: Sequence[Alert]) -> Any:
         {
             "watch": watch_document(last),
             "drifts": [drift_document(each) for each in last.drifts],
-            "reported": [drift_document(each) for each in last.told],
+            "reported": [drift_document(each) for each in last.published_drifts],
             "called": [each.test for each in tests if each.change.called],
             "alerts": [alert_document(each) for each in alerts],
         }

@@ -48,7 +48,7 @@ PAGES = {
     "bridges": "/bridges",
     "password": "/password",
 }
-CHARTS = {"hanger": 3, "recording": 6}
+CHARTS = {"hanger": 3, "recording": 5}
 PAPER, INK = "rgb(255, 255, 255)", "rgb(29, 35, 48)"
 PAPER_WIDE = "640px"
 

@@ -70,6 +70,13 @@ def test_a_hook_that_cannot_be_run_says_so(tmp_path: Path, command: tuple[str, .
         a_notifier(tmp_path)(CommandHook("mail", command), an_alert())
 
 
+def test_an_alert_links_to_the_page_that_it_is_about(tmp_path: Path) -> None:
+    notifier = HookNotifier(tmp_path, 30.0, ENVIRONMENT, "https://shm.example.org/")
+    told = python("import json, sys; print(json.load(sys.stdin).get('link', 'none'))")
+    assert notifier(told, an_alert()).endswith("https://shm.example.org/hangers/3#alerts")
+    assert a_notifier(tmp_path)(told, an_alert()).endswith("none")
+
+
 def test_a_hook_that_hangs_is_ended_with_all_its_children(tmp_path: Path) -> None:
     code = (
         "import subprocess, time; child = subprocess.Popen(['sleep', '60']);"

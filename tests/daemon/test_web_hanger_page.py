@@ -25,7 +25,7 @@ from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import START, make_workspace, write_loss, write_test
 from tests.report.diagnoses import LED
 
-_OF_SPRINGS = {"stiffness"}  # the class in force, beam1, clamps its ends
+_OF_OTHERS = {"stiffness", "control"}  # beam1 clamps its ends; no tension of it is known
 _PAGE = {"Accept": "text/html"}
 
 
@@ -130,7 +130,7 @@ def test_nothing_that_a_person_reads_is_not_a_number(client: httpx.Client, page:
 
 
 def test_every_figure_of_the_page_is_one_that_plotly_draws(client: httpx.Client, page: str) -> None:
-    assert set(figures_of(page)) == {each.name for each in FIGURES} - _OF_SPRINGS
+    assert set(figures_of(page)) == {each.name for each in FIGURES} - _OF_OTHERS
     for name in figures_of(page):
         document = figure(client, name)
         drawn = plotly.Figure({key: document[key] for key in ("data", "layout")})

@@ -29,15 +29,21 @@ def browser(workspace: Workspace) -> Iterator[httpx.Client]:
         yield client
 
 
-def put(client: httpx.Client, key: str, value: str, action: str = "set") -> httpx.Response:
-    told = {"key": key, "value": value, "action": action, "based_on": based_on(client, key)}
-    return client.post("/settings", data=told)
+def put(client: httpx.Client, key: str, value: str, back: bool = False) -> httpx.Response:
+    return client.post("/settings", data=filled_in(key, based_on(client, key), back, value=value))
+
+
+def filled_in(key: str, opened: str, back: bool = False, **values: str) -> dict[str, str]:
+    """Fill in one setting's fields in the form of a page opened at `opened`."""
+    told = {f"{part}.{key}": value for part, value in values.items()}
+    told |= {f"was_{part}.{key}": "as it was" for part in values}
+    return {**told, f"based_on.{key}": opened or "0", **({f"back.{key}": "on"} if back else {})}
 
 
 def based_on(client: httpx.Client, key: str) -> str:
-    """What the form of a page that is opened now carries."""
-    form = client.get("/settings?hanger=3").text.partition(f'name="key" value="{key}"')[2]
-    found = re.search('name="based_on" value="([0-9]+)"', form)
+    """Read what the form of a page that is opened now carries."""
+    page = client.get("/settings?hanger=3").text
+    found = re.search(f'name="based_on.{re.escape(key)}" value="([0-9]+)"', page)
     return found[1] if found else ""
 
 
@@ -62,7 +68,7 @@ def test_a_threshold_holds_from_now_on_and_goes_back_to_the_file(
     assert (row.who, row.via, row.action, row.detail) == (
         "engineer", "page", "setting changed", f"from {in_file:g} to 0.9",
     )  # fmt: skip
-    put(browser, LEVEL, "", "back")
+    put(browser, LEVEL, "", back=True)
     assert level(workspace) == in_file
 
 
@@ -71,8 +77,7 @@ def test_who_saves_on_what_another_has_changed_meanwhile_is_shown_it_and_overwri
 ) -> None:
     opened = based_on(browser, LEVEL)
     assert put(browser, LEVEL, "0.9").status_code == 303
-    late = {"key": LEVEL, "value": "0.7", "action": "set", "based_on": opened}
-    refused = browser.post("/settings", data=late)
+    refused = browser.post("/settings", data=filled_in(LEVEL, opened, value="0.7"))
     assert refused.status_code == 409
     assert "it is 0.9, set by engineer at 20" in refused.text
     assert "Your change, 0.7, was not saved" in refused.text
@@ -80,6 +85,34 @@ def test_who_saves_on_what_another_has_changed_meanwhile_is_shown_it_and_overwri
     assert put(browser, LEVEL, "0.7").status_code == 303
     with workspace.store() as store:
         assert list_changes(store, limit=1)[0].detail == "from 0.9 to 0.7"
+
+
+def test_what_nobody_changed_is_not_set_though_all_is_one_form(
+    browser: httpx.Client, workspace: Workspace
+) -> None:
+    other = "hanger.3.thresholds.tension_shift_fraction"
+    unchanged = {f"based_on.{other}": "0", f"value.{other}": "0.05", f"was_value.{other}": "0.05"}
+    opened = based_on(browser, LEVEL)
+    told = {**unchanged, **filled_in(LEVEL, opened, value="0.9")}
+    assert browser.post("/settings", data=told).status_code == 303
+    with workspace.store() as store:
+        assert [row.key for row in store.settings.list_current().values()] == [LEVEL]
+
+
+def test_a_test_alert_is_sent_from_the_page_and_what_went_wrong_is_said(
+    browser: httpx.Client, workspace: Workspace
+) -> None:
+    told = workspace.folder / "told.json"
+    with (workspace.folder / "bridge.toml").open("a") as file:
+        file.write(f'\n[[hook]]\nname = "file"\ncommand = ["tee", "{told}"]\n')
+        file.write('\n[[hook]]\nname = "broken"\ncommand = ["false"]\n')
+    answer = browser.post("/settings/hooks/test", data={"hook": "file"})
+    assert "The hook file took the test alert in" in answer.text
+    assert "This is a test of the hook file" in told.read_text()
+    assert browser.post("/settings/hooks/test", data={"hook": "broken"}).status_code == 409
+    assert browser.post("/settings/hooks/test", data={"hook": "none"}).status_code == 404
+    with workspace.store() as store:
+        assert store.alerts.list_all() == ()
 
 
 def test_the_page_says_whether_stored_tests_are_judged_with_what_it_shows(
@@ -112,10 +145,10 @@ def hooked(browser: httpx.Client, workspace: Workspace) -> httpx.Client:
 
 
 def put_hours(
-    client: httpx.Client, begins: str, ends: str, action: str = "set", opened: str | None = None
+    client: httpx.Client, begins: str, ends: str, back: bool = False, opened: str | None = None
 ) -> httpx.Response:
     opened = based_on(client, HOURS) if opened is None else opened
-    told = {"key": HOURS, "begins": begins, "ends": ends, "action": action, "based_on": opened}
+    told = filled_in(HOURS, opened, back, begins=begins, ends=ends)
     return client.post("/settings", data=told)
 
 
@@ -129,12 +162,12 @@ def test_quiet_hours_of_a_hook_are_set_taken_away_and_given_back_to_the_file(
 ) -> None:
     opened, found = based_on(hooked, HOURS), [hours(workspace)]
     shown = hooked.get("/settings").text
-    assert 'name="begins" value="22:00"' in shown
-    assert 'name="ends" value="06:00"' in shown
-    for begins, ends, action in (("20:30", "07:00", "set"), ("", "", "set"), ("", "", "back")):
-        assert put_hours(hooked, begins, ends, action).status_code == 303
+    assert f'name="begins.{HOURS}" value="22:00"' in shown
+    assert f'name="ends.{HOURS}" value="06:00"' in shown
+    for begins, ends, back in (("20:30", "07:00", False), ("", "", False), ("", "", True)):
+        assert put_hours(hooked, begins, ends, back).status_code == 303
         found.append(hours(workspace))
-        if not begins and action == "set":
+        if not begins and not back:
             told = "hook night watch quiet_hours = none instead of what bridge.toml says"
             assert any(told in each.found for each in examine(workspace.folder, utc_now()))
     assert found == ["22:00-06:00", "20:30-07:00", "none", "22:00-06:00"]

@@ -31,11 +31,22 @@ _DRAW_ALL = """async (longest_ms) => {
   const end = Date.now() + longest_ms;
   const charts = [...document.querySelectorAll("figure.chart")];
   for (const chart of charts) {
+    const part = chart.closest("[data-tab]");
+    if (part?.hidden) document.getElementById(`tab-${part.id}`).click();
     chart.scrollIntoView();
     while (undrawn(chart) && Date.now() < end) await new Promise((done) => setTimeout(done, 30));
   }
   scrollTo(0, 0);
   return charts.filter(undrawn).map((chart) => chart.innerText || chart.dataset.figure);
+}"""
+# Figures of a part that was hidden take their new width a moment after it is shown.
+_WIDTH = """async () => {
+  const whole = document.documentElement;
+  const end = Date.now() + 5000;
+  while (whole.scrollWidth > whole.clientWidth && Date.now() < end) {
+    await new Promise((done) => setTimeout(done, 50));
+  }
+  return whole.scrollWidth;
 }"""
 _RULES = {"resultTypes": ["violations"]}
 _COLOURS = {**_RULES, "runOnly": {"type": "rule", "values": ["color-contrast"]}}
@@ -92,7 +103,16 @@ def undrawn_charts(page: Page) -> list[str]:
 
 
 def faults(page: Page, *, colours_only: bool = False) -> list[str]:
-    """What axe-core calls serious or critical; not of the insides of plotly's drawings."""
+    """Return what axe-core calls serious or critical in any tab, but for what plotly draws."""
+    tabs = page.get_by_role("tab").all()
+    found = [] if tabs else _faults_shown(page, colours_only)
+    for tab in tabs:
+        tab.click()
+        found += _faults_shown(page, colours_only)
+    return found
+
+
+def _faults_shown(page: Page, colours_only: bool) -> list[str]:
     found = _AXE.run(page, {"exclude": [[".plot svg"]]}, _COLOURS if colours_only else _RULES)
     violations: list[dict[str, Any]] = found.response["violations"]
     return [
@@ -104,6 +124,9 @@ def faults(page: Page, *, colours_only: bool = False) -> list[str]:
 
 
 def width_px(page: Page) -> int:
-    """How wide the page is; more than its window where it scrolls sideways."""
-    found: int = page.evaluate("document.documentElement.scrollWidth")
-    return found
+    """How wide the page is in its widest tab; more than its window where it scrolls sideways."""
+    widest = 0
+    for show in [tab.click for tab in page.get_by_role("tab").all()] or [lambda: None]:
+        show()
+        widest = max(widest, page.evaluate(_WIDTH))
+    return widest

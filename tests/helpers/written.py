@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 import zipfile
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import csiio
 import h5py
@@ -25,6 +27,7 @@ from shm.read import write as write_ours
 from shm.read.arrays import Layout, layout_of
 from shm.read.base import PeekChannel
 from shm.read.comma_separated import recording_text, response_text
+from shm.read.header import mass_entries
 from shm.read.logger_words import SI
 from shm.read.sidecar import sidecar_path, write_sidecar
 from shm.values import FrequencyResponse, Recording
@@ -43,6 +46,9 @@ def write(described: Recording | FrequencyResponse, path: Path) -> None:
         return
     if path.suffix == ".mseed":
         _mini_seed(described, path)
+        return
+    if path.suffix == ".json":
+        _sep005(described, path)
         return
     if path.suffix in _WRITERS:
         _WRITERS[path.suffix](layout_of(described), path)
@@ -133,6 +139,27 @@ def _mini_seed(described: Recording | FrequencyResponse, path: Path) -> None:
     write_sidecar(described, channels, described.sampling_rate_hz, path)
     text = sidecar_path(path).read_text()
     sidecar_path(path).write_text(f"calibration = {[float(one) for one in largest]}\n{text}")
+
+
+def _sep005(described: Recording | FrequencyResponse, path: Path) -> None:
+    """Channels as JSON; what SEP005 does not know in keys of ours."""
+    assert isinstance(described, Recording)
+    whole = {"hanger": described.hanger, "temperature_c": described.temperature_c}
+    whole |= mass_entries(described.added_mass)
+    channels = [
+        {
+            **each,
+            "data": each["data"].tolist(),
+            "unit_str": SI[c.quantity],
+            **_known({"plane": c.plane, "x_m": c.x_m, "full_scale": c.full_scale, **whole}),
+        }
+        for each, c in zip(described.to_sep005(), described.channels, strict=True)
+    ]
+    path.write_text(json.dumps(channels))
+
+
+def _known(said: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in said.items() if value not in (None, "") and value == value}
 
 
 def _campbell(described: Recording | FrequencyResponse, path: Path) -> None:

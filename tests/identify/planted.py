@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.identify import IdentifyOptions
-from shm.identify.measuring.setups import measured_recordings
+from shm.identify.measuring.setups import measure_recordings
 from shm.identify.quality import Inspection, assess, tones
 from shm.values import FloatArray, QualityCheck, Recording
 from tests.identify.signals import hanger_modes, recording
@@ -33,7 +33,7 @@ def changed(
 
 
 def inspection(record: Recording, options: IdentifyOptions = OPTIONS) -> Inspection:
-    measurements = measured_recordings([record], options)
+    measurements = measure_recordings([record], options)
     return Inspection([record], measurements, options, tones(measurements, [record], options))
 
 

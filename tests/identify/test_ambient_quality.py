@@ -9,7 +9,7 @@ import pytest
 
 from shm.identify import Identification, IdentifyOptions, identify
 from shm.identify.contract import Dropped, Finding, FoundMode, Poles
-from shm.identify.estimation.stabilise import completed
+from shm.identify.estimation.stabilise import merge_findings
 from shm.identify.measuring.ambient import LEAST_PARTS, LOUDER, ambient_measurement, set_apart
 from shm.identify.quality import Inspection
 from shm.identify.quality.of_ambient import ROWS
@@ -132,6 +132,6 @@ def test_a_finding_is_completed_by_what_it_lacks() -> None:
     assert one is not None
     assert other is not None
     lost = Dropped("mode at 23 Hz", 1, "its frequency changes from hit to hit", 23.01)
-    whole = completed(replace(one, dropped=(lost,)), other)
+    whole = merge_findings(replace(one, dropped=(lost,)), other)
     assert [mode.frequency_hz for mode in whole.modes] == [6.0, 13.5, 23.0]
     assert whole.dropped == ()

@@ -11,7 +11,7 @@ import pytest
 from shm.documents import dump
 from shm.identify.contract import Measurement
 from shm.identify.identification import Identification
-from shm.identify.setup_merging.calm_part import calmed, free_below, level_left_at
+from shm.identify.setup_merging.calm_part import late_part_level, late_parts, linear_below_level
 from shm.modes_document import modes_document, parse_modes
 from shm.values import Mode, ResponsePoint
 from tests.helpers.struck import identified
@@ -51,10 +51,10 @@ def test_later_parts_keep_what_rings_and_know_what_is_left() -> None:
     time_s = np.arange(1000) / 100
     decay = np.exp(-0.3 * time_s) * np.sin(20 * time_s)[None]
     one = Measurement("a", (ResponsePoint("a"),), (decay, decay), 100.0, None, driven=(decay,))
-    (later,) = calmed([one], 0.5)
+    (later,) = late_parts([one], 0.5)
     assert np.array_equal(later.decays[0], decay[:, 500:])
     assert later.driven == ()
-    assert level_left_at([one], 0.5) == pytest.approx(np.exp(-0.3 * 5), rel=0.1)
+    assert late_part_level([one], 0.5) == pytest.approx(np.exp(-0.3 * 5), rel=0.1)
 
 
 def test_a_sound_test_says_nothing_of_it() -> None:
@@ -85,7 +85,7 @@ def _ringing(knocks: float) -> Measurement:
 
 def test_ring_downs_that_begin_as_no_sum_of_modes_are_seen_whatever_acts() -> None:
     modes = [Mode("transverse", n + 1, hz, 1e-3 * hz, RATIO, 1e-3) for n, hz in enumerate(HZ)]
-    assert free_below([_ringing(0.0)], modes) == 1.0
-    assert 0.3 < free_below([_ringing(0.02)], modes) < 0.95
+    assert linear_below_level([_ringing(0.0)], modes) == 1.0
+    assert 0.3 < linear_below_level([_ringing(0.02)], modes) < 0.95
     few = replace(_ringing(0.02), decays=_ringing(0.02).decays[:2])
-    assert free_below([few], modes) == 1.0
+    assert linear_below_level([few], modes) == 1.0

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode
-from shm.identify.estimation.close_pairs import told_apart
+from shm.identify.estimation.close_pairs import split_close_pairs
 from shm.identify.estimation.poles import Candidate, Pole, PoleSet
-from shm.identify.estimation.repeats import Repeats, doubt, find_again, proven
+from shm.identify.estimation.repeats import Repeats, doubt, find_again, validate_candidates
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray
 
@@ -60,8 +60,10 @@ def _before(models: list[list[PoleSet]]) -> tuple[list[Candidate], list[Repeats]
 
 
 def _after(models: list[list[PoleSet]]) -> tuple[FoundMode, ...]:
-    candidates, repeats = told_apart(*_before(models), (models[0], models[1:]), SECONDS, OPTIONS)
-    return proven(candidates, repeats, OPTIONS)[0]
+    candidates, repeats = split_close_pairs(
+        *_before(models), (models[0], models[1:]), SECONDS, OPTIONS
+    )
+    return validate_candidates(candidates, repeats, OPTIONS)[0]
 
 
 def test_modes_mixed_by_noise_are_both_found_with_their_own_shapes() -> None:
@@ -81,14 +83,14 @@ def test_modes_mixed_by_noise_are_both_found_with_their_own_shapes() -> None:
 def test_modes_that_noise_does_not_mix_stay_as_they_are() -> None:
     models = _models(mixing=1e-5)
     candidates, repeats = _before(models)
-    after, _ = told_apart(candidates, repeats, (models[0], models[1:]), SECONDS, OPTIONS)
+    after, _ = split_close_pairs(candidates, repeats, (models[0], models[1:]), SECONDS, OPTIONS)
     assert after == candidates
 
 
 def test_poles_of_one_shape_are_not_made_into_two_modes() -> None:
     models = _models(mixing=0.05, alike=True)
     candidates, repeats = _before(models)
-    after, _ = told_apart(candidates, repeats, (models[0], models[1:]), SECONDS, OPTIONS)
+    after, _ = split_close_pairs(candidates, repeats, (models[0], models[1:]), SECONDS, OPTIONS)
     assert after == candidates
 
 
@@ -96,5 +98,5 @@ def test_two_hits_prove_no_pair() -> None:
     models = _models(mixing=0.05)
     candidates = _candidates(models[0])
     repeats = find_again(candidates, models[1:3])
-    after, _ = told_apart(candidates, repeats, (models[0], models[1:3]), SECONDS, OPTIONS)
+    after, _ = split_close_pairs(candidates, repeats, (models[0], models[1:3]), SECONDS, OPTIONS)
     assert after == candidates

@@ -53,11 +53,14 @@ def test_free_motion_is_the_same_exponential_as_before_the_filter() -> None:
 
 
 def test_all_hits_have_the_same_lead_even_where_the_record_begins_with_the_hit() -> None:
-    def struck(hit: HitRecord) -> int:
+    def peak_of(hit: HitRecord) -> int:
         return int(np.argmax(cut(hit, RATE_HZ, 50.0).driven[0]))
 
     early = _hits(lead_s=0.002)
-    assert {struck(hit) for hit in early + _hits()} <= {struck(early[0]), struck(early[0]) + 1}
+    assert {peak_of(hit) for hit in early + _hits()} <= {
+        peak_of(early[0]),
+        peak_of(early[0]) + 1,
+    }
 
 
 def test_unknown_samples_before_the_hit_do_not_reach_it() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from shm.identify import IdentifyOptions, identify
 from shm.identify.estimation.poles import Candidate, Pole, PoleSet, collinearity
-from shm.identify.estimation.stabilise import as_simultaneous, delays_s, simultaneous
+from shm.identify.estimation.stabilise import delays_s, remove_candidate_delays, remove_delays
 from shm.values import Channel, FloatArray, Hanger, Recording
 
 OPTIONS = IdentifyOptions(2.0, 100.0)
@@ -33,12 +33,12 @@ def test_delays_are_found_and_taken_off() -> None:
     assert found is not None
     assert found - found[0] == pytest.approx(LATE_S, abs=1e-4)
     assert min(collinearity(each.poles[-1].shape) for each in candidates) < 0.5
-    real = [as_simultaneous(each, found) for each in candidates]
+    real = [remove_candidate_delays(each, found) for each in candidates]
     assert min(each.collinearity for each in real) > 0.99
     poles = PoleSet(20, FREQUENCIES_HZ, 0 * FREQUENCIES_HZ, np.array([
         each.poles[-1].shape for each in candidates
     ]).T)  # fmt: skip
-    turned = simultaneous(poles, found).shapes.T
+    turned = remove_delays(poles, found).shapes.T
     assert turned == pytest.approx(np.array([each.poles[-1].shape for each in real]))
 
 

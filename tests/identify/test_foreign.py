@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode, Tone
-from shm.identify.mode_ordering.placement import Placement, placed
+from shm.identify.mode_ordering.placement import Placement, place_modes
 from shm.simulate import HangerState
 from shm.values import PLANES, Hanger, ResponsePoint
 from tests.worlds.simulated.elements import plane_modes
@@ -43,7 +43,7 @@ def hanger_modes(hanger: Hanger = HANGER, orders: int = 7) -> list[FoundMode]:
 
 def with_foreign(foreign: FoundMode, *, tones: tuple[Tone, ...] = ()) -> Placement:
     found = sorted([*hanger_modes(), foreign], key=lambda mode: mode.frequency_hz)
-    return placed(found, POINTS, HANGER, tones)
+    return place_modes(found, POINTS, HANGER, tones)
 
 
 def orders_of(placement: Placement) -> dict[str, list[int]]:
@@ -54,9 +54,9 @@ COUNTED = {plane: list(range(1, 8)) for plane in PLANES}
 
 
 def test_a_hanger_alone_has_nothing_set_aside() -> None:
-    placement = placed(hanger_modes(), POINTS, HANGER)
+    placement = place_modes(hanger_modes(), POINTS, HANGER)
     assert orders_of(placement) == COUNTED
-    assert placement.set_aside == ()
+    assert placement.foreign_modes == ()
     assert placement.notes == ()
 
 
@@ -65,7 +65,7 @@ def test_a_multiple_of_a_mode_with_its_shape_is_a_harmonic(fold: int) -> None:
     base = hanger_modes()[0]
     placement = with_foreign(replace(base, frequency_hz=fold * base.frequency_hz))
     assert orders_of(placement) == COUNTED
-    (foreign,) = placement.set_aside
+    (foreign,) = placement.foreign_modes
     assert foreign.kind == "harmonic"
     assert f"{fold} times the mode at {base.frequency_hz:.3f} Hz" in foreign.reason
 
@@ -77,9 +77,9 @@ def test_the_true_modes_of_a_string_lie_at_multiples_and_stay() -> None:
     frequencies = modes.angular_frequency_rad_s / (2 * np.pi)
     assert frequencies[1:3] / frequencies[0] == pytest.approx([2, 3], rel=2e-4)
     found = [found_at(f, s) for f, s in zip(frequencies, modes.at(PLACES).T, strict=True)]
-    placement = placed(found, POINTS, STRING)
+    placement = place_modes(found, POINTS, STRING)
     assert [mode.order for mode in placement.modes] == [1, 2, 3, 4, 5, 6]
-    assert placement.set_aside == ()
+    assert placement.foreign_modes == ()
 
 
 def test_of_a_string_mode_and_a_harmonic_beside_it_the_harmonic_goes() -> None:
@@ -87,10 +87,10 @@ def test_of_a_string_mode_and_a_harmonic_beside_it_the_harmonic_goes() -> None:
     found = hanger_modes(STRING)
     first = found[0]
     harmonic = replace(first, frequency_hz=2 * first.frequency_hz)
-    placement = placed(
+    placement = place_modes(
         sorted([*found, harmonic], key=lambda mode: mode.frequency_hz), POINTS, STRING
     )
-    assert [(each.kind, each.frequency_hz) for each in placement.set_aside] == [
+    assert [(each.kind, each.frequency_hz) for each in placement.foreign_modes] == [
         ("harmonic", harmonic.frequency_hz)
     ]
     assert orders_of(placement) == COUNTED
@@ -102,16 +102,16 @@ def test_a_swing_about_the_arch_end_is_the_deck(frequency_hz: float, angle_deg: 
     swing = found_at(frequency_hz, 1 - PLACES / HANGER.length_m, angle_deg, damping=0.01)
     placement = with_foreign(swing)
     assert orders_of(placement) == COUNTED
-    assert [each.kind for each in placement.set_aside] == ["deck"]
-    assert placement.set_aside[0].damping_ratio == 0.01
+    assert [each.kind for each in placement.foreign_modes] == ["deck"]
+    assert placement.foreign_modes[0].damping_ratio == 0.01
 
 
 def test_a_second_mode_beside_an_order_is_told_from_it_by_its_shape() -> None:
     third = [mode for mode in hanger_modes() if abs(mode.shape[0]) > abs(mode.shape[1])][2]
     swing = found_at(1.006 * third.frequency_hz, 1 - PLACES / HANGER.length_m, damping=0.008)
     placement = with_foreign(swing)
-    assert [each.frequency_hz for each in placement.set_aside] == [swing.frequency_hz]
-    assert "one mode a plane near" in placement.set_aside[0].reason
+    assert [each.frequency_hz for each in placement.foreign_modes] == [swing.frequency_hz]
+    assert "one mode a plane near" in placement.foreign_modes[0].reason
 
 
 def test_a_named_tone_is_set_aside_with_its_name_even_where_an_order_lies() -> None:
@@ -119,9 +119,9 @@ def test_a_named_tone_is_set_aside_with_its_name_even_where_an_order_lies() -> N
     lost = found.pop(4)
     steady = replace(lost, damping_ratio=1e-5)
     tone = Tone(1.0005 * lost.frequency_hz, "pump")
-    placement = placed(sorted([*found, steady], key=lambda m: m.frequency_hz), POINTS, HANGER,
+    placement = place_modes(sorted([*found, steady], key=lambda m: m.frequency_hz), POINTS, HANGER,
                        (tone,))  # fmt: skip
-    (foreign,) = placement.set_aside
+    (foreign,) = placement.foreign_modes
     assert foreign.kind == "tone"
     assert "pump" in foreign.reason
     assert len(placement.modes) == len(found)
@@ -130,18 +130,18 @@ def test_a_named_tone_is_set_aside_with_its_name_even_where_an_order_lies() -> N
 def test_a_mode_that_decays_is_kept_though_a_tone_lies_there() -> None:
     found = hanger_modes()
     tone = Tone(found[4].frequency_hz, "mains")
-    placement = placed(found, POINTS, HANGER, (tone,))
+    placement = place_modes(found, POINTS, HANGER, (tone,))
     assert orders_of(placement) == COUNTED
 
 
 def test_what_hardly_decays_and_fits_no_order_is_a_tone_though_nobody_named_it() -> None:
     placement = with_foreign(found_at(16.7, np.array([1.0, -0.3, 0.5]), 40.0, damping=1e-5))
-    assert [each.kind for each in placement.set_aside] == ["tone"]
+    assert [each.kind for each in placement.foreign_modes] == ["tone"]
     assert orders_of(placement) == COUNTED
 
 
 def test_without_any_description_a_foreign_mode_is_still_found() -> None:
     found = sorted([*hanger_modes(), found_at(3.1, np.ones(3))], key=lambda mode: mode.frequency_hz)
-    placement = placed(found, POINTS, None)
+    placement = place_modes(found, POINTS, None)
     assert orders_of(placement) == COUNTED
-    assert [each.frequency_hz for each in placement.set_aside] == [3.1]
+    assert [each.frequency_hz for each in placement.foreign_modes] == [3.1]

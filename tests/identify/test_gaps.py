@@ -10,7 +10,7 @@ import pytest
 
 from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.bars import Description, log_factor
-from shm.identify.mode_ordering.placement import placed
+from shm.identify.mode_ordering.placement import place_modes
 from shm.identify.quality.of_modes import first_orders
 from shm.values import PLANES, Plane, ResponsePoint
 from tests.helpers.beam_shapes import mode_shape
@@ -62,7 +62,7 @@ def test_a_doubtful_mode_is_taken_only_where_the_bar_lacks_one(
         asked.extend(at_hz)
         return [], [doubtful]
 
-    placement = placed(SURE, POINTS, HANGER, look=look)
+    placement = place_modes(SURE, POINTS, HANGER, look=look)
     given = {(each.plane, each.order): each.frequency_hz for each in placement.modes}
     assert asked == pytest.approx([mode(*GAP).frequency_hz], rel=1e-3)
     assert (given.get(GAP) == doubtful.frequency_hz) is is_taken
@@ -77,7 +77,7 @@ def test_of_a_hanger_that_is_no_plain_bar_only_what_is_proven_is_taken(in_doubt:
     ]
     more = [mode(*GAP, 0.006)]
     seen = ([], more) if in_doubt else (more, [])
-    placement = placed(rough, POINTS, HANGER, look=lambda _: seen)
+    placement = place_modes(rough, POINTS, HANGER, look=lambda _: seen)
     assert len(placement.modes) == len(SURE) + (not in_doubt)
 
 
@@ -85,11 +85,11 @@ def test_without_a_description_nothing_is_asked_for() -> None:
     def never(_: object) -> tuple[list[FoundMode], list[FoundMode]]:
         raise AssertionError
 
-    assert placed(SURE, POINTS, None, look=never).modes
+    assert place_modes(SURE, POINTS, None, look=never).modes
 
 
 def test_a_first_order_below_the_band_is_not_missed() -> None:
-    placement = placed(SURE[1:], POINTS, HANGER, look=lambda _: ([], []))
+    placement = place_modes(SURE[1:], POINTS, HANGER, look=lambda _: ([], []))
     lowest, next_hz = (mode(PLANES[0], order).frequency_hz for order in (1, 2))
     lost = min(PLANES, key=lambda plane: mode(plane, 1).frequency_hz)
     told = first_orders(placement.modes, HANGER, 0.8 * lowest)

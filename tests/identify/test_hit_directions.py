@@ -10,7 +10,7 @@ import pytest
 
 from shm.identify import IdentifyOptions, identify
 from shm.identify.contract import Measurement
-from shm.identify.setup_merging.hit_directions import alike
+from shm.identify.setup_merging.hit_directions import have_same_sensors
 from shm.values import PLANES, ModalTest, Mode, Plane, Recording, ResponsePoint
 from tests.identify.signals import Planted, recording
 
@@ -96,4 +96,4 @@ def _set_up(plane: Plane | None, hammer_m: float = 1.0, hits: int = 3) -> Measur
 def test_only_set_ups_that_differ_by_the_direction_of_enough_hits_are_alike(
     others: list[Measurement], expected: bool
 ) -> None:
-    assert alike([_set_up("transverse"), *others]) is expected
+    assert have_same_sensors([_set_up("transverse"), *others]) is expected

@@ -102,11 +102,11 @@ def test_a_weak_blow_after_the_swing_ends_the_ring_down_and_is_no_second_blow(
 @pytest.mark.parametrize("after_s", [0.015, 0.06, 0.4])
 def test_a_second_strike_of_the_same_swing_is_seen(share: float, after_s: float) -> None:
     force, starts = _force()
-    struck = [
+    double_hits = [
         p.second_peak > 0
         for p in find_pulses(_struck_again(force, starts[2], share, after_s), 2048.0)
     ]
-    assert struck == [False, False, True, False]
+    assert double_hits == [False, False, True, False]
 
 
 def test_a_second_strike_is_told_as_a_share_of_the_first() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from shm.identify.estimation.repeats import FREQUENCY_FLOOR, frequency_sd, jackknife_sd, steadied
+from shm.identify.estimation.repeats import FREQUENCY_FLOOR, frequency_sd, jackknife_sd, smooth_sds
 
 
 def _without_each(values: np.ndarray) -> np.ndarray:
@@ -50,10 +50,10 @@ def test_it_works_column_by_column() -> None:
 def test_a_deviation_that_is_small_by_chance_is_held_up_by_its_neighbours() -> None:
     """(4 s^2 + 1 median^2)/5 for five hits; what neighbours agree on stays."""
     alike = np.full(6, 3.0)
-    np.testing.assert_allclose(steadied(alike, 5), alike)
+    np.testing.assert_allclose(smooth_sds(alike, 5), alike)
     alike[2] = 0.03
-    assert steadied(alike, 5)[2] == pytest.approx(np.sqrt((4 * 0.03**2 + 3.0**2) / 5))
-    np.testing.assert_array_equal(steadied(alike, 2), alike)
+    assert smooth_sds(alike, 5)[2] == pytest.approx(np.sqrt((4 * 0.03**2 + 3.0**2) / 5))
+    np.testing.assert_array_equal(smooth_sds(alike, 2), alike)
 
 
 def test_moderated_deviations_of_few_hits_make_fewer_false_outliers() -> None:
@@ -62,7 +62,7 @@ def test_moderated_deviations_of_few_hits_make_fewer_false_outliers() -> None:
     hits = rng.standard_normal((5, 16, 2000)) * np.geomspace(10, 1, 16)[:, None]
     mean = hits.mean(axis=0)
     sds = jackknife_sd((hits.sum(axis=0) - hits) / 4)
-    steady = np.array([steadied(own, 5) for own in sds.T]).T
+    steady = np.array([smooth_sds(own, 5) for own in sds.T]).T
     raw, better = (np.mean(np.abs(mean / each) > 4) for each in (sds, steady))
     assert better < 0.4 * raw
     assert 0.75 < np.mean((mean / steady) ** 2) < 1.1

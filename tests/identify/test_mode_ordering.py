@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode
-from shm.identify.mode_ordering.placement import placed
+from shm.identify.mode_ordering.placement import place_modes
 from shm.values import NAN, PLANES, Hanger
 from tests.identify.test_foreign import (
     COUNTED,
@@ -23,7 +23,7 @@ from tests.identify.test_foreign import (
 def test_missing_modes_do_not_shift_the_others_and_are_named() -> None:
     found = hanger_modes()
     kept = [mode for index, mode in enumerate(found) if index not in (0, 1, 6)]
-    placement = placed(kept, POINTS, HANGER)
+    placement = place_modes(kept, POINTS, HANGER)
     numbers = [number for orders in orders_of(placement).values() for number in orders]
     assert len(numbers) == len(kept)
     assert min(numbers) == 2
@@ -46,12 +46,12 @@ def _truth(found: list[FoundMode]) -> dict[FoundMode, int]:
 def test_a_nominal_tension_far_off_does_not_shift_the_orders(factor: float) -> None:
     hanger = replace(HANGER, nominal_tension_n=HANGER.nominal_tension_n / factor)
     kept = hanger_modes()[4:]
-    assert orders_of(placed(kept, POINTS, hanger)) == {p: [3, 4, 5, 6, 7] for p in PLANES}
+    assert orders_of(place_modes(kept, POINTS, hanger)) == {p: [3, 4, 5, 6, 7] for p in PLANES}
 
 
 def test_planes_turned_from_the_sensors_keep_their_modes_and_a_note_says_by_how_much() -> None:
     turned = [_turned(mode, 35.0) for mode in hanger_modes()]
-    placement = placed(turned, POINTS, HANGER)
+    placement = place_modes(turned, POINTS, HANGER)
     assert orders_of(placement) == COUNTED
     assert any("35 degrees" in note for note in placement.notes)
 
@@ -62,13 +62,13 @@ def test_a_pair_that_mixes_keeps_one_mode_in_each_plane() -> None:
     first, second = found[0], found[1]
     near = replace(second, frequency_hz=1.0005 * first.frequency_hz)
     mixed = [_turned(first, 40.0), _turned(near, 40.0), *found[2:]]
-    assert orders_of(placed(mixed, POINTS, HANGER)) == COUNTED
+    assert orders_of(place_modes(mixed, POINTS, HANGER)) == COUNTED
 
 
 def test_an_unresolved_pair_has_its_order_in_both_planes_and_a_wide_deviation() -> None:
     found = hanger_modes()
     merged = found_at(found[2].frequency_hz, found[2].shape[::2] + found[2].shape[1::2], 45.0)
-    placement = placed([*found[:2], merged, *found[4:]], POINTS, HANGER)
+    placement = place_modes([*found[:2], merged, *found[4:]], POINTS, HANGER)
     assert orders_of(placement) == COUNTED
     twice = [mode for mode in placement.modes if mode.frequency_hz == merged.frequency_hz]
     assert [mode.order for mode in twice] == [2, 2]
@@ -78,28 +78,28 @@ def test_an_unresolved_pair_has_its_order_in_both_planes_and_a_wide_deviation() 
 
 def test_without_positions_a_note_says_that_shapes_do_not_help() -> None:
     points = [replace(point, x_m=NAN) for point in POINTS]
-    placement = placed(hanger_modes(), points, HANGER)
+    placement = place_modes(hanger_modes(), points, HANGER)
     assert orders_of(placement) == COUNTED
     assert any("position" in note for note in placement.notes)
 
 
 def test_a_description_that_does_not_fit_is_left_out_and_a_note_says_so() -> None:
     other = Hanger(2, 4.0, 200e9, 0.00283, 6.4e-7, 22.1, 30e3)
-    placement = placed(hanger_modes(), [replace(p, x_m=NAN) for p in POINTS], other)
+    placement = place_modes(hanger_modes(), [replace(p, x_m=NAN) for p in POINTS], other)
     assert orders_of(placement) == COUNTED
     assert any("do not fit the hanger's description" in note for note in placement.notes)
 
 
 def test_what_is_no_hanger_is_counted_and_a_note_says_so() -> None:
     found = [found_at(f, np.ones(3)) for f in (10.0, 10.9, 11.7, 12.5, 90.0)]
-    placement = placed(found, POINTS, None)
+    placement = place_modes(found, POINTS, None)
     assert [mode.order for mode in placement.modes] == [1, 2, 3, 4, 5]
     assert any("counted" in note for note in placement.notes)
 
 
 def test_nothing_found_is_nothing_placed() -> None:
-    placement = placed([], POINTS, HANGER)
-    assert (placement.modes, placement.set_aside) == ((), ())
+    placement = place_modes([], POINTS, HANGER)
+    assert (placement.modes, placement.foreign_modes) == ((), ())
 
 
 def _turned(mode: FoundMode, degrees: float) -> FoundMode:
@@ -111,12 +111,12 @@ def _turned(mode: FoundMode, degrees: float) -> FoundMode:
 def test_a_first_order_that_lies_above_the_others_beam_is_kept_and_said() -> None:
     first, *others = hanger_modes()
     irregular = replace(first, frequency_hz=1.2 * first.frequency_hz)
-    placement = placed(sorted([irregular, *others], key=_hz), POINTS, HANGER)
+    placement = place_modes(sorted([irregular, *others], key=_hz), POINTS, HANGER)
     assert orders_of(placement) == COUNTED
     (told,) = [mode for mode in placement.modes if mode.irregular]
     assert told.frequency_hz == irregular.frequency_hz
     assert any(f"order 1, {told.frequency_hz:.2f} Hz, is well off" in n for n in placement.notes)
-    assert not any(mode.irregular for mode in placed(hanger_modes(), POINTS, HANGER).modes)
+    assert not any(mode.irregular for mode in place_modes(hanger_modes(), POINTS, HANGER).modes)
 
 
 def _hz(mode: FoundMode) -> float:

@@ -11,7 +11,7 @@ from shm.errors import NotIdentifiable
 from shm.identify import Identification
 from shm.identify.contract import FoundMode, Poles, Tone
 from shm.identify.mode_ordering.numbering import LEAST_MARGIN
-from shm.identify.mode_ordering.placement import Placement, placed
+from shm.identify.mode_ordering.placement import Placement, place_modes
 from shm.report.shared_tables import headline
 from shm.values import NAN, PLANES, Hanger, ModalTest, ResponsePoint
 from shm.values.modes import NUMBERING
@@ -51,27 +51,27 @@ def _right(placement: Placement) -> bool:
 
 @pytest.mark.parametrize("sensors", [1, 3])
 def test_the_stronger_of_two_series_is_the_axis_own(sensors: int) -> None:
-    placement = placed(_modes(sensors), POINTS[:sensors], HANGER)
+    placement = place_modes(_modes(sensors), POINTS[:sensors], HANGER)
     assert [mode.order for mode in placement.modes] == [1, 2, 3, 4, 5, 6, 7]
     assert _right(placement)
-    assert len(placement.set_aside) == 7
-    assert all("other plane" in mode.reason for mode in placement.set_aside)
+    assert len(placement.foreign_modes) == 7
+    assert all("other plane" in mode.reason for mode in placement.foreign_modes)
 
 
 def test_what_one_axis_does_not_say_is_warned_of() -> None:
-    check = placed(_modes(1), POINTS[:1], HANGER).check
+    check = place_modes(_modes(1), POINTS[:1], HANGER).check
     assert check is not None
     assert check.verdict == "warning"
     assert "biaxial" in check.remedy
     alone = [m for m in _modes(1) if np.isclose(TRUE_HZ, m.frequency_hz, rtol=1e-9).any()]
-    sound = placed(alone, POINTS[:1], HANGER).check
+    sound = place_modes(alone, POINTS[:1], HANGER).check
     assert sound is not None
     assert sound.verdict == "good"
 
 
 def test_hit_across_the_axis_the_shapes_tell_which_series_is_its_own() -> None:
     """The other plane's modes are the stronger ones, and have no shape of a bar."""
-    placement = placed(_modes(3, across=1.0, own=0.05), POINTS, HANGER)
+    placement = place_modes(_modes(3, across=1.0, own=0.05), POINTS, HANGER)
     assert len(placement.modes) >= 6
     assert _right(placement)
 
@@ -79,14 +79,14 @@ def test_hit_across_the_axis_the_shapes_tell_which_series_is_its_own() -> None:
 def test_where_nothing_tells_which_is_whose_neither_has_an_order() -> None:
     """One sensor, and both as strong."""
     equal = [replace(mode, acceleration_m_s2=1.0) for mode in _modes(1)]
-    placement = placed(equal, POINTS[:1], HANGER)
+    placement = place_modes(equal, POINTS[:1], HANGER)
     assert placement.modes == ()
-    assert len(placement.set_aside) == len(equal)
+    assert len(placement.foreign_modes) == len(equal)
 
 
 def test_a_mode_of_the_other_plane_alone_is_known_by_its_shape() -> None:
     rest = [m for m in _modes(3) if not np.isclose(m.frequency_hz, TRUE_HZ[2], rtol=1e-9)]
-    placement = placed(rest, POINTS, HANGER)
+    placement = place_modes(rest, POINTS, HANGER)
     assert [mode.order for mode in placement.modes] == [1, 2, 4, 5, 6, 7]
     assert _right(placement)
 
@@ -95,10 +95,10 @@ def test_orders_that_may_be_others_are_not_guessed_where_the_hanger_is_described
     """Three high orders of one plane, and a tension that may be 0.55 to 1.8 of nominal."""
     high = [m for m in _modes(1, orders=12) if m.acceleration_m_s2 > 0][-6:]
     own = [m for m in high if np.isclose(_far(12), m.frequency_hz, rtol=1e-9).any()]
-    described = placed(own, POINTS[:1], HANGER)
+    described = place_modes(own, POINTS[:1], HANGER)
     assert described.modes == ()
-    assert all("not guessed" in mode.reason for mode in described.set_aside)
-    kinds = {(mode.kind, mode.plane, mode.frequency_sd_hz > 0) for mode in described.set_aside}
+    assert all("not guessed" in mode.reason for mode in described.foreign_modes)
+    kinds = {(mode.kind, mode.plane, mode.frequency_sd_hz > 0) for mode in described.foreign_modes}
     assert kinds == {("unnumbered", None, True)}
     assert described.check is not None
     assert (described.check.name, described.check.verdict) == (NUMBERING, "refused")
@@ -106,11 +106,11 @@ def test_orders_that_may_be_others_are_not_guessed_where_the_hanger_is_described
     none = np.empty(0)
     found = Identification(
         ModalTest("t", ()), None, (), (), Poles(none, none, none, none.astype(bool)),
-        quality=(described.check,), set_aside=described.set_aside,
+        quality=(described.check,), set_aside=described.foreign_modes,
     )  # fmt: skip
     with pytest.raises(NotIdentifiable, match=f"{own[0].frequency_hz:.4g}, .* Hz"):
         found.with_orders("t.csv")
-    plain = placed(own, POINTS[:1], None)
+    plain = place_modes(own, POINTS[:1], None)
     assert len(plain.modes) == len(own)
     assert plain.check is not None
     assert plain.check.verdict == "warning"
@@ -124,8 +124,8 @@ def _far(orders: int) -> np.ndarray:
 
 def test_what_fits_no_bar_is_not_counted_where_a_hanger_is_described() -> None:
     found = [replace(_modes(1)[0], frequency_hz=hz) for hz in (10.0, 10.9, 11.7, 12.5, 90.0)]
-    assert placed(found, POINTS[:1], HANGER).modes == ()
-    counted = placed(found, POINTS[:1], None)
+    assert place_modes(found, POINTS[:1], HANGER).modes == ()
+    counted = place_modes(found, POINTS[:1], None)
     assert counted.check is not None
     assert counted.check.verdict == "warning"
 
@@ -136,10 +136,10 @@ DECK = Hanger.without_model(100, "Deck")
 def test_modes_of_what_no_model_describes_are_listed_by_frequency() -> None:
     """Neither a series, nor planes that share their orders, nor a neighbour's mode."""
     found = [replace(_modes(1)[0], frequency_hz=hz) for hz in (2.1, 2.12, 7.0, 7.9, 31.0)]
-    placement = placed(found, [ResponsePoint("deck", None, NAN)], DECK)
+    placement = place_modes(found, [ResponsePoint("deck", None, NAN)], DECK)
     assert [mode.order for mode in placement.modes] == [1, 2, 3, 4, 5]
     assert [mode.frequency_hz for mode in placement.modes] == [2.1, 2.12, 7.0, 7.9, 31.0]
-    assert placement.set_aside == ()
+    assert placement.foreign_modes == ()
     assert placement.check is None
     assert any("listed by frequency" in note for note in placement.notes)
 
@@ -147,9 +147,9 @@ def test_modes_of_what_no_model_describes_are_listed_by_frequency() -> None:
 def test_a_tone_is_no_mode_of_what_no_model_describes() -> None:
     found = [replace(_modes(1)[0], frequency_hz=hz) for hz in (2.1, 7.0, 31.0)]
     hum = replace(found[0], frequency_hz=50.0, damping_ratio=1e-6)
-    placement = placed([*found, hum], [ResponsePoint("deck")], DECK, (Tone(50.0, "mains"),))
+    placement = place_modes([*found, hum], [ResponsePoint("deck")], DECK, (Tone(50.0, "mains"),))
     assert [mode.frequency_hz for mode in placement.modes] == [2.1, 7.0, 31.0]
-    assert [mode.kind for mode in placement.set_aside] == ["tone"]
+    assert [mode.kind for mode in placement.foreign_modes] == ["tone"]
 
 
 def test_biaxial_sensors_say_in_which_direction_each_moves() -> None:
@@ -157,5 +157,5 @@ def test_biaxial_sensors_say_in_which_direction_each_moves() -> None:
     one, two = hanger_modes()[:2]
     shapes = (np.array([1.0, 0.1]), np.array([0.2, 1.0]))
     found = [replace(m, shape=s, shape_sd=0 * s) for m, s in zip((one, two), shapes, strict=True)]
-    placement = placed(found, points, DECK)
+    placement = place_modes(found, points, DECK)
     assert [(m.plane, m.order) for m in placement.modes] == [("transverse", 1), ("longitudinal", 2)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode
-from shm.identify.mode_ordering.placement import blurred, with_both_planes
+from shm.identify.mode_ordering.placement import blur, with_both_planes
 from shm.values import ResponsePoint
 
 BIAXIAL = (ResponsePoint("acc_1", "transverse", 2.0), ResponsePoint("acc_2", "longitudinal", 2.0))
@@ -21,7 +21,7 @@ def test_an_unresolved_pair_stands_in_both_planes_with_a_tenth_of_its_bandwidth(
     found, planes = with_both_planes([mode(10.0, 1.0, 0.9)], ["transverse"], BIAXIAL)
     assert planes == ["transverse", "longitudinal"]
     assert found[0] is found[1]
-    assert blurred(found[0]).frequency_sd_hz == pytest.approx(np.hypot(0.001, 0.004))
+    assert blur(found[0]).frequency_sd_hz == pytest.approx(np.hypot(0.001, 0.004))
 
 
 def test_a_mode_in_one_plane_is_left_alone() -> None:
@@ -44,7 +44,7 @@ def test_nothing_is_split_where_only_one_plane_is_measured() -> None:
 def test_an_unknown_standard_deviation_becomes_a_tenth_of_the_bandwidth() -> None:
     shape = np.array([1.0, 1.0])
     unknown = FoundMode(10.0, np.nan, 0.002, np.nan, shape, np.full(2, np.nan))
-    assert blurred(unknown).frequency_sd_hz == pytest.approx(0.004)
+    assert blur(unknown).frequency_sd_hz == pytest.approx(0.004)
 
 
 @pytest.mark.parametrize("share", [0.12, 0.17, 0.83, 0.88])

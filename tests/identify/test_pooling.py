@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.identify.setup_merging.joined import pooled
+from shm.identify.setup_merging.join_set_ups import pool_estimates
 from shm.values import FloatArray
 
 
@@ -13,17 +13,17 @@ def _cover(between: float, own: float, set_ups: int) -> float:
     hits = 0
     for _ in range(800):
         values = rng.normal(0, np.hypot(between, own), set_ups)
-        mean, sd = pooled(values, np.full(set_ups, own))
+        mean, sd = pool_estimates(values, np.full(set_ups, own))
         hits += abs(mean) < 1.645 * sd
     return hits / 800
 
 
 def _pooled(values: list[float], sds: list[float]) -> FloatArray:
-    return np.array(pooled(np.array(values), np.array(sds)))
+    return np.array(pool_estimates(np.array(values), np.array(sds)))
 
 
 def test_a_single_set_up_stays_as_it_is() -> None:
-    assert pooled(np.array([6.1]), np.array([0.002])) == (6.1, 0.002)
+    assert pool_estimates(np.array([6.1]), np.array([0.002])) == (6.1, 0.002)
 
 
 def test_set_ups_that_agree_are_averaged_by_their_precision() -> None:

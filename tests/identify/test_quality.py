@@ -10,7 +10,7 @@ import pytest
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, FoundMode, Measurement, Poles
 from shm.identify.measuring.prediction import prediction_rule, surprise
-from shm.identify.measuring.setups import measured_recordings
+from shm.identify.measuring.setups import measure_recordings
 from shm.identify.measuring.signal_faults import KNOCK
 from shm.identify.quality import CHECKS, Inspection, assess, refusal, tones
 from shm.values import Channel, FloatArray, FrequencyResponse, Recording, ResponsePoint
@@ -95,7 +95,7 @@ def test_a_hit_that_the_force_does_not_show_ends_the_ring_down_in_which_it_falls
     for channel in record.accelerations:
         if channel.plane in heard:
             record = changed(channel.name, knock, record)
-    (measurement,) = measured_recordings([record], OPTIONS)
+    (measurement,) = measure_recordings([record], OPTIONS)
     assert all(hit.used for hit in measurement.hits)
     assert [hit.cut for hit in measurement.hits if hit.cut] == [KNOCK]
     lengths = [decay.shape[1] for decay in measurement.decays]
@@ -255,7 +255,7 @@ def test_a_steady_tone_is_told_and_no_mode_is() -> None:
     """0.2 m/s^2 at 41.3 Hz in both channels, where the modes ring with several."""
     added = tone(5 * SLOT, 41.3, 0.2)
     record = changed("acc_1", lambda v: np.add(v, added, out=v))
-    found = tones(measured_recordings([record], OPTIONS), [record], OPTIONS)
+    found = tones(measure_recordings([record], OPTIONS), [record], OPTIONS)
     assert [t.frequency_hz for t in found] == pytest.approx([41.3], abs=0.02)
     assert found[0].name == "a machine"
     assert check_of("tones", record).value == 1.0
@@ -265,7 +265,7 @@ def test_mains_and_named_machines_are_named() -> None:
     added = tone(5 * SLOT, 40.02, 0.2) + tone(5 * SLOT, 45.5, 0.2)
     record = changed("acc_1", lambda v: np.add(v, added, out=v))
     options = replace(OPTIONS, mains_hz=40.0, disturbance_bands=(("pump", 45.0, 46.0),))
-    found = tones(measured_recordings([record], options), [record], options)
+    found = tones(measure_recordings([record], options), [record], options)
     assert [t.name for t in found] == ["mains", "pump"]
 
 
@@ -282,7 +282,7 @@ def test_a_weak_tone_between_short_ring_downs_is_told() -> None:
     assert check_of("tones", sound).verdict == "good"
     added = tone(len(sound.channels[0].values), 25.3, 20.0)
     humming = changed("acc_1", lambda v: np.add(v, added, out=v), sound)
-    found = tones(measured_recordings([humming], OPTIONS), [humming], OPTIONS)
+    found = tones(measure_recordings([humming], OPTIONS), [humming], OPTIONS)
     assert [t.frequency_hz for t in found] == pytest.approx([25.3], abs=0.02)
 
 

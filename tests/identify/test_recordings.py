@@ -9,7 +9,7 @@ import pytest
 
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify import Dropped, IdentifyOptions, identify
-from shm.identify.measuring.setups import measured, measurement_of_recordings
+from shm.identify.measuring.setups import measure_set_ups, measurement_of_recordings
 from shm.values import Channel, Recording
 from tests.identify.signals import BIAXIAL, Sensor, half_sine, hanger_modes, recording
 
@@ -131,26 +131,26 @@ def test_a_record_of_two_samples_is_not_identifiable() -> None:
 
 def test_a_record_without_force_among_others_or_without_acceleration_is_refused() -> None:
     with pytest.raises(BadInput, match="no force channel") as caught:
-        measured([RECORD, _channels(RECORD, *RECORD.accelerations)], OPTIONS)
+        measure_set_ups([RECORD, _channels(RECORD, *RECORD.accelerations)], OPTIONS)
     assert "N for the hammer" in caught.value.remedy
     with pytest.raises(BadInput, match="no acceleration channel"):
-        measured([_channels(RECORD, RECORD.channels[0])], OPTIONS)
+        measure_set_ups([_channels(RECORD, RECORD.channels[0])], OPTIONS)
 
 
 def test_a_record_too_slow_for_the_band_is_refused() -> None:
     with pytest.raises(BadInput, match="too slow"):
-        measured([RECORD], IdentifyOptions(2.0, 600.0))
+        measure_set_ups([RECORD], IdentifyOptions(2.0, 600.0))
 
 
 def test_records_of_different_sampling_rates_are_refused() -> None:
     with pytest.raises(BadInput, match="sampling rate differs"):
-        measured([RECORD, recording(hanger_modes(), rate_hz=2048.0)], OPTIONS)
+        measure_set_ups([RECORD, recording(hanger_modes(), rate_hz=2048.0)], OPTIONS)
 
 
 def test_rates_read_off_rounded_times_are_one_rate() -> None:
     rounded = replace(RECORD, sampling_rate_hz=RECORD.sampling_rate_hz * (1 + 1e-7))
-    (measurement,) = measured([RECORD, rounded], OPTIONS)
-    assert len(measurement.decays) == 2 * len(measured([RECORD], OPTIONS)[0].decays)
+    (measurement,) = measure_set_ups([RECORD, rounded], OPTIONS)
+    assert len(measurement.decays) == 2 * len(measure_set_ups([RECORD], OPTIONS)[0].decays)
 
 
 def test_a_ring_down_is_used_from_where_it_is_no_longer_clipped() -> None:

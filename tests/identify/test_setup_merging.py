@@ -9,7 +9,7 @@ import pytest
 
 from shm.identify import Dropped, IdentifyOptions, Poles
 from shm.identify.contract import Finding, FoundMode, Measurement
-from shm.identify.setup_merging.joined import LARGEST_SHIFT, Joined, joined, matched
+from shm.identify.setup_merging.join_set_ups import LARGEST_SHIFT, Joined, join_set_ups, matched
 from shm.values import NAN, Plane, ResponsePoint
 
 OPTIONS = IdentifyOptions()
@@ -49,7 +49,7 @@ ONE, OTHER = _ambient(_point(1.0), _point(2.0)), _ambient(_point(1.0), _point(3.
 
 
 def _joined(one: Finding, other: Finding, options: IdentifyOptions = OPTIONS) -> Joined:
-    return joined([ONE, OTHER], [one, other], options)
+    return join_set_ups([ONE, OTHER], [one, other], options)
 
 
 def test_modes_of_one_frequency_are_one_mode() -> None:
@@ -139,7 +139,7 @@ def test_nothing_found_is_nothing_joined() -> None:
 
 def test_a_single_set_up_stays_as_it_is() -> None:
     finding = _finding(_mode(6.0, (1, 1)))
-    result = joined([ONE], [finding], OPTIONS)
+    result = join_set_ups([ONE], [finding], OPTIONS)
     assert result.finding.modes == finding.modes
     assert result.points == ONE.points
     assert result.notes == ()

@@ -9,7 +9,7 @@ import pytest
 
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify import IdentifyOptions
-from shm.identify.measuring.setups import measured
+from shm.identify.measuring.setups import measure_set_ups
 from shm.values import Plane, Recording
 from tests.identify.signals import Sensor, hanger_modes, recording
 
@@ -27,13 +27,13 @@ def _hit_at(record: Recording, x_m: float, plane: Plane | None = None) -> Record
 
 
 def test_records_of_the_same_sensors_and_hammer_are_one_set_up() -> None:
-    (measurement,) = measured([_record(seed=1), _record(seed=2)], OPTIONS)
+    (measurement,) = measure_set_ups([_record(seed=1), _record(seed=2)], OPTIONS)
     assert [hit.record for hit in measurement.hits] == [0, 0, 1, 1]
     assert len(measurement.driven) == len(measurement.decays) == 4
 
 
 def test_a_sensor_elsewhere_is_another_set_up() -> None:
-    first, second = measured([_record(2.0), _record(3.0), _record(2.0, seed=1)], OPTIONS)
+    first, second = measure_set_ups([_record(2.0), _record(3.0), _record(2.0, seed=1)], OPTIONS)
     assert [hit.record for hit in first.hits] == [0, 0, 2, 2]
     assert [hit.record for hit in second.hits] == [1, 1]
     assert second.points[0].x_m == 3.0
@@ -47,14 +47,14 @@ def test_a_hammer_elsewhere_or_in_another_direction_is_another_set_up() -> None:
         _hit_at(record, 1.0, "longitudinal"),
         _hit_at(record, 1.0, "transverse"),
     ]
-    measurements = measured(records, OPTIONS)
+    measurements = measure_set_ups(records, OPTIONS)
     places = [(m.hammer.x_m, m.hammer.plane) for m in measurements if m.hammer]
     assert places == [(1.0, "transverse"), (1.5, "transverse"), (1.0, "longitudinal")]
     assert [len(m.hits) for m in measurements] == [4, 2, 2]
 
 
 def test_all_set_ups_have_the_same_lines_and_the_same_window() -> None:
-    measurements = measured([_record(2.0, seconds=6.0), _record(3.0, seconds=4.0)], OPTIONS)
+    measurements = measure_set_ups([_record(2.0, seconds=6.0), _record(3.0, seconds=4.0)], OPTIONS)
     one, other = (m.frequency_response for m in measurements)
     assert one is not None
     assert other is not None
@@ -63,7 +63,7 @@ def test_all_set_ups_have_the_same_lines_and_the_same_window() -> None:
 
 
 def test_spectra_of_the_hits_give_the_frequency_response() -> None:
-    (measurement,) = measured([_record()], OPTIONS)
+    (measurement,) = measure_set_ups([_record()], OPTIONS)
     response, spectra = measurement.frequency_response, measurement.spectra
     assert response is not None
     assert spectra is not None
@@ -83,7 +83,7 @@ def test_the_chosen_estimator_makes_the_frequency_response() -> None:
     gains = []
     for estimator in ("h1", "hv", "h2"):
         options = replace(OPTIONS, estimator=estimator)
-        (measurement,) = measured([record], options)
+        (measurement,) = measure_set_ups([record], options)
         assert measurement.frequency_response is not None
         gains.append(np.abs(measurement.frequency_response.accelerance[:, 20:]))
     assert np.all(gains[0] < gains[1])
@@ -94,14 +94,14 @@ def test_a_set_up_without_usable_hits_is_left_out_and_said_so() -> None:
     silent = _record(3.0)
     force = replace(silent.channels[0], values=np.zeros(silent.samples))
     silent = replace(silent, source="bad.csv", channels=(force, *silent.channels[1:]))
-    (measurement,) = measured([_record(), silent], OPTIONS)
+    (measurement,) = measure_set_ups([_record(), silent], OPTIONS)
     assert measurement.dropped[0].what == "set-up bad.csv"
     assert "no hammer hit" in measurement.dropped[0].reason
     with pytest.raises(NotIdentifiable, match="no hammer hit"):
-        measured([silent], OPTIONS)
+        measure_set_ups([silent], OPTIONS)
 
 
 def test_records_with_and_without_force_do_not_go_together() -> None:
     record = _record()
     with pytest.raises(BadInput, match="no force channel"):
-        measured([record, replace(record, channels=record.channels[1:])], OPTIONS)
+        measure_set_ups([record, replace(record, channels=record.channels[1:])], OPTIONS)

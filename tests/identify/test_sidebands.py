@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import Finding, FoundMode, Poles
-from shm.identify.estimation.finished import without_sidebands
+from shm.identify.estimation.postprocess import without_sidebands
 
 NOTHING = Poles(np.empty(0), np.empty(0), np.empty(0), np.empty(0, dtype=bool))
 RATE = 0.8  # of decay, in rad/s

@@ -59,7 +59,7 @@ def test_the_evidence_is_that_of_quadrature(table: str, model: str, repeat: int)
 class KnownNoise(ThesisLikelihood):
     """Take normal errors of known standard deviation and no model error."""
 
-    def nodes(self, step_in_sd: float) -> list[NoiseNode]:
+    def frequency_nodes(self, step_in_sd: float) -> list[NoiseNode]:
         covariance = Covariance.of_frequencies(np.diag(self.identification_error**2))
         return [NoiseNode(covariance, 0.0, 0.0)]
 

@@ -21,7 +21,7 @@ from shm.inference.posterior import DIFFERENCE
 from shm.inference.problem import Problem
 from shm.models import AsMade, build, described
 from shm.models.as_made import FITTING_STIFFNESS, Term, terms_of
-from shm.models.bar_of_terms import GRAVITY_M_S2
+from shm.models.bar_of_terms import GRAVITY_M_S2, bar_of_terms
 from shm.models.base import Conditions
 from shm.values import PLANES, AddedMass, FloatArray, Hanger, ModalTest, Mode, Turnbuckle
 from tests.worlds.eight_kinds import Member, Zone, natural_frequencies_hz
@@ -165,6 +165,19 @@ def test_a_bar_that_shears_has_fittings_that_shear_as_its_material_does() -> Non
     theta = usual_set(model)
     expected = natural_frequencies_hz(member_of(model, theta, 0), MODES, 600)
     np.testing.assert_allclose(model.frequencies_hz(theta, MODES)[0, 0], expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("bar", [ROD, TUBE], ids=["rod", "tube"])
+def test_a_bar_that_shears_has_its_frequencies_whatever_its_section(bar: Hanger) -> None:
+    """Vary the section as its tolerance does: rotary inertia varies with it."""
+    hanger = replace(bar, fittings_m=(0.3, 0.3))
+    model = as_made("beam3", hanger)
+    sections = hanger.scatter.section * np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
+    theta = np.vstack([usual_set(model, section=each) for each in sections])
+    of = bar_of_terms(hanger, model.fittings_m, True, MODES)
+    terms = of.terms(model._values(theta))
+    found, exact = of._bar.frequencies(terms), of._bar.full_frequencies(terms)
+    np.testing.assert_allclose(found, exact, rtol=1e-5)
 
 
 @pytest.mark.parametrize("lambda_squared", [2.0, 40.0])

@@ -112,12 +112,6 @@ def test_a_frequency_is_that_of_the_mean_level_and_temperature() -> None:
     assert mode.frequency_sd_hz < 1.5 * math.hypot(5 * SD / 12, 3e-4)
 
 
-def test_nothing_is_made_of_nothing() -> None:
-    assert pooled([], "day", START) is None
-    before = _readings(np.full(6, 5.0))
-    assert pooled(before, "hour", START + timedelta(hours=1)) is None
-
-
 @pytest.mark.parametrize(
     ("period", "name", "middle_h"),
     [

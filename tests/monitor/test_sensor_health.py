@@ -8,7 +8,7 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
-from shm.monitor import find_lost_planes, offsets, sees_nothing, sensor_faults
+from shm.monitor import find_lost_planes, sees_nothing, sensor_faults
 from shm.values import FloatArray
 from shm.values.stream import Window, WindowReading
 from tests.helpers.ambient_stream import Motion, drawn, piece, stream, values
@@ -84,14 +84,6 @@ def test_sensor_faults_negligible_drift() -> None:
     assert sensor_faults([piece(samples + 2e-4)], stream(), MOTION.known(), earlier) == ()
     found = sensor_faults([piece(samples + 0.05)], stream(), MOTION.known(), earlier)
     assert {each.kind for each in found} == {"drifting"}
-
-
-def test_offsets_are_medians_and_know_of_no_samples() -> None:
-    samples = SAMPLES + 0.02
-    samples[0] = np.nan
-    found = offsets([piece(samples)])
-    assert set(found) == {"l0", "t1", "l1"}
-    assert found["l1"] == pytest.approx(0.02, abs=1e-3)
 
 
 def _hours(*levels: float, modes: bool = True) -> list[WindowReading]:

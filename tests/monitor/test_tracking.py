@@ -16,7 +16,6 @@ from shm.values import PLANES, Channel, FloatArray, Hanger, Mode, Plane, Recordi
 from shm.values.stream import Piece, Stream, StreamChannel, WindowReading
 from tests.helpers.ambient_stream import (
     LENGTH_M,
-    RATE_HZ,
     START,
     Motion,
     drawn,
@@ -118,18 +117,6 @@ def test_two_modes_that_were_taken_for_one_are_told_apart_by_their_planes() -> N
     assert len(found) == 4
     for key, mode in found.items():
         assert abs(mode.frequency_hz - true[key]) < 4 * mode.frequency_sd_hz
-
-
-def test_noise_proves_no_mode() -> None:
-    rng = np.random.default_rng(6)
-    motion = drawn(rng)
-    for _ in range(3):
-        noise = 2e-3 * rng.normal(size=(4, int(600 * RATE_HZ)))
-        reading = read_window([piece(noise)], stream(), motion.known(), HANGER, OPTIONS)
-        assert reading.modes == ()
-        assert reading.how == "none"
-        assert reading.window.kind == "quiet"
-        assert "hidden by the noise" in reading.why
 
 
 @pytest.mark.parametrize("minute", [20, 30])
@@ -274,21 +261,6 @@ def test_without_known_modes_they_are_found_from_scratch_and_then_tracked() -> N
     assert second.how == "tracked"
     assert set(_by_name(second.modes)) == set(_by_name(first.modes))
     assert all(mode.acceleration_m_s2 > 0 for mode in second.modes)
-
-
-def test_pieces_with_gaps_give_the_modes_of_the_whole() -> None:
-    rng = np.random.default_rng(9)
-    motion = drawn(rng)
-    samples = values(motion, rng)
-    whole = read_window([piece(samples)], stream(), motion.known(), HANGER, OPTIONS)
-    pieces = [
-        piece(samples[:, int(a * RATE_HZ) : int(b * RATE_HZ)], START + timedelta(seconds=a))
-        for a, b in ((0, 200), (205, 420), (421, 600))
-    ]
-    parts = read_window(pieces, stream(), motion.known(), HANGER, OPTIONS)
-    assert set(_by_name(parts.modes)) == set(_by_name(whole.modes))
-    for one, two in zip(whole.modes, parts.modes, strict=True):
-        assert abs(one.frequency_hz - two.frequency_hz) < 0.7 * one.frequency_sd_hz
 
 
 def test_two_cables_exchanged_are_no_new_modes() -> None:

@@ -10,7 +10,6 @@ import pytest
 from shm.monitor import cut
 from shm.monitor.windows import judged
 from shm.values import FloatArray
-from shm.values.stream import Piece
 from tests.helpers.ambient_stream import RATE_HZ, START, Motion, drawn, piece, stream, values
 
 SECONDS = 300.0
@@ -102,10 +101,3 @@ def test_a_dead_channel_does_not_cost_the_others() -> None:
     assert found.window.kind == "wind"
     assert [channel.name for channel in found.channels] == ["t0", "t1", "l1"]
     assert "l0: its value never changes" in found.reason
-
-
-def test_a_piece_that_lacks_a_channel_is_left_out() -> None:
-    whole = piece(WIND)
-    short = Piece("h3", START - timedelta(minutes=9), RATE_HZ, ("t0",), WIND[:1], 10.0)
-    found = judged([short, whole], stream(), MOTION.known())
-    assert [part.shape for part in found.parts] == [WIND.shape]

@@ -22,6 +22,7 @@ from shm.store.queries.streams import list_pooled, load_stream_watch
 from shm.store.queries.tests import list_baseline_tests
 from shm.values import Mode
 from shm.values.stream import PooledReading, Window, WindowReading
+from shm.watch.kept_state import from_bytes
 from shm.watch.stream_thermometer import Thermometer
 from shm.watch.stream_watch import StreamState, watch_reading
 from tests.helpers.flows import Clock, ingest
@@ -122,7 +123,7 @@ def test_what_was_offline_is_watched_in_its_place_and_its_alert_raised_once(
     assert [each.alert.key for each in found if each.alert] == [raised.alert.key]
     kept = load_stream_watch(store, 3)
     assert kept is not None
-    state = StreamState.from_bytes(kept.content)
+    state = from_bytes(StreamState, kept.content)
     assert replace(state, settled_day=0.0, thermometer=Thermometer()).to_bytes() == found[-1].kept
     assert days_of(workspace) == [1, 2, 3, 4]
 
@@ -176,7 +177,7 @@ def test_whoever_comes_next_ends_what_late_hours_began(
     kept = load_stream_watch(store, 3)
     assert kept is not None
     assert len(readings) == 19
-    assert StreamState.from_bytes(kept.content).readings == 19
+    assert from_bytes(StreamState, kept.content).readings == 19
     assert readings[-1].learning == in_order(workspace, readings)[-1].learning
 
 

@@ -25,8 +25,7 @@ from shm.store.ring import ring_of
 from shm.store.stored_streams import Streams
 from shm.values.stream import PooledReading
 from shm.watch.stream_reading import ModeTable
-from shm.watch.stream_state import StreamState
-from shm.watch.stream_watch import StreamWatched
+from shm.watch.stream_watch import StreamState, StreamWatched
 from tests.helpers.flows import Clock
 from tests.helpers.live_streams import CALM, FIRST, HOUR, drain, send, with_live_streams
 from tests.helpers.workspaces import make_workspace

@@ -14,7 +14,6 @@ import pytest
 from shm.plausibility import Candidate, fingerprint_of
 from shm.plausibility.copies import copied, is_copy
 from shm.simulate import HammerPlan, HangerState, hammer_test
-from shm.store.blobs import pack
 from shm.values import (
     Channel,
     Fingerprint,
@@ -143,44 +142,6 @@ def state_of(own: Recording, *others: KnownSamples) -> tuple[str, tuple[int, ...
     return doubt.state, doubt.instead_of
 
 
-def test_which_of_two_is_the_part_and_what_share_it_is() -> None:
-    """The whole that came after a part of it was called the copy, without a word on lengths."""
-    whole = a_recording()
-    first = part(whole, 0, 0.38 * duration_s(whole))
-    assert state_of(whole, known(1, first)) == (
-        "it holds all of f1 (recording 1), 38 % of its own samples",
-        (1,),
-    )
-    assert state_of(first, known(1, whole)) == (
-        "it is a part of f1 (recording 1), 38 % of that one, sent again",
-        (),
-    )
-    assert state_of(whole, known(1, COPIES["cut"](whole))) == (
-        "it holds the samples of f1 (recording 1) again",
-        (),
-    )
-    early, late = part(whole, 0, 40), part(whole, 20, 60)
-    longer, shorter = part(whole, 0, 50), late
-    assert state_of(early, known(1, late))[0].startswith("50 % of its samples are in f1")
-    assert state_of(shorter, known(1, longer)) == (
-        "75 % of its samples are in f1 (recording 1), 60 % of that one",
-        (),
-    )
-    assert state_of(longer, known(1, shorter)) == (
-        "it holds 75 % of f1 (recording 1), 60 % of its own samples",
-        (1,),
-    )
-
-
-def test_a_channel_that_is_left_out_is_a_share_too() -> None:
-    whole = a_recording()
-    less = COPIES["one sensor left out"](whole)  # of four
-    assert state_of(whole, known(1, less)) == (
-        "it holds all of f1 (recording 1), 75 % of its own samples",
-        (1,),
-    )
-
-
 def test_the_whole_of_several_parts_names_them_all() -> None:
     whole = a_recording()
     parts = [known(n, part(whole, 10 * n, 10 * n + 10)) for n in range(5)]
@@ -241,16 +202,6 @@ def test_a_pump_or_the_mains_under_all_tests_makes_no_copies(hum_hz: float) -> N
     assert not any(is_copy(*pair) for pair in pairs)
 
 
-def test_each_hit_of_a_recording_is_a_copy_of_it_but_not_of_another_hit() -> None:
-    whole = a_recording()
-    prints = [fingerprint_of([part(whole, *span)]) for span in ((0, 20), (20, 40), (40, 60))]
-    pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b]
-    assert len(pairs) == 3
-    assert not any(is_copy(*pair) for pair in pairs)
-    own = print_of()
-    assert all(hit is not None and is_copy(hit, own) and is_copy(own, hit) for hit in prints)
-
-
 def test_real_hits_of_one_structure_are_copies_of_their_own_halves_alone(shared_data: Path) -> None:
     paths = sorted((shared_data / "pyfrf_hits").glob("*.npy"))
     rows = [np.load(path)[2] for path in paths]
@@ -262,18 +213,6 @@ def test_real_hits_of_one_structure_are_copies_of_their_own_halves_alone(shared_
     assert alike == np.eye(5, dtype=bool).tolist()
 
 
-def test_the_digest_is_that_of_the_numbers_alone() -> None:
-    one = a_recording()
-    digests = {
-        found.digest
-        for how in ("another header", "other order")
-        if (found := fingerprint_of([COPIES[how](one)]))
-    }
-    own, other = print_of(), print_of(2)
-    assert digests == {own.digest}
-    assert other.digest != own.digest
-
-
 def test_one_file_of_a_test_of_several_is_a_copy() -> None:
     """Its impact would count twice."""
     parts = [a_recording(seed) for seed in (1, 2, 3)]
@@ -281,55 +220,6 @@ def test_one_file_of_a_test_of_several_is_a_copy() -> None:
     assert whole is not None
     assert part is not None
     assert is_copy(part, whole)
-
-
-@pytest.mark.parametrize("hum_hz", [50.0, 50.0123])
-@pytest.mark.parametrize("live", [1, 3])
-def test_dead_channels_that_hum_alike_condemn_nothing(live: int, hum_hz: float) -> None:
-    """However many they are, and at whatever time of the hum the recordings begin."""
-    prints = []
-    for seed in range(4):
-        recording = a_recording(seed, hits=1)
-        time_s = np.arange(10_240) / 512 + seed / 7
-        hums = [
-            Channel(name, "acceleration", np.sin(2 * np.pi * hum_hz * time_s)) for name in "abc"
-        ]
-        channels = (*recording.accelerations[:live], *hums)
-        prints.append(fingerprint_of([replace(recording, channels=channels)]))
-    pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b]
-    assert len(pairs) == 6
-    assert not any(is_copy(*pair) for pair in pairs)
-
-
-def test_a_hum_alone_is_known_by_its_numbers() -> None:
-    hums = [np.sin(2 * np.pi * 50 * np.arange(size) / 512) for size in (5120, 5120, 5000)]
-    own, same, other = (
-        fingerprint_of([Recording("s", (Channel("dead", "acceleration", hum),), 512.0)])
-        for hum in hums
-    )
-    assert own is not None
-    assert same is not None
-    assert other is not None
-    assert is_copy(own, same)
-    assert not is_copy(own, other)
-
-
-def test_a_print_of_before_shapes_had_places_tells_by_its_digest() -> None:
-    own = print_of()
-    old = np.ones((4, 256), dtype=np.float32) / 16
-    assert is_copy(own, Fingerprint(own.digest, old))
-    assert not is_copy(own, Fingerprint("0" * 64, old))
-    assert not is_copy(Fingerprint("0" * 64, old), own)
-
-
-@pytest.mark.parametrize("channels", [2, 40, 900])
-def test_a_print_stays_small(channels: int) -> None:
-    rows = np.random.default_rng(1).normal(size=(channels, 2000))
-    many = tuple(Channel(f"a{n}", "acceleration", row) for n, row in enumerate(rows))
-    found = fingerprint_of([Recording("s", many, 512.0)])
-    assert found is not None
-    assert len(found.marks)
-    assert len(pack(shapes=found.shapes, marks=found.marks)) < 70_000
 
 
 def test_frequency_responses_are_compared_too() -> None:
@@ -345,9 +235,3 @@ def test_frequency_responses_are_compared_too() -> None:
     assert other is not None
     assert is_copy(own, copy)
     assert not is_copy(own, other)
-
-
-@pytest.mark.parametrize("values", [np.zeros(100), np.full(100, np.nan), np.empty(0)])
-def test_what_does_not_move_has_no_fingerprint(values: np.ndarray) -> None:
-    dead = Recording("s", (Channel("a", "acceleration", values),), 512.0)
-    assert fingerprint_of([dead]) is None

@@ -18,8 +18,8 @@ def refused(row: int, what: str) -> BadInput:
     return BadInput(f"{what} in row {row}.", file=Path("a.csv"))
 
 
-def rate(seconds: FloatArray, said_hz: float = NAN) -> float:
-    return logger_times._rate_of_coarse(seconds, said_hz, refused)
+def rate(seconds: FloatArray, stated_hz: float = NAN) -> float:
+    return logger_times._rate_of_coarse(seconds, stated_hz, refused)
 
 
 def whole_seconds(hz: int, seconds: int, late: int = 0) -> FloatArray:

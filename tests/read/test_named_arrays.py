@@ -15,7 +15,7 @@ from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
 from shm.errors import BadInput, UsageError
 from shm.read import Peek, peek, read, sidecar_path
-from shm.read.arrays import natural
+from shm.read.arrays import natural_sort_key
 from shm.values import Channel, FrequencyResponse, Recording
 from tests.helpers.written import write
 
@@ -351,7 +351,7 @@ def test_our_matlab_and_numpy_files_are_plain_to_other_software(
 
 def test_names_sort_as_people_count() -> None:
     names = ["acc_10", "acc_2", "Acc_1", "b", "acc_²"]
-    assert sorted(names, key=natural) == ["Acc_1", "acc_2", "acc_10", "acc_²", "b"]
+    assert sorted(names, key=natural_sort_key) == ["Acc_1", "acc_2", "acc_10", "acc_²", "b"]
 
 
 def test_tdms_without_its_extra_says_what_to_install(

@@ -116,8 +116,8 @@ def test_the_own_sidecar_comes_before_the_name_and_the_name_before_the_profile()
 
 
 def test_what_the_file_says_itself_the_profile_does_not_say_in_its_stead() -> None:
-    says = Layout("a", "b", ("c",), hanger=7, says_rate=True)
-    assert completed(SAID, says, {}) == {"channel": KEPT["channel"]}
+    has_entry = Layout("a", "b", ("c",), hanger=7, has_rate=True)
+    assert completed(SAID, has_entry, {}) == {"channel": KEPT["channel"]}
     listed = completed(SAID, LAYOUT, {"x_m": [1.0]})
     assert listed["channel"] == {"A 1": {"plane": "transverse"}}
 

@@ -28,7 +28,7 @@ def test_whole_numbers_are_shares_of_the_largest(
     assert [column.name for column in table.columns] == ["channel_1", "channel_2"]
     assert {column.unit for column in table.columns} == {"full scale"}
     np.testing.assert_array_equal([c.load() for c in table.columns], ROWS.T / full)
-    assert (table.own_header.sampling_rate_hz, table.own_header.hanger) == (500.0, 7)
+    assert (table.file_header.sampling_rate_hz, table.file_header.hanger) == (500.0, 7)
 
 
 def test_floats_are_as_they_are_and_one_channel_is_one(tmp_path: Path) -> None:

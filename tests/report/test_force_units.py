@@ -58,7 +58,7 @@ def test_a_force_has_the_unit_of_its_size(
 ) -> None:
     found = force_unit(force_n)
     assert found.name == unit
-    assert found.told(force_n) == told
+    assert found.with_unit(force_n) == told
     assert found.decimals(force_n) == decimals
     assert found.of(np.array([force_n])) == pytest.approx([force_n / found.newtons])
 

@@ -40,7 +40,7 @@ def drift(shift: float, sd: float = 0.005, probability: float = 0.0) -> Drift:
 
 def now(**changes: Any) -> HangerSummary:
     given = {
-        "latest": LatestTest("t9", NOW, tension(650e3)),
+        "latest": LatestTest("t9", NOW, replace(tension(650e3), repeatability_sd_n=1.5e3)),
         "baseline": tension(),
         "drifts": (drift(-0.08, probability=0.99),),
     }
@@ -65,6 +65,7 @@ def test_after_a_change_it_is_the_baseline_moved_by_the_change_and_not_the_lates
     expected = np.quantile(draws, [0.05, 0.5, 0.95])
     assert [known.q05, known.q50, known.q95] == pytest.approx(expected.tolist(), rel=1e-3)
     assert found.document["by_latest_test"]["tension_n"]["mean"] == 650e3
+    assert found.tension.repeatability_sd_n == 1.5e3  # of the latest test, as its own is
 
 
 def test_without_a_detected_change_a_well_known_shift_moves_it_as_stated() -> None:

@@ -57,7 +57,7 @@ def row(*shares: float, families: str = "") -> str:
 
 
 @pytest.mark.parametrize(
-    ("now", "is_told", "is_said"),
+    ("now", "is_reported", "is_said"),
     [
         (0.03, False, True),
         (0.03, True, False),  # the alert says it
@@ -66,9 +66,9 @@ def row(*shares: float, families: str = "") -> str:
     ],
 )
 def test_a_hanger_that_is_nearly_slack_by_its_own_test_is_said_first(
-    now: float, is_told: bool, is_said: bool
+    now: float, is_reported: bool, is_said: bool
 ) -> None:
-    said = nearly_slack(HANGER_3, tension(1.0), tension(now), is_told=is_told)
+    said = nearly_slack(HANGER_3, tension(1.0), tension(now), is_reported=is_reported)
     assert bool(said) is is_said
     if is_said:
         assert said.startswith("Hanger 3 carries 3.0 ± 2.0 % of its nominal tension by its latest")

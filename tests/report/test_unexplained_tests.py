@@ -55,8 +55,8 @@ def watched() -> Watched:
 def test_told_is_unknown_if_unexplained() -> None:
     latest = watched().latest
     assert not latest.change.called
-    assert all(math.isnan(each.shift_mean) for each in latest.told)
-    assert all(math.isnan(each.probability) for each in latest.told)
+    assert all(math.isnan(each.shift_mean) for each in latest.published_drifts)
+    assert all(math.isnan(each.probability) for each in latest.published_drifts)
 
 
 def test_told_keeps_probable_shift() -> None:
@@ -65,7 +65,7 @@ def test_told_keeps_probable_shift() -> None:
     drifts = tuple(replace(each, probability=0.9) for each in latest.drifts)
     probable = replace(latest, drifts=drifts)
     assert probable.is_unexplained
-    assert probable.told == drifts
+    assert probable.published_drifts == drifts
 
 
 def test_states_omit_unexplained_tests() -> None:
@@ -80,7 +80,9 @@ def test_hanger_message_doubts_unexplained_test() -> None:
     warnings = open_warnings(HANGER_3, None, latest=latest)
     tension = averaged(Interval.normal(711e3, 5e3))
     of_test = LatestTest(latest.test, BEGIN, tension)
-    message = HangerSummary(HANGER_3, of_test, drifts=latest.told, warnings=warnings).message
+    message = HangerSummary(
+        HANGER_3, of_test, drifts=latest.published_drifts, warnings=warnings
+    ).message
     assert message.status is Status.CHECK
     assert message.urgency == "week"
     assert "explains its latest test" in message.words

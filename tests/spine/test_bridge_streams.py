@@ -9,7 +9,7 @@ import pytest
 from shm.bridge import Bridge, load_bridge
 from shm.errors import BadInput
 from shm.resources import default_config
-from shm.values.stream import Stream, StreamChannel
+from shm.values.stream import SeedLinkFeed, Stream, StreamChannel
 from tests.helpers.comparing import assert_same
 from tests.spine.test_bridge import ROUND, written
 
@@ -103,3 +103,39 @@ def test_the_example_of_a_new_workspace_is_right(tmp_path: Path) -> None:
     lines = text[begin : text.index("\n\n", begin)].splitlines()
     example = "\n".join(line.removeprefix("# ") for line in lines)
     assert [stream.name for stream in bridge(tmp_path, example).streams] == ["h3"]
+
+
+FEED = STREAM.replace(
+    "sampling_rate_hz",
+    """kind = "seedlink"
+server = "logger.example.org:18001"
+channels = ["XX_HGR3__HN1"]
+calibration = [2e-6]
+sampling_rate_hz""",
+)
+
+
+def test_stream_of_seedlink(tmp_path: Path) -> None:
+    (found,) = bridge(tmp_path, FEED).streams
+    ids = (("XX", "HGR3", "", "HN1"),)
+    assert found.feed == SeedLinkFeed("logger.example.org", 18001, ids, (2e-6,))
+    (plain,) = bridge(tmp_path, FEED.replace(":18001", "")).streams
+    assert plain.feed is not None
+    assert plain.feed.port == 18000
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "said"),
+    [
+        ('"seedlink"', '"earthworm"', "kind = 'earthworm' is not known"),
+        ("logger.example.org:18001", "http://logger", "is no host and port"),
+        ('["XX_HGR3__HN1"]', '["XX_HGR3__HN1", "XX_HGR3__HN2"]', "is not one for each of the 1 "),
+        ("XX_HGR3__HN1", "HGR3.HN1", "is not one for each of the 1 "),
+        ("[2e-6]", "[0]", r"calibration = \[0\] is not one for each"),
+        ("calibration = [2e-6]", "", "calibration is missing"),
+        ('kind = "seedlink"', "", "unknown key"),
+    ],
+)
+def test_stream_of_seedlink_refuses(tmp_path: Path, was: str, becomes: str, said: str) -> None:
+    with pytest.raises(BadInput, match=said):
+        bridge(tmp_path, FEED.replace(was, becomes))

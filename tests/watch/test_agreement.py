@@ -144,12 +144,3 @@ def test_tests_of_later_visits_are_the_watchs_to_judge() -> None:
         None,
         None,
     ]
-
-
-@pytest.mark.slow
-def test_two_blunders_in_a_row_are_rarely_alike() -> None:
-    """One in a hundred tests of any size from half to half as much again: of pairs in a row of
-    them, itself one in 10,000, not one in ten is told."""
-    rng = np.random.default_rng(5)
-    pairs = [(a_test(1, one), a_test(2, two)) for one, two in rng.uniform(0.5, 1.5, (50, 2))]
-    assert sum(told(second, came(first)) is not None for first, second in pairs) < 5

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from shm.values import NAN, FloatArray, ModalTest
-from shm.watch.reading_corrections import SHARE, SHARE_SD
-from shm.watch.readings import Reader
+from shm.watch.readings import SHARE, SHARE_SD, Reader
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import (
     ALLOWANCE,

@@ -94,38 +94,6 @@ def direction(factor: Sequence[Sequence[float]], *, may_ramp: bool = True) -> Di
     return Direction("tension", np.array(factor), (0,), math.log(0.4), may_ramp)
 
 
-def one_mode(after: float, before_tests: int, after_tests: int) -> Example:
-    """One mode, one quantity, noise of 1e-3; `after` is what lies between the means."""
-    tests = before_tests + after_tests
-    rng = np.random.default_rng(1)
-    values = 1e-3 * rng.standard_normal((tests, 1))
-    values[before_tests:] += after
-    columns = np.tile(np.array([1.0, 0.5]), (tests, 1, 1))
-    return Example(
-        layout=Layout(1, 1, np.array([10.0, 0.05])),
-        years=np.arange(tests) / 12,
-        columns=columns,
-        values=values,
-        variances=np.full((tests, 1), 1e-6),
-        scatter=np.zeros((tests, 1, 1, 1)),
-        directions=(direction([[0.0], [0.05]], may_ramp=False),),
-    )
-
-
-@pytest.mark.parametrize(("after", "tests"), [(0.0, 2), (0.004, 1), (-0.02, 5)])
-def test_a_step_of_one_mode_has_the_bayes_factor_of_two_means(after: float, tests: int) -> None:
-    example = one_mode(after, 6, tests)
-    apart = example.values[6:].mean() - example.values[:6].mean()
-    noise = 1e-6 * (1 / 6 + 1 / tests)
-
-    for size, unit in enumerate(SIZES):
-        changed = noise + (unit * 0.05 * 0.5) ** 2
-        textbook = apart**2 / 2 * (1 / noise - 1 / changed) - math.log(changed / noise) / 2
-        mass = example.evidence.log_mass[6 - BASELINE, 0, STEP, 0, size]
-        factor = mass - math.log(0.4) - LOG_SHARES[size] - math.log(1 / 12)
-        assert factor == pytest.approx(textbook, abs=1e-5)
-
-
 def small_world(called: tuple[DetectedChange, ...] = ()) -> Example:
     """Three modes, two quantities, a covariate, two scatters, a mode that was missed at times."""
     rng = np.random.default_rng(4)
@@ -203,19 +171,6 @@ def test_the_size_of_a_change_is_that_of_the_dense_gaussian_posterior() -> None:
         assert root @ root.T == pytest.approx(done**2 * unit @ left @ unit.T, abs=1e-6)
 
 
-def test_the_last_test_alone_speaks_by_its_largest_factor() -> None:
-    example = one_mode(0.004, 8, 1)
-    waited = math.log(1 / 12)
-    factor = example.evidence.log_mass[-1, 0, STEP, 0] - math.log(0.4) - LOG_SHARES - waited
-
-    found, mass = example.evidence.of_last_visit
-    assert found == pytest.approx(float(factor.max()))
-    assert found > 3
-    assert mass == pytest.approx(float(logsumexp(example.evidence.log_mass[-1])))
-    of_last = example.evidence.log_mass[-1]
-    assert example.evidence.log_evidence < float(logsumexp(of_last))
-
-
 YEARS = np.cumsum(np.random.default_rng(9).uniform(0.02, 0.15, 14))
 WATCHED_YEARS = float(YEARS[-1] - YEARS[BASELINE - 1])
 SCATTERS = np.array([0.5, 1.5])
@@ -251,12 +206,3 @@ def test_without_change_the_statistic_grows_by_a_year_in_a_year(most: int) -> No
     assert error < 0.01 * WATCHED_YEARS
     assert statistic.mean() == pytest.approx(0.8 * WATCHED_YEARS, abs=3 * error)
     assert statistic.std() > 0.03 * WATCHED_YEARS
-
-
-@pytest.mark.parametrize("k", [0, 1])
-def test_whichever_scatter_holds_the_evidence_grows_no_faster_than_the_time(k: int) -> None:
-    statistic = np.exp([unchanged(seed, k).evidence.log_evidence for seed in range(200)])
-    error = statistic.std() / math.sqrt(len(statistic))
-
-    assert statistic.mean() < 0.8 * WATCHED_YEARS + 3 * error
-    assert statistic.mean() > 0.1 * WATCHED_YEARS

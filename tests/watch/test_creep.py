@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import pytest
 
-from shm.documents import dump
-from shm.store.blobs import watch_document, watch_in
 from shm.values import CreepRate
 from shm.watch.alert_text import watch_words
 from tests.helpers.synthetic_readings import History, watch_of
@@ -63,11 +60,3 @@ def test_a_called_loss_is_not_taken_for_creep() -> None:
 )
 def test_a_rate_is_said_where_the_tests_show_it(creep: CreepRate, words: str) -> None:
     assert creep.words == words
-
-
-def test_the_rate_is_kept_and_a_watch_of_before_has_none() -> None:
-    test = watch_of(RELAXES.readings(1)[:5], RELAXES.quantities).tests[-1]
-    document = json.loads(dump(watch_document(test)))
-    assert watch_in(json.dumps(document))[0].creep_per_year == test.creep_per_year
-    del document["creep_per_year"]
-    assert watch_in(json.dumps(document))[0].creep_per_year is None

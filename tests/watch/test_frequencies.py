@@ -14,7 +14,7 @@ from shm.errors import BadInput
 from shm.values import Hanger, ModalTest, Mode
 from shm.watch import WatchedFrequencies, WatchOptions, watch_frequencies
 from shm.watch.frequencies import FrequencyReader, frost_of
-from shm.watch.frequency_watch import FrequencyWatch, measured_levels
+from shm.watch.frequency_watch import FrequencyWatch, measured_levels, watch_newest_frequencies
 
 START = datetime(2026, 5, 1, 12, tzinfo=UTC)
 MODES = (("transverse", 1, 2.0), ("longitudinal", 1, 2.12), ("transverse", 2, 4.1))
@@ -227,31 +227,29 @@ def dated(tests: Sequence[ModalTest]) -> list[tuple[ModalTest, datetime]]:
     return [(each, each.time) for each in tests if each.time is not None]
 
 
-def test_going_on_from_what_was_kept_is_the_same_as_going_over_all() -> None:
+def test_watch_newest_frequencies_goes_on_from_what_was_kept() -> None:
     tests = dated(daily(range(100), from_day(80, -0.02, -0.02, -0.02)))
-    one = FrequencyWatch(tests[:30], Hanger.without_model(9), WatchOptions())
-    now, other, told, told_again = one.begin(), one.keep(one.begin()), [], []
+    given = tests[:30], Hanger.without_model(9), WatchOptions()
+    kept, told = None, []
     for each in tests[30:]:
-        now, alert = one.after(now, each)
-        resumed = one.resume(other)
-        assert resumed is not None
-        resumed, again = one.after(resumed, each)
-        other = one.keep(resumed)
-        told += [alert.message] if alert else []
-        told_again += [again.message] if again else []
+        found = watch_newest_frequencies(given[0], [each], *given[1:], kept)
+        assert found is not None
+        kept = found.kept
+        told += [found.alert.message] if found.alert else []
+    whole = watch_newest_frequencies(given[0], tests[30:], *given[1:])
 
-    assert told
-    assert told == told_again
-    assert one.keep(now) == other
+    assert len(told) == 2
+    assert whole is not None
+    assert whole.kept == kept
 
 
-def test_what_another_watch_kept_is_not_gone_on_from() -> None:
-    tests = dated(daily(range(40)))
-    hanger = Hanger.without_model(9)
-    one = FrequencyWatch(tests[:30], hanger, WatchOptions())
-    other = FrequencyWatch(tests[:20], hanger, WatchOptions())
+def test_watch_newest_frequencies_begins_anew_with_another_baseline() -> None:
+    tests, hanger = dated(daily(range(40))), Hanger.without_model(9)
+    one = watch_newest_frequencies(tests[:30], tests[30:31], hanger, WatchOptions())
 
-    assert other.resume(one.keep(one.begin())) is None
+    assert one is not None
+    again = watch_newest_frequencies(tests[:20], tests[31:], hanger, WatchOptions(), one.kept)
+    assert again is None
 
 
 def test_an_older_test_than_the_last_is_refused() -> None:

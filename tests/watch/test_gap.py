@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
 
 from shm.values import Alert, Posterior, PredictedFrequency
-from shm.watch import gap_percent, has_grown, joined, watch_gap
+from shm.watch import has_grown, joined, watch_gap
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_drift, a_posterior
 
@@ -29,14 +28,6 @@ def watched(before: Posterior, now: Posterior) -> Alert | None:
     return watch_gap(before, now, HANGER_3, test="t2", time=WHEN)
 
 
-def test_the_gap_is_the_root_mean_square_of_what_is_measured() -> None:
-    assert gap_percent(off(0.03, -0.04)) == pytest.approx(100 * math.sqrt(0.00125))
-    unknown = PredictedFrequency("transverse", 3, 10.0, 0.01, math.nan)
-    some = off(0.01)
-    assert gap_percent(replace(some, predicted=(*some.predicted, unknown))) == pytest.approx(1.0)
-    assert math.isnan(gap_percent(replace(some, predicted=(unknown,))))
-
-
 @pytest.mark.parametrize(
     ("before", "now", "grown"),
     [(0.2, 0.59, False), (0.2, 0.61, True), (0.001, 0.09, False), (0.001, 0.11, True)],
@@ -45,11 +36,6 @@ def test_a_gap_has_grown_beyond_three_times_and_a_tenth_of_a_percent(
     before: float, now: float, grown: bool
 ) -> None:
     assert has_grown(before, now) is grown
-
-
-def test_an_unknown_gap_has_not_grown() -> None:
-    assert not has_grown(math.nan, math.nan)
-    assert not has_grown(0.2, math.nan)
 
 
 def test_a_grown_gap_of_an_adopted_class_is_an_alert_with_both_figures() -> None:

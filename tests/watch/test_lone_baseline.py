@@ -14,7 +14,7 @@ from shm.pipeline.conditions import Evidence, why_over
 from shm.values import Alert, Beside, Drift, ModalTest, WatchedTest
 from shm.watch import WatchOptions, watch_newest
 from shm.watch.baseline_check import check_baseline
-from shm.watch.odd_test_alerts import alert_of_baseline
+from shm.watch.notices import alert_of_baseline
 from shm.watch.watching import DatedTest
 from tests.helpers.modelled_tests import misnamed
 from tests.helpers.nouns import a_change
@@ -98,7 +98,7 @@ def test_a_mistaken_mode_of_the_only_baseline_test_is_no_loss() -> None:
     tests[0] = misnamed(tests[0], "transverse", 2)
     check = check_baseline(tests[:1], build("beam2", HANGER))
     assert [(each.plane, each.order) for each in check.modes] == [("transverse", 2)]
-    assert rung([check.kept(tests[0]), *tests[1:]]) == []
+    assert rung([check.without_mistakes(tests[0]), *tests[1:]]) == []
 
 
 def test_a_mode_that_is_mistaken_in_the_baseline_unseen_is_at_most_a_notice() -> None:

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from shm.models import described
-from shm.values import TENSION, Hanger, Posterior, Turnbuckle, WatchedQuantity
+from shm.values import TENSION, Hanger, Posterior, Turnbuckle
 from shm.watch.quantities import (
     MeasuredMode,
-    common_stiffness,
     coordinate_of,
     shift_of,
     value_at,
@@ -45,10 +44,6 @@ def baseline(
     )
 
 
-def by_name(quantities: Sequence[WatchedQuantity]) -> dict[str, WatchedQuantity]:
-    return {each.name: each for each in quantities}
-
-
 def test_of_clamped_ends_the_tension_alone_is_watched() -> None:
     (tension,) = watched_quantities(baseline((1.1, 0.97), "beam1"), HANGER_3, BOTH)
     assert (tension.name, tension.step_sd, tension.end, tension.plane) == (
@@ -57,19 +52,6 @@ def test_of_clamped_ends_the_tension_alone_is_watched() -> None:
         None,
         None,
     )
-
-
-@pytest.mark.parametrize(
-    ("theta", "model", "unit"),
-    [
-        ((1.1, 0.97, 8.0, 8.0, 8.0, 8.0), "beam2", "N m/rad"),
-        pytest.param((1.1, *[8.0] * 4), "solid2", "N/m", marks=pytest.mark.slow),
-    ],
-)
-def test_watched_quantities_units(theta: tuple[float, ...], model: str, unit: str) -> None:
-    tension, *springs = watched_quantities(baseline(theta, model), HANGER_3, BOTH)
-    assert tension.unit == "N"
-    assert {each.unit for each in springs} == {unit}
 
 
 def test_the_tension_comes_first_and_then_the_ends_of_each_plane_in_one() -> None:
@@ -81,14 +63,6 @@ def test_the_tension_comes_first_and_then_the_ends_of_each_plane_in_one() -> Non
     ]
 
 
-def test_the_stiffness_of_two_ends_is_that_of_two_springs_alike() -> None:
-    found = by_name(watched_quantities(baseline(SPRUNG), HANGER_3, BOTH))[TRANSVERSE_ENDS]
-    assert 10**found.baseline == pytest.approx(2 / (10**-7.2 + 10**-8.6))
-    assert common_stiffness(np.array([[7.0, 7.0], [12.0, 7.0]])) == pytest.approx(
-        [7.0, 7.0 + np.log10(2)], abs=1e-4
-    )
-
-
 def test_the_tension_people_see_is_the_mean_and_its_coordinate_the_log_of_the_ratio() -> None:
     known = baseline(SPRUNG)
     tension = watched_quantities(known, HANGER_3, BOTH)[0]
@@ -98,66 +72,6 @@ def test_the_tension_people_see_is_the_mean_and_its_coordinate_the_log_of_the_ra
     assert value_at(tension, np.log(0.9)) == pytest.approx(0.9 * tension.baseline)
     assert shift_of(tension, np.log(0.9)) == pytest.approx(-0.1)
     assert coordinate_of(tension, 0.9 * tension.baseline) == pytest.approx(np.log(0.9))
-
-
-def test_a_springs_coordinate_is_the_change_of_the_mean_log_frequency() -> None:
-    springs = by_name(watched_quantities(baseline(SPRUNG), HANGER_3, BOTH))[TRANSVERSE_ENDS]
-    model, theta = described("beam2", HANGER_3), np.tile(SPRUNG, (3, 1))
-    decades = np.array([0.0, -0.75, 1.7])
-    theta[:, [2, 4]] += decades[:, None]
-    mean = np.log(model.frequencies_hz(theta, 6)).mean(axis=(1, 2))
-    assert coordinate_of(springs, springs.baseline) == 0.0
-    for row in (1, 2):
-        coordinate = coordinate_of(springs, springs.baseline + decades[row])
-        assert coordinate == pytest.approx(mean[row] - mean[0], rel=0.01)
-
-
-def test_values_and_coordinates_rise_strictly_through_the_baseline() -> None:
-    for theta in (SPRUNG, (1.0, 1.0, 12.0, 5.0, 11.9, 11.98)):
-        for each in watched_quantities(baseline(theta), HANGER_3, BOTH):
-            assert np.all(np.diff(each.coordinates) > 0)
-            assert np.all(np.diff(each.values) > 0)
-            assert value_at(each, 0.0) == pytest.approx(each.baseline, rel=1e-12)
-
-
-def test_a_value_stops_at_the_end_of_its_table() -> None:
-    found = by_name(watched_quantities(baseline(SPRUNG), HANGER_3, BOTH))
-    assert value_at(found[TRANSVERSE_ENDS], 1.0) == found[TRANSVERSE_ENDS].values[-1]
-    assert value_at(found[TRANSVERSE_ENDS], -1.0) == 5.0
-    nominal_n = HANGER_3.nominal_tension_n * 1.02
-    assert value_at(found["tension"], 9.0) == pytest.approx(5 * nominal_n, rel=0.01)
-    at_rest_n = value_at(found["tension"], 0.0)
-    assert value_at(found["tension"], -9.0) == pytest.approx(0.02 * at_rest_n, rel=0.01)  # slack
-
-
-def test_many_coordinates_give_as_many_values_and_shifts() -> None:
-    springs = by_name(watched_quantities(baseline(SPRUNG), HANGER_3, BOTH))[TRANSVERSE_ENDS]
-    values = springs.baseline + np.array([-0.3, 0.0, 0.3])
-    coordinates = np.array([coordinate_of(springs, value) for value in values])
-    np.testing.assert_allclose(value_at(springs, coordinates), values)
-    np.testing.assert_allclose(shift_of(springs, coordinates), [-0.3, 0.0, 0.3], atol=1e-9)
-
-
-def test_a_step_of_a_spring_is_what_a_third_of_a_decade_does() -> None:
-    known = baseline(SPRUNG, spread=0.0)
-    springs = by_name(watched_quantities(known, HANGER_3, BOTH))[TRANSVERSE_ENDS]
-    down, up = (coordinate_of(springs, springs.baseline + shift) for shift in (-0.3, 0.3))
-    assert springs.step_sd == pytest.approx(max(-down, up), rel=1e-9)
-
-
-def test_ends_that_may_be_softer_than_they_most_probably_are_may_change_visibly() -> None:
-    known = baseline((1.1, 0.97, 11.9, 7.6, 11.9, 6.6))
-    sure = by_name(watched_quantities(known, HANGER_3, BOTH))[TRANSVERSE_ENDS]
-    samples = known.samples.copy()
-    samples[:, 4] = np.linspace(8.0, 12.0, len(samples))
-    unsure = by_name(watched_quantities(replace(known, samples=samples), HANGER_3, BOTH))
-    assert sure.step_sd < 1e-6
-    assert unsure[TRANSVERSE_ENDS].step_sd > 1e-4
-
-
-def test_springs_of_a_plane_that_is_not_measured_are_not_watched() -> None:
-    found = watched_quantities(baseline(SPRUNG), HANGER_3, TRANSVERSE)
-    assert [each.name for each in found] == [TENSION, TRANSVERSE_ENDS]
 
 
 def test_ends_that_no_frequency_tells_apart_are_not_named() -> None:
@@ -175,13 +89,6 @@ def test_ends_that_a_turnbuckle_tells_apart_are_watched_each_by_its_name() -> No
         ("log10_k4", "arch", "longitudinal", ("log10_k4",)),
     ]
     assert [each.baseline for each in found[1:]] == list(SPRUNG[2:])
-
-
-def test_ends_that_a_turnbuckle_tells_apart_stay_apart_where_both_are_clamped() -> None:
-    hanger = replace(HANGER_3, turnbuckles=(Turnbuckle(1.5, 0.6, 120.0, 6e6),))
-    clamped = baseline((1.1, 0.97, 11.9, 11.8, 11.9, 11.8), hanger=hanger)
-    found = watched_quantities(clamped, hanger, BOTH)
-    assert [each.end for each in found] == [None, "deck", "deck", "arch", "arch"]
 
 
 def test_a_symmetrical_effect_leaves_the_ends_alike_and_is_not_watched_itself() -> None:

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from shm.assumptions import DEFAULTS
 from shm.errors import BadInput
 from shm.models import described
 from shm.models.base import Conditions
 from shm.values import (
-    NAN,
     PLANES,
     AddedMass,
     FloatArray,
     ModalTest,
-    Plane,
     Reading,
 )
 from shm.watch.quantities import coordinate_of
@@ -29,7 +25,6 @@ from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import (
     ALLOWANCE,
     EVERYTHING,
-    MODEL_ERROR,
     SD,
     WHEN,
     common_of,
@@ -122,94 +117,6 @@ def test_noisy_tests_are_read_within_their_own_covariance(
         assert np.linalg.eigvalsh(reading.information).min() > 0
 
 
-def test_a_model_error_that_all_tests_share_cancels(reader: Reader) -> None:
-    exact = frequencies(SPRUNG) / np.exp(MODEL_ERROR)
-    without = Reader(posterior(SPRUNG), [measured(exact)], HANGER_3)
-    theta = changed(tension=0.95, transverse=-0.3)
-    now = frequencies(theta)
-    one = reader.reading(measured(now), WHEN)
-    other = without.reading(measured(now / np.exp(MODEL_ERROR)), WHEN)
-    np.testing.assert_allclose(one.mean, other.mean, rtol=1e-6, atol=1e-9)
-    biased = without.reading(measured(now), WHEN)
-    assert distance(one, biased.mean) > 100
-
-
-def test_the_residual_is_the_mean_over_the_tests_of_the_baseline() -> None:
-    frequency_hz = frequencies(SPRUNG)
-    tests = [measured(frequency_hz * (1 + off)) for off in (0.002, -0.002)]
-    several = Reader(posterior(SPRUNG), tests, HANGER_3)
-    reading = several.reading(measured(frequency_hz), WHEN)
-    assert distance(reading, np.zeros(3)) < 1e-3
-    blundered = [measured(frequency_hz), measured(frequency_hz * 1.01, sd=0.05)]
-    weighted = Reader(posterior(SPRUNG), blundered, HANGER_3)
-    assert distance(weighted.reading(measured(frequency_hz), WHEN), np.zeros(3)) < 1e-3
-
-
-@pytest.mark.parametrize(
-    "modes",
-    [
-        EVERYTHING[1:],
-        [*EVERYTHING[:4], *EVERYTHING[6:9]],
-        EVERYTHING[:6],
-        [("transverse", 1), ("longitudinal", 2)],
-    ],
-)
-def test_missing_modes_widen_a_reading_but_do_not_bias_it(
-    reader: Reader, modes: list[tuple[Plane, int]]
-) -> None:
-    whole = reader.reading(measured(frequencies(SPRUNG)), WHEN)
-    few = reader.reading(measured(frequencies(SPRUNG), modes), WHEN)
-    np.testing.assert_allclose(few.mean, 0.0, atol=1e-6)
-    assert np.linalg.eigvalsh(whole.information - few.information).min() > -1e-3
-    theta = changed(tension=0.97)
-    assert distance(reader.reading(measured(frequencies(theta), modes), WHEN), _of(theta)) < 0.05
-
-
-def _of(theta: tuple[float, ...]) -> FloatArray:
-    """Coordinates where the tension alone has changed."""
-    return np.array([np.log(theta[0] / SPRUNG[0]), 0.0, 0.0])
-
-
-def test_what_a_test_does_not_see_stays_at_nought_with_no_information(reader: Reader) -> None:
-    one_plane = measured(frequencies(changed(tension=0.97)), EVERYTHING[:6])
-    reading = reader.reading(one_plane, WHEN)
-    longitudinal = [
-        index for index, each in enumerate(reader.quantities) if each.plane == "longitudinal"
-    ]
-    assert len(longitudinal) == 1
-    np.testing.assert_allclose(reading.mean[longitudinal], 0.0, atol=1e-9)
-    np.testing.assert_allclose(reading.information[longitudinal], 0.0, atol=1e-3)
-    assert reading.mean[0] == pytest.approx(np.log(0.97), abs=1e-3)
-
-
-def test_modes_that_the_baseline_lacks_are_left_out() -> None:
-    narrow = Reader(posterior(SPRUNG), [measured(frequencies(SPRUNG), EVERYTHING[:9])], HANGER_3)
-    now = frequencies(changed(tension=0.95))
-    few, many = (
-        narrow.reading(measured(now, modes), WHEN) for modes in (EVERYTHING[:9], EVERYTHING)
-    )
-    sd = 1 / np.sqrt(np.diag(many.information))
-    np.testing.assert_allclose(few.mean / sd, many.mean / sd, atol=1e-6)
-    known = (each.information * np.outer(sd, sd) for each in (few, many))
-    np.testing.assert_allclose(*known, atol=1e-6)
-
-
-def test_an_irregular_mode_is_not_read() -> None:
-    seen = measured(frequencies(SPRUNG))
-    irregular = replace(seen, modes=(replace(seen.modes[0], irregular=True), *seen.modes[1:]))
-    plain = Reader(posterior(SPRUNG), [irregular], HANGER_3)
-    assert (seen.modes[0].plane, seen.modes[0].order) not in plain.modes
-    assert len(plain.modes) == len(seen.modes) - 1
-
-
-def test_a_test_without_a_common_mode_says_nothing() -> None:
-    narrow = Reader(posterior(SPRUNG), [measured(frequencies(SPRUNG), EVERYTHING[:6])], HANGER_3)
-    reading = narrow.reading(measured(frequencies(SPRUNG), EVERYTHING[6:]), WHEN)
-    assert np.all(reading.information == 0)
-    assert np.all(reading.mean == 0)
-    assert np.all(narrow.reading(ModalTest("bare", ()), WHEN).information == 0)
-
-
 def test_a_test_of_conditions_beyond_the_class_says_nothing(reader: Reader) -> None:
     off = measured(frequencies(SPRUNG), added_mass=AddedMass(25.0, 99.0))
     assert np.all(reader.reading(off, WHEN).information == 0)
@@ -218,15 +125,6 @@ def test_a_test_of_conditions_beyond_the_class_says_nothing(reader: Reader) -> N
 def test_a_baseline_without_modes_is_refused() -> None:
     with pytest.raises(BadInput, match="no test with a mode"):
         Reader(posterior(SPRUNG), [ModalTest("bare", ())], HANGER_3)
-
-
-def test_a_known_mass_of_one_test_is_no_change(reader: Reader) -> None:
-    mass = AddedMass(25.0, 3.6)
-    laden = frequencies(SPRUNG, conditions=Conditions(added_mass=mass))
-    told = reader.reading(measured(laden, added_mass=mass), WHEN)
-    assert distance(told, np.zeros(3)) < 1e-3
-    untold = reader.reading(measured(laden), WHEN)
-    assert distance(untold, np.zeros(3)) > 50
 
 
 def test_an_adopted_swing_with_the_temperature_is_no_change() -> None:
@@ -253,36 +151,6 @@ def test_an_adopted_swing_with_the_temperature_is_no_change() -> None:
     assert np.isnan(unknown.temperature_c)
 
 
-def test_an_error_that_is_not_stated_is_the_assumed_one(reader: Reader) -> None:
-    frequency_hz = frequencies(SPRUNG)
-    unstated = measured(frequency_hz)
-    unstated = replace(
-        unstated, modes=tuple(replace(mode, frequency_sd_hz=NAN) for mode in unstated.modes)
-    )
-    sd = DEFAULTS.unstated_frequency_sd.value
-    stated = reader.reading(measured(frequency_hz, sd=sd), WHEN)
-    np.testing.assert_allclose(
-        reader.reading(unstated, WHEN).information, stated.information, rtol=1e-6
-    )
-
-
-def test_the_allowance_bounds_what_a_perfect_test_tells() -> None:
-    frequency_hz = frequencies(SPRUNG)
-    coarse = Reader(posterior(SPRUNG), [measured(frequency_hz)], HANGER_3, frequency_allowance=2e-3)
-    perfect, fair = (
-        coarse.reading(measured(frequency_hz, sd=sd), WHEN).information[0, 0] for sd in (1e-9, 2e-3)
-    )
-    assert perfect == pytest.approx(2 * fair, rel=1e-6)
-
-
-@pytest.mark.parametrize("factor", [0.2, 3.0])
-def test_frequencies_of_no_such_hanger_say_next_to_nothing(reader: Reader, factor: float) -> None:
-    reading = reader.reading(measured(factor * frequencies(SPRUNG)), WHEN)
-    assert np.all(np.isfinite(reading.mean))
-    steps = np.array([each.step_sd for each in reader.quantities])
-    assert np.diag(reading.information) @ steps**2 < 1
-
-
 @pytest.mark.parametrize("theta", [SPRUNG, changed(tension=0.9), changed(tension=1.05)])
 def test_a_mode_taken_for_another_is_left_out_and_moves_nothing(
     reader: Reader, theta: tuple[float, ...]
@@ -303,30 +171,6 @@ def test_a_mode_taken_for_another_is_left_out_and_moves_nothing(
     assert misled.mean == pytest.approx(lacking.mean)
     assert misled.information == pytest.approx(lacking.information)
     assert misled.modes.variances == pytest.approx(lacking.modes.variances)
-
-
-@pytest.mark.parametrize(
-    "theta",
-    [
-        changed(transverse=-0.5, longitudinal=-0.5),
-        changed(transverse=-1.0, longitudinal=-1.0),
-        changed(tension=0.9, transverse=-0.7),
-        (*SPRUNG[:2], SPRUNG[2] - 0.7, *SPRUNG[3:]),
-    ],
-    ids=["springs", "springs by a decade", "tension and springs", "one spring alone"],
-)
-def test_a_mistaken_mode_is_found_though_the_springs_have_moved(
-    reader: Reader, theta: tuple[float, ...]
-) -> None:
-    frequency_hz = frequencies(theta)
-    good = reader.reading(measured(frequency_hz), WHEN)
-    frequency_hz[0, 2] *= 1.04
-    misled = reader.reading(measured(frequency_hz), WHEN)
-
-    assert good.modes is not None
-    assert misled.modes is not None
-    assert not good.modes.mistaken.any()
-    assert [reader.modes[n] for n in np.flatnonzero(misled.modes.mistaken)] == [(PLANES[0], 3)]
 
 
 @pytest.mark.parametrize("left", [0.3, 0.05, 0.03])
@@ -353,29 +197,6 @@ def test_where_most_modes_fit_no_state_the_test_says_little(reader: Reader) -> N
     assert misled.information[0, 0] < good.information[0, 0] / 1000
 
 
-def test_mode_by_mode_a_reading_says_what_it_says_as_a_whole(reader: Reader) -> None:
-    theta = changed(tension=0.95, longitudinal=-0.2)
-    modes = [each for each in EVERYTHING if each != (PLANES[1], 4)]
-    reading = reader.reading(measured(frequencies(theta), modes=modes, amplitude=1.5), WHEN)
-
-    assert reading.modes is not None
-    missing = [each == (PLANES[1], 4) for each in reader.modes]
-    assert np.isinf(reading.modes.variances).tolist() == missing
-    expected = reading.modes.slopes @ coordinates(reader, theta)
-    assert reading.modes.values == pytest.approx(expected, abs=1e-5)
-    weighted = reading.modes.slopes / reading.modes.variances[:, None]
-    information = weighted.T @ reading.modes.slopes
-    assert information == pytest.approx(reading.information, rel=1e-6, abs=1e-3)
-    assert reading.amplitude == 1.5
-
-
-def test_a_reading_carries_the_test_its_time_and_its_temperature(reader: Reader) -> None:
-    other = datetime(2027, 1, 1, tzinfo=UTC)
-    warm = reader.reading(measured(frequencies(SPRUNG), temperature_c=21.0), other)
-    assert (warm.test, warm.time, warm.temperature_c) == ("t", other, 21.0)
-    assert np.isnan(reader.reading(measured(frequencies(SPRUNG)), WHEN).temperature_c)
-
-
 def test_steel_that_softens_as_it_warms_is_no_change() -> None:
     """Twenty kelvin warmer its modulus is 0.6 % lower: tension and ends are what they were."""
     mild = measured(frequencies(SPRUNG), temperature_c=10.0)
@@ -387,16 +208,3 @@ def test_steel_that_softens_as_it_warms_is_no_change() -> None:
     nothing = np.zeros(3)
     assert distance(known, nothing) < 0.05
     assert distance(unknown, nothing) > 20 * distance(known, nothing)
-
-
-def test_a_test_without_a_temperature_says_what_a_kelvin_has_done_to_it() -> None:
-    mild = measured(frequencies(SPRUNG), temperature_c=10.0)
-    warm = replace(HANGER_3, elastic_modulus_pa=HANGER_3.elastic_modulus_pa * (1 - 20 * 3e-4))
-    softer = frequencies(SPRUNG, hanger=warm)
-    reader = Reader(posterior(SPRUNG), [mild], HANGER_3)
-    known = reader.reading(measured(softer, temperature_c=30.0), WHEN)
-    unknown = reader.reading(measured(softer), WHEN)
-    assert known.per_kelvin is None
-    assert unknown.per_kelvin is not None
-    corrected = replace(unknown, mean=unknown.mean - 20 * unknown.per_kelvin)
-    assert distance(corrected, np.zeros(3)) < 0.1 < distance(unknown, np.zeros(3)) / 20

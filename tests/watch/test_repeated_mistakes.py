@@ -6,14 +6,12 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
-import pytest
 
-from shm.pipeline.conditions import Evidence, why_over
 from shm.values import ModeReading, Reading, RepeatedMistake, WatchedTest
-from shm.watch.alert_state import AlertState
+from shm.watch.kept_state import from_bytes, to_bytes
+from shm.watch.notices import repeated_mistakes
 from shm.watch.quantities import MeasuredMode
-from shm.watch.repeated_mistakes import repeated_mistakes
-from shm.watch.watching import after
+from shm.watch.watching import AlertState, after
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_change
 
@@ -29,30 +27,6 @@ def reading(number: int, wrong: str = "...", lacks: str = "...") -> Reading:
     modes = ModeReading(np.zeros(3), variances, np.zeros((3, 1)), np.zeros(3), mistaken)
     time = START + timedelta(days=number)
     return Reading(f"t{number}", time, 10.0, np.zeros(1), np.eye(1), modes=modes)
-
-
-def runs(*readings: Reading) -> list[tuple[RepeatedMistake, ...]]:
-    found: list[tuple[RepeatedMistake, ...]] = [()]
-    for each in readings:
-        found.append(repeated_mistakes(found[-1], each, MODES))
-    return found[1:]
-
-
-def test_a_run_counts_tests_in_a_row_from_its_first() -> None:
-    found = runs(reading(0, ".x."), reading(1, ".xx"), reading(2, ".x."))
-    assert [[(str(m), m.tests) for m in each] for each in found] == [
-        [("transverse 2", 1)],
-        [("transverse 2", 2), ("longitudinal 1", 1)],
-        [("transverse 2", 3)],
-    ]
-    assert found[-1][0].since == START
-    assert [each[0].is_notable for each in found] == [False, False, True]
-
-
-def test_a_test_without_the_mode_neither_counts_nor_ends_the_run() -> None:
-    blind = replace(reading(1), modes=None)
-    found = runs(reading(0, ".x."), reading(1, lacks=".x."), blind, reading(2, ".x."), reading(3))
-    assert [[m.tests for m in each] for each in found] == [[1], [1], [1], [2], []]
 
 
 def misfitting(number: int) -> Reading:
@@ -98,7 +72,7 @@ def rung(wrong: str) -> list[int]:
         mistaken = repeated_mistakes(mistaken, reading(number, f".{each}."), MODES)
         test = replace(watched(number, 0), mistaken=mistaken)
         told, alert = after(told, test, HANGER_3)
-        told = AlertState.from_text(told.to_text())
+        told = from_bytes(AlertState, to_bytes(told))
         rings += [number] if alert else []
     return rings
 
@@ -110,28 +84,3 @@ def test_a_notice_of_a_mode_that_is_wrong_now_and_then_is_given_once() -> None:
 def test_it_is_given_again_once_the_mode_was_right_in_six_tests_in_a_row() -> None:
     assert rung("xxx......xx.xxx") == [2, 14]
     assert rung("xxx.....xxxx") == [2]
-
-
-def test_a_further_mode_is_a_further_notice_that_names_it_alone() -> None:
-    first = RepeatedMistake("transverse", 3, START, 5)
-    other = RepeatedMistake("longitudinal", 1, START, 3)
-    _, alert = after(
-        AlertState(noted=frozenset({("transverse", 3)})),
-        replace(watched(6, 0), mistaken=(other, first)),
-        HANGER_3,
-    )
-    assert alert is not None
-    assert alert.message.startswith("Hanger 3: longitudinal 1 has not fitted the other modes")
-
-
-@pytest.mark.parametrize(("tests", "ends"), [(4, False), (1, True), (0, True)])
-def test_the_notice_ends_once_the_mode_fits_again(tests: int, ends: bool) -> None:
-    _, alert = after(AlertState(), watched(2, 3), HANGER_3)
-    assert alert is not None
-    later = [watched(number, tests) for number in (3, 6)]
-
-    def is_over(tests: list[WatchedTest]) -> bool:
-        return bool(why_over(alert, Evidence(HANGER_3, tests, "", lambda _: False, ())))
-
-    assert not is_over(later[:1])
-    assert is_over(later) is ends

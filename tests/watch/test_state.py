@@ -109,19 +109,6 @@ def jointly(history: StateHistory, upto: int) -> tuple[FloatArray, FloatArray, F
     return last @ mean, last @ covariance @ last.T, mean[-q:], float(density)
 
 
-def test_a_level_that_does_not_wander_is_the_weighted_mean() -> None:
-    still = replace(FIXED, rate_of_step=1e-9, scatter_of_step=1e-9, tension_per_kelvin_sd=1e-12)
-    sds, means = np.array([1e-3, 2e-3, 5e-4, 1e-3]), np.array([0.004, 0.001, 0.003, 0.002])
-    readings = [reading(10.0 * i, [x], s) for i, (x, s) in enumerate(zip(means, sds, strict=True))]
-    history = states(readings, [TENSION], options=still)
-    weight = np.append(1 / sds**2, 1 / 0.15**2)
-    assert history.smoothed_mean[:, 0] == pytest.approx(
-        np.full(4, weight[:4] @ means / weight.sum())
-    )
-    assert history.smoothed_covariance[:, 0, 0] == pytest.approx(np.full(4, 1 / weight.sum()))
-    assert history.filtered_mean[0, 0] == pytest.approx(means[0] * weight[0] / weight[[0, 4]].sum())
-
-
 def test_a_single_level_follows_a_hand_written_kalman_filter() -> None:
     readings = [reading(day, [x]) for day, x in [(0, 0.001), (3, 0.004), (40, -0.002), (400, 0.01)]]
     history = states(readings, [TENSION], options=FIXED)
@@ -145,17 +132,6 @@ def two_quantities() -> list[Reading]:
         each = reading(float(day), rng.normal(0, 2e-3, 2), temperature_c=float(rng.normal(12, 9)))
         readings.append(replace(each, information=root.T @ root + 1e5 * np.eye(2)))
     return readings
-
-
-def test_two_quantities_follow_the_joint_normal_law() -> None:
-    history = states(two_quantities(), [TENSION, SPRING], options=FIXED)
-    for upto in (1, 5, 12):
-        mean, covariance, _, _ = jointly(history, upto)
-        assert history.filtered_mean[upto - 1] == pytest.approx(mean, rel=1e-5, abs=1e-9)
-        assert history.filtered_covariance[upto - 1] == pytest.approx(covariance, rel=1e-4)
-    mean, covariance, coefficients, _ = jointly(history, 12)
-    assert history.smoothed_mean[-1] == pytest.approx(mean, rel=1e-5)
-    assert history.coefficient_mean == pytest.approx(coefficients, rel=1e-5)
 
 
 def test_rates_and_scatters_are_those_of_the_largest_posterior_density() -> None:
@@ -199,16 +175,6 @@ def test_the_temperature_coefficient_is_found_and_its_sd_is_honest(series: list[
     assert 0.8 <= np.mean(np.abs(errors) < 1.645) <= 0.98
 
 
-def test_a_gap_of_a_year_widens_the_band_and_no_more() -> None:
-    readings = weekly(np.zeros(40))
-    late = [replace(r, time=r.time + timedelta(days=365)) for r in readings[20:]]
-    history = states([*readings[:20], *late], [TENSION], options=OPTIONS)
-    sd = np.sqrt(history.filtered_covariance[:, 0, 0])
-    assert sd[20] > 1.1 * sd[19]
-    assert sd[-1] < 1.1 * sd[19]
-    assert np.all(np.abs(history.smoothed_mean[:, 0]) < 3e-3)
-
-
 def test_known_outliers_of_ten_sd_move_the_level_by_less_than_half_its_sd() -> None:
     clean = weekly(np.zeros(60), seed=3)
     blunders = {11: 1, 30: -1, 31: -1, 59: 1}
@@ -236,15 +202,6 @@ def test_a_called_step_is_followed_within_one_test() -> None:
     assert uncalled.level_rate[0] > 5 * called.level_rate[0]
 
 
-def test_a_change_between_two_tests_frees_the_level_at_the_later_one() -> None:
-    readings = weekly(np.where(np.arange(20) < 10, 0.0, 0.05), seed=6)
-    between, after = readings[10].time - timedelta(days=2), readings[-1].time + timedelta(days=1)
-    exact = states(readings, [TENSION], changes=[readings[10].time], options=OPTIONS)
-    history = states(readings, [TENSION], changes=[between, after], options=OPTIONS)
-    np.testing.assert_allclose(history.filtered_mean, exact.filtered_mean, atol=1e-9)
-    assert history.filtered_mean[10, 0] == pytest.approx(0.05, abs=4e-3)
-
-
 def called(readings: list[Reading], first: int, last: int, sudden: float) -> Change:
     """A change that began after test `first` and by test `last`."""
     return Change(900.0, 100.0, 1.0, sudden, readings[first].time, readings[last].time, ())
@@ -257,64 +214,6 @@ def test_a_called_step_frees_the_tests_of_its_beginning_a_ramp_none() -> None:
     assert set_free([clear], readings) == tuple(times[4:7])
     assert set_free([clear, clear, vague], readings) == (*times[4:7], times[20])
     assert set_free([called(readings, 3, 6, 0.1), called(readings, 3, 6, math.nan)], readings) == ()
-
-
-@pytest.mark.parametrize("tests", [1, 2, 3])
-def test_with_few_tests_the_priors_decide(tests: int) -> None:
-    readings = weekly(np.array([0.001, 0.012, -0.004])[:tests], seed=7)
-    history = states(readings, [TENSION], options=OPTIONS)
-    (coefficient,) = history.temperature_coefficients()
-    assert coefficient.sd == pytest.approx(OPTIONS.tension_per_kelvin_sd)
-    assert 1e-3 < history.level_rate[0] < 0.05
-    assert 3e-4 < history.scatter[0] < 0.012
-    band = history.filtered("tension")
-    assert np.all((band.low < band.middle) & (band.middle < band.high))
-    assert np.all((band.high - band.low) < 0.05 * BASELINE_N)
-
-
-def test_directions_not_seen_keep_their_uncertainty() -> None:
-    """Tests that see only the sum of two quantities tell the sum, and no more of each."""
-    along = np.array([1.0, 1.0]) / math.sqrt(2)
-    readings = [
-        replace(reading(7.0 * week, 0.004 * along), information=np.outer(along, along) * 1e6)
-        for week in range(30)
-    ]
-    history = states(readings, [TENSION, TENSION], options=OPTIONS)
-    across = np.array([1.0, -1.0]) / math.sqrt(2)
-    assert along @ history.smoothed_mean[-1] == pytest.approx(0.004, rel=0.01)
-    assert across @ history.smoothed_covariance[-1] @ across == pytest.approx(0.15**2, rel=0.01)
-
-
-def test_coordinates_of_very_different_size_are_both_followed() -> None:
-    """A spring of an end that is nearly clamped moves frequencies by a part in a million."""
-    tiny = replace(SPRING, step_sd=2e-6)
-    information = np.linalg.inv(np.array([[1e-6, -5e-10], [-5e-10, 1e-12]]))
-    readings = [
-        replace(reading(7.0 * week, [-0.03, 4e-6]), information=information) for week in range(40)
-    ]
-    history = states(readings, [TENSION, tiny], options=OPTIONS)
-    assert history.smoothed_mean[-1] == pytest.approx([-0.03, 4e-6], rel=0.05)
-    assert history.level_rate[1] < 1e-6
-
-
-def test_a_quantity_that_no_test_sees_is_not_read() -> None:
-    blind = [
-        replace(r, mean=np.append(r.mean, 0.0), information=np.diag([1e6, 0.0]))
-        for r in weekly(np.zeros(5))
-    ]
-    history = states(blind, [TENSION, SPRING], options=OPTIONS)
-    assert np.all(np.isnan(history.read("log10_k1").middle))
-    assert np.all(np.isfinite(history.read("tension").middle))
-    assert np.all(np.isfinite(history.smoothed("log10_k1").high))
-
-
-def test_a_test_that_saw_nothing_leaves_the_level_to_wander() -> None:
-    readings = weekly(np.zeros(10))
-    empty = replace(readings[5], mean=np.array([np.nan]), information=np.zeros((1, 1)))
-    history = states([*readings[:5], empty, *readings[6:]], [TENSION], options=OPTIONS)
-    assert history.filtered_mean[5, 0] == pytest.approx(history.filtered_mean[4, 0])
-    assert history.filtered_covariance[5, 0, 0] > history.filtered_covariance[4, 0, 0]
-    assert np.isnan(history.read("tension").middle[5])
 
 
 def test_a_test_without_temperature_weighs_less() -> None:
@@ -333,27 +232,6 @@ def test_a_test_without_temperature_weighs_less() -> None:
     assert history.coefficient_mean[0] == pytest.approx(0.001, abs=1e-4)
 
 
-def test_a_test_without_temperature_counts_in_full_where_the_coefficient_is_known_to_be_0() -> None:
-    rng = np.random.default_rng(9)
-    readings = [
-        reading(7.0 * i, [rng.normal(0, 1e-3)], temperature_c=float(rng.normal(12, 10)))
-        for i in range(60)
-    ]
-    unknown = replace(readings[30], temperature_c=math.nan)
-    known = states(readings, [TENSION], options=OPTIONS)
-    history = states([*readings[:30], unknown, *readings[31:]], [TENSION], options=OPTIONS)
-    sd, usual = (np.sqrt(each.filtered_covariance[30, 0, 0]) for each in (history, known))
-    assert sd < 1.2 * usual
-
-
-def test_without_any_temperature_the_coefficient_stays_at_its_prior() -> None:
-    unknown = [replace(r, temperature_c=math.nan) for r in weekly(np.zeros(20))]
-    history = states(unknown, [TENSION])
-    assert history.coefficient_mean[0] == pytest.approx(0.0, abs=1e-12)
-    assert history.coefficient_sd[0] == pytest.approx(StateOptions().tension_per_kelvin_sd)
-    assert math.isnan(history.reference_temperature_c)
-
-
 def test_bands_are_in_newtons_and_in_decades() -> None:
     readings = [reading(7.0 * week, [-0.05, 0.01], 1e-4) for week in range(30)]
     history = states(readings, [TENSION, SPRING], options=OPTIONS)
@@ -362,14 +240,6 @@ def test_bands_are_in_newtons_and_in_decades() -> None:
     assert spring.middle[-1] == pytest.approx(7.4, abs=0.02)
     assert tension.low[-1] < tension.middle[-1] < tension.high[-1]
     assert history.read("tension").middle[3] == pytest.approx(tension.middle[3], rel=1e-3)
-
-
-def test_coefficients_of_a_stiffness_are_in_decades_per_kelvin() -> None:
-    history = states(two_quantities(), [TENSION, SPRING], options=OPTIONS)
-    tension, spring = history.temperature_coefficients()
-    assert tension.mean == history.coefficient_mean[0]
-    assert spring.mean == pytest.approx(40 * history.coefficient_mean[1], rel=1e-3)
-    assert spring.sd == pytest.approx(40 * history.coefficient_sd[1], rel=1e-3)
 
 
 def test_readings_are_drawn_at_the_reference_temperature() -> None:

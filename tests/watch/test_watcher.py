@@ -11,9 +11,9 @@ import pytest
 
 from shm.errors import BadInput
 from shm.values import WatchedTest
-from shm.watch.causes import POINT_MASS, TIMEBASE, Columns
+from shm.watch.causes import POINT_MASS, TIMEBASE
 from shm.watch.options import WatchOptions
-from shm.watch.watcher import Watch, watched
+from shm.watch.watcher import Watch
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.synthetic_readings import (
     BOTH_ENDS,
@@ -27,7 +27,6 @@ from tests.helpers.synthetic_readings import (
     shifted,
     slopes,
     watch_of,
-    with_modes,
     without_modes,
 )
 
@@ -46,17 +45,10 @@ def lost(fraction: float, q: int = 1) -> list[float]:
     return [math.log(1 - fraction), *[0.0] * (q - 1)]
 
 
-def test_a_slow_loss_is_told_from_a_sudden_one() -> None:
-    slow = watch(History(tests=34, change_at=CHANGE_AT, ramp=[-0.02]))
-    sudden = watch(History(tests=14, change_at=CHANGE_AT, step=lost(0.05), outliers=0))
-
-    assert slow.calls[0].change.sudden < 0.5 < 0.9 < sudden.calls[0].change.sudden
-
-
 def test_a_hanger_none_of_whose_temperatures_is_known_can_be_watched() -> None:
     history = History(tests=18, temperatures_missing=1.0, change_at=10, step=lost(0.10))
 
-    assert watch(history).calls[0].change.moved[0].shift_mean == pytest.approx(-0.1, abs=0.03)
+    assert watch(history).calls[0][1].moved[0].shift_mean == pytest.approx(-0.1, abs=0.03)
 
 
 @pytest.mark.parametrize("size", [0.03, 0.1, 0.5, 2.0, -0.9])
@@ -74,16 +66,6 @@ def test_an_outlier_of_any_size_calls_no_change_and_hardly_moves_the_drift(size:
         assert abs(drift.shift_mean) < min(2 * drift.shift_sd, 0.015)
 
 
-def test_an_outlier_along_one_spring_of_many_calls_no_change() -> None:
-    history = History(PLANES_ALONE, tests=12, outliers=0)
-    readings = shifted(history.readings(1), 9, [0.0, -10 * SPRING_STEP, 0.0])
-
-    found = watch_of(readings, PLANES_ALONE)
-
-    assert not found.calls
-    assert max(drift.probability for drift in found.tests[9].drifts) < 0.8
-
-
 def test_a_called_step_is_called_once_and_a_second_one_anew() -> None:
     once = History(tests=30, change_at=8, step=lost(0.05), outliers=0)
     readings = once.readings(3)
@@ -94,10 +76,10 @@ def test_a_called_step_is_called_once_and_a_second_one_anew() -> None:
     both = watch_of(readings, TENSION_ALONE)
 
     assert len(alone.calls) == 1
-    assert 8 <= alone.calls[0].index < 11
+    assert 8 <= alone.calls[0][0] < 11
     assert len(both.calls) == 2
-    assert 20 <= both.calls[1].index < 24
-    assert both.calls[1].change.began_after == readings[19].time
+    assert 20 <= both.calls[1][0] < 24
+    assert both.calls[1][1].began_after == readings[19].time
     expected = math.expm1(math.log(0.95) + 0.03)
     assert last(both.tests).drifts[0].shift_mean == pytest.approx(expected, abs=0.004)
 
@@ -115,33 +97,10 @@ def test_a_loss_that_goes_on_is_followed_after_its_call() -> None:
     assert drift.shift_sd < 0.02
 
 
-def test_a_loss_that_goes_on_is_followed_whatever_it_was_called_as() -> None:
-    """Called as a step or as a ramp by the few tests that there were: those since decide."""
-    history = History(tests=70, change_at=CHANGE_AT, ramp=[-0.03], outliers=0)
-    found = watch(history)
-    assert found.calls
-    (shift,) = last(found.tests).drifts
-    readings = history.readings(0)
-    years = (readings[-1].time - readings[CHANGE_AT].time).days / 365.25
-    truth = math.expm1(-0.03 * years)
-    assert abs(shift.shift_mean - truth) < 2.6 * shift.shift_sd
-    assert abs(shift.shift_mean - truth) < 0.15 * abs(truth)
-
-
-def test_the_beginning_lies_in_its_interval() -> None:
-    history = History(tests=CHANGE_AT + 6, change_at=CHANGE_AT, step=lost(0.05))
-    readings = history.readings(0)
-
-    change = watch_of(readings, TENSION_ALONE).calls[0].change
-
-    assert change.began_after <= readings[CHANGE_AT - 1].time
-    assert readings[CHANGE_AT].time <= change.began_by <= readings[CHANGE_AT + 2].time
-
-
 def test_a_loss_of_tension_is_told_from_a_loosened_end() -> None:
     history = History(PLANES_ALONE, tests=CHANGE_AT + 8, change_at=CHANGE_AT)
-    tension = watch(replace(history, step=lost(0.04, q=3))).calls[0].change.moved
-    end = watch(replace(history, step=[0.0, -3 * SPRING_STEP, 0.0])).calls[0].change.moved
+    tension = watch(replace(history, step=lost(0.04, q=3))).calls[0][1].moved
+    end = watch(replace(history, step=[0.0, -3 * SPRING_STEP, 0.0])).calls[0][1].moved
 
     assert (tension[0].quantity, end[0].quantity) == ("tension", "log10_kx")
     assert min(tension[0].probability, end[0].probability) > 0.95
@@ -154,7 +113,7 @@ def test_ends_that_no_test_tells_apart_are_said_to_be_alike() -> None:
     step = [0.0, -3 * SPRING_STEP, 0.0, 0.0, 0.0]
     history = History(BOTH_ENDS, tests=CHANGE_AT + 8, change_at=CHANGE_AT, step=step)
 
-    first, second, third = watch(history).calls[0].change.moved[:3]
+    first, second, third = watch(history).calls[0][1].moved[:3]
 
     assert {first.quantity, second.quantity} == {"log10_k1", "log10_k3"}
     assert {first.end, second.end} == {"deck", "arch"}
@@ -170,11 +129,11 @@ def test_both_planes_of_an_end_that_loosen_together_are_called_and_named_togethe
     history = History(BOTH_ENDS, tests=CHANGE_AT + 3, change_at=CHANGE_AT, outliers=0)
     step = [0.0, -1.6 * SPRING_STEP, -2 * SPRING_STEP, 0.0, 0.0]
 
-    call = watch(replace(history, step=step)).calls[0]
-    first = call.change.moved[0]
-    by_name = {each.quantity: each for each in call.change.moved}
+    index, change = watch(replace(history, step=step)).calls[0]
+    first = change.moved[0]
+    by_name = {each.quantity: each for each in change.moved}
 
-    assert call.index <= CHANGE_AT + 2
+    assert index <= CHANGE_AT + 2
     pair = {"log10_k1": "log10_k2", "log10_k3": "log10_k4"}
     pair |= {other: one for one, other in pair.items()}
     assert pair[first.quantity] in first.together
@@ -186,14 +145,6 @@ def test_both_planes_of_an_end_that_loosen_together_are_called_and_named_togethe
     assert by_name["tension"].probability < 0.05
 
 
-def test_nothing_is_said_to_move_together_with_itself() -> None:
-    step = [0.0, -1.6 * SPRING_STEP, -2 * SPRING_STEP, 0.0, 0.0]
-    history = History(BOTH_ENDS, CHANGE_AT + 3, change_at=CHANGE_AT, outliers=0, step=step)
-
-    for each in watch(history).calls[0].change.moved:
-        assert each.quantity not in {*each.together, *each.alike}
-
-
 def test_springs_that_loosen_while_a_part_is_read_as_tension_are_called_in_five_tests() -> None:
     pairs = tuple(
         each if each.name == "tension" else replace(each, parameters=("one", "other"))
@@ -202,31 +153,15 @@ def test_springs_that_loosen_while_a_part_is_read_as_tension_are_called_in_five_
     step = [0.06, -1.8 * SPRING_STEP, -2.1 * SPRING_STEP]
     history = History(pairs, tests=CHANGE_AT + 6, change_at=CHANGE_AT, step=step, outliers=0)
 
-    call = watch(history).calls[0]
+    index, change = watch(history).calls[0]
 
-    assert call.index <= CHANGE_AT + 4
-    assert {each.quantity for each in call.change.moved if each.probability > 0.95} == {
+    assert index <= CHANGE_AT + 4
+    assert {each.quantity for each in change.moved if each.probability > 0.95} == {
         "tension",
         "log10_kx",
         "log10_ky",
     }
-    assert call.change.moved[0].quantity != "tension"
-
-
-def test_a_small_shift_that_is_not_called_is_told_with_its_uncertainty() -> None:
-    gained = 0.005
-    step = [math.log(1 + gained)]
-    shifts = []
-    for seed in range(3):
-        history = History(tests=CHANGE_AT + 6, change_at=CHANGE_AT, step=step, outliers=0)
-        drift = last(watch(history, seed).tests).drifts[0]
-        assert drift.probability < 0.01
-        assert drift.shift_mean == pytest.approx(gained, abs=3.5 * drift.shift_sd)
-        assert 0.0005 < drift.shift_sd < 0.01
-        shifts.append(drift.shift_mean)
-
-    # Ten tests before, six after: each is uncertain by 0.0016, three of them by 0.001.
-    assert np.mean(shifts) == pytest.approx(gained, abs=0.003)
+    assert change.moved[0].quantity != "tension"
 
 
 @pytest.mark.parametrize("gained", [0.0, 0.01, -0.02])
@@ -237,16 +172,6 @@ def test_the_first_test_since_the_baseline_tells_no_less_than_it_leaves_open(gai
         assert drift.probability < 0.05
         assert drift.shift_mean == pytest.approx(gained, abs=3 * drift.shift_sd)
         assert 0.002 < drift.shift_sd < 0.03
-
-
-def test_a_test_that_sees_nothing_leaves_the_shift_as_open_as_it_was_before() -> None:
-    first, second = History(tests=2, outliers=0).readings(1)
-    blind = without_modes(second, range(len(MODES)))
-
-    drift = last(watch_of([first, blind], TENSION_ALONE).tests).drifts[0]
-
-    assert drift.shift_mean == pytest.approx(0, abs=0.01)
-    assert 1 < drift.shift_sd / TENSION_ALONE[0].step_sd < 3
 
 
 def test_the_drift_is_the_state_with_the_swing_of_the_temperature_taken_out() -> None:
@@ -270,17 +195,6 @@ def test_a_result_rests_on_the_readings_up_to_it_alone() -> None:
     assert [test.drifts for test in early] == [test.drifts for test in late]
 
 
-def test_a_reading_that_sees_nothing_changes_nothing() -> None:
-    readings = History(tests=12).readings(0)
-    blind = replace(readings[6], information=np.zeros((1, 1)), mean=np.zeros(1), modes=None)
-
-    found = watch_of([*readings[:6], blind], TENSION_ALONE).tests
-
-    before, after = (found[index].drifts[0] for index in (5, 6))
-    assert after.shift_mean == pytest.approx(before.shift_mean, abs=before.shift_sd / 2)
-    assert found[6].change.evidence_years < 1
-
-
 def test_readings_out_of_order_or_of_other_quantities_are_refused() -> None:
     readings = History(tests=4).readings(0)
 
@@ -288,12 +202,6 @@ def test_readings_out_of_order_or_of_other_quantities_are_refused() -> None:
         watch_of(readings[::-1], TENSION_ALONE)
     with pytest.raises(BadInput, match="3 quantities"):
         watch_of(readings, PLANES_ALONE)
-
-
-def test_no_reading_gives_no_result() -> None:
-    found = watch_of([], TENSION_ALONE)
-
-    assert (found.tests, found.calls) == ((), ())
 
 
 def test_tests_of_one_day_say_no_more_than_one() -> None:
@@ -317,7 +225,7 @@ def test_a_mass_put_on_is_named_and_not_taken_for_tension() -> None:
     of_mass, _ = columns().by_cause[POINT_MASS][4]
     history = History(tests=CHANGE_AT + 4, change_at=CHANGE_AT, outliers=0, mode_step=3 * of_mass)
 
-    moved = watch(history).calls[0].change.moved
+    moved = watch(history).calls[0][1].moved
 
     assert moved[0].quantity == POINT_MASS
     by_name = {each.quantity: each.probability for each in moved}
@@ -338,7 +246,7 @@ def test_a_clock_that_is_off_is_named_and_a_trifle_is_not_called() -> None:
     # Of five seeds the trifle's evidence is thousands of times its limit in this one.
     off, trifle = clock(0.008, steady, 0), clock(0.003, impatient, 1)
 
-    first = off.calls[0].change.moved[0]
+    first = off.calls[0][1].moved[0]
     assert TIMEBASE in (first.quantity, *first.alike)
     assert not trifle.calls
     # It is no want of evidence: what it does is less than what is to be told.
@@ -359,9 +267,9 @@ def test_modes_that_a_test_lacks_and_an_unknown_amplitude_are_no_change() -> Non
     ]
 
     for given in (readings, loud):
-        (call,) = watch_of(given, PLANES_ALONE).calls
-        assert 13 <= call.index <= 16
-        assert call.change.moved[0].quantity == "tension"
+        ((index, change),) = watch_of(given, PLANES_ALONE).calls
+        assert 13 <= index <= 16
+        assert change.moved[0].quantity == "tension"
 
 
 def test_what_goes_with_the_excitation_is_learnt_and_not_called() -> None:
@@ -374,45 +282,3 @@ def test_what_goes_with_the_excitation_is_learnt_and_not_called() -> None:
     ]
 
     assert not watch_of(readings, TENSION_ALONE).calls
-
-
-def test_a_mode_that_is_said_to_be_unmeasured_moves_nothing_whatever_its_value() -> None:
-    readings = History(tests=8, outliers=0).readings(0)
-    lacking = [without_modes(each, [2, 7]) for each in readings]
-    wild = []
-    for each in lacking:
-        assert each.modes is not None
-        values = np.where(np.isinf(each.modes.variances), 0.4, each.modes.values)
-        wild.append(replace(each, modes=replace(each.modes, values=values)))
-
-    one, other = (watch_of(given, TENSION_ALONE).tests[-1] for given in (lacking, wild))
-    assert other.drifts[0].shift_mean == pytest.approx(one.drifts[0].shift_mean, abs=1e-6)
-    assert other.change.evidence_years == pytest.approx(one.change.evidence_years, rel=1e-4)
-
-
-def test_results_do_not_hang_on_the_order_of_modes() -> None:
-    readings = History(PLANES_ALONE, tests=7, change_at=5, step=lost(0.04, q=3)).readings(1)
-    backwards = [
-        with_modes(
-            each,
-            replace(
-                each.modes,
-                values=each.modes.values[::-1],
-                variances=each.modes.variances[::-1],
-                slopes=each.modes.slopes[::-1],
-            ),
-        )
-        for each in readings
-        if each.modes is not None
-    ]
-    turned = Columns(
-        MODES[::-1],
-        {name: places[:, :, ::-1] for name, places in columns().by_cause.items()},
-        columns().sensors[::-1, ::-1],
-    )
-
-    one = watch_of(readings, PLANES_ALONE).tests[-1]
-    other = watched(backwards, PLANES_ALONE, turned, HANGER_3).tests[-1]
-
-    assert other.change.evidence_years == pytest.approx(one.change.evidence_years, rel=1e-6)
-    assert other.drifts[0].shift_mean == pytest.approx(one.drifts[0].shift_mean, rel=1e-6)

@@ -10,6 +10,7 @@ import pytest
 
 from shm.errors import BadInput, UsageError
 from shm.values import Reading, WatchedTest
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.options import WatchOptions
 from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watcher
@@ -49,7 +50,7 @@ def by_kept_states(given: list[Reading]) -> tuple[WatchState, list[WatchedTest]]
     state, begun = WATCHER.begin(given[: OPTIONS.baseline_tests])
     tests = list(begun.tests)
     for reading in given[OPTIONS.baseline_tests :]:
-        kept = WatchState.from_bytes(state.to_bytes())
+        kept = from_bytes(WatchState, to_bytes(state))
         again = watcher(PLANES_ALONE, OPTIONS)
         state, found = again.after(kept, reading)
         tests.append(found)
@@ -64,17 +65,6 @@ def test_a_watch_from_kept_states_is_bit_for_bit_that_of_one_pass() -> None:
 
     assert once.calls
     assert_same(list(tests), list(once.tests))
-
-
-def test_a_state_knows_how_far_it_has_come_and_what_was_told() -> None:
-    given = readings(8)
-    state, _ = by_kept_states(given)
-
-    kept = WatchState.from_bytes(replace(state, told='{"beyond": "Zürich"}').to_bytes())
-
-    assert kept.tests == 8
-    assert kept.last_time == given[-1].time
-    assert kept.told == '{"beyond": "Zürich"}'
 
 
 def test_the_key_goes_with_options_and_quantities_but_not_with_thresholds() -> None:
@@ -112,12 +102,12 @@ def test_a_state_of_another_watch_or_an_older_test_is_refused() -> None:
 @pytest.mark.parametrize("content", [b"", b"not a state", b"PK\x03\x04 broken"])
 def test_content_that_is_no_state_is_refused(content: bytes) -> None:
     with pytest.raises(BadInput, match="cannot be read"):
-        WatchState.from_bytes(content)
+        from_bytes(WatchState, content)
 
 
 def test_a_state_cut_short_is_refused() -> None:
     state, _ = WATCHER.begin(readings(4))
-    content = state.to_bytes()
+    content = to_bytes(state)
 
     with pytest.raises(BadInput, match="cannot be read"):
-        WatchState.from_bytes(content[: len(content) // 2])
+        from_bytes(WatchState, content[: len(content) // 2])

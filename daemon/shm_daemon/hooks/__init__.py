@@ -25,8 +25,14 @@ KINDS: Mapping[type[Hook], type[Any]] = {
 class HookNotifier:
     """Delivers an alert to a hook of any kind; `close` ends, from another thread, what runs."""
 
-    def __init__(self, folder: Path, timeout_s: float, environment: Mapping[str, str]):
-        surroundings = Surroundings(folder, timeout_s, environment)
+    def __init__(
+        self,
+        folder: Path,
+        timeout_s: float,
+        environment: Mapping[str, str],
+        pages_address: str = "",
+    ):
+        surroundings = Surroundings(folder, timeout_s, environment, pages_address)
         self._deliverers: dict[type[Hook], Deliverer] = {
             kind: made(surroundings) for kind, made in KINDS.items()
         }

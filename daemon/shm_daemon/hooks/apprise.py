@@ -29,7 +29,7 @@ class AppriseDeliverer(Processes):
         # By standard input, as arguments are seen by everyone on the machine. -P: this folder
         # holds a module of the library's name.
         command = [sys.executable, "-P", str(_SENDER)]
-        self.run(command, _told(alert, addresses), {})
+        self.run(command, _told(alert, addresses, self.surroundings.link(alert)), {})
         return f"taken by {', '.join(schemes)}"
 
     def ready(self, hook: AppriseHook) -> str:
@@ -69,7 +69,7 @@ def _allowed(address: str) -> str:
         raise HookFailed(f"{error}.", remedy="See docs/alerts.md for those that do.") from None
 
 
-def _told(alert: Alert, addresses: Sequence[str]) -> bytes:
+def _told(alert: Alert, addresses: Sequence[str], link: str) -> bytes:
     test, resolved = "test" in alert.kinds, "resolved" in alert.kinds
     title = f"shm: {len(alert.alerts)} hangers" if alert.alerts else f"shm: hanger {alert.hanger}"
     body = f"{alert.message}\n\nTest {alert.test} of {alert.time:%Y-%m-%d %H:%M} UTC."
@@ -78,7 +78,9 @@ def _told(alert: Alert, addresses: Sequence[str]) -> bytes:
         "title": one_line(
             "shm: test of a hook" if test else f"{title}{': resolved' if resolved else ''}"
         ),
-        "body": f"{alert.message if test else body}\nKey: {alert.key}",
+        "body": "\n".join(
+            [alert.message if test else body, *filter(None, [link]), f"Key: {alert.key}"]
+        ),
         "type": "info" if test else "success" if resolved else "warning",
     }
     return json.dumps(told).encode()

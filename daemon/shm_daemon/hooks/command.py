@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from typing import IO
 
 from shm.bridge import CommandHook
-from shm.documents import alert_document, dump
+from shm.documents import dump
 from shm.values import Alert, printable
 from shm_daemon.hooks import reaper
 from shm_daemon.hooks.contract import SHOWN_CHARACTERS, HookFailed, Surroundings
@@ -30,6 +30,7 @@ class Processes:
     """Runs programs in the workspace's folder, each with a process that ends all it began."""
 
     def __init__(self, surroundings: Surroundings):
+        self.surroundings = surroundings
         self.folder, self._timeout_s = surroundings.folder, surroundings.timeout_s
         given = surroundings.environment
         self._environment = {name: given[name] for name in _PASSED_ON if name in given}
@@ -166,7 +167,7 @@ class CommandDeliverer(Processes):
 
     def __call__(self, hook: CommandHook, alert: Alert) -> str:
         """Runs the command; raises HookFailed with what it wrote."""
-        message = dump(alert_document(alert)).encode()
+        message = dump(self.surroundings.document(alert)).encode()
         answer = self.run(hook.command, message, {"SHM_ALERT_KEY": alert.key})
         return f"exit code 0: {answer}" if answer else "exit code 0"
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
+from shm.documents import alert_document
 from shm.errors import ShmError
 from shm.values import Alert, printable
 
@@ -19,11 +20,27 @@ class HookFailed(ShmError):
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The workspace's folder, the longest a delivery may take, and the daemon's environment."""
+    """The workspace's folder, the longest a delivery may take, and the daemon's environment.
+
+    `pages_address` is where the web interface answers; empty where that is not known.
+    """
 
     folder: Path
     timeout_s: float
     environment: Mapping[str, str]
+    pages_address: str = ""
+
+    def link(self, alert: Alert) -> str:
+        """Return the address of the page that an alert is about; empty without `pages_address`."""
+        if not self.pages_address:
+            return ""
+        page = "/alerts" if alert.alerts else f"/hangers/{alert.hanger}#alerts"
+        return f"{self.pages_address.rstrip('/')}{page}"
+
+    def document(self, alert: Alert) -> dict[str, Any]:
+        """Return `shm.alert/1` with the `link`, where it is known."""
+        link = self.link(alert)
+        return {**alert_document(alert), **({"link": link} if link else {})}
 
 
 class Deliverer(Protocol):

@@ -22,7 +22,7 @@ import requests
 from requests.adapters import HTTPAdapter
 
 from shm.bridge import WebhookHook
-from shm.documents import alert_document, dump
+from shm.documents import dump
 from shm.pipeline import DeliveryRefused
 from shm.values import Alert
 from shm_daemon.hooks.contract import SHOWN_CHARACTERS, HookFailed, Surroundings, one_line
@@ -44,7 +44,7 @@ class WebhookDeliverer:
 
     def __call__(self, hook: WebhookHook, alert: Alert) -> str:
         """Posts the alert; raises HookFailed, or DeliveryRefused where the server wants none."""
-        body = dump(alert_document(alert)).encode()
+        body = dump(self._surroundings.document(alert)).encode()
         headers = _headers(alert, body, self._secret(hook), int(time.time()))
         timeout_s = self._surroundings.timeout_s
         with self._lines.session(timeout_s) as (session, line):

@@ -1,5 +1,6 @@
-"""`python -m shm_daemon.web WORKSPACE HOST PORT [--certificate PEM] [--key PEM] [--log-file LOG]`:
-ends with its standard input.
+"""Serve a workspace until standard input ends.
+
+`python -m shm_daemon.web WORKSPACE HOST PORT [--certificate PEM] [--key PEM] [--log-file LOG]`
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ Credentials = Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]
 
 
 def reading(request: Request, site: AtSite, credentials: Credentials) -> Visitor:
-    """Lets in who may read: this machine where only it can come in, else a token.
+    """Let in who may read: this machine where only it can come in, else a token.
 
     `frame.page` shows who it is.
     """
@@ -92,21 +92,21 @@ def reading(request: Request, site: AtSite, credentials: Credentials) -> Visitor
 
 
 def writing(request: Request, site: AtSite, credentials: Credentials) -> Visitor:
-    """Lets in who may write: only signed in or with a token."""
+    """Let in who may write: only signed in or with a token."""
     if credentials is not None:
         return _visitor(request, site, credentials.credentials, Role.OPERATOR)
     return _signed_in(request, site, "Writing needs a user or a token.", Role.OPERATOR)
 
 
 def engineering(request: Request, site: AtSite) -> Visitor:
-    """Lets in engineers, in a browser: no token is one."""
+    """Let in engineers, in a browser: no token is one."""
     found = _signed_in(request, site, "This needs an engineer.", Role.ENGINEER)
     request.state.visitor = found
     return found
 
 
 def signed_in_person(request: Request, site: AtSite) -> Visitor:
-    """Lets in people who have signed in by name, whatever their role."""
+    """Let in people who have signed in by name, with any role."""
     found = _signed_in(request, site, "This needs a person.", Role.READER)
     request.state.visitor = found
     if not found.is_person:
@@ -189,8 +189,9 @@ def is_signed_in(request: Request, site: Site) -> bool:
 
 
 def session_of(request: Request, site: Site, name: str, password: str) -> str:
-    """The secret of a new session of a person; raises Refused where name or password is wrong, or
-    too many were.
+    """Return the secret of a new session; raises Refused for a wrong name or password.
+
+    Raises it, too, after too many wrong ones.
     """
     caller = unless_throttled(request, site, name)
     secret = site.store.people.sign_in(name, password, utc_now())
@@ -207,8 +208,10 @@ def session_of(request: Request, site: Site, name: str, password: str) -> str:
 def change_password_of(
     request: Request, site: Site, person: Visitor, old: str, password: str
 ) -> None:
-    """Raise UsageError where the new one is poor, Refused where the old one is wrong or too many
-    were. The browser that asks stays signed in.
+    """Set a person's password; the browser that asks stays signed in.
+
+    Raises UsageError where the new one is poor, Refused where the old one is wrong or after too
+    many wrong ones.
     """
     caller = unless_throttled(request, site, person.name)
     people, secret = site.store.acting_as(person.actor).people, request.cookies.get(COOKIE, "")

@@ -66,10 +66,10 @@ def network_of(address: str) -> str:
 
 
 def caller_of(peer: str, forwarded_for: str, proxies: str) -> str:
-    """The address of who asks: the peer or, where that is one of our `proxies`, whom it names.
+    """Return the address of the caller: the peer or, behind our `proxies`, whom they name.
 
-    Each proxy adds the address that it was called from at the end of X-Forwarded-For: what stands
-    before the first that is none of ours anybody may have written.
+    Each proxy adds the address that it was called from at the end of X-Forwarded-For: an entry
+    before the first that is none of ours may be forged.
     """
     ours = {name.strip() for name in proxies.split(",")}
     for named in reversed([peer] if peer not in ours else [*forwarded_for.split(","), peer]):
@@ -82,7 +82,7 @@ _HOST = re.compile(r"(\[(?P<number>[^\[\]]*)\]|(?P<name>[^\[\]:@/?#]*))(:\d*)?")
 
 
 def _name_of(host_header: str) -> str:
-    """Empty for what is no host with or without a port: RFC 9110 knows no user before it."""
+    """Return the host of a header; empty for anything else, as RFC 9110 knows no user there."""
     found = _HOST.fullmatch(host_header.strip().lower())
     return (found["number"] or found["name"].rstrip(".")) if found else ""
 
@@ -108,13 +108,13 @@ _DOTS = (".", "..")
 
 
 def test_page(hanger_id: int, name: str) -> str:
-    """The address of a test's page."""
+    """Return the address of a test's page."""
     segment = f"{name}/" if name in _DOTS else name
     return f"/hangers/{hanger_id}/tests/{quote(segment, safe='')}"
 
 
 def test_json(hanger_id: int, name: str) -> str:
-    """The address of what is known of a test, in numbers; its figures lie below it."""
+    """Return the address of a test's JSON; its figures are below it."""
     return f"/api{test_page(hanger_id, name)}"
 
 

@@ -23,12 +23,14 @@ from shm_daemon.web.bridge_view import glance
 from shm_daemon.web.faults import answers, handle_faults
 from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.middleware import Pages
+from shm_daemon.web.ordered_work import OrderedWork
 from shm_daemon.web.other_bridges import OtherBridges
 from shm_daemon.web.pages import (
     alerts,
     baseline,
     bridge,
     comparison,
+    diagnosis,
     hanger,
     notes,
     one_test,
@@ -59,6 +61,7 @@ _PARTS = (
     one_test,
     hanger,
     baseline,
+    diagnosis,
     notes,
     settings,
 )
@@ -71,7 +74,7 @@ _DESCRIPTION = (
 
 
 def load_pages(site: Site) -> Pages:
-    """All of the interface: pages, API and metrics."""
+    """Return all of the interface: pages, API and metrics."""
     watching_site = site.twin()  # so that a scrape need not wait for the pages' connections
     app = FastAPI(
         title="shm",
@@ -83,9 +86,9 @@ def load_pages(site: Site) -> Pages:
     )
     app.state.site = site
     app.state.background_worker = BackgroundWorker()
+    app.state.ordered_work = OrderedWork(app.state.background_worker)
     app.state.uploads = Counter[str]()
     app.state.passwords = ThreadPoolExecutor(1, "passwords")
-    app.state.ordered_baselines = baseline.Ordered()
     app.state.sign_ons = signing_in.SignOns()
     app.state.other_bridges = OtherBridges()
     app.state.exposition = Exposition(watching_site)

@@ -107,9 +107,9 @@ class BackgroundWorker(Generic[Made]):
             pass
 
     def _shift(self) -> bool:
-        """Works with one process until nothing is wanted, or the process is lost; whether to go on.
+        """Work with one process until no order waits or it is lost; return whether to go on.
 
-        The order in work stays among those waiting, so that nobody begins it a second time.
+        The order in work remains among those waiting, so that it is started only once.
         """
         with children_ended():
             pool = self._pool(1)
@@ -131,7 +131,7 @@ class BackgroundWorker(Generic[Made]):
             return next(iter(self._waiting), None)
 
     def _made(self, pool: ProcessPoolExecutor, order: Order) -> bool:
-        """Has an order made and notes what came of it; whether the process can be used further."""
+        """Run an order and record its result; return whether the process can be used further."""
         try:
             future = pool.submit(_packed, order)
             self._await(future)

@@ -126,9 +126,9 @@ class BridgeRow:
 
 
 def site_rows(site: Site, now: datetime) -> tuple[BridgeRow, ...]:
-    """The site's own bridge; empty where nothing of it is described, so that it only lists others.
+    """Return the row of the site's bridge; empty where it describes none and only lists others.
 
-    A store that is out is told like a bridge that is not reached.
+    A store that fails is shown like a bridge that is not reached.
     """
     bridge = site.workspace.bridge
     if not bridge.watched and bridge.other_bridges:
@@ -141,7 +141,7 @@ def site_rows(site: Site, now: datetime) -> tuple[BridgeRow, ...]:
 
 
 def row_document(row: BridgeRow) -> dict[str, object]:
-    """As `shm bridges --json` and `/api/bridges` give it."""
+    """Return a row as `shm bridges --json` and `/api/bridges` give it."""
     return {
         "name": row.name,
         "address": row.address,
@@ -157,7 +157,7 @@ _ORDER = [status.name.lower() for status in Status]
 
 
 def worst_first(rows: Sequence[BridgeRow]) -> tuple[BridgeRow, ...]:
-    """By urgency, then state, then whether they are watched; else in their order."""
+    """Sort rows by urgency, then state, then whether they are watched, then as given."""
 
     def rank(row: BridgeRow) -> tuple[int, int, bool]:
         status = row.summary and row.summary.status

@@ -1,10 +1,9 @@
-"""The whole bridge at a glance: what is shown of each hanger, what moved over all of them, and its
-elevation: where deck and hangers are drawn, and what marks them.
+"""Summarize all hangers of a bridge, and lay out its elevation with their marks.
 
 All hangers in a handful of queries, and no samples: a page of 200 hangers must not wait.
 
-A class of shift has a colour and, for whoever cannot tell colours, a number of triangles: down for
-lost, up for gained. Lengths are in drawing units; upwards is less y.
+A class of shift has a colour and, for the colour-blind, a number of triangles: down for lost, up
+for gained. Lengths are in drawing units; upwards is less y.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ class HangerGlance:
         return self.summary.hanger
 
     def cells(self, unit: ForceUnit) -> tuple[str, str, str]:
-        """As tables have it: tension, percent of nominal, shift in percent; empty where unknown."""
+        """Return tension, percent of nominal and shift in percent for a table; empty if unknown."""
         summary, shift, tension = self.summary, self.summary.change, "no test yet"
         is_known = summary.is_determined
         if summary.tension_n:
@@ -212,7 +211,7 @@ def elevation(hangers: Sequence[HangerGlance]) -> Elevation:
 
 
 def kind_of(glance: HangerGlance) -> str:
-    """The class of a hanger's shift; a test that is of the baseline itself says nothing of one."""
+    """Return the class of a hanger's shift; none for a test of the baseline itself."""
     shift = glance.summary.change
     if shift is None:
         return "unknown"
@@ -233,7 +232,7 @@ def shift_words(glance: HangerGlance) -> str:
 
 
 def triangles(kind: str, x: float, base: float, hollow: bool = False) -> tuple[Triangle, ...]:
-    """As many as the class says, one over the other from `base` up."""
+    """Return as many triangles as the class has, one over the other from `base` up."""
     if kind in ("same", "unknown"):
         return ()
     count, down, half = int(kind[-1]), kind.startswith("lost"), _TRIANGLE / 2

@@ -47,8 +47,9 @@ class Door:
         self._of_address: defaultdict[str, OrderedDict[Guarded, None]] = defaultdict(OrderedDict)
 
     def waits(self, one: Guarded, address: str, *, makes_room: bool) -> None:
-        """A connection waits; where too many do, the first is cut off: one that `makes_room`, else
-        the one that has waited longest.
+        """Register a waiting connection; where too many wait, cut one off.
+
+        That is the first that `makes_room`, else the one that has waited longest.
         """
         same = self._of_address[address]
         self._waiting[one], same[one] = address, None
@@ -61,7 +62,7 @@ class Door:
             self._cut_off(next(iter(self._waiting)))
 
     def leaves(self, one: Guarded) -> None:
-        """It waits no longer: it is answered, or gone."""
+        """Remove a connection that is answered or gone from those that wait."""
         address = self._waiting.pop(one, None)
         if address is None:
             return
@@ -100,7 +101,7 @@ class Guarded(H11Protocol):
         self._beginning = self.loop.create_task(self._begin_tls(transport, self.door.certificate))
 
     async def _begin_tls(self, transport: asyncio.Transport, context: ssl.SSLContext) -> None:
-        """Here and not in asyncio, which waits for a minute and lets nobody count meanwhile."""
+        """Start TLS here: asyncio would wait for a minute without counting the connection."""
         try:
             secured = await self.loop.start_tls(
                 transport, self, context, server_side=True, ssl_handshake_timeout=DEADLINE_S
@@ -162,7 +163,7 @@ class Guarded(H11Protocol):
         self.door.leaves(self)
 
     def _overdue(self) -> None:
-        """Time is over, unless a long answer is still being taken."""
+        """Close a connection whose time is over, unless it still receives a long answer."""
         before, self._unsent_bytes = self._unsent_bytes, self._unsent()
         is_taken = self._unsent_bytes > 0 and (
             before == 0 or before - self._unsent_bytes >= _LEAST_PROGRESS_BYTES

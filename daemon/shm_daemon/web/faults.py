@@ -70,7 +70,7 @@ class Refused(HTTPException):
 
 
 def answers(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The faults that a route documents; where it wants a token, that of many wrong ones too."""
+    """Return the faults that a route documents; 401 includes 429, for too many wrong tokens."""
     if 401 in statuses:
         statuses = (*statuses, 429)
     return {status: {"model": Fault, "description": _WORDS[status]} for status in statuses}

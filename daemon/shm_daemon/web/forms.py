@@ -1,6 +1,4 @@
-"""The forms of pages: their fields, what a person must have written in them, and what follows: the
-next page, or the same once more with the reason why not.
-"""
+"""Define the forms of pages, check what is entered, and answer with the next page or the reason."""
 
 from __future__ import annotations
 
@@ -18,7 +16,8 @@ from shm.errors import BadInput, NothingThere, UsageError
 from shm.store.notes import LARGEST_PHOTO_BYTES
 from shm_daemon.web.faults import Refused
 
-_MOST_FIELDS = 10  # technical: the longest of our forms has six
+_MOST_FIELDS = 10  # technical: the longest of our forms, but that of settings, has six
+_MOST_SETTINGS = 1000  # technical: three fields each of some 20 settings and of 100 hooks
 _LONGEST_BYTES = 32_768  # technical: a reason of 2,000 letters has 12 each at most as browsers send
 _LONGEST_OF_ANYBODY_BYTES = 8192  # technical: a token and an address have some hundreds
 _LONGEST_WITH_PHOTO_BYTES = LARGEST_PHOTO_BYTES + 65_536  # technical: the text is far shorter
@@ -26,14 +25,14 @@ _NAME = re.compile(rb'[; ]name="([^"]*)"')
 _BOUNDARY = re.compile(r'boundary="?([^";]+)')
 
 
-def _up_to(longest_bytes: int) -> Any:
+def _up_to(longest_bytes: int, most_fields: int = _MOST_FIELDS) -> Any:
     """Return a reader of forms up to a length; it raises Refused for longer ones."""
 
     async def fields(request: Request) -> dict[str, str]:
         body = await _body(
             request, longest_bytes, "This is more than the form asks for.", "Write less."
         )
-        found = parse_qs(body.decode("utf-8", "replace"), max_num_fields=_MOST_FIELDS)
+        found = parse_qs(body.decode("utf-8", "replace"), max_num_fields=most_fields)
         return {name: values[-1] for name, values in found.items()}
 
     return Depends(fields)
@@ -67,6 +66,7 @@ async def _body(request: Request, longest_bytes: int, message: str, remedy: str)
 # The fields of a form, each once. Name it after `Writer` or `Engineer`: nothing of a stranger's
 # form is read.
 Form = Annotated[dict[str, str], _up_to(_LONGEST_BYTES)]
+FormOfSettings = Annotated[dict[str, str], _up_to(4 * _LONGEST_BYTES, _MOST_SETTINGS)]
 FormOfAnybody = Annotated[dict[str, str], _up_to(_LONGEST_OF_ANYBODY_BYTES)]
 FormWithPhoto = Annotated[dict[str, bytes], Depends(_with_photo)]
 

@@ -1,7 +1,7 @@
-"""The frame around every page: its templates, its navigation, what went wrong as a page; the style
-sheets and scripts, which tell nothing of the bridge: anybody may have them.
+"""Render the frame of every page: templates, navigation, error pages, style sheets and scripts.
 
-Plotly's script is that of the installed package: nothing is fetched from elsewhere.
+Style sheets and scripts say nothing of the bridge: they need no access. Plotly's script is that of
+the installed package: nothing is fetched from elsewhere.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def for_a_person(request: Request) -> bool:
 
 @cache
 def asset(name: str) -> str:
-    """The address of a file of `static/`; it changes with the file, so that it may be kept."""
+    """Return the cacheable address of a file of `static/`, which changes with the file."""
     return f"/static/{name}?v={hashlib.sha256((STATIC / name).read_bytes()).hexdigest()[:12]}"
 
 
@@ -114,7 +114,7 @@ def plotly_address() -> str:
 
 @cache
 def _environment() -> Environment:
-    """Our templates; those of the reports stand behind `report/`."""
+    """Return the environment of our templates; those of the reports are under `report/`."""
     assert OF_REPORTS.loader is not None
     of_reports = PrefixLoader({"report": OF_REPORTS.loader})
     made = environment(ChoiceLoader([PackageLoader("shm_daemon.web", "templates"), of_reports]))
@@ -131,7 +131,7 @@ def _environment() -> Environment:
 
 
 def _open_alerts(site: Site) -> int | None:
-    """None where the store cannot be asked: the page itself says so."""
+    """Return the number of open alerts; None where the store fails, as the page itself says so."""
     try:
         return count_alerts(site.store)[0]
     except ShmError:

@@ -1,6 +1,4 @@
-"""The figures of the page of a hanger: its tests over time and over temperature; how the model's
-frequencies fit, what is open, and the causes of that.
-"""
+"""Draw the figures of a hanger's page: tests over time and temperature, model fit, causes."""
 
 from __future__ import annotations
 
@@ -14,6 +12,7 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet, HangerReport
 from shm.report.figures import (
+    control_chart,
     gap_before_and_after,
     gap_causes,
     gap_map,
@@ -29,6 +28,7 @@ from shm.report.formatting import Interval
 from shm.report.states import CalledChange, called_words
 from shm.store import EventKind, TrendPoint
 from shm.values.rounding import ForceUnit, force_unit
+from shm.watch.control_chart import ControlChart
 from shm_daemon.web import with_plotly
 from shm_daemon.web.hanger_view import HangerView
 
@@ -70,7 +70,7 @@ _HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {
 
 
 def _course(view: HangerView) -> hanger_trend.Course:
-    """All that the figure shows; without the state over time where that is still worked out."""
+    """Return the data of the trend; without the state over time while that is computed."""
     states, at = view.states, {point.time: place for place, point in enumerate(view.trend)}
     baseline = view.baseline
     baseline_n = baseline.averaged.tension_n.mean if baseline else None
@@ -158,7 +158,7 @@ def _with_temperature(view: HangerView) -> list[TrendPoint]:
 
 
 def _over_temperature(view: HangerView) -> Specification:
-    """Thinned by tension and temperature where there are very many."""
+    """Return thinned by tension and temperature where there are very many."""
     known, unit = _with_temperature(view), tension_unit(view.trend)
     bounds = bounds_of([Interval.of_averaged(point.averaged) for point in known])
     temperatures = np.array([point.temperature_c for point in known])
@@ -222,7 +222,21 @@ def report_of(view: HangerView) -> HangerReport:
     return view.report
 
 
+def _control(view: HangerView) -> ControlChart | None:
+    """Return the chart of a control hanger; None of any other."""
+    return view.report.now.control if view.report else None
+
+
 FIGURES: tuple[HangerFigure, ...] = (
+    HangerFigure(
+        "control",
+        control_chart.FIGURE.title,
+        "trends",
+        lambda view: _control(view) is not None,
+        lambda view: control_chart.specify(_control(view)),
+        lambda view: control_chart.FIGURE.caption(_control(view)),
+        lambda view: control_chart.FIGURE.alt(_control(view)),
+    ),
     HangerFigure(
         "trend",
         "Tension over time",

@@ -173,13 +173,13 @@ class TestLine:
 
 
 def headings(view: HangerView) -> tuple[str, ...]:
-    """Of the table of the lines."""
+    """Return the headings of the table of tests."""
     unit = tension_unit(view.trend)
     return ("test", "time", "temperature", "model", *formatting.tension_headings(unit))
 
 
 def lines_before(view: HangerView, limit: int, before: int | None = None) -> list[TestLine]:
-    """So many tests, the newest first; `before` is the number of the test to go on after."""
+    """Return `limit` tests, the newest first, that are older than the test number `before`."""
     points = {point.test_id: point for point in view.trend}
     rows = list_test_rows(view.store, view.hanger.id, limit, before)
     unit = tension_unit(view.trend)
@@ -227,7 +227,7 @@ def hanger(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Any:
 
 
 def _now(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
-    """Of many hangers in as many questions as of one."""
+    """Return the state of many hangers with as many queries as for one."""
     store = site.store
     known = HangersNow.of(site.workspace, store, hangers, utc_now())
     tests = count_tests(store)
@@ -256,8 +256,8 @@ def _tension(latest: StoredPoint | None) -> dict[str, Any]:
 
 
 def _watched(latest: StoredWatch | None) -> dict[str, Any]:
-    """Of the latest test that was compared with the baseline in force."""
-    drifts = latest.watched.told if latest else ()
+    """Return the result of the latest test compared with the current baseline."""
+    drifts = latest.watched.published_drifts if latest else ()
     creep = latest.watched.creep_per_year if latest else None
     return {
         "shifts": plain([{key: getattr(drift, key) for key in _SHIFT} for drift in drifts]),

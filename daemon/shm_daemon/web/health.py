@@ -19,9 +19,15 @@ from shm.pipeline.unheard import backlog_leads, heard, leads_of, ring_leads, str
 from shm.store.queries.alerts import count_alerts
 from shm.store.queries.recordings import list_holds
 from shm.store.queries.tests import count_tests
-from shm.store.stored_alerts import said_of
+from shm.store.stored_alerts import describe_silence
 from shm.values.messages import Lead
-from shm_daemon.heartbeat import NEARLY_FULL, patience_s, seconds_since_beat, told, why_turn_failed
+from shm_daemon.heartbeat import (
+    NEARLY_FULL,
+    duration_words,
+    patience_s,
+    seconds_since_beat,
+    why_turn_failed,
+)
 from shm_daemon.spool import never_taken, scan
 from shm_daemon.web.site import Site
 
@@ -126,7 +132,7 @@ def _of_silences(site: Site) -> list[Lead]:
             "on the page of alerts.",
         )
         for each in found
-        for text in [said_of(each)]
+        for text in [describe_silence(each)]
     ]
 
 
@@ -154,7 +160,7 @@ def _of_backlog(site: Site) -> Sequence[Lead]:
 
 
 def _found(site: Site, *checks: Callable[[Site], Sequence[str | Lead]]) -> list[str]:
-    """Whatever befalls one check, the others answer, and so does `/health`."""
+    """Return the findings of all checks; a check that fails does not stop the others."""
     found = []
     for check in checks:
         try:
@@ -213,12 +219,14 @@ def _of_disk(site: Site) -> list[Lead]:
 
 
 def _silence(site: Site) -> str:
-    """That the daemon has not reported for longer than it may take; empty where it has."""
+    """Return the message that the daemon is overdue; empty where it is not."""
     ago = seconds_since_beat(site.workspace)
     if ago is None:
         return "The daemon has never run here."
     is_late = ago > patience_s(site.workspace)
-    return f"The daemon was last seen {told(timedelta(seconds=ago))} ago." if is_late else ""
+    return (
+        f"The daemon was last seen {duration_words(timedelta(seconds=ago))} ago." if is_late else ""
+    )
 
 
 def _daemon(site: Site) -> list[str]:

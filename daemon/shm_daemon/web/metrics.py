@@ -27,6 +27,8 @@ from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4 as CONTENT_TYP
 from prometheus_client.registry import Collector
 
 from shm.pipeline import utc_now
+from shm.pipeline.bridge_reporting import hanger_summaries
+from shm.pipeline.publishing import HANGER, summary_fields
 from shm.pipeline.stream_state import StreamCondition, stream_states
 from shm.store import Workspace
 from shm.store.queries.alerts import count_alerts, count_deliveries
@@ -57,7 +59,7 @@ class Exposition(Collector):
         self._said: dict[str, str] = {}
 
     def page(self) -> bytes:
-        """In a registry of its own, as text of Prometheus."""
+        """Return the metrics of a separate registry as text of Prometheus."""
         registry = CollectorRegistry(auto_describe=False)
         registry.register(self)
         return generate_latest(registry)
@@ -133,6 +135,19 @@ def _deliveries(site: Site) -> Iterator[Metric]:
     yield _labelled("shm_deliveries", "Alerts to hooks.", "state", counts)
 
 
+def _hangers(site: Site) -> Iterator[Metric]:
+    """Yield the headline of each hanger under the names that published points have."""
+    families: dict[str, GaugeMetricFamily] = {}
+    labels = ["bridge", "hanger"]
+    for summary in hanger_summaries(site.workspace, site.store, utc_now()):
+        for name, value in summary_fields(summary).items():
+            if not isinstance(value, str):
+                named, text = f"{HANGER}_{name}", "See docs/publishing.md."
+                family = families.setdefault(name, GaugeMetricFamily(named, text, labels=labels))
+                family.add_metric([site.workspace.bridge.name, str(summary.hanger.id)], value)
+    yield from families.values()
+
+
 def _stages(site: Site) -> Iterator[Metric]:
     lately = list_stage_seconds(site.store, utc_now() - _LATELY)
     text = "From the stage before to this one, over the last hour: quantiles."
@@ -190,6 +205,7 @@ _OF_STORE: Mapping[str, _Part] = {
     "recordings": _recordings,
     "alerts": _alerts,
     "deliveries": _deliveries,
+    "hangers": _hangers,
     "stages": _stages,
     "streams": _streams,
 }
@@ -235,10 +251,12 @@ def health(site: AtSite) -> Any:
         **answers(400, 401, 403),
     },
     summary="Metrics for Prometheus",
+    description=(
+        "Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out, "
+        "and\n`shm_scrape_errors_total` counts what could not be told."
+    ),
 )
 def metrics(request: Request, _: Reader) -> Response:
-    """Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out, and
-    `shm_scrape_errors_total` counts what could not be told.
-    """
+    """Return the metrics, computed from store and spool at each scrape."""
     exposition: Exposition = request.app.state.exposition
     return Response(exposition.page(), headers={"Content-Type": CONTENT_TYPE})

@@ -222,7 +222,7 @@ class Front:
         await self._pages.app(scope, receive, send)
 
     async def _health(self) -> tuple[int, dict[str, Any]]:
-        """Many who ask at once get one answer, and none waits for a store that hangs."""
+        """Return the state of health, shared by simultaneous callers, without a hung store."""
         if self._checking is None or self._checking.done():
             self._checking = asyncio.create_task(self._check())
         try:
@@ -249,8 +249,9 @@ def is_upload(scope: Mapping[str, object]) -> bool:
 
 
 async def _whole(receive: Receive) -> Receive | None:
-    """A `receive` whose body has come already, so that nobody holds a place while it drips in;
-    None where it is too long.
+    """Return a `receive` with the complete body; None where it is too long.
+
+    So a slow sender occupies no place.
     """
     body, message = bytearray(), await receive()
     while message["type"] == "http.request":

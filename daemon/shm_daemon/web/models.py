@@ -14,7 +14,7 @@ from pydantic import AfterValidator, BaseModel, Field
 
 
 def _written(text: str) -> str:
-    """Text that a person may have written and any database keeps."""
+    """Return text that a person may have written and any database keeps."""
     if not text.strip() or not all(sign.isprintable() or sign in "\n\t" for sign in text):
         raise ValueError("a text without control characters is expected")
     return text.strip()
@@ -48,7 +48,7 @@ Listed = TypeVar("Listed", bound=Numbered)
 
 
 def paged(rows: Sequence[Listed], most: int) -> tuple[Sequence[Listed], int | None]:
-    """The first `most` of rows, of which one more was asked for; and `before` of the next page."""
+    """Return the first `most` of `most` + 1 rows, and `before` of the next page."""
     return rows[:most], rows[most - 1].id if len(rows) > most else None
 
 

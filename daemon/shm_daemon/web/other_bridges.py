@@ -22,7 +22,7 @@ from shm.documents import Misfit, value_of
 from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm.values.messages import Lead
-from shm_daemon.heartbeat import told
+from shm_daemon.heartbeat import duration_words
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.hooks.webhook import Lines, reason_of, unchanged
 from shm_daemon.web.address import SUMMARY
@@ -158,7 +158,7 @@ class _Known:
 
     asked_at: datetime
     summary: Summary | None = None
-    told_at: datetime | None = None
+    answered_at: datetime | None = None
     failing_since: datetime | None = None
     why: Lead | None = None
 
@@ -179,7 +179,7 @@ class OtherBridges:
         self._asking: dict[OtherBridge, Future[None]] = {}
 
     def rows(self, bridges: Sequence[OtherBridge], folder: Path) -> list[BridgeRow]:
-        """Each as it is now or, where it does not say so while a page waits, as it was last."""
+        """Return each bridge as it is now or, if it does not answer in time, as it was last."""
         now = self._clock()
         with self._lock:
             for each in bridges:
@@ -222,24 +222,28 @@ class OtherBridges:
                 "It is still being asked: open this page again in some seconds.",
             )
         trouble = _lead(bridge, known, why, now) if why else None
-        told_at = known.told_at if known else None
+        answered_at = known.answered_at if known else None
         return BridgeRow(
-            bridge.name, f"{bridge.address}/", known.summary if known else None, told_at, trouble
+            bridge.name,
+            f"{bridge.address}/",
+            known.summary if known else None,
+            answered_at,
+            trouble,
         )
 
 
 def _lead(bridge: OtherBridge, known: _Known | None, why: Lead, now: datetime) -> Lead:
-    """That a bridge is not reached, since when and why."""
+    """Return the message that a bridge is not reached, since when and why."""
     since = "is not reached"
-    if known and known.told_at:
-        since = f"has not been reached for {told(now - known.told_at)}"
+    if known and known.answered_at:
+        since = f"has not been reached for {duration_words(now - known.answered_at)}"
     elif known and known.failing_since and now - known.failing_since > _FRESH_FOR:
-        since = f"has not been reached for at least {told(now - known.failing_since)}"
+        since = f"has not been reached for at least {duration_words(now - known.failing_since)}"
     return Lead(f"{bridge.name} {since}: {why.state[0].lower()}{why.state[1:]}", why.action)
 
 
 def ask_all(bridges: Sequence[OtherBridge], folder: Path) -> list[BridgeRow]:
-    """All bridges asked once, as long as each may take."""
+    """Return all bridges asked once, as long as each may take."""
     asking = OtherBridges(page_waits_s=LONGEST_S + 1.0)
     try:
         return asking.rows(bridges, folder)

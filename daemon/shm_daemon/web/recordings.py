@@ -1,5 +1,6 @@
-"""Recordings over HTTP: streamed to disk, landed in the spool, and asked after.
-Chunks of permanent sensors over HTTP: acknowledged once they are on disk.
+"""Receive recordings over HTTP, streamed to disk, and chunks of permanent sensors.
+
+Both are acknowledged once they are on disk.
 """
 
 from __future__ import annotations
@@ -168,11 +169,10 @@ async def receive_body(
     max_bytes: int,
     refuse_large: Callable[[int, int], object] = refuse_oversize,
 ) -> None:
-    """Has the body of a request written, a piece at a time, beside the loop that serves the others;
-    `write` raises TooLarge before more is kept than is taken.
+    """Write the body of a request piece by piece, outside the loop that serves the others.
 
-    Refuses a form, and one that says it is too large, before a byte of it is sent, where the sender
-    waits for our word.
+    `write` raises TooLarge beyond its limit. Refuses a form, and a body whose header is too
+    large, before a byte of it is sent, where the sender waits for our response.
     """
     if request.headers.get("content-type", "").strip().lower().startswith("multipart/"):
         raise Refused(
@@ -270,7 +270,7 @@ def _listed(text: str | None) -> list[str] | None:
 
 
 def _numbers(key: str, text: str | None) -> list[object] | None:
-    """Numbers, and empty texts where a channel has none."""
+    """Return numbers, and empty texts where a channel has none."""
     if text is None:
         return None
     parts = [part.strip() for part in text.split(",")]

@@ -67,9 +67,9 @@ def serve(
 def make_app(
     workspace: Workspace, address: Address | None = None, *, warms_up: bool = False
 ) -> ASGIApp:
-    """The interface of one workspace, as it listens at `address` (by default this machine only).
+    """Return the interface of one workspace that listens at `address` (default: local only).
 
-    It answers `/health` at once and loads its pages beside.
+    It answers `/health` at once and loads its pages in the background.
     """
     from shm_daemon.web.middleware import Around, Front, Pages
     from shm_daemon.web.site import Description, Site
@@ -85,8 +85,10 @@ def make_app(
 
 @contextmanager
 def ending_in_order() -> Iterator[None]:
-    """End the process of SIGTERM as of itself: once it has ended, uvicorn sends us the signal that
-    ended it, and killed by that we would give nothing back that our processes hold.
+    """End the process of SIGTERM without uvicorn's signal.
+
+    Once it has ended, uvicorn sends the signal that ended it; killed by that we could not
+    release what our processes hold.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -100,10 +102,10 @@ def ending_in_order() -> Iterator[None]:
 
 @contextmanager
 def leaving() -> Iterator[None]:
-    """End the process with the context, without taking Python apart: a thread that is still at
-    work, loading pages or writing a line of the log, would have that end in a fatal error.
+    """End the process with the context, without finalizing Python.
 
-    What is raised but an exit goes on as it would without.
+    A thread that still loads pages or writes the log would make that a fatal error. Exceptions
+    but an exit pass through.
     """
     code = 0
     try:
@@ -122,7 +124,7 @@ def leaving() -> Iterator[None]:
 def make_server(
     app: ASGIApp, address: Address, certificate: ssl.SSLContext | None = None
 ) -> uvicorn.Server:
-    """A server that limits what a caller may take, and tells little of itself and of callers."""
+    """Return a server that limits each caller and says little of itself and of callers."""
     import uvicorn
 
     from shm_daemon.web.connections import Door, guarded_by
@@ -175,7 +177,7 @@ def refuse_uninstalled() -> None:
 
 
 def _allow_connections() -> None:
-    """As many open files as we may have: a burst of callers is let in before it is sorted out."""
+    """Raise the limit of open files: a burst of callers is let in before it is sorted out."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = _OPEN_FILES if most == resource.RLIM_INFINITY else min(most, _OPEN_FILES)
     if resource.getrlimit(resource.RLIMIT_NOFILE)[0] < wanted:
@@ -237,7 +239,7 @@ class _Keeper:
         self._command, self._stopped = command, threading.Event()
 
     def keep(self) -> None:
-        """Begins the process again whenever it ends, ever later where it does not live long."""
+        """Restart the process whenever it ends, ever later if it ends early."""
         wait_s = _FIRST_WAIT_S
         while not self._stopped.is_set():
             lived_s = self._run()
@@ -251,7 +253,7 @@ class _Keeper:
         self._stopped.set()
 
     def _run(self) -> float:
-        """Until the process ends or we are stopped; how many seconds it lived."""
+        """Run the process until it ends or we are stopped; return the seconds it lived."""
         lived_s, look_s = 0.0, 0.2
         try:
             # It ends when its standard input does, so that it outlives no killed daemon.

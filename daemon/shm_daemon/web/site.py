@@ -89,12 +89,12 @@ class Description:
         self._lock = threading.Lock()
 
     def forget(self) -> None:
-        """Has it read again: a setting was changed."""
+        """Have it read again: a setting was changed."""
         with self._lock:
             self._described_at = -1
 
     def now(self) -> tuple[Workspace, ShmError | None]:
-        """As it is described now or, where that has a fault, as it last was; and the fault."""
+        """Return the description or, where that has a fault, the last good one; and the fault."""
         with self._lock:
             modified = modified_ns(self._workspace)
             if modified != self._described_at:
@@ -118,7 +118,7 @@ class Site:
         self._lock = threading.Lock()
 
     def twin(self) -> Site:
-        """The same with connections of its own to the store: it need not wait for this one's."""
+        """Return a copy with separate connections to the store, which need not wait for these."""
         return Site(self._description, self.address)
 
     @property
@@ -132,7 +132,7 @@ class Site:
         return self._description.now()[1]
 
     def forget_description(self) -> None:
-        """Has the description read again: a setting was changed."""
+        """Have the description read again: a setting was changed."""
         self._description.forget()
 
     @property

@@ -30,7 +30,7 @@ _AT_ONCE_S = 0.05  # what would be rounded to 0.0 s
 
 
 def origin(view: TestView) -> Table:
-    """File, checksums and version; a checksum is written out, for it is there to be compared."""
+    """Return file, checksums and version; a checksum is complete, for comparison."""
     file, lineage = view.recording.file, view.stored.lineage
     size, is_now = file.size_bytes, view.order.terms == lineage
     remedy = f"have changed since: `shm ingest --again {view.recording.id}` identifies it anew"
@@ -56,7 +56,7 @@ def steps_of(view: TestView) -> tuple[Step, ...]:
 
 
 def steps(view: TestView) -> Table:
-    """Each stage that was reached and when, with the time since the one before."""
+    """Return each stage that was reached and when, with the time since the one before."""
     found = steps_of(view)
     before: list[datetime | None] = [None, *(step.at for step in found)]
     rows = tuple(
@@ -73,7 +73,7 @@ def steps(view: TestView) -> Table:
 
 
 def formers_of(view: TestView) -> tuple[FormerTest, ...]:
-    """Every identification of this test, in force or superseded, oldest first."""
+    """Return every identification of this test, in force or superseded, oldest first."""
     found = list_former_tests(view.store, view.recording.id)
     return tuple(each for each in found if each.name == view.stored.test.id)
 
@@ -88,7 +88,7 @@ def _replaced(view: TestView) -> list[tuple[str | None, datetime, FormerTest | F
 
 
 def superseded(view: TestView) -> Table:
-    """Identifications and posteriors that later runs have replaced."""
+    """Return identifications and posteriors that later runs have replaced."""
     rows = tuple(
         (
             f"posterior, {formatting.model_class(model)}" if model else "identification",
@@ -326,5 +326,5 @@ def waiting() -> JSONResponse:
 
 
 def _known(row: dict[str, Any]) -> dict[str, Any]:
-    """NaN is what is not known."""
+    """Return a row without NaN, which means unknown."""
     return {key: None if value != value else value for key, value in row.items()}

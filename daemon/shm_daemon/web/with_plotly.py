@@ -37,12 +37,12 @@ _SYMBOLS = {
 
 
 def document(figure: spec.Specification) -> dict[str, Any]:
-    """The plotly document `{"data", "layout"}`: lists and texts only, null for what is unknown."""
+    """Return the plotly document `{"data", "layout"}`: lists and texts, null for unknown."""
     return _Drawing(figure).document()
 
 
 def with_words(figure: spec.Specification, caption: str, alt: str) -> dict[str, Any]:
-    """Its document with what is seen and with what a blind reader needs."""
+    """Return its document with caption and text for blind readers."""
     return {**document(figure), "caption": caption, "alt": alt}
 
 
@@ -202,7 +202,7 @@ class _Drawing:
 
 
 def _heights(figure: spec.Specification) -> list[list[float]]:
-    """From the uppermost row to the lowest: where each begins and ends."""
+    """Return start and end of each row, from the uppermost to the lowest."""
     rows = figure.rows
     if figure.is_grid:
         each = 1 / len(rows)
@@ -230,7 +230,7 @@ def _shares(sizes: Sequence[float], gaps: Sequence[float]) -> list[list[float]]:
 
 
 def _key(axis: str) -> str:
-    """`yaxis2` of `y2`: how the layout names what a trace names."""
+    """Return the layout's name of an axis: `yaxis2` of `y2`."""
     return f"{axis[0]}axis{axis[1:]}"
 
 
@@ -348,19 +348,19 @@ def colour_of(name: str, opacity: float = 1.0) -> str:
 
 
 def escaped(text: str) -> str:
-    """Text that plotly shall not take for its own markup: names come from files."""
+    """Escape text that plotly would take for markup: names come from files."""
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
 def wrapped(text: str) -> str:
-    """Plotly breaks no lines by itself."""
+    """Break lines of a text, as plotly does not."""
     if len(text) <= _LONGEST_LINE and text.isprintable():  # as nearly all of some thousand are
         return text.strip()
     return "<br>".join(textwrap.wrap(text, _LONGEST_LINE))
 
 
 def numbers(values: FloatArray | Iterable[Any]) -> Any:
-    """Six digits of each value, None where it is unknown: nobody sees more in a figure.
+    """Return six digits of each value, None where it is unknown; more is not visible.
 
     Times are in UTC, without the zone, which plotly would ignore; texts stay.
     """

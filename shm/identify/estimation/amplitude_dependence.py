@@ -1,15 +1,16 @@
-"""How each mode's frequency depends on its amplitude, from the course of its phase.
+"""Estimate how each mode's frequency depends on its amplitude, from the course of its phase.
 
-A joint that slips lowers a frequency while the hanger swings far, stretching raises it. With
-f(A) = f0 (1 + c g(A / A_hit)), the phase of a mode that is turned back by a constant frequency f
-is, by the method of averaging (Nayfeh and Mook 1979, chapter 2),
+A joint that slips lowers a frequency while the hanger swings far, stretching raises it. With f(A) =
+f0 (1 + c g(A / A_hit)), the phase of a mode that is rotated back by a constant frequency f is, by
+the method of averaging (Nayfeh and Mook 1979, chapter 2),
 
     phase = phase_0 + 2 pi (f0 - f) t + 2 pi f0 c integral of g(A / A_hit) dt,
 
 linear in f0 - f and c. Phases and amplitudes A come from stretches of the ring-downs, in each of
 which the found poles and shapes are fitted to all channels by least squares. Laws g are friction
 (A), stretching (A^2) and joints that slip no further (A / (A + h)), averaged by how well they fit:
-where a ring-down ends before it is small, they part on the way to zero, and the interval widens.
+where a ring-down ends before it is small, they differ in the limit of zero, and the interval
+widens.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ _INDEPENDENT = 8.0
 _UNLIKE = 0.17
 """Of the rate by which a mode's amplitude falls otherwise than its pole says: so much its frequency
 may be off. A chirp that was found as a mode of thrice its damping is off by that."""
-_MOST_ASTRAY = 0.1
+_MAX_MISFIT = 0.1
 """Radians by which phases leave a law, the surer ones counting more: then it is something else that
 turns them. A law that is wrong by a tenth of 0.5 % leaves 0.03 in a second of 20 Hz."""
 _FINE = 16  # technical: steps of the integral a stretch
@@ -100,8 +101,10 @@ def are_sure(slopes: FloatArray, sds: FloatArray) -> BoolArray:
 
 
 def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Finding:
-    """The finding with the slope of each mode's frequency, and where it is sure, the frequency of
-    small amplitude instead of the mean one."""
+    """Return the finding with the slope of each mode's frequency over its amplitude.
+
+    Where the slope is sure, the frequency is that of small amplitude instead of the mean.
+    """
     if not found.modes or not measurement.hits:
         return found
     courses = [
@@ -121,8 +124,8 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
     # A joint that slips lowers all frequencies, stretching raises all.
     expected = float(np.median(shifts)) if len(shifts) > 1 else 0.0
     modes = tuple(
-        _unlike(_with_slope(mode, fit, bool(own), expected, usual), index, courses, mode)
-        for index, (mode, fit, own) in enumerate(zip(found.modes, fits, sure, strict=True))
+        _unlike(_with_slope(mode, fit, bool(is_sure), expected, usual), index, courses, mode)
+        for index, (mode, fit, is_sure) in enumerate(zip(found.modes, fits, sure, strict=True))
     )
     used = [hit for hit in measurement.hits if hit.used]
     return with_drift(replace(found, modes=modes), courses, used)
@@ -131,8 +134,10 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
 def _with_slope(
     mode: FoundMode, fit: _Fit | None, is_sure: bool, expected: float, usual: float
 ) -> FoundMode:
-    """The mode with its slope and shift; by `expected` +- `usual`, relative, it is shifted where
-    its own phase says nothing."""
+    """Return the mode with its slope and shift.
+
+    Where its phase gives none, it is shifted by `expected` +- `usual`, as fractions.
+    """
     slope = (fit.slope, fit.slope_sd) if fit is not None else (NAN, NAN)
     known = replace(mode, amplitude_slope=slope[0], amplitude_slope_sd=slope[1])
     if fit is None or abs(fit.slope) > MOST_SLOPE:
@@ -164,21 +169,21 @@ def _with_slope(
 
 
 def _leads_s(measurement: Measurement) -> list[float]:
-    """Of each ring-down, how long before it begins the hammer struck; 0 where nobody knows."""
+    """Return the time from the hammer's hit to the start of each ring-down; 0 if unknown."""
     if not measurement.driven:
         return [0.0] * len(measurement.decays)
     leads = []
     for driven, decay in zip(measurement.driven, measurement.decays, strict=True):
         free = driven.shape[1] - decay.shape[1]
-        struck = int(np.argmax(np.abs(driven[0, :free]))) if free else 0
-        leads.append((free - struck) / measurement.sampling_rate_hz)
+        at_hit = int(np.argmax(np.abs(driven[0, :free]))) if free else 0
+        leads.append((free - at_hit) / measurement.sampling_rate_hz)
     return leads
 
 
 def _fits(
     mode: FoundMode, index: int, courses: Sequence[Course], leads_s: Sequence[float]
 ) -> _Fit | None:
-    """What the laws say together; None where too little of the phase is known."""
+    """Return the estimate averaged over the laws; None where too little of the phase is known."""
     decay = 2 * math.pi * mode.frequency_hz * mode.damping_ratio
     seen = [phases_of(course, index, decay) for course in courses]
     rows = [row for row in seen if row is not None]
@@ -186,8 +191,8 @@ def _fits(
         return None
     leads = np.array([lead for lead, row in zip(leads_s, seen, strict=True) if row is not None])
     starts = np.array([size[0] for *_, size in rows])
-    struck = float(np.median(starts * np.exp(decay * leads)))
-    laws = [_fit(mode, [_through(row, decay, law, struck) for row in rows]) for law in _LAWS]
+    at_hit = float(np.median(starts * np.exp(decay * leads)))
+    laws = [_fit(mode, [_through(row, decay, law, at_hit) for row in rows]) for law in LAWS]
     fit = _averaged([law for law in laws if law is not None])
     if fit is None:
         return None
@@ -195,7 +200,7 @@ def _fits(
 
 
 def _unlike_hz(rows: Sequence[Row]) -> float:
-    """By how much the amplitudes fall otherwise than the pole says."""
+    """Return how far the decay of the amplitudes differs from the pole's, in Hz."""
     off = [math.log(size[-1] / size[0]) / (time_s[-1] - time_s[0]) for time_s, _, _, size in rows]
     return abs(float(np.median(off))) / (2 * math.pi)
 
@@ -203,7 +208,10 @@ def _unlike_hz(rows: Sequence[Row]) -> float:
 def _unlike(
     mode: FoundMode, index: int, courses: Sequence[Course], as_found: FoundMode
 ) -> FoundMode:
-    """Less sure where its amplitudes fall otherwise than it says, as after a clipped start."""
+    """Widen the mode's intervals where its amplitudes decay otherwise than its pole does.
+
+    A clipped beginning causes that, for example.
+    """
     decay = 2 * math.pi * as_found.frequency_hz * as_found.damping_ratio
     late = [_from_largest(course, index, decay) for course in courses]
     seen = [row for course in late if (row := phases_of(course, index, decay)) is not None]
@@ -222,7 +230,7 @@ def _from_largest(course: Course, index: int, decay: float) -> Course:
 
 
 def _averaged(laws: Sequence[_Fit]) -> _Fit | None:
-    """By how well each fits; their differences are part of the standard deviations."""
+    """Average the fits of all laws by their likelihood; differences add to the variances."""
     if not laws:
         return None
     best = min(laws, key=lambda law: law.misfit)
@@ -250,7 +258,7 @@ def _slips_no_further(half: float) -> _Law:
     return lambda size: size * (1 + half) / (size + half)
 
 
-_LAWS: tuple[_Law, ...] = (
+LAWS: tuple[_Law, ...] = (
     lambda size: size,
     lambda size: size**2,
     *(_slips_no_further(half) for half in _HALVES),
@@ -258,10 +266,10 @@ _LAWS: tuple[_Law, ...] = (
 """How a frequency falls with the amplitude: dry friction, stretching, and a joint that slips."""
 
 
-def _through(row: Row, decay: float, law: _Law, struck: float) -> _Grown:
+def _through(row: Row, decay: float, law: _Law, at_hit: float) -> _Grown:
     time_s, phase, sd, size = row
     fine_s = np.linspace(time_s[0], time_s[-1], _FINE * (len(time_s) - 1) + 1)
-    amplitude = np.exp(np.interp(fine_s, time_s, np.log(size)) - decay * fine_s) / struck
+    amplitude = np.exp(np.interp(fine_s, time_s, np.log(size)) - decay * fine_s) / at_hit
     height = law(amplitude)
     areas = np.diff(fine_s) * (height[1:] + height[:-1]) / 2
     grown = np.concatenate(([0.0], np.cumsum(areas)))
@@ -269,7 +277,7 @@ def _through(row: Row, decay: float, law: _Law, struck: float) -> _Grown:
 
 
 def _fit(mode: FoundMode, rows: Sequence[_Grown]) -> _Fit | None:
-    """Weighted least squares: a phase for each ring-down, the shift and the slope for all."""
+    """Fit a phase for each ring-down, and shift and slope for all, by weighted least squares."""
     count = len(rows)
     blocks = []
     for number, (time_s, _, _, grown, _) in enumerate(rows):
@@ -288,7 +296,7 @@ def _fit(mode: FoundMode, rows: Sequence[_Grown]) -> _Fit | None:
         return None
     solved, inverse, left_over = solution
     misfit = float(left_over @ left_over)
-    if misfit > (_MOST_ASTRAY * np.linalg.norm(weight)) ** 2:
+    if misfit > (_MAX_MISFIT * np.linalg.norm(weight)) ** 2:
         return None
     spread = np.sqrt(np.diag(inverse) * max(1.0, misfit / freedom)) * widening(freedom) * OVERLAP
     spread = np.fmax(
@@ -303,7 +311,7 @@ def _fit(mode: FoundMode, rows: Sequence[_Grown]) -> _Fit | None:
 def _by_ring_downs(
     weighted: FloatArray, left_over: FloatArray, inverse: FloatArray, rows: Sequence[_Grown]
 ) -> FloatArray:
-    """Standard deviations from what each ring-down leaves unexplained; NaN for fewer than three.
+    """Return standard deviations from the residuals of each ring-down; NaN for fewer than three.
 
     The sandwich of Liang and Zeger (Biometrika 73, 1986) with ring-downs as clusters.
     """

@@ -36,7 +36,7 @@ _LEAST_ANGLE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class _Pair:
-    """Where two near poles lie, and `axes` (channels, 2), orthonormal, real, one for each mode."""
+    """Hold two close poles and `axes` (channels, 2), orthonormal, real, one for each mode."""
 
     frequency_hz: float
     damping_ratio: float
@@ -48,18 +48,18 @@ class _Pair:
         return 2 * self.damping_ratio * self.frequency_hz
 
 
-def told_apart(
+def split_close_pairs(
     candidates: Sequence[Candidate],
     repeats: Sequence[Repeats],
     models: tuple[Sequence[PoleSet], Sequence[Sequence[PoleSet]]],
     seconds: float,
     options: IdentifyOptions,
 ) -> tuple[list[Candidate], list[Repeats]]:
-    """The candidates with near pairs, one of which would be dropped, on axes that noise leaves.
+    """Return the candidates with close pairs, one of which would be dropped, separated on axes.
 
     `models` are those of all hits at the final orders, and those with each hit left out. Pairs
-    that cannot be trusted then, either, stay as they were; so do all below three hits. The axes are
-    a choice that noise does not move: how well hits know the shapes is said by those without it.
+    that remain untrusted stay unchanged; so do all below three hits. The axes are chosen so
+    that noise does not rotate them: the scatter of shapes is that of the shapes without them.
     """
     by_id = {id(c): (c, r) for c, r in zip(candidates, repeats, strict=True)}
     if len(models[1]) >= LEAST_HITS:
@@ -75,7 +75,7 @@ def told_apart(
 def _doubtful_pairs(
     by_id: dict[int, tuple[Candidate, Repeats]], seconds: float, options: IdentifyOptions
 ) -> Iterator[tuple[Candidate, Candidate]]:
-    """Near neighbours of which one or both would be dropped; each candidate is in one pair."""
+    """Yield close neighbours of which one or both would be dropped, each candidate once."""
     known = sorted(by_id.values(), key=lambda entry: entry[0].frequency_hz)
     index = 0
     while index + 1 < len(known):
@@ -93,7 +93,7 @@ def _reach_hz(one: Candidate, other: Candidate, seconds: float) -> float:
 
 
 def _pair(one: Candidate, other: Candidate, seconds: float) -> _Pair | None:
-    """What is common to the two over the orders that have both; None where they are alike."""
+    """Return the pair averaged over the orders that have both; None where the two are equal."""
     shapes = [pole.shape for candidate in (one, other) for pole in candidate.poles]
     vectors, values, _ = np.linalg.svd(_real_parts(shapes), full_matrices=False)
     if len(values) < 2 or values[1] < _LEAST_SECOND * values[0]:
@@ -107,13 +107,13 @@ def _pair(one: Candidate, other: Candidate, seconds: float) -> _Pair | None:
 
 
 def _real_parts(shapes: Sequence[ComplexArray]) -> FloatArray:
-    """Real and imaginary parts of shapes, each turned to be as real as it can, (channels, 2 n)."""
+    """Return real and imaginary parts of shapes rotated to be most real, (channels, 2 n)."""
     turned = [shape * np.exp(-0.5j * np.angle(np.sum(shape**2))) for shape in shapes]
     return np.array([part for shape in turned for part in (shape.real, shape.imag)]).T
 
 
 def _simplest(vectors: FloatArray) -> FloatArray:
-    """Two orthonormal vectors (channels, 2) turned so that each channel has most of one."""
+    """Rotate two orthonormal vectors (channels, 2) so that each channel has most of one."""
     x, y = vectors.T
     squares, product = x**2 - y**2, 2 * x * y
     angle = np.arctan2(2 * squares @ product, squares @ squares - product @ product) / 4
@@ -126,9 +126,9 @@ def _apart(
     pole_pair: tuple[Candidate, Candidate],
     models: tuple[Sequence[PoleSet], Sequence[Sequence[PoleSet]]],
 ) -> list[tuple[Candidate, Repeats]]:
-    """The two modes on the pair's axes, and again with each hit left out; none where unseen."""
+    """Return the two modes on the pair's axes, with their repeats; empty where not seen."""
     together, without_each = models
-    whole = {p.order: _on_axes(pair, p) for p in together if len(_own(pair, p)) == 2}
+    whole = {p.order: _on_axes(pair, p) for p in together if len(_poles_of_pair(pair, p)) == 2}
     seen = {order: both for order, both in whole.items() if both}
     if 2 * len(seen) <= len(together):
         return []
@@ -146,11 +146,11 @@ def _apart(
 
 
 def _on_axes(pair: _Pair, poles: PoleSet) -> tuple[Pole, Pole] | None:
-    """The two motions of one model that its poles in the pair's place make on the pair's axes.
+    """Return the two motions on the pair's axes that one model's poles make.
 
-    One pole alone is both modes' motion; None where there is no pole.
+    One pole alone is the motion of both modes; None where there is no pole.
     """
-    best = _own(pair, poles)
+    best = _poles_of_pair(pair, poles)
     if not len(best):
         return None
     shapes = poles.shapes / np.linalg.norm(poles.shapes, axis=0)
@@ -165,23 +165,23 @@ def _on_axes(pair: _Pair, poles: PoleSet) -> tuple[Pole, Pole] | None:
     return one, other
 
 
-def _own(pair: _Pair, poles: PoleSet) -> IntArray:
-    """Which poles of one model are of the pair: none, one or the nearest two."""
+def _poles_of_pair(pair: _Pair, poles: PoleSet) -> IntArray:
+    """Return the indices of one model's poles in the pair: none, one or the closest two."""
     shapes = poles.shapes / np.linalg.norm(poles.shapes, axis=0)
     inside = np.linalg.norm(pair.axes.T @ shapes, axis=0) ** 2 > _WITHIN
     middle = _rates(np.array(pair.frequency_hz), np.array(pair.damping_ratio))
     away = np.abs(_rates(poles.frequency_hz, poles.damping_ratio) - middle)
-    own = inside & (away < 2 * np.pi * pair.reach_hz)
-    return np.asarray(np.argsort(np.where(own, away, np.inf))[: min(2, int(np.sum(own)))])
+    chosen = inside & (away < 2 * np.pi * pair.reach_hz)
+    return np.asarray(np.argsort(np.where(chosen, away, np.inf))[: min(2, int(np.sum(chosen)))])
 
 
 def _rates(frequency_hz: FloatArray, damping_ratio: FloatArray) -> ComplexArray:
-    """Poles of light damping in rad/s."""
+    """Return the poles of light damping in rad/s."""
     return np.asarray(2 * np.pi * frequency_hz * (1j - damping_ratio))
 
 
 def _span(shapes: ComplexArray) -> FloatArray:
-    """Projector on the two real directions that carry most of `shapes` (channels, 2)."""
+    """Return the projector on the two real directions with most of `shapes` (channels, 2)."""
     vectors = np.linalg.svd(_real_parts(list(shapes.T)), full_matrices=False)[0][:, :2]
     return np.asarray(vectors @ vectors.T)
 

@@ -1,16 +1,15 @@
-"""The course of each mode in each ring-down, its amplitude and phase from stretch to stretch, and
-whether by them all frequencies of a test move together from its first hit to its last.
+"""Follow amplitude and phase of each mode through each ring-down, and estimate a common drift.
 
 In each stretch the found poles and shapes are fitted to all channels by least squares.
 
-A logger's clock that drifts, or a hanger that warms up, moves every mode by the same share; a joint
-or stretching moves each by its own, and alike in every hit of equal strength. With the phase of a
-mode in ring-down h, begun at the share tau_h of the way from the first hit to the last,
+A logger's clock that drifts, or a hanger that warms up, moves every mode by the same fraction; a
+joint or stretching moves each by its amount, equally in every hit of equal strength. With the phase
+of a mode in ring-down h, begun at the fraction tau_h of the way from the first hit to the last,
 
     phase = phase_h + 2 pi f (shift + drift (tau_h - 1/2)) t + 2 pi f slope integral of g,
 
 linear in shift, slope and drift (the laws g of `amplitude_dependence`), each mode gives a drift;
-what they have in common, and how far they are apart, is the test's.
+their common part, and how far they differ, is the test's.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from shm.values.modes import SLOPE_OF_NOTE
 
 _LEAK = 0.01
 """Of a neighbour's motion, at least: comes into a mode's by the error of its shape."""
-_BESIDE_HZ = 2.0  # what stretches of half a second do not part by frequency: one over their length
+_RESOLUTION_HZ = 2.0  # one over the half second of a stretch
 OVERLAP = math.sqrt(41 / 35)
 """Stretches overlap by half: noise in two neighbours has the correlation 3/35 (the integral of
 sin^4 cos^4 over that of sin^8), which makes the variance of a mean 1 + 6/35 times larger."""
@@ -85,17 +84,17 @@ def course_of(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> 
     motion = solved[:, :half] + 1j * solved[:, half:]
     begin_s = np.arange(len(flat)) * hop / rate_hz
     hertz = omega / (2 * np.pi)
-    beside = np.abs(hertz[:, np.newaxis] - hertz) < _BESIDE_HZ
-    np.fill_diagonal(beside, False)
+    unresolved = np.abs(hertz[:, np.newaxis] - hertz) < _RESOLUTION_HZ
+    np.fill_diagonal(unresolved, False)
     sd = np.sqrt(np.outer(noise, variance[:half] + variance[half:]) / 2)
-    sd = np.hypot(sd, np.sqrt(np.abs(motion * _leaks(modes)) ** 2 @ beside))
+    sd = np.hypot(sd, np.sqrt(np.abs(motion * _leaks(modes)) ** 2 @ unresolved))
     turned = np.exp(-np.outer(begin_s, poles))
     middle_s = begin_s + length / (2 * rate_hz)
     return Course(middle_s, motion * turned, sd * np.abs(turned))
 
 
 def _leaks(modes: Sequence[FoundMode]) -> FloatArray:
-    """The error of each mode's shape over it, (modes,)."""
+    """Return the error of each mode's shape over it, (modes,)."""
     shares = [np.linalg.norm(mode.shape_sd) / np.linalg.norm(mode.shape) for mode in modes]
     return np.fmax(np.array(shares), _LEAK)
 
@@ -105,7 +104,7 @@ Row = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def phases_of(course: Course, index: int, decay: float) -> Row | None:
-    """Of the stretches from the beginning on in which the mode stands out of the rest."""
+    """Return the stretches from the start in which the mode is above the rest; None for few."""
     motion, sd = course.motion[:, index], course.sd[:, index]
     now = np.abs(motion) * np.exp(-decay * course.middle_s)
     # What grows again is no free decay: something else was heard at its frequency.
@@ -129,9 +128,9 @@ _LEAST_MODES = 3  # two are in the same ratio by chance
 
 
 def hit_shares(hits: Sequence[Hit]) -> FloatArray:
-    """Of each used hit, its share of the way from the first to the last, less a half: (hits,).
+    """Return the position of each used hit between first and last, minus a half: (hits,).
 
-    Hits of several records are taken as evenly apart: their files' clocks may not agree.
+    Hits of several records are taken as evenly spaced: their files' clocks may not agree.
     """
     used = [hit for hit in hits if hit.used]
     one = len({hit.record for hit in used}) == 1
@@ -141,11 +140,12 @@ def hit_shares(hits: Sequence[Hit]) -> FloatArray:
 
 
 def common_drift(drifts: Sequence[float], sds: Sequence[float]) -> Drift | None:
-    """The mean of what the modes say, weighted; None below three modes.
+    """Return the weighted mean of the modes' drifts; None below three modes.
 
-    What they differ by beyond their own scatter is estimated (DerSimonian and Laird, Controlled
-    Clinical Trials 7, 1986), the standard deviation is that of Hartung and Knapp (Statistics in
-    Medicine 20, 2001), whose ratio to the mean is Student's with modes - 1 degrees of freedom.
+    The variance between modes beyond their scatter is estimated (DerSimonian and Laird,
+    Controlled Clinical Trials 7, 1986), the standard deviation is that of Hartung and Knapp
+    (Statistics in Medicine 20, 2001), whose ratio to the mean is Student's with modes - 1
+    degrees of freedom.
     """
     value, sd = np.array(drifts), np.array(sds)
     if len(value) < _LEAST_MODES:
@@ -163,9 +163,10 @@ def common_drift(drifts: Sequence[float], sds: Sequence[float]) -> Drift | None:
 
 
 def with_drift(found: Finding, courses: Sequence[Course], hits: Sequence[Hit]) -> Finding:
-    """The finding with its drift; where that is sure, frequencies are known no closer.
+    """Return the finding with its drift; where that is sure, frequencies are known no closer.
 
-    Which end of it is right nobody knows: half of it either way, as far as hits are in the middle.
+    Which end of it is right nobody knows: half of it either way, as far as hits are in the
+    middle.
     """
     shares = hit_shares(hits)
     if len(shares) != len(courses):
@@ -188,9 +189,9 @@ def with_drift(found: Finding, courses: Sequence[Course], hits: Sequence[Hit]) -
 def _drift(
     mode: FoundMode, index: int, courses: Sequence[Course], shares: FloatArray
 ) -> tuple[float, float] | None:
-    """Relative change from first to last hit and its standard deviation, by weighted least squares.
+    """Return the relative change from first to last hit and its standard deviation.
 
-    Amplitude and its square stand for whatever the frequency owes to them.
+    A weighted least-squares fit; amplitude and its square absorb the amplitude dependence.
     """
     decay = 2 * math.pi * mode.frequency_hz * mode.damping_ratio
     seen = [phases_of(course, index, decay) for course in courses]
@@ -224,8 +225,10 @@ def _drift(
 def least_squares(
     matrix: FloatArray, values: FloatArray, weight: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """What `matrix` (values, unknowns) makes of its unknowns, the inverse of the normal equations,
-    and what is left of `values`, weighted; None where it cannot tell the unknowns apart.
+    """Solve `matrix` (values, unknowns) for its unknowns by weighted least squares.
+
+    Returns the unknowns, the inverse of the normal equations and the weighted residuals; None
+    where the unknowns cannot be separated.
     """
     weighted = matrix * weight[:, np.newaxis]
     scale = np.linalg.norm(weighted, axis=0)
@@ -240,7 +243,7 @@ def least_squares(
 
 
 def _grown(time_s: FloatArray, size: FloatArray, decay: float) -> FloatArray:
-    """The integral of `size` exp(-`decay` t) up to each time."""
+    """Return the integral of `size` exp(-`decay` t) from 0 to each time."""
     height = size * np.exp(-decay * time_s)
     areas = np.diff(time_s) * (height[1:] + height[:-1]) / 2
     return np.concatenate(([0.0], np.cumsum(areas)))

@@ -1,5 +1,6 @@
-"""Poles of state-space models, how real their shapes are, and candidates for modes: poles followed
-over rising model orders. A mode stays where it is, noise moves.
+"""Find mode candidates: poles of state-space models followed over rising model orders.
+
+A mode stays at its frequency and shape, noise moves. Also: how real shapes are.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class PoleSet:
     dropped: tuple[Dropped, ...] = ()
 
     def chosen(self, keep: BoolArray) -> PoleSet:
-        """The poles where `keep` (poles,) is true."""
+        """Return the poles where `keep` (poles,) is true."""
         return PoleSet(
             self.order,
             self.frequency_hz[keep],
@@ -47,19 +48,19 @@ class PoleSet:
 
 
 def in_band(poles: PoleSet, options: IdentifyOptions) -> BoolArray:
-    """Which poles lie in the band, (poles,)."""
+    """Return the mask (poles,) of poles in the band."""
     return np.asarray(
         (poles.frequency_hz >= options.band_low_hz) & (poles.frequency_hz <= options.band_high_hz)
     )
 
 
 def plausibly_damped(poles: PoleSet, options: IdentifyOptions) -> BoolArray:
-    """Which poles decay, and no faster than a hanger's mode, (poles,)."""
+    """Return the mask (poles,) of poles that decay, and no faster than a hanger's mode."""
     return np.asarray((poles.damping_ratio > 0) & (poles.damping_ratio < options.max_damping_ratio))
 
 
 def collinearity(shape: ComplexArray) -> FloatArray:
-    """Modal phase collinearity (...) of complex shapes (..., channels): 1 where all phases agree.
+    """Return the modal phase collinearity (...) of complex shapes (..., channels), 1 in phase.
 
     Pappa, Elliott and Schenk (1993), eq. 3 to 7, without the removal of the mean.
     """
@@ -71,13 +72,13 @@ def collinearity(shape: ComplexArray) -> FloatArray:
 
 
 def real_shape(shape: ComplexArray) -> FloatArray:
-    """`shape` (channels,) turned to be as real as it can, its largest value 1."""
+    """Return `shape` (channels,) rotated to be most real, its largest value 1."""
     turned = (shape * np.exp(-0.5j * np.angle(np.sum(shape**2)))).real
     return np.asarray(turned / turned[np.argmax(np.abs(turned))])
 
 
 def modal_assurance(one: FloatArray, other: FloatArray) -> float:
-    """Modal assurance criterion of two real shapes (channels,); 1 of shapes at a single channel.
+    """Return the modal assurance criterion of two real shapes (channels,); 1 for one channel.
 
     Allemang and Brown (1982).
     """
@@ -85,12 +86,12 @@ def modal_assurance(one: FloatArray, other: FloatArray) -> float:
 
 
 def aligned(shape: FloatArray, reference: FloatArray) -> FloatArray:
-    """`shape` (channels,) scaled to fit `reference` best, by least squares."""
+    """Scale `shape` (channels,) to fit `reference` best by least squares."""
     return np.asarray(shape * (shape @ reference) / (shape @ shape))
 
 
 def median_shape(shapes: Sequence[ComplexArray]) -> FloatArray:
-    """Median over complex shapes (channels,) made real, its largest value 1."""
+    """Return the median over complex shapes (channels,) made real, its largest value 1."""
     given = np.array(shapes)
     turn = np.exp(-0.5j * np.angle(np.sum(given**2, axis=1, keepdims=True)))
     real = (given * turn).real
@@ -139,17 +140,17 @@ class Candidate:
 
     @property
     def frequency_spread(self) -> float:
-        """How far the frequency moves over the model orders, as a fraction; one stray is free."""
+        """Return the relative spread of the frequency over model orders; one outlier is free."""
         return _spread([pole.frequency_hz for pole in self.poles])
 
     @property
     def damping_spread(self) -> float:
-        """How far the damping moves over the model orders, as a fraction; one stray is free."""
+        """Return the relative spread of the damping over model orders; one outlier is free."""
         return _spread([pole.damping_ratio for pole in self.poles])
 
 
 def _spread(values: Sequence[float]) -> float:
-    """Second largest deviation from the median, as a fraction; the largest of fewer than three."""
+    """Return the second largest relative deviation from the median; below three, the largest."""
     deviations = np.sort(np.abs(np.array(values) / np.median(values) - 1))
     return float(deviations[-2] if len(values) > 2 else deviations[-1])
 
@@ -161,7 +162,7 @@ def stable_candidates(
     *,
     gaps: bool = True,
 ) -> tuple[list[Candidate], tuple[Dropped, ...]]:
-    """Tracks that last over the model orders, and a count of the poles dropped on the way.
+    """Return tracks that last over the model orders, and a count of the poles dropped on the way.
 
     Without `gaps` they must be there at all of `final_orders` but one; else at more than half.
     """
@@ -182,7 +183,7 @@ def stable_candidates(
 
 
 def _left_out_before(sets: Sequence[PoleSet]) -> tuple[Dropped, ...]:
-    """What the models of all orders left out, counted by reason."""
+    """Count the poles that the models of all orders left out, by reason."""
     counts: Counter[str] = Counter()
     for poles in sets:
         counts.update({each.reason: each.count for each in poles.dropped})
@@ -192,7 +193,7 @@ def _left_out_before(sets: Sequence[PoleSet]) -> tuple[Dropped, ...]:
 def _lasting(
     tracks: list[Track], orders: int, final_orders: Sequence[int], options: IdentifyOptions
 ) -> list[Candidate]:
-    """Tracks seen at enough orders, with their poles at the final ones."""
+    """Return tracks seen at enough orders as candidates, with their poles at the final ones."""
     return [
         Candidate(track, tuple(pole for pole in track if pole.order in final_orders))
         for track in tracks
@@ -203,20 +204,20 @@ def _lasting(
 def resolved(
     candidates: Sequence[Candidate], seconds: float
 ) -> tuple[list[Candidate], tuple[Dropped, ...]]:
-    """The candidates that `seconds` of ring-down can tell apart, and the doubles dropped.
+    """Return the candidates that `seconds` of ring-down can separate, and the doubles dropped.
 
-    Two of like shape (MAC above 0.9) nearer than 1/seconds are one mode whose frequency falls with
-    its amplitude; the one that is steadier over the model orders stays.
+    Two of similar shape (MAC above 0.9) closer than 1/seconds are one mode whose frequency
+    falls with its amplitude; the one that varies less over the model orders stays.
     """
-    kept: list[Candidate] = []
+    accepted: list[Candidate] = []
     dropped: list[Dropped] = []
     for candidate in sorted(candidates, key=lambda c: c.frequency_spread):
-        if any(_double(candidate, other, seconds) for other in kept):
+        if any(_double(candidate, other, seconds) for other in accepted):
             what = f"mode at {candidate.frequency_hz:.4g} Hz"
             dropped.append(Dropped(what, 1, _DOUBLE, candidate.frequency_hz))
         else:
-            kept.append(candidate)
-    return kept, tuple(dropped)
+            accepted.append(candidate)
+    return accepted, tuple(dropped)
 
 
 def _double(one: Candidate, other: Candidate, seconds: float) -> bool:
@@ -232,7 +233,7 @@ def _count(sets: Sequence[PoleSet]) -> int:
 def diagram(
     sets: Sequence[PoleSet], candidates: Sequence[Candidate], options: IdentifyOptions
 ) -> Poles:
-    """All poles in the band with plausible damping; stable are those of `candidates`."""
+    """Return all plausibly damped poles in the band; stable are those of `candidates`."""
     shown = [poles.chosen(in_band(poles, options)) for poles in sets]
     shown = [poles.chosen(plausibly_damped(poles, options)) for poles in shown]
     tracked = {(p.order, p.frequency_hz) for c in candidates for p in c.track}
@@ -257,7 +258,7 @@ Track = tuple[Pole, ...]
 
 
 def link(sets: Sequence[PoleSet]) -> list[Track]:
-    """Tracks of poles that agree from order to order in frequency and shape (0.5 %, MAC 0.9)."""
+    """Link poles that agree from order to order (0.5 % of frequency, MAC 0.9) to tracks."""
     closed: list[list[Pole]] = []
     open_tracks: list[list[Pole]] = []
     for poles in sets:
@@ -278,7 +279,7 @@ def _as_poles(poles: PoleSet) -> list[Pole]:
 
 
 def _extended(tracks: list[list[Pole]], poles: list[Pole]) -> list[list[Pole]]:
-    """`tracks`, each with its best pole appended; a pole without a track begins one."""
+    """Return `tracks` with their best poles appended; a pole without a track starts one."""
     if not tracks or not poles:
         return tracks + [[pole] for pole in poles]
     cost = mismatch([track[-1] for track in tracks], poles)
@@ -296,7 +297,7 @@ def mismatch(
     frequency_tolerance: float = FREQUENCY_TOLERANCE,
     shape_tolerance: float = SHAPE_TOLERANCE,
 ) -> FloatArray:
-    """How badly each of `poles` continues each of `known`, (known, poles); 1e6 where it cannot."""
+    """Return the cost at which `poles` continue `known`, (known, poles); 1e6 where they cannot."""
     known_hz = np.array([pole.frequency_hz for pole in known])
     ratio = np.array([pole.frequency_hz for pole in poles]) / known_hz[:, np.newaxis]
     known_shapes = np.array([pole.shape for pole in known])
@@ -308,7 +309,7 @@ def mismatch(
 
 
 def continued(known: Sequence[Pole], poles: PoleSet) -> list[Pole | None]:
-    """For each of `known`, the pole of `poles` that repeats it (1 %, MAC 0.8), or None."""
+    """Return for each of `known` the pole of `poles` that repeats it (1 %, MAC 0.8), or None."""
     candidates = _as_poles(poles)
     if not known or not candidates:
         return [None] * len(known)

@@ -82,7 +82,7 @@ def _pole_set(
     )
 
 
-def own_identification(measurement: Measurement, options: IdentifyOptions) -> Finding:
+def identify_with_pyoma2(measurement: Measurement, options: IdentifyOptions) -> Finding:
     """Return what pyOMA2's own SSI and clustering find, with the steps of its documentation.
 
     It looks at all ring-downs in a row. How well hits repeat is not known: frequencies have the

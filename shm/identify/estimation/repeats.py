@@ -1,5 +1,6 @@
-"""Candidates found again with each hit left out: what that proves, and their standard deviations
-from it and from the choice of model order.
+"""Repeat candidates with each hit left out: validation and standard deviations.
+
+The choice of model order adds to the standard deviations.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ class Repeats:
 def find_again(
     candidates: Sequence[Candidate], models: Sequence[Sequence[PoleSet]]
 ) -> list[Repeats]:
-    """The repeats of each candidate; `models` has one list of pole sets for each left-out hit."""
+    """Return the repeats of each candidate; `models` has pole sets for each left-out hit."""
     matches = [_in_one_model(candidates, sets) for sets in models]
     return [
         repeats_of(candidate, [of_model[index] for of_model in matches])
@@ -81,7 +82,7 @@ def find_again(
 
 
 def repeats_of(candidate: Candidate, matches: Sequence[Sequence[tuple[Pole, Pole]]]) -> Repeats:
-    """The repeats from a list for each left-out hit: poles of the candidate, and these again."""
+    """Return the repeats from matches: for each left-out hit, old poles and the same again."""
     rows = [_repeat(candidate, of_model) for of_model in matches]
     return Repeats(
         np.array([frequency for frequency, _, _ in rows]),
@@ -111,7 +112,7 @@ def _in_one_model(
 def _repeat(
     candidate: Candidate, matches: Sequence[tuple[Pole, Pole]]
 ) -> tuple[float, float, FloatArray]:
-    """Frequency, damping and shape of a repeat: the candidate's own plus the median change."""
+    """Return frequency, damping and shape of a repeat: the candidate's plus the median change."""
     if 2 * len(matches) < len(candidate.poles):
         return np.nan, np.nan, np.full(len(candidate.shape), np.nan)
     change = [
@@ -126,12 +127,14 @@ def _repeat(
     )
 
 
-def proven(
+def validate_candidates(
     candidates: Sequence[Candidate], repeats: Sequence[Repeats], options: IdentifyOptions
 ) -> tuple[tuple[FoundMode, ...], list[Candidate], tuple[FoundMode, ...], tuple[Dropped, ...]]:
-    """The candidates that repeat as modes, by rising frequency, and themselves; those dropped as
-    the modes that they may be, and with the reason."""
-    kept: list[Candidate] = []
+    """Return the modes that repeat, by rising frequency, and their candidates; then the dropped.
+
+    The dropped come as the modes that they may be, and with the reason.
+    """
+    accepted: list[Candidate] = []
     again: list[Repeats] = []
     doubtful: list[FoundMode] = []
     dropped: list[Dropped] = []
@@ -145,29 +148,31 @@ def proven(
             by_hits_hz = frequency_sd(candidate.frequency_hz, repeat.frequency_hz)
             doubtful.append(_mode(candidate, repeat, by_hits_hz, options))
         else:
-            kept.append(candidate)
+            accepted.append(candidate)
             again.append(repeat)
     modes = tuple(
         _mode(candidate, repeat, by_hits, options)
-        for candidate, repeat, by_hits in zip(kept, again, _by_hits(kept, again), strict=True)
+        for candidate, repeat, by_hits in zip(
+            accepted, again, _by_hits(accepted, again), strict=True
+        )
     )
-    return modes, kept, tuple(doubtful), tuple(dropped)
+    return modes, accepted, tuple(doubtful), tuple(dropped)
 
 
 def _by_hits(candidates: Sequence[Candidate], repeats: Sequence[Repeats]) -> list[float]:
-    """What the hits say of each frequency's standard deviation, in Hz."""
+    """Return the standard deviation of each frequency in Hz from the scatter over hits."""
     frequency_hz = np.array([candidate.frequency_hz for candidate in candidates])
     sd_hz = np.array([
         frequency_sd(candidate.frequency_hz, repeat.frequency_hz)
         for candidate, repeat in zip(candidates, repeats, strict=True)
     ])  # fmt: skip
     hits = len(repeats[0].frequency_hz) if repeats else 0
-    steady: list[float] = (steadied(sd_hz / frequency_hz, hits) * frequency_hz).tolist()
+    steady: list[float] = (smooth_sds(sd_hz / frequency_hz, hits) * frequency_hz).tolist()
     return steady
 
 
 def doubt(candidate: Candidate, repeat: Repeats, options: IdentifyOptions) -> str:
-    """Why a candidate is not trusted; empty where it is."""
+    """Return the reason why a candidate is not trusted; empty where it is."""
     if candidate.collinearity < options.min_collinearity:
         return "its shape is not real (phase collinearity below the limit)"
     best = options.at_best(candidate.frequency_hz, candidate.damping_ratio)
@@ -197,11 +202,11 @@ def doubt(candidate: Candidate, repeat: Repeats, options: IdentifyOptions) -> st
 
 
 def _of_one_hit(candidate: Candidate, repeat: Repeats, options: IdentifyOptions) -> bool:
-    """Whether one hit alone made it ring: without that one nobody can find it again.
+    """Return whether the mode is lost when one particular hit is left out, and only then.
 
-    So it is where a crew hits each plane once or twice. Each other hit left out must leave it; then
-    it is trusted as a mode of a single hit is. After one of many hits it is a disturbance, and
-    ambient motion moves every mode in each of its parts.
+    Accepted where a crew hits each plane once or twice: then it is trusted as a mode of a
+    single hit is. With more hits it is a disturbance, and ambient motion moves every mode in
+    each of its parts.
     """
     found = np.isfinite(repeat.frequency_hz)
     if options.ambient_s or len(found) > _MOST_TO_BE_ALONE or len(found) - np.sum(found) != 1:
@@ -210,33 +215,33 @@ def _of_one_hit(candidate: Candidate, repeat: Repeats, options: IdentifyOptions)
 
 
 def _like(candidate: Candidate, shapes: FloatArray) -> bool:
-    """Whether its shape says that it is one mode whichever hit is left out."""
+    """Return whether the shape is that of one mode whichever hit is left out."""
     enough = _points(candidate) > _LEAST_POINTS
-    return enough and _alike(candidate, shapes) > _SAME_SHAPE
+    return enough and _lowest_mac(candidate, shapes) > _SAME_SHAPE
 
 
 def _steady(candidate: Candidate) -> bool:
-    """Whether its shape says that it is one mode in the models of all orders."""
+    """Return whether the shape is that of one mode in the models of all orders."""
     shapes = np.array([real_shape(pole.shape) for pole in candidate.poles])
     enough = _points(candidate) > _LEAST_POINTS_FEW
-    return enough and _alike(candidate, shapes) > _STEADY_SHAPE
+    return enough and _lowest_mac(candidate, shapes) > _STEADY_SHAPE
 
 
 def _points(candidate: Candidate) -> float:
-    """How many points take part in its shape; 0 where the channels are too few to tell."""
+    """Return the effective number of points in the shape; 0 where channels are too few to tell."""
     if len(candidate.shape) < _LEAST_CHANNELS:
         return 0.0
     squares = candidate.shape**2
     return float(np.sum(squares) ** 2 / np.sum(squares**2))
 
 
-def _alike(candidate: Candidate, shapes: FloatArray) -> float:
-    """Modal assurance criterion of its shape and the least like of `shapes` (some, channels)."""
+def _lowest_mac(candidate: Candidate, shapes: FloatArray) -> float:
+    """Return the lowest modal assurance criterion with one of `shapes` (some, channels)."""
     return min(modal_assurance(candidate.shape, shape) for shape in shapes)
 
 
 def _within(candidate: Candidate) -> float:
-    """Standard deviation of the frequency that all hits together have, in Hz."""
+    """Return the standard deviation of the frequency in Hz that all hits have in common."""
     by_order = float(order_sd([pole.frequency_hz for pole in candidate.poles]))
     return math.hypot(by_order, candidate.blur_hz)
 
@@ -258,11 +263,11 @@ def _mode(
 
 
 def jackknife_sd(estimates: FloatArray) -> FloatArray:
-    """Standard deviation of an estimate from its delete-one replicates (hits, ...): (...).
+    """Return the standard deviation from delete-one replicates (hits, ...) of an estimate: (...).
 
-    Efron (1982), eq. 3.1, widened by the ratio of Student's 95 % quantile with hits - 1 degrees of
-    freedom to the normal one, so that a 90 % interval of a normal distribution with this standard
-    deviation covers the truth in 90 %. NaN below three hits.
+    Efron (1982), eq. 3.1, widened by the ratio of Student's 95 % quantile with hits - 1 degrees
+    of freedom to the normal one, so that a 90 % interval of a normal distribution with this
+    standard deviation covers the truth in 90 %. NaN below three hits.
     """
     hits = len(estimates)
     if hits < LEAST_HITS:
@@ -272,10 +277,11 @@ def jackknife_sd(estimates: FloatArray) -> FloatArray:
 
 
 def order_sd(estimates: Sequence[float] | Sequence[FloatArray]) -> FloatArray:
-    """Standard deviation that the choice of the model order adds to a median over orders: (...).
+    """Return the standard deviation that the choice of the model order adds: (...).
 
-    `estimates` (orders, ...) come from the same hits, so no hit left out shows it. It is half of
-    their spread: measured to make the intervals of all identifiers right.
+    `estimates` (orders, ...) of a median over orders come from the same hits, so no hit left
+    out shows it. It is half of their spread: measured to make the intervals of all identifiers
+    right.
     """
     values = np.asarray(estimates)
     if len(values) < 2:
@@ -283,34 +289,34 @@ def order_sd(estimates: Sequence[float] | Sequence[FloatArray]) -> FloatArray:
     return np.asarray(_SHARE_OF_ORDERS * np.std(values, axis=0, ddof=1))
 
 
-def steadied(sds: FloatArray, hits: int) -> FloatArray:
-    """Standard deviations (modes,) of neighbours, each made steadier by those beside it.
+def smooth_sds(sds: FloatArray, hits: int) -> FloatArray:
+    """Smooth standard deviations (modes,) over neighbouring modes.
 
     From a few hits one may be far too small by chance. As in G. K. Smyth's moderated variances
-    (Statistical Applications in Genetics and Molecular Biology 3, 2004), a variance with hits - 1
-    degrees of freedom is averaged with what the others lead to expect, here the median of up to
-    four neighbours with one degree of freedom. On 576 simulated frequencies of 5 hits, none of
-    them used to choose that, 0.9 % lay beyond 3 standard deviations instead of 1.9 %. Unchanged
-    below three hits or three modes.
+    (Statistical Applications in Genetics and Molecular Biology 3, 2004), a variance with hits -
+    1 degrees of freedom is averaged with what the others lead to expect, here the median of up
+    to four neighbours with one degree of freedom. On 576 simulated frequencies of 5 hits, none
+    of them used to choose that, 0.9 % lay beyond 3 standard deviations instead of 1.9 %.
+    Unchanged below three hits or three modes.
     """
     if hits < LEAST_HITS or len(sds) < _LEAST_NEIGHBOURS:
         return sds
-    expected = np.array([_beside(sds, index) for index in range(len(sds))])
+    expected = np.array([_neighbours_sd(sds, index) for index in range(len(sds))])
     return np.asarray(np.sqrt(((hits - 1) * sds**2 + expected**2) / hits))
 
 
-def _beside(sds: FloatArray, index: int) -> float:
+def _neighbours_sd(sds: FloatArray, index: int) -> float:
     near = np.arange(max(0, index - _REACH), min(len(sds), index + _REACH + 1))
     return float(np.median(sds[near[near != index]]))
 
 
 def widening(freedom: int) -> float:
-    """Student's 95 % quantile over the normal one."""
+    """Return Student's 95 % quantile over the normal one."""
     return float(scipy.special.stdtrit(freedom, 0.95) / scipy.special.ndtri(0.95))
 
 
 def frequency_sd(frequency_hz: float, estimates_hz: FloatArray) -> float:
-    """Standard deviation of a frequency; the stated floor where there are too few hits."""
+    """Return the standard deviation of a frequency; the stated floor below three hits."""
     if len(estimates_hz) < LEAST_HITS or not np.all(np.isfinite(estimates_hz)):
         return FREQUENCY_FLOOR * frequency_hz
     return float(jackknife_sd(estimates_hz))

@@ -30,9 +30,9 @@ from shm.identify.estimation.poles import PoleSet
 from shm.identify.estimation.pyoma import poles_of_orders
 from shm.identify.estimation.repeats import LEAST_HITS
 from shm.identify.estimation.stabilise import (
-    completed,
+    empty_finding,
     final_orders,
-    nothing_moves,
+    merge_findings,
     stabilised,
 )
 from shm.identify.options import IdentifyOptions
@@ -79,10 +79,10 @@ class Window:
         return max(1, int(sampling_rate_hz / (4 * self._reach_hz)))
 
     def through(self, decay: FloatArray, sampling_rate_hz: float) -> FloatArray:
-        """A free decay (channels, samples) lowered by `shift_hz`, at `rate_hz`.
+        """Return a free decay (channels, samples) lowered by `shift_hz`, at `rate_hz`.
 
-        The filter runs from the end to the beginning: so a sum of decaying sines stays one from its
-        first sample on, and only its end, where the filter starts, is lost.
+        The filter runs from the end to the beginning: so a sum of decaying sines stays one
+        from its first sample on, and only its end, where the filter starts, is lost.
         """
         middle = self.shift_hz + self._reach_hz
         turned = decay * np.exp(-2j * np.pi * middle / sampling_rate_hz * np.arange(decay.shape[1]))
@@ -97,10 +97,10 @@ class Window:
         return np.asarray((slow * back).real)
 
     def options(self, options: IdentifyOptions) -> IdentifyOptions:
-        """Those of the band for this window; windows overlap, so that no mode falls between two.
+        """Return the options with this window's band; windows overlap to miss no mode.
 
-        Poles of noise lie as dense in one window as in another, so what a frequency may differ by
-        from model to model grows with it no further than `_SURE_BELOW_HZ`.
+        Poles of noise are as dense in one window as in another, so the tolerance of a
+        frequency from model to model grows with it no further than `_SURE_BELOW_HZ`.
         """
         more = _OVERLAP * (self.high_hz - self.low_hz)
         strict = min(1.0, 2 * _SURE_BELOW_HZ / (self.low_hz + self.high_hz))
@@ -116,12 +116,12 @@ class Window:
 
 @lru_cache(maxsize=16)
 def _low_pass(edge: float) -> FloatArray:
-    """Sections of a Chebyshev filter that stops from a share of half the sampling rate on."""
+    """Return the sections of a Chebyshev filter that stops above a fraction of half the rate."""
     return np.asarray(scipy.signal.cheby2(_FILTER_ORDER, _STOP_DB, min(edge, 0.99), output="sos"))
 
 
 def windows(sampling_rate_hz: float, options: IdentifyOptions) -> Iterator[Window]:
-    """Windows of equal width, side by side over the band."""
+    """Yield windows of equal width, side by side over the band."""
     low_hz = options.band_low_hz
     high_hz = min(options.band_high_hz, sampling_rate_hz / 2)
     count = max(1, round((high_hz - low_hz) / WIDTH_HZ))
@@ -130,7 +130,7 @@ def windows(sampling_rate_hz: float, options: IdentifyOptions) -> Iterator[Windo
         yield Window(low, high)
 
 
-_NOBODY_HIT = 2.0
+_AMBIENT_SD = 2.0
 """The chance in ambient motion moves a frequency more than noise does a ring-down's: so many times
 the largest standard deviation of a hammer test are taken."""
 # Rows are channels times lags and cost their cube; so many leave 0.9 s a test. Of modes 20 dB above
@@ -171,37 +171,39 @@ _RANK_TOLERANCE = 1e-17
 
 
 def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Finding:
-    """Modes of a measurement by multi-hit SSI (see the module's text)."""
-    nobody_hit = measurement.frequency_response is None and not measurement.hits
-    if nobody_hit:
+    """Return modes of a measurement by multi-hit SSI (see the module's text)."""
+    is_ambient = measurement.frequency_response is None and not measurement.hits
+    if is_ambient:
         samples = sum(part.shape[1] for part in measurement.decays)
         options = replace(
             options,
-            max_frequency_sd=_NOBODY_HIT * options.max_frequency_sd,
+            max_frequency_sd=_AMBIENT_SD * options.max_frequency_sd,
             ambient_s=samples / measurement.sampling_rate_hz,
         )
-    mixed = references(measurement.decays, _REFERENCES_AMBIENT if nobody_hit else _REFERENCES)
+    mixed = references(measurement.decays, _REFERENCES_AMBIENT if is_ambient else _REFERENCES)
     rows = block_rows(measurement, options)
     matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
-    if nobody_hit:
+    if is_ambient:
         matrices = _few_sums(matrices)
     found = modes_of_hankel(matrices, rows, measurement, options)
-    if nobody_hit:
+    if is_ambient:
         few = replace(options, max_order=min(options.max_order or _FEW_ORDERS, _FEW_ORDERS))
-        found = completed(found, modes_of_hankel(matrices, rows, measurement, few))
+        found = merge_findings(found, modes_of_hankel(matrices, rows, measurement, few))
     checked = len(measurement.decays) > 1 or len(measurement.points) >= _LEAST_POINTS
-    timed = bool(measurement.hits) or nobody_hit
+    timed = bool(measurement.hits) or is_ambient
     if _repeated(measurement) or not (timed and checked):
         return found
     every = windows(measurement.sampling_rate_hz, options)
-    return completed(found, through_windows(measurement, options, every))
+    return merge_findings(found, through_windows(measurement, options, every))
 
 
-def looked_at_again(
+def search_windows(
     measurement: Measurement, options: IdentifyOptions, at_hz: Sequence[float] | None = None
 ) -> Finding | None:
-    """What windows show about `at_hz`, or anywhere; None where they were looked through before, or
-    cannot be."""
+    """Identify modes in windows around `at_hz`, or over the band.
+
+    Returns None where windows were used before or cannot be.
+    """
     every = windows(measurement.sampling_rate_hz, options)
     around = [w for w in every if at_hz is None or any(w.low_hz <= hz <= w.high_hz for hz in at_hz)]
     if not around or not measurement.hits or not _repeated(measurement):
@@ -212,8 +214,8 @@ def looked_at_again(
 def through_windows(
     measurement: Measurement, options: IdentifyOptions, every: Iterable[Window]
 ) -> Finding:
-    """The modes that each window shows by itself."""
-    return reduce(completed, (_in_window(window, measurement, options) for window in every))
+    """Return the modes that each window shows by itself."""
+    return reduce(merge_findings, (_in_window(window, measurement, options) for window in every))
 
 
 def _in_window(window: Window, measurement: Measurement, options: IdentifyOptions) -> Finding:
@@ -223,7 +225,7 @@ def _in_window(window: Window, measurement: Measurement, options: IdentifyOption
     long = [decay for decay in measurement.decays if decay.shape[1] >= least]
     decays = tuple(window.through(decay, rate) for decay in long)
     if _size(decays) < STOPPED * _size(long):
-        return nothing_moves(len(decays))
+        return empty_finding(len(decays))
     mixed = references(decays)
     rows = min(_ROWS_WINDOW, min(decay.shape[1] for decay in decays) // 3)
     matrices = [hankel(decay, mixed @ decay, rows) for decay in decays]
@@ -234,7 +236,7 @@ def _in_window(window: Window, measurement: Measurement, options: IdentifyOption
 
 
 def _few_sums(matrices: Sequence[FloatArray]) -> list[FloatArray]:
-    """The matrices as no more than ten sums, each to be left out in turn."""
+    """Return the matrices as no more than ten sums, each to be left out in turn."""
     return [np.sum(matrices[n::_MOST_SUMS], axis=0) for n in range(min(len(matrices), _MOST_SUMS))]
 
 
@@ -258,7 +260,7 @@ class _Size:
 
 
 def references(responses: Sequence[FloatArray], most: int = _REFERENCES) -> FloatArray:
-    """Rows (references, channels) that mix the channels into the `most` that carry most energy."""
+    """Return rows (references, channels) that mix channels into the `most` with most energy."""
     channels = len(responses[0])
     if channels <= most:
         return np.eye(channels)
@@ -268,13 +270,13 @@ def references(responses: Sequence[FloatArray], most: int = _REFERENCES) -> Floa
 
 
 def _repeated(measurement: Measurement) -> bool:
-    """Whether hits enough tell modes from noise."""
+    """Return whether there are hits enough to separate modes from noise."""
     hit = bool(measurement.hits) or measurement.frequency_response is not None
     return hit and len(measurement.decays) >= LEAST_HITS
 
 
 def block_rows(measurement: Measurement, options: IdentifyOptions) -> int:
-    """How many time lags the Hankel matrices hold."""
+    """Return the number of time lags in the Hankel matrices."""
     shortest = min(decay.shape[1] for decay in measurement.decays)
     channels = len(measurement.points)
     rows, bounds = (_ROWS, _BLOCK_ROWS) if _repeated(measurement) else (_ROWS_FEW, _BLOCK_ROWS_FEW)
@@ -290,7 +292,7 @@ def modes_of_hankel(
     options: IdentifyOptions,
     shift_hz: float = 0.0,
 ) -> Finding:
-    """Modes from the Hankel matrices of the hits, each of `rows` blocks of rows.
+    """Return modes from the Hankel matrices of the hits, each of `rows` blocks of rows.
 
     `shift_hz` is what their frequencies lie below the true ones.
     """
@@ -298,7 +300,7 @@ def modes_of_hankel(
     left, values, right = np.linalg.svd(total, full_matrices=False)
     max_order = _max_order(total.shape, values, rows, options.max_order or _MAX_ORDER)
     if max_order < _LEAST_ORDER:
-        return nothing_moves(len(matrices))
+        return empty_finding(len(matrices))
     size = _Size(rows, max_order, measurement.sampling_rate_hz, shift_hz)
     leading = left[:, :max_order] * values[:max_order]
     sets = poles_of_orders(leading, rows, size.orders, size.sampling_rate_hz, shift_hz)
@@ -308,7 +310,7 @@ def modes_of_hankel(
 
 
 def _max_order(shape: tuple[int, int], values: FloatArray, rows: int, most: int) -> int:
-    """The highest even order up to `most` that a matrix has the size and numerical rank for."""
+    """Return the highest even order up to `most` that a matrix' size and numerical rank allow."""
     rank = int(np.sum(values > _RANK_TOLERANCE * values[0]))
     shifted_rows = shape[0] // rows * (rows - 1)
     largest = min(most, rank, shifted_rows // 2, shape[1])
@@ -318,7 +320,10 @@ def _max_order(shape: tuple[int, int], values: FloatArray, rows: int, most: int)
 def _models_without_each_hit(
     matrices: Sequence[FloatArray], basis: FloatArray, size: _Size
 ) -> list[list[PoleSet]]:
-    """Of the columns that `basis`, the whole matrix' right singular vectors, combines."""
+    """Return the models with each hit left out, in the columns that `basis` combines.
+
+    `basis` are right singular vectors of the full matrix.
+    """
     if len(matrices) < 2:
         return []
     projected = [matrix @ basis for matrix in matrices]

@@ -1,5 +1,4 @@
-"""What every identifier does with the poles of its models: the modes among them, and the rest; and
-by how much a logger's channels are late beside each other, from the phases of the modes.
+"""Separate modes from other poles for every identifier, and estimate channel delays.
 
 One converter that goes from channel to channel samples the last up to a sample later than the
 first, a second board may start late. A mode's phase at a channel that is late by tau falls behind
@@ -15,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.identify.contract import Dropped, Finding, FoundMode, Poles
-from shm.identify.estimation.close_pairs import told_apart
+from shm.identify.estimation.close_pairs import split_close_pairs
 from shm.identify.estimation.poles import (
     Candidate,
     PoleSet,
@@ -25,7 +24,7 @@ from shm.identify.estimation.poles import (
     resolved,
     stable_candidates,
 )
-from shm.identify.estimation.repeats import FEW_HITS, LEAST_HITS, find_again, proven
+from shm.identify.estimation.repeats import FEW_HITS, LEAST_HITS, find_again, validate_candidates
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray, FloatArray
 
@@ -35,7 +34,7 @@ _FINAL_ORDERS = 5  # judgement: the median of five bears two strays; each costs 
 
 
 def final_orders(orders: Sequence[int]) -> list[int]:
-    """The orders that estimates are taken from: up to five, spread over the upper half."""
+    """Return the orders that estimates are taken from: up to five, spread over the upper half."""
     upper = [order for order in orders if 2 * order >= max(orders)]
     picks = np.linspace(0, len(upper) - 1, _FINAL_ORDERS).round().astype(int)
     return [upper[pick] for pick in sorted(set(picks.tolist()))]
@@ -47,7 +46,7 @@ def stabilised(
     seconds: float,
     options: IdentifyOptions,
 ) -> Finding:
-    """The modes among the poles of models of rising order, `sets`.
+    """Return the modes among the poles of models of rising order, `sets`.
 
     `without_each_hit` holds the poles at the final orders with each hit left out in turn; empty
     where there is one hit. `seconds` of ring-down decide what can be told apart.
@@ -60,22 +59,22 @@ def stabilised(
     candidates, unstable = stable_candidates(sets, orders, options, gaps=gaps)
     late_s = delays_s(candidates, options)
     if late_s is not None:
-        sets = [simultaneous(poles, late_s) for poles in sets]
-        without_each_hit = [[simultaneous(p, late_s) for p in of] for of in without_each_hit]
-        candidates = [as_simultaneous(candidate, late_s) for candidate in candidates]
+        sets = [remove_delays(poles, late_s) for poles in sets]
+        without_each_hit = [[remove_delays(p, late_s) for p in of] for of in without_each_hit]
+        candidates = [remove_candidate_delays(candidate, late_s) for candidate in candidates]
     single, doubles = resolved(candidates, seconds)
     final = [poles for poles in sets if poles.order in orders]
     again = find_again(single, without_each_hit)
-    told, again = told_apart(single, again, (final, without_each_hit), seconds, options)
-    modes, kept, doubtful, refused = proven(told, again, options)
-    lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in kept)
+    separated, again = split_close_pairs(single, again, (final, without_each_hit), seconds, options)
+    modes, accepted, doubtful, refused = validate_candidates(separated, again, options)
+    lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in accepted)
     followed = Dropped("poles", lost, "stable, but of a mode that was dropped")
     dropped = (*unstable, followed, *doubles, *refused)
-    return Finding(modes, dropped, diagram(sets, kept, options), doubtful)
+    return Finding(modes, dropped, diagram(sets, accepted, options), doubtful)
 
 
-def completed(found: Finding, other: Finding) -> Finding:
-    """`found` with those modes of `other` that it lacks; what was dropped is what both did."""
+def merge_findings(found: Finding, other: Finding) -> Finding:
+    """Return `found` with the modes of `other` that it lacks; dropped are those of both."""
     added = [mode for mode in other.modes if not any(_same(mode, each) for each in found.modes)]
     modes = tuple(sorted((*found.modes, *added), key=lambda mode: mode.frequency_hz))
     dropped = tuple(
@@ -86,7 +85,7 @@ def completed(found: Finding, other: Finding) -> Finding:
 
 
 def _same(one: FoundMode, other: FoundMode) -> bool:
-    """Whether it may be one mode; of two at one place, the one that is known stays alone."""
+    """Return whether the two may be one mode."""
     sd_hz = np.hypot(one.frequency_sd_hz, other.frequency_sd_hz)
     reach_hz = max(_SAME * one.frequency_hz, _DEVIATIONS * float(np.nan_to_num(sd_hz)))
     near = abs(one.frequency_hz - other.frequency_hz) < reach_hz
@@ -94,12 +93,12 @@ def _same(one: FoundMode, other: FoundMode) -> bool:
 
 
 def _of(entry: Dropped, frequency_hz: float) -> bool:
-    """Whether that was dropped which is known as a mode of that frequency."""
+    """Return whether the dropped pole is at that frequency."""
     return abs(entry.frequency_hz - frequency_hz) < _SAME * frequency_hz
 
 
-def nothing_moves(hits: int) -> Finding:
-    """The finding where no sensor moves after any of `hits`."""
+def empty_finding(hits: int) -> Finding:
+    """Return the finding where no sensor moves after any of `hits`."""
     nothing = np.empty(0)
     dropped = (Dropped("ring-downs", hits, "nothing moves in them"),)
     return Finding((), dropped, Poles(nothing, nothing, nothing, nothing.astype(bool)))
@@ -114,10 +113,11 @@ _STEPS, _FINER, _PASSES = 33, 3, 6  # technical: delays to 1e-4 of a period, one
 
 
 def delays_s(candidates: Sequence[Candidate], options: IdentifyOptions) -> FloatArray | None:
-    """Of each channel (channels,), up to half a period of the band's end; None where not proven.
+    """Return the delay of each channel (channels,), up to half a period of the band's end.
 
-    They are proven where those of every other mode make the shapes of the rest real, and more so
-    than without. Asked are those that orders prove as modes, as where hits are few.
+    None where not validated: the delays of every other mode must make the shapes of the rest
+    real, and more so than none do. Candidates that orders validate count, as where hits are
+    few.
     """
     highest_hz = options.band_high_hz
     candidates = [
@@ -143,12 +143,12 @@ def delays_s(candidates: Sequence[Candidate], options: IdentifyOptions) -> Float
 
 
 def _realness(frequency_hz: FloatArray, shapes: ComplexArray, late_s: FloatArray) -> FloatArray:
-    """Phase collinearity (modes,) of each of `shapes` (modes, channels) with the delays off."""
+    """Return the phase collinearity (modes,) of `shapes` (modes, channels) with delays removed."""
     return collinearity(shapes * np.exp(2j * np.pi * np.outer(frequency_hz, late_s)))
 
 
 def _most_real(frequency_hz: FloatArray, shapes: ComplexArray, highest_hz: float) -> FloatArray:
-    """The delays with the largest sum over the modes of |sum of v^2|, the first channel's 0."""
+    """Return the delays with the largest sum over the modes of |sum of v^2|, the first 0."""
     squares = shapes**2 / np.sum(np.abs(shapes) ** 2, axis=1, keepdims=True)
     late_s = np.zeros(shapes.shape[1])
     reach_s = 1 / (2 * highest_hz)
@@ -159,22 +159,22 @@ def _most_real(frequency_hz: FloatArray, shapes: ComplexArray, highest_hz: float
                 turned = squares * np.exp(4j * np.pi * np.outer(frequency_hz, late_s))
                 others = turned.sum(axis=1) - turned[:, channel]
                 tried_s = steps_s + (late_s[channel] if finer else 0.0)
-                own = squares[:, channel] * np.exp(4j * np.pi * np.outer(tried_s, frequency_hz))
-                late_s[channel] = tried_s[np.argmax(np.abs(others + own).sum(axis=1))]
+                orders = squares[:, channel] * np.exp(4j * np.pi * np.outer(tried_s, frequency_hz))
+                late_s[channel] = tried_s[np.argmax(np.abs(others + orders).sum(axis=1))]
     return late_s
 
 
-def simultaneous(poles: PoleSet, late_s: FloatArray) -> PoleSet:
-    """The poles with shapes as channels without delays have them."""
+def remove_delays(poles: PoleSet, late_s: FloatArray) -> PoleSet:
+    """Return the poles with the shapes that channels without delays have."""
     turns = np.exp(2j * np.pi * np.outer(late_s, poles.frequency_hz))
     return replace(poles, shapes=poles.shapes * turns)
 
 
-def as_simultaneous(candidate: Candidate, late_s: FloatArray) -> Candidate:
-    """The candidate with shapes as channels without delays have them."""
+def remove_candidate_delays(candidate: Candidate, late_s: FloatArray) -> Candidate:
+    """Return the candidate with the shapes that channels without delays have."""
     track = tuple(
         replace(pole, shape=pole.shape * np.exp(2j * np.pi * pole.frequency_hz * late_s))
         for pole in candidate.track
     )
-    own = {pole.order for pole in candidate.poles}
-    return replace(candidate, track=track, poles=tuple(p for p in track if p.order in own))
+    orders = {pole.order for pole in candidate.poles}
+    return replace(candidate, track=track, poles=tuple(p for p in track if p.order in orders))

@@ -30,7 +30,7 @@ LEAST_PERIODS = 10
 
 
 def ambient_measurement(records: Sequence[Recording], options: IdentifyOptions) -> Measurement:
-    """The measurement in records of one set-up that nobody hit; gaps are cut out, trucks set apart.
+    """Return the measurement of one set-up without hits; gaps and trucks are cut out.
 
     Raises NotIdentifiable where no channel can be used or the records are too short.
     """
@@ -58,22 +58,23 @@ def ambient_measurement(records: Sequence[Recording], options: IdentifyOptions) 
 
 
 def set_apart(parts: Sequence[FloatArray]) -> tuple[list[FloatArray], int]:
-    """The parts without those of trucks and hits, as long as enough are left, and how many went.
+    """Return the parts without trucks and hits, as long as enough are left, and their number.
 
     What moves the structure for seconds is no noise, and its modes are those under the load.
     """
     level = np.array([loudness(part) for part in parts])
-    quiet = [p for p, own in zip(parts, level, strict=True) if own <= LOUDER * np.median(level)]
+    quiet = [p for p, each in zip(parts, level, strict=True) if each <= LOUDER * np.median(level)]
     if len(quiet) < LEAST_PARTS:
         return list(parts), 0
     return quiet, len(parts) - len(quiet)
 
 
 def loudness(part: FloatArray) -> float:
-    """Root mean square of a part's differences from sample to sample: drift does not count.
+    """Return the root mean square of differences from sample to sample: drift does not count.
 
-    Parts are divided by it, so that no gust outweighs the rest: on records with trucks 90 % of the
-    intervals of frequencies held the truth in 96 instead of 88 % (tests/worlds/recordings.py).
+    Parts are divided by it, so that no gust outweighs the rest: on records with trucks 90 % of
+    the intervals of frequencies held the truth in 96 instead of 88 %
+    (tests/worlds/recordings.py).
     """
     return float(np.sqrt(np.mean(np.diff(part, axis=1) ** 2))) or 1.0
 
@@ -86,7 +87,7 @@ def _least_part_seconds(options: IdentifyOptions) -> float:
 def _usable_channels(
     records: Sequence[Recording],
 ) -> tuple[list[int], tuple[Dropped, ...]]:
-    """Rows of the accelerations that can be used, and those that cannot with the reason."""
+    """Return the rows of usable accelerations, and the dropped ones with the reason."""
     channels = records[0].accelerations
     stated = any(channel.plane for channel in channels)
     rows, dropped = [], []
@@ -119,7 +120,7 @@ def _fault(channel: Channel, values: FloatArray, stated: bool) -> str:
 
 
 def _between_gaps(record: Recording, rows: Sequence[int]) -> list[FloatArray]:
-    """The stretches (channels, samples) in which all channels are known, free of their mean."""
+    """Return stretches (channels, samples) in which all channels are known, without mean."""
     signals = np.array([record.accelerations[row].values for row in rows])
     known: BoolArray = np.all(np.isfinite(signals), axis=0)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False]))))
@@ -128,7 +129,7 @@ def _between_gaps(record: Recording, rows: Sequence[int]) -> list[FloatArray]:
 
 
 def _parts(pieces: Sequence[tuple[FloatArray, float]], least_seconds: float) -> list[FloatArray]:
-    """The pieces cut into parts of about equal length, at most 20 of them."""
+    """Cut the pieces into parts of about equal length, at most 20 of them."""
     total = sum(signals.shape[1] / rate for signals, rate in pieces)
     wanted = max(least_seconds, total / MOST_PARTS)
     return [

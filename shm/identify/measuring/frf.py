@@ -30,11 +30,11 @@ LEAST_SAMPLES = 64  # judgement: 25 periods of the highest mode; fewer have no o
 
 @dataclass(frozen=True)
 class Window:
-    """What is looked at of each hit: `length` samples that begin `before` samples before it.
+    """Define the part of each hit that is used: `length` samples from `before` samples before it.
 
-    The exponential window of `time_constant_s` (inf: none) lies on force and accelerations alike.
-    It turns the accelerance H(s) into H(s + 1/time constant), whatever the estimator: a damping
-    ratio read off it is too high by 1/(2 pi f time constant).
+    The exponential window of `time_constant_s` (inf: none) is on force and accelerations
+    equally. It turns the accelerance H(s) into H(s + 1/time constant), whatever the estimator:
+    a damping ratio read off it is too high by 1/(2 pi f time constant).
     """
 
     before: int
@@ -61,7 +61,7 @@ class AveragedResponse:
 def common_window(
     hits: Sequence[HitRecord], sampling_rate_hz: float, band_high_hz: float
 ) -> Window:
-    """The window that suits each of `hits`: cut to one length, rung down at its end."""
+    """Return the window that suits each of `hits`: cut to one length, rung down at its end."""
     before = min(_margin(sampling_rate_hz), *(hit.pulse.start for hit in hits))
     longest = int(MOST_LINES / (BAND_MARGIN * band_high_hz) * sampling_rate_hz)
     length = min(longest, *(hit.pulse.stop - hit.pulse.start + before for hit in hits))
@@ -76,7 +76,7 @@ def averaged_response(
     estimator: str = "h1",
     window: Window | None = None,
 ) -> AveragedResponse:
-    """Accelerance and coherence up to 1.25 times the band, in the `window` or the hits' own.
+    """Return accelerance and coherence up to 1.25 times the band, in `window` or one that fits.
 
     The force window keeps the pulse and fades out after it.
     """
@@ -117,10 +117,10 @@ def _time_constant(hit: HitRecord, length: int, sampling_rate_hz: float) -> floa
 def _spectra(
     hit: HitRecord, window: Window, transform_length: int, sampling_rate_hz: float
 ) -> ComplexArray:
-    """Spectra of the windowed force (row 0) and accelerations, (1 + points, lines)."""
+    """Return spectra of the windowed force (row 0) and accelerations, (1 + points, lines)."""
     begin = hit.pulse.start - window.before
     cut = slice(begin, begin + window.length)
-    keep = hit.struck - begin + _margin(sampling_rate_hz)
+    keep = hit.impact_end - begin + _margin(sampling_rate_hz)
     faded = _force_window(window.length, keep)
     rows = np.vstack([hit.force[np.newaxis, cut], hit.accelerations[:, cut]])
     rows[0] -= np.nanmedian(rows[0])
@@ -134,17 +134,17 @@ def _spectra(
 
 
 def _force_window(length: int, keep: int) -> FloatArray:
-    """One for `keep` samples, then half a cosine down to zero over as many."""
+    """Return a window of ones for `keep` samples, then half a cosine to zero over as many."""
     phase = np.clip((np.arange(length) - keep) / keep, 0, 1)
     return np.asarray(0.5 + 0.5 * np.cos(np.pi * phase))
 
 
 def response_of(spectra: ComplexArray, estimator: str) -> tuple[ComplexArray, FloatArray]:
-    """Accelerance in m/s^2/N and coherence, each (points, lines); 0 where nothing is known.
+    """Return accelerance in m/s^2/N and coherence, each (points, lines); 0 where nothing is known.
 
-    `spectra` (hits, 1 + points, lines), the force first. `estimator` is `h1`, true where the noise
-    is in the responses; `h2`, where it is in the force; `hv`, where both have the same share of it
-    (Ewins 2000, section 3.6; Rocklin, Crowley and Vold 1985).
+    `spectra` (hits, 1 + points, lines), the force first. `estimator` is `h1`, true where the
+    noise is in the responses; `h2`, where it is in the force; `hv`, where both have the same
+    share of it (Ewins 2000, section 3.6; Rocklin, Crowley and Vold 1985).
     """
     force, response = spectra[:, :1], spectra[:, 1:]
     cross = np.sum(force.conj() * response, axis=0)
@@ -163,11 +163,11 @@ def _h2(cross: ComplexArray, force: FloatArray, response: FloatArray) -> Complex
 
 
 def _hv(cross: ComplexArray, force: FloatArray, response: FloatArray) -> ComplexArray:
-    """Total least squares of each response and the force, each scaled to unit power.
+    """Return the total least squares of each response and the force, scaled to unit power.
 
     Scaled so, the matrix of their spectral densities is [[1, c*], [c, 1]] and the vector of its
-    smallest eigenvalue gives a ratio of absolute value 1 and the phase of c: the result does not
-    depend on units, and is the geometric mean of H1 and H2.
+    smallest eigenvalue gives a ratio of absolute value 1 and the phase of c: the result does
+    not depend on units, and is the geometric mean of H1 and H2.
     """
     ratio = np.sqrt(response / np.maximum(force, _TINY))
     return np.asarray(ratio * cross / np.maximum(np.abs(cross), _TINY))
@@ -181,12 +181,12 @@ _ESTIMATORS: dict[str, Callable[[ComplexArray, FloatArray, FloatArray], ComplexA
 
 
 def least_seconds(band_high_hz: float) -> float:
-    """The shortest signal that leaves enough samples for an identification."""
+    """Return the shortest signal that leaves enough samples for an identification."""
     return (LEAST_SAMPLES + 4 * _HALF_LENGTH) / (RATE_OVER_BAND * band_high_hz)
 
 
 def filter_reach(sampling_rate_hz: float, band_high_hz: float) -> tuple[int, int]:
-    """How many samples the filter of `band_limited` reaches to either side, and the thinning."""
+    """Return the reach of the filter of `band_limited` to either side, and the thinning."""
     factor = max(1, int(sampling_rate_hz // (RATE_OVER_BAND * band_high_hz)))
     return (_HALF_LENGTH * factor if factor > 1 else 0), factor
 
@@ -194,10 +194,10 @@ def filter_reach(sampling_rate_hz: float, band_high_hz: float) -> tuple[int, int
 def band_limited(
     signals: FloatArray, sampling_rate_hz: float, band_high_hz: float
 ) -> tuple[FloatArray, float]:
-    """Signals (channels, samples) at the lowest whole fraction of their rate that holds the band.
+    """Return signals (channels, samples) at the lowest whole fraction of their rate with the band.
 
-    Only outputs for which the filter lies wholly inside the signal are kept: there a finite filter
-    turns a sum of exponentials into the same exponentials, so poles come out unchanged.
+    Only outputs for which the filter is completely inside the signal are used: there a finite
+    filter turns a sum of exponentials into the same exponentials, so poles come out unchanged.
     """
     reach, factor = filter_reach(sampling_rate_hz, band_high_hz)
     if factor < 2:

@@ -1,6 +1,4 @@
-"""Finds the hammer hits in a force signal, judges each at the signal's own sampling rate, and says
-which plane each struck.
-"""
+"""Find the hammer hits in a force signal, at its full sampling rate, and the plane of each."""
 
 from __future__ import annotations
 
@@ -68,18 +66,18 @@ class HitRecord:
     @property
     def free(self) -> int:
         """The first sample at which the hanger rings freely and is recorded as it rings."""
-        return max(self.struck, self.clipped_end)
+        return max(self.impact_end, self.clipped_end)
 
     @property
-    def struck(self) -> int:
+    def impact_end(self) -> int:
         """The first sample at which nothing strikes any more."""
         return max(self.pulse.end, self.pulse.second_end)
 
 
 def find_pulses(force: FloatArray, sampling_rate_hz: float) -> list[Pulse]:
-    """The hits in `force` (samples,), NaN where bad; empty where none stands out of the noise.
+    """Find the hits in `force` (samples,), NaN where bad; empty where none exceeds the noise.
 
-    A hit stands 10 standard deviations of the noise and a tenth of the hardest hit above a slow
+    A hit is 10 standard deviations of the noise and a tenth of the hardest hit above a slow
     baseline, in the direction of the largest excursion: a hammer only pushes.
     """
     if np.sum(np.isfinite(force)) < _BASELINE_SAMPLES:
@@ -105,7 +103,7 @@ def find_pulses(force: FloatArray, sampling_rate_hz: float) -> list[Pulse]:
 
 
 def _push(force: FloatArray, sampling_rate_hz: float) -> tuple[FloatArray, float]:
-    """Force over its slow baseline, hits positive, 0 where it is NaN; and the noise in it."""
+    """Return force over its slow baseline, hits positive, 0 where NaN; and the noise in it."""
     good = np.isfinite(force)
     filled = np.where(good, force, np.median(force[good]))
     above = filled - _baseline(filled, sampling_rate_hz)
@@ -116,7 +114,7 @@ def _push(force: FloatArray, sampling_rate_hz: float) -> tuple[FloatArray, float
 
 
 def _baseline(signal: FloatArray, sampling_rate_hz: float) -> FloatArray:
-    """Medians of blocks joined by straight lines: follows drift, not hits."""
+    """Return medians of blocks joined by straight lines: follows drift, not hits."""
     block = max(_BASELINE_SAMPLES, int(_BASELINE_SECONDS * sampling_rate_hz))
     blocks = max(2, len(signal) // block)
     parts = np.array_split(signal, blocks)
@@ -138,7 +136,7 @@ def _grouped(peaks: list[int], distance: int) -> list[list[int]]:
 
 
 def _start(push: FloatArray, peak: int, noise: float) -> int:
-    """The first sample of the rise to `peak`."""
+    """Return the first sample of the rise to `peak`."""
     quiet = np.flatnonzero(push[:peak] < _quiet(push[peak], noise))
     return int(quiet[-1]) + 1 if len(quiet) else 0
 
@@ -156,7 +154,7 @@ def _pulse(
     falls = np.flatnonzero(push[first:stop] < _quiet(push[first], noise))
     end = first + int(falls[0]) if len(falls) else stop
     hardest = max(_between_samples(push, peak) for peak in peaks)
-    again = first + _struck_again(push[first:stop], end - first, noise, rate)
+    again = first + _second_impacts(push[first:stop], end - first, noise, rate)
     apart = again[again > peaks[-1] + int(GROUP_SECONDS * rate)]
     if len(apart):  # too weak for a hit, and no second blow of this one
         stop = int(apart[0]) - int(PULSE_SECONDS * rate) - RINGING_SAMPLES
@@ -168,7 +166,7 @@ def _pulse(
 
 
 def _between_samples(push: FloatArray, peak: int) -> float:
-    """The peak of a band-limited pulse, which as a rule lies between samples."""
+    """Return the peak of a band-limited pulse, interpolated between samples."""
     first = max(0, peak - _REACH)
     part = push[first : peak + _REACH + 1]
     nodes = np.arange(len(part))
@@ -181,12 +179,14 @@ def _same_pulse(sampling_rate_hz: float) -> int:
     return max(int(PULSE_SECONDS * sampling_rate_hz), RINGING_SAMPLES)
 
 
-def _struck_again(after: FloatArray, fall: int, noise: float, sampling_rate_hz: float) -> IntArray:
-    """The samples of `after`, which begins with the first peak, at which something strikes again.
+def _second_impacts(
+    after: FloatArray, fall: int, noise: float, sampling_rate_hz: float
+) -> IntArray:
+    """Return the samples of `after`, from the first peak on, at which another impact begins.
 
-    Up to 6 ms after the peak, and until it has fallen after `fall` samples (a soft tip's pulse is
-    long), it is the same pulse; then 2 % of the peak and 8 sigma count, and more near the pulse,
-    where the ringing of an anti-aliasing filter is still above 2 %.
+    Up to 6 ms after the peak, and until it has fallen after `fall` samples (a soft tip's pulse
+    is long), it is the same pulse; then 2 % of the peak and 8 sigma count, and more close to
+    the pulse, where the ringing of an anti-aliasing filter is still above 2 %.
     """
     skip = max(1, fall, int(np.ceil(PULSE_SECONDS * sampling_rate_hz)))
     ringing = RINGING / np.arange(skip, len(after))
@@ -199,14 +199,14 @@ _CLEARLY = 4.0
 _FEWEST = 2  # of a plane: one alone may have struck the wrong way
 
 
-def struck_planes(power: FloatArray, planes: Sequence[Plane | None]) -> dict[Plane, list[int]]:
-    """The hits of each plane by the motion after them; empty unless both were struck on purpose.
+def hits_by_plane(power: FloatArray, planes: Sequence[Plane | None]) -> dict[Plane, list[int]]:
+    """Return the hits of each plane by the motion after them; empty unless both were hit.
 
     `power` (hits, channels) is that of the channels of `planes`.
     """
     if not len(power) or {*PLANES} - {*planes}:
         return {}
-    share = {plane: power[:, [own == plane for own in planes]].mean(axis=1) for plane in PLANES}
+    share = {plane: power[:, [each == plane for each in planes]].mean(axis=1) for plane in PLANES}
     one, other = PLANES
     above = share[one] > _CLEARLY * share[other]
     below = share[other] > _CLEARLY * share[one]

@@ -1,4 +1,4 @@
-"""What no ring-down can do: jumps, bursts and gaps that its past does not foretell.
+"""Detect jumps, bursts and gaps in ring-downs by linear prediction.
 
 A ring-down is a sum of decaying sines, so each sample follows from the ones before it by one linear
 rule (Prony). What does not follow came in on the way from the sensor to the file.
@@ -32,7 +32,7 @@ _RIDGE = 1e-9  # judgement: 90 dB below the signal, beneath the noise of recordi
 
 
 def thinned(signals: FloatArray, sampling_rate_hz: float, wanted_rate_hz: float) -> FloatArray:
-    """Means of neighbouring samples, (channels, fewer samples), at no less than the wanted rate.
+    """Return means of neighbouring samples, (channels, fewer samples), at the wanted rate or more.
 
     What folds back stays a sum of decaying sines, which is all that counts here.
     """
@@ -43,11 +43,11 @@ def thinned(signals: FloatArray, sampling_rate_hz: float, wanted_rate_hz: float)
 
 
 def surprise(ring_downs: Sequence[FloatArray]) -> FloatArray:
-    """How far one channel's ring-downs, each (samples,), leave their rule at worst, (hits,).
+    """Return the largest prediction error of one channel's ring-downs, each (samples,): (hits,).
 
-    Largest error of the prediction in a block of 16 samples over the median of those of the blocks
-    around it, or of those before it: what comes back slowly disturbs the blocks after it for long.
-    NaN for a ring-down too short to tell.
+    Largest error of the prediction in a block of 16 samples over the median of those of the
+    blocks around it, or of those before it: what comes back slowly disturbs the blocks after it
+    for long. NaN for a ring-down too short to tell.
     """
     long_enough = [part for part in ring_downs if len(part) >= 2 * _ORDER]
     if not long_enough:
@@ -57,8 +57,10 @@ def surprise(ring_downs: Sequence[FloatArray]) -> FloatArray:
 
 
 def is_cut_short(ring: FloatArray) -> bool:
-    """Whether all channels, (channels, samples), go on after a jump as they would some samples
-    later: samples are lost. After a knock they do not."""
+    """Return whether samples are lost at a jump of all channels, (channels, samples).
+
+    After it they continue as they would some samples later. After a knock they do not.
+    """
     rules = [prediction_rule([row]) for row in ring]
     errors = [
         np.abs(np.convolve(row, rule, mode="valid")) for row, rule in zip(ring, rules, strict=True)
@@ -77,18 +79,20 @@ def is_cut_short(ring: FloatArray) -> bool:
 
 
 def knocked_at(ring_downs: Sequence[FloatArray], number: int, limit: float) -> int:
-    """The sample before which nothing in the ring-down of that number is a surprise above `limit`;
-    each is (channels, samples)."""
+    """Return the sample before which no surprise in ring-down `number` is above `limit`.
+
+    Each ring-down is (channels, samples).
+    """
     blocks = []
     for row, part in enumerate(ring_downs[number]):
         every = [ring[row] for ring in ring_downs if ring.shape[1] >= 2 * _ORDER]
-        error = _beside_usual(part, prediction_rule(every))
+        error = _relative_error(part, prediction_rule(every))
         blocks.append(int(np.argmax(error > limit)))
     return max(0, int(np.median(blocks)) - 1) * _BLOCK + _ORDER
 
 
 def prediction_rule(parts: Sequence[FloatArray]) -> FloatArray:
-    """Coefficients (1 + order,) that annihilate the parts, by least squares over all of them."""
+    """Return coefficients (1 + order,) that annihilate the parts, by least squares over all."""
     rows = np.vstack([sliding_window_view(part[:_FIT_SAMPLES], _ORDER + 1) for part in parts])
     rows = rows[np.isfinite(rows).all(axis=1)]  # lost samples of a hit leave the rule to the others
     past, now = rows[:, :-1], rows[:, -1]
@@ -103,11 +107,11 @@ def prediction_rule(parts: Sequence[FloatArray]) -> FloatArray:
 def _worst(part: FloatArray, rule: FloatArray) -> float:
     if len(part) < 2 * _ORDER:
         return float("nan")
-    return float(np.max(_beside_usual(part, rule)))
+    return float(np.max(_relative_error(part, rule)))
 
 
-def _beside_usual(part: FloatArray, rule: FloatArray) -> FloatArray:
-    """The largest error of each block of the prediction over what is usual about it, (blocks,)."""
+def _relative_error(part: FloatArray, rule: FloatArray) -> FloatArray:
+    """Return the largest prediction error of each block over its usual size, (blocks,)."""
     error = np.abs(np.convolve(part, rule, mode="valid"))
     peaks = error[: len(error) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).max(axis=1)
     width = min(_AROUND, len(peaks))

@@ -31,12 +31,12 @@ Place: TypeAlias = tuple[Plane | None, float | None, str]
 
 
 def point_of(channel: Channel) -> ResponsePoint:
-    """Where a channel's sensor sits, or its hammer hits."""
+    """Return the point where a channel's sensor is mounted, or its hammer hits."""
     return ResponsePoint(channel.name, channel.plane, channel.x_m)
 
 
 def place_of(point: ResponsePoint) -> Place:
-    """What makes the point the same in several set-ups."""
+    """Return what identifies a point in several set-ups."""
     if math.isnan(point.x_m):
         return point.plane, None, point.name
     return point.plane, point.x_m, ""
@@ -53,7 +53,7 @@ _USED_SHARE = 0.8
 def measurement_of_responses(
     responses: Sequence[FrequencyResponse], options: IdentifyOptions
 ) -> Measurement:
-    """The measurement in the frequency responses of one test.
+    """Return the measurement in the frequency responses of one test.
 
     Raises BadInput where their lines differ, NotIdentifiable where no point is left to use.
     """
@@ -93,7 +93,7 @@ def _refuse_different(first: FrequencyResponse, second: FrequencyResponse) -> No
 def _merged(
     responses: Sequence[FrequencyResponse], options: IdentifyOptions
 ) -> tuple[FrequencyResponse, tuple[Dropped, ...]]:
-    """All points with finite lines in the band as one response; and those without."""
+    """Merge all points with finite lines in the band into one response; also return the others."""
     first = responses[0]
     lines = (first.frequency_hz >= options.band_low_hz) & (
         first.frequency_hz <= options.band_high_hz
@@ -116,7 +116,7 @@ def _merged(
 def _impulse_responses(
     response: FrequencyResponse, options: IdentifyOptions, most_samples: int
 ) -> tuple[FloatArray, float]:
-    """Impulse responses (points, samples) without their first and last part, and their rate."""
+    """Return impulse responses (points, samples) without first and last part, and their rate."""
     rate = 2 * float(response.frequency_hz[-1])
     # Lines outside of the band, such as H1's 0/0 at zero frequency, may be unknown: they count 0.
     known = np.where(np.isfinite(response.accelerance), response.accelerance, 0)
@@ -134,12 +134,12 @@ _LEAST_SAMPLES = 32  # of a block: its level is known to an eighth
 _LEAST_FALL = math.log(3.0)
 """Of the noise over a ring-down: eight times what chance makes of it in such blocks. Of 28 sound
 tests of tests/worlds/recordings.py the accelerometers' fell by 0.4 at most, in the median."""
-_MOST_ASTRAY = 0.4
+_MAX_SCATTER = 0.4
 """Of the logarithm of a block's level, root mean square: three times what chance does."""
 
 
 def recorded_window_rate(measurement: Measurement) -> float:
-    """Its rate of decay in 1/s, the median over the hits; 0 where there is none to be seen."""
+    """Return the window's rate of decay in 1/s, the median over the hits; 0 where none is seen."""
     if not measurement.hits:
         return 0.0
     rate_hz, after = measurement.sampling_rate_hz, int(_AFTER_S * measurement.sampling_rate_hz)
@@ -152,7 +152,7 @@ def recorded_window_rate(measurement: Measurement) -> float:
 
 
 def _rate_of_motion(measurement: Measurement, after: int) -> float:
-    """That by which the noise of all accelerometers falls after all hits."""
+    """Return the rate by which the noise of all accelerometers falls after all hits."""
     rates = []
     for row in range(len(measurement.points)):
         parts = [decay[row] for decay in measurement.decays if decay.shape[1] > _BLOCKS * after]
@@ -160,12 +160,12 @@ def _rate_of_motion(measurement: Measurement, after: int) -> float:
         for part in parts:
             error = np.convolve(part, rule, mode="valid")[after:]
             rates.append(_rate(error, measurement.sampling_rate_hz))
-    own = 1 / measurement.decay_time_constant_s
-    return float(np.median(rates)) - own if rates and min(rates) > own else 0.0
+    of_motion = 1 / measurement.decay_time_constant_s
+    return float(np.median(rates)) - of_motion if rates and min(rates) > of_motion else 0.0
 
 
 def _rate(noise: FloatArray, rate_hz: float) -> float:
-    """The rate by which the level of noise falls; 0 where it does not, or not evenly."""
+    """Return the rate by which the level of noise falls; 0 where it does not, or not evenly."""
     length = len(noise) // _BLOCKS
     if length < _LEAST_SAMPLES:
         return 0.0
@@ -174,6 +174,6 @@ def _rate(noise: FloatArray, rate_hz: float) -> float:
         return 0.0
     middle_s = np.arange(_BLOCKS) * length / rate_hz
     line = np.polynomial.Polynomial.fit(middle_s, np.log(levels), 1)
-    astray = float(np.std(np.log(levels) - line(middle_s)))
+    scatter = float(np.std(np.log(levels) - line(middle_s)))
     fall = float(line(middle_s[0]) - line(middle_s[-1]))
-    return fall / float(middle_s[-1]) if fall > _LEAST_FALL and astray < _MOST_ASTRAY else 0.0
+    return fall / float(middle_s[-1]) if fall > _LEAST_FALL and scatter < _MAX_SCATTER else 0.0

@@ -1,10 +1,10 @@
-"""Which hits and channels of a set-up can be used: nothing bad gets through to an identifier.
+"""Select the usable hits and channels of a set-up.
 
 A fault of one channel after one hit leaves out that hit; after most hits, that channel. A clipped
-force does not: the ring-down is as good as any, the check `clipping` tells what it spoils. Nor does
-an acceleration that is clipped at first: the ring-down begins later. What strikes unseen in a
-ring-down, as a hit between two samples of the force does, and a gap in one channel end it. A double
-hit's begins after the second blow. A hit that disagrees with the others fell at a wrong place or
+force does not: the ring-down is as good as any, the check `clipping` states what it spoils. Nor
+does an acceleration that is clipped at first: the ring-down begins later. An unseen impact in a
+ring-down, as a hit between two samples of the force, and a gap in one channel end it. A double
+hit's begins after the second impact. A hit that disagrees with the others fell at a wrong place or
 direction, or somebody held the hanger.
 """
 
@@ -26,7 +26,7 @@ from shm.identify.measuring.hits import (
     HitRecord,
     Pulse,
     find_pulses,
-    struck_planes,
+    hits_by_plane,
 )
 from shm.identify.measuring.signal_faults import (
     CLIPPED,
@@ -70,8 +70,8 @@ class Screening:
     unlike: float
 
 
-def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screening:
-    """What can be used of records of one set-up; raises NotIdentifiable where nothing can."""
+def screen(records: Sequence[Recording], options: IdentifyOptions) -> Screening:
+    """Select the usable hits and channels of one set-up; raises NotIdentifiable for none."""
     hits, ring_downs = _hits(records, options)
     channels, rate = records[0].accelerations, records[0].sampling_rate_hz
     ends = clipped_ends(channels, ring_downs)
@@ -101,7 +101,7 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
 
 
 def pulses_of(record: Recording, options: IdentifyOptions) -> list[Pulse]:
-    """The hits of a record: by its force where that is recorded, else by the motion after them."""
+    """Return the hits of a record: by its force where that is recorded, else by the motion."""
     rate = record.sampling_rate_hz
     if record.force is not None:
         return find_pulses(record.force.values, rate)
@@ -112,7 +112,7 @@ def pulses_of(record: Recording, options: IdentifyOptions) -> list[Pulse]:
 def _hits(
     records: Sequence[Recording], options: IdentifyOptions
 ) -> tuple[list[Hit], list[HitRecord]]:
-    """Each hit of each record, as a row of the result and with its signals."""
+    """Return each hit of each record, as a row of the result and with its signals."""
     hits, ring_downs = [], []
     for index, record in enumerate(records):
         accelerations = np.array([channel.values for channel in record.accelerations])
@@ -125,7 +125,7 @@ def _hits(
 
 
 def _cut(ring_down: HitRecord, clipped_channels: Sequence[str]) -> str:
-    """Why a used ring-down begins later than its first pulse ends, or ends before the next."""
+    """Return the reason why a used ring-down begins after its pulse or ends before the next hit."""
     if ring_down.cut:
         return ring_down.cut
     if ring_down.clipped_end:
@@ -134,20 +134,20 @@ def _cut(ring_down: HitRecord, clipped_channels: Sequence[str]) -> str:
 
 
 def _with_rows(ring_downs: Sequence[HitRecord], rows: list[int]) -> list[HitRecord]:
-    """The hits with some rows of their accelerations; hits of one record share them as before."""
-    kept = {
+    """Return the hits with some rows of their accelerations; hits of one record share them."""
+    chosen = {
         id(r.accelerations): r.accelerations
         if len(rows) == len(r.accelerations)
         else r.accelerations[rows]
         for r in {id(r.accelerations): r for r in ring_downs}.values()
     }
-    return [replace(r, accelerations=kept[id(r.accelerations)]) for r in ring_downs]
+    return [replace(r, accelerations=chosen[id(r.accelerations)]) for r in ring_downs]
 
 
 def _usable_channels(
     channels: Sequence[Channel], faults: Sequence[Sequence[str]]
 ) -> tuple[list[int], tuple[Dropped, ...]]:
-    """Rows of the accelerations that can be used, and those that cannot with the reason.
+    """Return the rows of usable accelerations, and the dropped ones with the reason.
 
     Where every channel has a fault after most hits, those stay that have one hit without.
     """
@@ -167,7 +167,7 @@ def _usable_channels(
 
 
 def _channel_fault(channel: Channel, faults: Sequence[str], most: float, some_plane: bool) -> str:
-    """Why a channel cannot be used; `faults` one a hit, of which it may have a share of `most`."""
+    """Return why a channel cannot be used; at most a fraction `most` of hits may have `faults`."""
     found = [fault for fault in faults if fault]
     if faults and (len(found) > most * len(faults) or len(found) == len(faults)):
         (fault, count), *_ = Counter(found).most_common(1)
@@ -183,7 +183,7 @@ def _reasons(
     sampling_rate_hz: float,
     options: IdentifyOptions,
 ) -> list[str]:
-    """Why each hit cannot be used; empty where it can."""
+    """Return the reason why each hit cannot be used; empty where it can."""
     least = _least_samples(ring_downs, sampling_rate_hz, options)
     return [_hit_fault(r, f, least) for r, f in zip(ring_downs, faults, strict=True)]
 
@@ -191,7 +191,7 @@ def _reasons(
 def _least_samples(
     ring_downs: Sequence[HitRecord], sampling_rate_hz: float, options: IdentifyOptions
 ) -> float:
-    """Of a ring-down that is no stub."""
+    """Return the shortest useful ring-down in samples."""
     longest = max((r.pulse.stop - r.free for r in ring_downs), default=0)
     return max(
         least_seconds(options.band_high_hz) * sampling_rate_hz, _LEAST_SHARE_OF_LONGEST * longest
@@ -216,7 +216,7 @@ def _with_outliers(
     options: IdentifyOptions,
     planes: Sequence[Plane | None],
 ) -> list[str]:
-    """The reasons, with one for each hit that is sound by itself and disagrees with the others."""
+    """Return the reasons, with one added for each sound hit that disagrees with the others."""
     sound = [index for index, reason in enumerate(reasons) if not reason]
     band_hz = options.band_low_hz, options.band_high_hz
     apart = disagreement([ring_downs[index] for index in sound], sampling_rate_hz, band_hz, planes)
@@ -256,14 +256,14 @@ def disagreement(
     band_hz: tuple[float, float],
     planes: Sequence[Plane | None],
 ) -> FloatArray:
-    """How far each hit's accelerance is from that of the others, (hits,): 0 alike, 1 unlike.
+    """Return the distance of each hit's accelerance from the others', (hits,), from 0 to 1.
 
-    Of hits j and k over all channels and lines: 1 - |h_j . h_k|^2 / (|h_j|^2 |h_k|^2) (the modal
-    assurance criterion, Allemang 1982, of two responses), which a hammer's level and calibration
-    do not move; for each hit the lower median over the others. NaN where there are none, for a hit
-    whose pulse the record's beginning may cut off, that struck twice, was clipped or disturbed, and
-    for one so soon after another that nobody can say what of its ring-down is its own. Where both
-    of the channels' `planes` were struck in turn, the others are those of its plane.
+    Of hits j and k over all channels and lines: 1 - |h_j . h_k|^2 / (|h_j|^2 |h_k|^2) (the
+    modal assurance criterion, Allemang 1982, of two responses), which a hammer's level and
+    calibration do not move; for each hit the lower median over the others. NaN where there are
+    none, for a hit whose pulse the record's beginning may cut off, for double, clipped or
+    disturbed hits, and for one so soon after another that its ring-down cannot be separated.
+    Where both of the channels' `planes` were hit in turn, the others are those of its plane.
     """
     apart = np.full(len(hits), np.nan)
     step = _step([hit for hit in hits if not hit.cut], sampling_rate_hz, band_hz)
@@ -281,16 +281,16 @@ def disagreement(
     flat = responses.reshape(len(known), -1)
     level = np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
     with np.errstate(invalid="ignore"):  # a hit with lost samples is like none: NaN
-        alike = np.abs((flat / level) @ (flat / level).conj().T) ** 2
+        mac = np.abs((flat / level) @ (flat / level).conj().T) ** 2
     power = np.sum(np.abs(responses) ** 2, axis=2)
-    for group in list(struck_planes(power, planes).values()) or [list(range(len(known)))]:
-        ordered = np.sort((1 - alike + 2 * np.eye(len(known)))[np.ix_(group, group)], axis=1)
+    for group in list(hits_by_plane(power, planes).values()) or [list(range(len(known)))]:
+        ordered = np.sort((1 - mac + 2 * np.eye(len(known)))[np.ix_(group, group)], axis=1)
         apart[np.array(known)[group]] = np.maximum(ordered[:, (len(group) - 2) // 2], 0.0)
     return apart
 
 
 def outliers(apart: FloatArray) -> BoolArray:
-    """The hits that disagree while most of the others agree, (hits,)."""
+    """Return the hits that disagree while most of the others agree, (hits,)."""
     judged = apart[np.isfinite(apart)]
     if len(judged) < FEWEST_TO_COMPARE:
         return np.zeros(len(apart), dtype=bool)
@@ -299,7 +299,7 @@ def outliers(apart: FloatArray) -> BoolArray:
 
 
 def _step(hits: Sequence[HitRecord], sampling_rate_hz: float, band_hz: tuple[float, float]) -> int:
-    """Samples from one spectrum of a ring-down to the next: 100 periods of the highest mode."""
+    """Return the samples between two spectra of a ring-down: 100 periods of the highest mode."""
     gap = _gap(sampling_rate_hz)
     room = min((hit.pulse.stop - hit.pulse.start for hit in hits), default=0)
     wanted = int(_PERIODS_OF_BAND / band_hz[1] * sampling_rate_hz)
@@ -311,8 +311,10 @@ def _gap(sampling_rate_hz: float) -> int:
 
 
 def _comes_too_soon(hit: HitRecord, step: int, unseen: HitRecord) -> bool:
-    """Is there another hit in the two spectra that foretell what still rings, or one that the force
-    does not show, which ends the ring-down before?"""
+    """Return whether the two spectra that predict the remaining ringing contain another hit.
+
+    A hit that the force does not show ends the ring-down before, too.
+    """
     if unseen.cut and unseen.force is hit.force and unseen.pulse.start < hit.pulse.start:
         return unseen.pulse.stop > hit.pulse.start - 2 * step
     before = hit.force[
@@ -326,7 +328,7 @@ def _comes_too_soon(hit: HitRecord, step: int, unseen: HitRecord) -> bool:
 def _responses(
     hits: Sequence[HitRecord], sampling_rate_hz: float, band_hz: tuple[float, float], step: int
 ) -> ComplexArray:
-    """Accelerance of each hit alone without what still rang before it, (hits, channels, lines)."""
+    """Return each hit's accelerance without the ringing before it, (hits, channels, lines)."""
     gap = _gap(sampling_rate_hz)
     length = step - gap
     frequency = np.fft.rfftfreq(length, 1 / sampling_rate_hz)
@@ -354,9 +356,10 @@ def _response(hit: HitRecord, gap: int, window: FloatArray) -> ComplexArray:
 
 
 def _carried_on(earlier: ComplexArray, later: ComplexArray) -> ComplexArray:
-    """What two spectra (channels, lines) of one ring-down, a step apart, come to one step on.
+    """Extrapolate two spectra (channels, lines) of one ring-down, a step apart, by one step.
 
-    A single mode turns and shrinks by the same factor each step: z2 / z1, here from three lines.
+    A single mode rotates and shrinks by the same factor each step: z2 / z1, here from three
+    lines.
     """
     cross = _three_lines(later * earlier.conj())
     power = np.maximum(_three_lines(np.abs(earlier) ** 2), np.finfo(float).tiny)
@@ -371,7 +374,7 @@ def _three_lines(values: ComplexArray | FloatArray) -> ComplexArray:
 
 
 def _force_spectrum(hit: HitRecord, gap: int, length: int) -> ComplexArray:
-    """Of the pulse alone, (lines,)."""
+    """Return the spectrum of the pulse alone, (lines,)."""
     pulse = hit.pulse
     begin = max(0, pulse.start - gap)
     force = np.zeros(length)

@@ -31,7 +31,7 @@ from shm.identify.measuring.frf import (
 )
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
 from shm.identify.measuring.responses import measurement_of_responses, point_of
-from shm.identify.measuring.screening import FEWEST_TO_COMPARE, Screening, pulses_of, screened
+from shm.identify.measuring.screening import FEWEST_TO_COMPARE, Screening, pulses_of, screen
 from shm.identify.measuring.signal_faults import HITS_NOT_SHOWN, KNOCK
 from shm.identify.options import IdentifyOptions
 from shm.values import Channel, ComplexArray, FloatArray, FrequencyResponse, Hanger, Recording
@@ -49,13 +49,13 @@ class _SetUp:
     places: tuple[int, ...]
 
 
-def measured(
+def measure_set_ups(
     records: Sequence[Recording | FrequencyResponse], options: IdentifyOptions
 ) -> tuple[Measurement, ...]:
-    """One measurement a set-up; those of hits have frequency responses on the same lines.
+    """Return one measurement a set-up; those of hits have frequency responses on the same lines.
 
-    Raises BadInput where records lack a channel or do not belong together, NotIdentifiable where
-    no set-up can be used.
+    Raises BadInput where records lack a channel or do not belong together, NotIdentifiable
+    where no set-up can be used.
     """
     recordings = [record for record in records if isinstance(record, Recording)]
     responses = [record for record in records if isinstance(record, FrequencyResponse)]
@@ -67,19 +67,19 @@ def measured(
         )
     if responses:
         return (measurement_of_responses(responses, options),)
-    return measured_recordings(recordings, options)
+    return measure_recordings(recordings, options)
 
 
-def measured_recordings(
+def measure_recordings(
     records: Sequence[Recording], options: IdentifyOptions
 ) -> tuple[Measurement, ...]:
-    """One measurement a set-up of time records; see `measured`."""
+    """Return one measurement a set-up of time records; see `measured`."""
     hammered = any(record.force is not None for record in records)
     for record in records:
         _refuse_incomplete(record, hammered, options)
         _refuse_other_rate(records[0], record)
     set_ups = _grouped(records)
-    if not hammered and not all(_struck(record, options) for record in records):
+    if not hammered and not all(_has_hits(record, options) for record in records):
         return tuple(ambient_measurement(set_up.records, options) for set_up in set_ups)
     try:
         if len(set_ups) == 1:
@@ -95,7 +95,7 @@ def measured_recordings(
 def without_unused_force(
     records: Sequence[Recording], measurements: Sequence[Measurement]
 ) -> list[Recording]:
-    """The records as they were measured: without a force that does not show the hits."""
+    """Return the records as they were measured: without a force that does not show the hits."""
     if all(m.frequency_response is not None for m in measurements):
         return list(records)
     return [replace(record, channels=record.accelerations) for record in records]
@@ -104,7 +104,7 @@ def without_unused_force(
 def _misses_hits(
     records: Sequence[Recording], found: Measurement, options: IdentifyOptions
 ) -> bool:
-    """Whether the motion shows more hits than a force that shows few, some in its ring-downs."""
+    """Return whether the motion shows more hits than the force does, some in its ring-downs."""
     few = sum(hit.used for hit in found.hits) < FEWEST_TO_COMPARE
     if not few or all(hit.cut != KNOCK for hit in found.hits):
         return False
@@ -115,30 +115,31 @@ def _misses_hits(
 def _by_motion_alone(
     records: Sequence[Recording], refused: NotIdentifiable, options: IdentifyOptions
 ) -> tuple[Measurement, ...]:
-    """The measurements by the hits that the accelerations show, the force left aside.
+    """Return the measurements by the hits in the accelerations, without the force.
 
-    A logger that samples slowly and without a filter misses a pulse between two samples, and noise
-    hides a weak one; what rings after it is recorded all the same. Raises `refused` where the
-    motion shows no hits either, and where the force is dead: somebody has to look at its cable.
+    A logger that samples slowly and without a filter misses a pulse between two samples, and
+    noise hides a weak one; the ringing after it is recorded all the same. Raises `refused`
+    where the motion shows no hits either, and where the force is dead: its cable must be
+    checked.
     """
     forces = [record.force for record in records if record.force is not None]
     rest = [replace(record, channels=record.accelerations) for record in records]
     alive = all(np.ptp(np.nan_to_num(force.values)) > 0 for force in forces)
     alive = alive and all(record.samples >= LEAST_SAMPLES for record in rest)
-    if not (forces and alive and all(_struck(record, options) for record in rest)):
+    if not (forces and alive and all(_has_hits(record, options) for record in rest)):
         raise refused
-    first, *others = measured_recordings(rest, options)
+    first, *others = measure_recordings(rest, options)
     lost = Dropped(f"channel {forces[0].name}", 1, HITS_NOT_SHOWN)
     return (replace(first, dropped=(lost, *first.dropped)), *others)
 
 
-def _struck(record: Recording, options: IdentifyOptions) -> bool:
-    """Whether somebody struck in it, not just a lorry the joint, once in many minutes."""
+def _has_hits(record: Recording, options: IdentifyOptions) -> bool:
+    """Return whether a record has hammer hits, not only a lorry at the joint in many minutes."""
     return record.duration_s <= _MOST_SECONDS_A_HIT * len(pulses_of(record, options))
 
 
 def _measured_apart(set_ups: Sequence[_SetUp], options: IdentifyOptions) -> tuple[Measurement, ...]:
-    """Several set-ups, seen through the same window."""
+    """Return the measurements of several set-ups, with the same window."""
     usable, lost = _screened(set_ups, options)
     hits = [hit for _, found in usable for hit in found.used]
     rate = set_ups[0].records[0].sampling_rate_hz
@@ -195,7 +196,7 @@ def _grouped(records: Sequence[Recording]) -> list[_SetUp]:
 
 
 def _layout(record: Recording) -> Hashable:
-    """Equal for records of one set-up: sensors by name and place, and the hammer's place."""
+    """Return a key that is equal for records of one set-up: sensors and the hammer's position."""
     sensors = tuple((c.name, *_place(c)) for c in record.accelerations)
     return sensors, _place(record.force) if record.force else None
 
@@ -207,11 +208,11 @@ def _place(channel: Channel) -> tuple[str | None, float | None]:
 def _screened(
     set_ups: Sequence[_SetUp], options: IdentifyOptions
 ) -> tuple[list[tuple[_SetUp, Screening]], tuple[Dropped, ...]]:
-    """The set-ups with something to use; a set-up without is left out if another has."""
+    """Return the set-ups with something to use; a set-up without is left out if another has."""
     usable, failures = [], []
     for set_up in set_ups:
         try:
-            usable.append((set_up, screened(set_up.records, options)))
+            usable.append((set_up, screen(set_up.records, options)))
         except NotIdentifiable as failure:
             failures.append(failure)
     if not usable:
@@ -220,7 +221,7 @@ def _screened(
 
 
 def _renumbered(found: Screening, set_up: _SetUp) -> Screening:
-    """`found` with each hit's record counted among all records of the test."""
+    """Return `found` with each hit's record counted among all records of the test."""
     hits: tuple[Hit, ...] = tuple(
         replace(hit, record=set_up.places[hit.record]) for hit in found.hits
     )
@@ -250,7 +251,7 @@ class Cut:
 
 
 def cut(hit: HitRecord, sampling_rate_hz: float, band_high_hz: float) -> Cut:
-    """The hit and its ring-down; force and accelerations pass the same filter.
+    """Return the hit and its ring-down; force and accelerations pass the same filter.
 
     Where the record begins too late, the hanger is taken to have been at rest before.
     """
@@ -265,7 +266,7 @@ def cut(hit: HitRecord, sampling_rate_hz: float, band_high_hz: float) -> Cut:
 
 
 def _centred(hit: HitRecord, begin: int, free: int) -> FloatArray:
-    """Force and accelerations from `begin` to the end of the ring-down, free of their offset."""
+    """Return force and accelerations from `begin` to the end of the ring-down, without offset."""
     first = max(0, begin)
     stop = hit.pulse.stop
     signals = np.zeros((1 + len(hit.accelerations), stop - begin))
@@ -281,11 +282,11 @@ def _centred(hit: HitRecord, begin: int, free: int) -> FloatArray:
 def measurement_of_recordings(
     records: Sequence[Recording], options: IdentifyOptions
 ) -> Measurement:
-    """The measurement in records of one set-up, each with one hit or several.
+    """Return the measurement in records of one set-up, each with one hit or several.
 
     Raises NotIdentifiable where no hit is left to use.
     """
-    found = screened(records, options)
+    found = screen(records, options)
     window = common_window(found.used, records[0].sampling_rate_hz, options.band_high_hz)
     return screened_measurement(records, found, window, options)
 
@@ -293,7 +294,7 @@ def measurement_of_recordings(
 def screened_measurement(
     records: Sequence[Recording], found: Screening, window: Window, options: IdentifyOptions
 ) -> Measurement:
-    """The measurement in records of one set-up, of which `found` says what can be used."""
+    """Return the measurement in the records of one set-up, of which `found` can be used."""
     rate = records[0].sampling_rate_hz
     cuts = [cut(hit, rate, options.band_high_hz) for hit in found.used]
     if records[0].force is None:
@@ -328,7 +329,7 @@ def screened_measurement(
 def _response(
     first: Recording, found: Screening, window: Window, options: IdentifyOptions
 ) -> tuple[FrequencyResponse, ComplexArray]:
-    """The frequency response of a set-up, and the spectra it is an average of."""
+    """Return the frequency response of a set-up, and the spectra it is an average of."""
     average = averaged_response(
         found.used, first.sampling_rate_hz, options.band_high_hz, options.estimator, window
     )
@@ -351,7 +352,7 @@ _ROUNDED = 0.01
 
 
 def fault_of_place(x_m: float, hanger: Hanger) -> str:
-    """Why a place cannot be on a hanger; empty where it can, or is not known."""
+    """Return why a position cannot be on a hanger; empty where it can, or is not known."""
     if x_m < 0 or x_m > (1 + _ROUNDED) * hanger.length_m:
         return (
             f"it is said to be at {x_m:g} m from the deck end, and the hanger is "
@@ -363,7 +364,7 @@ def fault_of_place(x_m: float, hanger: Hanger) -> str:
 def refuse_off_the_hanger(
     records: Sequence[Recording | FrequencyResponse], hanger: Hanger | None
 ) -> None:
-    """Raises BadInput naming the channel that cannot be where it is said to be."""
+    """Raise BadInput naming a channel whose position cannot be on the hanger."""
     if hanger is None or not hanger.as_hanger:
         return
     for record in records:

@@ -62,7 +62,7 @@ def faults_of_channels(
     sampling_rate_hz: float,
     options: IdentifyOptions,
 ) -> list[list[str]]:
-    """What is wrong with each channel after each hit, [hit][channel]; empty where nothing is."""
+    """Return the fault of each channel after each hit, [hit][channel]; empty where none."""
     if not ring_downs:
         return []
     cuts = [r.accelerations[:, r.clipped_end or r.pulse.start : r.pulse.stop] for r in ring_downs]
@@ -83,7 +83,7 @@ def faults_of_channels(
 def _thin(
     ring_downs: Sequence[HitRecord], sampling_rate_hz: float, options: IdentifyOptions
 ) -> tuple[list[FloatArray], int]:
-    """The free motion after each hit, thinned, and every how many samples that is."""
+    """Return the free motion after each hit, thinned, and every how many samples that is."""
     wanted_hz = RATE_OVER_BAND * options.band_high_hz
     rings = [
         r.accelerations[:, r.free + RINGING_SAMPLES : r.pulse.stop - RINGING_SAMPLES]
@@ -101,10 +101,13 @@ def until_disturbed(
     sampling_rate_hz: float,
     options: IdentifyOptions,
 ) -> tuple[list[HitRecord], list[list[str]]]:
-    """Ring-downs that something strikes, or in which a channel drops out that mostly does not, end
-    there, if that leaves `least_samples`; and what is wrong with them then."""
+    """Cut ring-downs at an impact or a drop-out of one channel, and return them and their faults.
+
+    They are cut only if that leaves `least_samples`; a channel that mostly drops out is no
+    reason.
+    """
     free, step = _thin(ring_downs, sampling_rate_hz, options)
-    kept = list(ring_downs)
+    cut_down = list(ring_downs)
     for number, (r, names) in enumerate(zip(ring_downs, faults, strict=True)):
         heard = [name == KNOCK for name in names]
         gaps = [row for row in range(len(names)) if _drops_out(row, number, faults)]
@@ -117,20 +120,20 @@ def until_disturbed(
         else:
             continue
         if stop - r.free >= least_samples:
-            kept[number] = replace(r, pulse=replace(r.pulse, stop=stop), cut=cut)
-    if not any(r.cut for r in kept):
-        return kept, faults
-    return kept, faults_of_channels(channels, kept, sampling_rate_hz, options)
+            cut_down[number] = replace(r, pulse=replace(r.pulse, stop=stop), cut=cut)
+    if not any(r.cut for r in cut_down):
+        return cut_down, faults
+    return cut_down, faults_of_channels(channels, cut_down, sampling_rate_hz, options)
 
 
 def _drops_out(row: int, number: int, faults: Sequence[Sequence[str]]) -> bool:
-    """Whether a channel does after that hit, and after most others has no fault."""
+    """Return whether a channel drops out after that hit, and has no fault after most others."""
     faulty = sum(bool(names[row]) for names in faults)
     return faults[number][row] in (NOT_A_NUMBER, FROZEN) and 2 * faulty <= len(faults)
 
 
 def _gap_in(signal: FloatArray) -> int:
-    """The sample of a signal from which it is missing or stands still; 0 where neither is."""
+    """Return the sample from which a signal is missing or frozen; 0 where neither is."""
     if not np.all(np.isfinite(signal)):
         return int(np.argmin(np.isfinite(signal)))
     return next((first for first, _ in _still_runs(signal)), 0)
@@ -140,13 +143,13 @@ Faults = list[list[str]]
 
 
 def _add(faults: Faults, more: Faults) -> None:
-    """A channel keeps the first fault that is found in it."""
+    """Add faults in place; a channel's first fault takes precedence."""
     for row, new in zip(faults, more, strict=True):
         row[:] = [old or fault for old, fault in zip(row, new, strict=True)]
 
 
 def _plain_faults(cut: FloatArray) -> list[str]:
-    """Of one hit, (channels, samples): what each signal shows by itself."""
+    """Return the faults that each signal of one hit, (channels, samples), shows individually."""
     good = np.isfinite(cut.sum(axis=1))
     moves = np.ptp(cut, axis=1)
     still = frozen(cut)
@@ -161,7 +164,7 @@ def _plain_faults(cut: FloatArray) -> list[str]:
 
 
 def _clipped(channels: Sequence[Channel], cuts: Sequence[FloatArray], known: Faults) -> Faults:
-    """Clipped in the free ring-down; within the pulse it spoils the frequency response alone."""
+    """Return signals clipped in the free ring-down; in the pulse only the response is spoilt."""
     faults = [[""] * len(channels) for _ in cuts]
     for row, channel in enumerate(channels):
         sound = [hit for hit in range(len(cuts)) if not known[hit][row]]
@@ -172,7 +175,7 @@ def _clipped(channels: Sequence[Channel], cuts: Sequence[FloatArray], known: Fau
 
 
 def _copies(cuts: Sequence[FloatArray], known: Faults) -> Faults:
-    """Two sensors never give the same samples; the first of two such channels stays."""
+    """Return channels with the samples of another; the first of two stays without fault."""
     faults = []
     for cut, names in zip(cuts, known, strict=True):
         seen: set[bytes] = set()
@@ -186,7 +189,7 @@ def _copies(cuts: Sequence[FloatArray], known: Faults) -> Faults:
 
 
 def _drift(signals: FloatArray, sampling_rate_hz: float) -> FloatArray:
-    """What warmth and an amplifier's charge add slowly to ring-downs (channels, samples).
+    """Return the slow drift of ring-downs (channels, samples): warmth, an amplifier's charge.
 
     The polynomial of one degree a second, by least squares: of 2 Hz it holds a hundredth of the
     energy, so it is taken off to judge a signal, not to identify it.
@@ -199,7 +202,7 @@ def _drift(signals: FloatArray, sampling_rate_hz: float) -> FloatArray:
 
 
 def _wanders(free: Sequence[FloatArray], known: Faults, rate_hz: float) -> Faults:
-    """Means over half a second move by more than twice the level with which the hanger rings.
+    """Return signals whose means over 0.5 s move by more than twice the level of the ringing.
 
     What drifts slowly is no fault: it is taken off.
     """
@@ -220,8 +223,10 @@ def _wanders(free: Sequence[FloatArray], known: Faults, rate_hz: float) -> Fault
 
 
 def _surprises(free: Sequence[FloatArray], known: Faults, planes: Sequence[Plane | None]) -> Faults:
-    """Jumps, bursts and loose contacts; where more than half the channels have them, or of those of
-    a plane, a knock."""
+    """Return jumps, bursts and loose contacts.
+
+    A knock where more than half the channels have them, or those of a plane.
+    """
     channels = len(free[0])
     found = np.zeros((len(free), channels))
     for row in range(channels):
@@ -229,7 +234,7 @@ def _surprises(free: Sequence[FloatArray], known: Faults, planes: Sequence[Plane
         if sound:
             found[sound, row] = surprise([free[hit][row] for hit in sound])
     wild = found > _SURPRISE
-    groups = [np.array([plane == own for own in planes]) for plane in PLANES]
+    groups = [np.array([plane == each for each in planes]) for plane in PLANES]
     groups = [group for group in (*groups, np.full(channels, True)) if group.sum() > 1]
     knocks = np.full(len(free), False)
     for group in groups:
@@ -241,9 +246,9 @@ def _surprises(free: Sequence[FloatArray], known: Faults, planes: Sequence[Plane
 
 
 def clipped(parts: Sequence[FloatArray], full_scale: float) -> BoolArray:
-    """Which parts of one signal, each (samples,), reach what its logger can record.
+    """Return which parts of one signal, each (samples,), reach the limit of its logger.
 
-    Where nobody says what that is: an extreme value is a limit if three samples have it, and more
+    Where the limit is unknown: an extreme value is a limit if three samples have it, and more
     than the values next to it make likely.
     """
     if np.isfinite(full_scale):
@@ -255,10 +260,10 @@ def clipped(parts: Sequence[FloatArray], full_scale: float) -> BoolArray:
 def clipped_ends(
     channels: Sequence[Channel], ring_downs: Sequence[HitRecord]
 ) -> list[tuple[int, tuple[str, ...]]]:
-    """Of each hit, from which sample on no channel is clipped any more, and which channels were.
+    """Return for each hit the first sample without clipping, and the channels clipped before.
 
-    A clipped signal is not the hanger's motion; what follows is. 0 where nothing is clipped. A
-    channel that is clipped beyond half of a ring-down is no matter of where to begin.
+    A clipped signal is not the hanger's motion; what follows is. 0 where none is clipped. A
+    channel that is clipped beyond half of a ring-down does not count.
     """
     rings = [r.accelerations[:, r.pulse.end : r.pulse.stop] for r in ring_downs]
     ends = [0] * len(rings)
@@ -274,7 +279,7 @@ def clipped_ends(
 
 
 def _last_clipped(part: FloatArray, full_scale: float) -> int:
-    """The first sample after those at the limits of what is recorded."""
+    """Return the first sample after those at the limits of the recording."""
     if np.isfinite(full_scale):
         at_limit = np.abs(part) >= FULL_SCALE_SHARE * full_scale
     else:
@@ -293,10 +298,10 @@ def _flat_topped(parts: Sequence[FloatArray]) -> BoolArray:
 
 
 def _is_crowded(values: FloatArray, repeats: int) -> bool:
-    """Is the largest value met far more often than each of the ten levels below it?
+    """Return whether the largest value is far more frequent than each of the ten levels below.
 
-    The crest of a sine, quantised, has its top level 3 to 4 times as often as those; a clipped one
-    tens of times. A signal of one level is not clipped, it is dead.
+    The crest of a sine, quantised, has its top level 3 to 4 times as often as those; a clipped
+    one tens of times. A signal of one level is not clipped, it is dead.
     """
     highest = np.sort(np.partition(values, -_TOP)[-_TOP:] if len(values) > _TOP else values)
     steps = np.diff(highest)
@@ -310,10 +315,10 @@ def _is_crowded(values: FloatArray, repeats: int) -> bool:
 
 
 def same_peaks(parts: Sequence[FloatArray]) -> BoolArray:
-    """Which parts of one signal, each (samples,), share their largest value to the last bit.
+    """Return which parts of one signal, each (samples,), share their largest value exactly.
 
-    No two hits are alike: what two have in common is the limit of the logger, even where a pulse
-    of few samples reaches it once. False where levels are so coarse that chance does it.
+    No two hits are equal: what two have in common is the limit of the logger, even where a
+    pulse of few samples reaches it once. False where levels are so coarse that chance does it.
     """
     tops = np.array([part.max(initial=-np.inf) for part in parts])
     top = float(tops.max(initial=-np.inf))
@@ -325,22 +330,22 @@ def same_peaks(parts: Sequence[FloatArray]) -> BoolArray:
 
 
 def frozen(signals: FloatArray) -> BoolArray:
-    """Which signals, (channels, samples), stand still for 16 samples while they ought to move."""
+    """Return which signals, (channels, samples), are constant for 16 samples while others move."""
     stride = FROZEN_SAMPLES // 2
     # Sixteen equal samples hold two equal ones that are eight apart: only those are looked into.
     thin = signals[:, ::stride]
     suspects = np.flatnonzero(np.any(thin[:, 1:] == thin[:, :-1], axis=1))
     found = np.zeros(len(signals), dtype=bool)
-    found[suspects] = [_stands_still(signals[row]) for row in suspects]
+    found[suspects] = [_is_constant(signals[row]) for row in suspects]
     return found
 
 
-def _stands_still(signal: FloatArray) -> bool:
+def _is_constant(signal: FloatArray) -> bool:
     return bool(_still_runs(signal))
 
 
 def _still_runs(signal: FloatArray) -> list[tuple[int, int]]:
-    """The first and last samples of those stretches that stand still."""
+    """Return the first and last samples of constant stretches."""
     steps = np.abs(np.diff(signal))
     edges = np.flatnonzero(np.diff(np.concatenate(([0], steps == 0, [0]))))
     runs = [(a, b) for a, b in edges.reshape(-1, 2).tolist() if b - a + 1 >= FROZEN_SAMPLES]

@@ -31,9 +31,9 @@ and more, but for weak ones in the ring-down of a strong one."""
 def find_unforced(
     accelerations: FloatArray, sampling_rate_hz: float, band_hz: float
 ) -> list[Pulse]:
-    """The hits in `accelerations` (channels, samples), of unknown force; empty where none is.
+    """Find the hits in `accelerations` (channels, samples), of unknown force; may be empty.
 
-    Blows within half a second are one hit that is over with its last one.
+    Impacts within half a second are one hit that ends with the last one.
     """
     power, step = _power(accelerations, sampling_rate_hz, band_hz)
     rise = _rises(power, sampling_rate_hz / step)
@@ -67,7 +67,7 @@ def find_unforced(
 def _power(
     accelerations: FloatArray, sampling_rate_hz: float, band_hz: float
 ) -> tuple[FloatArray, int]:
-    """Power of the fast motion over all channels (thinned samples,), each over its usual one."""
+    """Return the relative power of the fast motion over all channels (thinned samples,)."""
     wanted = RATE_OVER_BAND * band_hz
     step = max(1, int(sampling_rate_hz / wanted))
     slow = np.nan_to_num(thinned(accelerations, sampling_rate_hz, wanted))
@@ -81,7 +81,7 @@ def _power(
 
 
 def _rises(power: FloatArray, rate_hz: float) -> FloatArray:
-    """Power of the window after each sample over the largest of the windows before it."""
+    """Return power of the window after each sample over the largest of the windows before it."""
     window = max(2, int(_WINDOW_SECONDS * rate_hz))
     if len(power) < 2 * window:
         return np.zeros(len(power))

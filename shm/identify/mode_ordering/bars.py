@@ -91,11 +91,11 @@ class Description:
 
 def described_bars(hanger: Hanger) -> Bars:
     """Return the bars around a description, in steps of 2 % of tension and 1 % of length."""
-    told = Description.of(hanger)
-    log_xi = told.log_xi + np.arange(-0.6, 0.6, 0.012)
-    unit = told.log_unit + np.linspace(-0.8, 0.8, 65)
+    described = Description.of(hanger)
+    log_xi = described.log_xi + np.arange(-0.6, 0.6, 0.012)
+    unit = described.log_unit + np.linspace(-0.8, 0.8, 65)
     offset = np.broadcast_to(unit, (len(log_xi), len(unit)))
-    prior = told.cost(offset, log_xi[:, np.newaxis])
+    prior = described.cost(offset, log_xi[:, np.newaxis])
     shift = turnbuckle_shift(hanger)
     return Bars(np.exp(log_xi), offset, prior, 0.025, _MISSING_DESCRIBED, shift)
 

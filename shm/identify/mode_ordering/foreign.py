@@ -1,7 +1,7 @@
-"""What rings in a test without being a bending mode of the hanger, and how that is known.
+"""Classify vibrations in a test that are no bending modes of the hanger.
 
 A tone is known by its frequency and by not decaying. Anything else is foreign only if it fits no
-order of the hanger: a string's modes are near multiples of each other, too.
+order of the hanger: a string's modes are close to multiples of each other, too.
 """
 
 from __future__ import annotations
@@ -30,30 +30,30 @@ _NEAR = 0.03  # judgement: words alone depend on it
 def without_tones(
     found: Sequence[FoundMode], tones: Sequence[Tone], *, unordered: bool = False
 ) -> tuple[list[FoundMode], list[ForeignMode]]:
-    """The modes that are none of the `tones`, and those that are.
+    """Return the modes that are none of the `tones`, and those that are.
 
-    A mode is a tone where it lies at one and hardly decays beside the other modes; where no order
-    could tell that it is one (`unordered`), either is enough.
+    A mode is a tone where it is at one and hardly decays compared with the other modes; where
+    no order could tell that it is one (`unordered`), either is enough.
     """
-    rest, aside = [], []
+    rest, foreign = [], []
     for mode in found:
         tone = next((tone for tone in tones if _lies_at(mode, tone)), None)
         steady = _is_steady(mode, found)
         if tone and (steady or unordered):
             decay = " and hardly decays" if steady else ""
             reason = f"It lies at {tone.frequency_hz:.4g} Hz ({tone.name}){decay}."
-            aside.append(ForeignMode("tone", mode.frequency_hz, mode.damping_ratio, reason))
+            foreign.append(ForeignMode("tone", mode.frequency_hz, mode.damping_ratio, reason))
         elif steady and unordered:
-            aside.append(_driven(mode))
+            foreign.append(_driven(mode))
         else:
             rest.append(mode)
-    return rest, aside
+    return rest, foreign
 
 
-def explained(
+def explain_foreign(
     mode: FoundMode, modes: Sequence[FoundMode], hanger_modes: Sequence[FoundMode]
 ) -> ForeignMode:
-    """A mode that fits no order, as what it is; `modes` are all, `hanger_modes` those that do."""
+    """Return a mode without order as foreign; `modes` are all, `hanger_modes` have orders."""
     frequency_hz, damping = mode.frequency_hz, mode.damping_ratio
     if _is_steady(mode, modes):
         return _driven(mode)
@@ -73,8 +73,8 @@ def _driven(mode: FoundMode) -> ForeignMode:
     return ForeignMode("tone", mode.frequency_hz, mode.damping_ratio, reason)
 
 
-def askew_mode(mode: FoundMode, order: int) -> ForeignMode:
-    """A mode of the plane that no sensor measures, of that order."""
+def cross_axis_mode(mode: FoundMode, order: int) -> ForeignMode:
+    """Return a mode of the plane that no sensor measures, of that order."""
     reason = (
         f"It is order {order} of the other plane, which the sensors hear askew, or a neighbour's "
         "motion near it."
@@ -83,7 +83,7 @@ def askew_mode(mode: FoundMode, order: int) -> ForeignMode:
 
 
 def unnumbered_mode(mode: FoundMode, plane: Plane | None, order: int | None) -> ForeignMode:
-    """A mode that may be of that order, or of another; None where none has an order."""
+    """Return a mode that may be of that order, or of another; None if no mode has an order."""
     reason = "The modes fit neither the hanger's description nor any tensioned bar."
     if order:
         reason = f"Its order may be {order}, another fits nearly as well: it is not guessed."
@@ -99,7 +99,7 @@ def unnumbered_mode(mode: FoundMode, plane: Plane | None, order: int | None) -> 
 
 
 def base_of(mode: FoundMode, modes: Sequence[FoundMode]) -> tuple[int, FoundMode] | None:
-    """The stronger mode of like shape of which this is a multiple, and which."""
+    """Return the stronger mode of like shape of which this is a multiple, and which."""
     found = [
         (fold, base)
         for fold, base in product(MULTIPLES, modes)

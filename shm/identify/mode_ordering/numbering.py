@@ -1,11 +1,12 @@
-"""Orders of modes as one likelihood over bars: of each bar a mode takes the nearest order or is
-foreign, the cheapest bar numbers the modes, and the next cheapest that gives a mode another order
-says how sure its number is.
+"""Number modes by one likelihood over bars.
 
-Both planes share the tension and nearly the length, not the springs. Where length and sensor places
-are known, shapes have a say. A hanger that is but a bar in springs is one to a thousandth with its
-own orders and seldom with others: there one least-squares bar decides between orders that the grid
-leaves open, and says where a missing order lies.
+On each bar a mode takes the nearest order or is foreign. The cheapest bar numbers the modes; the
+next cheapest that gives a mode another order tells how sure its number is.
+
+Both planes share the tension and nearly the length, not the springs. Where length and sensor
+positions are known, shapes count. A hanger that is a bar in springs fits to a thousandth with its
+orders and seldom with others: there one least-squares bar decides between orders that the grid
+leaves open, and shows where an order is missing.
 """
 
 from __future__ import annotations
@@ -91,18 +92,18 @@ class Numbering:
         """Return the least margin of a mode with an order; inf where none has one."""
         known = [
             margin
-            for orders, own in zip(self.orders, self.margins, strict=True)
-            for order, margin in zip(orders, own, strict=True)
+            for orders, margins in zip(self.orders, self.margins, strict=True)
+            for order, margin in zip(orders, margins, strict=True)
             if order
         ]
         return min(known, default=np.inf)
 
 
 def number_modes(planes: Sequence[PlaneModes], hanger: Hanger | None) -> Numbering:
-    """Number the modes of one or two planes.
+    """Assign orders to the modes of one or two planes.
 
-    Where too many would be foreign, the description is doubted, then that there is a bar at all:
-    without either, modes are counted.
+    Where too many would be foreign, first the description is dropped, then the bar: without
+    either, modes are counted.
     """
     counts = [len(plane.frequency_hz) for plane in planes]
     if 0 < max(counts) <= HIGHEST_ORDER:
@@ -129,8 +130,8 @@ def _is_believed(planes: Sequence[PlaneModes], found: Numbering, bars: Bars | No
     lowest_hz = float(np.exp(bars.log_factor.min() + bars.offset.min())) if bars else 0.0
     orders = [
         order
-        for plane, own in zip(planes, found.orders, strict=True)
-        for hz, order in zip(plane.frequency_hz, own, strict=True)
+        for plane, of_plane in zip(planes, found.orders, strict=True)
+        for hz, order in zip(plane.frequency_hz, of_plane, strict=True)
         if hz >= lowest_hz
     ]
     most = MOST_FOREIGN if len(planes) > 1 or not bars else _MOST_FOREIGN_ONE_AXIS
@@ -139,8 +140,11 @@ def _is_believed(planes: Sequence[PlaneModes], found: Numbering, bars: Bars | No
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Hold a plane on a grid at the best springs: `total` (tensions, units), `number` from 1, 0 for
-    foreign, and `misfit` of the frequency, (modes, tensions, units)."""
+    """Hold the fit of a plane on a grid of (tensions, units), at the best springs.
+
+    `total` is the cost, `number` the orders from 1, 0 for foreign, and `misfit` the error of
+    the frequency, both (modes, tensions, units).
+    """
 
     total: FloatArray
     number: IntArray
@@ -163,11 +167,11 @@ def _cheapest(planes: Sequence[PlaneModes], bars: Bars, basis: Basis) -> Numberi
     margins = tuple(
         tuple(
             min(
-                float(np.min(cost[(n[p][m] > 0) & (n[p][m] != own)], initial=np.inf))
+                float(np.min(cost[(n[p][m] > 0) & (n[p][m] != order)], initial=np.inf))
                 for cost, n, _ in fits
             )
             - least
-            for m, own in enumerate(numbered)
+            for m, order in enumerate(numbered)
         )
         for p, numbered in enumerate(orders)
     )
@@ -187,9 +191,9 @@ def _fit(plane: PlaneModes, bars: Bars, tolerance: tuple[float, float]) -> _Fit:
     loose = 2 * np.log(tolerance[0] / _TOLERANCES[0][0])
     numbers, costs, misfits = [], [], []
     for mode, hz in enumerate(plane.frequency_hz):
-        beside = (np.log(hz) - bars.offset)[:, :, np.newaxis]
-        near = np.sum(beside[..., np.newaxis] > limits, axis=-1)
-        off = beside - logs[t, s, near]
+        log_ratio = (np.log(hz) - bars.offset)[:, :, np.newaxis]
+        near = np.sum(log_ratio[..., np.newaxis] > limits, axis=-1)
+        off = log_ratio - logs[t, s, near]
         misfit = (off / tolerance[0]) ** 2
         first = (near == 0) & (off > -_FARTHEST_BELOW)
         cost = np.where(first, np.minimum(misfit, _IRREGULAR), misfit) + loose
@@ -307,23 +311,23 @@ class FittedBar:
 
 def fit_bar(planes: Sequence[FloatArray], orders: Orders, hanger: Hanger) -> FittedBar:
     """Fit tension, stiffness and each plane's fixity to frequencies in Hz of given orders."""
-    told = Description.of(hanger)
+    described = Description.of(hanger)
     shift = turnbuckle_shift(hanger)
-    number = np.concatenate([np.array(own, float) for own in orders])
+    number = np.concatenate([np.array(of_plane, float) for of_plane in orders])
     number[number == 0] = np.nan
-    start = np.array([told.log_unit, told.log_xi, *([0.5] * len(planes))])
+    start = np.array([described.log_unit, described.log_xi, *([0.5] * len(planes))])
     if not np.nanmin(number) >= 1 or np.nanmax(number) > HIGHEST_ORDER:
         return FittedBar(orders, np.inf, np.full(number.shape, np.nan), start, shift)
     log_hz = np.log(np.concatenate(planes))
     log_hz = log_hz - np.append(np.nan, shift)[np.nan_to_num(number).astype(int)]
-    plane_of = np.repeat(np.arange(len(planes)), [len(own) for own in orders])
+    plane_of = np.repeat(np.arange(len(planes)), [len(of_plane) for of_plane in orders])
 
     def off(at: FloatArray) -> FloatArray:
         return np.asarray(log_hz - at[0] - log_factor(at[1], at[2:][plane_of], number))
 
     def misfit(at: FloatArray) -> FloatArray:
-        unit = at[0] - told.log_unit
-        string = unit + at[1] - told.log_xi
+        unit = at[0] - described.log_unit
+        string = unit + at[1] - described.log_xi
         rest = off(at) / PLAIN_BAR
         every = np.append(rest[np.isfinite(rest)], [string / TENSION_SD, unit / UNIT_SD])
         return np.asarray(np.sign(every) * np.sqrt(heavy_tailed(every)))
@@ -339,7 +343,7 @@ def decided_by_bar(planes: Sequence[PlaneModes], found: Numbering, hanger: Hange
     Tried are shifts of all orders, as far as they fit better, and of one plane's beside the other.
     Shapes have no say: a sensor's gain or place is one cause for the shapes of all modes.
     """
-    known = sum(order > 0 for own in found.orders for order in own)
+    known = sum(order > 0 for of_plane in found.orders for order in of_plane)
     if known < LEAST_MODES:
         return found
     frequency_hz = [plane.frequency_hz for plane in planes]
@@ -348,16 +352,18 @@ def decided_by_bar(planes: Sequence[PlaneModes], found: Numbering, hanger: Hange
         return found
     tried = list(_shifted_while_better(first, frequency_hz, hanger))
     best = min(tried, key=lambda bar: bar.cost)
-    if all(any(own) for own in found.orders) and len(planes) > 1:
-        beside = ((0, 1), (0, -1))
-        tried += [fit_bar(frequency_hz, _shifted(best.orders, by), hanger) for by in beside]
+    if all(any(of_plane) for of_plane in found.orders) and len(planes) > 1:
+        single_shifts = ((0, 1), (0, -1))
+        tried += [fit_bar(frequency_hz, _shifted(best.orders, by), hanger) for by in single_shifts]
     best, *others = sorted(tried, key=lambda bar: bar.cost)
     if not best.is_plain:
         return found
     margin = min((bar.cost for bar in others), default=np.inf) - best.cost
     sure = np.where(np.abs(best.off) < _MOST_OFF * PLAIN_BAR, margin, 0.0)
-    apart = np.split(sure, np.cumsum([len(own) for own in best.orders])[:-1])
-    return replace(found, orders=best.orders, margins=tuple(tuple(own.tolist()) for own in apart))
+    apart = np.split(sure, np.cumsum([len(of_plane) for of_plane in best.orders])[:-1])
+    return replace(
+        found, orders=best.orders, margins=tuple(tuple(of_plane.tolist()) for of_plane in apart)
+    )
 
 
 def _has_shapes(planes: Sequence[PlaneModes]) -> bool:
@@ -382,6 +388,6 @@ def _shifted_while_better(
 def _shifted(orders: Orders, shifts: Sequence[int]) -> Orders:
     """Return orders higher by `shifts`, one a plane; what comes below 1 makes a bar of no cost."""
     return tuple(
-        tuple(order and (order + by if order + by > 0 else HIGHEST_ORDER + 1) for order in own)
-        for own, by in zip(orders, shifts, strict=False)
+        tuple(order and (order + by if order + by > 0 else HIGHEST_ORDER + 1) for order in of_plane)
+        for of_plane, by in zip(orders, shifts, strict=False)
     )

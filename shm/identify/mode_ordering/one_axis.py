@@ -1,8 +1,8 @@
-"""Which of two modes at one order is the axis' own, where sensors of one axis hear both planes.
+"""Assign two modes at one order to planes, where sensors of one axis measure both planes.
 
-A sensor that is turned by a few degrees, or hears a few percent across, shows the modes of the
-other plane beside those of its own. Which is whose says the strength, as sensors hear their own
-plane better, and with several sensors the shape: each is turned by its own angle, so the other
+A sensor that is rotated by a few degrees, or has a few percent of cross-axis sensitivity, shows the
+modes of the other plane next to those of its plane. The strength decides, as sensors measure their
+plane better, and with several sensors the shape: each is rotated by another angle, so the other
 plane's modes do not have the shape of a bar.
 """
 
@@ -33,32 +33,33 @@ _DECIDED = 6.0
 
 
 @dataclass(frozen=True)
-class Heard:
-    """Orders from 1 (modes,) `own` of the axis' plane and `askew` of the other, 0 for neither;
-    `undecided` counts the orders of which nothing tells which mode is whose: they are in neither.
+class AxisOrders:
+    """Hold orders from 1 (modes,) in the axis' plane and in the other, 0 for neither.
+
+    `undecided` counts the orders with two modes that cannot be assigned: they are in neither.
     """
 
-    own: tuple[int, ...]
-    askew: tuple[int, ...]
+    in_axis: tuple[int, ...]
+    cross_axis: tuple[int, ...]
     undecided: int
 
 
 def tell_planes(
     found: Sequence[FoundMode], orders: Sequence[int], modes: PlaneModes, hanger: Hanger
-) -> Heard:
+) -> AxisOrders:
     """Compare each mode with an order with the nearest one that has none.
 
     Of those without such a neighbour the ones that have no bar's shape are the other plane's, where
     most of the series have one.
     """
-    own, askew = list(orders), [0] * len(orders)
+    in_axis, cross_axis = list(orders), [0] * len(orders)
     pairs = _pairs(found, orders)
     at = {i: order for i, order in enumerate(orders) if order}
     misfit = _shape_misfits(modes, at | {j: orders[i] for i, j in pairs}, hanger)
     if 2 * sum(misfit[i] < _GOOD_SHAPE for i in at) >= len(at):
         for i in at.keys() - {i for i, _ in pairs}:
             if misfit[i] >= _ODD_SHAPE:
-                own[i], askew[i] = 0, at[i]
+                in_axis[i], cross_axis[i] = 0, at[i]
     cost = np.array([
         COST_OF_RATIO * _log_ratio(found[i], found[j]) + misfit[j] - misfit[i] for i, j in pairs
     ])  # fmt: skip
@@ -70,12 +71,12 @@ def tell_planes(
     for (i, j), each in zip(pairs, cost.tolist(), strict=True):
         order = orders[i]
         if abs(each) < _DECIDED:
-            own[i], undecided = 0, undecided + 1
+            in_axis[i], undecided = 0, undecided + 1
         elif each > 0:
-            askew[j] = order
+            cross_axis[j] = order
         else:
-            own[i], own[j], askew[i] = 0, order, order
-    return Heard(tuple(own), tuple(askew), undecided)
+            in_axis[i], in_axis[j], cross_axis[i] = 0, order, order
+    return AxisOrders(tuple(in_axis), tuple(cross_axis), undecided)
 
 
 def _pairs(found: Sequence[FoundMode], orders: Sequence[int]) -> Sequence[tuple[int, int]]:

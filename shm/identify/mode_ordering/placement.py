@@ -16,8 +16,8 @@ import numpy as np
 
 from shm.identify.contract import FoundMode, Tone
 from shm.identify.mode_ordering.foreign import (
-    askew_mode,
-    explained,
+    cross_axis_mode,
+    explain_foreign,
     unnumbered_mode,
     without_tones,
 )
@@ -30,9 +30,9 @@ from shm.identify.mode_ordering.numbering import (
     fit_bar,
     number_modes,
 )
-from shm.identify.mode_ordering.one_axis import COST_OF_RATIO, Heard, tell_planes
+from shm.identify.mode_ordering.one_axis import COST_OF_RATIO, AxisOrders, tell_planes
 from shm.identify.mode_ordering.planes import (
-    blurred,
+    blur,
     moves_in_one_plane,
     pair_note,
     planes_of,
@@ -76,7 +76,7 @@ class Placement:
     """
 
     modes: tuple[Mode, ...]
-    set_aside: tuple[ForeignMode, ...] = ()
+    foreign_modes: tuple[ForeignMode, ...] = ()
     notes: tuple[str, ...] = ()
     check: QualityCheck | None = None
 
@@ -103,7 +103,7 @@ class _Numbered:
 
     ordered: list[_Candidate]
     basis: Basis
-    askew: dict[int, int] = field(default_factory=dict)
+    cross_axis: dict[int, int] = field(default_factory=dict)
     unsure: dict[int, int] = field(default_factory=dict)
     undecided: int = 0
 
@@ -113,7 +113,7 @@ class _Numbered:
         return min((each.margin for each in self.ordered), default=0.0)
 
 
-def placed(
+def place_modes(
     found: Sequence[FoundMode],
     points: Sequence[ResponsePoint],
     hanger: Hanger | None,
@@ -132,17 +132,17 @@ def placed(
         numbered = replace(numbered, ordered=sorted(
             [*numbered.ordered, *more], key=lambda each: (PLANES.index(each.plane), each.order)
         ))  # fmt: skip
-    kept = [each.found for each in numbered.ordered]
-    pairs = [mode for mode in found if sum(each is mode for each in kept) == len(PLANES)]
-    aside = [mode for mode in found if not any(each is mode for each in kept)]
+    ordered = [each.found for each in numbered.ordered]
+    pairs = [mode for mode in found if sum(each is mode for each in ordered) == len(PLANES)]
+    unordered = [mode for mode in found if not any(each is mode for each in ordered)]
     planes = {
         id(mode): plane if moves_in_one_plane(mode, points, turned_rad) else None
         for mode, plane in zip(found, planes_of(found, points, turned_rad), strict=True)
     }
-    foreign = [_foreign(mode, planes[id(mode)], numbered, found, kept) for mode in aside]
+    foreign = [_foreign(mode, planes[id(mode)], numbered, found, ordered) for mode in unordered]
     return Placement(
         modes=tuple(_mode(each, pairs) for each in numbered.ordered),
-        set_aside=_by_frequency([*steady, *foreign]),
+        foreign_modes=_by_frequency([*steady, *foreign]),
         notes=tuple(_notes(numbered, hanger, points, turned_rad, pairs)),
         check=_check(numbered, known, found, points),
     )
@@ -167,24 +167,24 @@ def _number(
     weight = COST_OF_RATIO if one_axis else 1.0
     inputs = [_plane_modes(group, points, known, weight) for group in groups]
     numbering = number_modes(inputs, known)
-    orders, heard = numbering.orders, None
+    orders, axis_orders = numbering.orders, None
     if known and one_axis and numbering.basis != "counting":
-        heard = tell_planes([each.found for each in groups[0]], orders[0], inputs[0], known)
-        orders = (heard.own,)
+        axis_orders = tell_planes([each.found for each in groups[0]], orders[0], inputs[0], known)
+        orders = (axis_orders.in_axis,)
     every = [
         replace(each, order=order, irregular=irregular and order == 1, margin=margin)
-        for group, own, irregular, margins in zip(
+        for group, plane_orders, irregular, margins in zip(
             groups, orders, numbering.irregular, numbering.margins, strict=True
         )
-        for each, order, margin in zip(group, own, margins, strict=True)
+        for each, order, margin in zip(group, plane_orders, margins, strict=True)
     ]
-    return _sure(every, numbering.basis, heard, groups[0], described=known is not None)
+    return _sure(every, numbering.basis, axis_orders, groups[0], described=known is not None)
 
 
 def _sure(
     every: Sequence[_Candidate],
     basis: Basis,
-    heard: Heard | None,
+    axis_orders: AxisOrders | None,
     group: Sequence[_Candidate],
     *,
     described: bool,
@@ -195,12 +195,12 @@ def _sure(
     ordered = [each for each in every if each.order]
     few = basis == "pattern" and len(ordered) < _LEAST_BY_PATTERN
     least = np.inf if few else LEAST_MARGIN
-    kept = [each for each in ordered if not described or each.margin >= least]
+    accepted = [each for each in ordered if not described or each.margin >= least]
     unsure = {id(c.found): c.order for c in ordered if described and c.margin < least}
-    if heard is None:
-        return _Numbered(kept, basis, unsure=unsure)
-    askew = {id(c.found): n for c, n in zip(group, heard.askew, strict=True) if n}
-    return _Numbered(kept, basis, askew, unsure, heard.undecided)
+    if axis_orders is None:
+        return _Numbered(accepted, basis, unsure=unsure)
+    cross_axis = {id(c.found): n for c, n in zip(group, axis_orders.cross_axis, strict=True) if n}
+    return _Numbered(accepted, basis, cross_axis, unsure, axis_orders.undecided)
 
 
 def _plane_modes(
@@ -239,10 +239,10 @@ def _in_gaps(
         return []
     groups = [[each for each in sure if each.plane == plane] for plane in planes]
     highest = max(each.order for each in sure)
-    orders = tuple(tuple(each.order for each in own) for own in groups)
-    if all(len(own) == highest for own in orders):
+    orders = tuple(tuple(each.order for each in group) for group in groups)
+    if all(len(group) == highest for group in orders):
         return []
-    frequency_hz = [np.array([each.found.frequency_hz for each in own]) for own in groups]
+    frequency_hz = [np.array([each.found.frequency_hz for each in group]) for group in groups]
     bar = fit_bar(frequency_hz, orders, hanger)
     gaps = {
         (plane, order): hz
@@ -280,21 +280,21 @@ def _foreign(
     plane: Plane | None,
     numbered: _Numbered,
     found: Sequence[FoundMode],
-    kept: Sequence[FoundMode],
+    hanger_modes: Sequence[FoundMode],
 ) -> ForeignMode:
     """Return a mode without an order, as what it is."""
-    if order := numbered.askew.get(id(mode)):
-        return askew_mode(mode, order)
+    if order := numbered.cross_axis.get(id(mode)):
+        return cross_axis_mode(mode, order)
     order = numbered.unsure.get(id(mode))
-    if order or not kept:
+    if order or not hanger_modes:
         return unnumbered_mode(mode, plane, order)
-    return explained(mode, found, kept)
+    return explain_foreign(mode, found, hanger_modes)
 
 
 def _mode(candidate: _Candidate, pairs: Sequence[FoundMode]) -> Mode:
     found = candidate.found
     if any(found is pair for pair in pairs):
-        found = blurred(found)
+        found = blur(found)
     return Mode(
         plane=candidate.plane,
         order=candidate.order,
@@ -351,7 +351,7 @@ def _of_no_planes(numbered: _Numbered) -> QualityCheck:
 
 
 def _of_no_order(numbered: _Numbered) -> QualityCheck:
-    """That modes are known and their orders are not."""
+    """Return the check for modes that are known while their orders are not."""
     found = "the modes fit neither the hanger's description nor any tensioned bar"
     if numbered.unsure:
         found = f"the lowest may be order {min(numbered.unsure.values())}, or another"
@@ -364,7 +364,7 @@ def _of_no_order(numbered: _Numbered) -> QualityCheck:
 
 
 def _doubt_of_numbers(numbered: _Numbered, known: Hanger | None) -> tuple[str, str]:
-    """What is not known of the numbers, and the remedy; empty where nothing is."""
+    """Return what is uncertain about the numbers, and the remedy; empty where nothing is."""
     if numbered.basis == "counting":
         return "the modes fit no tensioned beam: they are counted", "Describe the hanger."
     if known and numbered.basis == "pattern":
@@ -388,7 +388,7 @@ def _doubt_of_numbers(numbered: _Numbered, known: Hanger | None) -> tuple[str, s
             "which mode is whose",
             "Measure with a biaxial accelerometer.",
         )
-    if numbered.askew:
+    if numbered.cross_axis:
         return (
             "both planes show on one axis: the series that it shows better is taken for its own",
             "Measure with a biaxial accelerometer.",

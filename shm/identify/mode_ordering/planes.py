@@ -1,5 +1,7 @@
-"""Which plane a mode vibrates in, by its shape; what stands for one of each plane; and whether
-sensors at several places see each mode move in one direction, as a bar does.
+"""Determine the plane in which a mode vibrates, by its shape.
+
+Also: unresolved pairs of both planes, and whether sensors at several positions see each mode move
+in one direction, as a bar does.
 """
 
 from __future__ import annotations
@@ -29,11 +31,11 @@ _LEAST_IN_A_PLANE = 0.25
 def planes_of(
     modes: Sequence[FoundMode], points: Sequence[ResponsePoint], turned_rad: float = 0.0
 ) -> list[Plane]:
-    """The plane of each of `modes` (by rising frequency).
+    """Return the plane of each of `modes` (by rising frequency).
 
-    The plane with more energy a channel, on axes that are turned from the sensors' by `turned_rad`;
-    of two close modes in one plane, the one with more energy in the other plane goes there, if that
-    plane has no mode near. All are transverse where no plane is stated.
+    The plane with more energy a channel, on axes that are turned from the sensors' by
+    `turned_rad`; of two close modes in one plane, the one with more energy in the other plane
+    goes there, if that plane has no mode near. All are transverse where no plane is stated.
     """
     known = [plane for plane in PLANES if any(point.plane == plane for point in points)]
     if len(known) < 2:
@@ -49,7 +51,7 @@ def planes_of(
 def transverse_share(
     shape: FloatArray, points: Sequence[ResponsePoint], turned_rad: float = 0.0
 ) -> float:
-    """Share of the energy a channel along the transverse axis, turned towards longitudinal."""
+    """Return the energy share of a channel along the transverse axis, rotated to longitudinal."""
     transverse, longitudinal, product = _energies(shape, points)
     cosine, sine = math.cos(turned_rad), math.sin(turned_rad)
     turned = cosine**2 * transverse + 2 * cosine * sine * product + sine**2 * longitudinal
@@ -57,10 +59,10 @@ def transverse_share(
 
 
 def principal_angle(modes: Sequence[FoundMode], points: Sequence[ResponsePoint]) -> float:
-    """How far the hanger's planes are turned from the sensors' axes, in radians up to pi/4.
+    """Return the angle between the hanger's planes and the sensors' axes, in radians up to pi/4.
 
     0 where sensors are not biaxial, and where the modes do not agree on two directions at right
-    angles, some in either: then each mode's own energies must do.
+    angles, some in either: then each mode's energies must do.
     """
     if set(PLANES) - {point.plane for point in points} or len(modes) < _LEAST_MODES:
         return 0.0
@@ -76,9 +78,9 @@ def principal_angle(modes: Sequence[FoundMode], points: Sequence[ResponsePoint])
 
 
 def _energies(shape: FloatArray, points: Sequence[ResponsePoint]) -> tuple[float, float, float]:
-    """Mean squares in either plane, and the mean product of the two.
+    """Return mean squares in either plane, and the mean product of the two.
 
-    The product is 0 where the planes are not measured at the same places.
+    The product is 0 where the planes are not measured at the same positions.
     """
     one, two = (
         [(p.x_m, v) for p, v in zip(points, shape, strict=True) if p.plane == plane]
@@ -92,7 +94,7 @@ def _energies(shape: FloatArray, points: Sequence[ResponsePoint]) -> tuple[float
 
 
 def _separate(first: int, planes: list[Plane], shares: FloatArray, frequencies: FloatArray) -> None:
-    """Moves one of the modes `first` and `first + 1` to the other plane where they must differ."""
+    """Move one of the modes `first` and `first + 1` to the other plane where they must differ."""
     pair = [first, first + 1]
     if planes[first] != planes[first + 1] or not is_close(
         frequencies[pair[0]], frequencies[pair[1]]
@@ -110,17 +112,18 @@ def _separate(first: int, planes: list[Plane], shares: FloatArray, frequencies: 
 
 
 def is_close(one: float, other: float) -> bool:
-    """Whether two frequencies are too near to be neighbours in one plane."""
+    """Return whether two frequencies are too close to be neighbours in one plane."""
     return bool(abs(one / other - 1) < CLOSE)
 
 
 def shape_points(
     mode: FoundMode, plane: Plane, points: Sequence[ResponsePoint]
 ) -> tuple[ShapePoint, ...]:
-    """The mode's shape by position: value in its plane, cross in the other, largest value 1.
+    """Return the mode's shape by position: value in its plane, cross in the other, largest value 1.
 
     The standard deviation is the larger of both: where a shape may be turned, that of `cross`.
-    Channels without a position are left out; those at one position and in one plane are averaged.
+    Channels without a position are left out; those at one position and in one plane are
+    averaged.
     """
     largest = mode.shape[_largest(mode, plane, points)]
     positions = sorted({point.x_m for point in points if np.isfinite(point.x_m)})
@@ -128,7 +131,7 @@ def shape_points(
 
 
 def sd_in_plane(mode: FoundMode, plane: Plane, points: Sequence[ResponsePoint]) -> float:
-    """The largest standard deviation of the shape's values in a plane, the largest value 1.
+    """Return the largest standard deviation of the shape's values in a plane, the largest value 1.
 
     0 where it is not known. What may turn a shape hardly changes them.
     """
@@ -173,20 +176,21 @@ def with_both_planes(
     points: Sequence[ResponsePoint],
     turned_rad: float = 0.0,
 ) -> tuple[list[FoundMode], list[Plane]]:
-    """`modes` and their `planes` with each mode that may be an unresolved pair in either plane.
+    """Return `modes` and `planes` with each possible unresolved pair in either plane.
 
-    Two modes much nearer than their half-power bandwidth may ring down as one, in the direction of
-    the hammer. A mode with a near neighbour is no such pair. `turned_rad`: see `transverse_share`.
+    Two modes much closer than their half-power bandwidth may ring down as one, in the direction
+    of the hammer. A mode with a close neighbour is no such pair. `turned_rad`: see
+    `transverse_share`.
     """
     both: list[tuple[FoundMode, Plane]] = []
     single = bool(set(PLANES) - {point.plane for point in points})
     for mode, plane in zip(modes, planes, strict=True):
-        twice = not single and _stands_for_both(mode, modes, points, turned_rad)
+        twice = not single and _is_unresolved_pair(mode, modes, points, turned_rad)
         both += [(mode, each) for each in PLANES] if twice else [(mode, plane)]
     return [mode for mode, _ in both], [plane for _, plane in both]
 
 
-def _stands_for_both(
+def _is_unresolved_pair(
     mode: FoundMode, modes: Sequence[FoundMode], points: Sequence[ResponsePoint], turned_rad: float
 ) -> bool:
     share = transverse_share(mode.shape, points, turned_rad)
@@ -197,17 +201,18 @@ def _stands_for_both(
 
 
 def moves_in_one_plane(mode: FoundMode, points: Sequence[ResponsePoint], turned_rad: float) -> bool:
-    """Whether it is seen to: on one axis the other plane's modes are heard, too."""
+    """Return whether it is seen to: on one axis the other plane's modes are heard, too."""
     if set(PLANES) - {point.plane for point in points}:
         return False
     share = transverse_share(mode.shape, points, turned_rad)
     return not SHARE_OF_BOTH <= share <= 1 - SHARE_OF_BOTH
 
 
-def blurred(mode: FoundMode) -> FoundMode:
-    """An unresolved pair's mode: either of the two has its frequency to a tenth of the bandwidth.
+def blur(mode: FoundMode) -> FoundMode:
+    """Return an unresolved pair's mode with a tenth of the bandwidth added to its uncertainty.
 
-    That part of twice damping ratio times frequency is added to the standard deviation.
+    The bandwidth is twice damping ratio times frequency; either of the two has its frequency
+    within it.
     """
     bandwidth = 2 * mode.damping_ratio * mode.frequency_hz
     sd = float(np.hypot(np.nan_to_num(mode.frequency_sd_hz), BLUR * bandwidth))
@@ -215,7 +220,7 @@ def blurred(mode: FoundMode) -> FoundMode:
 
 
 def pair_note(mode: FoundMode) -> str:
-    """What a reader should know of an unresolved pair."""
+    """Return the note on an unresolved pair for the reader."""
     return (
         f"the mode at {mode.frequency_hz:.2f} Hz moves in both planes: it stands for one of each, "
         "uncertain by a tenth of its bandwidth"
@@ -231,7 +236,7 @@ _MODES_SEEN = 3  # a median that one mode cannot make
 
 
 def directions(modes: Sequence[FoundMode], points: Sequence[ResponsePoint]) -> QualityCheck | None:
-    """Compares places pair by pair; None where fewer than two have axes in both planes."""
+    """Compare places pair by pair; None where fewer than two have axes in both planes."""
     biaxial = _biaxial(points)
     if len(biaxial) < 2:
         return None
@@ -255,7 +260,7 @@ def directions(modes: Sequence[FoundMode], points: Sequence[ResponsePoint]) -> Q
 
 
 def _biaxial(points: Sequence[ResponsePoint]) -> dict[float, tuple[int, int]]:
-    """Of each place that is measured in both planes, where in a shape its two components are."""
+    """Return by position in both planes the indices of its two components in a shape."""
     found = [
         {p.x_m: row for row, p in enumerate(points) if p.plane == plane and not math.isnan(p.x_m)}
         for plane in PLANES
@@ -264,7 +269,7 @@ def _biaxial(points: Sequence[ResponsePoint]) -> dict[float, tuple[int, int]]:
 
 
 def _apart(modes: Sequence[FoundMode], one: tuple[int, int], other: tuple[int, int]) -> float:
-    """Degrees, 0 to 90, between the directions at two places; the median of modes seen at both."""
+    """Return the degrees, 0 to 90, between directions at two positions; the median over modes."""
     found = []
     for mode in modes:
         here, there = mode.shape[list(one)], mode.shape[list(other)]

@@ -1,4 +1,4 @@
-"""What can be wrong with a test, each as a figure beside its limit and what to do about it.
+"""Check the quality of a test: each check is a figure, its limit and what to do about it.
 
 A check is a row of a table: a statistic, its limit, and three sentences.
 """

@@ -1,4 +1,4 @@
-"""What a quality check looks at, and how hits and channels are counted and told to the crew."""
+"""Hold the data that a quality check evaluates, and describe hits and channels to the crew."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from shm.identify.options import IdentifyOptions
 from shm.values import Recording
 from shm.values.rounding import listed
 
-_MOST_TOLD = 4  # technical: of a sentence that can be read
+_MAX_NAMED = 4  # technical: of a sentence that can be read
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,17 +31,17 @@ class Inspection:
 
 
 def hits_of(inspection: Inspection) -> list[Hit]:
-    """All hits of all set-ups, used or not."""
+    """Return all hits of all set-ups, used or not."""
     return [hit for measurement in inspection.measurements for hit in measurement.hits]
 
 
 def hits_for(inspection: Inspection, reasons: Sequence[str]) -> list[Hit]:
-    """The hits that were left out for one of the reasons."""
+    """Return the hits that were left out for one of the reasons."""
     return [hit for hit in hits_of(inspection) if hit.reason.startswith(tuple(reasons))]
 
 
 def channels_for(inspection: Inspection, reasons: Sequence[str]) -> list[str]:
-    """The channels that were left out for one of the reasons, as `channel acc_3`."""
+    """Return the channels that were left out for one of the reasons, as `channel acc_3`."""
     dropped = [d for measurement in inspection.measurements for d in measurement.dropped]
     return sorted(
         {d.what for d in dropped if "channel" in d.what and d.reason.startswith(tuple(reasons))}
@@ -49,14 +49,14 @@ def channels_for(inspection: Inspection, reasons: Sequence[str]) -> list[str]:
 
 
 def places(inspection: Inspection, hits: Sequence[Hit]) -> str:
-    """Such as `the hits at 12.3 s and 45.1 s`, with the record where there are several.
+    """Describe hits, as `the hits at 12.3 s and 45.1 s`, with the record where there are several.
 
     More than four are counted.
     """
-    if len(hits) > _MOST_TOLD:
+    if len(hits) > _MAX_NAMED:
         return f"{len(hits)} hits"
     several = len(inspection.records) > 1
-    told = [
+    names = [
         f"{hit.start_s:.1f} s" + (f" of record {hit.record + 1}" if several else "") for hit in hits
     ]
-    return ("the hit at " if len(told) == 1 else "the hits at ") + listed(told)
+    return ("the hit at " if len(names) == 1 else "the hits at ") + listed(names)

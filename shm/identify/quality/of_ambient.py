@@ -1,4 +1,4 @@
-"""What can be wrong with a record that nobody hit: unsteady, drowned, or with peaks unexplained."""
+"""Check records without hits: unsteady, drowned in noise, or with unexplained peaks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _AROUND = 0.15  # of a frequency, to either side: where the floor beside a peak 
 _FLOOR = 0.2  # quantile of the spectrum there; neighbouring modes fill less than the rest
 _PROMINENCE_DB = 5.0  # judgement: five deviations of a mean of twenty spectra
 _SAME = 0.02  # judgement: half-power width of 1 % damping
-_MOST_TOLD = 4  # technical: of a sentence that can be read
+_MAX_NAMED = 4  # technical: of a sentence that can be read
 
 
 def _stationarity(inspection: Inspection) -> Reading | None:
@@ -55,8 +55,8 @@ def _peaks(inspection: Inspection) -> Reading | None:
         return None
     known = [mode.frequency_hz for mode in inspection.finding.modes]
     missed = sorted({hz for m in inspection.measurements for hz in _missed(m, known, inspection)})
-    named = listed([f"{hz:.3g} Hz" for hz in missed[:_MOST_TOLD]])
-    more = f" and {len(missed) - _MOST_TOLD} more" if len(missed) > _MOST_TOLD else ""
+    named = listed([f"{hz:.3g} Hz" for hz in missed[:_MAX_NAMED]])
+    more = f" and {len(missed) - _MAX_NAMED} more" if len(missed) > _MAX_NAMED else ""
     return Reading(len(missed), {"named": named + more})
 
 
@@ -84,13 +84,13 @@ ROWS = (
 
 
 def _ambient(inspection: Inspection) -> Sequence[Recording]:
-    """The records, where nobody hit; empty where somebody did."""
+    """Return the records of a test without hits; empty for one with hits."""
     hit = any(m.hits or m.frequency_response is not None for m in inspection.measurements)
     return () if hit else inspection.records
 
 
 def _unrest(record: Recording) -> float:
-    """Loudest over median stretch of a record; NaN where it has none without a gap."""
+    """Return loudest over median stretch of a record; NaN where all have gaps."""
     signals = np.array([channel.values for channel in record.accelerations])
     count = int(_STRETCH_S * record.sampling_rate_hz)
     starts = range(0, signals.shape[1] - count + 1, count)
@@ -100,7 +100,7 @@ def _unrest(record: Recording) -> float:
 
 
 def _spectrum(measurement: Measurement) -> tuple[FloatArray, FloatArray]:
-    """Lines in Hz, and the power of all channels on them, each channel of one weight."""
+    """Return lines in Hz, and the power of all channels on them, equally weighted."""
     samples = min(part.shape[1] for part in measurement.decays)
     size = np.sqrt(np.mean([np.mean(p**2, axis=1) for p in measurement.decays], axis=0))
     weight = 1 / np.where(size > 0, size, 1.0)[:, np.newaxis]
@@ -113,7 +113,7 @@ def _spectrum(measurement: Measurement) -> tuple[FloatArray, FloatArray]:
 
 
 def _height_db(frequency_hz: FloatArray, power: FloatArray, at_hz: float) -> float:
-    """Of the peak at a frequency over the spectrum around."""
+    """Return the height in dB of the peak at a frequency over the spectrum around it."""
     around = np.abs(frequency_hz / at_hz - 1) < _AROUND
     near = np.abs(frequency_hz - at_hz) <= max(1.5 * frequency_hz[1], _SAME / 2 * at_hz)
     floor = float(np.quantile(power[around], _FLOOR)) if around.any() else 0.0
@@ -124,7 +124,7 @@ def _height_db(frequency_hz: FloatArray, power: FloatArray, at_hz: float) -> flo
 def _missed(
     measurement: Measurement, known_hz: Sequence[float], inspection: Inspection
 ) -> list[float]:
-    """Frequencies of strong peaks without a mode."""
+    """Return frequencies of strong peaks without a mode."""
     frequency_hz, power = _spectrum(measurement)
     options = inspection.options
     inside = (frequency_hz >= options.band_low_hz) & (frequency_hz <= options.band_high_hz)

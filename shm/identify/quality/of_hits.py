@@ -1,6 +1,4 @@
-"""What can be wrong with the blows: too few, two in one swing, no time before or after, unlike each
-other, a tip too soft for the band.
-"""
+"""Check the hits: too few, double, too close, inconsistent, or of too soft a tip."""
 
 from __future__ import annotations
 
@@ -51,7 +49,7 @@ def _hits_used(inspection: Inspection) -> Reading | None:
 
 
 def _dies_away(inspection: Inspection) -> bool:
-    """Whether ring-downs fall by 10 dB, and most modes are seen to turn steadily as they do."""
+    """Return whether ring-downs fall by 10 dB while most modes keep a steady phase."""
     decays = [decay for m in inspection.measurements for decay in m.decays]
     modes = inspection.finding.modes if inspection.finding else ()
     steady = [mode for mode in modes if math.isfinite(mode.amplitude_slope)]
@@ -60,14 +58,14 @@ def _dies_away(inspection: Inspection) -> bool:
 
 
 def _unforced(inspection: Inspection) -> bool:
-    """Whether the hits are known from the accelerations alone."""
+    """Return whether the hits are known from the accelerations alone."""
     return any(record.force is None for record in inspection.records)
 
 
 def _reasons(reasons: list[str]) -> str:
     counts = Counter(reason for reason in reasons if reason)
-    told = "; ".join(f"{count} {reason}" for reason, count in counts.items())
-    return f" (left out: {told})" if told else ""
+    text = "; ".join(f"{count} {reason}" for reason, count in counts.items())
+    return f" (left out: {text})" if text else ""
 
 
 def _double_hits(inspection: Inspection) -> Reading | None:
@@ -115,11 +113,11 @@ def _repeatability(inspection: Inspection) -> Reading | None:
     dropped = hits_for(inspection, (OUTLIER, KNOCK))
     known = [m.unlike for m in inspection.measurements if np.isfinite(m.unlike)]
     value = max(known, default=NAN)
-    struck = [hit for hit in hits_of(inspection) if hit.cut == KNOCK]
-    if dropped or struck:
-        told = [f"left out as unlike the others: {places(inspection, dropped)}"] if dropped else []
-        told += [f"something else struck: {places(inspection, struck)}"] if struck else []
-        return Reading(value, {}, "warning", found="; ".join(told))
+    knocked = [hit for hit in hits_of(inspection) if hit.cut == KNOCK]
+    if dropped or knocked:
+        text = [f"left out as unlike the others: {places(inspection, dropped)}"] if dropped else []
+        text += [f"something else struck: {places(inspection, knocked)}"] if knocked else []
+        return Reading(value, {}, "warning", found="; ".join(text))
     if not known:
         found = f"fewer than {FEWEST_TO_COMPARE} hits: nothing to compare"
         return Reading(NAN, {}, "unknown", found=found, remedy="Hit more often.")
@@ -144,7 +142,7 @@ def _force_spectrum(inspection: Inspection) -> Reading | None:
 
 
 def _spectrum_db(inspection: Inspection, hit: Hit) -> tuple[FloatArray, FloatArray]:
-    """Frequencies (lines,) in the band and the pulse's level at them over its largest, in dB."""
+    """Return the lines (lines,) in the band and the pulse's relative level at them in dB."""
     record, options = inspection.records[hit.record], inspection.options
     force, rate = record.force, record.sampling_rate_hz
     assert force is not None

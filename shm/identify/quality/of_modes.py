@@ -1,4 +1,4 @@
-"""Does the force explain the modes, does a second identifier find them, are the lowest there?"""
+"""Check the modes: explained by the force, confirmed by a second identifier, lowest present."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from shm.identify.contract import Measurement
 from shm.identify.estimation.amplitude_dependence import are_sure
 from shm.identify.measuring.frf import response_of
-from shm.identify.measuring.hits import struck_planes
+from shm.identify.measuring.hits import hits_by_plane
 from shm.identify.mode_ordering.bars import Description, log_factor
 from shm.identify.quality.inspection import Inspection
 from shm.identify.quality.table import Reading, Row
@@ -71,7 +71,7 @@ def _explained(inspection: Inspection) -> Reading | None:
 
 
 def _coherence(measurement: Measurement, inspection: Inspection) -> FloatArray | None:
-    """Coherence of all points at the lines that count, flat."""
+    """Return coherence of all points at the lines that count, flat."""
     response = measurement.frequency_response
     if response is None or response.coherence is None:
         return None
@@ -89,7 +89,7 @@ def _coherence(measurement: Measurement, inspection: Inspection) -> FloatArray |
 
 
 def _coherence_by_plane(measurement: Measurement) -> FloatArray:
-    """Of each point with the hits of its plane, where both planes were struck in turn."""
+    """Return the coherence of each point with the hits of its plane, where both were hit."""
     response = measurement.frequency_response
     assert response is not None
     assert response.coherence is not None
@@ -98,14 +98,14 @@ def _coherence_by_plane(measurement: Measurement) -> FloatArray:
     planes = [point.plane for point in measurement.points]
     force, motion = np.split(np.sum(np.abs(measurement.spectra) ** 2, axis=2), [1], axis=1)
     coherence = response.coherence.copy()
-    for plane, hits in struck_planes(motion / force, planes).items():
-        own = [each == plane for each in planes]
-        coherence[own] = response_of(measurement.spectra[hits], "h1")[1][own]
+    for plane, hits in hits_by_plane(motion / force, planes).items():
+        in_plane = [each == plane for each in planes]
+        coherence[in_plane] = response_of(measurement.spectra[hits], "h1")[1][in_plane]
     return coherence
 
 
 def _near(frequency_hz: FloatArray, modes_hz: FloatArray) -> BoolArray:
-    """The lines at modes and two to either side."""
+    """Return the lines at modes and two to either side."""
     spacing = float(frequency_hz[1] - frequency_hz[0])
     distance = np.abs(frequency_hz[:, None] - modes_hz)
     return np.asarray(np.any(distance <= (_LINES_AROUND + 0.5) * spacing, axis=1))
@@ -203,35 +203,38 @@ def _pairs(one: FloatArray, other: FloatArray) -> list[tuple[int, int]]:
 
 def _alone(who: str, frequency_hz: FloatArray, common: list[int]) -> str:
     alone = np.delete(frequency_hz, common)
-    told = listed([f"{value:.2f} Hz" for value in alone])
-    return f"; {who} identifier alone saw {told}" if len(alone) else ""
+    names = listed([f"{value:.2f} Hz" for value in alone])
+    return f"; {who} identifier alone saw {names}" if len(alone) else ""
 
 
 def first_orders(modes: Sequence[Mode], hanger: Hanger, low_hz: float) -> QualityCheck | None:
-    """How many modes the described hanger has above `low_hz` and below the first one of a plane."""
+    """Return the check for modes of the described hanger below the first one found in a plane.
+
+    Only modes above `low_hz` count.
+    """
     lost = {plane: _below_first(modes, plane, hanger, low_hz) for plane in PLANES}
     if not modes:
         return None
-    told = [
+    names = [
         f"{plane} order {listed([str(order) for order in orders])}"
         for plane, orders in lost.items()
         if orders
     ]
-    if not told:
+    if not names:
         found = "no mode is missing below the first one of a plane"
         return QualityCheck(FIRST_ORDERS, "good", 0.0, 0.0, "", found)
     count = sum(len(orders) for orders in lost.values())
     return QualityCheck(
-        FIRST_ORDERS, "warning", float(count), 0.0, "", f"{listed(told)} not found",
+        FIRST_ORDERS, "warning", float(count), 0.0, "", f"{listed(names)} not found",
         "Hit nearer to the middle with a softer tip, and record longer.",
     )  # fmt: skip
 
 
 def _below_first(modes: Sequence[Mode], plane: Plane, hanger: Hanger, low_hz: float) -> list[int]:
-    own = [mode for mode in modes if mode.plane == plane]
-    if not own:
+    of_plane = [mode for mode in modes if mode.plane == plane]
+    if not of_plane:
         return []
-    first = min(own, key=lambda mode: mode.order)
+    first = min(of_plane, key=lambda mode: mode.order)
     orders = np.arange(1, first.order + 1)
     half_fixed = np.full(orders.shape, 0.5)
     log_hz = log_factor(Description.of(hanger).log_xi, half_fixed, orders.astype(float))

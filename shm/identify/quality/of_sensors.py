@@ -1,9 +1,9 @@
-"""Whether the sensors move as the described hanger does: right unit, gain and place?
+"""Check unit, gain and position of the sensors against the described hanger.
 
 A hit's residue is the shape at the sensor times that at the hammer, each for unit modal mass. Away
 from its ends a hanger of mass M has the shape sqrt(2/M) sin(beta s + theta), whatever tension and
-ends, so that a unit that is off by 9.81 shows. Of several places each mode's shape tells whether
-one reads too much or too little, or is elsewhere: that one change mends all modes.
+ends, so that a unit that is wrong by 9.81 shows. With several positions each mode's shape shows
+whether one reads too much or too little, or is elsewhere: that one change corrects all modes.
 """
 
 from __future__ import annotations
@@ -55,10 +55,11 @@ def sensor_gain(
     modes: Sequence[Mode],
     hanger: Hanger,
 ) -> QualityCheck | None:
-    """Motion for the force over that of the described mass; None where it cannot be told.
+    """Return the check of motion per force over that of the described mass; None if unknown.
 
-    `found` are the modes of each set-up, `modes` those with an order. Of frequencies that change
-    much with amplitude the residues are too small. Not checked where no hammer's place is stated.
+    `found` are the modes of each set-up, `modes` those with an order. Of frequencies that
+    change much with amplitude the residues are too small. Not checked where no hammer's
+    position is stated.
     """
     hammers = [measurement.hammer for measurement in measurements if measurement.driven]
     if hammers and not any(hammer and np.isfinite(hammer.x_m) for hammer in hammers):
@@ -71,22 +72,22 @@ def sensor_gain(
         return None
     factors = [
         factor
-        for measurement, own in zip(measurements, found, strict=True)
-        if measurement.driven and own
-        for factor in _factors(measurement, own, modes, hanger)
+        for measurement, modes_of in zip(measurements, found, strict=True)
+        if measurement.driven and modes_of
+        for factor in _factors(measurement, modes_of, modes, hanger)
     ]
     if not factors:
         return None
     value = float(np.median(factors))
     times, side = max(value, 1 / value), "more" if value > 1 else "less"
-    told = (
+    text = (
         f"the hanger moves {times:.2g} times {side} for the force than its described mass lets it"
     )
     if times < LARGEST_FACTOR:
-        return QualityCheck("gain", "good", value, LARGEST_FACTOR, "", told)
+        return QualityCheck("gain", "good", value, LARGEST_FACTOR, "", text)
     cause = ", as accelerations in g do under the name m/s2" if 7 < 1 / value < 14 else ""
     return QualityCheck(
-        "gain", "warning", value, LARGEST_FACTOR, "", told + cause,
+        "gain", "warning", value, LARGEST_FACTOR, "", text + cause,
         "Check unit and sensitivity of hammer and accelerometers, the hammer's place, and the "
         "described section and length.",
     )  # fmt: skip
@@ -95,7 +96,7 @@ def sensor_gain(
 def _factors(
     measurement: Measurement, found: Sequence[FoundMode], modes: Sequence[Mode], hanger: Hanger
 ) -> FloatArray:
-    """What each hit moves over what the described hanger would, both planes together."""
+    """Return each hit's motion over that of the described hanger, both planes together."""
     hammer = measurement.hammer
     if hammer is None or not np.isfinite(hammer.x_m):
         return np.empty(0)
@@ -104,10 +105,10 @@ def _factors(
     squares = []
     for plane in PLANES:
         rows = [n for n, p in enumerate(measurement.points) if p.plane == plane and p.x_m == p.x_m]
-        own = list(_numbered(found, modes, plane))
-        if not rows or not own or (len(measured) == 1 and hammer.plane not in measured):
+        numbered = list(_numbered(found, modes, plane))
+        if not rows or not numbered or (len(measured) == 1 and hammer.plane not in measured):
             continue  # a hit across the only plane that is measured moves little in it
-        at, orders = (np.array(each) for each in zip(*own, strict=True))
+        at, orders = (np.array(each) for each in zip(*numbered, strict=True))
         places_m = [measurement.points[row].x_m for row in rows]
         part = residue[:, rows][:, :, at]
         squares.append(_ratio(part, orders, [*places_m, hammer.x_m], hanger) ** 2)
@@ -118,7 +119,7 @@ def _factors(
 def _numbered(
     found: Sequence[FoundMode], modes: Sequence[Mode], plane: Plane
 ) -> Iterator[tuple[int, int]]:
-    """Of each found mode of a plane, its index and its order."""
+    """Yield index and order of each found mode of a plane."""
     for mode in modes:
         away = [abs(each.frequency_hz / mode.frequency_hz - 1) for each in found]
         if mode.plane == plane and mode.order <= HIGHEST_ORDER and min(away) < _SAME_MODE:
@@ -128,9 +129,9 @@ def _numbered(
 def _ratio(
     residue: FloatArray, orders: IntArray, places_m: Sequence[float], hanger: Hanger
 ) -> FloatArray:
-    """Median ratio of residues (hits, points, modes) to the described ones, a hit each.
+    """Return the median ratio of residues (hits, points, modes) to the described ones, per hit.
 
-    The hammer's is the last of the places. Of all end springs those whose ratios agree best.
+    The hammer's is the last of the positions. Of all end springs those whose ratios agree best.
     """
     best, least = np.full(len(residue), np.nan), np.inf
     for shape in described_shapes(np.array(places_m), orders, hanger):
@@ -148,8 +149,11 @@ def _ratio(
 
 
 def sensor_places(modes: Sequence[Mode], hanger: Hanger) -> QualityCheck | None:
-    """Whether one sensor's factor or place spoils the shapes; None where they do not tell, as those
-    of a bar with turnbuckles, which bend otherwise by as much as a wrong place does."""
+    """Return the check of whether one sensor's factor or position spoils the shapes.
+
+    None where shapes do not tell, as those of a bar with turnbuckles, which bend otherwise by
+    as much as a wrong position does.
+    """
     if hanger.turnbuckles:
         return None
     results = [
@@ -173,21 +177,21 @@ def _in_plane(modes: Sequence[Mode], plane: Plane, hanger: Hanger) -> QualityChe
     misfit, typical, wrong = _explained(values[:, seen], places_m, orders, hanger)
     best = min(wrong, key=lambda each: each.misfit)
     if misfit < LARGEST_MISFIT:
-        told = "the sensors' shapes are those of the described hanger"
-        return QualityCheck("places", "good", misfit, LARGEST_MISFIT, "", told)
+        text = "the sensors' shapes are those of the described hanger"
+        return QualityCheck("places", "good", misfit, LARGEST_MISFIT, "", text)
     in_most = typical >= _TYPICAL * LARGEST_MISFIT
     if not in_most or not best.is_large or best.misfit > _EXPLAINED * misfit:
-        told = "the shapes are not those of the described hanger, and no one sensor explains it"
+        text = "the shapes are not those of the described hanger, and no one sensor explains it"
         remedy = (
             "Compare the sensors' places with the sheet: two may be exchanged, or one 0.2 m off."
         )
         verdict: Verdict = "warning" if in_most and misfit > _SURELY_OFF else "unknown"
-        return QualityCheck("places", verdict, misfit, LARGEST_MISFIT, "", told, remedy)
-    alike = [each for each in wrong if each.misfit < _NEARLY * best.misfit]
-    told = " or ".join(each.text for each in sorted(alike, key=lambda each: each.misfit)[:3])
+        return QualityCheck("places", verdict, misfit, LARGEST_MISFIT, "", text, remedy)
+    candidates = [each for each in wrong if each.misfit < _NEARLY * best.misfit]
+    text = " or ".join(each.text for each in sorted(candidates, key=lambda each: each.misfit)[:3])
     return QualityCheck(
         "places", "warning", misfit, LARGEST_MISFIT, "",
-        f"{len(modes)} {plane} modes fit the described hanger if {told}",
+        f"{len(modes)} {plane} modes fit the described hanger if {text}",
         "Check place, unit, sensitivity and sign of that sensor.",
     )  # fmt: skip
 
@@ -195,24 +199,26 @@ def _in_plane(modes: Sequence[Mode], plane: Plane, hanger: Hanger) -> QualityChe
 def _explained(
     values: FloatArray, places_m: FloatArray, orders: IntArray, hanger: Hanger
 ) -> tuple[float, float, list[_Wrong]]:
-    """The misfit of shapes (modes, places), its mean and its median over the modes, and of each
-    place what its factor or its place mends."""
+    """Return misfits of shapes (modes, places): mean, median, and the fix of each position.
+
+    The fix is by its factor or its position.
+    """
     every = np.concatenate([places_m, _PLACES * hanger.length_m])
     shapes = described_shapes(every, orders, hanger)
-    own, elsewhere = shapes[:, :, : len(places_m)], shapes[:, :, len(places_m) :]
+    at_places, elsewhere = shapes[:, :, : len(places_m)], shapes[:, :, len(places_m) :]
     wrong = []
     for n, x_m in enumerate(places_m):
         scaled = np.repeat(values[np.newaxis], len(_FACTORS), axis=0)
         scaled[:, :, n] *= _FACTORS[:, np.newaxis]
-        left = np.min([_misfits(scaled, shape).mean(axis=-1) for shape in own], axis=0)
+        left = np.min([_misfits(scaled, shape).mean(axis=-1) for shape in at_places], axis=0)
         wrong.append(_mended_by_factor(float(left.min()), x_m, _FACTORS[int(np.argmin(left))]))
-        moved = np.repeat(own[np.newaxis], len(_PLACES), axis=0)
+        moved = np.repeat(at_places[np.newaxis], len(_PLACES), axis=0)
         moved[:, :, :, n] = elsewhere.transpose(2, 0, 1)
         left = _misfits(values, moved).mean(axis=-1).min(axis=1)
         there_m = float(every[len(places_m) + int(np.argmin(left))])
         text = f"the sensor said to be at {x_m:.3g} m is at {there_m:.1f} m"
         wrong.append(_Wrong(float(left.min()), abs(there_m - x_m) > _LEAST_MOVE_M, text))
-    least = min((_misfits(values, shape) for shape in own), key=np.mean)
+    least = min((_misfits(values, shape) for shape in at_places), key=np.mean)
     return float(np.mean(least)), float(np.median(least)), wrong
 
 
@@ -227,7 +233,7 @@ def _mended_by_factor(misfit: float, x_m: float, factor: float) -> _Wrong:
 
 
 def _misfits(values: FloatArray, shapes: FloatArray) -> FloatArray:
-    """1 - MAC of each mode (..., modes); both (..., modes, places)."""
+    """Return 1 - MAC of each mode (..., modes); both arguments are (..., modes, places)."""
     product = np.sum(values * shapes, axis=-1) ** 2
     norms = np.sum(values**2, axis=-1) * np.sum(shapes**2, axis=-1)
     return np.asarray(1 - product / np.maximum(norms, 1e-300))

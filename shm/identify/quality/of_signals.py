@@ -1,6 +1,4 @@
-"""What can be wrong with the signals: clipped, jumping, silent or doubled channels,
-missing samples, a ring-down that drowns in noise.
-"""
+"""Check the signals: clipped, jumping, silent, doubled or noisy channels, missing samples."""
 
 from __future__ import annotations
 
@@ -69,7 +67,7 @@ def _clipping(inspection: Inspection) -> Reading | None:
     late = [hit for hit in hits_of(inspection) if hit.cut.startswith(CLIPPED)]
     clipped_channels = sorted({hit.cut.removeprefix(f"{CLIPPED}: ") for hit in late})
     pulses = _clipped_pulses(inspection)
-    told = [
+    texts = [
         *([f"left out: {listed([places(inspection, dropped)])}"] if dropped else []),
         *([f"left out: {listed(channels)}"] if channels else []),
         *(
@@ -82,13 +80,13 @@ def _clipping(inspection: Inspection) -> Reading | None:
         ),
         *(f"{name} is clipped in the pulse of {places(inspection, h)}" for name, h in pulses),
     ]
-    struck = {(hit.record, hit.start) for _, hits in pulses for hit in hits}
-    struck |= {(hit.record, hit.start) for hit in (*dropped, *late)}
-    return Reading(max(len(struck), len(channels)), {"faults": "; ".join(told)})
+    hits_affected = {(hit.record, hit.start) for _, hits in pulses for hit in hits}
+    hits_affected |= {(hit.record, hit.start) for hit in (*dropped, *late)}
+    return Reading(max(len(hits_affected), len(channels)), {"faults": "; ".join(texts)})
 
 
 def _clipped_pulses(inspection: Inspection) -> list[tuple[str, list[Hit]]]:
-    """Channels by name with the hits in whose pulses they are clipped."""
+    """Return channels by name with the hits in whose pulses they are clipped."""
     found: dict[str, list[Hit]] = {}
     for measurement in inspection.measurements:
         hits = [hit for hit in measurement.hits if hit.used and not hit.cut]
@@ -199,7 +197,10 @@ NOISE = Row(
 
 
 def _ratios_db(measurement: Measurement, inspection: Inspection) -> tuple[float, bool]:
-    """Signal to noise of a set-up's best channel, and whether a time before a hit was seen."""
+    """Return the signal to noise of a set-up's best channel, and whether noise was measured.
+
+    Noise is measured in the time before a hit.
+    """
     after, quiet, before = [], [], False
     by_record: dict[int, list[int]] = {}
     for hit in measurement.hits:
@@ -234,7 +235,7 @@ def _ratios_db(measurement: Measurement, inspection: Inspection) -> tuple[float,
 def _power(
     record: Recording, first: int, stop: int, inspection: Inspection, *, last: bool = False
 ) -> FloatArray | None:
-    """Mean square in the band of half a second, the first or the last of a stretch, (channels,)."""
+    """Return the mean square in the band of the first or last 0.5 s of a stretch, (channels,)."""
     rate, options = record.sampling_rate_hz, inspection.options
     length = min(stop - first, int(_STRETCH_S * rate))
     if length < max(_LEAST_STRETCH_S * rate, LEAST_SAMPLES):

@@ -77,8 +77,8 @@ def fault_reading(
         return None
     hits, channels = hits_for(inspection, reasons), channels_for(inspection, reasons)
     cut = [hit for hit in hits_of(inspection) if hit.cut.startswith(tuple(reasons))]
-    told = [places(inspection, hits)] if hits else []
-    found = f"left out: {listed(told + channels)}" if told + channels else ""
+    texts = [places(inspection, hits)] if hits else []
+    found = f"left out: {listed(texts + channels)}" if texts + channels else ""
     used = f"{part}: {places(inspection, cut)}" if cut else ""
     text = "; ".join(each for each in (found, used) if each)
     return Reading(len(hits) + len(channels) + len(cut), {"faults": text})

@@ -54,13 +54,13 @@ _MAINS_TOLERANCE = 0.004
 def tones(
     measurements: Sequence[Measurement], records: Sequence[Recording], options: IdentifyOptions
 ) -> tuple[Tone, ...]:
-    """The tones in time records, by rising frequency.
+    """Return the tones in time records, by rising frequency.
 
-    A tone keeps amplitude and phase through all ring-downs' later halves and has them before the
-    first hit. A mode, however lightly damped, gets a new phase with each hit and is not there
-    before the first. Where no quiet time before a hit is recorded, it must not go with the hits.
-    Narrow peaks within a named disturbance band need only half-steadiness. None are found in
-    frequency responses.
+    A tone keeps amplitude and phase through all ring-downs' later halves and has them before
+    the first hit. A mode, however lightly damped, gets a new phase with each hit and is not
+    there before the first. Where no quiet time before a hit is recorded, it must not go with
+    the hits. Narrow peaks within a named disturbance band need only half-steadiness. None are
+    found in frequency responses.
     """
     hits = [hit for measurement in measurements for hit in measurement.hits]
     lists = [
@@ -100,7 +100,7 @@ ROW = Row(
 def _tones_of_record(
     record: Recording, hits: Sequence[Hit], options: IdentifyOptions
 ) -> list[float]:
-    """Those of the accelerations, and those of the force between hits, where nothing rings."""
+    """Return tones of the accelerations and, between hits, where nothing rings, of the force."""
     found = _steady(stretches(record, record.accelerations, hits, options), options)
     if record.force is None or not hits:
         return found
@@ -109,7 +109,7 @@ def _tones_of_record(
 
 
 def _steady(parts: Stretches, options: IdentifyOptions) -> list[float]:
-    """Frequencies of the tones in some channels, the strongest first."""
+    """Return frequencies of the tones in some channels, the strongest first."""
     if not parts.later:
         return []
     apart_hz = 2 * parts.rate_hz / min(part.signals.shape[1] for part in parts.later)
@@ -122,7 +122,7 @@ def _steady(parts: Stretches, options: IdentifyOptions) -> list[float]:
 
 
 def _candidates(parts: Stretches, options: IdentifyOptions) -> list[float]:
-    """Frequencies of narrow lines in the sum of all later halves, the strongest first."""
+    """Return frequencies of narrow lines in the sum of all later halves, the strongest first."""
     gated = np.zeros((len(parts.later[0].signals), parts.samples))
     for part in parts.later:
         gated[:, part.first : part.first + part.signals.shape[1]] = part.signals
@@ -142,17 +142,14 @@ def _candidates(parts: Stretches, options: IdentifyOptions) -> list[float]:
     peaks = (power == scipy.ndimage.maximum_filter1d(power, 9)) & (power > _PROMINENCE * floor)
     places = np.flatnonzero(peaks & _may_be_there_before(spectra, length, lines, parts, options))
     strongest = places[np.argsort(-power[places])][:_MOST_CANDIDATES]
-    tops = frequency[lines][strongest] + frequency[1] * _beside(power, strongest)
+    tops = frequency[lines][strongest] + frequency[1] * _peak_offset(power, strongest)
     return [float(value) for value in tops]
 
 
 def _may_be_there_before(
     spectra: ComplexArray, length: int, lines: BoolArray, parts: Stretches, options: IdentifyOptions
 ) -> BoolArray:
-    """At which lines the time before the first hit does not rule a tone out, (lines,).
-
-    Ring-downs short and many make combs of hundreds of lines around each mode.
-    """
+    """Return the lines (lines,) at which the time before the first hit does not exclude a tone."""
     if parts.before is None:
         return np.ones(spectra.shape[1], dtype=bool)
     mean = spectra * 2 / sum(part.weight for part in parts.later)
@@ -167,8 +164,8 @@ def _may_be_there_before(
     return np.asarray(there)
 
 
-def _beside(power: FloatArray, places: NDArray[np.intp]) -> FloatArray:
-    """How far, in lines, the tops of peaks lie from their largest lines: by a parabola."""
+def _peak_offset(power: FloatArray, places: NDArray[np.intp]) -> FloatArray:
+    """Return the distance of peaks from their largest lines in lines, by a parabola."""
     inner = np.clip(places, 1, len(power) - 2)
     left, top, right = (np.log(power[inner + step]) for step in (-1, 0, 1))
     offset = 0.5 * (left - right) / np.minimum(left - 2 * top + right, -np.finfo(float).eps)
@@ -192,7 +189,7 @@ def _is_tone(frequency_hz: float, parts: Stretches, options: IdentifyOptions) ->
 
 
 def _steadiness(weights: FloatArray, amplitudes: ComplexArray) -> float:
-    """Power of the mean over the mean power of amplitudes (stretches, channels); 1: all equal."""
+    """Return power of the mean over mean power of amplitudes (stretches, channels); 1: equal."""
     power = float(np.sum(np.abs(weights @ amplitudes) ** 2))
     total = float(np.sum(weights @ np.abs(amplitudes) ** 2))
     return power / max(total, np.finfo(float).tiny)
@@ -201,7 +198,7 @@ def _steadiness(weights: FloatArray, amplitudes: ComplexArray) -> float:
 def _locked(
     turns_a_sample: float, weights: FloatArray, amplitudes: ComplexArray, parts: Stretches
 ) -> float:
-    """Steadiness of the amplitudes referred to their hits and forces, 1 for a mode; 0: no hits."""
+    """Return the steadiness of amplitudes referred to hits and forces; 1 for a mode, 0: no hits."""
     hits = np.array([part.hit for part in parts.later])
     if not np.all(np.isfinite(hits)):
         return 0.0
@@ -211,7 +208,7 @@ def _locked(
 
 
 def _in_most(lists: Sequence[Sequence[float]], options: IdentifyOptions) -> tuple[Tone, ...]:
-    """One tone for each frequency that at least half of the records have."""
+    """Return a tone for each frequency that at least half of the records have."""
     pooled = sorted(frequency for each in lists for frequency in each)
     groups: list[list[float]] = []
     for frequency in pooled:
@@ -254,7 +251,7 @@ class Stretch:
     force_n: float = 1.0
 
     def amplitude(self, turns_a_sample: float) -> ComplexArray:
-        """Complex amplitude of a sine, referred to the beginning of the record, (channels,)."""
+        """Return the complex amplitude of a sine from the start of the record, (channels,)."""
         phase = 2 * np.pi * turns_a_sample * (self.first + np.arange(self.signals.shape[1]))
         parts = self.signals @ np.column_stack((np.cos(phase), -np.sin(phase)))
         return np.asarray((parts[:, 0] + 1j * parts[:, 1]) * 2 / self.weight)
@@ -273,7 +270,7 @@ class Stretches:
 def stretches(
     record: Recording, channels: Sequence[Channel], hits: Sequence[Hit], options: IdentifyOptions
 ) -> Stretches:
-    """The stretches of some channels of a record, thinned to the band."""
+    """Return the stretches of some channels of a record, thinned to the band."""
     wanted = RATE_OVER_BAND * options.band_high_hz
     factor = max(1, int(record.sampling_rate_hz / wanted))
     rate = record.sampling_rate_hz / factor
@@ -289,12 +286,12 @@ def stretches(
     margin = int(np.ceil(RINGING_SAMPLES / factor)) + 1
     starts = [hit.start // factor for hit in hits]
     spans = _spans(starts, margin, signals.shape[1])
-    struck = [hits[bisect(starts, a) - 1] if hits else None for a, _ in spans]
+    hit_before = [hits[bisect(starts, a) - 1] if hits else None for a, _ in spans]
     later = tuple(
         _stretch(signals, a, b)
         if hit is None
         else replace(_stretch(signals, a, b), hit=hit.start / factor, force_n=_size(hit))
-        for (a, b), hit in zip(spans, struck, strict=True)
+        for (a, b), hit in zip(spans, hit_before, strict=True)
         if b - a >= LEAST_SAMPLES
     )
     quiet = starts[0] - margin if starts else 0
@@ -304,17 +301,17 @@ def stretches(
 
 
 def _size(hit: Hit) -> float:
-    """How hard it was; 1 where nobody measured that."""
+    """Return the peak force of a hit; 1 if it was not measured."""
     return abs(hit.peak_force_n) if math.isfinite(hit.peak_force_n) else 1.0
 
 
 def _smoothed(values: FloatArray, samples: int) -> FloatArray:
-    """Running means over as many samples as are thinned to one."""
+    """Return running means over as many samples as are thinned to one."""
     return np.asarray(scipy.ndimage.uniform_filter1d(values, samples)) if samples > 1 else values
 
 
 def _spans(starts: Sequence[int], margin: int, samples: int) -> list[tuple[int, int]]:
-    """First and last sample of each ring-down's later half, in thirds where there are few."""
+    """Return first and last sample of each ring-down's later half, in thirds if they are few."""
     ends = [*(start - margin for start in starts[1:]), samples]
     spans = [((a + b) // 2, b) for a, b in zip(starts, ends, strict=True)] if starts else []
     if len(spans) >= _FEW_SEGMENTS:

@@ -18,7 +18,7 @@ import numpy as np
 
 from shm.identify.contract import Measurement
 from shm.identify.estimation.repeats import LEAST_HITS
-from shm.identify.setup_merging.hit_directions import alike, together
+from shm.identify.setup_merging.hit_directions import have_same_sensors, pool_hits
 from shm.values import ComplexArray, FloatArray, Mode
 
 LEFT_OUT = (1 / 4, 1 / 2, 3 / 4)
@@ -26,7 +26,7 @@ LEFT_OUT = (1 / 4, 1 / 2, 3 / 4)
 _LOUDNESS = 0.05  # technical: share of a ring-down over which its level is taken
 _PARTS, _FITTED_FROM = 8, 2
 """A ring-down in eighths, the first two of which are foretold from the others. Technical."""
-_LEAST_ASTRAY, _MOST_ASTRAY, _GROWTH = 0.05, 1.5, 12.0
+_MIN_UNPREDICTED, _MAX_UNPREDICTED, _GROWTH = 0.05, 1.5, 12.0
 """Of the swing in the first eighth, what is not foretold, and how often that is what the later part
 leaves. Of 97 awkward records with three hits and more (tests/worlds/recordings.py, seeds 7000 to
 7006) one was astray, with sidebands; of bars of tests/benchmarks/gap_dynamics.py with a guide that
@@ -36,21 +36,21 @@ _CALM = 2.0  # judgement: of what the later part leaves; noise alone scatters by
 _UNSURE = 0.3  # judgement: of a damping without standard deviation
 
 
-def calmed(measurements: Sequence[Measurement], left_out: float) -> tuple[Measurement, ...]:
-    """The measurements without the beginnings of their ring-downs.
+def late_parts(measurements: Sequence[Measurement], left_out: float) -> tuple[Measurement, ...]:
+    """Return the measurements without the beginnings of their ring-downs.
 
     Hits in several directions count together, since what the force says of them went with the
     beginning.
     """
-    whole = (together(measurements),) if alike(measurements) else tuple(measurements)
+    whole = (pool_hits(measurements),) if have_same_sensors(measurements) else tuple(measurements)
     return tuple(
         replace(each, decays=tuple(_later(decay, left_out) for decay in each.decays), driven=())
         for each in whole
     )
 
 
-def level_left_at(measurements: Sequence[Measurement], left_out: float) -> float:
-    """What a typical ring-down has left of its level where its later part begins."""
+def late_part_level(measurements: Sequence[Measurement], left_out: float) -> float:
+    """Return the median fraction of its level that a ring-down has at its later part."""
     decays = [decay for each in measurements for decay in each.decays]
     left = [_loudness(_later(decay, left_out)) / _loudness(decay) for decay in decays]
     return float(np.median(left))
@@ -65,42 +65,45 @@ def _loudness(decay: FloatArray) -> float:
     return float(np.sqrt(np.mean(decay[:, :samples] ** 2))) or np.finfo(float).tiny
 
 
-def free_below(measurements: Sequence[Measurement], modes: Sequence[Mode]) -> float:
-    """What a typical ring-down has left of its level where it begins to be a sum of `modes`.
+def linear_below_level(measurements: Sequence[Measurement], modes: Sequence[Mode]) -> float:
+    """Return the median fraction of level below which a ring-down is a sum of `modes`.
 
-    1 where it is one from its beginning on, and where fewer than three hits say nothing of it.
+    1 where it is one from its beginning on, and where fewer than three hits show it.
     """
     hit = [each for each in measurements if each.driven]
     known = all(mode.damping_ratio > 0 and mode.frequency_sd_hz > 0 for mode in modes)
     if not known or sum(len(each.decays) for each in hit) < LEAST_HITS:
         return 1.0
     for refine in (False, True):
-        found = [_astray(each, modes, refine) for each in hit]
-        astray, level = (np.concatenate(each) for each in zip(*found, strict=True))
-        least = astray[:, _FITTED_FROM:].min(axis=1)
-        first, growth = np.median(astray[:, 0]), np.median(astray[:, 0] / least)
-        if not first > _LEAST_ASTRAY:
+        found = [_unpredicted(each, modes, refine) for each in hit]
+        unpredicted, level = (np.concatenate(each) for each in zip(*found, strict=True))
+        least = unpredicted[:, _FITTED_FROM:].min(axis=1)
+        first, growth = np.median(unpredicted[:, 0]), np.median(unpredicted[:, 0] / least)
+        if not first > _MIN_UNPREDICTED:
             return 1.0
-    if not (first < _MOST_ASTRAY and growth > _GROWTH):
+    if not (first < _MAX_UNPREDICTED and growth > _GROWTH):
         return 1.0
-    calm = np.median(astray, axis=0) < _CALM * np.median(least)
+    calm = np.median(unpredicted, axis=0) < _CALM * np.median(least)
     return float(np.median(level, axis=0)[calm.argmax()])
 
 
-def _astray(
+def _unpredicted(
     measurement: Measurement, modes: Sequence[Mode], refine: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """What the later part does not foretell of each part's swing, over it, and the swing over that
-    of the first part; both (decays, parts). Swings are displacements: they close a gap."""
+    """Return the unpredicted fraction of each part's swing, and its size over the first part's.
+
+    The later part predicts the others; both are (decays, parts). Swings are displacements: they
+    close a gap.
+    """
     rate = measurement.sampling_rate_hz
     omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])
     damping = np.array([mode.damping_ratio for mode in modes])
     poles = omega * (-damping + 1j * np.sqrt(1 - damping**2))
     poles = poles - 1 / measurement.decay_time_constant_s
     if refine:
-        own = np.array([(mode.damping_sd, mode.frequency_sd_hz) for mode in modes])
-        decay_sd = omega * np.where(own[:, 0] > 0, own[:, 0], _UNSURE * damping)
-        sd = np.concatenate([decay_sd, 2 * np.pi * own[:, 1]])
+        real = np.array([(mode.damping_sd, mode.frequency_sd_hz) for mode in modes])
+        decay_sd = omega * np.where(real[:, 0] > 0, real[:, 0], _UNSURE * damping)
+        sd = np.concatenate([decay_sd, 2 * np.pi * real[:, 1]])
         poles = poles + _correction(measurement.decays, poles, sd, rate)
     rows = [_swings(decay, poles, rate) for decay in measurement.decays]
     rest, whole = (np.array(each) for each in zip(*rows, strict=True))
@@ -108,7 +111,7 @@ def _astray(
 
 
 def _swings(decay: FloatArray, poles: ComplexArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Of each part (parts,): the swing that the later ones do not foretell, and the whole one."""
+    """Return the unpredicted and the full swing of each part, both (parts,)."""
     size = decay.shape[1] // _PARTS
     later = slice(_FITTED_FROM * size, None)
     columns = _columns(decay.shape[1], poles, rate, _FITTED_FROM * size)
@@ -130,8 +133,10 @@ def _columns(samples: int, poles: ComplexArray, rate: float, zero: int) -> Float
 def _correction(
     decays: Sequence[FloatArray], poles: ComplexArray, sd: FloatArray, rate: float
 ) -> ComplexArray:
-    """One step of Gauss and Newton towards the poles of the later parts; `sd` (2 poles,) are the
-    standard deviations of their real and imaginary parts as identified."""
+    """Return one Gauss-Newton step towards the poles of the later parts.
+
+    `sd` (2 poles,) are the standard deviations of their real and imaginary parts as identified.
+    """
     count = len(poles)
     square, right, left, free = np.zeros((2 * count, 2 * count)), np.zeros(2 * count), 0.0, 0
     for decay in decays:
@@ -146,9 +151,9 @@ def _correction(
         grown = (wave[:, :count] - 1j * wave[:, count:]) * np.arange(len(wave))[:, None] / rate
         for channel in range(len(decay)):
             slope = grown * (found[:count, channel] + 1j * found[count:, channel])
-            own = np.hstack([slope.real, -slope.imag])
-            own = own - base @ (base.T @ own)
-            square += own.T @ own
-            right += own.T @ rest[:, channel]
+            real = np.hstack([slope.real, -slope.imag])
+            real = real - base @ (base.T @ real)
+            square += real.T @ real
+            right += real.T @ rest[:, channel]
     step = np.linalg.solve(square / (left / free) + np.diag(sd**-2.0), right / (left / free))
     return np.asarray(step[:count] + 1j * step[count:])

@@ -27,19 +27,19 @@ from shm.identify.estimation.poles import modal_assurance
 from shm.identify.estimation.repeats import LEAST_HITS
 from shm.identify.measuring.responses import place_of
 from shm.identify.mode_ordering.planes import transverse_share
-from shm.identify.setup_merging.joined import LARGEST_SHIFT, Joined, matched
+from shm.identify.setup_merging.join_set_ups import LARGEST_SHIFT, Joined, matched
 from shm.identify.setup_merging.modal_participation import ringing, with_levels
 from shm.values import PLANES, FloatArray, ResponsePoint
 
 _MOST_TURN = 0.1
 """Radians: shapes that noise turns by more (as a standard deviation) have no direction."""
 _UNKNOWN_TURN = math.pi / 4  # nothing is farther from the nearer of two axes
-_ALIKE = 0.5  # MAC: less than 45 degrees apart
+_SAME_DIRECTION = 0.5  # MAC: less than 45 degrees apart
 _OTHER = dict(zip(PLANES, reversed(PLANES), strict=True))
 
 
-def alike(measurements: Sequence[Measurement]) -> bool:
-    """Whether they have the same two-axis sensors, and enough hits in several directions."""
+def have_same_sensors(measurements: Sequence[Measurement]) -> bool:
+    """Return whether they have the same two-axis sensors, and enough hits in several directions."""
     layouts = {tuple(place_of(point) for point in m.points) for m in measurements}
     hammers = [m.hammer for m in measurements if m.hammer is not None]
     directions = {hammer.plane for hammer in hammers} - {None}
@@ -51,8 +51,8 @@ def alike(measurements: Sequence[Measurement]) -> bool:
     return several and enough and biaxial and len(layouts) == len(places) == len(windows) == 1
 
 
-def together(measurements: Sequence[Measurement]) -> Measurement:
-    """The hits of all as one measurement; what hangs on the force is the first one's."""
+def pool_hits(measurements: Sequence[Measurement]) -> Measurement:
+    """Return the hits of all as one measurement; what depends on the force is the first one's."""
     return replace(
         measurements[0],
         decays=tuple(decay for m in measurements for decay in m.decays),
@@ -61,20 +61,24 @@ def together(measurements: Sequence[Measurement]) -> Measurement:
     )
 
 
-def sharpened(measurements: Sequence[Measurement], apart: Joined, found: Finding) -> Joined:
-    """What was found in all hits together, `found`, with modes found `apart` where they say more.
+def refine_by_direction(
+    measurements: Sequence[Measurement], apart: Joined, found: Finding
+) -> Joined:
+    """Return the modes of all hits, completed by modes found `apart` in one direction.
 
-    These are those of which all hits together do not know the direction, or which they miss.
+    Those replace modes whose direction is unknown in all hits together, and add missing ones.
     """
-    everything = together(measurements)
+    everything = pool_hits(measurements)
     groups = matched((everything, everything), (found.modes, apart.finding.modes))
     pairs = [{seen.set_up: seen.mode for seen in group} for group in groups]
     modes = [_better(pair[0], pair.get(1), apart.points) for pair in pairs if 0 in pair]
     missed = [pair[1] for pair in pairs if 0 not in pair]
     for mode in missed:
         if not any(_same(mode, other) for other in modes):
-            beside = any(_near(mode, other) for other in [*modes, *missed] if other is not mode)
-            modes.append(_turned(mode, _UNKNOWN_TURN, apart.points) if beside else mode)
+            has_neighbour = any(
+                _near(mode, other) for other in [*modes, *missed] if other is not mode
+            )
+            modes.append(_turned(mode, _UNKNOWN_TURN, apart.points) if has_neighbour else mode)
     return _as_joined(measurements, replace(found, modes=_by_frequency(modes)))
 
 
@@ -83,10 +87,12 @@ def _by_frequency(modes: Sequence[FoundMode]) -> tuple[FoundMode, ...]:
 
 
 def _as_joined(measurements: Sequence[Measurement], found: Finding) -> Joined:
-    """A finding over the points of all set-ups, with the levels at which its modes ring."""
+    """Return a finding over the points of all set-ups, with the levels at which its modes ring."""
     modes = found.modes
     if modes:
-        modes = with_levels(modes, [ringing(m, modes, _struck(m, modes)) for m in measurements])
+        modes = with_levels(
+            modes, [ringing(m, modes, _moves_with_hammer(m, modes)) for m in measurements]
+        )
     note = f"the hits of {len(measurements)} directions are identified together"
     apart = (modes,) * len(measurements)
     return Joined(measurements[0].points, replace(found, modes=modes), apart, (note,))
@@ -95,7 +101,7 @@ def _as_joined(measurements: Sequence[Measurement], found: Finding) -> Joined:
 def _better(
     mode: FoundMode, by_itself: FoundMode | None, points: Sequence[ResponsePoint]
 ) -> FoundMode:
-    """The mode of all hits where its direction is known, else that of its own hits."""
+    """Return the mode of all hits where its direction is known, else that of one direction."""
     turn = float(np.linalg.norm(mode.shape_sd) / np.linalg.norm(mode.shape))
     if by_itself is None or turn <= _MOST_TURN:
         return mode
@@ -105,13 +111,13 @@ def _better(
 
 
 def _turned(mode: FoundMode, turn_rad: float, points: Sequence[ResponsePoint]) -> FoundMode:
-    """The mode with standard deviations of a shape that may be turned about the hanger's axis."""
+    """Return the mode with standard deviations for a possible rotation about the hanger's axis."""
     across = np.abs(_across(mode.shape, points))
     return replace(mode, shape_sd=np.hypot(mode.shape_sd, turn_rad * across))
 
 
 def _across(shape: FloatArray, points: Sequence[ResponsePoint]) -> FloatArray:
-    """At each point what the shape is at the same place in the other plane; 0 where unknown."""
+    """Return the shape's value in the other plane at each point's position; 0 where unknown."""
     value = {place_of(p): each for p, each in zip(points, shape.tolist(), strict=True)}
     others = [replace(p, plane=_OTHER[p.plane]) if p.plane else p for p in points]
     return np.array([value.get(place_of(other), 0.0) for other in others])
@@ -122,11 +128,11 @@ def _near(mode: FoundMode, other: FoundMode) -> bool:
 
 
 def _same(mode: FoundMode, other: FoundMode) -> bool:
-    return _near(mode, other) and modal_assurance(mode.shape, other.shape) > _ALIKE
+    return _near(mode, other) and modal_assurance(mode.shape, other.shape) > _SAME_DIRECTION
 
 
-def _struck(measurement: Measurement, modes: Sequence[FoundMode]) -> list[bool]:
-    """Which modes move more in the hammer's direction than across it."""
+def _moves_with_hammer(measurement: Measurement, modes: Sequence[FoundMode]) -> list[bool]:
+    """Return which modes move more in the hammer's direction than across it."""
     plane = measurement.hammer.plane if measurement.hammer else None
     share = np.array([transverse_share(mode.shape, measurement.points) for mode in modes])
     return list((share >= 0.5) == (plane == PLANES[0]))

@@ -1,13 +1,11 @@
-"""How the found modes ring after each hit: amplitudes, and what the hammer's force makes of them.
+"""Fit the found modes to the ring-down after each hit, and to measured responses.
 
 After a hit the acceleration at a point is the real part of a sum of c exp(s t) over the modes, with
-s the pole and t from the first sample of the hit's cut. What still rings of the hit before is
-taken off. What is left is made by the force, whose transform is F(s): it is
-phi phi_h s^2 F(s) / (i w_d), with phi the shape for unit modal mass at the point, phi_h at the
-hammer, and w_d the damped angular frequency (Ewins 2000, section 2.4). Force and accelerations
-have passed the same filter, so its gain cancels.
-
-What the found modes make of a measured frequency response.
+s the pole and t from the first sample of the hit's cut. What still rings of the hit before is taken
+off. What is left is made by the force, whose transform is F(s): it is phi phi_h s^2 F(s) / (i w_d),
+with phi the shape for unit modal mass at the point, phi_h at the hammer, and w_d the damped angular
+frequency (Ewins 2000, section 2.4). Force and accelerations have passed the same filter, so its
+gain cancels.
 
 An accelerance is the sum over modes of (a + b s) s^2 / (s^2 + 2 zeta w s + w^2), plus a constant
 for the modes below the band and a multiple of s^2 for those above (Ewins 2000, section 4.3). An
@@ -34,11 +32,11 @@ _AROUND_BAND = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Ringing:
-    """What each used hit says of each mode; both arrays are (hits, points, modes).
+    """Hold the result of each used hit for each mode; both arrays are (hits, points, modes).
 
-    `amplitude_m_s2` is that of the mode's acceleration right after the hit. `residue` is the shape
-    at the point times that at the hammer, in 1/kg; NaN where the hit before it was not used, so
-    that what still rang is unknown.
+    `amplitude_m_s2` is that of the mode's acceleration right after the hit. `residue` is the
+    shape at the point times that at the hammer, in 1/kg; NaN where the hit before it was not
+    used, so that the remaining ringing is unknown.
     """
 
     amplitude_m_s2: FloatArray
@@ -48,20 +46,20 @@ class Ringing:
 def ringing(
     measurement: Measurement, modes: Sequence[FoundMode], seen: Sequence[bool] = ()
 ) -> Ringing:
-    """Amplitudes and residues of `modes` after the used hits of time records.
+    """Return amplitudes and residues of `modes` after the used hits of time records.
 
-    Those that were not `seen` here (default: all were) and lie too near to one that was to be told
-    apart from it have none: the ring-down would be divided between the two by chance.
+    Those that were not `seen` here (default: all were) and are too close to one that was have
+    none: the ring-down would be divided between the two by chance.
     """
     rings = np.ones(len(modes), bool) if all(seen) else ~_hidden(measurement, modes, seen)
-    found = _ringing(measurement, [mode for mode, own in zip(modes, rings, strict=True) if own])
+    found = _ringing(measurement, [mode for mode, each in zip(modes, rings, strict=True) if each])
     return Ringing(_spread(found.amplitude_m_s2, rings), _spread(found.residue, rings))
 
 
 def _hidden(
     measurement: Measurement, modes: Sequence[FoundMode], seen: Sequence[bool]
 ) -> BoolArray:
-    """Which modes stand behind one that was seen."""
+    """Return which modes are hidden by one that was seen."""
     frequency_hz, known = np.array([mode.frequency_hz for mode in modes]), np.array(seen)
     samples = max(decay.shape[1] for decay in measurement.decays)
     away = np.abs(np.subtract.outer(frequency_hz, frequency_hz[known]))
@@ -69,10 +67,10 @@ def _hidden(
     return np.asarray(~known & near.any(axis=1))
 
 
-def _spread(values: FloatArray, kept: BoolArray) -> FloatArray:
-    """Values (hits, points, kept) among zeros, (hits, points, modes)."""
-    spread = np.zeros((*values.shape[:2], len(kept)))
-    spread[:, :, kept] = values
+def _spread(values: FloatArray, chosen: BoolArray) -> FloatArray:
+    """Return values (hits, points, chosen) among zeros, (hits, points, modes)."""
+    spread = np.zeros((*values.shape[:2], len(chosen)))
+    spread[:, :, chosen] = values
     return spread
 
 
@@ -89,25 +87,22 @@ def _ringing(measurement: Measurement, modes: Sequence[FoundMode]) -> Ringing:
         old = starts[before] * np.exp(poles * seconds) if before >= 0 else 0.0
         driven, decay = measurement.driven[index], measurement.decays[index]
         force = driven[0, : driven.shape[1] - decay.shape[1]]
-        struck = int(np.argmax(np.abs(force)))
+        peak = int(np.argmax(np.abs(force)))
         transform = (force / measurement.sampling_rate_hz) @ (1 / waves[:, : len(force)]).T
         made = (starts[index] - old) / transform
-        amplitude.append(np.abs(starts[index] * waves[:, struck]))
+        amplitude.append(np.abs(starts[index] * waves[:, peak]))
         residue.append((made * 1j * poles.imag / poles**2).real)
     return Ringing(np.array(amplitude), np.array(residue))
 
 
 def levels(rings: Sequence[Ringing]) -> FloatArray:
-    """Amplitude of each mode in m/s^2 right after a hit, (modes,).
-
-    Median over the hits at the point that moves most, in the set-up in which it does.
-    """
+    """Return the amplitude of each mode in m/s^2 right after a hit, (modes,)."""
     medians = [np.median(ring.amplitude_m_s2, axis=0).max(axis=0) for ring in rings]
     return np.asarray(np.max(medians, axis=0))
 
 
 def with_levels(modes: Sequence[FoundMode], rings: Sequence[Ringing]) -> tuple[FoundMode, ...]:
-    """The modes with these amplitudes."""
+    """Return the modes with these amplitudes."""
     return tuple(
         replace(mode, acceleration_m_s2=float(level))
         for mode, level in zip(modes, levels(rings), strict=True)
@@ -115,20 +110,20 @@ def with_levels(modes: Sequence[FoundMode], rings: Sequence[Ringing]) -> tuple[F
 
 
 def poles_of_modes(modes: Sequence[FoundMode]) -> ComplexArray:
-    """The poles in rad/s above the real axis, (modes,)."""
+    """Return the poles in rad/s above the real axis, (modes,)."""
     omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])
     damping = np.array([mode.damping_ratio for mode in modes])
     return np.asarray(omega * (-damping + 1j * np.sqrt(1 - damping**2)))
 
 
 def _at_start(driven: FloatArray, decay: FloatArray, waves: ComplexArray) -> ComplexArray:
-    """Complex amplitudes (points, modes) of a ring-down, at the first sample of its cut."""
+    """Return complex amplitudes (points, modes) of a ring-down at the first sample of its cut."""
     free = driven.shape[1] - decay.shape[1]
     return _amplitudes(decay, waves) / waves[:, free]
 
 
 def _amplitudes(decay: FloatArray, waves: ComplexArray) -> ComplexArray:
-    """Least-squares c (points, modes) of decay = Re(c waves), `waves` (modes, >= samples)."""
+    """Return least-squares c (points, modes) of decay = Re(c waves), `waves` (modes, samples)."""
     samples = decay.shape[1]
     used = waves[:, :samples]
     right = np.hstack([decay @ used.real.T, -decay @ used.imag.T])
@@ -141,7 +136,7 @@ def _amplitudes(decay: FloatArray, waves: ComplexArray) -> ComplexArray:
 
 
 def _gram(step: ComplexArray, samples: int) -> FloatArray:
-    """Inner products of the rows [Re waves; -Im waves], whose samples are powers of `step`."""
+    """Return inner products of the rows [Re waves; -Im waves], sampled powers of `step`."""
     crossed = _geometric(np.outer(step, step.conj()), samples)
     straight = _geometric(np.outer(step, step), samples)
     same, other = (crossed + straight) / 2, (crossed - straight) / 2
@@ -153,10 +148,10 @@ def _geometric(ratio: ComplexArray, terms: int) -> ComplexArray:
 
 
 def _before(hits: Sequence[Hit]) -> list[tuple[int, float]]:
-    """Of each used hit, which used hit (by number) came before it in its record, and how long.
+    """Return for each used hit the used hit before it in its record, and the time between.
 
-    -1 where the hanger is taken to have been at rest: nothing came before, or no hit of all
-    follows a used one. NaN seconds where what still rang is not known.
+    -1 where the hanger is taken to have been at rest: no hit came before, or no hit of all
+    follows a used one. NaN seconds where the remaining ringing is unknown.
     """
     result = []
     number = -1
@@ -178,14 +173,14 @@ def fitted(
     modes: Sequence[Sequence[FoundMode]],
     options: IdentifyOptions,
 ) -> ComplexArray | None:
-    """The accelerance (points, lines) that the modes of each set-up make; None without a force.
+    """Return the accelerance (points, lines) of the modes of each set-up; None without a force.
 
     The factors of each point are the linear least-squares ones over the lines of the band; NaN
     where no line of the band is known.
     """
     parts = [
-        _fitted(m.frequency_response, m.window_time_constant_s, own, options)
-        for m, own in zip(measurements, modes, strict=True)
+        _fitted(m.frequency_response, m.window_time_constant_s, each, options)
+        for m, each in zip(measurements, modes, strict=True)
         if m.frequency_response is not None
     ]
     return np.vstack(parts) if parts else None
@@ -212,7 +207,7 @@ def _fitted(
 
 
 def _basis(s: ComplexArray, modes: Sequence[FoundMode], scale: float) -> ComplexArray:
-    """Two rows a mode and the two residual terms, (2 * modes + 2, lines)."""
+    """Return two rows a mode and the two residual terms, (2 * modes + 2, lines)."""
     omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])[:, None]
     damping = np.array([mode.damping_ratio for mode in modes])[:, None]
     single = s**2 / (s**2 + 2 * damping * omega * s + omega**2)

@@ -1,11 +1,10 @@
-"""What several set-ups say of the shapes: products of two factors, as far as they were measured.
+"""Join the shapes of several set-ups: products of two factors, as far as measured.
 
 After a hit the residue of a mode is its shape at the sensor times its shape at the hammer (Ewins
-2000, section 2.4). All set-ups together fill a table with a row for each hammer place and a column
-for each sensor, whose factors are the shape at the sensors and, by reciprocity, at the hammer's
-places. Without a force a set-up's shape has a scale of its own, which takes the hammer's place.
-
-The two factors of a product of which only some entries are known.
+2000, section 2.4). All set-ups together fill a table with a row for each hammer position and a
+column for each sensor, whose factors are the shape at the sensors and, by reciprocity, at the
+hammer's positions. Without a force a set-up's shape has an unknown scale, which takes the hammer's
+place.
 """
 
 from __future__ import annotations
@@ -44,41 +43,41 @@ class Product:
 
 
 def of_hits(ring: Ringing) -> Product:
-    """The residues, averaged over the hits."""
+    """Return the residues, averaged over the hits."""
     known = ring.residue[np.isfinite(ring.residue).all(axis=(1, 2))]
     others = (known.sum(axis=0) - known) / max(len(known) - 1, 1)
     return Product(known.mean(axis=0).T, jackknife_sd(others).T)
 
 
 def of_seen_shapes(modes: Sequence[FoundMode], seen: Sequence[bool]) -> Product:
-    """The shapes of the modes that the set-up has `seen`, certain ones larger; 0 of the others.
+    """Return shapes of modes `seen` by the set-up, certain ones larger; 0 for the others.
 
-    They are free of what modes beyond the band leave in residues, but tell no scales.
+    They are free of what modes beyond the band leave in residues, but give no scales.
     """
     values, sds = np.zeros((2, len(modes), max(len(mode.shape) for mode in modes)))
-    for index, (mode, own) in enumerate(zip(modes, seen, strict=True)):
-        if own:
+    for index, (mode, each) in enumerate(zip(modes, seen, strict=True)):
+        if each:
             values[index] = _certainty(mode) * mode.shape
             sds[index] = _certainty(mode) * mode.shape_sd
     return Product(values, sds)
 
 
 def _certainty(mode: FoundMode) -> float:
-    """1 over the mean standard deviation of a shape; 1 where it is not known."""
+    """Return 1 over the mean standard deviation of a shape; 1 where it is not known."""
     sd = float(np.mean(mode.shape_sd))
     return 1 / sd if sd > 0 else 1.0
 
 
 def of_shapes(modes: Sequence[FoundMode]) -> Product:
-    """The shapes as they are."""
+    """Return the shapes as they are."""
     return Product(np.array([m.shape for m in modes]), np.array([m.shape_sd for m in modes]))
 
 
 def joined_shapes(measurements: Sequence[Measurement], products: Sequence[Product]) -> Shapes:
-    """The shapes over all points of all set-ups, the largest value 1.
+    """Return the shapes over all points of all set-ups, the largest value 1.
 
-    The points are the sensors', or the hammer's where it hit at more places than there are sensors.
-    Raises BadInput where set-ups share neither the hammer's place nor a sensor's.
+    The points are the sensors', or the hammer's where it hit at more places than there are
+    sensors. Raises BadInput where set-ups share neither the hammer's place nor a sensor's.
     """
     table = _table(measurements, products)
     if not hang_together(table.known):
@@ -101,13 +100,13 @@ def joined_shapes(measurements: Sequence[Measurement], products: Sequence[Produc
 
 
 def hammer_roves(measurements: Sequence[Measurement]) -> bool:
-    """Whether the hammer hit at more places along the hanger than there are sensors."""
+    """Return whether the hammer hit at more places along the hanger than there are sensors."""
     hammers = {m.hammer.x_m for m in measurements if m.hammer}
     return len(hammers) > len({point.x_m for m in measurements for point in m.points})
 
 
 def joined_response(measurements: Sequence[Measurement]) -> FrequencyResponse | None:
-    """The frequency responses of all set-ups as one; None without a force.
+    """Return the frequency responses of all set-ups as one; None without a force.
 
     Where the hammer roves, its place is the point.
     """
@@ -165,7 +164,7 @@ def _table(measurements: Sequence[Measurement], products: Sequence[Product]) -> 
 
 
 def _sds(variances: FloatArray, other: FloatArray, known: BoolArray) -> FloatArray:
-    """Standard deviations (modes, rows) of the least-squares factor of rows, given the `other`."""
+    """Return standard deviations (modes, rows) of the rows' least-squares factor, given `other`."""
     weights = np.where(known, other[:, np.newaxis, :] ** 2, 0.0)
     spread = np.sum(weights * np.where(known, variances, 0.0), axis=2)
     return np.asarray(np.sqrt(spread) / np.maximum(np.sum(weights, axis=2), _TINY))
@@ -174,7 +173,7 @@ def _sds(variances: FloatArray, other: FloatArray, known: BoolArray) -> FloatArr
 def _along_hammer(
     table: _Table, at_hammer: FloatArray, sds: FloatArray, at_sensor: FloatArray
 ) -> Shapes:
-    """The shapes at the hammer's places; in each plane of the sensors where its own is unknown."""
+    """Return shapes at the hammer's positions; in each sensor plane if its plane is unknown."""
     planes = [point.plane for point in table.sensors.values()]
     points, values, spreads = [], [], []
     for row, hammer in enumerate(table.hammers.values()):
@@ -189,8 +188,8 @@ def _along_hammer(
 def _share(
     at_sensor: FloatArray, planes: Sequence[Plane | None], plane: Plane | None
 ) -> FloatArray:
-    """How much each mode (modes,) moves the sensors in `plane`, with the sign of the largest."""
-    part = at_sensor[:, [own == plane for own in planes]]
+    """Return the motion of each mode (modes,) in `plane`, with the sign of the largest."""
+    part = at_sensor[:, [each == plane for each in planes]]
     largest = np.take_along_axis(part, np.argmax(np.abs(part), axis=1)[:, np.newaxis], axis=1)
     return np.asarray(np.sign(largest[:, 0]) * np.linalg.norm(part, axis=1))
 
@@ -201,7 +200,7 @@ _TOLERANCE = 1e-9
 
 
 def hang_together(known: BoolArray) -> bool:
-    """Whether the known entries (rows, columns) are joined by steps along rows and columns.
+    """Return whether the known entries (rows, columns) are joined by steps along rows and columns.
 
     Only then all entries of a factor have one scale.
     """
@@ -214,7 +213,7 @@ def hang_together(known: BoolArray) -> bool:
 
 
 def factors(products: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Least-squares factors (modes, rows), (modes, columns) of `products` (modes, rows, columns).
+    """Return factors (modes, rows), (modes, columns) of `products` (modes, rows, columns).
 
     Only the `known` entries (rows, columns) count. By turns each factor is the least-squares
     solution given the other; the second has the norm 1.
@@ -234,7 +233,7 @@ def factors(products: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatAr
 
 
 def _first_guess(values: FloatArray) -> FloatArray:
-    """The largest row of each mode; columns it does not know are 0 and take no part at first."""
+    """Return the largest row of each mode; unknown columns are 0 and do not count at first."""
     largest = np.argmax(np.sum(values**2, axis=2), axis=1)
     return np.asarray(values[np.arange(len(values)), largest])
 

@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a reader said, not yet checked against what was asked."""
+    """Hold the result of a reader, not yet checked against the request."""
 
     refused: bool
     found: Any

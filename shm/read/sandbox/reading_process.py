@@ -40,7 +40,7 @@ _CODE = (
     "from shm.read.sandbox.serving import serve; serve()"
 )
 _TIME_IS_UP = b"late"
-_KEPT = ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")
+_PASSED_ON = ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")
 _OURS = {
     "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
     "HDF5_USE_FILE_LOCKING": "FALSE",  # nobody writes what is archived
@@ -76,7 +76,7 @@ class _Reader:
                 [sys.executable, "-I", "-X", "utf8", "-c", _CODE, paths],
                 stdin=theirs.fileno(),
                 stdout=subprocess.DEVNULL,
-                env={name: os.environ[name] for name in _KEPT if name in os.environ} | _OURS,
+                env={name: os.environ[name] for name in _PASSED_ON if name in os.environ} | _OURS,
                 start_new_session=True,
             )
         self.owner, self.requests = os.getpid(), ours
@@ -105,8 +105,8 @@ class _Reader:
             finally:
                 os.close(into)
             raw = _received(out, limits)
-            said = self._heard(4, _GRACE_S)
-            status = int(struct.unpack("i", said)[0]) if len(said) == 4 else None
+            received = self._heard(4, _GRACE_S)
+            status = int(struct.unpack("i", received)[0]) if len(received) == 4 else None
         finally:
             os.close(out)
             if status is None:

@@ -35,7 +35,7 @@ class Course:
 
 
 def specify(courses: Sequence[Course]) -> spec.Specification:
-    """One panel; a hanger has its own colour and symbol."""
+    """Return one panel in which each hanger has its colour and symbol."""
     marks: list[spec.Mark] = [level(0.0, "baseline", "quiet", "dot")]
     for course, (colour, symbol) in zip(courses, _MARKS, strict=False):
         marks += _marks(course, colour, symbol)
@@ -78,7 +78,7 @@ def caption(courses: Sequence[Course]) -> str:
 
 
 def alt(courses: Sequence[Course]) -> str:
-    """For a blind reader: the latest of each."""
+    """Return the latest value of each hanger for a blind reader."""
     latest = [
         f"{each.name} {_words(each.shifts[-1])} over {formatting.counted(len(each.times), 'test')}"
         for each in courses

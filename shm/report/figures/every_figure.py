@@ -49,7 +49,7 @@ def bridge_figures(data: BridgeReport) -> tuple[Illustration, ...]:
 
 
 def modal_test_figures(sheet: ModalTestReport) -> tuple[Illustration, ...]:
-    """All of one hammer test."""
+    """Return all of one hammer test."""
     return drawn(OF_MODAL_TEST, Shown.of(sheet))
 
 

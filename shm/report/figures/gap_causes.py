@@ -40,7 +40,7 @@ class Bar:
 
 
 def specify(sheet: DiagnosisSheet) -> spec.Specification | None:
-    """With the Bayes factors, and brackets around causes that the data cannot tell apart."""
+    """Return bars with Bayes factors, and brackets around indistinguishable causes."""
     bars = _bars(sheet.diagnosis)
     if not any(bar.probability > 0 for bar in bars):
         return None
@@ -73,7 +73,7 @@ def probability_bars(
     bars: Sequence[Bar], longest: int = _LABEL_ON_SCREEN,
     ends: tuple[float, float] = (-0.6, 1.15), marks: Sequence[spec.Mark] = (),
 ) -> spec.Specification:  # fmt: skip
-    """Bars one below the other, their labels in lines of at most so many letters.
+    """Return bars one below the other, their labels broken at so many letters.
 
     `ends` are the upper end of the one axis and the right one of the other.
     """
@@ -120,7 +120,7 @@ def _others(diagnosis: Diagnosis) -> tuple[Bar, Bar]:
 
 
 def _shown(diagnosis: Diagnosis) -> list[tuple[Claim, Cause]]:
-    """Causes of any probability to speak of, at least three where there are so many."""
+    """Return causes of relevant probability, at least three where there are so many."""
     all_causes = [
         (claim, cause) for claim in group_causes(diagnosis.causes) for cause in claim.causes
     ]
@@ -156,7 +156,7 @@ def _notes(
     x: Sequence[float], y: Sequence[float], wording: Sequence[str], colour: str = "quiet",
     side: spec.Side = "left",
 ) -> spec.Points:  # fmt: skip
-    """Words alone."""
+    """Return text without markers."""
     return spec.Points(x=x, y=y, size=0, labels=wording, label_side=side, colour=colour)
 
 
@@ -194,7 +194,7 @@ _MOST_TICKS = 24  # numbers of hangers that a page has room for
 
 
 def specify_shared(diagnosis: BridgeDiagnosis) -> spec.Specification | None:
-    """Above the probability of each hanger to have it, below its size with the family's own."""
+    """Return the probability of each hanger to have it above its size with the family's."""
     if (leading := diagnosis.leading) is None:
         return None
     at = range(len(leading.members))

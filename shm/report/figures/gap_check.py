@@ -32,7 +32,7 @@ _LOOKS = (
 
 
 def specify(check: GapCheck) -> spec.Specification | None:
-    """Effects as rows, sizes from the weakest to the strongest, a mark for each diagnosis."""
+    """Return effects as rows, sizes from weakest to strongest, a mark for each diagnosis."""
     if not check.effects:
         return None
     places = range(len(check.effects))

@@ -146,7 +146,7 @@ def _marks(residuals: Sequence[Residual], plane: Plane, tests: Sequence[str]) ->
 def _excluded(
     residuals: Sequence[Residual], sheet: DiagnosisSheet, low: float, high: float
 ) -> list[spec.Mark]:
-    """Gross errors as crosses with their size, at the edge where they lie beyond the others."""
+    """Return gross errors as crosses with their size, at the edge if they exceed the others."""
     last = max(r.order for r in measured(sheet))
     return [
         spec.Points(
@@ -179,7 +179,7 @@ def _sd_percent(residual: Residual) -> float:
 
 
 def local(sheet: DiagnosisSheet) -> list[GapPlace]:
-    """Places with a profile, those that explain most first."""
+    """Return places with a profile, those that explain most first."""
     found = [place for place in sheet.diagnosis.places if len(place.profile) > 1]
     return sorted(found, key=lambda place: -place.share)[: len(_LOOKS)]
 
@@ -196,7 +196,7 @@ def profiles(sheet: DiagnosisSheet) -> spec.Panel:
 
 
 def _profile(place: GapPlace, colour: str, dash: spec.Dash) -> list[spec.Mark]:
-    """One kind of cause as a curve, or as bars where it may only sit at a few places."""
+    """Return one kind of cause as a curve, or as bars where it can only be at a few places."""
     x_m, density = np.array(place.profile).T
     density = density / max(float(np.nanmax(density)), 1e-300)
     name, hover = f"{formatting.quantity(place.kind)} ({_share(place)})", "%{x:.2f} m"
@@ -292,8 +292,8 @@ def _alt(sheet: DiagnosisSheet) -> str:
     there = f" {places_in_words(sheet)}" if local(sheet) else ""
     count = formatting.counted(len(residuals), "residual")
     gross = ", ".join(f"{r.plane} {r.order} in {r.test}" for r in excluded(sheet))
-    set_aside = f" Set aside as a gross error: {gross}." if gross else ""
-    return f"{count} of frequencies; the largest: {wording}.{set_aside}{there}"
+    gross_words = f" Set aside as a gross error: {gross}." if gross else ""
+    return f"{count} of frequencies; the largest: {wording}.{gross_words}{there}"
 
 
 FIGURE = spec.Member("gap_map", "Where the gap lies", specify, caption, _alt)

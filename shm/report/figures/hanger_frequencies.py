@@ -77,7 +77,7 @@ def _points(plane: Plane, compared: Sequence[PredictedFrequency]) -> spec.Points
 
 
 def _measurement(known: Sequence[Mode]) -> spec.Bars:
-    """The measurement's own 90 % interval around 1, where its standard deviation is known."""
+    """Return the measurement's 90 % interval around 1, where its standard deviation is known."""
     half = np.array([NORMAL_90 * mode.frequency_sd_hz / mode.frequency_hz for mode in known])
     return spec.Bars(
         x=[mode.order + _NEXT_TO[mode.plane] for mode in known], y=2 * half, base=1 - half,

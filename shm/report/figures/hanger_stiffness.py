@@ -42,7 +42,7 @@ class Course:
 def specify(
     courses: Sequence[Course], reach_decades: float, is_on_screen: bool = False
 ) -> spec.Specification | None:
-    """Side by side on paper, one below the other on a screen, which may be narrow."""
+    """Return side by side on paper, one below the other on a screen, which may be narrow."""
     if not courses:
         return None
     panels = [_panel(course, reach_decades, is_on_screen) for course in courses]
@@ -161,7 +161,7 @@ def _courses(data: HangerReport) -> list[Course]:
 
 
 def names_of(rows: Iterable[Mapping[str, object]]) -> list[str]:
-    """`transverse_end_stiffness` first."""
+    """Return the names of the stiffnesses, `transverse_end_stiffness` first."""
     return sorted({name for row in rows for name in row})[::-1]
 
 

@@ -227,8 +227,10 @@ def _noted(notes: Sequence[Note]) -> list[Deed]:
 
 
 def _range(course: Course, scale: float) -> tuple[float, float]:
-    """Tests, state, baseline, thresholds and a nominal tension near them; lone intervals may lie
-    beyond."""
+    """Return the range of tests, state, baseline, thresholds and a nominal tension close by.
+
+    Single wide intervals may exceed it.
+    """
     counted = np.ones(len(course.times), bool)
     counted[list(course.excluded)] = len(course.excluded) == len(course.times)
     seen: list[FloatArray] = [course.bounds_n.middle[counted]]

@@ -1,5 +1,6 @@
-"""The records of a test on one axis of time, what each hit left in them, and the hits themselves
-laid over each other: pulse, force spectrum, ring-down.
+"""Draw the records of a test, what each hit left in them, and all hits superposed.
+
+Superposed are pulse, force spectrum and ring-down.
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ _MOST_CHANNELS, _MOST_FAULTY = 4, 2
 
 
 def shown_rows(sheet: ModalTestReport) -> list[int]:
-    """Rows of the accelerations to draw: a few that were left out, then of each plane in turn
-    the first, the last, those between."""
+    """Return rows of accelerations to draw: some left out, then some of each plane in turn.
+
+    Of a plane the first, the last, and those between.
+    """
     channels = sheet.recordings[0].accelerations
     faults = sheet.channel_faults
     faulty = [row for row, channel in enumerate(channels) if channel.name in faults]
@@ -47,7 +50,7 @@ def _ends_first(rows: list[int]) -> list[int]:
 
 
 def strongest_row(sheet: ModalTestReport) -> int:
-    """Row of the acceleration that moves most in the first record, faulty ones aside."""
+    """Return the row of the sound acceleration that moves most in the first record."""
     faults = sheet.channel_faults
     peaks = [
         -1.0 if channel.name in faults else float(np.nanmax(np.abs(channel.values), initial=0.0))
@@ -95,7 +98,7 @@ def channel_of(record: Recording, row: int | None) -> Channel | None:
 
 
 def thinned(records: Sequence[Recording], row: int | None) -> tuple[FloatArray, FloatArray]:
-    """Time in s and values of one channel over all records, thinned by their envelope; both (m,).
+    """Return time in s and values of one channel, thinned by their envelope; both (m,).
 
     NaN where samples are, and between the records, so that a line drawn through them breaks.
     """
@@ -112,7 +115,7 @@ def thinned(records: Sequence[Recording], row: int | None) -> tuple[FloatArray, 
 
 
 def unknown_times_s(records: Sequence[Recording], row: int | None) -> FloatArray:
-    """The middle of each bin with samples that are not a number, on the common axis, in s."""
+    """Return the middle of each bin with samples that are NaN, on the common axis, in s."""
     found: list[float] = []
     for offset, record in zip(offsets_s(records), records, strict=True):
         channel = channel_of(record, row)
@@ -143,9 +146,11 @@ _FADE_BINS = 80  # layout: steps that the eye takes for a line
 
 @dataclass(frozen=True, eq=False)
 class HitRecord:
-    """One hit. `time_s` and `force_n` (samples,) of its pulse, 0 s where it begins;
-    `spectrum_hz` and `spectrum_db` (lines,), relative to the spectrum's largest value;
-    `fade_s` and `fade_m_s2_n` (bins,): largest accelerations after the hit per peak force.
+    """Hold the signals of one hit.
+
+    `time_s` and `force_n` (samples,) of its pulse, 0 s where it begins; `spectrum_hz` and
+    `spectrum_db` (lines,), relative to the spectrum's largest value; `fade_s` and `fade_m_s2_n`
+    (bins,): largest accelerations after the hit per peak force.
     """
 
     number: int
@@ -176,20 +181,20 @@ class HitRecord:
 
 
 def hit_records(sheet: ModalTestReport) -> list[HitRecord]:
-    """Every hit whose record is at hand, in the order of the hits."""
+    """Return every hit whose record is at hand, in the order of the hits."""
     row = strongest_row(sheet) if sheet.recordings else 0
     found = [_hit_record(sheet, number, hit, row) for number, hit in located_hits(sheet)]
     return [hit_record for hit_record in found if hit_record is not None]
 
 
 def shown_hits(sheet: ModalTestReport) -> list[HitRecord]:
-    """All hits, or some of them with every dropped one first."""
+    """Return all hits, or some of them with every dropped one first."""
     dropped_first = sorted(hit_records(sheet), key=lambda hit_record: hit_record.hit.used)
     return sorted(dropped_first[:_MOST_SHOWN], key=lambda hit_record: hit_record.number)
 
 
 def hit_name(hit_record: HitRecord) -> str:
-    """`hit 2, dropped: double hit`."""
+    """Return `hit 2, dropped: double hit`."""
     reason = "" if hit_record.hit.used else f", dropped: {hit_record.hit.reason}"
     return f"hit {hit_record.number}{reason}"
 
@@ -214,7 +219,7 @@ def _run(hit_at: BoolArray) -> int:
 
 
 def _stop(sheet: ModalTestReport, hit: Hit) -> int:
-    """Shortly before the next hit of the same record begins, or where the record ends."""
+    """Return the sample shortly before the next hit in the record, or where the record ends."""
     record = sheet.recordings[hit.record]
     margin = int(_BEFORE_S * record.sampling_rate_hz) + _FILTER_SAMPLES
     later = [h.start for h in sheet.hits if h.record == hit.record and h.start > hit.start]
@@ -238,7 +243,7 @@ def _pulse(force: FloatArray, hit: Hit, rate: float) -> tuple[FloatArray, FloatA
 
 
 def _spectrum(force_n: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """NaN throughout, so that nothing is drawn, where samples of the pulse are missing."""
+    """Return the pulse's spectrum; NaN, which is not drawn, where samples are missing."""
     length = max(len(force_n), int(_TRANSFORM_S * rate))
     size = np.abs(np.fft.rfft(force_n, n=length))
     decibel = 20 * np.log10(np.maximum(size / max(float(size.max()), _TINY), _TINY))
@@ -269,7 +274,7 @@ def _draw(shown: Shown) -> spec.Specification | None:
 
 
 def _look(hit_record: HitRecord, place: int) -> dict[str, Any]:
-    """Colour, dashes and name of a hit: a dropped one is red."""
+    """Return colour, dashes and name of a hit: a dropped one is red."""
     name = hit_name(hit_record)
     if not hit_record.hit.used:
         dashes = _DROPPED_DASHES[place % len(_DROPPED_DASHES)]

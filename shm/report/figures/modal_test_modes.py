@@ -1,6 +1,4 @@
-"""The modes of a test: the poles over model order that they were chosen from, their damping and how
-sure they are, their shapes along the hanger.
-"""
+"""Draw the modes of a test: poles over model order, damping, uncertainty and shapes."""
 
 from __future__ import annotations
 
@@ -63,7 +61,7 @@ def _poles(
 def _background(
     found: Spectrum, low_hz: float, high_hz: float, bottom: float, top: float
 ) -> list[spec.Mark]:
-    """The spectrum over all points, its logarithm between the lowest order and the highest."""
+    """Return the log spectrum over all points, drawn between lowest and highest order."""
     start, stop = np.searchsorted(found.frequency_hz, [low_hz, high_hz])
     lines = slice(max(1, int(start)), int(stop) + 1)
     values = found.together[lines]
@@ -124,7 +122,7 @@ def shown_modes(sheet: ModalTestReport) -> list[Mode]:
 
 
 def modes_with_shape(sheet: ModalTestReport) -> list[Mode]:
-    """Modes measured at so many places or directions that there is a shape to see."""
+    """Return modes measured at enough positions or directions to show a shape."""
     return [mode for mode in sheet.modes if _known_values(mode) >= _LEAST_POINTS]
 
 
@@ -134,7 +132,7 @@ def _known_values(mode: Mode) -> int:
 
 
 def extent_m(sheet: ModalTestReport) -> tuple[float, float]:
-    """From end to end of the hanger, or of the measured places where its length is not known."""
+    """Return the ends of the hanger, or of the measured positions where its length is unknown."""
     if sheet.hanger is not None:
         return 0.0, sheet.hanger.length_m
     places = [p.x_m for mode in sheet.modes for p in mode.shape if math.isfinite(p.x_m)]
@@ -143,7 +141,7 @@ def extent_m(sheet: ModalTestReport) -> tuple[float, float]:
 
 
 def panel_title(mode: Mode) -> str:
-    """`2: 13.85 Hz`."""
+    """Return `2: 13.85 Hz`."""
     return f"{mode.order}: {mode.frequency_hz:.4g} Hz"
 
 
@@ -153,8 +151,11 @@ def guide_name(sheet: ModalTestReport) -> str:
 
 
 def guide(sheet: ModalTestReport, mode: Mode) -> Guide | None:
-    """A taut string's shape of the mode's order in the measured size, None where it does not come
-    near the points; straight lines between the places where the hanger is not described."""
+    """Return the shape of a taut string of the mode's order, scaled to the measurement.
+
+    None where it does not come close to the points; straight lines between them where the
+    hanger is not described.
+    """
     known = [p for p in mode.shape if math.isfinite(p.x_m) and math.isfinite(p.value)]
     pairs = sorted((p.x_m, p.value) for p in known)
     x_m, value = np.array(pairs, dtype=np.float64).reshape(-1, 2).T
@@ -190,7 +191,7 @@ def _draw_shapes(shown: Shown) -> spec.Specification | None:
 
 
 def rows_of(sheet: ModalTestReport, is_on_screen: bool) -> list[list[Mode]]:
-    """The modes row by row, the rows of a plane about equally full: a plane begins a new row."""
+    """Return the modes in about equally full rows; each plane begins a new row."""
     modes = shown_modes(sheet)
     planes = [[mode for mode in modes if mode.plane == plane] for plane in PLANES]
     longest = max(map(len, planes)) or 1

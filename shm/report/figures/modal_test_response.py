@@ -1,8 +1,6 @@
-"""The curve in which the modes of a test are peaks: the response at a few points with the modal fit
-over it, phase and coherence; how modes are marked over frequency.
+"""Draw the response at a few points with the modal fit over it, phase and coherence.
 
-Of an ambient test, in which nobody hit, the spectral density stands instead. A screen shows the one
-point that is asked for.
+Of an ambient test it is the spectral density. A screen shows the one point that is asked for.
 """
 
 from __future__ import annotations
@@ -73,7 +71,7 @@ class Shown:
 
     @classmethod
     def of(cls, sheet: ModalTestReport, point: int | None = None) -> Shown:
-        """With the curve worked out from the sheet, whose records must be there."""
+        """Return the curves computed from the records of the sheet, which must be there."""
         return cls(sheet, spectrum(sheet), point)
 
     @property
@@ -82,7 +80,7 @@ class Shown:
 
 
 def _density(records: Sequence[Recording]) -> Spectrum | None:
-    """Welch's estimate (1967), averaged over the records that have the sensors of the first."""
+    """Return Welch's estimate (1967), averaged over the records with the sensors of the first."""
     first = records[0]
     similar = [r for r in records if len(r.accelerations) == len(first.accelerations)]
     length = min(record.samples for record in similar)
@@ -107,13 +105,13 @@ def _welch(record: Recording, segment: int) -> tuple[FloatArray, FloatArray]:
 
 
 def shown_range(sheet: ModalTestReport) -> tuple[float, float]:
-    """Lowest and highest frequency to draw, in Hz."""
+    """Return the lowest and highest frequency to draw, in Hz."""
     low, high = searched_range(sheet)
     return (0.0 if low < 0.15 * high else low - _MARGIN * (high - low), high * (1 + _MARGIN / 2))
 
 
 def searched_range(sheet: ModalTestReport) -> tuple[float, float]:
-    """The band in Hz; where it is not known, from the lowest to the highest that was found."""
+    """Return the band in Hz; if unknown, from the lowest to the highest mode."""
     if sheet.band_hz is not None:
         return sheet.band_hz
     found = [mode.frequency_hz for mode in sheet.modes]
@@ -125,7 +123,7 @@ def searched_range(sheet: ModalTestReport) -> tuple[float, float]:
 def telling_points(
     points: Sequence[ResponsePoint], modes: Sequence[Mode], values: FloatArray, most: int
 ) -> list[int]:
-    """Indices of at most `most` points that between them show the modes best, in their order.
+    """Return indices of at most `most` points that together show the modes best.
 
     `values` (points, modes) is how strongly each point shows each mode. Planes take turns.
     """
@@ -160,8 +158,10 @@ _HEADROOM = 0.36
 
 
 def mode_marks(sheet: ModalTestReport, low_hz: float, high_hz: float) -> list[spec.Mark]:
-    """A symbol and a line at each mode within the axis, a row for each plane, orders where there is
-    room."""
+    """Return a symbol and a line at each mode within the axis, a row for each plane.
+
+    Orders are written where there is room.
+    """
     found: list[spec.Mark] = []
     for plane in PLANES:
         modes = sorted(
@@ -273,7 +273,7 @@ def _curve(
     frequency_hz: FloatArray, values: FloatArray, point: ResponsePoint | None, width: float,
     name: str = "", dash: spec.Dash = "solid",
 ) -> spec.Line:  # fmt: skip
-    """In the colour of the point's plane; dark without one."""
+    """Return a curve in the colour of the point's plane; dark without one."""
     places = spec.envelope_places(values, _BINS)
     return spec.Line(
         x=frequency_hz[places], y=values[places], width=width, name=name, dash=dash, hover=_HOVER,
@@ -284,7 +284,7 @@ def _curve(
 def _phase(
     shown: Shown, response: FrequencyResponse, index: int, band_hz: tuple[float, float]
 ) -> spec.Panel:
-    """Phase from -90 to 270 degrees, so that 0 and 180, between which it jumps, lie inside."""
+    """Return phase from -90 to 270 degrees, so that 0 and 180, where it jumps, are inside."""
     lines, fit = _lines(response.frequency_hz, band_hz), shown.sheet.identification.fit
     measured = response.accelerance[index, lines]
     # Of noise, phase fills the whole panel: the strongest line of each bin stands for it.

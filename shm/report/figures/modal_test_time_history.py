@@ -128,7 +128,7 @@ def _hit_lines(sheet: ModalTestReport) -> list[spec.Mark]:
 
 
 def _hit_marks(sheet: ModalTestReport) -> list[spec.Mark]:
-    """A row of numbered symbols for the hits that were used, and for each reason to drop some."""
+    """Return numbered symbols for used hits in one row, and a row for each reason to drop."""
     located = located_hits(sheet)
     groups: dict[str, list[tuple[int, Hit]]] = {}
     for number, hit in located:
@@ -151,7 +151,7 @@ def _hit_marks(sheet: ModalTestReport) -> list[spec.Mark]:
 
 
 def _wording(number: int, hit: Hit, at_s: float) -> str:
-    """`at_s` is as the axis has it, also where records follow each other."""
+    """Describe a hit; `at_s` is on the axis, also where records follow each other."""
     what = "used" if hit.used else f"dropped: {hit.reason}"
     return f"hit {number}, {at_s:.3f} s, {formatting.plain(hit.peak_force_n, 4)} N, {what}"
 

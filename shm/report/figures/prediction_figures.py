@@ -1,6 +1,4 @@
-"""Figures of what a model class predicts: curves against one parameter, and a mode of a solid in
-space, coloured by how far it moves.
-"""
+"""Draw predictions of a model class: curves over one parameter, and a solid's mode in space."""
 
 from __future__ import annotations
 
@@ -33,7 +31,7 @@ class Curves:
 
 
 def specify(parts: Sequence[Curves], x_label: str, y_label: str) -> Specification:
-    """Panels side by side with one vertical axis; a mode has one colour in all of them."""
+    """Return panels side by side with one vertical axis; a mode has one colour in all."""
     bounds = limits(*(each.y.ravel() for each in parts))
     panels = [
         Panel(
@@ -76,7 +74,10 @@ _SWOLLEN = 2.0
 
 
 def draw(corners: FloatArray, moved: FloatArray) -> Figure:
-    """Of facets (n, 4, 3) in m and their motion, the largest 1, as `SolidModel.surface` gives."""
+    """Draw facets (n, 4, 3) in m, coloured by their motion, the largest 1.
+
+    `SolidModel.surface` gives both.
+    """
     # What draws is loaded where something is drawn. The last is a part that ships no types.
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize

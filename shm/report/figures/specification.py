@@ -207,13 +207,13 @@ class Specification:
 def stacked(
     panels: Sequence[Panel], height_inches: float, legend_columns: int = 4
 ) -> Specification:
-    """Panels one below the other."""
+    """Return panels one below the other."""
     rows = tuple((panel,) for panel in panels)
     return Specification(rows=rows, height_inches=height_inches, legend_columns=legend_columns)
 
 
 def limits(*values: Values, room: float = 0.08) -> tuple[float, float]:
-    """From the least known value to the largest, with a little room."""
+    """Return the least and the largest known value, with a little room."""
     known = np.concatenate([np.asarray(each, np.float64) for each in values])
     low, high = float(np.nanmin(known)), float(np.nanmax(known))
     margin = room * max(high - low, 1e-3 * abs(high))
@@ -270,8 +270,11 @@ _COLUMNS_AN_INCH = 17  # layout: letters of the smallest size, about half as wid
 
 @dataclass(frozen=True)
 class Member(Generic[Data]):
-    """A figure: `draw` gives None where `Data` lacks what it shows; `caption` explains what is
-    seen, `alt` says what a blind reader needs. What only paper shows may be drawn at once."""
+    """Define a figure: `draw` gives None where `Data` lacks what it shows.
+
+    `caption` explains what is seen, `alt` says what a blind reader needs. Figures on paper only
+    may be drawn at once.
+    """
 
     name: str
     title: str
@@ -310,7 +313,7 @@ class Illustration:
 
 
 def drawn(members: Sequence[Member[Data]], data: Data) -> tuple[Illustration, ...]:
-    """Every figure that `data` holds enough for, in the order of `members`."""
+    """Return every figure that `data` holds enough for, in the order of `members`."""
     made = (illustration(member, data) for member in members)
     return tuple(each for each in made if each is not None)
 
@@ -328,7 +331,7 @@ _REFERENCE = re.compile(r'(href="#|url\(#)([^")]+)')
 
 
 def png(figure: Figure, dots_per_inch: int = DOTS_PER_INCH, words: str = "") -> bytes:
-    """The figure on white; with `words` below it, where it goes without a page that says them."""
+    """Return the figure on white; `words` below it, where it is shown without a page."""
     box = None
     if words:
         columns = round(_COLUMNS_AN_INCH * figure.get_figwidth())
@@ -341,9 +344,11 @@ def png(figure: Figure, dots_per_inch: int = DOTS_PER_INCH, words: str = "") -> 
 
 
 def svg(figure: Figure, name: str, title: str, alt: str) -> str:
-    """The figure as one `<svg>` element: named for screen readers, its ids prefixed by `name`
-    and counted (so that they are unique on the page and the same on every run), its colours
-    CSS variables with the printed colour as fallback."""
+    """Return the figure as one `<svg>` element, named for screen readers.
+
+    Its ids are prefixed by `name` and counted (so that they are unique on the page and the same
+    on every run), its colours CSS variables with the printed colour as fallback.
+    """
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()

@@ -55,7 +55,7 @@ class Course:
 
 
 def specify(course: Course) -> spec.Specification:
-    """Panels over one time axis: spectrum, frequencies, tension with what befell the sensors."""
+    """Return panels over one time axis: spectrum, frequencies, tension with sensor events."""
     when = [*course.window_times, *course.hours]
     time = spec.Axis(label="time (UTC)", scale="date", range=(min(when), max(when)))
     panels = [_spectrogram(course)] if course.spectrum_db.size else []
@@ -122,7 +122,7 @@ def _health(events: Sequence[StreamEvent]) -> list[spec.Span]:
 
 
 def _broken(course: Course, *values: FloatArray) -> tuple[list[datetime], FloatArray, FloatArray]:
-    """Two courses with a NaN in each long gap, so that no line bridges it."""
+    """Return two courses with a NaN in each long gap, so that no line bridges it."""
     hours, longest = course.hours, _BREAK * PERIODS[course.period]
     places = [n for n in range(1, len(hours)) if hours[n] - hours[n - 1] > longest]
     times = list(hours)

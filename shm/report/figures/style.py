@@ -1,5 +1,6 @@
-"""The style of all figures: size, letters, quiet axes, colours that the colour-blind distinguish;
-a word stands beside each.
+"""Define the style of all figures: size, letters, quiet axes, distinguishable colours.
+
+A word is written next to each colour.
 """
 
 from __future__ import annotations
@@ -80,13 +81,13 @@ def one_panel(x_label: str, y_label: str, height_inches: float = 3.4) -> tuple[F
 
 
 def stacked(figure: FigureBase, heights: Sequence[float]) -> list[Axes]:
-    """Panels one below the other over one horizontal axis, with these shares of the height."""
+    """Return panels one below the other over one axis, with these fractions of the height."""
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False)
     return list(panels[:, 0])
 
 
 def dress(axes: Axes, x_label: str, y_label: str) -> None:
-    """Labels, grid and spines."""
+    """Set labels, grid and spines."""
     axes.set_facecolor("none")
     axes.set_xlabel(x_label, fontsize=_SMALL, color=INK)
     axes.set_ylabel(y_label, fontsize=_SMALL, color=INK)
@@ -114,7 +115,7 @@ def legend_above(axes: Axes, columns: int = 4) -> Legend:
 def legend_of_figure(
     figure: FigureBase, axes: Sequence[Axes], columns: int = 4, where: str = "outside upper left"
 ) -> None:
-    """One legend over the whole figure for all `axes`, each name once; none where nothing has."""
+    """Draw one legend over the figure for all `axes`, each name once; none without names."""
     named: dict[str, Artist] = {}
     for each in axes:
         handles, names = each.get_legend_handles_labels()

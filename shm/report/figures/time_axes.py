@@ -63,7 +63,7 @@ def thinned_words(count: int) -> str:
 
 
 def bounds_of(intervals: Sequence[Interval | None]) -> Bounds:
-    """Means with their 90 % intervals, NaN where there is none."""
+    """Return means with their 90 % intervals, NaN where there is none."""
     rows = [(each.low, each.mean, each.high) if each else (np.nan,) * 3 for each in intervals]
     return Bounds(*np.array(rows, dtype=np.float64).reshape(-1, 3).T)
 
@@ -90,7 +90,7 @@ def band(times: Sequence[datetime], bounds: Bounds, colour: str, name: str = "")
 
 
 def spans(bounds: Bounds) -> list[str]:
-    """`702.3 (90 %: 690.1 to 714.5)` of each."""
+    """Return `702.3 (90 %: 690.1 to 714.5)` of each."""
     rows = zip(bounds.low, bounds.middle, bounds.high, strict=True)
     return [f"{middle:.4g} (90 %: {low:.4g} to {high:.4g})" for low, middle, high in rows]
 
@@ -99,7 +99,7 @@ def single_tests(
     x: spec.Values, bounds: Bounds, names: Sequence[str], colour: str,
     name: str = "test by itself", size: float = 3.6,
 ) -> spec.Points:  # fmt: skip
-    """Single tests as marks with their 90 % intervals."""
+    """Return single tests as marks with their 90 % intervals."""
     wording = zip(names, spans(bounds), strict=True)
     return spec.Points(
         x=x, y=bounds.middle, low=bounds.low, high=bounds.high, caps=False, colour=colour,
@@ -129,14 +129,14 @@ def changes(
 
 
 def time_axis(times: Sequence[datetime]) -> spec.Axis:
-    """All tests with a little room, at least a day either side."""
+    """Return all tests with a little room, at least a day either side."""
     first, last = min(times), max(times)
     margin = max(_MARGIN * (last - first), _LEAST_MARGIN)
     return spec.Axis(label=TIME, scale="date", range=(first - margin, last + margin))
 
 
 def inner(values: FloatArray) -> FloatArray:
-    """The known ones, those far from the rest drawn near, as of a test that hardly sees a thing.
+    """Return the known values, with outliers drawn closer to the rest.
 
     For the limits of an axis: (n,) of any unit to (m,), m <= n.
     """

@@ -28,6 +28,11 @@ _LINEAGE = ("input_sha256", "settings_sha256", "version")
 _WITHOUT_SAMPLES = ("id", "model", "updated_at", "superseded_at")
 
 
+def find_newest_entry(store: Repository) -> int:
+    """Return the number of the last entry, 0 where there is none: it changes with results."""
+    return store.scalar(sa.select(sa.func.max(journal.c.id))) or 0
+
+
 def list_changes(
     store: Repository, limit: int | None = None, before: int | None = None
 ) -> tuple[AuditRow, ...]:

@@ -1,8 +1,4 @@
-"""Alerts: listed and taken note of over HTTP, and their page, some at a time: those that are open,
-then the others.
-
-Silences and maintenance windows: made and ended on the page of alerts.
-"""
+"""Show and acknowledge alerts; create and end silences and maintenance windows."""
 
 from __future__ import annotations
 
@@ -23,7 +19,7 @@ from shm.report import formatting
 from shm.report.hanger_status import HangerMessage
 from shm.store import Delivery, DeliveryState, News, Silence, StoredAlert
 from shm.store.queries.alerts import count_open_alerts, list_alert_page
-from shm.store.stored_alerts import said_of, silenced_until
+from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values.messages import Lead
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import test_page
@@ -57,7 +53,7 @@ def alerts_page(
     open_before: Before = None,
     noted_before: Before = None,
 ) -> Response:
-    """Alerts of all hangers or of one, the newest first.
+    """Return alerts of all hangers or of one, the newest first.
 
     `open_before` goes on among the open ones alone, `noted_before` among the others.
     """
@@ -88,14 +84,14 @@ def alerts_page(
 
 
 def _sentence(silence: Silence) -> str:
-    words = f"{said_of(silence)}, from {silence.starts_at:%Y-%m-%d %H:%M} on."
+    words = f"{describe_silence(silence)}, from {silence.starts_at:%Y-%m-%d %H:%M} on."
     return words[0].upper() + words[1:]
 
 
 def _some(
     site: Site, hanger: int | None, before: int | None, *, is_open: bool
 ) -> tuple[list[dict[str, Any]], int | None]:
-    """Alerts as the page shows them, and the number to go on after, if there are more."""
+    """Return a page of alerts, and the number to continue after, if there are more."""
     rows = list_alert_page(site.store, hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
     shown, older = paged(rows, _SHOWN)
     documents, now = alert_documents(shown, site), _messages(shown, site)
@@ -196,7 +192,7 @@ def acknowledge(site: AtSite, writer: Writer, alert_id: Row, comment: Acknowledg
 
 
 def alert_documents(found: Sequence[StoredAlert], site: Site) -> list[dict[str, Any]]:
-    """Alerts with what became of their deliveries, and what holds them back."""
+    """Return alerts with the state of their deliveries, and what holds these back."""
     silences, now = site.store.silences.list_all(), utc_now()
     hooks = {hook.name: hook for hook in site.workspace.bridge.hooks}
     owed = defaultdict[int, list[Delivery]](list)
@@ -236,9 +232,9 @@ def _delivery(row: Delivery, hook: Hook | None, message: str, now: datetime) -> 
     if hook is not None and row.state is DeliveryState.WAITING:
         until = hook.quiet_until(message, now, is_raised=row.news is News.RAISED)
     escalates = hook is not None and hook.escalation_after_seconds is not None
-    told = {name: getattr(row, name) for name in ("hook", "attempts", "last_error", "news")}
+    delivery = {name: getattr(row, name) for name in ("hook", "attempts", "last_error", "news")}
     state = {"state": row.state.value, "escalation": escalates, "waits_until": until}
-    return {**told, **state}
+    return {**delivery, **state}
 
 
 @router.post("/silences", include_in_schema=False)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
-from collections import OrderedDict
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -11,7 +9,7 @@ from pathlib import Path
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 
-from shm.errors import BadInput, NothingThere, ShmError
+from shm.errors import BadInput
 from shm.pipeline import utc_now
 from shm.pipeline.rebaselining import Order, set_baseline
 from shm.report import formatting
@@ -19,15 +17,14 @@ from shm.store import Workspace
 from shm.store.journal import Actor
 from shm.watch.repair_check import EVENT_KINDS
 from shm_daemon.web.access import AtSite, Engineer
-from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.forms import Form, reason_in, time_in
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import HangerNumber
+from shm_daemon.web.ordered_work import ordered_work_of, still_at_work
 from shm_daemon.web.site import described
 
 router = APIRouter(prefix="/hangers/{hanger_id}/baseline", include_in_schema=False)
 
-_MOST_REMEMBERED = 50  # technical: outcomes that a page may still ask for
 _AT_WORK = "Its tests are updated together; that takes some seconds …"
 
 
@@ -58,10 +55,6 @@ class SetBaseline:
         return Outcome(found.warning, found.sentences)
 
 
-Ordered = OrderedDict[str, SetBaseline | Outcome | ShmError]
-"""By the word that the page of an order asks with: the order, later what came of it."""
-
-
 @router.get("")
 def baseline_page(
     request: Request, site: AtSite, _: Engineer, hanger_id: HangerNumber, order: str = ""
@@ -84,7 +77,7 @@ def baseline_page(
 def order_baseline(
     request: Request, site: AtSite, engineer: Engineer, hanger_id: HangerNumber, form: Form
 ) -> Response:
-    """Has it made beside the interface."""
+    """Start a new baseline in the background."""
     one = described(site.workspace, hanger_id)
     since, why, kind = time_in(form, "since"), reason_in(form, "a baseline"), form.get("kind", "")
     if since is None:
@@ -93,33 +86,16 @@ def order_baseline(
         raise BadInput(f"{kind!r} is nothing that can be done.", remedy="Choose it in the form.")
     order = Order(since, why, engineer.actor.name, EVENT_KINDS[kind] if kind else None)
     wanted = SetBaseline(site.workspace.folder, one.id, order, engineer.actor, utc_now())
-    word = secrets.token_urlsafe(9)
-    background_worker_of(request).wanted(wanted)
-    ordered: Ordered = request.app.state.ordered_baselines
-    ordered[word] = wanted
-    while len(ordered) > _MOST_REMEMBERED:
-        ordered.popitem(last=False)
+    word = ordered_work_of(request).place(wanted)
     return RedirectResponse(f"/hangers/{one.id}/baseline?order={word}", 303)
 
 
 @router.get("/outcome")
 def outcome(request: Request, _: Engineer, hanger_id: HangerNumber, order: str) -> Response:
     """Return the outcome of a request without the frame; 202 while it is computed."""
-    ordered: Ordered = request.app.state.ordered_baselines
-    found = ordered.get(order)
-    if isinstance(found, SetBaseline):
-        try:
-            made = background_worker_of(request).wanted(found)
-        except ShmError as error:
-            made = error
-        if made is None:
-            return HTMLResponse(f'<p class="note">{_AT_WORK}</p>', 202, RETRY_AFTER)
-        found = ordered[order] = made
+    found = ordered_work_of(request).outcome(
+        order, f"Whether it was made, the page of hanger {hanger_id} says."
+    )
     if found is None:
-        raise NothingThere(
-            "this order is not known any more.",
-            remedy=f"Whether it was made, the page of hanger {hanger_id} says.",
-        )
-    if isinstance(found, ShmError):
-        raise found.with_traceback(None)
+        return still_at_work(_AT_WORK)
     return page(request, "baseline_outcome.html.j2", told=found)

@@ -1,6 +1,4 @@
-"""The page of the bridge: its elevation, what moved over it, and all hangers in a table; and the
-page of all bridges: this one and those of `[[other_bridge]]`, the worst first.
-"""
+"""Show the page of the bridge and the page of all bridges, the worst first."""
 
 from __future__ import annotations
 
@@ -14,11 +12,13 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 
 from shm.pipeline import utc_now
+from shm.pipeline.controls import control_charts
 from shm.report import formatting
 from shm.report.contents import hangers_unit
+from shm.report.control_report import control_lead
 from shm.values.messages import TODAY, WEEK, Lead, Urgency
 from shm.values.rounding import ForceUnit
-from shm_daemon.heartbeat import told
+from shm_daemon.heartbeat import duration_words
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import SUMMARY, test_page
 from shm_daemon.web.background_work import RETRY_AFTER
@@ -77,6 +77,10 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
             for each in bridge.hangers
             for text in each.summary.message.beyond_lead(each.summary.warnings)
         ],
+        controls=[
+            (chart.hanger, control_lead(chart))
+            for chart in control_charts(site.workspace, site.store)
+        ],
         notes=site.store.notes.list_all(of_bridge=True),
         rows=[SimpleNamespace(**_row(each, unit, now)) for each in bridge.hangers],
     )
@@ -132,7 +136,7 @@ def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
     return [
         (
             "Last test",
-            f"{told(now - newest)} ago" if newest else "none yet",
+            f"{duration_words(now - newest)} ago" if newest else "none yet",
             f"hanger {latest.hanger.id}, {formatting.moment(newest)}" if latest else "",
         ),
         ("Hangers", str(len(bridge.hangers)), "; ".join(missing) or "all with a result"),
@@ -156,7 +160,7 @@ def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
         "when": _WHEN[line.message.urgency],
         "open_alerts": line.open_alerts,
         "day": f"{latest.time:%Y-%m-%d}" if latest else "",
-        "age": f"{told(now - latest.time)} ago" if latest else "",
+        "age": f"{duration_words(now - latest.time)} ago" if latest else "",
         "test_page": test_page(hanger.id, latest.name) if latest else "",
         "is_quiet": each.is_quiet,
         "tests": each.tests,
@@ -245,7 +249,11 @@ def _words_of(row: BridgeRow, now: datetime) -> str:
     found = row.summary
     if found is None or row.told_at is None:
         return ""
-    latest = f"last test {told(now - found.latest_test_at)} ago" if found.latest_test_at else ""
+    latest = (
+        f"last test {duration_words(now - found.latest_test_at)} ago"
+        if found.latest_test_at
+        else ""
+    )
     parts = (
         found.bridge if found.bridge != row.name else "",
         formatting.counted(found.hangers, "hanger"),

@@ -47,7 +47,7 @@ def compare_page(
     hanger: _Chosen = None,
     since: Annotated[str, Query(max_length=10)] = "",
 ) -> HTMLResponse:
-    """Hangers to choose from, and those that were chosen, beside each other."""
+    """Show hangers to choose from, and the chosen ones next to each other."""
     every, day = site.workspace.bridge.hangers, _day(since)
     chosen = _chosen(site, hanger) if hanger else []
     rows = hanger_summaries(site.workspace, site.store, utc_now(), chosen)
@@ -91,7 +91,7 @@ def compare_figure(
 
 
 def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:
-    """Each once, in the order of the description; raises BadInput, NothingThere."""
+    """Return each once, in the order of the description; raises BadInput, NothingThere."""
     if len(set(numbers)) > MOST:
         raise BadInput(
             f"{len(set(numbers))} hangers are too many for one figure.",
@@ -113,7 +113,7 @@ def _begin(since: date | None) -> datetime:
 
 
 def _day(text: str) -> date | None:
-    """Of a form whose field may be left empty; raises BadInput."""
+    """Return the day of a form field, which may be empty; raises BadInput."""
     if not text:
         return None
     try:
@@ -123,7 +123,7 @@ def _day(text: str) -> date | None:
 
 
 def _courses(site: Site, chosen: Sequence[Hanger], since: date | None) -> list[Course]:
-    """Of those that have a baseline and tests since that day."""
+    """Return the courses of the hangers with a baseline and tests since that day."""
     begin = _begin(since) if since else None
     baselines = list_baselines_in_force(site.store, chosen)
     found = []

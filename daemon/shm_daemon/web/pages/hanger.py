@@ -1,6 +1,4 @@
-"""The page of one hanger: how it stands, how it went, what the model misses, its tests; its report
-as a file, and its results as a table.
-"""
+"""Show the page of a hanger: state, trend, model, tests; its report and its results as files."""
 
 from __future__ import annotations
 
@@ -8,7 +6,6 @@ import csv
 import io
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -54,13 +51,11 @@ _EVENTS = {
     EventKind.UNDONE: "adoption undone",
     EventKind.ACKNOWLEDGED: "alert acknowledged",
 }
-_TABLES = (
-    hanger_tables.results,
-    hanger_tables.frequencies,
-    hanger_tables.parameters,
-    hanger_tables.models,
-    hanger_tables.quality,
-)
+_TABLES = {
+    "numbers": (hanger_tables.results, hanger_tables.frequencies),
+    "model": (hanger_tables.models, hanger_tables.parameters),
+    "tests": (hanger_tables.quality, hanger_tables.conditions),
+}
 _TYPES = {"pdf": "application/pdf", "html": "text/html; charset=utf-8"}
 # Judgement: a report takes 5 to 15 s; a browser's user waits for a minute, hardly longer.
 _LONGEST_S = 60.0
@@ -86,7 +81,7 @@ class Chart:
 
 @router.get("/hangers/{hanger_id}")
 def hanger(request: Request, site: AtSite, _: Reader, view: View) -> HTMLResponse:
-    """Everything known of a hanger; its figures are fetched as they come into view."""
+    """Show a hanger; its figures are fetched as they come into view."""
     one, rows = view.hanger, lines_before(view, _LATEST_TESTS + 1)
     common: dict[str, Any] = {
         "name": formatting.hanger_name(one.id, one.name),
@@ -107,7 +102,7 @@ def hanger(request: Request, site: AtSite, _: Reader, view: View) -> HTMLRespons
 
 @router.get("/hangers/{hanger_id}/tests")
 def all_tests(request: Request, _: Reader, view: View, before: Before = None) -> HTMLResponse:
-    """All tests of a hanger, the newest first, some a page."""
+    """Return all tests of a hanger, the newest first, some a page."""
     one = view.hanger
     tests, older = paged(lines_before(view, _TESTS_A_PAGE + 1, before), _TESTS_A_PAGE)
     return page(
@@ -125,9 +120,9 @@ def all_tests(request: Request, _: Reader, view: View, before: Before = None) ->
 def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
     lead = report.now.message
     assert lead.status is not None  # a hanger with a test has one
-    tables = [make(report) for make in _TABLES]
+    tables = {part: [make(report) for make in of] for part, of in _TABLES.items()}
     if view.states is not None:
-        tables.insert(2, temperature_table(view.states))
+        tables["numbers"].append(temperature_table(view.states))
     return {
         "status_word": lead.status.value,
         "style": lead.status.name.lower(),
@@ -139,13 +134,12 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
             part: [_chart(view, e) for e in FIGURES if e.part == part and e.is_there(view)]
             for part in ("trends", "model", "gap")
         },
-        "tables": [table for table in tables if table.rows],
+        "tables": {part: [each for each in of if each.rows] for part, of in tables.items()},
         "alerts": hanger_tables.alerts(report),
         "events": _events(view),
         "gap": gap_part(report),
         "answers": answers(view.sheet) if view.sheet else (),
         "evidence": evidence(view.sheet) if view.sheet else (),
-        "origin": hanger_tables.conditions(report),
     }
 
 
@@ -172,7 +166,7 @@ def _events(view: HangerView) -> Table:
 
 def _neighbours(workspace: Workspace, hanger: Hanger) -> list[tuple[str, Hanger]]:
     """Return the hangers before and after it in the description."""
-    order: Sequence[Hanger] = workspace.bridge.hangers
+    order = workspace.bridge.bars
     place = [each.id for each in order].index(hanger.id)
     before = [("previous", order[place - 1])] if place > 0 else []
     return before + [("next", each) for each in order[place + 1 : place + 2]]
@@ -214,7 +208,7 @@ def report(
 
 @router.get("/hangers/{hanger_id}/results.csv")
 def results(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Response:
-    """Every test with its tension averaged over the model classes, in N, the oldest first."""
+    """Return every test with its tension averaged over the classes, in N, oldest first, as CSV."""
     hanger = described(site.workspace, hanger_id)
     _refuse_untested(site.store, hanger)
     text = io.StringIO()
@@ -256,5 +250,5 @@ def _row(point: TrendPoint) -> tuple[str, ...]:
 
 
 def _cell(value: float) -> str:
-    """Empty where it is not known."""
+    """Return a value for CSV; empty where unknown."""
     return f"{value:.6g}" if math.isfinite(value) else ""

@@ -65,7 +65,7 @@ def one_test(
         results=filled(
             modal_test_report.modes(sheet),
             modal_test_report.quality(sheet),
-            modal_test_report.set_aside(sheet),
+            modal_test_report.foreign_modes(sheet),
         ),
         charts=[(each, *_chart(view, each, chosen)) for each in view.figures()],
         points=[point_name(point) for point in points],
@@ -80,7 +80,7 @@ def one_test(
 
 
 def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
-    """None where they are not worked out."""
+    """Return the tables of hits; None where they are not computed."""
     whole = None if view.missing else view.background_worker.stored(view.order)
     return filled(whole.hits) if whole else None
 

@@ -1,6 +1,4 @@
-"""The page of operation: whether the work flows, what was refused, what `shm doctor` says; and what
-is held until a person decides whether it counts.
-"""
+"""Show the page of operation: state of the work, refused files, `shm doctor`, held recordings."""
 
 from __future__ import annotations
 
@@ -27,7 +25,7 @@ from shm.store import ENDED, DeliveryState, Workspace
 from shm.store.queries.alerts import count_deliveries
 from shm.store.queries.recordings import count_stages, find_latest_hold, find_oldest_waiting
 from shm_daemon.doctor import Finding, Level, examine
-from shm_daemon.heartbeat import seconds_since_beat, told
+from shm_daemon.heartbeat import duration_words, seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
@@ -73,9 +71,9 @@ class Examine:
 
 @router.get("/operation", include_in_schema=False)
 def operation_page(request: Request, site: AtSite, _: Reader, decided: Before = None) -> Response:
-    """Everything an operator asks first, and the full examination as soon as it is there.
+    """Show the state of operation, and the full examination as soon as it is available.
 
-    `decided` is a recording that was held, of which its decision is told.
+    `decided` is a held recording whose decision is shown.
     """
     state = _operation(site)
     return page(
@@ -91,7 +89,7 @@ def operation_page(request: Request, site: AtSite, _: Reader, decided: Before = 
 
 @router.post("/held/{recording}", include_in_schema=False)
 def decide(site: AtSite, writer: Writer, recording: Row, form: Form) -> Response:
-    """Lets a recording count from now on, or takes it out; the daemon does what follows."""
+    """Accept a held recording or discard it; the daemon does the rest."""
     who, why, now = writer.actor, reason_in(form, "a decision"), utc_now()
     decisions = site.store.acting_as(who).recordings
     match form.get("action"):
@@ -210,7 +208,7 @@ def _facts(state: dict[str, Any]) -> list[tuple[str, str, str]]:
             "Daemon",
             "active" if state["daemon"] else "none active",
             "never seen here" if seen_s is None
-            else f"last seen {told(timedelta(seconds=seen_s))} ago",
+            else f"last seen {duration_words(timedelta(seconds=seen_s))} ago",
         ),
         (
             "Waiting",

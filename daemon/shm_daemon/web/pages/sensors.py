@@ -26,7 +26,7 @@ from shm.store.ring import ring_of
 from shm.values.rounding import NINETY_PERCENT, rounded_percent
 from shm.values.stream import Stream, StreamEvent
 from shm.watch.ambient_hammer import AmbientBias
-from shm_daemon.heartbeat import told
+from shm_daemon.heartbeat import duration_words
 from shm_daemon.web import with_plotly
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
@@ -65,7 +65,7 @@ class Row:
 
 @router.get("/streams", include_in_schema=False)
 def streams_page(request: Request, site: AtSite, _: Reader) -> Response:
-    """All streams of the bridge."""
+    """Return all streams of the bridge."""
     rows = [_row(each) for each in _states(site)]
     headings = ("Last sample", "Lag", "Lost in 24 h", "Last window", "Tension since the beginning")
     return page(request, "streams.html.j2", rows=rows, headings=headings)
@@ -75,7 +75,7 @@ def streams_page(request: Request, site: AtSite, _: Reader) -> Response:
 def stream_page(
     request: Request, site: AtSite, _: Reader, name: Name, days: Days = 7.0
 ) -> Response:
-    """One stream: its state, what it showed, what befell it."""
+    """Show one stream: its state, its measurements, its events."""
     stream = _stream(site, name)
     state = next(each for each in _states(site) if each.stream.name == name)
     return page(
@@ -131,7 +131,7 @@ def _row(state: StreamCondition) -> Row:
     modes = len(state.window.modes) if state.window else 0
     cells = (
         formatting.moment(state.last_sample) if state.last_sample else "none yet",
-        told(state.lag) if state.lag is not None else "",
+        duration_words(state.lag) if state.lag is not None else "",
         f"{state.lost_share:.1%}" if math.isfinite(state.lost_share) else "",
         f"{window.kind}, {formatting.counted(modes, 'mode')}" if window else "none yet",
         tension_words(state.hour),
@@ -141,7 +141,7 @@ def _row(state: StreamCondition) -> Row:
 
 def _facts(state: StreamCondition, hammer: AmbientBias) -> list[tuple[str, str, str]]:
     stream, window = state.stream, state.window
-    behind = told(state.behind) if state.behind is not None else "unknown"
+    behind = duration_words(state.behind) if state.behind is not None else "unknown"
     found = [
         ("Hanger", str(stream.hanger), f"{len(stream.channels)} channels"),
         ("Last sample", formatting.moment(state.last_sample) if state.last_sample else "none yet",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +13,7 @@ from fastapi import APIRouter, Request, Response
 from shm.bridge import Bridge
 from shm.bridge.changes import HANGER_KEYS, HOOK_KEYS, SETTING_KEYS
 from shm.bridge.hooks import QUIET_HOURS, QuietHours
-from shm.errors import BadInput
+from shm.errors import BadInput, ShmError
 from shm.pipeline import utc_now
 from shm.pipeline.watching import differences
 from shm.report import formatting
@@ -22,9 +23,10 @@ from shm.store.queries.hangers import find_latest_watches
 from shm.store.queries.tests import list_waiting_tests
 from shm.store.rows import ChangedSetting, said
 from shm.values import Hanger
+from shm_daemon.hooks.trial import send_test_alert
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.faults import Refused
-from shm_daemon.web.forms import Form, done_or_again
+from shm_daemon.web.forms import Form, FormOfSettings, done_or_again
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import Before
 from shm_daemon.web.site import Site
@@ -58,6 +60,11 @@ class _Row:
     changed: ChangedSetting | None
 
     @property
+    def shown(self) -> str:
+        """The number as its field shows it, empty where none is set."""
+        return "" if self.in_force == said(None) else self.in_force
+
+    @property
     def span(self) -> tuple[str, str] | None:
         """The two times of quiet hours, empty where there are none; None for numbers."""
         begins, _, ends = self.in_force.partition("-")
@@ -71,41 +78,67 @@ def settings_page(request: Request, site: AtSite, _: Engineer, hanger: Before = 
 
 
 @router.post("/settings")
-def change(request: Request, site: AtSite, engineer: Engineer, form: Form) -> Response:
-    """Set one value, or give it back to `bridge.toml`."""
-    key, hanger, workspace = form.get("key", ""), None, site.workspace
+def change(request: Request, site: AtSite, engineer: Engineer, form: FormOfSettings) -> Response:
+    """Set the values that differ from those the page showed, or give them back to `bridge.toml`."""
+    workspace = site.workspace
     rows = {row.key: row for row in _all_rows(workspace.bridge, workspace.settings)}
-    if key not in rows:
-        raise Refused(404, f"{key!r} is none of the settings of this page.", "See bridge.toml.")
-    address = "/settings"
-    if key.startswith("hanger."):
-        hanger = int(key.split(".")[1])
-        address = f"/settings?hanger={hanger}#hanger"
+    wanted = [key.removeprefix("based_on.") for key in form if key.startswith("based_on.")]
+    if unknown := [key for key in wanted if key not in rows]:
+        raise Refused(
+            404, f"{unknown[0]!r} is none of the settings of this page.", "See bridge.toml."
+        )
+    hanger = next((int(key.split(".")[1]) for key in wanted if key.startswith("hanger.")), None)
+    address = "/settings" if hanger is None else f"/settings?hanger={hanger}#hanger"
 
     def change() -> None:
+        store = site.store.acting_as(engineer.actor)
         try:
-            workspace.change_setting(
-                site.store.acting_as(engineer.actor),
-                key,
-                _value(key, form),
-                utc_now(),
-                engineer.name,
-                based_on=int(form["based_on"]) if form.get("based_on", "").isdecimal() else 0,
-                in_file=rows[key].in_file,
-            )
+            for key in wanted:
+                if form.get(f"back.{key}") is None and not _is_changed(key, form):
+                    continue
+                based_on = form[f"based_on.{key}"]
+                workspace.change_setting(
+                    store,
+                    key,
+                    _value(key, form),
+                    utc_now(),
+                    engineer.name,
+                    based_on=int(based_on) if based_on.isdecimal() else 0,
+                    in_file=rows[key].in_file,
+                )
         finally:
             site.forget_description()  # ours, or somebody else's change, which it may not show yet
 
     return done_or_again(change, address, partial(_page, request, site, hanger))
 
 
+@router.post("/settings/hooks/test")
+def try_hook(request: Request, site: AtSite, _: Engineer, form: Form) -> Response:
+    """Send a test alert to one hook, and say what it answered."""
+    workspace = site.workspace
+    hook = next((each for each in workspace.bridge.hooks if each.name == form.get("hook")), None)
+    if hook is None:
+        raise Refused(404, "bridge.toml describes no such hook.", "Load the page again.")
+    try:
+        told, status = send_test_alert(workspace, hook, os.environ, utc_now()).sentence(hook), 200
+    except ShmError as error:
+        told, status = f"{error.message} {error.remedy}", 409
+    return _page(request, site, None, told, status)
+
+
+def _is_changed(key: str, form: Mapping[str, str]) -> bool:
+    """Return True where a field is not as the page showed it."""
+    parts = ("begins", "ends") if key.endswith(QUIET_HOURS) else ("value",)
+    return any(form.get(f"{part}.{key}", "") != form.get(f"was_{part}.{key}", "") for part in parts)
+
+
 def _value(key: str, form: Mapping[str, str]) -> float | str | None:
-    """None of what is given back; whether quiet hours are a span, `bridge.toml` itself checks."""
-    if form.get("action") == "back":
+    """Return a setting's new value, None for its default; `bridge.toml` checks quiet hours."""
+    if form.get(f"back.{key}") is not None:
         return None
     if not key.endswith(QUIET_HOURS):
-        return _number(form.get("value", ""))
-    begins, ends = form.get("begins", ""), form.get("ends", "")
+        return _number(form.get(f"value.{key}", ""))
+    begins, ends = form.get(f"begins.{key}", ""), form.get(f"ends.{key}", "")
     return f"{begins}-{ends}" if begins or ends else ""
 
 
@@ -138,11 +171,13 @@ def _page(
         "settings.html.j2",
         status=status,
         message=message,
+        is_refused=status >= 400,
         groups=groups,
         hangers=[(h.id, formatting.hanger_name(h.id, h.name)) for h in bridge.watched],
         hanger=hanger,
         judged=judged,
         changed=tuple(changed.values()),
+        hooks=tuple(each.name for each in bridge.hooks),
     )
 
 

@@ -1,6 +1,6 @@
-"""Signing in: a person gives name and password, or a token, or is named by a provider of OpenID
-Connect; the browser then keeps a secret where no script can read it. Signing out, and the page
-where a person changes the own password.
+"""Sign people in by password, token or OpenID Connect, and out; change passwords.
+
+The browser keeps a secret where no script can read it.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ log = logging.getLogger(__name__)
 
 @router.get("/sign-in")
 def sign_in_page(request: Request, site: AtSite, next: str = "/") -> Response:
-    """Asks for name and password, or for a token; who has signed in already goes on."""
+    """Ask for name and password, or for a token; who has signed in already goes on."""
     if is_signed_in(request, site):
         return RedirectResponse(_ours(next), 303)
     return _ask(request, next)
@@ -89,7 +89,7 @@ def _let_in(request: Request, site: Site, form: Mapping[str, str]) -> Response:
 
 
 def _keep_signed_in(request: Request, answer: Response, secret: str) -> None:
-    """Has the browser keep the secret of a session."""
+    """Have the browser keep the secret of a session."""
     answer.set_cookie(COOKIE, secret, max_age=_COOKIE_S, httponly=True, samesite="strict",
                       secure=is_https(request.scope))  # fmt: skip
 
@@ -118,7 +118,7 @@ def _ours(wanted: str) -> str:
 
 @router.get("/password")
 def password_page(request: Request, _: Person, changed: bool = False) -> Response:
-    """Asks for the old password and, twice, for the new one."""
+    """Ask for the old password and, twice, for the new one."""
     return page(request, "password.html.j2", message="", changed=changed)
 
 
@@ -140,7 +140,8 @@ async def change_password(request: Request, site: AtSite, person: Person, form: 
 
 
 class SignOns:
-    """The provider as it is described now, and the sign-ins that have begun; each is of use once.
+    """Hold the provider as it is described now, and pending sign-ins, each usable once.
+
     May be used from many threads.
     """
 
@@ -163,7 +164,7 @@ class SignOns:
             return self._provider
 
     def note(self, begun: Begun, wanted: str) -> None:
-        """Somebody is on their way, and then wants to open a page of ours."""
+        """Record a pending sign-in and the page to open after it."""
         with self._lock:
             self._begun[begun.state] = utc_now(), begun, wanted
             while len(self._begun) > _MOST:
@@ -198,7 +199,7 @@ def begin(request: Request, site: AtSite, next: str = "/") -> Response:
 def come_back(
     request: Request, site: AtSite, state: str = "", code: str = "", error: str = ""
 ) -> Response:
-    """Signs in whom the provider names, where that is a user; nobody by default."""
+    """Sign in the user whom the provider names; by default nobody is one."""
     caller, signs = unless_throttled(request, site), request.app.state.sign_ons
     cookie = request.cookies.get(_COOKIE, "")
     is_its_browser = secrets.compare_digest(cookie.encode(), state.encode())

@@ -43,14 +43,13 @@ router = APIRouter(tags=["recordings"])
 
 @router.get("/upload", include_in_schema=False)
 def upload_page(request: Request, site: AtSite, _: Reader) -> Response:
-    """Files go to `POST /api/recordings` one by one; `static/upload.js` follows each."""
+    """Show the form; files go to `POST /api/recordings` singly, `static/upload.js` follows each."""
     workspace = site.workspace
     return page(
         request,
         "upload.html.j2",
         hangers=[
-            (each.id, formatting.hanger_name(each.id, each.name))
-            for each in workspace.bridge.hangers
+            (each.id, formatting.hanger_name(each.id, each.name)) for each in workspace.bridge.bars
         ],
         max_mb=workspace.settings.max_file_bytes / 1e6,
         max_bytes=workspace.settings.max_file_bytes,

@@ -113,12 +113,37 @@
     }
   }
 
+  // From when to when the time axes of all figures go, as they came.
+  function extent() {
+    const ranges = [...drawn.values()].flatMap(({ layout = {} }) =>
+      timeAxes(layout).map((name) => (layout[name].range ?? []).map(Date.parse)));
+    const known = ranges.filter((each) => each.length === 2 && each.every(Number.isFinite));
+    if (!known.length) return [];
+    const [first, last] = [Math.min(...known.map(([at]) => at)), Math.max(...known.map(([, at]) => at))];
+    return [new Date(first).toISOString(), new Date(last).toISOString()];
+  }
+
   function lastDays(days) {
-    const ends = [...drawn.values()].flatMap(({ layout = {} }) =>
-      timeAxes(layout).map((name) => Date.parse(layout[name].range?.[1])).filter(Number.isFinite));
-    if (!ends.length) return;
-    const end = Math.max(...ends);
-    show([new Date(end - 86_400_000 * days).toISOString(), new Date(end).toISOString()]);
+    const [, end] = extent();
+    if (end) show([new Date(Date.parse(end) - 86_400_000 * days).toISOString(), end]);
+  }
+
+  // The last days by a button, or any days by their dates; an empty date leaves that end open.
+  function choosePeriod(form) {
+    const { from, to } = form.elements;
+    for (const button of form.querySelectorAll("button[data-days]")) {
+      const days = Number(button.dataset.days);
+      button.addEventListener("click", () => {
+        form.reset();
+        if (days) lastDays(days); else show(null);
+      });
+    }
+    form.addEventListener("change", () => {
+      const [first, last] = extent();
+      const stretch = [from.value || first, to.value ? `${to.value}T23:59:59Z` : last];
+      if (stretch[0] && stretch[0] < stretch[1]) show(stretch);
+    });
+    form.addEventListener("submit", (event) => event.preventDefault());
   }
 
   async function draw(plot, figure) {
@@ -202,10 +227,7 @@
       }
     }, { rootMargin: "400px" });
     charts.forEach((chart) => watcher.observe(chart));
-    for (const button of document.querySelectorAll("button[data-days]")) {
-      const days = Number(button.dataset.days);
-      button.addEventListener("click", () => (days ? lastDays(days) : show(null)));
-    }
+    document.querySelectorAll("form[data-period]").forEach(choosePeriod);
     dark.addEventListener("change", redraw);
     addEventListener("beforeprint", () => print(true));
     addEventListener("afterprint", () => print(false));

@@ -17,7 +17,7 @@
       for (;;) {
         const answer = await fetch(place.dataset.fragment);
         if (answer.status === 202) {
-          await answer.text(); // an answer that nobody reads keeps its connection
+          place.innerHTML = await answer.text();
           await wait(Number(answer.headers.get("Retry-After")) || 2);
           continue;
         }

@@ -1,0 +1,61 @@
+"""A test alert to one hook: whether its notifications arrive, before one is needed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+
+from shm.bridge import Bridge, Hook
+from shm.documents import format_time
+from shm.errors import NothingThere
+from shm.store import Workspace
+from shm.values import Alert
+from shm_daemon.hooks import HookNotifier
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a hook answered to a test alert, after how many seconds."""
+
+    alert: Alert
+    answer: str
+    seconds: float
+
+    def sentence(self, hook: Hook) -> str:
+        return f"The hook {hook.name} took the test alert in {self.seconds:.1f} s: {self.answer}."
+
+
+def send_test_alert(
+    workspace: Workspace, hook: Hook, environment: Mapping[str, str], now: datetime
+) -> Trial:
+    """Send a test alert once, the way of every alert, and keep it nowhere.
+
+    Raises HookFailed or DeliveryRefused where it did not arrive, NothingThere without a hanger.
+    """
+    alert = make_test_alert(workspace.bridge, hook, now)
+    settings, began = workspace.settings, time.monotonic()
+    notifier = HookNotifier(
+        workspace.folder, settings.hook_timeout_seconds, environment, settings.pages_address
+    )
+    try:
+        answer = notifier(hook, alert)
+    finally:
+        notifier.close()
+    return Trial(alert, answer, time.monotonic() - began)
+
+
+def make_test_alert(bridge: Bridge, hook: Hook, now: datetime) -> Alert:
+    """Return an alert that says it is none, of the bridge's first hanger; raise NothingThere."""
+    if not bridge.hangers:
+        raise NothingThere(
+            "bridge.toml describes no hanger.", remedy="Describe one: an alert is of a hanger."
+        )
+    hanger = bridge.hangers[0].id
+    message = (
+        f"This is a test of the hook {hook.name} of {bridge.name}. Nothing has happened to hanger "
+        f"{hanger} or any other."
+    )
+    key = f"test:{hook.name}:{format_time(now)}"
+    return Alert(key, hanger, "", now, message, drifts=(), kinds=("test",))

@@ -1,0 +1,240 @@
+"""Results to the databases of `[[publish]]`: queued on disk, then posted until each is taken.
+
+In a thread of its own. A database that is down, or refuses, is tried again for ever and stops
+nobody; points are the same however often they are sent: record 0027.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import logging
+import os
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from http import HTTPStatus
+
+import requests
+
+from shm.bridge.publish import Publication
+from shm.errors import ShmError
+from shm.pipeline import Clock
+from shm.pipeline.publishing import Progress, queue_results
+from shm.store import Store, Workspace
+from shm.store.point_outbox import PointOutbox, WaitingPoint
+from shm_daemon.hooks.contract import SHOWN_CHARACTERS, one_line
+from shm_daemon.hooks.webhook import Lines, reason_of, unchanged
+
+_POINTS_REFUSED = (
+    HTTPStatus.BAD_REQUEST,
+    HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+    HTTPStatus.UNPROCESSABLE_ENTITY,
+)
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How often to look and to retry, in s; how many lines go at once (InfluxData: 5000).
+
+    With more than `max_refused` points refused it is not the points that are wrong.
+    """
+
+    look_s: float = 10.0
+    retry_s: float = 60.0
+    at_once: int = 5000
+    max_refused: int = 20
+
+
+class NotTaken(ShmError):
+    """A database did not take points; `of_points` says that it is these, not who sends them."""
+
+    def __init__(self, message: str, *, remedy: str, of_points: bool = False):
+        super().__init__(message, remedy=remedy)
+        self.of_points = of_points
+
+
+def token_of(publication: Publication, workspace: Workspace, environment: Mapping[str, str]) -> str:
+    """Return the token, empty where none is named; raises NotTaken where it cannot be read."""
+    where = publication.token_file or f"the variable {publication.token_env}"
+    try:
+        found = (
+            (workspace.folder / publication.token_file).read_text(encoding="utf-8")
+            if publication.token_file
+            else environment.get(publication.token_env, "")
+        ).strip()
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or "not a text"
+        raise NotTaken(f"{where} cannot be read: {why}.", remedy="Write the token there.") from None
+    if publication.needs_token and (not found or not found.isprintable()):
+        raise NotTaken(f"{where} holds no token.", remedy="Write the token there.")
+    return found
+
+
+def post(
+    publication: Publication, token: str, lines: Sequence[str], web: Lines, timeout_s: float
+) -> None:
+    """Post lines of the line protocol; raises NotTaken where not all of them were taken."""
+    headers = {"Content-Type": "text/plain; charset=utf-8", "User-Agent": "shm"}
+    if token and publication.bucket:
+        headers["Authorization"] = f"Token {token}"
+    elif token:
+        headers["Authorization"] = f"Basic {base64.b64encode(token.encode()).decode()}"
+    with web.session(timeout_s) as (session, line):
+        try:
+            with session.post(
+                publication.write_url,
+                data="\n".join(lines).encode(),
+                headers=headers,
+                timeout=timeout_s,
+                allow_redirects=False,
+                stream=True,
+                auth=unchanged,
+            ) as response:
+                status = response.status_code
+                words = next(response.iter_content(SHOWN_CHARACTERS), b"")
+        except (requests.RequestException, OSError) as error:
+            late = line.cut_off or isinstance(error, requests.Timeout)
+            why = f"no answer within {timeout_s:g} s" if late else reason_of(error)
+            remedy = "See that it runs, and that url is right."
+            raise NotTaken(f"{publication.url}: {why}.", remedy=remedy) from None
+    if not 200 <= status < 300:
+        raise _refusal(publication, status, words)
+
+
+def _refusal(publication: Publication, status: int, words: bytes) -> NotTaken:
+    try:
+        document = json.loads(words)
+        said = document.get("error") or document.get("message") or ""
+    except (ValueError, AttributeError):
+        said = words.decode(errors="replace")
+    place = f"bucket {publication.bucket}" if publication.bucket else publication.database
+    remedy = {
+        401: "Correct the token in the file or variable that [[publish]] names.",
+        403: f"Let its token write to {place}.",
+        404: f"Create {place} there, or correct its name in [[publish]].",
+    }.get(status, "See its log.")
+    if 300 <= status < 400:
+        remedy = "It is not followed: write the address that it sends to into [[publish]]."
+    return NotTaken(
+        f"{publication.url} answered {status}: {one_line(str(said)) or 'no message'}.",
+        remedy=remedy,
+        of_points=status in _POINTS_REFUSED,
+    )
+
+
+class Publisher:
+    """One turn after the other: what is new into the outbox, what waits to the databases."""
+
+    def __init__(self, workspace: Workspace, clock: Clock, pace: Pace | None = None):
+        self._workspace, self._clock, self._web = workspace, clock, Lines()
+        self.pace = pace or Pace()
+        self._outbox = PointOutbox(workspace.folder)
+        self._store: Store | None = None
+        self._progress: dict[str, Progress] = {}
+        self._retry_at: dict[str, float] = {}
+        self._refused = 0
+
+    def use(self, workspace: Workspace) -> None:
+        """Take a changed description over, and try at once what it may have corrected."""
+        self._workspace = workspace
+        self._retry_at.clear()
+        self._progress.clear()
+
+    def turn(self) -> None:
+        """Queue what is new for each database, and post what waits where it is time to try."""
+        for publication in self._workspace.bridge.publications:
+            name = publication.name
+            if self._store is None:
+                self._store = self._workspace.store()
+            if name not in self._progress:
+                self._progress[name] = Progress()
+                self._outbox.retry_refused(name)
+            now, progress = self._clock(), self._progress[name]
+            queue_results(self._outbox, name, self._workspace, self._store, now, progress)
+            if time.monotonic() >= self._retry_at.get(name, 0.0):
+                self._deliver(publication)
+
+    def _deliver(self, publication: Publication) -> None:
+        """Post all that waits; note and log why where it is not taken."""
+        name, before = publication.name, self._outbox.state(publication.name).why
+        self._refused = 0
+        try:
+            token = token_of(publication, self._workspace, os.environ)
+            while waiting := self._outbox.list_waiting(name, self.pace.at_once):
+                self._send(publication, token, waiting)
+        except NotTaken as error:
+            why = f"{error.message} {error.remedy}"
+            self._retry_at[name] = time.monotonic() + self.pace.retry_s
+        else:
+            why = ""
+        if why != before and not self._web.closed:
+            self._outbox.note_failure(name, why, self._clock())
+            log.warning("publish %s: %s", name, why) if why else log.info("publish %s: works", name)
+
+    def _send(self, publication: Publication, token: str, points: Sequence[WaitingPoint]) -> None:
+        """Send points; halve those that are refused, until those at fault are known."""
+        timeout_s = self._workspace.settings.hook_timeout_seconds
+        try:
+            post(publication, token, [each.line for each in points], self._web, timeout_s)
+        except NotTaken as error:
+            if not error.of_points:
+                raise
+            if len(points) > 1:
+                for half in (points[: len(points) // 2], points[len(points) // 2 :]):
+                    self._send(publication, token, half)
+                return
+            self._refused += 1
+            if self._refused > self.pace.max_refused:
+                raise
+            log.warning("publish %s: refused: %s: %s", publication.name, points[0].line, error)
+            self._outbox.mark(points, "refused")
+        else:
+            self._outbox.mark(points, "taken")
+
+    def close(self) -> None:
+        if self._store is not None:
+            self._store.close()
+
+    def break_off(self) -> None:
+        """End, from another thread, what is being sent; it is sent again."""
+        self._web.close()
+
+
+@contextmanager
+def results_published(
+    workspace: Workspace, clock: Clock, *, when_done: bool = False, pace: Pace | None = None
+) -> Iterator[Publisher]:
+    """Publish while the context lasts; with `when_done` once, at its end.
+
+    For the holder of the workspace's lock.
+    """
+    publisher, ended = Publisher(workspace, clock, pace), threading.Event()
+    thread = threading.Thread(target=_work, args=(publisher, ended), name="publish")
+    try:
+        if not when_done:
+            thread.start()
+        yield publisher
+        if when_done:
+            publisher.turn()
+    finally:
+        ended.set()
+        if thread.ident is not None:
+            publisher.break_off()
+            thread.join()
+        publisher.close()
+
+
+def _work(publisher: Publisher, ended: threading.Event) -> None:
+    while not ended.is_set():
+        pause_s = publisher.pace.look_s
+        try:
+            publisher.turn()
+        except Exception as error:  # the daemon goes on without publishing rather than not at all
+            log.warning("results wait: %s", error, exc_info=not isinstance(error, ShmError))
+            pause_s = getattr(error, "retry_after_s", None) or publisher.pace.retry_s
+        ended.wait(pause_s)

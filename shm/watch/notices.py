@@ -1,0 +1,251 @@
+"""Notices: a baseline or tests that agree with no other, and modes that tests keep having wrong.
+
+A baseline that agrees with none of the tests since: a change right after it, or a disturbed day. No
+test can tell which. One baseline in twelve has a vehicle next to the hanger, and hardly one change
+in a thousand comes right after it: what a load may do is a notice that states both. What no load
+does is an alert, since a loss in a notice is silent for as long as nobody looks.
+
+One slip of a test is left out and forgotten. The same mode wrong in three tests in a row is
+numbered wrongly each time, or the hanger has changed in a way that its model class does not know.
+Where more modes are off the baseline than can be misnamed, it is the tests that do not fit it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shm.values import (
+    TENSION,
+    Alert,
+    AlertKind,
+    BoolArray,
+    Drift,
+    Hanger,
+    Plane,
+    Reading,
+    RepeatedMistake,
+    WatchedTest,
+)
+from shm.values.drift import ENOUGH_FITS
+from shm.values.messages import WEEK
+from shm.values.rounding import force_unit, listed
+from shm.watch.agreement import BY_A_LOAD
+from shm.watch.alert_text import (
+    against_baseline_words,
+    alert_of,
+    is_stiffness,
+    look_again,
+    quantity_words,
+    size_words,
+    structure_words,
+)
+from shm.watch.mistaken_modes import MOST_MISTAKEN
+from shm.watch.quantities import MeasuredMode
+
+_CHECK: AlertKind = "check the baseline"
+_CLEAR_DRIFT = 2.0  # judgement: that tests and baseline disagree is known by then
+# Of a log frequency: more than sensors, joints and traffic do to a mode by itself (judgement).
+_OFF = 0.01
+
+
+# ---------------------------------------------------------------- the baseline
+
+
+def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
+    """Return an alert where the tension moved further than by any load, else a notice.
+
+    One mistaken mode of the only test before passes for an end that moved.
+    """
+    clear = [each for each in test.drifts if _deviations(each) > _CLEAR_DRIFT]
+    lead = max(clear, key=_deviations, default=None)
+    message, kind = message_of_baseline(test, hanger), _CHECK
+    drifts: tuple[Drift, ...] = ()
+    if lead is not None:
+        if hanger.is_modelled:
+            message = _either_words(hanger, lead, test.change.against_baseline)
+        is_far = abs(lead.shift_mean) > max(BY_A_LOAD, lead.threshold)
+        if lead.quantity == TENSION and lead.is_clearly_beyond and is_far:
+            kind, drifts = "beyond threshold", (lead,)
+    return alert_of(hanger, (test.test, test.time), "check-the-baseline", message, (kind,), drifts)
+
+
+def _deviations(drift: Drift) -> float:
+    return abs(drift.shift_mean) / drift.shift_sd if drift.shift_sd > 0 else 0.0
+
+
+def _either_words(hanger: Hanger, lead: Drift, tests: int) -> str:
+    """Return both causes, what to do about either, how far it is and how many tests show it."""
+    look = "inspect its anchorages and the rod"
+    if is_stiffness(lead.quantity):
+        look = "inspect both ends"
+    elif lead.shift_mean >= 0:
+        look = "compare the hangers beside it (`shm drift bridge`)"
+    now = ""
+    if lead.quantity == TENSION:
+        unit = force_unit(lead.value, lead.baseline)
+        was, value = unit.with_unit(lead.baseline), unit.with_unit(lead.value)
+        now = f"Tension was {was} at the baseline, {value} since. "
+    return (
+        f"Hanger {hanger.id}: either {quantity_words(lead.quantity)} {size_words(lead)} since its "
+        f"baseline, or the baseline was disturbed. Within a week, {look}, and find out what was "
+        f"different on the day of the baseline. {now}The last {tests} tests agree with each other "
+        "and not with it; no test tells which. If it was disturbed, set another (`shm drift "
+        "rebaseline`)."
+    )
+
+
+def message_of_baseline(test: WatchedTest, hanger: Hanger) -> str:
+    """Return the message of a baseline that agrees with none of the tests since."""
+    return (
+        f"{against_baseline_words(test.change, hanger)} Either the baseline was disturbed, by a "
+        "load on the deck for one, or the hanger changed right after it; no test shows which."
+    )
+
+
+# ---------------------------------------------------------------- tests that agree with none
+
+
+def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
+    """Return the message of a test that agrees with none before it, or of so many in a row."""
+    if not hanger.is_modelled:
+        return _odd_frequencies(test, hanger, in_a_row)
+    state = f"{in_a_row} tests in a row agree neither with those before nor with each other"
+    if in_a_row == 1:
+        state = f"test {test.test} agrees with no test before it"
+    if hanger.has_sensors:  # the next day is another test by itself
+        return (
+            f"Hanger {hanger.id}: {state}. {look_again(hanger)} {WEEK}. Until tests agree again, "
+            "its state rests on older ones. A sensor may have moved or the order of a mode been "
+            "mistaken; or the hanger has changed."
+        )
+    if in_a_row == 1:
+        return (
+            f"Hanger {hanger.id}: {state}. Repeat it within "
+            "a week; it does not count until another test agrees with it. Another hanger may have "
+            "been hit, a sensor moved or the order of a mode mistaken; or the hanger has changed."
+        )
+    return (
+        f"Hanger {hanger.id}: {state}. Repeat the hammer test within a week, with the same people "
+        "and sensors as at the baseline. Until then the state of this hanger rests on older tests."
+    )
+
+
+def _odd_frequencies(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
+    """Return the same of a structure that no model class describes."""
+    name = structure_words(hanger)
+    if in_a_row == 1:
+        return (
+            f"The frequencies of {name} in test {test.test} agree with no test before. Test again "
+            "within a week; this one does not count until another agrees with it. A mode may be "
+            "mistaken, a clock or a sensor wrong; or the structure has changed."
+        )
+    return (
+        f"The frequencies of {name} agreed {in_a_row} times in a row neither with those before nor "
+        "with each other. Look at sensors and clock within a week. Until then its state rests on "
+        "older tests."
+    )
+
+
+# ---------------------------------------------------------------- modes that are wrong again
+
+
+def repeated_mistakes(
+    before: Sequence[RepeatedMistake], reading: Reading, modes: Sequence[MeasuredMode]
+) -> tuple[RepeatedMistake, ...]:
+    """Return the modes that are wrong by a reading, or were of late.
+
+    `modes` are those of the baseline, in the order of the reading's; `before` is the same by the
+    test before.
+    """
+    if reading.modes is None:
+        return tuple(before)
+    known = {(each.plane, each.order): each for each in before}
+    misfit = off_the_baseline(reading)
+    is_wrong = reading.modes.mistaken | misfit
+    found = []
+    for key, wrong, off, variance in zip(
+        modes, is_wrong.tolist(), misfit.tolist(), reading.modes.variances, strict=True
+    ):
+        run = known.get(key)
+        if wrong:
+            since, tests = (run.since, run.tests) if run else (reading.time, 0)
+            found.append(RepeatedMistake(*key, since, tests + 1, is_misfit=off))
+        elif run and math.isinf(variance):  # this test does not have the mode
+            found.append(run)
+        elif run and run.is_notable and run.fits + 1 < ENOUGH_FITS:
+            found.append(replace(run, fits=run.fits + 1))
+    return tuple(found)
+
+
+def off_the_baseline(reading: Reading) -> BoolArray:
+    """Return which modes (modes,) lie off the state that a reading fits best.
+
+    None where these are few enough to be misnamed.
+    """
+    modes = reading.modes
+    if modes is None:
+        return np.zeros(0, bool)
+    measured = np.isfinite(modes.variances)
+    off = measured & (np.abs(modes.values - modes.slopes @ reading.mean) > _OFF)
+    can_tell = measured.sum() > len(reading.mean) + 1
+    are_too_many = can_tell and off.sum() > MOST_MISTAKEN * measured.sum()
+    return off if are_too_many else np.zeros(len(off), bool)
+
+
+def news_of(
+    mistaken: Sequence[RepeatedMistake], noted: Collection[tuple[Plane, int]]
+) -> tuple[RepeatedMistake, ...]:
+    """Return the modes that a notice is due for, `noted` being those of which one was given.
+
+    A further mode of tests that do not fit is no further cause.
+    """
+    notable = [each for each in mistaken if each.is_notable]
+    is_told = any((each.plane, each.order) in noted for each in notable if each.is_misfit)
+    return tuple(
+        each
+        for each in notable
+        if (each.plane, each.order) not in noted and not (is_told and each.is_misfit)
+    )
+
+
+def notice_of(test: WatchedTest, hanger: Hanger, news: Sequence[RepeatedMistake]) -> Alert:
+    """Return the notice of the modes `news` that tests keep having wrong."""
+    kind: AlertKind = "check the modes"
+    names = "+".join(f"{each.plane}-{each.order}" for each in news)
+    what = f"{kind.replace(' ', '-')}:{names}"
+    return alert_of(hanger, (test.test, test.time), what, notice_words(news, hanger), (kind,))
+
+
+def notice_words(mistaken: Sequence[RepeatedMistake], hanger: Hanger) -> str:
+    """Return the notice of them."""
+    return f"Hanger {hanger.id}: {' '.join(_words(mistaken))}"
+
+
+def warning_words(mistaken: Sequence[RepeatedMistake], hanger: Hanger) -> str:
+    """Return the same as one of several warnings of a report, without the reason."""
+    return f"Hanger {hanger.id}: {' '.join(_words(mistaken)[:2])}"
+
+
+def _words(mistaken: Sequence[RepeatedMistake]) -> tuple[str, str, str]:
+    """Return state, action and reason."""
+    since = f"{min(each.since for each in mistaken):%Y-%m-%d}"
+    if any(each.is_misfit for each in mistaken):
+        return (
+            f"since {since} more of its modes miss the baseline's than one wrong number explains.",
+            "At the next planned test, compare how the modes were numbered then and now, and "
+            "look for new fittings.",
+            "No tension and no end stiffness of the baseline's model explains them, so these tests "
+            "count for little until another baseline is set (`shm drift rebaseline`).",
+        )
+    names, many = [str(each) for each in mistaken], len(mistaken) > 1
+    have, numbers, them = ("have", "their numbers", "them") if many else ("has", "its number", "it")
+    return (
+        f"{listed(names)} {have} not fitted the other modes since {since}.",
+        f"Check {numbers} at the next planned test.",
+        f"The watch leaves {them} out: another order or a machine's tone may be taken for {them}, "
+        "or one end alone has loosened.",
+    )
