@@ -198,8 +198,8 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
         return
     first, last = (_age(path, examined.now) for path in (reasons[0], reasons[-1]))
     try:
-        said = json.loads(reasons[-1].read_text(encoding="utf-8"))
-        why = f"{said['file']}: {said['message']}"
+        document = json.loads(reasons[-1].read_text(encoding="utf-8"))
+        why = f"{document['file']}: {document['message']}"
     except (OSError, ValueError, KeyError, TypeError):
         why = reasons[-1].name
     yield warning(

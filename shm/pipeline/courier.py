@@ -144,8 +144,8 @@ class Courier:
         next_attempt_at = now + _wait_after(attempts, settings) if again else None
         self._store.alerts.save_failure(delivery, str(error), now, next_attempt_at)
         end = "" if again else "; given up: nobody is told of it by this hook"
-        said = "hook %s failed on %s: %s%s"
-        log.warning(said, delivery.hook, sent.message.key, error, end, extra=sent.log_fields)
+        text = "hook %s failed on %s: %s%s"
+        log.warning(text, delivery.hook, sent.message.key, error, end, extra=sent.log_fields)
 
 
 def alert_fields(alert: Alert) -> dict[str, object]:

@@ -241,8 +241,8 @@ class Flow:
             self._postponed.update(dict.fromkeys(task.recordings, until))
             names = ", ".join(map(str, task.recordings))
             self.delays |= dict.fromkeys(task.recordings, f"recording {names} waits: {error}")
-            said = "%s %s is tried again in %.0f s: %s"
-            log.warning(said, *task.key, wait_s, error, extra=task.log_fields)
+            text = "%s %s is tried again in %.0f s: %s"
+            log.warning(text, *task.key, wait_s, error, extra=task.log_fields)
         else:
             self._refuse(task, error)
 

@@ -305,9 +305,9 @@ def works_before(
 
 def after_works(alert: Alert, works: Silence) -> Alert:
     """The same alert, which says that works lie in between and how to accept what they changed."""
-    said = (
+    text = (
         f"Planned works lie in between ({works.why.rstrip('.')}), until {works.until:%Y-%m-%d}. If "
         f"they explain it, accept the new state: `shm drift rebaseline --hanger {alert.hanger} "
         f"--since {works.until:%Y-%m-%d}`."
     )
-    return replace(alert, message=f"{alert.message} {said}")
+    return replace(alert, message=f"{alert.message} {text}")

@@ -130,8 +130,8 @@ def _key(tests: Sequence[TestRow], newest: StoredTest | None = None) -> str:
     """Of these tests in this order: one that came late, or is done again, makes another."""
     named = [(each.id, each.name, each.time) for each in tests]
     named += [(newest.id, newest.test.id, newest.time)] if newest else []
-    told = "\n".join(f"{id_} {name} {time.isoformat()}" for id_, name, time in named)
-    return f"{shm.__version__} {hashlib.sha256(told.encode()).hexdigest()}"
+    text = "\n".join(f"{id_} {name} {time.isoformat()}" for id_, name, time in named)
+    return f"{shm.__version__} {hashlib.sha256(text.encode()).hexdigest()}"
 
 
 _RECENT_TESTS = 64  # technical: two visits of so many tests each are none of hammer tests
@@ -182,8 +182,8 @@ class JudgedAgain:
         baseline_id, why = self._left.pop(hanger)
         self._judging = hanger
         count = self._store.watch.rerun(hanger, baseline_id, why, at)
-        said = "hanger %d: %d tests are judged again, %d hangers are left: %s"
-        log.info(said, hanger, count, len(self._left), why)
+        text = "hanger %d: %d tests are judged again, %d hangers are left: %s"
+        log.info(text, hanger, count, len(self._left), why)
         return count
 
 

@@ -112,10 +112,10 @@ class Dispositions(Repository):
             own = of_baselines(connection, rows)
             end_tests(connection, recording_id, ids, at)
             supersede_results(connection, ids, Stage.IDENTIFIED, at)
-            told = f"test discarded by {who}" + (f": {why}" if why else "")
+            text = f"test discarded by {who}" + (f": {why}" if why else "")
             raised = sa.select(alerts.c.id).where(alerts.c.test_id.in_(ids))
             for alert_id in connection.scalars(raised).all():
-                resolve(connection, alert_id, who, told, at)
+                resolve(connection, alert_id, who, text, at)
             again = _watch_again(connection, rows, weighed, at)
             named = [HeldTest(row.position, row.name, ()) for row in rows]
             hold = _unheld(recording, Decision.WITHDRAWN, named)

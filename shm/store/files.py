@@ -102,8 +102,8 @@ def end_tests(
 def note_name(connection: Connection, known: Row[Any], file_name: str, at: datetime) -> None:
     """Keeps the former name of a file that comes again under another: it is found by both."""
     if known.file_name != file_name:
-        said = f"called {file_name} from now on."
-        write(connection, at, RENAMED, known.id, subject=known.file_name, detail=said)
+        text = f"called {file_name} from now on."
+        write(connection, at, RENAMED, known.id, subject=known.file_name, detail=text)
 
 
 def by_former_names(connection: Connection, which: str) -> list[int]:

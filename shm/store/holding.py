@@ -241,19 +241,19 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
     """Notes a decision, and with it that the notice was seen to its end."""
     made = {"decision": hold.decision, "decided_at": at, "who": who, "why": why, "time": hold.time}
     connection.execute(sa.update(holds).where(holds.c.id == hold.id).values(**made))
-    told = f"{hold.decision}" + (f": {why}" if why else "")
+    text = f"{hold.decision}" + (f": {why}" if why else "")
     key = notice_key(hold.hanger, hold.id)
     notice = connection.scalar(sa.select(alerts.c.id).where(alerts.c.key == key))
     if notice is not None:
-        acknowledge(connection, notice, who, told, at)
-        resolve(connection, notice, who, told, at)
+        acknowledge(connection, notice, who, text, at)
+        resolve(connection, notice, who, text, at)
     if hold.decision in (Decision.WITHDRAWN, Decision.REINSTATED):
         names = ", ".join(test.name for test in hold.tests)
-        told = f"{names}: {why}" if why else names
+        text = f"{names}: {why}" if why else names
     else:
-        told = why
+        text = why
     subject, about = hold.file_name, hold.recording_id
-    write(connection, at, str(hold.decision), about, None, subject, told, who)
+    write(connection, at, str(hold.decision), about, None, subject, text, who)
     return replace(hold, decided_at=at, who=who, why=why)
 
 

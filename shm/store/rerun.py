@@ -92,8 +92,8 @@ def rerun_recording(
     recording = by_id(connection, recording_id)
     out = standing_discard(connection, recording)
     if out is not None and not _any_counts(connection, recording_id):
-        told = f"{recording.file_name} was {discarded_reason(out)}"
-        raise UsageError(told, remedy=taking_back(out))
+        text = f"{recording.file_name} was {discarded_reason(out)}"
+        raise UsageError(text, remedy=taking_back(out))
     chosen = _chosen(connection, recording, from_stage, test)
     own = of_baselines(connection, chosen)
     if from_stage is not Stage.IDENTIFIED:
@@ -102,9 +102,9 @@ def rerun_recording(
     superseded = rerun(connection, chosen, from_stage, at)
     if not chosen:  # it was refused before it was identified
         begin_again(connection, recording_id, at)
-    told = f"sent back by request, to be {from_stage} again."
+    text = f"sent back by request, to be {from_stage} again."
     name = recording.file_name
-    write(connection, at, AGAIN, recording_id, subject=name, detail=told, who="")
+    write(connection, at, AGAIN, recording_id, subject=name, detail=text, who="")
     stored = recording_from(by_id(connection, recording_id))
     names = tuple(row.name for row in chosen)
     return Rerun(stored, names, *superseded, tuple(row.name for row in chosen if row.id in own))
@@ -135,10 +135,10 @@ def redescribe(connection: Connection, known: Row[Any], file: ReceivedFile, at: 
     rerun(connection, rows, Stage.IDENTIFIED, at)
     if not rows:
         begin_again(connection, known.id, at)
-    told = f"the same bytes as {known.file_name} with another sidecar: done again with that."
+    text = f"the same bytes as {known.file_name} with another sidecar: done again with that."
     if of_baseline:
-        told += f" The baseline made from {', '.join(of_baseline)} stays: `shm drift rebaseline`."
-    return told
+        text += f" The baseline made from {', '.join(of_baseline)} stays: `shm drift rebaseline`."
+    return text
 
 
 def of_baselines(connection: Connection, chosen: Sequence[Row[Any]]) -> set[int]:

@@ -211,9 +211,9 @@ class Ring:
         """Keeps the samples of a time for good, for a reason."""
         kept = self._folder(stream).folder / "kept"
         kept.mkdir(parents=True, exist_ok=True)
-        told = {"stream": stream, "start": start, "end": end, "why": why}
+        document = {"stream": stream, "start": start, "end": end, "why": why}
         path = kept / f"{microseconds(start):017d}-{microseconds(end):017d}.json"
-        replace_text(path, dump(told) + "\n")
+        replace_text(path, dump(document) + "\n")
         for each in (path, kept, kept.parent):
             sync(each)
 
