@@ -107,7 +107,7 @@ def check_logo(workspace: Workspace) -> Iterator[Finding]:
         yield ok("logo", path.name)
 
 
-def check_deliveries(examined: of_store.Examined) -> Iterator[Finding]:
+def check_deliveries(examined: of_store.DoctorContext) -> Iterator[Finding]:
     """Check whether alerts wait for their hooks, or were given up."""
     store, now = examined.store, examined.now
     waiting = store.alerts.list_deliveries(DeliveryState.WAITING)
@@ -219,7 +219,7 @@ def _of_store(workspace: Workspace, now: datetime) -> Iterator[Finding]:
         return
     with store:
         for name, check in _CHECKS:
-            yield from _found(name, partial(check, of_store.Examined(workspace, store, now)))
+            yield from _found(name, partial(check, of_store.DoctorContext(workspace, store, now)))
 
 
 def _found(name: str, check: Callable[[], Iterable[Finding]]) -> list[Finding]:

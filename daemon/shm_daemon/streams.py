@@ -38,7 +38,7 @@ from shm.read.sandbox import read_test
 from shm.store import Store, Workspace
 from shm.store.archive import checksum, refuse_oversize
 from shm.store.queries.streams import list_stream_events
-from shm.store.ring import Kept, ring_of
+from shm.store.ring import StoredChunk, ring_of
 from shm.values import Channel, FloatArray, Recording
 from shm.values.stream import Chunk, Stream, StreamEvent
 from shm_daemon.spool import STREAMS, FileStabilityTracker, scan
@@ -48,7 +48,7 @@ log = logging.getLogger(__name__)
 
 def take_chunks(
     workspace: Workspace, store: Store, stream: str, contents: Sequence[bytes], now: datetime
-) -> list[Kept]:
+) -> list[StoredChunk]:
     """Keeps chunks of a stream: they are on disk when this returns.
 
     Raises BadInput where one cannot be used, which is noted, and ShmError with `retry_after_s`

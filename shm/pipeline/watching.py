@@ -83,7 +83,7 @@ def to_watch(store: Store, baseline: Baseline, newest: StoredTest) -> ToWatch:
     )
 
 
-def tests_beside(store: Store, baseline: Baseline, newest: StoredTest) -> Beside:
+def find_neighbouring_tests(store: Store, baseline: Baseline, newest: StoredTest) -> Beside:
     """The tests that a test may agree with: two each way, as they came in and by their clocks.
 
     What is held for its clock alone came in as any other: what it measured is in no doubt. Tests
@@ -139,7 +139,7 @@ _RECENT_TESTS = 64  # technical: two visits of so many tests each are none of ha
 log = logging.getLogger(__name__)
 
 
-class JudgedAgain:
+class ReevaluationQueue:
     """Sends back the tests of each hanger whose latest was judged with other thresholds.
 
     One hanger at a time, so that what comes in meanwhile waits for no other hanger's; those of a

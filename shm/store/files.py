@@ -42,12 +42,12 @@ def recording_from(row: Row[Any]) -> StoredRecording:
     return value_in(row, StoredRecording)
 
 
-def counts(table: sa.Table) -> sa.ColumnElement[bool]:
+def is_counted(table: sa.Table) -> sa.ColumnElement[bool]:
     """Select what is neither refused nor held: all that is shown and computed with."""
     return table.c.stage.not_in([Stage.REFUSED, Stage.HELD])
 
 
-def in_force(table: sa.Table) -> sa.ColumnElement[bool]:
+def is_current(table: sa.Table) -> sa.ColumnElement[bool]:
     """Select what no later run has replaced."""
     return table.c.superseded_at.is_(None)
 
@@ -161,7 +161,7 @@ def advance_recordings(connection: Connection, ids: Collection[int], at: datetim
     """A recording stands where the least advanced of its tests stands, and is held with one."""
     for recording_id in ids:
         query = sa.select(tests.c.stage).where(
-            tests.c.recording_id == recording_id, in_force(tests), tests.c.stage != Stage.REFUSED
+            tests.c.recording_id == recording_id, is_current(tests), tests.c.stage != Stage.REFUSED
         )
         stages = connection.scalars(query).all()
         stage = Stage.HELD if Stage.HELD in stages else min(stages, key=_PROGRESS.index)

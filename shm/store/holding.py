@@ -16,7 +16,7 @@ from shm.modes_document import test_document
 from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.columns import loads
 from shm.store.database import insert
-from shm.store.files import in_force, reason_document
+from shm.store.files import is_current, reason_document
 from shm.store.journal import REFUSED, write
 from shm.store.mapping import value_in
 from shm.store.outbox import acknowledge, raise_alert, resolve
@@ -35,7 +35,7 @@ _holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(reco
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class Judgement:
     """Judgement of plausibility on a recording with the sidecar that it was judged with.
 
     `held` are its tests that are held, `notice` what to tell of that; None where none is.
@@ -52,7 +52,7 @@ class Judged:
 
 
 def keep_judgement(
-    connection: Connection, recording: Row[Any], judged: Judged, at: datetime
+    connection: Connection, recording: Row[Any], judged: Judgement, at: datetime
 ) -> StoredAlert | None:
     """Holds what is in doubt; the notice of that, None where nothing is."""
     if judged.fingerprint is not None:
@@ -117,7 +117,7 @@ def _mark(
     connection: Connection, recording_id: int, position: int, stage: Stage, at: datetime
 ) -> int:
     """Brings the test at a place of a file to a stage; its number."""
-    own = (tests.c.recording_id == recording_id) & in_force(tests)
+    own = (tests.c.recording_id == recording_id) & is_current(tests)
     here = own & (tests.c.position == position)
     number: int = connection.scalars(sa.select(tests.c.id).where(here)).one()
     connection.execute(sa.update(tests).where(here).values(stage=stage))
@@ -211,7 +211,7 @@ def held_rows(connection: Connection, recording_id: int) -> Sequence[Row[Any]]:
     """The tests of a recording that are held, each with the time of its receipt."""
     own = (tests.c.recording_id == recording_id) & (tests.c.stage == Stage.HELD)
     query = sa.select(tests, recordings.c.received_at).join(recordings)
-    return connection.execute(query.where(own, in_force(tests)).order_by(tests.c.id)).all()
+    return connection.execute(query.where(own, is_current(tests)).order_by(tests.c.id)).all()
 
 
 def confirmed_values(

@@ -237,8 +237,8 @@ class Deliveries(Repository):
             if not connection.scalar(_any_waits):  # as a rule, and what follows takes six times it
                 return ()
         at, tried = deliveries.c.next_attempt_at, deliveries.c.attempts
-        counts = [tried == count for count in range(len(waits) - 1)] + [tried >= len(waits) - 1]
-        too_far = [of & (at > now + wait) for of, wait in zip(counts, waits, strict=False)]
+        is_counted = [tried == count for count in range(len(waits) - 1)] + [tried >= len(waits) - 1]
+        too_far = [of & (at > now + wait) for of, wait in zip(is_counted, waits, strict=False)]
         own = sa.func.coalesce(deliveries.c.message_id, deliveries.c.id) == deliveries.c.id
         due = (deliveries.c.state == DeliveryState.WAITING) & own & sa.or_(at <= now, *too_far)
         if begun:

@@ -14,7 +14,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError
-from shm.store.files import begin_again, by_id, counts, in_force, move_numbers, recording_from
+from shm.store.files import begin_again, by_id, is_counted, is_current, move_numbers, recording_from
 from shm.store.holding import discarded_reason, end_hold, standing_discard, taking_back
 from shm.store.journal import AGAIN, write
 from shm.store.rows import ReceivedFile, Rerun, Stage
@@ -30,7 +30,7 @@ from shm.store.tables import (
     watches,
 )
 
-AGAIN_FROM = (Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
+RERUN_STAGES = (Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
 _BEFORE = {Stage.UPDATED: Stage.IDENTIFIED, Stage.WATCHED: Stage.UPDATED}
 
 
@@ -69,8 +69,8 @@ def rerun_watched(
     query = (
         sa.select(tests.c.id, tests.c.recording_id, tests.c.hanger)
         .join(watches)
-        .where(watches.c.hanger == hanger, which, in_force(watches))
-        .where(tests.c.stage == Stage.WATCHED, in_force(tests))
+        .where(watches.c.hanger == hanger, which, is_current(watches))
+        .where(tests.c.stage == Stage.WATCHED, is_current(tests))
         .distinct()
     )
     chosen = connection.execute(query).all()
@@ -125,7 +125,7 @@ def redescribe(connection: Connection, known: Row[Any], file: ReceivedFile, at: 
 
     `known` is its row as it was.
     """
-    query = sa.select(tests).where(tests.c.recording_id == known.id, in_force(tests))
+    query = sa.select(tests).where(tests.c.recording_id == known.id, is_current(tests))
     rows = connection.execute(query).all()
     own = of_baselines(connection, rows)
     of_baseline = sorted(row.name for row in rows if row.id in own)
@@ -175,13 +175,13 @@ def _chosen(
     connection: Connection, recording: Row[Any], stage: Stage, test: str | None
 ) -> Sequence[Row[Any]]:
     """Return the tests that are sent back: those of a whole file, or the one that is named."""
-    query = sa.select(tests).where(tests.c.recording_id == recording.id, in_force(tests))
+    query = sa.select(tests).where(tests.c.recording_id == recording.id, is_current(tests))
     if test is not None and stage is not Stage.IDENTIFIED:
         query = query.where(tests.c.name == test)
     rows = connection.execute(query.order_by(tests.c.id)).all()
     waits = recording.stage == Stage.RECEIVED
     if stage is not Stage.IDENTIFIED:
-        reached = AGAIN_FROM[AGAIN_FROM.index(stage) :]
+        reached = RERUN_STAGES[RERUN_STAGES.index(stage) :]
         waits = not rows or any(row.stage not in reached for row in rows)
     if waits:
         raise UsageError(
@@ -194,11 +194,11 @@ def _chosen(
 
 def _any_counts(connection: Connection, recording_id: int) -> bool:
     own = sa.select(tests.c.id).where(tests.c.recording_id == recording_id)
-    return connection.execute(own.where(in_force(tests), counts(tests))).first() is not None
+    return connection.execute(own.where(is_current(tests), is_counted(tests))).first() is not None
 
 
 def _mark(
     connection: Connection, table: sa.Table, which: sa.ColumnElement[bool], at: datetime
 ) -> int:
-    found = sa.update(table).where(which, in_force(table)).values(superseded_at=at)
+    found = sa.update(table).where(which, is_current(table)).values(superseded_at=at)
     return connection.execute(found).rowcount

@@ -14,7 +14,7 @@ from shm.documents import posterior_document
 from shm.store.blobs import pack_samples, posterior_from, test_from_document
 from shm.store.columns import loads
 from shm.store.database import Repository, insert
-from shm.store.files import counts, in_force
+from shm.store.files import is_counted, is_current
 from shm.store.mapping import value_in
 from shm.store.rows import DESCRIBED, Baseline, Lineage, Stage, StoredSelection, StoredTest, TestRow
 from shm.store.tables import (
@@ -59,7 +59,7 @@ _OF_WORKS = (
         tests.c.time < sa.func.coalesce(silences.c.ended_at, silences.c.ends_at),
     )
     .correlate(tests)
-) & ~sa.exists().where(watches.c.test_id == tests.c.id, in_force(watches)).correlate(tests)
+) & ~sa.exists().where(watches.c.test_id == tests.c.id, is_current(watches)).correlate(tests)
 
 
 test_columns = tuple(tests.c[field.name] for field in fields(TestRow))
@@ -72,21 +72,23 @@ def test_row(row: Row[Any]) -> TestRow:
 
 def counted_tests(hanger: int | None = None) -> sa.Select[Any]:
     """The tests of a hanger, or of all, that are neither refused nor held, by time."""
-    query = plain_tests.where(counts(tests), in_force(tests))
+    query = plain_tests.where(is_counted(tests), is_current(tests))
     if hanger is not None:
         query = query.where(tests.c.hanger == hanger)
     return query.order_by(tests.c.time, tests.c.id)
 
 
-def compared_with(baseline: Baseline, *, or_of_works: bool = False) -> list[sa.ColumnElement[bool]]:
-    """Tests that were watched since a baseline, `or_of_works` those that were passed over."""
+def select_since_baseline(
+    baseline: Baseline, *, include_maintenance: bool = False
+) -> list[sa.ColumnElement[bool]]:
+    """Select tests watched since a baseline, with `include_maintenance` those passed over."""
     found = [
         tests.c.hanger == baseline.hanger,
         tests.c.stage == Stage.WATCHED,
         tests.c.name.not_in(baseline.posterior.tests),
-        in_force(tests),
+        is_current(tests),
     ]
-    if not or_of_works:
+    if not include_maintenance:
         found.append(~_OF_WORKS)
     return found if baseline.since is None else [*found, tests.c.time >= baseline.since]
 
@@ -219,7 +221,7 @@ def baseline_in_force(hanger: int) -> sa.Select[Any]:
     return query.where(_in_force(hanger)).order_by(baselines.c.id.desc()).limit(1)
 
 
-def among(
+def for_hangers(
     hanger: sa.ColumnElement[int], hangers: Sequence[Hanger] | None
 ) -> sa.ColumnElement[bool]:
     """Return the condition that a row is of one of `hangers`, or of any where None."""

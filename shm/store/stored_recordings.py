@@ -16,7 +16,7 @@ from shm.store.files import (
     by_id,
     end_recording,
     end_tests,
-    in_force,
+    is_current,
     note_name,
     recording_from,
 )
@@ -128,7 +128,7 @@ def waits_at(
     if not test_ids:
         return bool(recording.stage == stage)
     own = _own(connection, recording.id, test_ids)
-    waiting = sa.select(tests.c.id).where(in_force(tests), tests.c.stage == stage)
+    waiting = sa.select(tests.c.id).where(is_current(tests), tests.c.stage == stage)
     return len(connection.scalars(waiting.where(tests.c.id.in_(own))).all()) == len(own)
 
 

@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 from shm.errors import NothingThere, UsageError
 from shm.store.database import Repository
-from shm.store.files import by_checksum, by_former_names, by_id, in_force, recording_from
+from shm.store.files import by_checksum, by_former_names, by_id, is_current, recording_from
 from shm.store.holding import latest_hold, open_holds, standing_discard
 from shm.store.journal import DIED, is_step
 from shm.store.rows import (
@@ -19,10 +19,10 @@ from shm.store.rows import (
     ON_THE_WAY,
     Deaths,
     Hold,
+    RecordingInProgress,
     Stage,
-    Standing,
     StoredRecording,
-    counts_by_name,
+    sum_counts,
 )
 from shm.store.stored_recordings import waits_at
 from shm.store.tables import journal, recordings, tests
@@ -54,7 +54,7 @@ def find_recording(store: Repository, which: str) -> tuple[int, str | None]:
             by_number = sa.select(recordings.c.id).where(recordings.c.id == int(which))
             if connection.scalar(by_number) is not None:
                 return int(which), None
-        by_name = sa.select(tests.c.recording_id).where(tests.c.name == which, in_force(tests))
+        by_name = sa.select(tests.c.recording_id).where(tests.c.name == which, is_current(tests))
         found = connection.scalars(by_name.order_by(tests.c.recording_id)).all()
         if found:
             return _single(found, f"{len(found)} hangers have a test {which!r}."), which
@@ -81,7 +81,7 @@ def list_waiting_recordings(
     return _load(store, query.order_by(recordings.c.id).limit(limit))
 
 
-def list_under_way(store: Repository) -> tuple[Standing, ...]:
+def list_under_way(store: Repository) -> tuple[RecordingInProgress, ...]:
     """List recordings under way, each with the time of its last step."""
     reached = sa.func.max(journal.c.at).label("reached_at")
     query = (
@@ -93,7 +93,7 @@ def list_under_way(store: Repository) -> tuple[Standing, ...]:
     )
     rows = store.rows(query)
     return tuple(
-        Standing(
+        RecordingInProgress(
             row.id,
             row.file_name,
             row.stage,
@@ -112,11 +112,11 @@ def find_oldest_waiting(store: Repository) -> datetime | None:
 
 
 def count_stages(store: Repository) -> dict[str, int]:
-    """Count the recordings at each stage; see `counts_by_name`."""
+    """Count the recordings at each stage; see `sum_counts`."""
     query = sa.select(sa.type_coerce(recordings.c.stage, sa.Text), sa.func.count()).group_by(
         recordings.c.stage
     )
-    return counts_by_name(Stage, store.rows(query))
+    return sum_counts(Stage, store.rows(query))
 
 
 def list_stage_seconds(store: Repository, since: datetime) -> dict[str, list[float]]:

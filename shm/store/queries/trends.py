@@ -9,7 +9,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from shm.store.database import Repository
-from shm.store.files import counts, in_force
+from shm.store.files import is_counted, is_current
 from shm.store.mapping import value_in
 from shm.store.rows import StoredPosterior, StoredTest, TrendPoint
 from shm.store.selects import counted_tests, posterior_of_row, read_tests
@@ -60,7 +60,7 @@ def find_latest_trends(store: Repository, hangers: Iterable[Hanger]) -> dict[int
     """Return the latest point of the trend of each hanger that has one."""
     known = list(hangers)
     one = [tests.c.hanger == each.id for each in known] if len(known) == 1 else []
-    of_hangers = sa.select(tests.c.hanger).where(in_force(tests), *one).distinct().subquery()
+    of_hangers = sa.select(tests.c.hanger).where(is_current(tests), *one).distinct().subquery()
     latest = (
         _shown_tests()
         .where(tests.c.hanger == of_hangers.c.hanger, tests.c.id.in_(_of_shown(tests.c.id)))
@@ -80,4 +80,4 @@ def _of_shown(test_id: sa.ColumnElement[int]) -> sa.Select[Any]:
 
 
 def _shown_tests() -> sa.Select[Any]:
-    return sa.select(tests.c.id).where(in_force(tests), counts(tests))
+    return sa.select(tests.c.id).where(is_current(tests), is_counted(tests))
