@@ -22,7 +22,7 @@ from shm.store.queries.streams import list_pooled, load_stream_watch
 from shm.store.queries.tests import list_baseline_tests
 from shm.values import Mode
 from shm.values.stream import PooledReading, Window, WindowReading
-from shm.watch.kept_state import from_bytes
+from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.stream_thermometer import Thermometer
 from shm.watch.stream_watch import StreamState, watch_reading
 from tests.helpers.flows import Clock, ingest
@@ -65,7 +65,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     )
     monkeypatch.setattr(stream_steps, "read_stream_window", lambda *_: window(starts[-1]))
     monkeypatch.setattr(stream_days, "PERIOD", HOUR)
-    monkeypatch.setattr(streaming, "heed_silences", lambda *_: None)  # the ring is empty
+    monkeypatch.setattr(streaming, "evaluate_silent_streams", lambda *_: None)  # the ring is empty
     return made
 
 
@@ -124,7 +124,8 @@ def test_what_was_offline_is_watched_in_its_place_and_its_alert_raised_once(
     kept = load_stream_watch(store, 3)
     assert kept is not None
     state = from_bytes(StreamState, kept.content)
-    assert replace(state, settled_day=0.0, thermometer=Thermometer()).to_bytes() == found[-1].kept
+    same = replace(state, settled_day=0.0, thermometer=Thermometer())
+    assert to_bytes(same) == found[-1].kept
     assert days_of(workspace) == [1, 2, 3, 4]
 
 
