@@ -39,7 +39,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Pace:
-    """How often to look and to retry, in s; how many lines go at once (InfluxData: 5000).
+    """Seconds between looks and retries, and how many lines go at once (InfluxData: 5000).
 
     With more than `max_refused` points refused it is not the points that are wrong.
     """

@@ -109,9 +109,16 @@ def acknowledge(connection: Connection, alert_id: int, who: str, why: str, at: d
 def _note_on(
     connection: Connection, alert_id: int, prefix: str, who: str, why: str, at: datetime
 ) -> bool:
-    once = (alerts.c.id == alert_id) & alerts.c[f"{prefix}_at"].is_(None)
     note = {f"{prefix}_at": at, f"{prefix}_who": who, f"{prefix}_why": why}
-    return bool(connection.execute(sa.update(alerts).where(once), note).rowcount)
+    return bool(connection.execute(_ONCE[prefix], {"alert": alert_id, **note}).rowcount)
+
+
+_ONCE = {
+    prefix: sa.update(alerts).where(
+        alerts.c.id == sa.bindparam("alert"), alerts.c[f"{prefix}_at"].is_(None)
+    )
+    for prefix in ("noted", "ended")
+}
 
 
 def owe_resolution(connection: Connection, alert_id: int, hook: str, at: datetime) -> None:
