@@ -19,8 +19,7 @@ from shm.modes_document import test_document
 from shm.store.archive import suffix_of
 from shm.store.blobs import pack_response
 from shm.store.journal import RENAMED, write
-from shm.store.mapping import value_in
-from shm.store.rows import IdentifiedTest, Stage, StoredRecording, StoredTest
+from shm.store.rows import IdentifiedTest, Stage, StoredTest
 from shm.store.tables import journal, recordings, tests
 
 
@@ -35,11 +34,6 @@ def by_id(connection: Connection, recording_id: int) -> Row[Any]:
 def by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
     query = sa.select(recordings).where(recordings.c.sha256 == sha256)
     return connection.execute(query).one_or_none()
-
-
-def recording_from(row: Row[Any]) -> StoredRecording:
-    """Return a row of `recordings` as a value."""
-    return value_in(row, StoredRecording)
 
 
 def is_counted(table: sa.Table) -> sa.ColumnElement[bool]:

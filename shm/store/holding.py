@@ -31,7 +31,7 @@ from shm.store.tables import (
 )
 from shm.values import Alert, Fingerprint
 
-_holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(recordings)
+stored_holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(recordings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,28 +130,20 @@ def reason_of(recording: Row[Any], message: str, at: datetime, remedy: str = "")
     return reason_document(recording.file_name, recording.sha256, message, remedy, at)
 
 
-def open_holds(connection: Connection, hanger: int | None = None) -> tuple[Hold, ...]:
-    """List holds that nobody has decided on, the oldest first; of one hanger where named."""
-    query = _holds.where(holds.c.decision.is_(None)).order_by(holds.c.id)
-    if hanger is not None:
-        query = query.where(recordings.c.hanger == hanger)
-    return tuple(_hold(row) for row in connection.execute(query))
-
-
 def holds_of(connection: Connection, recording_id: int) -> tuple[Hold, ...]:
     """All holds of a recording and decisions on it, the oldest first."""
-    query = _holds.where(holds.c.recording_id == recording_id).order_by(holds.c.id)
-    return tuple(_hold(row) for row in connection.execute(query))
+    query = stored_holds.where(holds.c.recording_id == recording_id).order_by(holds.c.id)
+    return tuple(hold_from(row) for row in connection.execute(query))
 
 
 def latest_hold(connection: Connection, recording_id: int) -> Hold | None:
     """Return why a recording is or was last held, and what a person made of it."""
     row = _latest(connection, recording_id)
-    return None if row is None else _hold(row)
+    return None if row is None else hold_from(row)
 
 
 def _latest(connection: Connection, recording_id: int) -> Row[Any] | None:
-    query = _holds.where(holds.c.recording_id == recording_id)
+    query = stored_holds.where(holds.c.recording_id == recording_id)
     return connection.execute(query.order_by(holds.c.id.desc()).limit(1)).one_or_none()
 
 
@@ -160,7 +152,7 @@ def standing_discard(connection: Connection, recording: Row[Any]) -> Hold | None
     if recording.stage != Stage.REFUSED:
         return None
     row = _latest(connection, recording.id)
-    hold = None if row is None else _hold(row)
+    hold = None if row is None else hold_from(row)
     if hold is None or not hold.is_out:
         return None
     refusals = sa.select(journal.c.kind).where(
@@ -190,7 +182,7 @@ def end_hold(connection: Connection, recording_id: int, at: datetime) -> None:
     """Nobody need decide any more: the recording is done again."""
     row = _latest(connection, recording_id)
     if row is not None and row.decision is None:
-        hold = replace(_hold(row), decision=Decision.REPLACED)
+        hold = replace(hold_from(row), decision=Decision.REPLACED)
         decide(connection, hold, "shm", "done again", at)
 
 
@@ -257,7 +249,8 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
     return replace(hold, decided_at=at, who=who, why=why)
 
 
-def _hold(row: Row[Any]) -> Hold:
+def hold_from(row: Row[Any]) -> Hold:
+    """Return a row of `stored_holds` as a value."""
     document = loads(row.document)
-    tests = value_of(tuple[HeldTest, ...], document.pop("tests"))
-    return value_in(row, Hold, tests=tests, **document)
+    known = {name: document[name] for name in ("message", "sidecar_as")}
+    return value_in(row, Hold, tests=value_of(tuple[HeldTest, ...], document["tests"]), **known)

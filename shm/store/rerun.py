@@ -14,10 +14,11 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError
-from shm.store.files import begin_again, by_id, is_counted, is_current, move_numbers, recording_from
+from shm.store.files import begin_again, by_id, is_counted, is_current, move_numbers
 from shm.store.holding import discarded_reason, end_hold, standing_discard, taking_back
 from shm.store.journal import AGAIN, write
-from shm.store.rows import ReceivedFile, Rerun, Stage
+from shm.store.mapping import value_in
+from shm.store.rows import ReceivedFile, Rerun, Stage, StoredRecording
 from shm.store.tables import (
     baselines,
     drifts,
@@ -105,7 +106,7 @@ def rerun_recording(
     text = f"sent back by request, to be {from_stage} again."
     name = recording.file_name
     write(connection, at, AGAIN, recording_id, subject=name, detail=text, who="")
-    stored = recording_from(by_id(connection, recording_id))
+    stored = value_in(by_id(connection, recording_id), StoredRecording)
     names = tuple(row.name for row in chosen)
     return Rerun(stored, names, *superseded, tuple(row.name for row in chosen if row.id in own))
 

@@ -35,7 +35,7 @@ from shm.values import Hanger, Posterior, Selection
 _columns = (column for column in tests.columns if column is not tests.c.frequency_response)
 plain_tests = sa.select(*_columns, recordings.c.sha256).join(recordings)
 _undone = adoptions.c.undone_at.is_not(None)
-_undone_selections = sa.select(adoptions.c.selection_id).where(_undone)
+undone_selections = sa.select(adoptions.c.selection_id).where(_undone)
 _undone_baselines = sa.select(adoptions.c.baseline_id).where(_undone)
 WEIGHED = sa.type_coerce(tests.c.document, sa.Text).contains('"tension_read_n"')
 # Posteriors of the baseline's tests in a class that is not in force: it lost a selection that
@@ -43,7 +43,7 @@ WEIGHED = sa.type_coerce(tests.c.document, sa.Text).contains('"tension_read_n"')
 # a posterior each, which must still show what moved between them.
 hidden = sa.union(
     sa.select(selection_entries.c.posterior_id).where(
-        (selection_entries.c.rank > 0) != selection_entries.c.selection_id.in_(_undone_selections)
+        (selection_entries.c.rank > 0) != selection_entries.c.selection_id.in_(undone_selections)
     ),
     sa.select(baselines.c.posterior_id).where(baselines.c.since.is_not(None)),
 )
@@ -93,15 +93,9 @@ def select_since_baseline(
     return found if baseline.since is None else [*found, tests.c.time >= baseline.since]
 
 
-def read_tests(connection: Connection, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
-    """The tests of a query on `plain_tests`."""
-    return tuple(_test(row) for row in connection.execute(query))
-
-
 def load_tests(store: Repository, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
     """Read the tests of a query on `plain_tests`."""
-    with store.reading() as connection:
-        return read_tests(connection, query)
+    return tuple(map(_test, store.rows(query)))
 
 
 def _test(row: Row[Any]) -> StoredTest:
@@ -169,24 +163,17 @@ def selection_of(connection: Connection, hanger: int) -> StoredSelection | None:
     return StoredSelection(row.id, selection, row.selected_at, row.model)
 
 
-def selected_classes(connection: Connection) -> dict[int, str]:
-    """The name of the class in force of each hanger that has one."""
-    query = sa.select(selections.c.hanger, selections.c.model).order_by(selections.c.id)
-    held = query.where(selections.c.id.not_in(_undone_selections))
-    return {row.hanger: row.model for row in connection.execute(held)}
-
-
 def selection_numbers(connection: Connection) -> dict[int, int]:
     """The number of the selection in force of each hanger that has one."""
     query = sa.select(selections.c.hanger, sa.func.max(selections.c.id).label("id"))
-    query = query.where(selections.c.id.not_in(_undone_selections)).group_by(selections.c.hanger)
+    query = query.where(selections.c.id.not_in(undone_selections)).group_by(selections.c.hanger)
     return {row.hanger: row.id for row in connection.execute(query)}
 
 
 def selection_in_force(hanger: int) -> sa.Select[Any]:
     """The newest selection of a hanger that did not come with an adoption since undone."""
     query = sa.select(selections).where(
-        selections.c.hanger == hanger, selections.c.id.not_in(_undone_selections)
+        selections.c.hanger == hanger, selections.c.id.not_in(undone_selections)
     )
     return query.order_by(selections.c.id.desc()).limit(1)
 
@@ -200,7 +187,7 @@ def _in_force(hanger: int) -> sa.ColumnElement[bool]:
 def baselines_now(hanger: int | None = None) -> sa.Select[Any]:
     """The numbers of the newest baselines of all hangers or of one, each in its class in force."""
     newest = sa.select(sa.func.max(selections.c.id)).group_by(selections.c.hanger)
-    held = newest.where(selections.c.id.not_in(_undone_selections))
+    held = newest.where(selections.c.id.not_in(undone_selections))
     found = (
         sa.select(sa.func.max(baselines.c.id))
         .join(posteriors, posteriors.c.id == baselines.c.posterior_id)

@@ -18,10 +18,10 @@ from shm.store.files import (
     end_tests,
     is_current,
     note_name,
-    recording_from,
 )
 from shm.store.holding import standing_discard
 from shm.store.journal import ARCHIVED, DIED, REFUSED, write
+from shm.store.mapping import value_in
 from shm.store.rerun import redescribe, reopen
 from shm.store.rows import Outcome, Receipt, ReceivedFile, Stage, StoredRecording
 from shm.store.tables import recordings, tests
@@ -43,7 +43,7 @@ class Recordings(Dispositions):
             else:
                 row_id = known.id
                 _notice(connection, known, file, outcome, at)
-            return Receipt(outcome, recording_from(by_id(connection, row_id)))
+            return Receipt(outcome, value_in(by_id(connection, row_id), StoredRecording))
 
     def refuse(
         self,
@@ -75,7 +75,7 @@ class Recordings(Dispositions):
     def get(self, recording_id: int) -> StoredRecording:
         """One recording by its number; raises NothingThere."""
         with self.reading() as connection:
-            return recording_from(by_id(connection, recording_id))
+            return value_in(by_id(connection, recording_id), StoredRecording)
 
     def note_death(self, recording_id: int, message: str, at: datetime) -> None:
         """Note that a process that worked on a recording died."""

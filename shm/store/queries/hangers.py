@@ -16,9 +16,17 @@ from shm.store.database import Repository
 from shm.store.files import is_current
 from shm.store.mapping import value_in
 from shm.store.rows import BaselineGlance, StoredAdoption, StoredDiagnosis, StoredWatch
-from shm.store.selects import baselines_now, for_hangers, selected_classes
+from shm.store.selects import baselines_now, for_hangers, undone_selections
 from shm.store.stored_watch import load_watches
-from shm.store.tables import adoptions, baselines, diagnoses, posterior_tests, tests, watches
+from shm.store.tables import (
+    adoptions,
+    baselines,
+    diagnoses,
+    posterior_tests,
+    selections,
+    tests,
+    watches,
+)
 from shm.store.trends import baselines_in_numbers
 from shm.values import Change, Hanger
 
@@ -27,8 +35,9 @@ log = logging.getLogger(__name__)
 
 def list_selected_models(store: Repository) -> dict[int, str]:
     """Return the selected or adopted class of each hanger that has one."""
-    with store.reading() as connection:
-        return selected_classes(connection)
+    query = sa.select(selections.c.hanger, selections.c.model).order_by(selections.c.id)
+    held = query.where(selections.c.id.not_in(undone_selections))
+    return {row.hanger: row.model for row in store.rows(held)}
 
 
 def find_latest_diagnosis(store: Repository, hanger: int) -> StoredDiagnosis | None:

@@ -11,9 +11,10 @@ import sqlalchemy as sa
 
 from shm.errors import NothingThere, UsageError
 from shm.store.database import Repository
-from shm.store.files import by_checksum, by_former_names, by_id, is_current, recording_from
-from shm.store.holding import latest_hold, open_holds, standing_discard
+from shm.store.files import by_checksum, by_former_names, by_id, is_current
+from shm.store.holding import hold_from, latest_hold, standing_discard, stored_holds
 from shm.store.journal import DIED, is_step
+from shm.store.mapping import value_in
 from shm.store.rows import (
     ENDED,
     ON_THE_WAY,
@@ -25,7 +26,7 @@ from shm.store.rows import (
     sum_counts,
 )
 from shm.store.stored_recordings import waits_at
-from shm.store.tables import journal, recordings, tests
+from shm.store.tables import holds, journal, recordings, tests
 
 
 def is_waiting(
@@ -40,7 +41,7 @@ def find_by_checksum(store: Repository, sha256: str) -> StoredRecording | None:
     """Return the recording with these bytes, if it was received."""
     with store.reading() as connection:
         row = by_checksum(connection, sha256)
-    return None if row is None else recording_from(row)
+    return None if row is None else value_in(row, StoredRecording)
 
 
 def find_recording(store: Repository, which: str) -> tuple[int, str | None]:
@@ -159,8 +160,10 @@ def count_deaths(store: Repository) -> dict[int, Deaths]:
 
 def list_holds(store: Repository, hanger: int | None = None) -> tuple[Hold, ...]:
     """Return the holds that nobody has decided on, the oldest first; of one hanger if named."""
-    with store.reading() as connection:
-        return open_holds(connection, hanger)
+    query = stored_holds.where(holds.c.decision.is_(None)).order_by(holds.c.id)
+    if hanger is not None:
+        query = query.where(recordings.c.hanger == hanger)
+    return tuple(map(hold_from, store.rows(query)))
 
 
 def find_latest_hold(store: Repository, recording_id: int) -> Hold | None:
@@ -183,4 +186,4 @@ def _single(found: Sequence[int], several: str) -> int:
 
 
 def _load(store: Repository, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
-    return tuple(map(recording_from, store.rows(query)))
+    return tuple(value_in(row, StoredRecording) for row in store.rows(query))

@@ -12,7 +12,7 @@ from shm.store.database import Repository
 from shm.store.files import is_counted, is_current
 from shm.store.mapping import value_in
 from shm.store.rows import StoredPosterior, StoredTest, TrendPoint
-from shm.store.selects import counted_tests, posterior_of_row, read_tests
+from shm.store.selects import counted_tests, load_tests, posterior_of_row
 from shm.store.stored_posteriors import posteriors_of
 from shm.store.tables import posterior_tests, posteriors, tests
 from shm.store.trends import load_points, shown_posteriors
@@ -39,8 +39,7 @@ def list_history(store: Repository, hanger: int) -> tuple[tuple[StoredTest, Post
     stored = {row.id: row.posterior for row in list_posteriors(store, hanger)}
     with store.reading() as connection:
         newest_of = {row[0]: row[1] for row in connection.execute(newest)}
-    with store.reading() as connection:
-        known = read_tests(connection, counted_tests(hanger))
+    known = load_tests(store, counted_tests(hanger))
     return tuple(
         (test, stored[newest_of[test.id]]) for test in known if newest_of.get(test.id) in stored
     )
