@@ -18,6 +18,7 @@ import ast
 import csv
 import inspect
 import re
+import runpy
 import sys
 import textwrap
 from collections.abc import Mapping
@@ -111,8 +112,19 @@ def examples() -> str:
         number, _, name = path.stem.partition("_")
         title = f"{int(number)}. {name.replace('_', ' ').capitalize()}"
         link = f"[The complete program](examples/{path.name})."
-        parts.append(f"### {title}\n\n{purpose} {link}\n\n```python\n{_core(text)}\n```")
+        picture = f"![{title[3:].strip()}](static/examples/{path.stem}.png)"
+        core = f"```python\n{_core(text)}\n```"
+        parts.append(f"### {title}\n\n{purpose} {link}\n\n{core}\n\n{picture}")
     return "\n" + "\n\n".join(parts) + "\n"
+
+
+def draw_examples() -> None:
+    """Run the programs of docs/examples and keep the figure of each for docs/api.md."""
+    folder = DOCS / "static" / "examples"
+    folder.mkdir(exist_ok=True)
+    for path in sorted((DOCS / "examples").glob("*.py")):
+        figure = runpy.run_path(str(path), run_name="__main__")["figure"]
+        figure.savefig(folder / f"{path.stem}.png", dpi=70)
 
 
 def _core(program: str) -> str:
@@ -181,7 +193,9 @@ def _ranges(bounds: Mapping[str, tuple[float, float]]) -> str:
 
 
 def main() -> None:
-    """Write the pages."""
+    """Write the pages; with --figures the pictures of the examples, too, with --quick no tables."""
+    if "--figures" in sys.argv:
+        draw_examples()
     (DOCS / "commands.md").write_text(commands_page(), encoding="utf-8")
     (DOCS / "settings.md").write_text(settings_page(), encoding="utf-8")
     (DOCS / "effects.md").write_text(effects_page(), encoding="utf-8")

@@ -39,7 +39,7 @@ def _channel_of(text: str, name: str, option: str) -> Channel:
             f"{' or '.join(PLANES)}, and what full scale of the interface is worth in N or m/s2.",
         ) from None
     quantity: Any = "force" if name == "force" else "acceleration"
-    return Channel(name, quantity, np.empty(0), plane, float(x_m), float(full_scale))  # type: ignore[arg-type]
+    return Channel(name, quantity, np.empty(0), plane, float(x_m), float(full_scale))
 
 
 @click.command()
@@ -60,16 +60,20 @@ def _channel_of(text: str, name: str, option: str) -> Channel:
 )
 @click.option("--seconds", type=click.FloatRange(1, 600), default=20.0, help="Ring-down of a hit.")
 @click.option("--rate", "rate_hz", type=click.FloatRange(100), default=1000.0, help="Samples/s.")
-@click.option("--least-hits", type=click.IntRange(1, 99), default=3)
-@click.option("--most-hits", type=click.IntRange(1, 99), default=10)
+@click.option("--least-hits", type=click.IntRange(1, 99), default=3, help="Before it may stop.")
+@click.option("--most-hits", type=click.IntRange(1, 99), default=10, help="It stops after these.")
 @click.option(
     "--precision",
     type=click.FloatRange(1e-5, 0.1),
     default=1e-3,
     help="Enough: standard deviation of the worst mode over its frequency.",
 )
-@click.option("--temperature-c", type=float, default=np.nan, show_default=False)
-@click.option("--out", required=True, type=flags.NewFile(), metavar="TEST.zip")
+@click.option(
+    "--temperature-c", type=float, default=np.nan, show_default=False, help="Unknown if left out."
+)
+@click.option(
+    "--out", required=True, type=flags.NewFile(), metavar="TEST.zip", help="Write the test here."
+)
 @flags.hanger()
 @flags.hanger_file
 @flags.seed
@@ -77,6 +81,7 @@ def _channel_of(text: str, name: str, option: str) -> Channel:
 @click.pass_context
 def command(
     ctx: click.Context,
+    /,
     device: str,
     hammer: str,
     sensors: tuple[str, ...],

@@ -74,7 +74,9 @@ GROUPS: dict[str, dict[str, Verb]] = {
         "token": Verb("shm_cli.access", "Manage tokens for access over the network.", "token"),
     },
     "Files alone": {
-        "acquire": Verb("shm_cli.acquire", "Record a hammer test, guided hit by hit."),
+        "acquire": Verb(
+            "shm_cli.acquire", "Guide a hammer test: levels, when to hit, and which hits count."
+        ),
         "identify": Verb("shm_cli.identify", "Identify the modes of recordings."),
         "select": Verb(
             "shm_cli.update",

@@ -31,6 +31,7 @@ test = shm.ModalTest(
     ),
 )
 posterior = shm.update(test, hanger, model="beam1", seed=1, priors="thesis")
+figure = shm.plot.tension(posterior, hanger)
 # Shown in the manual until here.
 tension_kn = posterior.tension_n / 1e3
 print(f"tension {tension_kn.mean():.0f} ± {tension_kn.std():.0f} kN")

@@ -5,6 +5,8 @@ model (`beam1`) for the first and the one with springs (`beam2`) for the second;
 a wrong tension, and says so by its evidence and its model error.
 """
 
+from matplotlib.figure import Figure
+
 import shm
 
 hanger = shm.round_bar(
@@ -40,6 +42,11 @@ for name, choice in (("clamped", clamped), ("turning", soft)):
             f"{name} deck end, {posterior.model}: probability {probability:.3f}, "
             f"tension {posterior.tension_n.mean() / 1e3:.1f} kN"
         )
+
+figure = Figure(layout="constrained")
+for axes, posterior in zip(figure.subplots(2, 1, sharex=True), soft.posteriors, strict=True):
+    shm.plot.tension(posterior, hanger, ax=axes)
+    axes.set_xlabel(f"tension (kN), turning deck end, {posterior.model}")
 
 assert soft.selected.model == "beam2"
 assert soft.probabilities[0] > 0.99

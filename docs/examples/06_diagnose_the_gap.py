@@ -29,6 +29,7 @@ diagnosis = shm.diagnose(shm.ModalTest("t1", modes, hanger=3), hanger, draws=200
 cause = diagnosis.leading
 assert cause is not None
 print(diagnosis.summary())
+figure = shm.plot.causes(diagnosis, hanger)
 # Shown in the manual until here.
 
 found = {estimate.name: estimate for estimate in cause.parameters}

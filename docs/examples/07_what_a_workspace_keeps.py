@@ -9,6 +9,8 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from matplotlib.figure import Figure
+
 import shm
 from shm.documents import dump
 from shm.modes_document import modes_document
@@ -40,7 +42,7 @@ def measured(hanger: shm.Hanger, tension_n: float, day: int) -> shm.ModalTest:
     return replace(shm.identify(recording, hanger=hanger).test, id=f"day {day}")
 
 
-def main() -> None:
+def main() -> Figure:
     with TemporaryDirectory() as folder:
         described, modes = Path(folder) / "described.toml", Path(folder) / "hanger3.modes.json"
         arch = Path(folder) / "arch"
@@ -73,8 +75,9 @@ def main() -> None:
     assert abs(posteriors[0].tension_n.mean() / 711e3 - 1) < 0.005
     assert abs(posteriors[1].tension_n.mean() / 700e3 - 1) < 0.005
     assert figure.axes[0].get_xlabel() == "time of the test (UTC)"
+    return figure
 
 
 # The command line works in processes of its own, which import this file again.
 if __name__ == "__main__":
-    main()
+    figure = main()

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.io
 from nptdms import ChannelObject, RootObject, TdmsWriter
 
+import shm
 from shm.read import peek, read
 
 force, acceleration = np.random.default_rng(1).standard_normal((2, 5120))
@@ -52,6 +53,7 @@ with tempfile.TemporaryDirectory() as name:
         found = read(path)
         assert found.force is not None
         (channel,) = found.accelerations
+        figure = shm.plot.recording(found)
         assert np.allclose(channel.values, 9.80665 * acceleration)
         print(
             f"{path.name}: hanger {found.hanger}, {channel.name} of {len(channel.values)} samples"

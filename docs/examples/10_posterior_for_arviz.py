@@ -4,6 +4,7 @@ Needs `pip install 'shm[arviz]'`; then `arviz.summary`, `arviz.loo`, `arviz.plot
 """
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import shm
 
@@ -23,6 +24,11 @@ posterior = shm.update(test, hanger, model="beam1", samples=500, seed=1, priors=
 tree = posterior.to_arviz([test.test], hanger)
 
 tension = tree["posterior"]["tension_n"]
+length = tree["posterior"]["theta_L"]
+figure = Figure(layout="constrained")
+axes = figure.subplots()
+axes.scatter(length, tension / 1e3, s=4)
+axes.set(xlabel="effective over described length", ylabel="tension (kN)")
 # Shown in the manual until here.
 print(f"tension {float(tension.mean()):.0f} {tension.attrs['units']}")
 replicated = tree["posterior_predictive"]["frequency_hz"]

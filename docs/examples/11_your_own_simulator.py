@@ -5,6 +5,7 @@ simulator does not know; the catalogue has that and two rivals.
 """
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import shm
 
@@ -45,6 +46,11 @@ readings = [
 ]
 answer = shm.diagnose_simulator(simulator, readings, candidates=[{"x_m": 0.0, "warm_k": 0.0}])
 print(answer.summary())
+figure = Figure(layout="constrained")
+axes = figure.subplots()
+axes.barh([each.name for each in answer.causes], [each.probability for each in answer.causes])
+axes.set(xlabel="probability")
+
 assert answer.named == ("pretension",)
 assert answer.no_gap_probability < 0.01
 assert answer.shrinkage.held_out_after < answer.shrinkage.held_out_before / 3

@@ -5,6 +5,7 @@ A reading of 0.3 % closes most of that for this test and for every later one of 
 """
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import shm
 from shm.models import build
@@ -36,6 +37,14 @@ calibrated = shm.update(later, hanger, model="beam1", seed=1, calibrated_by=[lif
 
 widths = [np.ptp(np.quantile(each.tension_n, [0.05, 0.95])) for each in (without, calibrated)]
 print(f"90 % interval {widths[0] / 1e3:.0f} kN wide without, {widths[1] / 1e3:.0f} kN with")
+
+figure = Figure(layout="constrained")
+axes = figure.subplots()
+for each, label in ((without, "without a reading"), (calibrated, "calibrated")):
+    axes.hist(each.tension_n / 1e3, bins=40, density=True, histtype="step", label=label)
+axes.axvline(truth_n / 1e3, color="black", linestyle=":")
+axes.set(xlabel="tension (kN)", ylabel="density")
+axes.legend()
 
 assert widths[1] < 0.75 * widths[0]
 assert abs(calibrated.tension_n.mean() - truth_n) < 3 * calibrated.tension_n.std()

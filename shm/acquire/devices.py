@@ -133,7 +133,7 @@ class SimulatedDevice:
                 part[:, later:] += 0.5 * part[:, :-later].copy()
             if hit in overload:
                 part *= 1.5 / np.abs(part).max()
-        self._played = np.clip(played, -1.0, 1.0)
+        self._played = np.asarray(np.clip(played, -1.0, 1.0), np.float64)
 
     def read(self, samples: int) -> FloatArray:
         begin, self._at = self._at, self._at + samples

@@ -46,6 +46,7 @@ from shm.values import (
     Outlier,
     TensionEstimate,
 )
+from shm.values.verdict import DOUBTFUL
 
 _ATTRIBUTION = 0.85
 """The part of a diagnosis's time that goes into finding the cause."""
@@ -202,7 +203,7 @@ def _on_the_way(
 def _of_another(tests: Sequence[ModalTest], hanger: Hanger) -> tuple[str, ...]:
     """Which tests are not of the hanger as described, before anything that else they would mean."""
     doubts = {test.id: doubt_of(test, Known(hanger), []) for test in tests}
-    return tuple(f"Doubtful: test {id_}. {each.text}" for id_, each in doubts.items() if each)
+    return tuple(f"{DOUBTFUL}: test {id_}. {each.text}" for id_, each in doubts.items() if each)
 
 
 def _states(

@@ -260,7 +260,7 @@ class HangersNow:
         standing, blind = self.standing.get(hanger.id, ()), self.blind.get(hanger.id)
         control = next((each for each in self.charts if each.hanger.id == hanger.id), None)
         days, at = self.workspace.settings.campaign_days, point.time if point else None
-        doubts = () if control else campaign_warnings(self.charts, hanger.id, at, days)
+        doubts = campaign_warnings(self.charts, hanger, at, days)
         return HangerSummary(
             hanger,
             LatestTest(point.test, point.time, point.averaged, point.model) if point else None,

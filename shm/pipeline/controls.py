@@ -9,7 +9,7 @@ from math import isfinite
 from shm.report.control_report import campaign_warning
 from shm.store import Store, Workspace
 from shm.store.queries.trends import list_trend
-from shm.values import ControlHanger
+from shm.values import ControlHanger, Hanger
 from shm.watch.control_chart import ControlChart, chart_control
 
 
@@ -33,10 +33,13 @@ def _chart(store: Store, control: ControlHanger) -> ControlChart:
 
 
 def campaign_warnings(
-    charts: Sequence[ControlChart], hanger: int, time: datetime | None, days: float
+    charts: Sequence[ControlChart], hanger: Hanger, time: datetime | None, days: float
 ) -> tuple[str, ...]:
-    """Return that a control hanger was out of its limits within `days` of a test; else nothing."""
-    if time is None:
+    """Return that a control hanger was out of its limits within `days` of a test; else nothing.
+
+    Sensors that stay on a hanger have another logger than a campaign, and control hangers none.
+    """
+    if time is None or hanger.has_sensors or hanger.is_control:
         return ()
     found = ((chart, chart.out_near(time, days)) for chart in charts)
-    return tuple(campaign_warning(hanger, chart, point) for chart, point in found if point)
+    return tuple(campaign_warning(hanger.id, chart, point) for chart, point in found if point)

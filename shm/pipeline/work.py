@@ -210,8 +210,9 @@ class Queue:
             alert = alert if works is None else after_works(alert, works)
         if alert is not None and self.workspace.bridge.controls:
             charts, days = control_charts(self.workspace, store), settings.campaign_days
-            doubts = campaign_warnings(charts, hanger.id, test.time, days)
-            alert = replace(alert, message=" ".join((alert.message, *doubts)))
+            doubts = campaign_warnings(charts, hanger, test.time, days)
+            said, mark, details = alert.message.partition(" Details: ")
+            alert = replace(alert, message=f"{' '.join((said, *doubts))}{mark}{details}")
         changes = reconciled(store, hanger, baseline, test, (watched, alert))
         stored = (test, baseline, watched, alert, hooks, self.clock())
         state, level = (

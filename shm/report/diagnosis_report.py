@@ -83,7 +83,8 @@ def diagnosis_paper(sheet: DiagnosisSheet) -> Paper:
 
 def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] = ()) -> Part:
     """Return all of it: verdict, remarks on the data, figures, tables."""
-    outcome = sheet.diagnosis.verdict.outcome
+    verdict = sheet.diagnosis.verdict
+    outcome = verdict.outcome
     return Part(
         title,
         paragraphs,
@@ -95,7 +96,7 @@ def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] 
         figures=lambda: diagnosis_figures(sheet),
         tables=(*answers(sheet), *evidence(sheet)),
         status=outcome.value,
-        style="watch" if sheet.diagnosis.verdict.is_uncertain else _STYLES[outcome],
+        style="watch" if verdict.is_uncertain or verdict.is_doubted else _STYLES[outcome],
     )
 
 

@@ -69,6 +69,7 @@ _HELD_OUT: Mapping[bool | None, str] = {
     None: "Nothing was held out of the fit to check the cause.",
 }
 _UNCERTAIN = "the sampler failed, so the answer is uncertain; "
+_DOUBTED = "make sure first that these tests are of this hanger: "
 _CALLIPER = "measure section, length and weight with calliper and tape first: "
 _MEASUREMENT = "what differs is the measurement's, not the hanger's: "
 
@@ -87,6 +88,7 @@ def write_lead(diagnosis: Diagnosis) -> str:
     """Return the verdict in a sentence, what asks for care first."""
     verdict = diagnosis.verdict
     start = _UNCERTAIN if verdict.is_uncertain else ""
+    start += _DOUBTED if verdict.is_doubted else ""
     if verdict.claim is not None and verdict.is_description_off:
         start += _CALLIPER
     elif verdict.claim is not None and is_of_the_measurement(verdict.claim):
@@ -159,6 +161,8 @@ def write_tension(diagnosis: Diagnosis) -> str:
         care = ""
         if verdict.is_open:
             care = ", not to be relied on while the gap is open"
+        elif verdict.is_doubted:
+            care = ", not to be relied on while it may be another hanger"
         elif verdict.is_description_off:
             care = ", not to be relied on while the description may be off"
         wording = short_tension_words(after_n, tension_unit(diagnosis))

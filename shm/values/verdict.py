@@ -67,6 +67,8 @@ Reason = Literal[
     "sampler failed",
     "no probabilities",
 ]
+DOUBTFUL = "Doubtful"
+"""How a remark begins that doubts of which hanger the tests are."""
 _UNKNOWN: Reason = "unknown is more probable"
 
 
@@ -109,6 +111,7 @@ class GapVerdict:
 
     `probability` is that of the claim, of no gap, or of something unknown. `rms_z` is the root mean
     square of what is left, in standard deviations of the stated errors (NaN without any).
+    It `is_doubted` where the tests may be of another hanger than the described one.
     `runner_up` is the most probable cause where none is claimed. `alone` is the excluded frequency
     that may be no blunder, but something that acts on one mode alone. `holds_out` is False if
     frequencies that were held out of the fit come no nearer with the claim, None if none were.
@@ -124,6 +127,7 @@ class GapVerdict:
     alone: Outlier | None = None
     is_within_errors: bool = True
     is_uncertain: bool = False
+    is_doubted: bool = False
     is_few: bool = False
     holds_out: bool | None = None
 
@@ -150,6 +154,7 @@ def judge(diagnosis: Diagnosis) -> GapVerdict:
         diagnosis.fit_p_value,
         alone=alone,
         is_uncertain=diagnosis.effective_draws < ENOUGH_EFFECTIVE,
+        is_doubted=any(each.startswith(DOUBTFUL) for each in diagnosis.remarks),
         is_few=len({(each.plane, each.order) for each in diagnosis.where}) < FEW_MODES,
         holds_out=_holds_out(diagnosis.shrinkage),
     )

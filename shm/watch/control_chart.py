@@ -14,8 +14,8 @@ from shm.values import ControlHanger, Summary
 class ControlPoint:
     """A test on the chart: its tension and the known one in N, and the deviation as a fraction.
 
-    `sd` is the repeatability of the deviation, `centre` what is expected by all tests before,
-    `limit` the half width about it.
+    `sd` is what deviations scatter by from test to test, `centre` what is expected by all tests
+    before, `limit` the half width about it.
     """
 
     test: str
@@ -59,15 +59,17 @@ def chart_control(
 ) -> ControlChart:
     """Chart tests by name, time, absolute tension, its repeatability and the known one, in N.
 
-    A deviation is a constant bias and the repeatability of its test. Tests within limits teach
+    A deviation is a constant bias, the repeatability of its test, and what tensions differ by from
+    test to test (`tension_between_tests` of the assumptions). Tests within limits teach
     the bias (a Kalman filter of a constant): the first is judged by its zeta score (ISO
     13528:2022, 9.6), later ones as on a chart of Shewhart (ISO 7870-2:2023). See record 0028.
     """
     points: list[ControlPoint] = []
+    between = hanger.assumptions.tension_between_tests.value
     bias, variance = 0.0, math.nan
     for test, time, tension, repeatability_n, known_n in sorted(tests, key=lambda each: each[1]):
         absolute, repeats = tension.sd / known_n, repeatability_n / known_n
-        repeats = repeats if math.isfinite(repeats) else absolute
+        repeats = math.hypot(repeats if math.isfinite(repeats) else absolute, between)
         if math.isnan(variance):
             reference = hanger.known_tension_sd_n / hanger.known_tension_n
             variance = reference**2 + max(absolute**2 - repeats**2, 0.0)

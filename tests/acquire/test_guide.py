@@ -130,3 +130,24 @@ def test_acquire_refuses_bad_levels(dead: bool, wrong: str) -> None:
         acquire(Dead(dead), CHANNELS, list[str]().append, OPTIONS)
 
     assert "cable" in refused.value.remedy
+
+
+class Interrupted(SimulatedDevice):
+    """A device at which the crew presses Ctrl-C after so many seconds."""
+
+    read_s = 0.0
+
+    def read(self, samples: int) -> FloatArray:
+        self.read_s += samples / self.sampling_rate_hz
+        if self.read_s > 25.0:
+            raise KeyboardInterrupt
+        return super().read(samples)
+
+
+def test_acquire_interrupted_keeps_hits(hanger: Hanger) -> None:
+    device = Interrupted(hanger, CHANNELS, np.random.default_rng(7), hits=3, seconds=13.0)
+
+    got = acquire(device, CHANNELS, list[str]().append, OPTIONS, hanger=hanger)
+
+    assert len(got.hits) == 1
+    assert not got.lost

@@ -10,15 +10,18 @@ import pytest
 
 from tests.helpers.slow import few_of
 
-EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "docs" / "examples").glob("*.py"))
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
 
 
 @pytest.mark.parametrize("example", few_of(EXAMPLES, 3), ids=lambda path: path.stem)
 def test_an_example_runs_and_finds_the_known_truth(
     example: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    runpy.run_path(str(example), run_name="__main__")
+    found = runpy.run_path(str(example), run_name="__main__")
     assert capsys.readouterr().out
+    assert found["figure"].axes
+    assert (ROOT / "docs" / "static" / "examples" / f"{example.stem}.png").is_file()
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)

@@ -165,8 +165,8 @@ def find_contradictions(found: Diagnosis) -> list[str]:
     if is_settled and (failed or found.effective_draws < ENOUGH_EFFECTIVE):
         said.append("settled, though the sampler failed")
     doubted = [each for each in found.remarks if each.startswith("Doubtful")]
-    if is_settled and doubted:
-        said.append("settled, though a remark doubts that the tests are of this hanger")
+    if doubted and not verdict.is_doubted:
+        said.append("a remark doubts that the tests are of this hanger, the verdict does not")
     before, after = found.tension_before_n, found.tension_after_n
     for each in (before, after):
         ordered = [each.q025, each.q05, each.mean, each.q95, each.q975]

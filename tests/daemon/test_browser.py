@@ -157,6 +157,18 @@ def test_the_keyboard_reaches_the_content_and_every_hanger(signed_in: Browser, s
     expect(hanger).to_have_attribute("href", "/hangers/3")
 
 
+@pytest.mark.parametrize(("address", "shown"), [("", "now"), ("#trend", "trend")])
+def test_tabs_open_one_part(signed_in: Browser, site: Site, address: str, shown: str) -> None:
+    page = signed_in.open(site.url)
+
+    page.goto(f"{site.url}/hangers/3{address}")
+
+    visible = page.locator("[data-tab]:visible")
+
+    expect(visible).to_have_count(1)
+    expect(visible).to_have_id(shown)
+
+
 def test_an_uploaded_file_becomes_a_test(signed_in: Browser, site: Site, tmp_path: Path) -> None:
     path = tmp_path / "sent by hand.modes.json"
     write_test(path, site.workspace, day=120, tension=0.8)

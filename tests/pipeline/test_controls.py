@@ -15,10 +15,11 @@ from shm.bridge import load_bridge
 from shm.documents import dump
 from shm.errors import BadInput
 from shm.modes_document import modes_document
-from shm.pipeline.controls import control_charts
+from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.store import Workspace
 from shm.store.queries.hangers import find_latest_watches
-from shm.store.queries.trends import list_trend
+from shm.store.queries.trends import find_latest_trends, list_trend
+from shm.values import MonitoredHanger
 from shm_cli.main import run
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import served
@@ -92,7 +93,18 @@ def test_control_never_watched(workspace: Workspace) -> None:
         assert CONTROL not in find_latest_watches(store)
     assert alerts  # the hangers are not silenced
     assert all(alert.hanger != CONTROL for alert in alerts)
-    assert any(DOUBT in alert.message for alert in alerts)
+    assert any(DOUBT in alert.message.partition(" Details: ")[0] for alert in alerts)
+
+
+def test_campaign_warnings_spare_sensors(workspace: Workspace) -> None:
+    hanger = workspace.bridge.hanger(3)
+    with workspace.store() as store:
+        charts = control_charts(workspace, store)
+        latest, _ = find_latest_trends(store, workspace.bridge.hangers).values()
+
+    assert len(campaign_warnings(charts, hanger, latest.time, 1.0)) == 1
+    assert not campaign_warnings(charts, hanger, latest.time, 0.1)
+    assert not campaign_warnings(charts, MonitoredHanger.of(hanger), latest.time, 1.0)
 
 
 def test_control_report_has_chart(

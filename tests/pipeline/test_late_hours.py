@@ -124,8 +124,8 @@ def test_what_was_offline_is_watched_in_its_place_and_its_alert_raised_once(
     kept = load_stream_watch(store, 3)
     assert kept is not None
     state = from_bytes(StreamState, kept.content)
-    same = replace(state, settled_day=0.0, thermometer=Thermometer())
-    assert to_bytes(same) == found[-1].kept
+    begun = replace(state, settled_day=0.0, thermometer=Thermometer())
+    assert to_bytes(begun) == found[-1].kept
     assert days_of(workspace) == [1, 2, 3, 4]
 
 

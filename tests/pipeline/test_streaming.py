@@ -24,6 +24,7 @@ from shm.store.queries.streams import list_pooled, list_windows, load_stream_wat
 from shm.store.ring import ring_of
 from shm.store.stored_streams import Streams
 from shm.values.stream import PooledReading
+from shm.watch.kept_state import to_bytes
 from shm.watch.stream_reading import ModeTable
 from shm.watch.stream_watch import StreamState, StreamWatched
 from tests.helpers.flows import Clock
@@ -203,7 +204,7 @@ def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
         at = reading.start + HOUR
         alert = Alert("hanger-3:sudden-change:x", 3, "hanger03-x", at, "Hanger 3 lost 3 %.", ())
         nonlocal state
-        state = StreamState.begun("", at, ModeTable.of(None, hanger, reading.modes)).to_bytes()
+        state = to_bytes(StreamState.begun("", at, ModeTable.of(None, hanger, reading.modes)))
         return StreamWatched(state, -0.03, 1e-3, -0.03, 1e-3, None, alert, (), (), "")
 
     monkeypatch.setattr(stream_steps, "watch_reading", alarmed)

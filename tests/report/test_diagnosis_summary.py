@@ -124,6 +124,16 @@ def test_beside_no_gap_only_a_rival_that_counts_calls_for_a_measurement() -> Non
     assert "To tell no gap from sag, measure next: two-axis sensors" in said(rival)
 
 
+def test_where_another_hanger_may_have_been_hit_that_comes_first_and_nothing_is_relied_on() -> None:
+    sure = LED
+    doubted = replace(sure, remarks=("Doubtful: test t1. It does not fit hanger 3.",))
+    assert "make sure" not in said(sure)
+    assert doubted.verdict.is_doubted
+    assert doubted.verdict.outcome is sure.verdict.outcome
+    assert said(doubted).startswith("Make sure first that these tests are of this hanger: ")
+    assert "not to be relied on while it may be another hanger" in said(doubted)
+
+
 def test_a_mean_outside_its_interval_is_not_told() -> None:
     """Most draws at a bound and a few far off: the mean lies below the 5 % quantile."""
     piled = TensionEstimate(2099.2, 8.1, 2099.27, 2100.0)

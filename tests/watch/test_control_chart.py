@@ -8,12 +8,14 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
+from shm.assumptions import DEFAULTS
 from shm.values import ControlHanger, Summary
 from shm.watch.control_chart import ControlChart, chart_control
 from tests.helpers.workspaces import START
 
 KNOWN_N, KNOWN_SD_N = 20e3, 100.0
-ABSOLUTE, REPEATS = 0.02, 0.002
+ABSOLUTE, REPEATABILITY = 0.02, 0.002
+REPEATS = math.hypot(REPEATABILITY, DEFAULTS.tension_between_tests.value)
 
 
 def control() -> ControlHanger:
@@ -37,7 +39,7 @@ def charted(*deviations: float) -> ControlChart:
         mean_n, sd_n = KNOWN_N * (1 + deviation), ABSOLUTE * KNOWN_N
         tension = Summary(mean_n, sd_n, mean_n - sd_n, mean_n, mean_n + sd_n)
         time = START + timedelta(days=30 * n)
-        tests.append((f"c{n}", time, tension, REPEATS * KNOWN_N, KNOWN_N))
+        tests.append((f"c{n}", time, tension, REPEATABILITY * KNOWN_N, KNOWN_N))
     return chart_control(control(), tests)
 
 

@@ -57,7 +57,7 @@
       });
     });
     whole.prepend(list);
-    open(tabs, tabOf(tabs, location.hash) ?? tabs[0]);
+    open(tabs, tabOf(tabs, location.hash) || tabs[0]);
     follow(tabs);
     addEventListener("hashchange", () => follow(tabs));
   }
