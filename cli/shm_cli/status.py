@@ -21,8 +21,8 @@ from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.controls import control_charts
-from shm.pipeline.telling import quiet_until
-from shm.pipeline.unheard import stream_leads
+from shm.pipeline.notification_plan import quiet_until
+from shm.pipeline.stream_health import stream_leads
 from shm.report.control_report import chart_document
 from shm.report.formatting import Interval, model_class, with_half
 from shm.report.hanger_status import Status, bridge_message

@@ -25,7 +25,7 @@ from shm import __version__
 from shm.bridge import AppriseHook, Bridge, Hook, WebhookHook
 from shm.errors import NothingThere, ShmError
 from shm.models import competing_names
-from shm.pipeline.telling import quiet_until
+from shm.pipeline.notification_plan import quiet_until
 from shm.read import sandbox
 from shm.report.formatting import counted
 from shm.report.paper import read_logo

@@ -15,7 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from shm.pipeline.lineage import discarded_of_baselines, redescribed
-from shm.pipeline.unheard import REMEDIES, backlog_leads, heard, ring_leads
+from shm.pipeline.stream_health import REMEDIES, backlog_leads, heard, ring_leads
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files

@@ -31,7 +31,7 @@ import numpy as np
 from shm.errors import BadInput, DoubledChunk, ShmError, retry_pause_s
 from shm.pipeline.faults import move_to_quarantine
 from shm.pipeline.lineage import read_limits
-from shm.pipeline.unheard import sweep_ring
+from shm.pipeline.stream_health import sweep_ring
 from shm.read import sidecar_path
 from shm.read.chunk_document import BY_TIME, chunk_document
 from shm.read.sandbox import read_test

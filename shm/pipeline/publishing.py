@@ -126,7 +126,7 @@ def queue_results(
     """Queue for a database all that is new or changed; return how many points."""
     look, newest = _Look(outbox, target, workspace, store, now), find_newest_entry(store)
     points = [*look.headlines(), *alert_points(store.alerts.list_all(), look.tags)]
-    lines = {}
+    lines: dict[str, str] = {}
     for hanger in workspace.bridge.hangers:
         points += look.hours(hanger)
         if newest != progress.journal:

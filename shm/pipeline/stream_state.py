@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from shm.documents import parse_time
-from shm.pipeline.unheard import LATELY, State, classify_stream, last_samples, measure_unread
+from shm.pipeline.stream_health import LATELY, State, classify_stream, last_samples, measure_unread
 from shm.report.figures.stream_course import Course
 from shm.store import Store, Workspace
 from shm.store.queries.streams import (

@@ -26,7 +26,7 @@ from shm.errors import BadInput, ShmError, StoreError
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.reconcile import Condition, is_same_event, reconcile
 from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day
-from shm.pipeline.unheard import (
+from shm.pipeline.stream_health import (
     compare_thermometers,
     evaluate_silent_streams,
     lateness_limit,

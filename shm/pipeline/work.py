@@ -17,11 +17,11 @@ from shm.errors import NothingThere
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline import Clock
 from shm.pipeline.controls import campaign_warnings, control_charts
-from shm.pipeline.judging import judge
 from shm.pipeline.limits import evaluate_limit_alerts
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
+from shm.pipeline.notification_plan import after_works, with_tension, works_before
+from shm.pipeline.plausibility_check import judge
 from shm.pipeline.registry import Opens, RemoteFile, WatchResult, registered, run_step
-from shm.pipeline.telling import after_works, with_tension, works_before
 from shm.pipeline.watching import find_neighbouring_tests, reconciled, to_watch
 from shm.report.hanger_summary import HangerSummary, LatestTest
 from shm.store import (

@@ -15,7 +15,7 @@ from typing import Any
 
 from shm.errors import ShmError, sentence
 from shm.pipeline import utc_now
-from shm.pipeline.unheard import backlog_leads, heard, leads_of, ring_leads, stream_leads
+from shm.pipeline.stream_health import backlog_leads, heard, leads_of, ring_leads, stream_leads
 from shm.store.queries.alerts import count_alerts
 from shm.store.queries.recordings import list_holds
 from shm.store.queries.tests import count_tests

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline.bridge_reporting import hanger_summaries, unwatched
-from shm.pipeline.unheard import (
+from shm.pipeline.stream_health import (
     State,
     StreamHealth,
     blind_hangers,
