@@ -31,6 +31,7 @@ from shm.report.formatting import counted
 from shm.report.paper import read_logo
 from shm.settings import Settings
 from shm.store import Workspace
+from shm.store.point_outbox import PointOutbox
 from shm.store.rows import Delivery, DeliveryState, Silence
 from shm.store.stored_alerts import silenced_until
 from shm.store.workspace import FOLDERS
@@ -96,6 +97,20 @@ def check_other_bridges(workspace: Workspace) -> Iterator[Finding]:
         else:
             yield ok(check, other.address)
         yield from _secrecy(workspace, check, other.token_file)
+
+
+def check_publications(examined: of_store.DoctorContext) -> Iterator[Finding]:
+    """Find databases that do not take the results; nothing where `bridge.toml` names none."""
+    workspace = examined.workspace
+    outbox = PointOutbox(workspace.folder)
+    for each in workspace.bridge.publications:
+        check, state = f"publish {each.name}", outbox.state(each.name)
+        if state.refused or state.why:
+            remedy = "The daemon tries again each minute, and sends what waits once it is taken."
+            yield warning(check, state.words or state.why, remedy)
+        else:
+            yield ok(check, f"{each.url}: {state.waiting} points wait")
+        yield from _secrecy(workspace, check, each.token_file)
 
 
 def check_logo(workspace: Workspace) -> Iterator[Finding]:
@@ -180,7 +195,7 @@ _CHECKS: Sequence[tuple[str, of_store.Check]] = (
     ("deliveries", check_deliveries),
     ("hangers", of_store.check_hangers),
     ("streams", of_store.check_streams),
-    ("publish", of_store.check_publications),
+    ("publish", check_publications),
     ("settings", of_store.check_changed_settings),
 )
 _REPORT = "This is a fault of shm; please report it."

@@ -19,7 +19,6 @@ from shm.pipeline.stream_health import REMEDIES, backlog_leads, heard, ring_lead
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
-from shm.store.point_outbox import PointOutbox
 from shm.store.queries.hangers import list_selected_models
 from shm.store.queries.recordings import count_stages, list_holds, list_recordings, list_under_way
 from shm.store.queries.tests import count_tests
@@ -381,18 +380,6 @@ def check_streams(examined: DoctorContext) -> Iterator[Finding]:
         yield warning("ring", lead.state, lead.action)
     if found and not behind and not any(each.state in REMEDIES for each in found):
         yield ok("streams", f"{counted(len(found), 'stream')}, heard within the hour")
-
-
-def check_publications(examined: DoctorContext) -> Iterator[Finding]:
-    """Find databases that do not take the results; nothing where `bridge.toml` names none."""
-    outbox = PointOutbox(examined.workspace.folder)
-    for each in examined.workspace.bridge.publications:
-        check, state = f"publish {each.name}", outbox.state(each.name)
-        if state.refused or state.why:
-            remedy = "The daemon tries again each minute, and sends what waits once it is taken."
-            yield warning(check, state.words or state.why, remedy)
-        else:
-            yield ok(check, f"{each.url}: {state.waiting} points wait")
 
 
 def check_changed_settings(examined: DoctorContext) -> Iterator[Finding]:

@@ -13,7 +13,7 @@ from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
 from shm.report.hanger_summary import HangerSummary
 from shm.store import Store, StoredAlert, Workspace
-from shm.store.point_outbox import PointOutbox
+from shm.store.point_outbox import PointOutbox, key_of
 from shm.store.queries.history import find_newest_entry
 from shm.store.queries.streams import list_pooled
 from shm.store.queries.trends import list_trend
@@ -52,7 +52,7 @@ class Point:
     @property
     def key(self) -> str:
         """Return what makes it the same point to a database: it replaces what it had."""
-        return f"{self.series} {self.nanoseconds:020d}"
+        return key_of(self.series, self.nanoseconds)
 
     @property
     def line(self) -> str:
@@ -135,6 +135,12 @@ def queue_results(
             lines |= look.no_longer_counted(hanger, {each.key for each in of_tests})
     lines |= {point.key: point.line for point in points if point.line}
     queued = outbox.queue(target, lines, now)
+    ends: dict[str, int] = {}
+    for point in points:
+        if point.measurement == HANGER or "stream" in point.tags:
+            ends[point.series] = max(point.nanoseconds, ends.get(point.series, 0))
+    reviewed_ns = 2 * (_HOURS_REVIEWED // timedelta(microseconds=1)) * 1000
+    outbox.forget(target, {series: end - reviewed_ns for series, end in ends.items()})
     progress.journal = newest
     return queued
 

@@ -38,7 +38,7 @@ from shm.store.queries.hangers import list_detected_changes, list_selected_model
 from shm.store.queries.recordings import list_waiting_recordings
 from shm.store.queries.tests import list_waiting_tests
 from shm.store.queries.watching import find_latest_weighed, list_weighed
-from shm.values import NAN, WITHOUT_MODEL, Hanger, ModalTest
+from shm.values import NAN, WITHOUT_MODEL, Alert, Hanger, ModalTest
 from shm.values.stated_tension import averaged_now
 
 Work: TypeAlias = "Generator[Callable[[], Any], Any, Sequence[StoredAlert] | None]"
@@ -209,17 +209,19 @@ class Queue:
             works = works_before(alert, silences, earlier)
             alert = alert if works is None else after_works(alert, works)
         if alert is not None and self.workspace.bridge.controls:
-            charts, days = control_charts(self.workspace, store), settings.campaign_days
-            doubts = campaign_warnings(charts, hanger, test.time, days)
-            said, mark, details = alert.message.partition(" Details: ")
-            alert = replace(alert, message=f"{' '.join((said, *doubts))}{mark}{details}")
+            alert = self._add_doubts(alert, hanger, test.time)
         changes = reconciled(store, hanger, baseline, test, (watched, alert))
         stored = (test, baseline, watched, alert, hooks, self.clock())
-        state, level = (
-            WatchCheckpoint(needed.key, test.time, kept),
-            hanger.thresholds.alert_probability,
-        )
+        state = WatchCheckpoint(needed.key, test.time, kept)
+        level = hanger.thresholds.alert_probability
         return store.watch.save(*stored, state, changes, level)
+
+    def _add_doubts(self, alert: Alert, hanger: Hanger, time: datetime) -> Alert:
+        """Return an alert that names what the control hangers put in doubt."""
+        charts = control_charts(self.workspace, self.store)
+        doubts = campaign_warnings(charts, hanger, time, self.workspace.settings.campaign_days)
+        text, mark, details = alert.message.partition(" Details: ")
+        return replace(alert, message=f"{' '.join((text, *doubts))}{mark}{details}")
 
     def _summarise(self, hanger: Hanger) -> None:
         if hanger.is_modelled:
