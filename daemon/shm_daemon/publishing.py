@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Pace:
-    """Seconds between looks and retries, and how many lines go at once (InfluxData: 5000)."""
+    """Define how often to look and to retry, in s, and the lines of one post (InfluxData: 5000)."""
 
     look_s: float = 10.0
     retry_s: float = 60.0

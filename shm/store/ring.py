@@ -19,7 +19,7 @@ from types import MappingProxyType
 import numpy as np
 
 from shm.bridge.streams import stream_named
-from shm.documents import Misfit, dump, format_time, value_of
+from shm.documents import ValidationError, dump, format_time, value_of
 from shm.errors import BadInput, DoubledChunk, StoreBusy
 from shm.read.atomic import replace_text
 from shm.read.chunk_document import chunk_document, numbered, parse_chunk, refuse_long_chunk
@@ -243,7 +243,7 @@ class Ring:
             return value_of(Swept, json.loads((self.folder / _SWEEP).read_text(encoding="utf-8")))
         except FileNotFoundError:
             return None
-        except (Misfit, ValueError) as error:
+        except (ValidationError, ValueError) as error:
             log.warning("%s cannot be read: %s", self.folder / _SWEEP, error)
             return None
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shm.documents import Misfit, dump, parse_time, value_of
+from shm.documents import ValidationError, dump, parse_time, value_of
 from shm.read.atomic import replace_text
 from shm.read.chunk_document import BY_TIME, numbered
 from shm.read.ring_segment import ChunkKey, microseconds
@@ -72,7 +72,7 @@ def load_state(path: Path) -> StreamState:
         return value_of(StreamState, json.loads(path.read_text(encoding="utf-8")))
     except FileNotFoundError:
         return StreamState()
-    except (Misfit, ValueError) as error:
+    except (ValidationError, ValueError) as error:
         log.warning("%s begins anew: %s", path, error)
         return StreamState()
 

@@ -60,7 +60,7 @@ OTHERS = {
 
 @pytest.fixture(scope="module")
 def hostile(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """A bridge in which everything that a person may write holds what no terminal should get."""
+    """Return a bridge whose written texts all hold what no terminal should get."""
     workspace = with_a_loss(tmp_path_factory.mktemp("hostile") / "bridge")
     path = workspace.folder / "bridge.toml"
     named = path.read_text().replace('"Test bridge"', json.dumps(EVIL))

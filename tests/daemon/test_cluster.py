@@ -42,7 +42,7 @@ def pool(cluster: clusters.Cluster) -> Iterator[Cluster]:
 
 
 def worked_through(folder: Path, scheduler: str) -> Workspace:
-    """Tests with the real sampler, and a file that is refused."""
+    """Return tests with the real sampler, and a file that is refused."""
     settings = {"scheduler": scheduler, "workers": 2}
     workspace = make_workspace(folder, settings=settings, hooks={"mail": ["true"]})
     for day in range(FILES):

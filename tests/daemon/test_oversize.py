@@ -40,7 +40,7 @@ def on_disk(folder: Path) -> int:
 
 @contextmanager
 def serving(workspace: Workspace) -> Iterator[None]:
-    """A daemon that runs until the end of the block."""
+    """Yield a daemon that runs until the end of the block."""
     wakeup = Wakeup()
     daemon = threading.Thread(
         target=run, args=(workspace,), kwargs={"wakeup": wakeup, "make_executor": threads}

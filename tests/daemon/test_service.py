@@ -100,7 +100,7 @@ def hear(systemd: socket.socket) -> list[str]:
 
 
 def hear_until(systemd: socket.socket, word: str) -> list[str]:
-    """What is told in the first message that holds a word."""
+    """Return the first message that holds a word."""
     end = time.monotonic() + 120
     while word not in (said := hear(systemd)):
         assert time.monotonic() < end, f"{word} never came"
