@@ -25,7 +25,7 @@ from shm import __version__
 from shm.bridge import AppriseHook, Bridge, Hook, WebhookHook
 from shm.errors import NothingThere, ShmError
 from shm.models import competing_names
-from shm.pipeline.telling import quiet_until
+from shm.pipeline.notification_plan import quiet_until
 from shm.read import sandbox
 from shm.report.formatting import counted
 from shm.report.paper import read_logo
@@ -99,7 +99,7 @@ def check_other_bridges(workspace: Workspace) -> Iterator[Finding]:
         yield from _secrecy(workspace, check, other.token_file)
 
 
-def check_publications(examined: of_store.Examined) -> Iterator[Finding]:
+def check_publications(examined: of_store.DoctorContext) -> Iterator[Finding]:
     """Find databases that do not take the results; nothing where `bridge.toml` names none."""
     workspace = examined.workspace
     outbox = PointOutbox(workspace.folder)
@@ -122,7 +122,7 @@ def check_logo(workspace: Workspace) -> Iterator[Finding]:
         yield ok("logo", path.name)
 
 
-def check_deliveries(examined: of_store.Examined) -> Iterator[Finding]:
+def check_deliveries(examined: of_store.DoctorContext) -> Iterator[Finding]:
     """Check whether alerts wait for their hooks, or were given up."""
     store, now = examined.store, examined.now
     waiting = store.alerts.list_deliveries(DeliveryState.WAITING)
@@ -234,7 +234,7 @@ def _of_store(workspace: Workspace, now: datetime) -> Iterator[Finding]:
         return
     with store:
         for name, check in _CHECKS:
-            yield from _found(name, partial(check, of_store.Examined(workspace, store, now)))
+            yield from _found(name, partial(check, of_store.DoctorContext(workspace, store, now)))
 
 
 def _found(name: str, check: Callable[[], Iterable[Finding]]) -> list[Finding]:

@@ -16,7 +16,7 @@ import shm
 from shm.errors import NothingThere
 from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.lineage import discarded_of_baselines, redescribed, settings_words, software
-from shm.pipeline.unheard import blind_hangers, heard
+from shm.pipeline.stream_health import blind_hangers, heard
 from shm.report.contents import BridgeReport
 from shm.report.formatting import Interval
 from shm.report.hanger_status import findings, still_detected

@@ -32,7 +32,7 @@ _SPECIAL_IN_TAG, _SPECIAL_IN_TEXT = re.compile(r"([,= \\])"), re.compile(r'(["\\
 
 @dataclass(frozen=True)
 class Point:
-    """What one measurement says at one time; unknown numbers are left out."""
+    """Values of one measurement at one time; unknown numbers are left out."""
 
     measurement: str
     tags: Mapping[str, str]
@@ -109,7 +109,7 @@ def _interval(name: str, unit: str, interval: Interval | None) -> dict[str, Valu
 
 @dataclass
 class Progress:
-    """What was looked at for one database since the daemon began; made anew, all is."""
+    """Results looked at for one database since the daemon began; made anew, all is."""
 
     tests: set[int] = field(default_factory=set)
     journal: int = -1
@@ -147,7 +147,7 @@ def queue_results(
 
 @dataclass(frozen=True)
 class _Look:
-    """What one database may lack at one time."""
+    """Results that one database may lack at one time."""
 
     outbox: PointOutbox
     target: str

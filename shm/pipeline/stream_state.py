@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from shm.documents import parse_time
-from shm.pipeline.unheard import LATELY, State, last_samples, measure_unread, word_of
+from shm.pipeline.stream_health import LATELY, State, classify_stream, last_samples, measure_unread
 from shm.report.figures.stream_course import StreamHistory
 from shm.store import Store, Workspace
 from shm.store.queries.streams import (
@@ -99,7 +99,7 @@ def _state(
     received, lost = _received(state, now)
     return StreamCondition(
         stream=stream,
-        state=word_of(last, events, now),
+        state=classify_stream(last, events, now),
         last_sample=last,
         lag=None if last is None else max(timedelta(0), now - last),
         behind=None if last is None else unread,

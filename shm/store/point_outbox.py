@@ -43,7 +43,7 @@ class WaitingPoint:
 
 @dataclass(frozen=True)
 class OutboxState:
-    """How far a database is behind; `why` is empty while it takes what it is sent."""
+    """State of a database that lags behind; `why` is empty while it takes what it is sent."""
 
     waiting: int
     refused: int
