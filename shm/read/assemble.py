@@ -23,8 +23,8 @@ from shm.read.sidecar import sidecar_path
 from shm.read.table import Column, Description, Table, describe, is_raw
 from shm.read.time_axis import on_even_grid, rate_of
 from shm.values import (
-    CONDITIONS,
     NAN,
+    TEST_CONDITIONS,
     Channel,
     ComplexArray,
     FloatArray,
@@ -379,7 +379,7 @@ def _peek_channel(header: Header, name: str, attempt: Attempt) -> PeekChannel:
 
 def read_of_test(header: Header, attempt: Attempt) -> dict[str, Any]:
     """Return what a header says of the complete test; None and NaN where that is faulty."""
-    unknown = dict.fromkeys(CONDITIONS) | {"temperature_c": NAN}
+    unknown = dict.fromkeys(TEST_CONDITIONS) | {"temperature_c": NAN}
     return {key: attempt(partial(getattr, header, key), none) for key, none in unknown.items()}
 
 

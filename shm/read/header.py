@@ -21,15 +21,15 @@ from shm.read.logger_words import (
     unit_of,
 )
 from shm.values import (
-    CONDITIONS,
     NAN,
     PLANES,
+    TEST_CONDITIONS,
     AddedMass,
     FrequencyResponse,
     Plane,
     Quantity,
     Recording,
-    conditions_of,
+    collect_conditions,
     outdoor_c,
 )
 
@@ -82,8 +82,8 @@ class Header:
 
     @property
     def of_test(self) -> dict[str, Any]:
-        """Return what is stated of the complete test, by the names of `CONDITIONS`."""
-        return {name: getattr(self, name) for name in CONDITIONS}
+        """Return what is stated of the complete test, by the names of `TEST_CONDITIONS`."""
+        return {name: getattr(self, name) for name in TEST_CONDITIONS}
 
     @property
     def hanger(self) -> int | None:
@@ -319,7 +319,7 @@ def entries_of(values: Mapping[str, Any], path: Path) -> dict[str, Entry]:
 
 def condition_entries(described: Recording | FrequencyResponse) -> dict[str, Any]:
     """Return the entries that state the conditions of a test; what is unknown is left out."""
-    known = conditions_of(described)
+    known = collect_conditions(described)
     mass = known.pop("added_mass")
     known["time"] = format_time(known["time"])
     return known_values({**known, **mass_entries(mass)})

@@ -25,7 +25,7 @@ from shm.values import (
     RepeatedMistake,
     ResponsePoint,
     WatchedTest,
-    conditions_of,
+    collect_conditions,
 )
 
 _HELD = 1024  # technical: what stands is shown again and again, some kilobytes a hanger
@@ -74,7 +74,7 @@ def unpack_response(blob: bytes, source: str, test: ModalTest) -> FrequencyRespo
         frequency_hz=arrays["frequency_hz"],
         accelerance=arrays["accelerance"].astype(np.complex128),
         coherence=None if coherence is None else coherence.astype(float),
-        **conditions_of(test),
+        **collect_conditions(test),
     )
 
 

@@ -117,7 +117,7 @@ from shm.values.posterior import (
     Summary,
 )
 from shm.values.recording import (
-    CONDITIONS,
+    TEST_CONDITIONS,
     AddedMass,
     Channel,
     Doubt,
@@ -126,8 +126,8 @@ from shm.values.recording import (
     KnownSamples,
     Recording,
     ResponsePoint,
-    conditions_of,
-    known_conditions,
+    collect_conditions,
+    collect_known_conditions,
 )
 from shm.values.verdict import (
     FEW_MODES,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shm.values.kinds import NAN, ComplexArray, FloatArray, IntArray, Plane, Quantity
-from shm.values.showing import Shown, front
+from shm.values.showing import Displayable, front
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +54,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording(Shown):
+class Recording(Displayable):
     """Accelerations over time, as received, with the hammer's force unless nobody hit.
 
     One file, one or many hits. The force channel's `x_m` and `plane` say where and in which
@@ -116,18 +116,18 @@ class Recording(Shown):
         return figure
 
 
-CONDITIONS = ("hanger", "time", "temperature_c", "added_mass")
+TEST_CONDITIONS = ("hanger", "time", "temperature_c", "added_mass")
 """What recordings, frequency responses and modal tests alike hold of how a test was made."""
 
 
-def conditions_of(test: Any) -> dict[str, Any]:
+def collect_conditions(test: Any) -> dict[str, Any]:
     """Return the conditions of a test by name, from whatever has them as attributes."""
-    return {name: getattr(test, name) for name in CONDITIONS}
+    return {name: getattr(test, name) for name in TEST_CONDITIONS}
 
 
-def known_conditions(test: Any) -> dict[str, Any]:
+def collect_known_conditions(test: Any) -> dict[str, Any]:
     """Return the conditions that are neither None, nor NaN, nor an empty text."""
-    stated = conditions_of(test)
+    stated = collect_conditions(test)
     return {
         key: value for key, value in stated.items() if value not in (None, "") and value == value
     }

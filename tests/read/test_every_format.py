@@ -14,12 +14,12 @@ from shm.errors import BadInput, UsageError
 from shm.read import FORMATS, Format, bundle, peek, peek_test, read, sidecar_path
 from shm.read import write as write_ours
 from shm.values import (
-    CONDITIONS,
+    TEST_CONDITIONS,
     Channel,
     FrequencyResponse,
     Recording,
-    conditions_of,
-    known_conditions,
+    collect_conditions,
+    collect_known_conditions,
 )
 from tests.helpers.written import needs_responses, write
 
@@ -43,7 +43,7 @@ def written(file_format: Format, recording: Recording | FrequencyResponse, folde
 
 def assert_same(found: Recording | FrequencyResponse, expected: Recording) -> None:
     assert isinstance(found, Recording)
-    for name, stated in conditions_of(expected).items():
+    for name, stated in collect_conditions(expected).items():
         read_back = getattr(found, name)
         is_number = isinstance(stated, float)
         assert read_back == (pytest.approx(stated, nan_ok=True) if is_number else stated), name
@@ -56,7 +56,9 @@ def assert_same(found: Recording | FrequencyResponse, expected: Recording) -> No
 
 
 def test_recording_states_every_condition(recording: Recording) -> None:
-    assert list(known_conditions(recording)) == list(CONDITIONS), "Add it to the fixture."
+    assert list(collect_known_conditions(recording)) == list(TEST_CONDITIONS), (
+        "Add it to the fixture."
+    )
 
 
 @formats

@@ -41,7 +41,7 @@ from shm.values import (
     FrequencyResponse,
     Hanger,
     Recording,
-    conditions_of,
+    collect_conditions,
 )
 
 _MOST_SECONDS_A_HIT = 90.0  # judgement: crews wait half a minute at most
@@ -347,7 +347,7 @@ def _response(
         frequency_hz=average.frequency_hz,
         accelerance=average.accelerance,
         coherence=average.coherence,
-        **conditions_of(first),
+        **collect_conditions(first),
     )
     return response, average.spectra
 
