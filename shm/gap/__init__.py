@@ -1,4 +1,4 @@
-"""Where model and measurement differ, which effect causes it, how far the gap shrinks."""
+"""Diagnose where model and measurement differ, which effect causes it, how far the gap shrinks."""
 
 from __future__ import annotations
 
