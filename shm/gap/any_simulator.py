@@ -94,7 +94,7 @@ class NextReading:
 
 @dataclass(frozen=True)
 class SimulatorDiagnosis:
-    """Where a simulator and its readings differ, and why.
+    """Hold where a simulator and its readings differ, and why.
 
     `causes` come with the likeliest first; their probabilities, `no_gap_probability` and
     `unexplained_probability` add to 1. `groups` are causes that these data cannot tell apart.
@@ -129,13 +129,15 @@ class SimulatorDiagnosis:
         """The answer in a few lines."""
         lines = [self._verdict(), *(f"! {each}" for each in self.remarks)]
         for each in self.causes:
-            sizes = ", ".join(f"{n} = {_told(m, s, 4)}" for n, (m, s) in each.size.items())
+            sizes = ", ".join(
+                f"{n} = {_format_estimate(m, s, 4)}" for n, (m, s) in each.size.items()
+            )
             lines.append(f"{each.probability:5.2f}  {each.name} ({sizes})")
         lines.append(f"{self.no_gap_probability:5.2f}  no gap")
         lines.append(f"{self.unexplained_probability:5.2f}  something not in the catalogue")
         for name, (mean, sd) in self.parameters_after.items():
-            alone = _told(*self.parameters_before[name], 5)
-            lines.append(f"{name}: {alone} alone, {_told(mean, sd, 5)} after")
+            alone = _format_estimate(*self.parameters_before[name], 5)
+            lines.append(f"{name}: {alone} alone, {_format_estimate(mean, sd, 5)} after")
         lines += [
             f"Next: {each.observable} at {dict(each.condition)}, {each.apart_sds:.1f} sds apart"
             for each in self.next_readings[:1]
@@ -159,7 +161,7 @@ class SimulatorDiagnosis:
         return f"Gap of {gap.before:.1f} sds from {named}; with it {gap.after:.1f} ({held})."
 
 
-def _told(mean: float, sd: float, digits: int) -> str:
+def _format_estimate(mean: float, sd: float, digits: int) -> str:
     return f"{mean:.{digits}g} ± " + ("unknown" if np.isnan(sd) else f"{sd:.2g}")
 
 
@@ -170,7 +172,7 @@ def diagnose_simulator(
     candidates: Sequence[Condition] = (),
     seed: int = 1,
 ) -> SimulatorDiagnosis:
-    """Why the readings differ from a simulator of your own, and which effect of yours causes it.
+    """Return why readings differ from a simulator of your own, and which effect of yours causes it.
 
     `candidates` are conditions that could be measured next.
 
@@ -178,8 +180,8 @@ def diagnose_simulator(
     >>> spring = shm.Simulator(lambda p, at: {"force_n": p["k"] * at["x_m"]}, {"k": prior})
     >>> shm.diagnose_simulator(spring, readings).summary()  # doctest: +SKIP
     """
-    kept, repeated = drop_copies(readings)
-    problem = SimulatorProblem(simulator, kept)
+    distinct, repeated = drop_copies(readings)
+    problem = SimulatorProblem(simulator, distinct)
     rng = np.random.default_rng(seed)
     answers = _answers(problem, rng)
     fits, alone = answers.fits, answers.fits[Hypothesis()]
@@ -210,7 +212,7 @@ def diagnose_simulator(
 
 @dataclass(frozen=True, eq=False)
 class _Answers:
-    """What was tried, the probability of each, and of something unknown that passes for one."""
+    """Hold the fits, the probability of each, and of something unknown that passes for one."""
 
     problem: SimulatorProblem
     fits: Mapping[Hypothesis, Fit]
@@ -254,7 +256,7 @@ def _pairs(
         return []
     found: dict[frozenset[str], Fit] = {}
     for leader in leaders:
-        one = problem.own_priors(leader.hypothesis)
+        one = problem.effect_priors(leader.hypothesis)
         for other in problem.simulator.effects:
             names = frozenset((leader.hypothesis.name, other.name))
             # Effects with a parameter of one name are forms of one effect.
@@ -272,9 +274,9 @@ def _pairs(
 def _cause(answers: _Answers, hypothesis: Hypothesis) -> SimulatorCause:
     problem, fit, alone = answers.problem, answers.fits[hypothesis], answers.fits[Hypothesis()]
     left, before = rms(in_sds(problem, fit)), rms(in_sds(problem, alone))
-    beside = answers.of(replace(hypothesis, flexible=True))
-    off = beside * (1 - _MIMICS) if left < LAW_OFF * before else 0.0
-    size = moments(problem, fit, problem.own_priors(hypothesis))
+    flexible = answers.of(replace(hypothesis, flexible=True))
+    off = flexible * (1 - _MIMICS) if left < LAW_OFF * before else 0.0
+    size = moments(problem, fit, problem.effect_priors(hypothesis))
     return SimulatorCause(hypothesis.name, answers.of(hypothesis) + off, left, size)
 
 
@@ -285,10 +287,12 @@ def _groups(
         return ()
     of = {h.name: fit for h, fit in fits.items() if not h.flexible}
     supported = [each.name for each in causes if each.probability > _SUPPORTED]
-    own = [of[name] for name in supported]
-    best = max((each.log_evidence for each in own), default=0.0)
-    near = [each.log_evidence > best - SAME_BELOW for each in own]
-    return tuple(tuple(supported[i] for i in each) for each in group([(fit,) for fit in own], near))
+    members = [of[name] for name in supported]
+    best = max((each.log_evidence for each in members), default=0.0)
+    near = [each.log_evidence > best - SAME_BELOW for each in members]
+    return tuple(
+        tuple(supported[i] for i in each) for each in group([(fit,) for fit in members], near)
+    )
 
 
 def _shrinkage(problem: SimulatorProblem, alone: Fit, best: Fit) -> Shrinkage:
@@ -319,12 +323,14 @@ def _averaged(answers: _Answers) -> dict[str, tuple[float, float]]:
     free = Hypothesis(flexible=True)
     weight[free] = weight.get(free, 0.0) + answers.unknown
     problem = answers.problem
-    own = problem.simulator.parameters
-    found = {h: moments(problem, answers.fits[h], own) for h in weight if weight[h] > _OF_NOTE}
+    parameters = problem.simulator.parameters
+    found = {
+        h: moments(problem, answers.fits[h], parameters) for h in weight if weight[h] > _OF_NOTE
+    }
     whole = sum(weight[h] for h in found)
     weight = {h: weight[h] / whole for h in found}
     averaged = {}
-    for name in own:
+    for name in parameters:
         mean = sum(weight[h] * found[h][name][0] for h in found)
         square = sum(weight[h] * (found[h][name][1] ** 2 + found[h][name][0] ** 2) for h in found)
         averaged[name] = (mean, float(np.sqrt(max(square - mean**2, 0.0))))
@@ -332,7 +338,7 @@ def _averaged(answers: _Answers) -> dict[str, tuple[float, float]]:
 
 
 def _planned(answers: _Answers, candidates: Sequence[Condition]) -> tuple[NextReading, ...]:
-    """What tells the two likeliest answers apart, the most telling first."""
+    """Return readings that separate the two most probable answers, the best first."""
     problem, fits = answers.problem, answers.fits
     plain = sorted((h for h in fits if not h.flexible), key=lambda h: -answers.of(h))[:2]
     if not candidates or len(plain) < 2:

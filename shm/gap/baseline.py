@@ -66,12 +66,12 @@ def find_richer(problem: GapProblem, hypothesis: Hypothesis) -> GapProblem | Non
 
     It has those of the beam of `problem`, too. None where no beam has any effect more.
     """
-    effects, own = {name for name, _ in hypothesis.effects}, set(problem.has_itself)
+    effects, included = {name for name, _ in hypothesis.effects}, set(problem.has_itself)
     best, most = None, 0
     for name in applicable(problem.hanger, BEAMS)[0]:
         other = _problem(name, problem.tests, problem.hanger, problem.observations)
-        shared = len(effects & set(other.has_itself) - own)
-        if own <= set(other.has_itself) and shared > most:
+        shared = len(effects & set(other.has_itself) - included)
+        if included <= set(other.has_itself) and shared > most:
             best, most = other, shared
     if best is not None:
         best.rivals = problem.rivals

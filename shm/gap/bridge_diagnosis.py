@@ -126,7 +126,7 @@ def diagnose_jointly(
 ) -> BridgeDiagnosis:
     """Return the causes that hangers share, by the evidence of each."""
     started = time.perf_counter() if started is None else started
-    groups, own = find_groups(hangers), OwnCauses.of(hangers)
+    groups, individual = find_groups(hangers), OwnCauses.of(hangers)
     places = dict.fromkeys(place for each in hangers for place in each.effects)
     variants = Counter(name for name, _ in places)
     of_effect = np.log(SHARED * _KNOWN / max(len(variants), 1))
@@ -135,10 +135,10 @@ def diagnose_jointly(
         for place in places
         if (grid := SizeGrid.of(hangers, place)) is not None
         for log_prior in [of_effect - np.log(variants[place[0]] * len(groups))]
-        for shared in [weigh_shared(grid, group, own) for group in groups]
+        for shared in [weigh_shared(grid, group, individual) for group in groups]
     ]
     log_unknown = np.log(SHARED * (1 - _KNOWN) / len(groups))
-    unknown = [weigh_unknown(hangers, group, own) + log_unknown for group in groups]
+    unknown = [weigh_unknown(hangers, group, individual) + log_unknown for group in groups]
     unknown += [each.log_weight + _log_mimic_odds(hangers, each) for each in candidates]
     known = [each.log_weight for each in candidates]
     total = float(scipy.special.logsumexp([np.log(1 - SHARED), *unknown, *known]))
@@ -239,11 +239,11 @@ def _grouped(
 ) -> tuple[list[SharedCause], tuple[tuple[str, ...], ...]]:
     """Return the causes, those that the data hardly prefer the best to in one group with it."""
     best = max((each.log_bayes_factor for each in causes), default=0.0)
-    alike = [each.effect for each in causes if each.log_bayes_factor > best - SAME_BELOW]
-    if len(alike) < LEAST or best < SAME_BELOW:
+    equivalent = [each.effect for each in causes if each.log_bayes_factor > best - SAME_BELOW]
+    if len(equivalent) < LEAST or best < SAME_BELOW:
         return list(causes), ()
-    found = [replace(each, group=0) if each.effect in alike else each for each in causes]
-    return found, (tuple(alike),)
+    found = [replace(each, group=0) if each.effect in equivalent else each for each in causes]
+    return found, (tuple(equivalent),)
 
 
 def _tensions(

@@ -1,4 +1,4 @@
-"""What the steps of a diagnosis hand to each other, and what it may be told.
+"""Define what the steps of a diagnosis hand to each other, and its options.
 
 All data of a hanger are one vector: first the logarithms of the measured frequencies, then the
 components of the measured shapes, each shape scaled to length 1 over its own components and turned
@@ -27,7 +27,7 @@ Markov chain."""
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """What is measured under which conditions, without its values.
+    """Describe what is measured under which conditions, without its values.
 
     Of the F frequencies `frequency_test`, `frequency_plane` and `frequency_order` (F,) say of which
     test, plane (0, 1) and order (from 1) they are. Of the S components of shapes `shape_mode` (S,)
@@ -51,7 +51,7 @@ class Design:
 
     @property
     def size(self) -> int:
-        """How many data: F + S."""
+        """Return the number of data: F + S."""
         return self.frequencies + len(self.shape_mode)
 
     @property
@@ -72,7 +72,7 @@ class Design:
 
     @property
     def kinds(self) -> IntArray:
-        """What each datum is (5, F + S): known mass, plane, order, place and axis; -1 for none."""
+        """Return mass, plane, order, place and axis of each datum (5, F + S); -1 for none."""
         masses = [each.added_mass for each in self.conditions]
         mass = np.array([masses.index(each) for each in masses])[self.frequency_test]
         mode = np.concatenate([np.arange(self.frequencies), self.shape_mode])
@@ -154,7 +154,7 @@ class Hypothesis:
 
     @property
     def at(self) -> str:
-        """Where the effects act, as one."""
+        """Return where the effects act, as one text."""
         return joined(variant.at for _, variant in self.effects)
 
 

@@ -59,8 +59,8 @@ class Coordinates:
     @property
     def places(self) -> IntArray:
         """Return the columns of places along the hanger."""
-        own = [is_place(each) for each in self.effects]
-        return np.asarray(self.baseline + np.flatnonzero(own))
+        are_places = [is_place(each) for each in self.effects]
+        return np.asarray(self.baseline + np.flatnonzero(are_places))
 
     def theta(self, z: FloatArray) -> FloatArray:
         """Return parameters (n, parameters) in their units, what is not seen at its middle."""
@@ -79,8 +79,10 @@ class Coordinates:
 
     def effect_z(self, values: FloatArray, first: int) -> FloatArray:
         """Return the coordinates (n, p) of values (n, p) of the effects from column `first` on."""
-        own = self.effects[first - self.baseline :]
-        share = np.stack([each.share(v) for each, v in zip(own, values.T, strict=True)], axis=1)
+        parameters = self.effects[first - self.baseline :]
+        share = np.stack(
+            [each.share(v) for each, v in zip(parameters, values.T, strict=True)], axis=1
+        )
         return np.asarray(scipy.special.ndtri(share.clip(_INSIDE, 1 - _INSIDE)))
 
     def magnitude(self, values: FloatArray) -> FloatArray:
@@ -89,10 +91,10 @@ class Coordinates:
         `values` are those of the last effect. 0 is the end nearest to no effect; 1 where there is
         no size whose range is scale-free.
         """
-        own = self.effects[len(self.effects) - values.shape[1] :]
+        parameters = self.effects[len(self.effects) - values.shape[1] :]
         shares = [
             _away_from_none(each, v)
-            for each, v in zip(own, values.T, strict=True)
+            for each, v in zip(parameters, values.T, strict=True)
             if scale_free(each)
         ]
         return np.max(shares, axis=0) if shares else np.ones(len(values))

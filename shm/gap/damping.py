@@ -50,14 +50,14 @@ def log_rising(observations: Observations) -> float:
     mode = same_mode(design)[np.ix_(known, known)]
     fixed = _ANY**2 * mode + _OF_TESTS**2 * np.equal.outer(test, test) + np.diag(sd**2)
     grown = level / level.max()
-    alike = np.outer(grown, grown)
+    uniform = np.outer(grown, grown)
     # What slips takes energy from every mode alike, from some more than from others, or from some.
-    patterns = (alike, alike * (mode + 1) / 2, alike * mode)
+    patterns = (uniform, uniform * (mode + 1) / 2, uniform * mode)
     of_both = np.eye(len(known))
-    steady = [_log_density(value, fixed + own**2 * of_both) for own in _OF_BOTH]
+    steady = [_log_density(value, fixed + scatter**2 * of_both) for scatter in _OF_BOTH]
     rising = [
-        _log_density(value, fixed + own**2 * of_both + size**2 * pattern)
-        for own, size, pattern in product(_OF_BOTH, _RISES, patterns)
+        _log_density(value, fixed + scatter**2 * of_both + size**2 * pattern)
+        for scatter, size, pattern in product(_OF_BOTH, _RISES, patterns)
     ]
     return float(
         scipy.special.logsumexp(rising)

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from shm.errors import BadInput
-from shm.gap.observations import told_of_rounding
+from shm.gap.observations import remark_on_rounding
 from shm.inference.data_checks import CheckedData, check_data, mode_name
 from shm.values import FEW_MODES, Hanger, ModalTest
 
@@ -31,7 +31,7 @@ def usable(tests: Sequence[ModalTest], hanger: Hanger) -> CheckedData:
     used = tuple(test for test in checked.tests if test.modes)
     if not used:
         raise BadInput("no test holds a mode that can be used.", remedy="Give tests with modes.")
-    return replace(checked, tests=used, remarks=(*checked.remarks, *_said_of_all(used, hanger)))
+    return replace(checked, tests=used, remarks=(*checked.remarks, *_remark_on_all(used, hanger)))
 
 
 def _refuse(tests: Sequence[ModalTest], hanger: Hanger) -> None:
@@ -61,12 +61,12 @@ def _places(test: ModalTest) -> Iterator[tuple[str, float]]:
             yield f"a sensor of {mode_name(mode)}", point.x_m
 
 
-def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
+def _remark_on_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
     remarks = [
-        told_of_few(tests, hanger),
+        remark_on_few_modes(tests, hanger),
         _irregular(tests),
         _without_sd(tests),
-        told_of_rounding(tests),
+        remark_on_rounding(tests),
         _without_temperature(tests),
         _without_shape_sd(tests),
         _amplitude(tests),
@@ -160,13 +160,13 @@ def _amplitude(tests: Sequence[ModalTest]) -> str:
 
 
 def _rattling(tests: Sequence[ModalTest]) -> str:
-    told = [test for test in tests if math.isfinite(test.rattles_above)]
-    if not told:
+    rattling = [test for test in tests if math.isfinite(test.rattles_above)]
+    if not rattling:
         return ""
     return (
-        f"Above a level of {min(test.rattles_above for test in told):.2g} the hanger does not ring "
-        f"as a bar does ({_listed([test.id for test in told])}): something knocks, such as a guide "
-        f"with play, slips or opens. {_whose(told)}"
+        f"Above a level of {min(test.rattles_above for test in rattling):.2g} the hanger does not "
+        f"ring as a bar does ({_listed([test.id for test in rattling])}): something knocks, such "
+        f"as a guide with play, slips or opens. {_whose(rattling)}"
     )
 
 
@@ -180,8 +180,8 @@ def _listed(names: Sequence[str]) -> str:
     return f"test {names[0]}" if len(names) == 1 else f"tests {', '.join(names)}"
 
 
-def told_of_few(tests: Sequence[ModalTest], hanger: Hanger) -> str:
-    """What so few modes can show; empty where there are more."""
+def remark_on_few_modes(tests: Sequence[ModalTest], hanger: Hanger) -> str:
+    """Return what so few modes can show; empty where there are more."""
     names = _modes(tests)
     if len(names) >= FEW_MODES:
         return ""
@@ -207,13 +207,13 @@ def _what_they_do(tests: Sequence[ModalTest], hanger: Hanger) -> str:
 
 
 def _held_by(tests: Sequence[ModalTest], hanger: Hanger) -> str:
-    """Why the tension cannot follow the frequencies, so that a gap shows though not its cause."""
-    alike = "but most causes look alike in so few frequencies"
+    """Return why the tension cannot follow the frequencies: a gap shows, though not its cause."""
+    why = "but most causes look alike in so few frequencies"
     if hanger.nominal_tension_n == 0:
-        return f"the bar carries no tension that could follow them, so that a gap can show, {alike}"
+        return f"the bar carries no tension that could follow them, so that a gap can show, {why}"
     if math.isfinite(hanger.scatter.tension):
         known = f"the tension is known to {100 * hanger.scatter.tension:.2g} %"
-        return f"{known}, so that a gap can show, {alike}"
+        return f"{known}, so that a gap can show, {why}"
     read_n = {test.tension_read_n for test in tests if math.isfinite(test.tension_read_n)}
     if len(read_n) > 1:
         return (

@@ -19,8 +19,8 @@ from shm.gap.misfit import doubt_orders, refuse_misfit
 from shm.gap.outliers import (
     Cleared,
     describe_doubtful,
+    describe_excluded,
     describe_outliers,
-    describe_set_aside,
     exclude_gross_errors,
     residuals_with_outliers,
 )
@@ -89,7 +89,7 @@ def examined(
     answer, before = answered(attribution), attribution.baseline
     after = attribution.leading.best.fit if attribution.leading else None
     best = answer[0][1]
-    aside, doubted = (describe_outliers(clear, e, best) for e in (clear.aside, clear.doubted))
+    excluded, doubted = (describe_outliers(clear, e, best) for e in (clear.excluded, clear.doubted))
     held = held_out(problem, before, after, options.hold_out, rng)
     after_n = _tension(problem, possible(attribution), rng)
     before_n = _tension(problem, [(1.0, before)], rng)
@@ -117,12 +117,12 @@ def examined(
             *doubts,
             *_states(problem, before, after, (before_n, after_n)),
             *remark_on_damping(clear.whole.observations),
-            *_on_the_way(found, clear, aside, doubted, after or before),
+            *_on_the_way(found, clear, excluded, doubted, after or before),
         ),
         seed=options.seed,
         seconds=time.perf_counter() - started,
-        outliers=aside,
-        widest_swing_m=_widest_swing_m(found.tests),
+        outliers=excluded,
+        widest_swing_m=_widest_motion_m(found.tests),
         effective_draws=_effective_draws(answer),
         slenderness=_slenderness(hanger, before_n.mean),
     ), attribution
@@ -165,7 +165,7 @@ def _effective_draws(answer: Sequence[tuple[float, Fit]]) -> float:
     return min(known) if known else NAN
 
 
-def _widest_swing_m(tests: Sequence[ModalTest]) -> float:
+def _widest_motion_m(tests: Sequence[ModalTest]) -> float:
     swings = [test.widest_swing_m for test in tests]
     return max((each for each in swings if each > 0), default=NAN)
 
@@ -189,19 +189,18 @@ def _following(
 def _on_the_way(
     found: CheckedData,
     clear: Cleared,
-    aside: Sequence[Outlier],
+    excluded: Sequence[Outlier],
     doubted: Sequence[Outlier],
     best: Fit,
 ) -> tuple[str, ...]:
-    """What was found on the way to data that can be used and hold no gross errors, and what the
-    measurement errs by."""
-    gross = (*describe_set_aside(clear, aside), *describe_doubtful(doubted))
+    """Return remarks on the data's checks, on gross errors and on errors of the measurement."""
+    gross = (*describe_excluded(clear, excluded), *describe_doubtful(doubted))
     measured = sensor_remarks(clear.problem, best)
     return (*found.remarks, *gross, *measured)
 
 
 def _of_another(tests: Sequence[ModalTest], hanger: Hanger) -> tuple[str, ...]:
-    """Which tests are not of the hanger as described, before anything that else they would mean."""
+    """Return remarks on tests that are not of the hanger as described."""
     doubts = {test.id: doubt_of(test, Known(hanger), []) for test in tests}
     return tuple(f"{DOUBTFUL}: test {id_}. {each.text}" for id_, each in doubts.items() if each)
 
@@ -209,7 +208,7 @@ def _of_another(tests: Sequence[ModalTest], hanger: Hanger) -> tuple[str, ...]:
 def _states(
     problem: GapProblem, before: Fit, after: Fit | None, tensions_n: Sequence[TensionEstimate]
 ) -> tuple[str, ...]:
-    """What keeps the answer from being taken at its word, to be read first."""
+    """Return remarks on what makes the answer uncertain, to be read first."""
     found = []
     for fit in (before, *((after,) if after else ())):
         if fit.effective < ENOUGH_EFFECTIVE:
@@ -277,8 +276,8 @@ def _list_other_places(problem: GapProblem, fit: Fit) -> tuple[str, ...]:
     found = []
     for each, column in zip(coordinates.effects, values.T, strict=True):
         if is_place(each):
-            own, other = _split_place(column, problem.hanger.length_m)
-            if len(other) > math.exp(-_AS_LIKELY) * len(own):
+            main, other = _split_place(column, problem.hanger.length_m)
+            if len(other) > math.exp(-_AS_LIKELY) * len(main):
                 found.append(f"at {other.mean():.2f} m")
     return tuple(found)
 
@@ -289,12 +288,12 @@ def _split_place(x_m: FloatArray, length_m: float) -> tuple[FloatArray, FloatArr
     There are no others where the two sides run into each other: that is one place.
     """
     sides = x_m[x_m < length_m / 2], x_m[x_m >= length_m / 2]
-    own, other = sorted(sides, key=len, reverse=True)
+    main, other = sorted(sides, key=len, reverse=True)
     if not len(other):
-        return own, other
+        return main, other
     (low, high), (first, last) = (np.quantile(each, [0.05, 0.95]) for each in sides)
     apart = first - high > (high - low) + (last - first)
-    return (own, other) if apart else (x_m, other[:0])
+    return (main, other) if apart else (x_m, other[:0])
 
 
 def _contenders(attribution: Attribution) -> list[Fit]:
@@ -326,7 +325,7 @@ def tension_draws_n(
     parts = []
     for weight, fit in fits:
         if fit.hypothesis == Hypothesis() and alone:
-            parts += [(weight * odds, rival, own) for odds, rival, own in alone]
+            parts += [(weight * odds, rival, rival_fit) for odds, rival, rival_fit in alone]
         else:
             parts.append((weight, problem, fit))
     share = np.concatenate([np.full(len(f.draws), w / len(f.draws)) for w, _, f in parts])

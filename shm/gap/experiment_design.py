@@ -191,8 +191,8 @@ def _modes(design: Design) -> IntArray:
 
 def _present_shapes(design: Design, modes: IntArray) -> IntArray:
     """Return the distinct (index of the mode, place, axis) of the present tests."""
-    own = np.column_stack([design.frequency_plane, design.frequency_order])[design.shape_mode]
-    mode = np.argmax((own[:, None] == modes).all(axis=2), axis=1) if len(own) else own[:, 0]
+    keys = np.column_stack([design.frequency_plane, design.frequency_order])[design.shape_mode]
+    mode = np.argmax((keys[:, None] == modes).all(axis=2), axis=1) if len(keys) else keys[:, 0]
     return np.unique(
         np.column_stack([mode, design.shape_place, design.shape_component]), axis=0
     ).astype(np.int64)

@@ -92,13 +92,13 @@ class NewTests:
             self._predictions[fit] = self._predict(fit)
         mean, spread = (each.copy() for each in self._predictions[fit])
         new, size = design.frequencies, design.size
-        was, own = problem.repeated, self._of_frequencies
+        was, mode_loads = problem.repeated, self._of_frequencies
         shared = errors.between(design, old) + self._section @ was.section.T
         among_old = errors.between(old, old) + was.frequency + np.diag(errors.frequency_sd**2)
         gain = np.linalg.solve(among_old, shared.T).T
         mean[:new] += gain @ (problem.observations.value - fit.predicted)[: old.frequencies]
         spread[:new] -= gain @ (fit.slopes @ _roots(fit.covariance).T)[: old.frequencies]
-        repeated = errors.between(design, design) + own @ own.T - gain @ shared.T
+        repeated = errors.between(design, design) + mode_loads @ mode_loads.T - gain @ shared.T
         rows = np.arange(len(mean)) if rows is None else rows
         sd = [np.median(errors.frequency_sd), errors.shape_sd, self.reading_sd]
         variance = np.repeat(sd, [new, size - new, len(mean) - size])[rows] ** 2

@@ -30,7 +30,7 @@ from shm.gap.noise import (
     FREQUENCY_SIZES,
     LARGEST_FREQUENCY,
     LARGEST_SHAPE,
-    alike_in_planes,
+    correlate_orders,
     same_mode,
     sizes_of,
     smooth_over_orders,
@@ -77,10 +77,10 @@ def ranked(problem: GapProblem, fits: Sequence[Fit]) -> tuple[NextMeasurement, .
     leader, *rivals = contenders
     offered, rows, new = _offered(problem, contenders)
     errors = Errors.of(problem, leader)
-    seen = [new.foresee(leader, errors, own) for own in rows]
+    seen = [new.foresee(leader, errors, indices) for indices in rows]
     found = []
     for rival in rivals:
-        other = [new.foresee(rival, errors, own) for own in rows]
+        other = [new.foresee(rival, errors, indices) for indices in rows]
         promises = {
             each: min(divergence(one, two), divergence(two, one))
             for each, one, two in zip(offered, seen, other, strict=True)
@@ -279,7 +279,7 @@ class Contender:
 
 @dataclass(frozen=True, eq=False)
 class Race:
-    """What every contender foresees of the data (data,) of all measurements `offered`.
+    """Hold what every contender foresees of the data (data,) of all measurements `offered`.
 
     `rows` are those of each; `draws` (ways, draws, data) are data by each way of each contender.
     """
@@ -300,9 +300,9 @@ class Race:
         contenders = []
         for each in racing:
             ways = [
-                (weight * share, new.foresee(fit, own))
+                (weight * share, new.foresee(fit, way_errors))
                 for weight, fit in each.fits
-                for share, own in _ways(problem, fit, errors)
+                for share, way_errors in _ways(problem, fit, errors)
             ]
             total = sum(weight for weight, _ in ways)
             shares = tuple((weight / total, seen) for weight, seen in ways)
@@ -326,9 +326,9 @@ class Race:
         after = np.exp(logs - scipy.special.logsumexp(logs, axis=0))
         truth = [k for k, each in enumerate(self.contenders) for _ in each.ways]
         weight = [each.probability * share for each in self.contenders for share, _ in each.ways]
-        own = np.einsum("kj,jkn->kn", self._holds[truth], after)
+        correct = np.einsum("kj,jkn->kn", self._holds[truth], after)
         means = np.average(
-            [log_odds_of(own).mean(axis=1), own.mean(axis=1)], axis=1, weights=weight
+            [log_odds_of(correct).mean(axis=1), correct.mean(axis=1)], axis=1, weights=weight
         )
         return float(means[0]), float(means[1])
 
@@ -368,10 +368,10 @@ def _racing(attribution: Attribution) -> list[Explanation]:
     """Return the explanations in the race, the likeliest known one first, unknown ones last."""
     able = [each for each in explanations(attribution) if each.fits]
     best = next(each.probability for each in able if each.is_known)
-    kept = [each for each in able if each.probability > best * np.exp(-WITHIN_REACH)][:_CONTENDERS]
-    total = sum(each.probability for each in kept)
-    kept = [replace(each, probability=each.probability / total) for each in kept]
-    return sorted(kept, key=lambda each: not each.is_known)
+    close = [each for each in able if each.probability > best * np.exp(-WITHIN_REACH)][:_CONTENDERS]
+    total = sum(each.probability for each in close)
+    close = [replace(each, probability=each.probability / total) for each in close]
+    return sorted(close, key=lambda each: not each.is_known)
 
 
 def _ways(problem: GapProblem, fit: Fit, usual: Errors) -> list[tuple[float, Errors]]:
@@ -391,7 +391,7 @@ def _ways(problem: GapProblem, fit: Fit, usual: Errors) -> list[tuple[float, Err
     sizes = sizes_of(usual.frequency_sd, LARGEST_FREQUENCY, FREQUENCY_SIZES, assumed).tolist()
     ways = [
         replace(usual, shape_sd=shape_sd, remainder=size, pattern=pattern)
-        for size, pattern in product(sizes, (same_mode, smooth_over_orders, alike_in_planes))
+        for size, pattern in product(sizes, (same_mode, smooth_over_orders, correlate_orders))
     ]
     roots = [np.linalg.cholesky(way.between(design, design) + noise) for way in ways]
     log = [

@@ -90,21 +90,21 @@ def _from_one_on(problem: GapProblem) -> Iterator[_Numbering]:
     planes = np.unique(design.frequency_plane).tolist()
     for these in [[plane] for plane in planes] + ([planes] if len(planes) > 1 else []):
         inside = np.isin(design.frequency_plane, these)
-        own = "both planes'" if len(these) > 1 else f"the {PLANES[these[0]]}"
+        label = "both planes'" if len(these) > 1 else f"the {PLANES[these[0]]}"
         for first in np.unique(design.frequency_order[inside]).tolist():
             above = inside & (design.frequency_order > first)
             if not above.any():
                 continue
             up = _numbered(problem, design.frequency_order + above)
             asked = f"Was a mode missed between {first} and {first + 1}?"
-            yield _Numbering(f"{own} modes above {first} numbered one higher", up, asked)
-            kept = ~(inside & (design.frequency_order == first))
-            down = _numbered(problem.part(kept), (design.frequency_order - above)[kept])
+            yield _Numbering(f"{label} modes above {first} numbered one higher", up, asked)
+            remaining = ~(inside & (design.frequency_order == first))
+            down = _numbered(problem.part(remaining), (design.frequency_order - above)[remaining])
             yield _Numbering(
-                f"{own} mode {first} left out and those above numbered one lower",
+                f"{label} mode {first} left out and those above numbered one lower",
                 down,
                 "Is that mode a damper's, the deck's or another neighbour's?",
-                int(np.sum(~kept)),
+                int(np.sum(~remaining)),
             )
 
 

@@ -78,7 +78,7 @@ def _of_frequencies(
     known, same = np.isfinite(sd), same_mode(observations.design)
     return [
         (
-            errors * np.outer(own, own) + sigma**2 * same,
+            errors * np.outer(frequency_sd, frequency_sd) + sigma**2 * same,
             float(of_common * of_factor * of_sigma * of_errors),
             float(sigma if known.any() else common),
         )
@@ -86,7 +86,7 @@ def _of_frequencies(
         for common, of_common in zip(*_unknown_sds(known, observations.assumed), strict=True)
         for factor, of_factor in zip(*_factors(known, observations.assumed), strict=True)
         for sigma, of_sigma in zip(*_model_errors(known, observations.assumed), strict=True)
-        for own in [np.where(known, factor * sd, common)]
+        for frequency_sd in [np.where(known, factor * sd, common)]
     ]
 
 
@@ -141,9 +141,9 @@ def _drawn(group: IntArray, sd: FloatArray) -> FloatArray:
         if rows.sum() < _FEWEST:
             continue
         scatter = np.var(np.log(sd[rows]), ddof=1)
-        kept = 1 - _CHANCE / max(scatter, _CHANCE)
+        exponent = 1 - _CHANCE / max(scatter, _CHANCE)
         centre = np.sqrt(np.mean(sd[rows] ** 2))
-        drawn[rows] = centre * (sd[rows] / centre) ** kept
+        drawn[rows] = centre * (sd[rows] / centre) ** exponent
     return drawn
 
 
@@ -204,9 +204,9 @@ def _between_tests(observations: Observations) -> tuple[float, float]:
         return 1.0, 0.0
     away = ((value - mean[kind]) / sd)[several] / np.sqrt(1 - 1 / count[kind][several])
     # Scaling to unit length takes one degree of freedom from each shape.
-    kept = 1 - len(np.unique(mode)) / len(mode)
-    freedom = kept * float(np.sum(1 - 1 / count[kind][several]))
-    scatter = float(np.sqrt(np.mean(np.minimum(away**2, _WILD**2)) / kept))
+    free_share = 1 - len(np.unique(mode)) / len(mode)
+    freedom = free_share * float(np.sum(1 - 1 / count[kind][several]))
+    scatter = float(np.sqrt(np.mean(np.minimum(away**2, _WILD**2)) / free_share))
     return max(scatter, _LEAST_SCATTER), freedom
 
 
@@ -217,10 +217,10 @@ def _model_errors(known: FloatArray, assumed: Assumptions) -> tuple[FloatArray, 
     values = np.geomspace(_SIGMA_LOWER, assumed.model_error.upper, _SIGMAS)
     density = values * np.exp(-((values / MODEL_ERROR_SCALE) ** 2) / 2)
     # Below its smallest value the prior is flat: its integral there is the density by logarithm.
-    own = _trapezoidal(density, below=density[0] / np.log(values[1] / values[0]))
+    rayleigh = _trapezoidal(density, below=density[0] / np.log(values[1] / values[0]))
     field = _trapezoidal((values >= MODEL_ERROR_SCALE).astype(float))
     share = assumed.field_noise_share.value
-    return values, np.asarray((1 - share) * own + share * field)
+    return values, np.asarray((1 - share) * rayleigh + share * field)
 
 
 def _trapezoidal(density: FloatArray, below: float = 0.0) -> FloatArray:
@@ -295,10 +295,10 @@ def _thinned(plain: tuple[NoiseNode, ...]) -> tuple[NoiseNode, ...]:
     weight = np.exp([node.log_weight for node in plain])
     reached = np.cumsum(weight) / weight.sum()
     middles = (np.arange(PLAIN_NODES) + 0.5) / PLAIN_NODES
-    kept, counts = np.unique(np.searchsorted(reached, middles), return_counts=True)
+    chosen, counts = np.unique(np.searchsorted(reached, middles), return_counts=True)
     return tuple(
         NoiseNode(plain[i].covariance, float(np.log(count / PLAIN_NODES)), plain[i].model_error)
-        for i, count in zip(kept, counts, strict=True)
+        for i, count in zip(chosen, counts, strict=True)
     )
 
 
@@ -343,16 +343,16 @@ def _over_orders(design: Design) -> list[FloatArray]:
     """Correlations (F, F) between modes: none, smooth over the order in one plane or in both."""
     patterns = [same_mode(design), smooth_over_orders(design)]
     several = np.ptp(design.frequency_plane) > 0
-    return [*patterns, alike_in_planes(design)] if several else patterns
+    return [*patterns, correlate_orders(design)] if several else patterns
 
 
 def smooth_over_orders(one: Design, other: Design | None = None) -> FloatArray:
     """Correlations (F, F) that fall with the difference of the orders, in each plane."""
     planes = np.equal.outer(one.frequency_plane, (other or one).frequency_plane)
-    return np.asarray(planes * alike_in_planes(one, other))
+    return np.asarray(planes * correlate_orders(one, other))
 
 
-def alike_in_planes(one: Design, other: Design | None = None) -> FloatArray:
+def correlate_orders(one: Design, other: Design | None = None) -> FloatArray:
     """Correlations (F, F) that fall with the difference of the orders, whatever the planes."""
     orders = np.subtract.outer(one.frequency_order, (other or one).frequency_order)
     apart = orders / SMOOTH_ORDERS

@@ -98,7 +98,7 @@ def _damping(mode: Mode) -> tuple[float, float]:
 
 
 def survey_of(tests: Sequence[ModalTest]) -> Survey:
-    """What `tests` measure and vary; sensors count only where their shapes can be used."""
+    """Return what `tests` measure and vary; sensors count only where their shapes can be used."""
     components = [c for test in tests for mode in test.modes for c in _components(0, mode)]
     modes = [mode for test in tests for mode in test.modes]
     axes = {(PLANES.index(mode.plane), c.axis) for mode in modes for c in _components(0, mode)}
@@ -182,13 +182,13 @@ def _as_turned(shape: list[_Component], least: float) -> list[_Component]:
     if len(shape) % 2 or any(one.x_m != other.x_m for one, other in pairs):
         return shape
     size = np.array([max(abs(one.value), abs(other.value)) for one, other in pairs])
-    own, turn = told_apart(np.array([one.sd for one, _ in pairs]), size, least)
+    sds, turn = separate_turn(np.array([one.sd for one, _ in pairs]), size, least)
     return [
         replace(
-            each, sd=float(sd), turned=turn * (beside.value if each.axis == 0 else -beside.value)
+            each, sd=float(sd), turned=turn * (partner.value if each.axis == 0 else -partner.value)
         )
-        for (one, other), sd in zip(pairs, own, strict=True)
-        for each, beside in ((one, other), (other, one))
+        for (one, other), sd in zip(pairs, sds, strict=True)
+        for each, partner in ((one, other), (other, one))
     ]
 
 
@@ -253,7 +253,7 @@ def _integers(values: Sequence[int]) -> IntArray:
 _FEWEST = 3  # places: one more than the two unknowns, own standard deviation and turn
 
 
-def told_apart(sd: FloatArray, size: FloatArray, least: float) -> tuple[FloatArray, float]:
+def separate_turn(sd: FloatArray, size: FloatArray, least: float) -> tuple[FloatArray, float]:
     """The components' own standard deviations (places,) and the turn's, in radians.
 
     `sd` and `size` (places,) are the larger standard deviation and the larger component of each
@@ -263,12 +263,12 @@ def told_apart(sd: FloatArray, size: FloatArray, least: float) -> tuple[FloatArr
     """
     if len(sd) < _FEWEST:
         return sd, 0.0
-    (own, turn), _ = scipy.optimize.nnls(
+    (variance, turn), _ = scipy.optimize.nnls(
         np.column_stack([np.ones_like(sd), size**2]) / sd[:, None] ** 2, sd / sd
     )
-    if turn * np.max(size**2) <= max(own, least**2):
+    if turn * np.max(size**2) <= max(variance, least**2):
         return sd, 0.0
-    return np.full_like(sd, np.sqrt(max(own, least**2))), float(np.sqrt(turn))
+    return np.full_like(sd, np.sqrt(max(variance, least**2))), float(np.sqrt(turn))
 
 
 def rounding_sds(tests: Sequence[ModalTest]) -> FloatArray:
@@ -298,7 +298,7 @@ def rounding_covariance(observations: Observations) -> FloatArray:
     return np.asarray(np.outer(sd, sd) * (np.eye(count) + shared))
 
 
-def told_of_rounding(tests: Sequence[ModalTest]) -> str:
+def remark_on_rounding(tests: Sequence[ModalTest]) -> str:
     """The coarsest rounding, in words."""
     steps = [(step_hz(test), test) for test in tests]
     step, test = max(steps, key=lambda pair: pair[0])

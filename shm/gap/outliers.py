@@ -58,15 +58,15 @@ class GrossError:
 class Cleared:
     """The attribution of those frequencies `rows` (indices) of `whole` that `problem` keeps.
 
-    `aside` are the others, `doubted` at most one of those kept: more likely than not a gross error,
-    but not surely. `first` is the attribution of all frequencies.
+    `excluded` are the others, `doubted` at most one of those kept: more likely than not a gross
+    error, but not surely. `first` is the attribution of all frequencies.
     """
 
     whole: GapProblem
     problem: GapProblem
     rows: IntArray
     attribution: Attribution
-    aside: tuple[GrossError, ...] = ()
+    excluded: tuple[GrossError, ...] = ()
     doubted: tuple[GrossError, ...] = ()
     first: Attribution | None = None
 
@@ -99,17 +99,17 @@ def exclude_gross_errors(
         error = _find_gross_error(found)
         if error is None or error.probability < LIKELIER_THAN_NOT:
             break
-        full = len(found.aside) == most or len(found.rows) <= _FEWEST_LEFT
+        full = len(found.excluded) == most or len(found.rows) <= _FEWEST_LEFT
         if error.probability < SURE or full:
-            found = Cleared(*_fields(found), found.aside, (error,))
+            found = Cleared(*_fields(found), found.excluded, (error,))
             break
         rows = np.setdiff1d(found.rows, [error.row])
         part = whole.part(rows)
         again = attribute(part, options, rng, lambda label, _: progress(label, 1.0))
-        found = Cleared(whole, part, rows, again, (*found.aside, error))
-    kept = all(_remains(found, each) for each in found.aside)
-    last = found if kept else first
-    return Cleared(*_fields(last), last.aside, last.doubted, first.attribution)
+        found = Cleared(whole, part, rows, again, (*found.excluded, error))
+    confirmed = all(_remains(found, each) for each in found.excluded)
+    last = found if confirmed else first
+    return Cleared(*_fields(last), last.excluded, last.doubted, first.attribution)
 
 
 def _fields(found: Cleared) -> tuple[GapProblem, GapProblem, IntArray, Attribution]:
@@ -162,7 +162,7 @@ def _open(found: Cleared) -> BoolArray:
 
     What moves more together is no slip.
     """
-    design, gone = found.whole.design, [each.row for each in found.aside]
+    design, gone = found.whole.design, [each.row for each in found.excluded]
     test, mode = design.frequency_test, design.mode
     touched = np.isin(test, test[gone]) | np.isin(mode, mode[gone])
     return np.asarray(~touched[found.rows])
@@ -297,8 +297,8 @@ def left_out(
     outer[:, :, 0] -= z
     solved = np.linalg.solve(inner, outer)
     pull = gram[:, d, d:] - np.einsum("kd,kdc->kc", outer[:, :, 0], solved)
-    own = np.einsum("kcc->kc", gram[:, d + 1 :, d + 1 :])
-    precision = own - (outer[:, :, 1:] * solved[:, :, 1:]).sum(axis=1)
+    diagonal = np.einsum("kcc->kc", gram[:, d + 1 :, d + 1 :])
+    precision = diagonal - (outer[:, :, 1:] * solved[:, :, 1:]).sum(axis=1)
     height = likelihood.log_height - np.linalg.slogdet(inner)[1] / 2
     return LeftOut(
         deviation=pull[:, 1:] / precision,
@@ -320,14 +320,14 @@ def _seen_from(problem: GapProblem, fit: Fit, row: int) -> LeftOut:
 
 
 def acts_alone(
-    design: Design, kept: Design, row: int, deviation: float, gross_share: float
+    design: Design, remaining: Design, row: int, deviation: float, gross_share: float
 ) -> float:
     """Return how probably the frequency `row` of `design`, off by `deviation` of its logarithm,
     is no slip but moved by something unknown that acts on this mode alone.
 
-    `kept` are the frequencies that were not set aside.
+    `remaining` are the frequencies that were not set aside.
     """
-    if abs(deviation) > _LARGEST or _right_elsewhere(design, kept, row):
+    if abs(deviation) > _LARGEST or _right_elsewhere(design, remaining, row):
         return 0.0
     modes = len(np.unique(design.mode))
     slip = gross_share / np.log(WIDE_TO / WIDE_FROM)
@@ -335,11 +335,11 @@ def acts_alone(
     return float(acts / (acts + slip))
 
 
-def _right_elsewhere(design: Design, kept: Design, row: int) -> bool:
-    same = (kept.frequency_plane == design.frequency_plane[row]) & (
-        kept.frequency_order == design.frequency_order[row]
+def _right_elsewhere(design: Design, remaining: Design, row: int) -> bool:
+    same = (remaining.frequency_plane == design.frequency_plane[row]) & (
+        remaining.frequency_order == design.frequency_order[row]
     )
-    return bool((kept.amplitude[same] * SAME_LEVEL >= design.amplitude[row]).any())
+    return bool((remaining.amplitude[same] * SAME_LEVEL >= design.amplitude[row]).any())
 
 
 def describe_outliers(
@@ -354,53 +354,53 @@ def _outlier(found: Cleared, error: GrossError, fit: Fit) -> Outlier:
     deviation, sd = found.expected(error, fit)
     measured_hz = float(np.exp(observations.value[error.row]))
     expected_hz = measured_hz * float(np.exp(-deviation))
-    own = float(np.nan_to_num(observations.sd[error.row]))
+    stated_sd = float(np.nan_to_num(observations.sd[error.row]))
     return Outlier(
         plane=PLANES[design.frequency_plane[error.row]],
         order=int(design.frequency_order[error.row]),
         test=design.conditions[design.frequency_test[error.row]].test,
         measured_hz=measured_hz,
         expected_hz=expected_hz,
-        expected_sd_hz=expected_hz * float(np.sqrt(max(sd**2 - own**2, 0.0))),
+        expected_sd_hz=expected_hz * float(np.sqrt(max(sd**2 - stated_sd**2, 0.0))),
         probability=error.probability,
-        acts_alone=found.acts_alone(error, fit) if error in found.aside else 0.0,
+        acts_alone=found.acts_alone(error, fit) if error in found.excluded else 0.0,
     )
 
 
 def residuals_with_outliers(
-    found: Cleared, kept: Sequence[Residual], before: Fit, after: Fit | None
+    found: Cleared, residuals: Sequence[Residual], before: Fit, after: Fit | None
 ) -> tuple[Residual, ...]:
-    """Return the residuals of the frequencies `kept` and of those set aside, in their order.
+    """Return `residuals` and those of the frequencies set aside, in their order.
 
     These have no share in the misfit, since it is that of the others.
     """
-    rows = dict(zip(found.rows.tolist(), kept, strict=True))
-    rows |= {each.row: _residual(found, each, before, after) for each in found.aside}
+    rows = dict(zip(found.rows.tolist(), residuals, strict=True))
+    rows |= {each.row: _residual(found, each, before, after) for each in found.excluded}
     return tuple(rows[row] for row in sorted(rows))
 
 
 def _residual(found: Cleared, error: GrossError, before: Fit, after: Fit | None) -> Residual:
-    (told,) = describe_outliers(found, [error], before)
+    (outlier,) = describe_outliers(found, [error], before)
     deviation, sd = found.expected(error, before)
     left = NAN if after is None else found.expected(error, after)[0]
     percent, after_percent = (100 * float(np.expm1(each)) for each in (deviation, left))
-    own = told.plane, told.order, told.test, told.measured_hz, told.expected_hz
-    return Residual(*own, percent, deviation / sd, 0.0, after_percent)
+    fields = outlier.plane, outlier.order, outlier.test, outlier.measured_hz, outlier.expected_hz
+    return Residual(*fields, percent, deviation / sd, 0.0, after_percent)
 
 
-def describe_set_aside(found: Cleared, outliers: Sequence[Outlier]) -> tuple[str, ...]:
+def describe_excluded(found: Cleared, outliers: Sequence[Outlier]) -> tuple[str, ...]:
     """Return remarks on frequencies that were done without."""
     otherwise = _led_before(found)
-    told = tuple(
+    remarks = tuple(
         f"{_measured(each)}, is set aside as a gross error (probability {_probability(each)}): "
         f"{_expected(each)}. A wrong mode, a tone or a slip; look at the recording again."
         f"{_acts_alone(each)}"
         for each in outliers
     )
-    if not told or not otherwise:
-        return told
-    right = "it prove right" if len(told) == 1 else "they prove right"
-    return (*told, f"Should {right}, {otherwise} is the likeliest cause: repeat the test.")
+    if not remarks or not otherwise:
+        return remarks
+    right = "it prove right" if len(remarks) == 1 else "they prove right"
+    return (*remarks, f"Should {right}, {otherwise} is the likeliest cause: repeat the test.")
 
 
 def describe_doubtful(outliers: Sequence[Outlier]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Where along the hanger a local cause would have to sit, from the pattern over modes and shapes.
+"""Locate the place of a local cause along the hanger from the pattern over modes and shapes.
 
 One local change is tried at many places; its size and the baseline's parameters follow by least
 squares, to first order and then once more at the size found (Cawley and Adams 1979 compare patterns
@@ -29,7 +29,7 @@ class Misfit:
     """The baseline's misfit, with its free parameters and errors together as one covariance.
 
     `value` (data,) are the data with errors `sd`, `deviation` (data,) is theirs from the middle of
-    the prior, to first order; `slopes` (data, p) are those of the baseline's `own` parameters and
+    the prior, to first order; `slopes` (data, p) are those of the baseline's own `n_parameters` and
     then, as further parameters z, of the errors that repeat; `weighted` is the same over `sd`,
     `inner` (p, p) the covariance of all p. `least_scale` is the least chi-square of a datum that is
     taken for noise.
@@ -41,7 +41,7 @@ class Misfit:
     slopes: FloatArray
     weighted: FloatArray
     inner: FloatArray
-    own: int
+    n_parameters: int
     least_scale: float
 
     @classmethod
@@ -56,7 +56,7 @@ class Misfit:
             slopes=slopes,
             weighted=weighted,
             inner=np.asarray(np.linalg.inv(np.eye(slopes.shape[1]) + weighted.T @ weighted)),
-            own=len(before.z),
+            n_parameters=len(before.z),
             least_scale=1.0 if np.isfinite(observations.sd).any() else _LEAST_SCALE,
         )
 
@@ -78,7 +78,7 @@ class Misfit:
 
     def repeated(self, z: FloatArray) -> FloatArray:
         """Return what repeated errors add to predictions (n, data) at parameters z (n, p)."""
-        return np.asarray(z[:, self.own :] @ self.slopes[:, self.own :].T)
+        return np.asarray(z[:, self.n_parameters :] @ self.slopes[:, self.n_parameters :].T)
 
     def at(self, predicted: FloatArray, z: FloatArray) -> FloatArray:
         """Return the chi-square (n,) of predictions (n, data) at parameters z (n, p)."""
@@ -151,7 +151,7 @@ class LocalCause:
 
     def predicted(self, problem: GapProblem, baseline: FloatArray, size: FloatArray) -> FloatArray:
         """The data (n, data) with sizes (n,), and the baseline's parameters at z (n, d)."""
-        return problem.predict_beside(self.hypothesis, baseline, self._values(problem, size))
+        return problem.predict_with_effect(self.hypothesis, baseline, self._values(problem, size))
 
     def _values(self, problem: GapProblem, size: FloatArray) -> FloatArray:
         """The effect's parameters (n, parameters)."""
@@ -160,12 +160,12 @@ class LocalCause:
             return np.repeat(-np.log10(size)[:, None], len(variant.planes), axis=1)
         extent_m = np.full(len(size), _EXTENT * problem.hanger.length_m)
         values = {"x_m": self.places_m, "extent_m": extent_m}
-        own = parameters_of(name, problem.hanger, variant)
-        return np.stack([size, *(values[each.name] for each in own[1:])], axis=1)
+        parameters = parameters_of(name, problem.hanger, variant)
+        return np.stack([size, *(values[each.name] for each in parameters[1:])], axis=1)
 
 
 def local_causes(problem: GapProblem) -> tuple[LocalCause, ...]:
-    """Those that may sit anywhere, in all planes that were measured."""
+    """Return the causes that may sit anywhere, in all planes that were measured."""
     return tuple(_anywhere(problem, each) for each in EFFECTS.values() if each.localised_as)
 
 
@@ -239,8 +239,8 @@ def _without(problem: GapProblem, before: Fit, misfit: Misfit, cause: LocalCause
     """No cause yet, but what a small one would do."""
     count = len(cause.places_m)
     z = np.zeros((count, misfit.slopes.shape[1]))
-    z[:, : misfit.own] = before.z
-    small = cause.predicted(problem, z[:, : misfit.own], np.full(count, cause.small))
+    z[:, : misfit.n_parameters] = before.z
+    small = cause.predicted(problem, z[:, : misfit.n_parameters], np.full(count, cause.small))
     per_size = (small - before.predicted) / cause.small
     change = Change(np.repeat(misfit.deviation[None], count, axis=0), per_size, cause.largest)
     left = misfit.at(before.predicted[None], z)
@@ -251,7 +251,7 @@ def _at(
     problem: GapProblem, misfit: Misfit, cause: LocalCause, z: FloatArray, size: FloatArray
 ) -> _State:
     here, further = (
-        cause.predicted(problem, z[:, : misfit.own], each) + misfit.repeated(z)
+        cause.predicted(problem, z[:, : misfit.n_parameters], each) + misfit.repeated(z)
         for each in (size, _FURTHER * size)
     )
     per_size = (further - here) / ((_FURTHER - 1) * size[:, None])
@@ -308,8 +308,8 @@ def _place(problem: GapProblem, before: Fit, misfit: Misfit, cause: LocalCause) 
     density = probability.reshape(_BINS, -1).sum(axis=1) * _BINS / length_m
     middles_m = fine_m.reshape(_BINS, -1).mean(axis=1)
     profile = tuple(zip(middles_m.tolist(), density.tolist(), strict=True))
-    likeliest_m = float(fine_m[probability.argmax()])
-    return GapPlace(cause.kind, likeliest_m, float(low_m), float(high_m), share, profile)
+    best_m = float(fine_m[probability.argmax()])
+    return GapPlace(cause.kind, best_m, float(low_m), float(high_m), share, profile)
 
 
 def _end(problem: GapProblem, before: Fit, misfit: Misfit) -> GapPlace | None:
@@ -325,9 +325,9 @@ def _end(problem: GapProblem, before: Fit, misfit: Misfit) -> GapPlace | None:
     x_m = np.concatenate([end.places_m for end in ends])
     possible = x_m[probability >= 2 * _OUTSIDE]
     profile = tuple(zip(x_m.tolist(), probability.tolist(), strict=True))
-    likeliest_m = float(x_m[probability.argmax()])
+    best_m = float(x_m[probability.argmax()])
     low_m, high_m = float(possible.min()), float(possible.max())
-    return GapPlace(ends[0].kind, likeliest_m, low_m, high_m, share, profile)
+    return GapPlace(ends[0].kind, best_m, low_m, high_m, share, profile)
 
 
 def _judged(misfit: Misfit, left: FloatArray) -> tuple[FloatArray, float] | None:

@@ -84,10 +84,10 @@ def read_calibration(file: Path = FILE) -> Calibration:
         ) from error
 
 
-def _values(told: dict[str, Any]) -> Calibration:
-    mimic, law = told["mimic"], told["law"]
+def _values(document: dict[str, Any]) -> Calibration:
+    mimic, law = document["mimic"], document["law"]
     return Calibration(
-        provenance=Provenance(**told["provenance"]),
+        provenance=Provenance(**document["provenance"]),
         mimics_one=mimic["one_effect"],
         mimics_two=mimic["two_effects"],
         exact=Share(**law["exact"]),
@@ -119,10 +119,10 @@ def allow_for_laws(
     ways = [(CALIBRATION.exact, fit.noise), *_allowances(problem, baseline, fit)]
     found = [_linear(fit, errors, residual) for _, errors in ways]
     log = np.array([each for each, *_ in found]) - found[0][0]
-    own, unknown = (
+    log_known, unknown = (
         np.log([getattr(share, name) for share, _ in ways]) + log for name in Share._fields
     )
-    chosen = rng.choice(len(ways), size=len(fit.draws), p=normalised(own))
+    chosen = rng.choice(len(ways), size=len(fit.draws), p=normalised(log_known))
     draws = fit.draws.copy()
     for way in np.unique(chosen[chosen > 0]):
         rows = np.flatnonzero(chosen == way)
@@ -130,7 +130,7 @@ def allow_for_laws(
         normal = rng.standard_normal((len(rows), len(fit.z)))
         draws[rows] = fit.z + step + np.linalg.solve(np.linalg.cholesky(inner).T, normal.T).T
     return ByLaws(
-        float(scipy.special.logsumexp(own)), float(scipy.special.logsumexp(unknown)), draws
+        float(scipy.special.logsumexp(log_known)), float(scipy.special.logsumexp(unknown)), draws
     )
 
 
@@ -152,10 +152,10 @@ def _allowances(problem: GapProblem, baseline: Fit, fit: Fit) -> Iterator[tuple[
     count, patterns = design.frequencies, (same_mode(design), smooth_over_orders(design))
     for fraction, share in CALIBRATION.off_by.items():
         off = fraction * shift
-        for alike in patterns:
+        for pattern in patterns:
             errors = replace(
                 fit.noise,
-                frequency=fit.noise.frequency + np.outer(off[:count], off[:count]) * alike,
+                frequency=fit.noise.frequency + np.outer(off[:count], off[:count]) * pattern,
                 shape=fit.noise.shape + off[count:] ** 2,
             )
             yield Share(*(each / len(patterns) for each in share)), errors
@@ -260,9 +260,9 @@ def probabilities(candidates: Sequence[Family]) -> tuple[FloatArray, float]:
         for name in ("log_evidence", "log_mimic", "log_prior", "mimic_odds")
     )
     resembling_nothing = 1 - CALIBRATION.mimics_one - CALIBRATION.mimics_two
-    kept = np.array([resembling_nothing if each.flexible else 1.0 for each in candidates])
+    factor = np.array([resembling_nothing if each.flexible else 1.0 for each in candidates])
     top = float((evidence + prior).max())
-    weight = kept * np.exp(evidence + prior - top)
+    weight = factor * np.exp(evidence + prior - top)
     unknown = float(np.sum(odds * np.exp(mimic + prior - top)))
     whole = weight.sum() + unknown
     return np.asarray(weight / whole), unknown / whole

@@ -1,4 +1,4 @@
-"""What a hypothesis predicts of a hanger's tests, and what errors that repeat do to these."""
+"""Predict a hanger's tests by a hypothesis, and what errors that repeat do to these."""
 
 from __future__ import annotations
 
@@ -140,13 +140,13 @@ class GapProblem:
     @property
     def has_itself(self) -> tuple[str, ...]:
         """Return the effects of the catalogue that the hanger has as parameters of its own."""
-        own = {
+        included = {
             "rotational_end_flexibility": bool(self.model.springs),
             "shear_and_rotary_inertia": isinstance(self.model.model, Beam3),
             "sag": self.model.has_terms,
             "bending_stiffness": BENDING in self.described.names,
         }
-        return tuple(name for name, has in own.items() if has)
+        return tuple(name for name, has in included.items() if has)
 
     def predict(
         self, hypothesis: Hypothesis, z: FloatArray, design: Design | None = None
@@ -165,7 +165,7 @@ class GapProblem:
         found = self._predicted(hypothesis.effects, theta, design, scaling)
         return found + self.usual_of(design)
 
-    def predict_beside(
+    def predict_with_effect(
         self, hypothesis: Hypothesis, z: FloatArray, effect: FloatArray
     ) -> FloatArray:
         """Return the data (n, data) with values (n, p) of the last effect, all else at z.
@@ -201,7 +201,7 @@ class GapProblem:
 
     @cached_property
     def repeated(self) -> Repeated:
-        """What the errors that repeat do to the data, from the baseline near the data."""
+        """Return what errors that repeat do to the data, from the baseline near the data."""
         sensors, errors = sensor_loads(self.observations, self._predicted_near, self.hanger)
         shapes = np.hstack([sensors, turn_loads(self.observations)])
         design = self.design
@@ -245,12 +245,13 @@ class GapProblem:
         return loads_of_radii(masses, log_frequency, self.hanger.assumptions)
 
     def section_of(self, design: Design) -> FloatArray:
-        """What the section along the bar, the sensors' mass and the supports' give do to the
-        frequencies of a design: loads (F, k), the same k of every design.
+        """Return loads (F, k) on the frequencies of a design, the same k of every design.
+
+        They are of the section along the bar, the sensors' mass and the supports' give.
         """
         theta = self.described.theta(self.near)
-        alike = self.model.physical(np.repeat(theta, STRETCHES + 1, axis=0))
-        section = section_loads(design, alike, self.hanger)
+        copies = self.model.physical(np.repeat(theta, STRETCHES + 1, axis=0))
+        section = section_loads(design, copies, self.hanger)
         if not self.hanger.as_hanger:
             return section
         ends = self._ends_of(design)
@@ -291,7 +292,7 @@ class GapProblem:
         return self.model.end_waves(theta, frequency_hz, design.frequency_plane)
 
     def sensors_of(self, design: Design) -> FloatArray:
-        """What errors of sensors do to the shapes of a new design: loads (S, k)."""
+        """Return the loads (S, k) of errors of sensors on the shapes of a new design."""
         near = self._predicted_near(design)
         as_if = Observations(design, near, np.ones_like(near))
         return sensor_loads(as_if, self._predicted_near, self.hanger)[0]
@@ -347,16 +348,16 @@ class GapProblem:
 
         `rows` are theirs, as indices or as a choice (F,). Priors are those of the whole.
         """
-        kept = np.arange(self.design.frequencies)[rows]
-        shapes = np.flatnonzero(np.isin(self.design.shape_mode, kept))
-        return self._with(self.observations.part(kept, shapes))
+        frequencies = np.arange(self.design.frequencies)[rows]
+        shapes = np.flatnonzero(np.isin(self.design.shape_mode, frequencies))
+        return self._with(self.observations.part(frequencies, shapes))
 
     def without_shape(self, row: int) -> GapProblem:
         """The same problem without the shape of the mode `row`; itself where it has none."""
-        kept = np.flatnonzero(self.design.shape_mode != row)
-        if len(kept) == len(self.design.shape_mode):
+        components = np.flatnonzero(self.design.shape_mode != row)
+        if len(components) == len(self.design.shape_mode):
             return self
-        return self._with(self.observations.part(np.arange(self.design.frequencies), kept))
+        return self._with(self.observations.part(np.arange(self.design.frequencies), components))
 
     def _with(self, part: Observations) -> GapProblem:
         problem = GapProblem(self.model, self.tests, part, self.described)

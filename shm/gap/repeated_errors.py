@@ -98,8 +98,8 @@ def section_ways(length_m: float, sd: float, reach_m: float) -> FloatArray:
     centring = np.eye(STRETCHES) - 1 / STRETCHES
     covariance = centring @ np.exp(-(apart**2) / 2) @ centring
     variance, ways = np.linalg.eigh(covariance * STRETCHES / np.trace(covariance))
-    kept = variance > _LEAST_SHARE * variance.sum()
-    return np.asarray(sd * ways[:, kept] * np.sqrt(variance[kept]))
+    significant = variance > _LEAST_SHARE * variance.sum()
+    return np.asarray(sd * ways[:, significant] * np.sqrt(variance[significant]))
 
 
 def _influence(physical: PhysicalHanger, edges_m: FloatArray, orders: int) -> FloatArray:
@@ -131,26 +131,26 @@ def sensor_loads(
     of_channel = (2 * place + component)[:, None] == channel
     of_sensor = place[:, None] == sensor
     slopes = _slopes(observations, predict, hanger.length_m)
-    beside = _beside(design, value)
-    turned = usual.sensor_turn * np.where(component == 0, beside, -beside)
+    cross = _cross_components(design, value)
+    turned = usual.sensor_turn * np.where(component == 0, cross, -cross)
     raw = np.column_stack(
         [
             usual.sensor_gain * value[:, None] * of_channel,
             usual.sensor_place_m * slopes[:, None] * of_sensor,
             turned[:, None] * of_sensor,
-            usual.sensor_cross_mean * beside[:, None] * of_sensor,
+            usual.sensor_cross_mean * cross[:, None] * of_sensor,
         ]
     )
     names: list[SensorError] = [("gain", each // 2, each % 2) for each in channel.tolist()]
     names += [("place", each, 0) for each in sensor.tolist()]
     names += [("turn", each, 0) for each in sensor.tolist()]
     names += [("cross", each, 0) for each in sensor.tolist()]
-    loads = _beside_scaling(observations, raw)
+    loads = _remove_scaling(observations, raw)
     felt = np.abs(loads).max(axis=0) > _LEAST_LOAD
     return np.asarray(loads[:, felt]), tuple(n for n, f in zip(names, felt, strict=True) if f)
 
 
-def _beside(design: Design, value: FloatArray) -> FloatArray:
+def _cross_components(design: Design, value: FloatArray) -> FloatArray:
     """The other component at each component's place, or 0 (S,)."""
     key = design.shape_mode * (design.shape_place.max() + 1) + design.shape_place
     seen = {(k, c): v for k, c, v in zip(key, design.shape_component, value, strict=True)}
@@ -163,14 +163,14 @@ def _slopes(observations: Observations, predict: Predict, length_m: float) -> Fl
     design = observations.design
     count = len(design.places_m)
     step_m = np.where(np.array(design.places_m) < length_m / 2, 1.0, -1.0) * _STEP_SHARE * length_m
-    beside = replace(
+    extended = replace(
         design,
         places_m=(*design.places_m, *(np.array(design.places_m) + step_m).tolist()),
         shape_mode=np.repeat(design.shape_mode, 2),
         shape_place=np.stack([design.shape_place, design.shape_place + count], axis=1).ravel(),
         shape_component=np.repeat(design.shape_component, 2),
     )
-    here, there = predict(beside)[design.frequencies :].reshape(-1, 2).T
+    here, there = predict(extended)[design.frequencies :].reshape(-1, 2).T
     scaling = ShapeScaling.measured(observations)
     value = observations.value[design.frequencies :]
     along, size = (
@@ -180,19 +180,19 @@ def _slopes(observations: Observations, predict: Predict, length_m: float) -> Fl
     return np.asarray((there - here) / step_m[design.shape_place] * along / size)
 
 
-def _beside_scaling(observations: Observations, raw: FloatArray) -> FloatArray:
+def _remove_scaling(observations: Observations, raw: FloatArray) -> FloatArray:
     """Changes (S, k) of shapes without what scaling to unit length takes back."""
     scaling = ShapeScaling.measured(observations)
     value = observations.value[observations.design.frequencies :]
     shapes = int(scaling.shape.max()) + 1
-    own = (scaling.shape == np.arange(shapes)[:, None]) * (scaling.weight * value)
-    length = own @ value
-    return np.asarray(raw - value[:, None] * ((own @ raw) / length[:, None])[scaling.shape])
+    weighted = (scaling.shape == np.arange(shapes)[:, None]) * (scaling.weight * value)
+    length = weighted @ value
+    return np.asarray(raw - value[:, None] * ((weighted @ raw) / length[:, None])[scaling.shape])
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeScaling:
-    """How shapes of a design are scaled. All fields are (S,).
+    """Scale the shapes of a design. All fields are (S,).
 
     `shape` counts the shapes from 0 and goes up, `weight` is that of a component in its shape's
     length, `reference` is what a component is compared with for the sign.
@@ -241,21 +241,21 @@ def turn_loads(observations: Observations) -> FloatArray:
     design, columns = observations.design, []
     value = observations.value[design.frequencies :]
     for mode in np.unique(design.shape_mode[turned_modes(observations)]):
-        own = design.shape_mode == mode
-        turned = own * _turned_components(observations)
-        variance = (turned @ turned) / (value[own] @ value[own])
-        columns += [turned, np.sqrt(3) / 2 * variance * own * value]
+        in_shape = design.shape_mode == mode
+        turned = in_shape * _turned_components(observations)
+        variance = (turned @ turned) / (value[in_shape] @ value[in_shape])
+        columns += [turned, np.sqrt(3) / 2 * variance * in_shape * value]
     return np.column_stack(columns) if columns else np.zeros((len(value), 0))
 
 
 def turned_modes(observations: Observations) -> BoolArray:
-    """Which components (S,) are of shapes whose direction is uncertain."""
+    """Return True for components (S,) of shapes whose direction is uncertain."""
     mode = observations.design.shape_mode
     return np.asarray(np.isin(mode, mode[_turned_components(observations) != 0]))
 
 
 def _turned_components(observations: Observations) -> FloatArray:
-    """What one standard deviation of its mode's turn does to each component (S,)."""
+    """Return the change of each component (S,) by one standard deviation of its mode's turn."""
     count = observations.design.frequencies
     if observations.turned is None:
         return np.zeros(len(observations.value) - count)

@@ -89,8 +89,10 @@ def identification_sd(problem: GapProblem, fit: Fit) -> FloatArray:
     Less what repeats in any case, which is no error of identification.
     """
     sd, count = problem.observations.sd, problem.design.frequencies
-    own = np.diag(fit.noise.frequency - problem.repeated.frequency)
-    return np.concatenate([np.where(np.isfinite(sd[:count]), sd[:count], np.sqrt(own)), sd[count:]])
+    variance = np.diag(fit.noise.frequency - problem.repeated.frequency)
+    return np.concatenate(
+        [np.where(np.isfinite(sd[:count]), sd[:count], np.sqrt(variance)), sd[count:]]
+    )
 
 
 def left_over(fit: Fit, sd: FloatArray) -> FloatArray:
@@ -103,8 +105,8 @@ def left_over(fit: Fit, sd: FloatArray) -> FloatArray:
     weighed = np.concatenate([noise.frequency[0], noise.shape[0]])
     information = np.eye(fit.slopes.shape[1]) + fit.slopes.T @ weighed
     followed = fit.slopes @ np.linalg.solve(information, weighed.T)
-    kept = (np.eye(len(sd)) - followed)[: len(fit.noise.frequency)]
-    return np.asarray((kept * sd**2) @ kept.T)
+    remainder = (np.eye(len(sd)) - followed)[: len(fit.noise.frequency)]
+    return np.asarray((remainder * sd**2) @ remainder.T)
 
 
 def trends(problem: GapProblem, before: Fit) -> tuple[Trend, ...]:
@@ -226,18 +228,18 @@ _MOST = 4  # judgement: more is not read; the largest come first
 
 
 def sensor_remarks(problem: GapProblem, fit: Fit) -> tuple[str, ...]:
-    """What these data are sure that sensors err by, as one remark; none where there is nothing."""
-    told = [
-        _told(problem, error, mean, sd)
+    """Return one remark on errors of sensors that these data are sure of; none without any."""
+    remarks = [
+        _describe_error(problem, error, mean, sd)
         for error, mean, sd in sorted(_posterior(problem, fit), key=lambda each: -abs(each[1]))
         if abs(mean) > max(_SURE * sd, _OF_NOTE)
     ]
-    if not told:
+    if not remarks:
         return ()
-    more = f", and {len(told) - _MOST} more" if len(told) > _MOST else ""
+    more = f", and {len(remarks) - _MOST} more" if len(remarks) > _MOST else ""
     return (
         f"The measurement's own, allowed for in every explanation and no part of the gap: "
-        f"{'; '.join(told[:_MOST])}{more}.",
+        f"{'; '.join(remarks[:_MOST])}{more}.",
     )
 
 
@@ -256,7 +258,7 @@ def _posterior(problem: GapProblem, fit: Fit) -> list[tuple[SensorError, float, 
     return list(zip(repeated.sensor_errors, mean.tolist(), sd.tolist(), strict=False))
 
 
-def _told(problem: GapProblem, error: SensorError, mean: float, sd: float) -> str:
+def _describe_error(problem: GapProblem, error: SensorError, mean: float, sd: float) -> str:
     kind, place, component = error
     usual: Scatter = problem.hanger.scatter
     at = f"the sensor at {problem.design.places_m[place]:.2f} m"
@@ -266,18 +268,20 @@ def _told(problem: GapProblem, error: SensorError, mean: float, sd: float) -> st
         "turn": float(np.degrees(usual.sensor_turn)),
         "cross": 100 * usual.sensor_cross_mean,
     }[kind]
-    off, own = factor * mean, factor * sd
+    off, uncertainty = factor * mean, factor * sd
     match kind:
         case "gain":
             much = "much" if mean > 0 else "little"
-            return f"{at} reads {abs(off):.1f} +- {own:.1f} % too {much} {PLANES[component]}"
+            return (
+                f"{at} reads {abs(off):.1f} +- {uncertainty:.1f} % too {much} {PLANES[component]}"
+            )
         case "place":
             end = "arch" if mean > 0 else "deck"
-            return f"{at} sits {abs(off):.1f} +- {own:.1f} cm nearer to the {end} end"
+            return f"{at} sits {abs(off):.1f} +- {uncertainty:.1f} cm nearer to the {end} end"
         case "turn":
-            return f"{at} is turned by {off:.1f} +- {own:.1f} degrees"
+            return f"{at} is turned by {off:.1f} +- {uncertainty:.1f} degrees"
         case "cross":
-            return f"{at} reads {off:.1f} +- {own:.1f} % of each axis in the other"
+            return f"{at} reads {off:.1f} +- {uncertainty:.1f} % of each axis in the other"
 
 
 _FEWEST = 4  # frequencies: three to fit (tension, stiffness and a size), one to predict
@@ -359,9 +363,11 @@ def _residuals(problem: GapProblem, fit: Fit, folds: BoolArray) -> FloatArray:
     left = np.full_like(residual, NAN)
     for fold, out in enumerate(folds):
         # What repeats in all frequencies is known by those that are kept.
-        kept = fit.noise.frequency[np.ix_(~out, ~out)]
+        covariance = fit.noise.frequency[np.ix_(~out, ~out)]
         across = problem.repeated.frequency[np.ix_(out, ~out)]
-        left[fold, out] = residual[fold, out] - across @ np.linalg.solve(kept, residual[fold, ~out])
+        left[fold, out] = residual[fold, out] - across @ np.linalg.solve(
+            covariance, residual[fold, ~out]
+        )
     return left
 
 
@@ -389,8 +395,8 @@ def _in_turn(design: Design, after: Fit | None, rng: np.random.Generator) -> Boo
     """Return folds (folds, F) over orders and over tests that leave enough to fit."""
     folds = np.array([*_over_orders(design), *_over_tests(design, after, rng)], dtype=bool)
     folds = folds.reshape(-1, design.frequencies)
-    kept = np.sum(~folds, axis=1)
-    enough = kept >= (_FEWEST - 1 if design.frequencies >= _FEWEST else design.frequencies + 1)
+    n_fitted = np.sum(~folds, axis=1)
+    enough = n_fitted >= (_FEWEST - 1 if design.frequencies >= _FEWEST else design.frequencies + 1)
     return np.asarray(folds[enough & folds.any(axis=1)])
 
 
@@ -449,14 +455,14 @@ def _rms_percent(residual: FloatArray) -> float:
 _STEPS, _STEP_IN_SDS, _SHORTER = 6, 0.05, 0.3
 
 
-def refitted(problem: GapProblem, fit: Fit, kept: BoolArray) -> FloatArray:
-    """Return predictions (folds, data) of `fit` refitted to the frequencies `kept` (folds, F).
+def refitted(problem: GapProblem, fit: Fit, fitted: BoolArray) -> FloatArray:
+    """Return predictions (folds, data) of `fit` refitted to the frequencies `fitted` (folds, F).
 
     A shape goes with its frequency. The slopes and the sizes of unknown errors are those of the
     full fit; the predictions are computed anew in every step, for all folds at once. A step that
     does not lower the misfit is taken back and tried shorter.
     """
-    value, parts = problem.observations.value, [_part(problem.design, fit, each) for each in kept]
+    value, parts = problem.observations.value, [_part(problem.design, fit, each) for each in fitted]
 
     def misfits(z: FloatArray, predicted: FloatArray) -> FloatArray:
         return np.array(
@@ -487,8 +493,8 @@ def refitted(problem: GapProblem, fit: Fit, kept: BoolArray) -> FloatArray:
     return predicted
 
 
-def _part(design: Design, fit: Fit, kept: BoolArray) -> tuple[IntArray, Likelihood]:
+def _part(design: Design, fit: Fit, fitted: BoolArray) -> tuple[IntArray, Likelihood]:
     """Return the rows of the data that stay, with their errors."""
-    frequency, shape = np.flatnonzero(kept), np.flatnonzero(kept[design.shape_mode])
+    frequency, shape = np.flatnonzero(fitted), np.flatnonzero(fitted[design.shape_mode])
     errors = Likelihood.of(fit.noise.part(frequency, shape), fit.model_error)
     return np.concatenate([frequency, design.frequencies + shape]), errors

@@ -52,7 +52,7 @@ class SamplingOptions:
     `far_below` of the best log density (peaks `lobes_apart` standard deviations away are other
     lobes), and `without` of it where the posterior without the last effects is, by
     `clusters_without` parts. Of `wide_every` rounds one or two do without a surrogate; of the
-    others' `candidates` a round is kept, each with a chance of `least_kept` or more, found by
+    others' `candidates` a round is kept, each with a chance of `least_chance` or more, found by
     `halvings`. The surrogate's fit has a `least_weight` for all points and a `ridge`, and leaves
     out errors of a smaller share than `least_of_errors`. Linear parameters are followed
     `most_settled` times at most.
@@ -72,7 +72,7 @@ class SamplingOptions:
     clusters_without: int = 3
     wide_every: int = 4
     candidates: int = 3000
-    least_kept: float = 0.01
+    least_chance: float = 0.01
     halvings: int = 30
     least_weight: float = 1e-2
     ridge: float = 1e-6
@@ -163,8 +163,8 @@ class _Collapsed:
 
     def with_errors(self, nodes: IntArray) -> Linear:
         """Return the linear parameters where errors are one of these `nodes`."""
-        kept = [self.target.likelihood.nodes[each] for each in nodes]
-        return Linear(Likelihood(kept), self.slopes[:, self.target.linear])
+        chosen = [self.target.likelihood.nodes[each] for each in nodes]
+        return Linear(Likelihood(chosen), self.slopes[:, self.target.linear])
 
     def scatter(self, draws: _Draws, rng: np.random.Generator) -> FloatArray:
         """Return the points (n, d) with their linear parameters drawn about their best."""
@@ -209,8 +209,8 @@ class _Wide:
         return w
 
     def log_density(self, w: FloatArray) -> FloatArray:
-        own = np.log1p(-self.of_prior) + self.mixture.log_density(w)
-        return np.asarray(np.logaddexp(own, np.log(self.of_prior) + log_normal(w)))
+        log_mixture = np.log1p(-self.of_prior) + self.mixture.log_density(w)
+        return np.asarray(np.logaddexp(log_mixture, np.log(self.of_prior) + log_normal(w)))
 
 
 class _Surrogate:
@@ -246,15 +246,15 @@ class _Surrogate:
 
     def draw(self, rng: np.random.Generator) -> tuple[FloatArray, int]:
         w = self._wide.mixture_draws(_HOW.candidates, rng)
-        return np.asarray(w[np.log(rng.random(len(w))) < self._log_kept(w)]), len(w)
+        return np.asarray(w[np.log(rng.random(len(w))) < self._log_acceptance(w)]), len(w)
 
     def log_density(self, w: FloatArray) -> FloatArray:
-        return np.asarray(self._wide.log_density(w) + self._log_kept(w))
+        return np.asarray(self._wide.log_density(w) + self._log_acceptance(w))
 
-    def _log_kept(self, w: FloatArray) -> FloatArray:
+    def _log_acceptance(self, w: FloatArray) -> FloatArray:
         """Return the log of the chance (n,) that a candidate is kept."""
         log = self._log_scale + self._log(w) - self._wide.log_density(w)
-        return np.nan_to_num(log, nan=-np.inf).clip(np.log(_HOW.least_kept), 0.0)
+        return np.nan_to_num(log, nan=-np.inf).clip(np.log(_HOW.least_chance), 0.0)
 
     def _scaled(self, rng: np.random.Generator) -> float:
         """Return the log scale of chances by which a round of draws is kept."""
@@ -263,8 +263,8 @@ class _Surrogate:
         low, high = -log[-1] - 50.0, -log[-1] + 50.0
         for _ in range(_HOW.halvings):
             middle = (low + high) / 2
-            kept = np.exp((middle + log).clip(np.log(_HOW.least_kept), 0.0)).sum()
-            low, high = (low, middle) if kept > _HOW.round else (middle, high)
+            accepted = np.exp((middle + log).clip(np.log(_HOW.least_chance), 0.0)).sum()
+            low, high = (low, middle) if accepted > _HOW.round else (middle, high)
         return float(low)
 
     def _log(self, w: FloatArray) -> FloatArray:
@@ -349,14 +349,14 @@ class Sampling:
         self.target, self.peaks, self.rng = target, tuple(peaks), rng
         self._lobes = _Lobes(target, peaks)
         about = self._lobes.nearest(np.array([peak.z[target.other] for peak in peaks])) == 0
-        own = [peak for peak, is_own in zip(peaks, about, strict=True) if is_own]
-        self._collapsed = _Collapsed(target, own)
+        near = [peak for peak, is_near in zip(peaks, about, strict=True) if is_near]
+        self._collapsed = _Collapsed(target, near)
         self._pool: Pool[_Proposal, _Draws] = Pool(
             lambda proposal, batch: proposal.log_density(batch.z[:, target.other])
         )
         self._rounds = 0
         if len(target.other):
-            self._first = _parts(target, own, without, rng)
+            self._first = _parts(target, near, without, rng)
             self._proposal: _Proposal = _Wide(self._first, _HOW.prior_at_first)
 
     @property

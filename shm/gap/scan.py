@@ -82,12 +82,12 @@ class Scan:
         coordinates = problem.coordinates(self.hypothesis)
         moved = (before.z + self.step).clip(-_FARTHEST, _FARTHEST)
         z = np.hstack([moved, coordinates.effect_z(self.effect, len(before.z))])
-        log, own = np.where(self.seen, self.log, -np.inf), slice(len(before.z), None)
+        log, columns = np.where(self.seen, self.log, -np.inf), slice(len(before.z), None)
         least = log.max() - max(_BEHIND, _BEHIND_SHARE * np.ptp(self.log[self.seen]))
         most = _STARTS + self.effect.shape[1] - 1
         chosen: list[int] = []
         for row in np.argsort(-log, kind="stable").tolist():
-            apart = all(np.abs(z[row, own] - z[k, own]).max() > _APART for k in chosen)
+            apart = all(np.abs(z[row, columns] - z[k, columns]).max() > _APART for k in chosen)
             if apart and len(chosen) < most and log[row] > least:
                 chosen.append(row)
         places = coordinates.places
@@ -102,16 +102,16 @@ def scan(problem: GapProblem, before: Fit, linear: Linear, hypothesis: Hypothesi
     `linear` has the slopes of that fit.
     """
     whole, count = problem.coordinates(hypothesis, whole=True), len(before.z)
-    own = whole.effects[count - whole.baseline :]
-    points = _POINTS.get(len(own), _MOST_POINTS)
-    share = scipy.stats.qmc.Sobol(len(own), scramble=False).random(points) + 0.5 / points
-    effect = np.stack([p.value(u) for p, u in zip(own, share.T, strict=True)], axis=1)
+    parameters = whole.effects[count - whole.baseline :]
+    points = _POINTS.get(len(parameters), _MOST_POINTS)
+    share = scipy.stats.qmc.Sobol(len(parameters), scramble=False).random(points) + 0.5 / points
+    effect = np.stack([p.value(u) for p, u in zip(parameters, share.T, strict=True)], axis=1)
     with np.errstate(all="ignore"):
-        predicted = problem.predict_beside(hypothesis, before.z, effect)
+        predicted = problem.predict_with_effect(hypothesis, before.z, effect)
     return _scanned(problem, before, linear, hypothesis, effect, predicted - before.predicted)
 
 
-def scan_beside(problem: GapProblem, before: Fit, linear: Linear, alone: Scan) -> Scan:
+def scan_pair(problem: GapProblem, before: Fit, linear: Linear, alone: Scan) -> Scan:
     """Scan the effect of a scan `alone` beside a fit of another one; what both do is added up."""
     pair = Hypothesis((*before.hypothesis.effects, *alone.hypothesis.effects))
     return _scanned(problem, before, linear, pair, alone.effect, alone.shift)

@@ -28,7 +28,7 @@ from shm.gap.probabilities import (
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import predictions, predictive_p_value
 from shm.gap.sampling import MOST_ROUNDS, Sampling, approximate
-from shm.gap.scan import scan, scan_beside
+from shm.gap.scan import scan, scan_pair
 from shm.inference.coordinates import log_normal
 from shm.inference.linear import Linear
 from shm.inference.mixture import normalised
@@ -136,17 +136,17 @@ class Search:
         """Return every hypothesis with its evidence, by laws that may be off."""
         common, tried = len(self.baseline.z), []
         for fit in self.fits.values():
-            own = ScoredHypothesis.fitted(fit, common)
+            score = ScoredHypothesis.fitted(fit, common)
             if fit.hypothesis.effects and not fit.hypothesis.flexible:
                 laws = allow_for_laws(self.problem, self.baseline, fit, self.rng)
-                log = own.log_evidence
-                own = replace(
-                    own,
+                log = score.log_evidence
+                score = replace(
+                    score,
                     log_evidence=log + laws.gain,
                     log_mimic=log + laws.mimic,
                     draws=laws.draws,
                 )
-            tried.append(own)
+            tried.append(score)
         # What was not fitted is no better than what is hopeless: a scan may say anything far off.
         most = max(each.log_evidence for each in tried) - HOPELESS
         rest = {h: min(e + self._beyond, most) for h, e in self.rough.items() if h not in self.fits}
@@ -232,10 +232,10 @@ class Search:
 
     def _leading(self, most: int, effects: int) -> list[Fit]:
         """Return the likeliest fit of each of the leading effects, or pairs."""
-        own = [f for h, f in self.fits.items() if len(h.effects) == effects and not h.flexible]
-        own.sort(key=lambda each: -self.rough[each.hypothesis])
+        fits = [f for h, f in self.fits.items() if len(h.effects) == effects and not h.flexible]
+        fits.sort(key=lambda each: -self.rough[each.hypothesis])
         first: dict[str, Fit] = {}
-        for fit in own:
+        for fit in fits:
             first.setdefault(fit.hypothesis.name, fit)
         return list(first.values())[:most]
 
@@ -248,7 +248,7 @@ class Search:
                 pair = Hypothesis((*lead.hypothesis.effects, *single.effects))
                 other_way = Hypothesis(pair.effects[::-1])
                 if single.name != lead.hypothesis.name and other_way not in found:
-                    both = scan_beside(self.problem, lead, linear, alone)
+                    both = scan_pair(self.problem, lead, linear, alone)
                     self.rough[pair] = both.log_evidence
                     found[pair] = both.log_evidence, both.starts(self.problem, lead)
         best = sorted(found, key=lambda h: -found[h][0])[:_MOST_PAIRS]
@@ -390,9 +390,9 @@ def attribute(
     search.sample_probable(lambda: _chances(search))
     tried = search.scored()
     kinds = families(tried, search.variants)
-    likeliest = _fit([kind for kind in kinds if not kind.flexible])
+    most_probable = _fit([kind for kind in kinds if not kind.flexible])
     p_value = predictive_p_value(
-        problem.observations, predictions(problem, likeliest), likeliest.noise
+        problem.observations, predictions(problem, most_probable), most_probable.noise
     )
     chances, mimic = probabilities(kinds)
     progress("weighing", 1.0)
@@ -504,12 +504,12 @@ def answered(attribution: Attribution) -> list[tuple[float, Fit]]:
     if leading is None:
         no_gap = attribution.leads == "no gap"
         return [(1.0, attribution.baseline if no_gap else attribution.unexplained)]
-    alike = [
+    members = [
         each
         for each in attribution.explanations
         if each is leading or (each.group is not None and each.group == leading.group)
     ]
-    found = [(each.probability, each.best.fit) for each in alike if each.best.fit is not None]
+    found = [(each.probability, each.best.fit) for each in members if each.best.fit is not None]
     # A group may lead by members that screening alone has weighed.
     return found or [(1.0, attribution.unexplained)]
 

@@ -39,7 +39,7 @@ hangers as unlike as that are mostly made otherwise."""
 _SHARES = (np.arange(10) + 0.5) / 10
 # Judgement: from bridges on which every hanger has something of its own to those on which one in
 # fifty has; 0.25 is what a single diagnosis takes it to be.
-_NOTHING_OWN = np.array([0.1, 0.25, 0.5, 0.8, 0.95, 0.98])
+_NO_INDIVIDUAL_CAUSE = np.array([0.1, 0.25, 0.5, 0.8, 0.95, 0.98])
 # Judgement: parts made alike differ by 7 to 60 % in how much they give, weigh or lack; the steps
 # are of a decade, or of the range where it has none, and less scatter is likelier (half normal).
 SCATTERS = np.array([0.03, 0.06, 0.12, 0.2])
@@ -109,10 +109,10 @@ class OwnCauses:
 
     @classmethod
     def of(cls, hangers: Sequence[HangerEvidence]) -> OwnCauses:
-        nothing = _NOTHING_OWN * np.array([[each.no_gap] for each in hangers])
-        something = (1 - _NOTHING_OWN) * np.array([[each.gap] for each in hangers])
+        nothing = _NO_INDIVIDUAL_CAUSE * np.array([[each.no_gap] for each in hangers])
+        something = (1 - _NO_INDIVIDUAL_CAUSE) * np.array([[each.gap] for each in hangers])
         log = _log(nothing + something)
-        together = scipy.special.logsumexp(log.sum(axis=0)) - np.log(len(_NOTHING_OWN))
+        together = scipy.special.logsumexp(log.sum(axis=0)) - np.log(len(_NO_INDIVIDUAL_CAUSE))
         return cls(nothing, something, log, float(together))
 
 
@@ -205,34 +205,36 @@ class SharedEvidence:
         return np.asarray(evidence.weight * np.where(evidence.visible, visible, small))
 
 
-def weigh_shared(grid: SizeGrid, group: Group, own: OwnCauses) -> SharedEvidence:
+def weigh_shared(grid: SizeGrid, group: Group, individual: OwnCauses) -> SharedEvidence:
     """Return the evidence for an effect at one place, shared by two hangers of a group or more."""
     rows = list(group.members)
-    nothing, something = (each[rows][:, None, None, :] for each in (own.nothing, own.something))
+    nothing, something = (
+        each[rows][:, None, None, :] for each in (individual.nothing, individual.something)
+    )
     visible, small, ratio = (
         each[rows][..., None] for each in (grid.visible, grid.small, grid.ratio)
     )
     prior = np.exp(-((SCATTERS / _LIKELY_SCATTER) ** 2) / 2)
     log_prior = np.log(prior / prior.sum() / len(grid.x))
-    own_log = own.log[rows][:, None, None, :]
-    others = own.log.sum(axis=0) - own.log[rows].sum(axis=0)
+    individual_log = individual.log[rows][:, None, None, :]
+    others = individual.log.sum(axis=0) - individual.log[rows].sum(axis=0)
     present = np.maximum(visible + ratio * nothing + small * something, _TINY)
-    gain = present / np.exp(own_log)
+    gain = present / np.exp(individual_log)
     log_all, log_prior_only, member = [], [], []
     for part in _SHARES:
         odds = part / (1 - part)
         absent, one = np.log1p(-part), np.ones((len(rows), 1))
-        log_all.append(sum_two_or_more(absent + own_log, odds * gain) + others)
+        log_all.append(sum_two_or_more(absent + individual_log, odds * gain) + others)
         log_prior_only.append(sum_two_or_more(absent * one, odds * one))
         member.append(odds * gain / (1 + odds * gain))
     log = np.array(log_all) + log_prior[:, None]
     total = scipy.special.logsumexp(log)
     weight = np.exp(log - total)
     there = np.array([weight[k] * each for k, each in enumerate(member)]).sum(axis=0)
-    log_two = scipy.special.logsumexp(log_prior_only) + np.log(len(_NOTHING_OWN))
+    log_two = scipy.special.logsumexp(log_prior_only) + np.log(len(_NO_INDIVIDUAL_CAUSE))
     return SharedEvidence(
         group,
-        float(total - log_two - own.log_evidence),
+        float(total - log_two - individual.log_evidence),
         there.sum(axis=(1, 2, 3)),
         (there / present).sum(axis=3),
         (there / present * nothing).sum(axis=3),
@@ -250,12 +252,14 @@ def sum_two_or_more(absent: FloatArray, odds: FloatArray) -> FloatArray:
     return np.asarray(absent.sum(axis=0) + every + _log(-np.expm1((few - every).clip(max=0))))
 
 
-def weigh_unknown(hangers: Sequence[HangerEvidence], group: Group, own: OwnCauses) -> float:
+def weigh_unknown(hangers: Sequence[HangerEvidence], group: Group, individual: OwnCauses) -> float:
     """Return the log evidence for something unknown, of no size, that a group shares."""
     there = np.array([each.unknown for each in hangers])[:, None, None]
     visible = np.repeat(there, len(SCATTERS), axis=2)
     none, one = np.zeros_like(visible), np.ones(1)
-    return weigh_shared(SizeGrid(one, one, visible, none, none, none), group, own).log_evidence
+    return weigh_shared(
+        SizeGrid(one, one, visible, none, none, none), group, individual
+    ).log_evidence
 
 
 def _log(value: FloatArray) -> FloatArray:

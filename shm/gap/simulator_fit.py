@@ -15,7 +15,7 @@ from shm.inference.posterior import climb, find_peaks
 from shm.values import BoolArray, FloatArray
 
 # Numerical: points of the priors among which climbs start, those climbs, draws that are kept.
-_SCOUTS, _STARTS, _KEPT = 150, 3, 400
+_SCOUTS, _STARTS, _DRAWS = 150, 3, 400
 
 
 def fit_hypothesis(
@@ -34,7 +34,7 @@ def fit_hypothesis(
         z[::2, : len(start)] = start
     log = target.log(z)
     best = np.argsort(-np.where(np.isnan(log), -np.inf, log))[:_STARTS]
-    return sample(target, find_peaks(target, z[best]), _KEPT, rng)
+    return sample(target, find_peaks(target, z[best]), _DRAWS, rng)
 
 
 def refit(problem: SimulatorProblem, fit: Fit, rows: BoolArray) -> FloatArray:
@@ -53,13 +53,13 @@ _BAD, _GOOD, _SUSPECTS = 0.01, 0.05, 3
 
 def drop_copies(readings: Sequence[Reading]) -> tuple[tuple[Reading, ...], tuple[str, ...]]:
     """Return the readings, those alike to the last digit once, and a remark on them."""
-    kept = {
+    distinct = {
         (tuple(sorted(e.condition.items())), e.observable, e.value, repr(e.sd)): e for e in readings
     }
-    copies = len(readings) - len(kept)
+    copies = len(readings) - len(distinct)
     if not copies:
         return tuple(readings), ()
-    return tuple(kept.values()), (
+    return tuple(distinct.values()), (
         f"{copies} of {len(readings)} readings repeat another one to the last digit and count once:"
         " a copy, or a step of the instrument that hides its scatter, adds nothing.",
     )
@@ -72,7 +72,7 @@ def errors_of(problem: SimulatorProblem, fit: Fit) -> FloatArray:
 
 
 def in_sds(problem: SimulatorProblem, fit: Fit) -> FloatArray:
-    """What a fit leaves of each reading (data,)."""
+    """Return what a fit leaves of each reading (data,), in its standard deviations."""
     return np.asarray((problem.value - fit.predicted) / errors_of(problem, fit))
 
 
@@ -113,37 +113,37 @@ def _at_bound(prior: Prior, z: FloatArray) -> bool:
 
 def at_bounds(problem: SimulatorProblem, fit: Fit) -> tuple[str, ...]:
     """A remark on each parameter that lies at the bound of its prior, or far out of it."""
-    said = []
+    remarks = []
     for j, (name, prior) in enumerate(problem.priors(fit.hypothesis).items()):
         z = fit.draws[:, j]
         bound = _at_bound(prior, z)
         if bound or abs(z.mean()) > _FAR_OUT:
             where = "at its bound" if bound else "far out of its prior"
-            said.append(
+            remarks.append(
                 f"{name} lies {where}, {float(prior.value(z).mean()):.4g}: widen its prior if it "
                 "may lie there."
             )
-    return tuple(said)
+    return tuple(remarks)
 
 
 def slips(problem: SimulatorProblem, *fits: Fit) -> tuple[str, ...]:
     """A remark on the reading with which alone the last of these does not fit, if any does not."""
-    return tuple(said for fit in fits if (said := _slip(problem, fit)))[-1:]
+    return tuple(remark for fit in fits if (remark := _slip(problem, fit)))[-1:]
 
 
 def _slip(problem: SimulatorProblem, fit: Fit) -> str:
     """On the reading without which a bad fit is a good one; empty where there is none."""
     if len(problem.value) < len(fit.z) + 3 or p_value(problem, fit) > _BAD:
         return ""
-    best, said = _GOOD, ""
+    best, remark = _GOOD, ""
     for row in np.argsort(-np.abs(in_sds(problem, fit)))[:_SUSPECTS]:
         z = refit(problem, fit, np.arange(len(problem.value)) != row)
         away = problem.value - problem.predict(fit.hypothesis, z[None])[0]
         off = abs(away[row]) / errors_of(problem, fit)[row]
         away[row] = np.nan
         if (p := p_value(problem, fit, away)) > best:
-            best, said = p, _on_slip(problem.readings[row], off, fit.hypothesis.name)
-    return said
+            best, remark = p, _on_slip(problem.readings[row], off, fit.hypothesis.name)
+    return remark
 
 
 def _on_slip(reading: Reading, off: float, effect: str) -> str:

@@ -39,7 +39,7 @@ _SEVERAL = 6  # technical: of more observables, a remainder is not tried in each
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of a parameter before the data, as one of four spreads.
+    """Describe what is known of a parameter before the data, as one of four spreads.
 
     `uniform` and `logarithmic` lie between `a` and `b`; `normal` has the mean `a` and the standard
     deviation `b`; `lognormal` has the median `a`, and its logarithm the standard deviation `b`.
@@ -83,7 +83,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class SimulatorEffect:
-    """What may be true beside the simulator: its own priors and the simulator with it in.
+    """Describe what may be true beside the simulator: its priors and the simulator with it in.
 
     `predict` gets the simulator's parameters and the effect's own in one dictionary.
     """
@@ -169,13 +169,13 @@ class SimulatorProblem:
         """The effects of a hypothesis; none of the simulator alone."""
         return tuple(e for e in self.simulator.effects if e.name in hypothesis.names)
 
-    def own_priors(self, hypothesis: Hypothesis) -> dict[str, Prior]:
+    def effect_priors(self, hypothesis: Hypothesis) -> dict[str, Prior]:
         """Of its effects alone."""
         return {n: p for each in self.effects(hypothesis) for n, p in each.parameters.items()}
 
     def priors(self, hypothesis: Hypothesis) -> dict[str, Prior]:
         """Of the simulator, then of the effects: one coordinate z each, in this order."""
-        return {**self.simulator.parameters, **self.own_priors(hypothesis)}
+        return {**self.simulator.parameters, **self.effect_priors(hypothesis)}
 
     def dimension(self, hypothesis: Hypothesis) -> int:
         return len(self.priors(hypothesis))
@@ -189,8 +189,8 @@ class SimulatorProblem:
 
     def part(self, rows: BoolArray) -> SimulatorProblem:
         """Return the problem of some of the readings (data,)."""
-        kept = [each for each, keep in zip(self.readings, rows, strict=True) if keep]
-        return SimulatorProblem(self.simulator, tuple(kept), self.scale[rows])
+        chosen = [each for each, keep in zip(self.readings, rows, strict=True) if keep]
+        return SimulatorProblem(self.simulator, tuple(chosen), self.scale[rows])
 
     def predict(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
         """Return predictions (n, data) at z (n, d)."""
@@ -264,23 +264,23 @@ class SimulatorProblem:
         shares = np.zeros(1) if known.all() else np.geomspace(*bounds, _UNKNOWN_SDS)
         factors = _HERMITE if known.any() else ((0.0, 1.0),)
         return tuple(
-            _node(np.diag(own**2), np.log(weight / len(shares)))
+            _node(np.diag(reading_sd**2), np.log(weight / len(shares)))
             for share in shares
             for away, weight in factors
-            for own in [np.where(known, np.exp(spread * away) * self.sd, share * self.scale)]
+            for reading_sd in [np.where(known, np.exp(spread * away) * self.sd, share * self.scale)]
         )
 
     def flexible_nodes(self) -> tuple[NoiseNode, ...]:
         """The unknown errors and a remainder that is free in form and size, log-uniform in size."""
         plain = self.nodes()
-        own = plain[len(plain) // 2].covariance.frequency
-        sd = np.sqrt(np.diag(own))
+        covariance = plain[len(plain) // 2].covariance.frequency
+        sd = np.sqrt(np.diag(covariance))
         largest = np.maximum(LARGEST_REMAINDER * self.scale, 2 * sd)
         patterns, steps = self._patterns(), np.linspace(0, 1, _REMAINDERS)
         log_weight = -np.log(len(patterns) * len(steps))
         amplitudes = [sd ** (1 - step) * largest**step for step in steps]
         return tuple(
-            _node(own + np.outer(size, size) * pattern, log_weight)
+            _node(covariance + np.outer(size, size) * pattern, log_weight)
             for pattern in patterns
             for size in amplitudes
         )
@@ -338,8 +338,8 @@ def _mapping(
 
 def _together(values: list[Any]) -> Any:
     """As one array; what has no common shape is no number."""
-    alike = len({np.shape(each) for each in values}) == 1
-    return np.array(values) if alike else np.full(len(values), None)
+    same_shape = len({np.shape(each) for each in values}) == 1
+    return np.array(values) if same_shape else np.full(len(values), None)
 
 
 def _observable(

@@ -179,13 +179,13 @@ class Twin:
     def _shape(self, row: int, mode: Mode, data: FloatArray) -> tuple[ShapePoint, ...]:
         """Return the shape of a mode in `data`, as large as the measured one."""
         design, value = self._problem.design, self._problem.observations.value
-        own = np.flatnonzero(design.shape_mode == row)
-        if not len(own):
+        components = np.flatnonzero(design.shape_mode == row)
+        if not len(components):
             return ()
         measured = [v for p in mode.shape for v in (p.value, p.cross) if math.isfinite(v)]
-        rows = design.frequencies + own
+        rows = design.frequencies + components
         scale = np.abs(measured).max() / np.abs(value[rows]).max()
-        parts = dict(zip(self._keys(own), (scale * data[rows]).tolist(), strict=True))
+        parts = dict(zip(self._keys(components), (scale * data[rows]).tolist(), strict=True))
         plane, places_m = PLANES.index(mode.plane), np.array(design.places_m)
         points = []
         for point in mode.shape:

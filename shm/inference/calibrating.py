@@ -65,19 +65,19 @@ def calibrate(
             file=file,
             remedy="Check the reading (in N), the orders and the description.",
         )
-    own = tests[0].hanger in (None, hanger.id)
-    return replace(options, calibration=learn(posterior, hanger, own))
+    same_hanger = tests[0].hanger in (None, hanger.id)
+    return replace(options, calibration=learn(posterior, hanger, same_hanger))
 
 
-def learn(posterior: Posterior, hanger: Hanger, own: bool) -> Calibration | None:
-    """Return what a posterior with a measured tension, of an `own` test or a sibling's, teaches.
+def learn(posterior: Posterior, hanger: Hanger, same_hanger: bool) -> Calibration | None:
+    """Return what a posterior with a measured tension teaches; None where it teaches nothing.
 
-    None where there is nothing to learn from it.
+    The test is of the `same_hanger` or of a sibling.
     """
     if not _is_teacher(posterior):
         return None
     learnt = calibration_of(posterior.names, posterior.samples, hanger)
-    return learnt if own else _of_sibling(learnt, hanger)
+    return learnt if same_hanger else _of_sibling(learnt, hanger)
 
 
 def _is_teacher(posterior: Posterior) -> bool:
@@ -96,8 +96,8 @@ def _of_sibling(learnt: Calibration, hanger: Hanger) -> Calibration:
         MODULUS: scatter.modulus,
         BENDING: bending if np.isfinite(bending) else unstated,
     }
-    kept = [index for index, name in enumerate(learnt.names) if name != LENGTH]
-    names = tuple(learnt.names[index] for index in kept)
-    own = np.array([_SHARE_WITHIN_A_FAMILY * sds[name] for name in names])
-    covariance = learnt.covariance[np.ix_(kept, kept)] + np.diag(own**2)
-    return replace(learnt, names=names, mean=learnt.mean[kept], covariance=covariance)
+    shared = [index for index, name in enumerate(learnt.names) if name != LENGTH]
+    names = tuple(learnt.names[index] for index in shared)
+    sd = np.array([_SHARE_WITHIN_A_FAMILY * sds[name] for name in names])
+    covariance = learnt.covariance[np.ix_(shared, shared)] + np.diag(sd**2)
+    return replace(learnt, names=names, mean=learnt.mean[shared], covariance=covariance)

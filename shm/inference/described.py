@@ -71,8 +71,8 @@ class DescribedCoordinates:
     ):
         self.model, self._hanger = model, model.hanger
         self.parameters = model.parameter_names
-        self.deviations = own = Deviations(model, calibration)
-        self._slips = model.is_strand and BENDING not in own.names
+        self.deviations = prior = Deviations(model, calibration)
+        self._slips = model.is_strand and BENDING not in prior.names
         self._open = model.length_is_open
         planes = {mode.plane for test in tests for mode in test.regular_modes}
         beam = isinstance(model.model, Beam)
@@ -92,13 +92,13 @@ class DescribedCoordinates:
         self._reading = reading_of(tests, self._hanger.assumptions)
         others = []
         if isinstance(model.model, Beam3) and not model.is_strand:
-            others.append(own.row(section=1.0))
+            others.append(prior.row(section=1.0))
         if model.effect_names:  # they are of other sizes on another bar
-            others += [own.row(section=1.0), own.row(density=1.0), own.row(theta_L=1.0)]
+            others += [prior.row(section=1.0), prior.row(density=1.0), prior.row(theta_L=1.0)]
         if any(test.added_mass is not None for test in tests):
-            others.append(own.row(section=1.0, density=1.0, theta_L=1.0))
-        seen = [] if self._slips else [own.row(**_C)]
-        self._seen = _basis(np.array([*others, *seen]).reshape(-1, len(own.names)))
+            others.append(prior.row(section=1.0, density=1.0, theta_L=1.0))
+        seen = [] if self._slips else [prior.row(**_C)]
+        self._seen = _basis(np.array([*others, *seen]).reshape(-1, len(prior.names)))
         sizes = [len(self.names), len(felt) if beam else 0, len(self.terms), self._seen.shape[1]]
         self._cuts = np.cumsum(sizes)[:-1]
         self.dimension = sum(sizes)
@@ -205,15 +205,15 @@ class DescribedCoordinates:
         rng: np.random.Generator | None,
     ) -> FloatArray:
         """Return parameters (n, parameters) of these and of deviates n (n, k)."""
-        own, stated = self.deviations, self._hanger.bending_stiffness_factor
-        deviations = own.mean + n @ own.factor.T
-        section, density, modulus = (own.column(deviations, name) for name in DEVIATIONS)
-        taped = np.exp(own.column(deviations, LENGTH))
+        prior, stated = self.deviations, self._hanger.bending_stiffness_factor
+        deviations = prior.mean + n @ prior.factor.T
+        section, density, modulus = (prior.column(deviations, name) for name in DEVIATIONS)
+        taped = np.exp(prior.column(deviations, LENGTH))
         if self._slips:
             log_c = (section - density + modulus) / 2 - 2 * np.log(taped)
             slip = box[BENDING] * np.exp(-2 * log_c)
         else:
-            slip = stated * np.exp(own.column(deviations, BENDING))
+            slip = stated * np.exp(prior.column(deviations, BENDING))
         stiffness = np.exp(2 * section + modulus) * slip / stated
         columns = {
             TENSION: np.exp(box[TENSION] + section + density) * taped**2,
@@ -247,13 +247,13 @@ class DescribedCoordinates:
     def places(self, theta: FloatArray) -> FloatArray:
         """Return coordinates (n, d) of parameters (n, parameters)."""
         values = dict(zip(self.parameters, theta.T, strict=True))
-        own, stated = self.deviations, self._hanger.bending_stiffness_factor
+        prior, stated = self.deviations, self._hanger.bending_stiffness_factor
         taped = np.ones(len(theta)) if self._open else values[LENGTH]
         slip = values.get(BENDING, np.full(len(theta), stated))
         logs = {name: values[name] for name in DEVIATIONS}
         logs |= {BENDING: np.log(slip / stated), LENGTH: np.log(taped)}
         deviations = np.column_stack(
-            [logs.get(name, np.full(len(theta), own.mean_of(name))) for name in own.names]
+            [logs.get(name, np.full(len(theta), prior.mean_of(name))) for name in prior.names]
         )
         stiffness = np.exp(2 * values[SECTION] + values[MODULUS]) * slip / stated
         mass = np.exp(values[SECTION] + values[DENSITY])
@@ -269,7 +269,7 @@ class DescribedCoordinates:
         )
         ends = self.ends.scores(springs, self._slenderness(box), len(theta))
         terms = [term.score(values[term.name]).clip(-_SCORES, _SCORES) for term in self.terms]
-        deviates = (deviations - own.mean) @ np.linalg.pinv(own.factor).T @ self._seen
+        deviates = (deviations - prior.mean) @ np.linalg.pinv(prior.factor).T @ self._seen
         return np.column_stack(
             [self._tension.score(box[TENSION]), of.places(inner), ends, *terms, deviates]
         )

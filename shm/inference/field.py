@@ -114,7 +114,7 @@ class FieldLikelihood(MeasuredFrequencies):
         Frequencies in Hz with ends as they usually are, a tension that was read in N, and misfits
         of shapes.
         """
-        if isinstance(model, AsMade) and model.has_slopes and self.alike_conditions:
+        if isinstance(model, AsMade) and model.has_slopes and self.has_equal_conditions:
             modes = model.modes_at(theta, self._modes, self._places_m)
             bare, shapes = modes.frequency[:, self._plane, self._order], modes.deflection
             misfits = self.shapes.misfits_of(shapes)
@@ -127,7 +127,7 @@ class FieldLikelihood(MeasuredFrequencies):
         return np.hstack([found, read, misfits])
 
     @property
-    def alike_conditions(self) -> bool:
+    def has_equal_conditions(self) -> bool:
         """Return True where no test has conditions that change the bar."""
         return len(set(self._conditions)) == 1 and self._conditions[0].added_mass is None
 
@@ -175,8 +175,8 @@ class FieldLikelihood(MeasuredFrequencies):
         smallest = self._assumed.model_error.lower
         least = max(self.identification_error[: self.frequencies].min(), smallest)
         left, size, _ = np.linalg.svd(loads, full_matrices=False)
-        kept = size > _UNFELT * least
-        return np.append(mean, np.zeros(int(self.has_reading))), left[:, kept] * size[kept]
+        felt = size > _UNFELT * least
+        return np.append(mean, np.zeros(int(self.has_reading))), left[:, felt] * size[felt]
 
     def _log_with_radius(self, model: Model, theta: FloatArray) -> Callable[[float], FloatArray]:
         """Return what says ln f (frequencies,) of `theta` (parameters,) for a radius in m.
@@ -194,10 +194,10 @@ class FieldLikelihood(MeasuredFrequencies):
     @property
     def fit_error(self) -> FloatArray:
         """Fractional standard deviations (data,) of all errors but tau."""
-        own = self.identification_error.copy()
+        error = self.identification_error.copy()
         shared = (self._loads**2).sum(axis=1)
-        own[: self.frequencies] = np.sqrt(own[: self.frequencies] ** 2 + shared)
-        return np.append(own, np.full(self.shapes.size, self._shapes_factor))
+        error[: self.frequencies] = np.sqrt(error[: self.frequencies] ** 2 + shared)
+        return np.append(error, np.full(self.shapes.size, self._shapes_factor))
 
     def misfit(self, predicted: FloatArray) -> FloatArray:
         """Misfits (n, data): logarithms of predictions, with mean errors of the bar, over
@@ -209,15 +209,17 @@ class FieldLikelihood(MeasuredFrequencies):
 
     def frequency_nodes(self, step_in_sd: float) -> list[NoiseNode]:
         part = slice(self.frequencies)
-        own, together, always = np.zeros((3, len(self.frequency_hz), len(self.frequency_hz)))
-        own[part, part] = np.diag(self.identification_error[part] ** 2)
+        independent, together, always = np.zeros(
+            (3, len(self.frequency_hz), len(self.frequency_hz))
+        )
+        independent[part, part] = np.diag(self.identification_error[part] ** 2)
         together[part, part] = self._together
         always[part, part] = self._loads @ self._loads.T
         if self.has_reading:
             always[-1, -1] = self.identification_error[-1] ** 2
         return [
             NoiseNode(
-                Covariance.of_frequencies(phi**2 * own + tau**2 * together + always),
+                Covariance.of_frequencies(phi**2 * independent + tau**2 * together + always),
                 float(self._constant + share + log_phi),
                 float(tau),
             )
@@ -248,12 +250,12 @@ class FieldLikelihood(MeasuredFrequencies):
         supports, fittings and section that the data most probably had, by their normal posterior at
         the mean prediction."""
         middle = predicted.mean(axis=0)[None]
-        own = self.identification_error[: self.frequencies] ** 2
-        repeats = self.likeliest_sigma(middle)[0] ** 2 * self._together
+        independent = self.identification_error[: self.frequencies] ** 2
+        repeats = self.most_likely_sigma(middle)[0] ** 2 * self._together
         shared = self._loads @ self._loads.T
         off = -self.misfit(middle)[0, : self.frequencies]
         found = self._shift[: self.frequencies] + shared @ np.linalg.solve(
-            np.diag(own) + repeats + shared, off
+            np.diag(independent) + repeats + shared, off
         )
         return np.asarray(predicted[:, : self.frequencies] * np.exp(found))
 
@@ -266,10 +268,10 @@ class FieldLikelihood(MeasuredFrequencies):
         log = np.log(self._order + 1.0)
         apart = np.subtract.outer(log, log) / self._assumed.model_error_reach.value
         plane = np.equal.outer(self._plane, self._plane)
-        own = plane & np.equal.outer(self._order, self._order)
+        same_mode = plane & np.equal.outer(self._order, self._order)
         shared = np.exp(-0.5 * apart**2) * np.where(plane, 1.0, 0.5)
         together = self._assumed.model_error_shared.value
-        return np.asarray((1 - together) * own + together * shared)
+        return np.asarray((1 - together) * same_mode + together * shared)
 
     def sigma_grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
         step = step_in_sd / np.sqrt(2 * self.frequencies)

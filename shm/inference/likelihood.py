@@ -37,8 +37,8 @@ class Covariance:
 
     def part(self, frequencies: IntArray, components: IntArray) -> Covariance:
         """Return that of some frequencies and some components of shapes, by index."""
-        own = self.frequency[np.ix_(frequencies, frequencies)]
-        return Covariance(own, self.shape[components], self.shape_loads[components])
+        frequency = self.frequency[np.ix_(frequencies, frequencies)]
+        return Covariance(frequency, self.shape[components], self.shape_loads[components])
 
     def scaled(self, by: float) -> Covariance:
         """Return that of errors so many times as large."""
@@ -53,8 +53,8 @@ class Covariance:
     def factor(self) -> FloatArray:
         """Return the Cholesky factor (data, data)."""
         shapes = np.diag(self.shape) + self.shape_loads @ self.shape_loads.T
-        own = np.linalg.cholesky(self.frequency)
-        return np.asarray(scipy.linalg.block_diag(own, np.linalg.cholesky(shapes)))
+        root = np.linalg.cholesky(self.frequency)
+        return np.asarray(scipy.linalg.block_diag(root, np.linalg.cholesky(shapes)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +74,8 @@ class _Blocks:
 
     def __init__(self, rows: IntArray, covariances: FloatArray):
         self._rows = rows
-        own = covariances[:, rows[:, :, None], rows[:, None, :]]
-        factors = np.linalg.cholesky(own)
+        blocks = covariances[:, rows[:, :, None], rows[:, None, :]]
+        factors = np.linalg.cholesky(blocks)
         self.log_volume = np.log(np.einsum("kbii->kbi", factors)).sum(axis=(1, 2))
         self._whitening: FloatArray = np.linalg.inv(factors)
 
@@ -112,8 +112,8 @@ class ShapeErrors:
         weighted = np.swapaxes(loads * self.precision[:, :, None], 1, 2)
         inner = np.linalg.cholesky(np.eye(loads.shape[2]) + weighted @ loads)
         self._shared: FloatArray = np.linalg.solve(inner, weighted).astype(np.float64)
-        own = np.log(np.einsum("kii->ki", inner)).sum(axis=1)
-        self.log_volume: FloatArray = own + np.log(variance).sum(axis=1) / 2
+        inner_volume = np.log(np.einsum("kii->ki", inner)).sum(axis=1)
+        self.log_volume: FloatArray = inner_volume + np.log(variance).sum(axis=1) / 2
 
     def weighed(self, columns: FloatArray) -> FloatArray:
         """C^-1 X (K, S, c) of columns X (S, c)."""
@@ -129,8 +129,8 @@ class ShapeErrors:
         """X' C^-1 X (n, K, c, c) of columns X (n, S, c)."""
         weighted = columns[:, None] * self.precision[:, :, None]
         shared = self._shared @ columns[:, None]
-        own = np.swapaxes(weighted, 2, 3) @ columns[:, None]
-        return np.asarray(own - np.swapaxes(shared, 2, 3) @ shared)
+        diagonal = np.swapaxes(weighted, 2, 3) @ columns[:, None]
+        return np.asarray(diagonal - np.swapaxes(shared, 2, 3) @ shared)
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,10 +245,10 @@ def _rows(covariances: FloatArray) -> list[IntArray]:
 def _distinct(arrays: Sequence[tuple[FloatArray, ...]]) -> tuple[list[int], IntArray]:
     """Indices of those that differ and, for each of all, which of them it is."""
     found: dict[tuple[bytes, ...], int] = {}
-    kept: list[int] = []
+    first: list[int] = []
     index = np.empty(len(arrays), dtype=np.int64)
     for k, each in enumerate(arrays):
         index[k] = found.setdefault(tuple(part.tobytes() for part in each), len(found))
-        if index[k] == len(kept):
-            kept.append(k)
-    return kept, index
+        if index[k] == len(first):
+            first.append(k)
+    return first, index

@@ -106,7 +106,7 @@ class MeasuredFrequencies(ABC):
         jitter = np.log(grid[1] / grid[0]) * (rng.random(len(node)) - 0.5)
         return np.asarray((grid[node] * np.exp(jitter)).clip(*self.sigma_range))
 
-    def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
+    def most_likely_sigma(self, predicted: FloatArray) -> FloatArray:
         """Return the node of the grid with the largest joint likelihood (n,)."""
         grid, share = self.sigma_grid(self.steps[0])
         found = self._by_sigma(self._coarse, predicted, len(grid)) - share
@@ -162,7 +162,7 @@ def predicted_hz(
         rows.setdefault(each, []).append(index)
     # One measurement after the other, as indexing lays them: sums round alike, to the last bit.
     predicted, highest = np.empty((len(plane), len(theta))).T, int(order.max()) + 1
-    for each, own in rows.items():
+    for each, indices in rows.items():
         found = model.frequencies_at(theta, highest, each)
-        predicted[:, own] = found[:, plane[own], order[own]]
+        predicted[:, indices] = found[:, plane[indices], order[indices]]
     return predicted

@@ -110,13 +110,13 @@ class TMixture:
         parts = np.exp(log_parts - log_parts.max(axis=1, keepdims=True))
         owned = weights[:, None] * parts / parts.sum(axis=1, keepdims=True)
         pull = (_DEGREES_OF_FREEDOM + z.shape[1]) / (_DEGREES_OF_FREEDOM + squares)
-        kept = owned.sum(axis=0) > _NO_SHARE
-        former = [part for part, keep in zip(self.parts, kept, strict=True) if keep]
+        supported = owned.sum(axis=0) > _NO_SHARE
+        former = [part for part, keep in zip(self.parts, supported, strict=True) if keep]
         fitted = [
-            _fitted(z, own, own * u, part)
-            for own, u, part in zip(owned.T[kept], pull.T[kept], former, strict=True)
+            _fitted(z, weight, weight * u, part)
+            for weight, u, part in zip(owned.T[supported], pull.T[supported], former, strict=True)
         ]
-        return TMixture(fitted, owned.sum(axis=0)[kept])
+        return TMixture(fitted, owned.sum(axis=0)[supported])
 
     def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Draws (n, d) in random order."""
@@ -144,36 +144,38 @@ def _shrunk(cluster: FloatArray, whole: Normal) -> Normal:
     """The normal of a cluster; a small one borrows covariance from the whole."""
     n, d = cluster.shape
     borrowed = (d + 2) / (n + d + 2)
-    own = np.atleast_2d(np.cov(cluster.T))
-    return Normal(cluster.mean(axis=0), (1 - borrowed) * own + borrowed * whole.covariance)
+    covariance = np.atleast_2d(np.cov(cluster.T))
+    return Normal(cluster.mean(axis=0), (1 - borrowed) * covariance + borrowed * whole.covariance)
 
 
 def _fitted(z: FloatArray, owned: FloatArray, pulled: FloatArray, former: Normal) -> Normal:
     """The t part of points `z` with their weights (n,) in it, plain and by distance."""
     effective = owned.sum() ** 2 / (owned**2).sum()
-    kept = (z.shape[1] + 2) / (effective + z.shape[1] + 2)
-    mean = (1 - kept) * (pulled @ z / pulled.sum()) + kept * former.mean
+    retained = (z.shape[1] + 2) / (effective + z.shape[1] + 2)
+    mean = (1 - retained) * (pulled @ z / pulled.sum()) + retained * former.mean
     away = z - mean
-    own = _INFLATION * (away * pulled[:, None]).T @ away / owned.sum()
-    return Normal(mean, (1 - kept) * own + kept * former.covariance)
+    covariance = _INFLATION * (away * pulled[:, None]).T @ away / owned.sum()
+    return Normal(mean, (1 - retained) * covariance + retained * former.covariance)
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What is known of n points: arrays, or other rows, with one row for each.
+    """Hold what is known of n points: arrays, or other rows, with one row for each.
 
     A field that is a number is that of all points.
     """
 
     def take(self, rows: BoolArray | IntArray) -> Self:
         """Some of the points, by index or choice."""
-        return self._mapped(lambda own: own.take(rows) if isinstance(own, Rows) else own[rows])
+        return self._mapped(
+            lambda field: field.take(rows) if isinstance(field, Rows) else field[rows]
+        )
 
     def joined(self, other: Self) -> Self:
         """These points and then the others."""
         return self._mapped(
-            lambda own, its: (
-                own.joined(its) if isinstance(own, Rows) else np.concatenate([own, its])
+            lambda field, its: (
+                field.joined(its) if isinstance(field, Rows) else np.concatenate([field, its])
             ),
             other,
         )
@@ -181,10 +183,10 @@ class Rows:
     def where(self, chosen: BoolArray, other: Self) -> Self:
         """These points where `chosen` (n,), elsewhere the `other` ones."""
 
-        def either(own: Any, its: Any) -> Any:
-            if isinstance(own, Rows):
-                return own.where(chosen, its)
-            return np.where(chosen.reshape(-1, *[1] * (np.ndim(own) - 1)), own, its)
+        def either(field: Any, its: Any) -> Any:
+            if isinstance(field, Rows):
+                return field.where(chosen, its)
+            return np.where(chosen.reshape(-1, *[1] * (np.ndim(field) - 1)), field, its)
 
         return self._mapped(either, other)
 
@@ -214,7 +216,7 @@ class Pool(Generic[P, B]):
 
     @property
     def draws(self) -> int:
-        """How many were drawn, those that were not kept among them."""
+        """Return the number of draws, those that were not kept among them."""
         return sum(draws for _, draws in self._proposals)
 
     @property
@@ -238,7 +240,7 @@ class Pool(Generic[P, B]):
         return evidence_error(self.log_weights, self.draws)
 
     def add(self, proposal: P, draws: int, batch: B, log_target: FloatArray) -> None:
-        """Those kept of so many draws of a proposal, where the target's log density is known."""
+        """Add those kept of so many draws of a proposal, with the target's log density."""
         self._append([(proposal, draws)], batch, log_target)
 
     def absorb(self, other: Pool[P, B]) -> None:

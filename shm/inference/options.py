@@ -1,4 +1,4 @@
-"""How to update, and who hears how far it is."""
+"""Define the options of an update, and who hears how far it is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sampler found, made into the posterior that others see."""
+"""Make the posterior that others see of what a sampler found."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def _most_probable(problem: Problem, samples: FloatArray, log_likelihood: FloatA
     at = int((log_likelihood + coordinates.log_prior(coordinates.fold(z))).argmax())
     z, _ = climb(problem, z[[at]])
     theta = coordinates.theta(z)
-    return np.append(theta[0], problem.measured.likeliest_sigma(problem.run(theta)))
+    return np.append(theta[0], problem.measured.most_likely_sigma(problem.run(theta)))
 
 
 def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
@@ -129,9 +129,9 @@ def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
     places = coordinates.places(outcome.samples[:, :-1])
     middle = places[[int(((places - np.median(places, axis=0)) ** 2).sum(axis=1).argmin())]]
     slopes = problem.slopes(middle)[0]
-    own = np.asarray(likelihood.identification_error)
+    errors = np.asarray(likelihood.identification_error)
     common = np.median(outcome.samples[:, -1])
-    known = likelihood.frequencies if isinstance(likelihood, FieldLikelihood) else len(own)
+    known = likelihood.frequencies if isinstance(likelihood, FieldLikelihood) else len(errors)
     variance = np.asarray(likelihood.fit_error) ** 2
     variance[:known] += common**2
     precision = slopes.T @ (slopes / variance[:, None]) + np.eye(slopes.shape[1])
@@ -139,7 +139,7 @@ def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
     step = DIFFERENCE * np.eye(slopes.shape[1])
     tension_n = coordinates.tension_n(np.vstack([middle, middle + step]))
     rise = (tension_n[1:] - tension_n[0]) / DIFFERENCE
-    repeated_n = float(np.sqrt(((rise @ gain * own[:known]) ** 2).sum()))
+    repeated_n = float(np.sqrt(((rise @ gain * errors[:known]) ** 2).sum()))
     column = coordinates.names.index(TENSION)
     response = float(rise @ gain @ slopes[:known, column] / rise[column])
     return repeated_n / response if response > 0 else math.nan
@@ -180,7 +180,7 @@ def _highest_in_box(problem: Problem, best: FloatArray) -> FloatArray:
 
     start = ((best[:-1] - prior.lower) / width).clip(0, 1)
     theta = prior.lower + width * fitted(scaled, start, np.zeros_like(start), np.ones_like(start))
-    climbed = np.append(theta, likelihood.likeliest_sigma(problem.run(theta[None])))
+    climbed = np.append(theta, likelihood.most_likely_sigma(problem.run(theta[None])))
     candidates = np.array([best, np.append(theta, best[-1]), climbed])
     predicted = problem.run(candidates[:, :-1])
     return np.asarray(candidates[likelihood.joint(predicted, candidates[:, -1]).argmax()])

@@ -203,10 +203,10 @@ def climb(
             hessian[moved], gradient[moved] = _curvature(by, residual[moved], slopes[moved], away)
         if not len(going):
             break
-        own, pull = hessian[going], gradient[going][..., None]
-        diagonal = np.einsum("nii->ni", own) * damping[going, None]
-        step = np.linalg.solve(own + diagonal[..., None] * np.eye(z.shape[1]), pull)[..., 0]
-        hoped = (pull * np.linalg.solve(own, pull))[..., 0].sum(axis=1)
+        curvature, pull = hessian[going], gradient[going][..., None]
+        diagonal = np.einsum("nii->ni", curvature) * damping[going, None]
+        step = np.linalg.solve(curvature + diagonal[..., None] * np.eye(z.shape[1]), pull)[..., 0]
+        hoped = (pull * np.linalg.solve(curvature, pull))[..., 0].sum(axis=1)
         step /= np.maximum(np.abs(step).max(axis=1, keepdims=True) / _LONGEST, 1.0)
         tried = np.clip(z[going] + step, -_FARTHEST, _FARTHEST)
         there, log_there = view(tried, going)

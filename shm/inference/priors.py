@@ -23,7 +23,7 @@ DEVIATIONS = (SECTION, DENSITY, MODULUS)
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What measured tensions have taught of the deviations of a bar as made.
+    """Hold what measured tensions have taught of the deviations of a bar as made.
 
     `names` are among `section`, `density`, `modulus`, `theta_L` and `bending_factor` (as logarithms
     of true over described); `mean` (k,) and `covariance` (k, k).
@@ -89,13 +89,13 @@ class Deviations:
         covariance = np.diag(np.array(list(sds.values())) ** 2)
         if calibration is not None:
             rows = [self.names.index(n) for n in calibration.names if n in self.names]
-            kept = [k for k, n in enumerate(calibration.names) if n in self.names]
-            self.mean[rows] = calibration.mean[kept]
-            covariance[np.ix_(rows, rows)] = calibration.covariance[np.ix_(kept, kept)]
+            columns = [k for k, n in enumerate(calibration.names) if n in self.names]
+            self.mean[rows] = calibration.mean[columns]
+            covariance[np.ix_(rows, rows)] = calibration.covariance[np.ix_(columns, columns)]
         self.factor: FloatArray = _root(covariance)
 
     def row(self, **shares: float) -> FloatArray:
-        """How a combination of the deviations goes with n (k,)."""
+        """Return the factors (k,) by which a combination of the deviations goes with n."""
         return np.asarray(np.array([shares.get(name, 0.0) for name in self.names]) @ self.factor)
 
     def mean_of(self, name: str) -> float:
@@ -167,11 +167,11 @@ class Ends:
         ]
         self._folded = self._pairs
         self._unit = hanger.bending_stiffness_n_m2 / hanger.length_m
-        alike = assumed.similarity_of_ends.value
-        correlation = (1 - alike) * np.eye(_ALL) + alike
+        similarity = assumed.similarity_of_ends.value
+        correlation = (1 - similarity) * np.eye(_ALL) + similarity
         self._factor = np.linalg.cholesky(correlation)
-        own = self._factor[: len(springs), : len(springs)]
-        self._inverse = np.linalg.inv(own)
+        factor = self._factor[: len(springs), : len(springs)]
+        self._inverse = np.linalg.inv(factor)
         fixity = fixity_of(hanger.end_kind, assumed)
         freedom = fixity.value * (1 - fixity.value) / fixity.sd**2 - 1
         shape = fixity.value * freedom, (1 - fixity.value) * freedom
@@ -272,10 +272,10 @@ def clamped_probability(kind: str, assumed: Assumptions) -> float:
 
 
 def calibration_of(names: Sequence[str], samples: FloatArray, hanger: Hanger) -> Calibration:
-    """What draws (n, parameters) of a posterior say of the bar's deviations."""
+    """Return what draws (n, parameters) of a posterior say of the bar's deviations."""
     values = dict(zip(names, samples.T, strict=True))
-    kept = [n for n in (*DEVIATIONS, LENGTH, BENDING) if n in values]
+    chosen = [n for n in (*DEVIATIONS, LENGTH, BENDING) if n in values]
     stated = hanger.bending_stiffness_factor
     logs = {LENGTH: lambda v: np.log(v), BENDING: lambda v: np.log(v / stated)}
-    table = np.column_stack([logs.get(n, np.asarray)(values[n]) for n in kept])
-    return Calibration(tuple(kept), table.mean(axis=0), np.atleast_2d(np.cov(table.T)))
+    table = np.column_stack([logs.get(n, np.asarray)(values[n]) for n in chosen])
+    return Calibration(tuple(chosen), table.mean(axis=0), np.atleast_2d(np.cov(table.T)))

@@ -40,12 +40,12 @@ class Problem(Density):
         self.evaluations = 0
         self._settled = False
         middle = (1 + measured.highest_order) / 2
-        own = model.wave_stiffness_n_m_rad(middle)
+        stiffness = model.wave_stiffness_n_m_rad(middle)
         self.coordinates: Coordinates | DescribedCoordinates
         if isinstance(model, AsMade):
-            self.coordinates = DescribedCoordinates(model, measured.tests, own, calibration)
+            self.coordinates = DescribedCoordinates(model, measured.tests, stiffness, calibration)
         else:
-            self.coordinates = Coordinates(model.prior, swaps_of(model, measured.tests), own)
+            self.coordinates = Coordinates(model.prior, swaps_of(model, measured.tests), stiffness)
         self.prior = model.prior
         self.dimension = self.coordinates.dimension
 
@@ -129,7 +129,9 @@ class Problem(Density):
         """Return True where the class gives the frequencies of near parameter sets at once."""
         likelihood = self.measured
         slopes = isinstance(self.model, AsMade) and self.model.has_slopes
-        return slopes and isinstance(likelihood, FieldLikelihood) and likelihood.alike_conditions
+        return (
+            slopes and isinstance(likelihood, FieldLikelihood) and likelihood.has_equal_conditions
+        )
 
     def _near(self, z: FloatArray, steps: FloatArray) -> FloatArray:
         """Return changes (m, measurements, steps) of the misfit by `steps` (k, d) from `z`."""

@@ -84,7 +84,7 @@ def sample(
     on_progress(0.4)
     for attempt in range(_SET.attempts):
         best = points[[int(density.log(points).argmax())]]
-        whitening = likeliest_error(density, best).whitening
+        whitening = most_likely_error(density, best).whitening
         valleys = [Valley(density, points, whitening)]
         if attempt == 0:
             valleys = valleys_through(density, points, nearest, whitening)
@@ -112,7 +112,7 @@ def sample(
     )
 
 
-def likeliest_error(density: Density, z: FloatArray) -> Covariance:
+def most_likely_error(density: Density, z: FloatArray) -> Covariance:
     """Return the covariance of the data about z (1, d) at its most probable size."""
     likelihood = density.likelihood
     return likelihood.nodes[int(likelihood.by_node(density.residual(z))[0].argmax())].covariance
@@ -137,15 +137,15 @@ def draw_along(
     chances = normalised(_SET.tempered * np.array([peak.log for peak in peaks]))
     chosen = rng.choice(len(chances), len(centres), p=chances)
     z = np.array([peak.z for peak in peaks])[chosen]
-    error = likeliest_error(density, peaks[0].z[None])
+    error = most_likely_error(density, peaks[0].z[None])
     for wider in _SET.wider:
         wide = error.scaled(wider)
         noise = rng.standard_normal((len(z), len(density.value))) @ wide.factor.T
         z, _ = climb(density, z, Likelihood.of(wide, 0.0), centres, noise, _SET.along_steps)
     log = density.log(density.fold(z))
     least = min(log.max() - _SET.farthest, np.sort(log)[-min(_SET.fewest, len(log))])
-    kept = log >= least
-    return density.connect(density.fold(z[kept]), rng), chosen[kept]
+    likely = log >= least
+    return density.connect(density.fold(z[likely]), rng), chosen[likely]
 
 
 def _continue(

@@ -92,9 +92,9 @@ class MeasuredShapes:
         if not self.size:
             return np.zeros((len(deflection), 0))
         raw = deflection[:, self._plane, self._order - 1, self._place]
-        own = self._of == np.arange(self._of[-1] + 1)[:, None]
+        in_shape = self._of == np.arange(self._of[-1] + 1)[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
-            size = (raw * self._value) @ own.T / (raw**2 @ own.T)
+            size = (raw * self._value) @ in_shape.T / (raw**2 @ in_shape.T)
         return np.asarray((size[:, self._of] * raw - self._value) @ self._whitening.T)
 
     @property
@@ -133,10 +133,10 @@ class MeasuredShapes:
         """Return directions (size, components) across each shape, of length 1."""
         rows = [np.zeros((0, len(self._of)))]
         for shape in range(shapes):
-            own = np.flatnonzero(self._of == shape)
-            across = scipy.linalg.null_space(self._value[None, own]).T
+            components = np.flatnonzero(self._of == shape)
+            across = scipy.linalg.null_space(self._value[None, components]).T
             row = np.zeros((len(across), len(self._of)))
-            row[:, own] = across
+            row[:, components] = across
             rows.append(row)
         return np.vstack(rows)
 
@@ -152,8 +152,10 @@ class MeasuredShapes:
         wave = self._order * np.pi / length_m
         x_m = self.places_m[self._place]
         sine, slope = np.sin(wave * x_m), wave * np.cos(wave * x_m)
-        own = np.equal.outer(self._of, self._of)
-        size = (own @ (self._value * sine)) / np.maximum(own @ sine**2, np.finfo(float).tiny)
+        same_shape = np.equal.outer(self._of, self._of)
+        size = (same_shape @ (self._value * sine)) / np.maximum(
+            same_shape @ sine**2, np.finfo(float).tiny
+        )
         moved = size * slope
         gains = scatter.sensor_gain**2 * np.outer(self._value, self._value) * same_channel
         return gains + scatter.sensor_place_m**2 * np.outer(moved, moved) * same_place

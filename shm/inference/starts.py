@@ -21,13 +21,13 @@ def find_starts(
     of = problem.coordinates
     drawn = [of.draw_prior(_DRAWS, rng), of.draw_felt(_DRAWS, rng)]
     z = np.vstack(drawn if known is None else [*drawn, known])
-    kept: list[int] = []
+    chosen: list[int] = []
     for row in np.argsort(-problem.log(z), kind="stable").tolist():
-        if all(np.abs(z[row] - z[other]).max() > _APART for other in kept):
-            kept.append(row)
-        if len(kept) == _STARTS:
+        if all(np.abs(z[row] - z[other]).max() > _APART for other in chosen):
+            chosen.append(row)
+        if len(chosen) == _STARTS:
             break
-    return np.asarray(z[kept])
+    return np.asarray(z[chosen])
 
 
 def known_places(problem: Problem, known: Posterior, rng: np.random.Generator) -> FloatArray | None:

@@ -32,7 +32,7 @@ _LEAST_SHARE = 1e-3
 def mean_of_ends(
     ends: Ends, fittings_m: tuple[float, float], assumed: Assumptions = DEFAULTS
 ) -> FloatArray:
-    """What the supports and fittings of both ends do on average to ln of frequencies (n, F)."""
+    """Return the mean change of ln of frequencies (n, F) by supports and fittings of both ends."""
     rigid, heavier = assumed.fitting_rigidity.value, assumed.fitting_mass.value
     found = assumed.support_compliance_m_n.value * (ends[0].give() + ends[1].give())
     for end, fitting_m in zip(ends, fittings_m, strict=True):
@@ -104,8 +104,8 @@ def loads_of_radii(
     radius = assumed.added_mass_radius_m
     larger = log_frequency(radius.value + radius.sd)
     change = (larger - log_frequency(max(radius.value - radius.sd, 0.0))) / 2
-    own = np.equal.outer(size_kg, bodies) & np.array(is_open)[:, None]
-    return np.asarray(np.where(own, change[:, None], 0.0))
+    same_body = np.equal.outer(size_kg, bodies) & np.array(is_open)[:, None]
+    return np.asarray(np.where(same_body, change[:, None], 0.0))
 
 
 def _share(hanger: Hanger) -> float:
@@ -129,8 +129,8 @@ def _within_reach_m(hanger: Hanger, count: int) -> FloatArray:
 def _by_plane(plane: IntArray, assumed: Assumptions) -> FloatArray:
     """Shares (F, 3) of what the planes have in common and each for itself."""
     shared = assumed.end_details_shared.value
-    own = np.sqrt(1 - shared) * (plane[:, None] == np.arange(2))
-    return np.column_stack([np.sqrt(shared) * np.ones(len(plane)), own])
+    separate = np.sqrt(1 - shared) * (plane[:, None] == np.arange(2))
+    return np.column_stack([np.sqrt(shared) * np.ones(len(plane)), separate])
 
 
 def loads_of_section(hanger: Hanger, order: IntArray) -> FloatArray:
@@ -145,8 +145,8 @@ def loads_of_section(hanger: Hanger, order: IntArray) -> FloatArray:
     distinct = np.unique(order)
     variance = np.sqrt(2 * np.pi) * reach * np.exp(-((2 * np.pi * distinct * reach) ** 2) / 2)
     size = hanger.scatter.along * np.sqrt(variance / 2)
-    kept = size > _LEAST_SHARE * hanger.scatter.along
-    return np.asarray((order[:, None] == distinct[kept]) * size[kept])
+    significant = size > _LEAST_SHARE * hanger.scatter.along
+    return np.asarray((order[:, None] == distinct[significant]) * size[significant])
 
 
 def errors_of_sensors(

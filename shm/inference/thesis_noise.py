@@ -57,10 +57,10 @@ class ThesisLikelihood(MeasuredFrequencies):
         return self.identification_error
 
     def frequency_nodes(self, step_in_sd: float) -> list[NoiseNode]:
-        own = self.identification_error**2
+        variance = self.identification_error**2
         return [
             NoiseNode(
-                Covariance.of_frequencies(np.diag(sigma**2 + own)),
+                Covariance.of_frequencies(np.diag(sigma**2 + variance)),
                 float(share + self._jacobian),
                 float(sigma),
             )

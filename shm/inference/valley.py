@@ -173,17 +173,17 @@ class Valley:
             going = np.flatnonzero(size > _SET.near_enough)
             if not len(going):
                 break
-            own = rows[going]
-            misfit = -self._density.residual(z[own])
+            active = rows[going]
+            misfit = -self._density.residual(z[active])
             none = _SET.no_mode
             misfit = np.nan_to_num(misfit, nan=none, posinf=none, neginf=-none)
             misfit = misfit @ self._whitening.T
-            gradient = np.einsum("nfg,nf->ng", across[going], misfit) + z[own] @ self._determined
+            gradient = np.einsum("nfg,nf->ng", across[going], misfit) + z[active] @ self._determined
             half = np.linalg.solve(factor[going], gradient[..., None])
             step = -np.linalg.solve(np.swapaxes(factor[going], 1, 2), half)[..., 0]
             longest = np.abs(step).max(axis=1)
             step *= np.minimum(1.0, _SET.longest_step / longest.clip(_SET.least))[:, None]
-            z[own] += step @ self._determined.T
+            z[active] += step @ self._determined.T
             size[going] = np.where(
                 longest > _SET.longest_step, np.inf, np.abs(half[..., 0]).max(axis=1)
             )
@@ -210,8 +210,8 @@ def valleys_through(
     found: list[Valley] = []
     left = np.arange(len(points))
     while len(left) > _SET.fewest_points and len(found) < _SET.most_valleys:
-        own = left[nearest[left] == np.bincount(nearest[left]).argmax()]
-        rows = own if len(own) > _SET.fewest_points else left
+        crowded = left[nearest[left] == np.bincount(nearest[left]).argmax()]
+        rows = crowded if len(crowded) > _SET.fewest_points else left
         found.append(Valley(density, points[rows], whitening))
         left = left[~found[-1].follows(points[left])]
     return found or [Valley(density, points, whitening)]
@@ -237,11 +237,11 @@ class Proposal:
         """Return a first one from `points` (n, d) along the valleys."""
         mixtures, sizes = [], []
         for valley in valleys:
-            own = points[valley.follows(points)]
-            own = own if len(own) > _SET.fewest_points else points
+            members = points[valley.follows(points)]
+            members = members if len(members) > _SET.fewest_points else points
             felt = valley.felt.shape[1]
-            mixtures.append(TMixture.of(own @ valley.felt, clusters, rng) if felt else None)
-            sizes.append(len(own))
+            mixtures.append(TMixture.of(members @ valley.felt, clusters, rng) if felt else None)
+            sizes.append(len(members))
         return cls(valleys, mixtures, np.array(sizes) / sum(sizes), _FIRST_CHANCES)
 
     def refitted(self, draws: Draws, weights: FloatArray) -> Proposal:
@@ -251,10 +251,10 @@ class Proposal:
         owned *= (weights / owned.sum(axis=1))[:, None]
         chances = owned.sum(axis=0).clip(_SET.least_chance)
         mixtures = [
-            mixture and mixture.refitted(draws.z @ valley.felt, own / own.sum())
-            if own.sum() > _SET.least_chance
+            mixture and mixture.refitted(draws.z @ valley.felt, shares / shares.sum())
+            if shares.sum() > _SET.least_chance
             else mixture
-            for valley, mixture, own in zip(self.valleys, self.mixtures, owned.T, strict=True)
+            for valley, mixture, shares in zip(self.valleys, self.mixtures, owned.T, strict=True)
         ]
         scaled = self._log_scaled(draws)
         of_scale = np.exp(scaled - scaled.max(axis=2, keepdims=True))
@@ -273,8 +273,8 @@ class Proposal:
             if mixture is not None and chosen.any():
                 y[chosen, : valley.felt.shape[1]] = mixture.draw(int(chosen.sum()), rng)
             scale = rng.choice(_SCALES, count, p=self.scales)
-            points, *own = valley.draw(y, scale, rng)
-            at = [own if each is valley else each.distance(points) for each in self.valleys]
+            points, *drawn = valley.draw(y, scale, rng)
+            at = [drawn if each is valley else each.distance(points) for each in self.valleys]
             z.append(points)
             square.append(np.column_stack([each[0] for each in at]))
             log_size.append(np.column_stack([each[1] for each in at]))

@@ -86,7 +86,7 @@ def class_units(name: str) -> Mapping[str, str]:
 
 
 def applicable(hanger: Hanger, names: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Which of the model classes `names` apply to `hanger`, and why each other one does not.
+    """Return the model classes of `names` that apply to `hanger`, and why the others do not.
 
     Raises UsageError for an unknown name, be it in `names` or among the hanger's own.
     """
@@ -96,7 +96,7 @@ def applicable(hanger: Hanger, names: Sequence[str]) -> tuple[tuple[str, ...], d
 
 
 def competing_names(hanger: Hanger, names: Sequence[str]) -> tuple[str, ...]:
-    """Those of the model classes `names` that apply to a hanger; UsageError where none does."""
+    """Return the model classes of `names` that apply to a hanger; UsageError where none does."""
     fitting, reasons = applicable(hanger, names)
     if fitting:
         return fitting

@@ -109,13 +109,16 @@ class AdoptedAsMade(_WithEffects, AsMade):
         self.adopted = AdoptedHanger.of(name, hanger)
         AsMade.__init__(self, self.adopted.baseline_class)
         self.name, self.title, self.swaps = name, self.adopted.title, ()
-        own = self.adopted.effect_parameters
+        parameters = self.adopted.effect_parameters
         bounds = dict(self.bounds)
         if math.isfinite(known := hanger.scatter.tension):  # weighed
             bounds[TENSION] = (1 - known, 1 + known)
-        self.effect_names = tuple(own)
+        self.effect_names = tuple(parameters)
         self.bounds = bounds | self.adopted.effect_bounds
-        self.units = {**self.units, **{each: parameter.unit for each, parameter in own.items()}}
+        self.units = {
+            **self.units,
+            **{each: parameter.unit for each, parameter in parameters.items()},
+        }
 
     def values(self, theta: FloatArray) -> FloatArray:
         return self.adopted.in_plain_values(theta)
@@ -144,8 +147,8 @@ class Adopted(_WithEffects):
         sds = asdict(hanger.scatter)
         halves = {each: _HALF_WIDTH_IN_SD * sds[each] for each in _DEVIATIONS}
         bounds |= {each: (-half, half) for each, half in halves.items() if half}
-        own = self.adopted.effect_parameters
-        self.units = {**baseline.units, **{each: of.unit for each, of in own.items()}}
+        parameters = self.adopted.effect_parameters
+        self.units = {**baseline.units, **{each: of.unit for each, of in parameters.items()}}
         self.bounds = bounds | self.adopted.effect_bounds
 
     def values(self, theta: FloatArray) -> FloatArray:
@@ -179,13 +182,13 @@ class AdoptedHanger:
         model = AsMade(MODELS[made.baseline](hanger), with_terms)
         effects = [(each.effect, variant_of(each, hanger)) for each in made.effects]
         bar = HangerWithEffects(model, effects)
-        own = {own_name(each): each for each in bar.effect_parameters}
-        bounds = {key: bounds_of(each) for key, each in own.items()}
+        parameters = {parameter_name(each): each for each in bar.effect_parameters}
+        bounds = {key: bounds_of(each) for key, each in parameters.items()}
         for effect in made.effects:
             for parameter, both in effect.ranges.items():
                 bounds[parameter if parameter in bounds else f"{effect.effect}.{parameter}"] = both
         reference_c = next((e.reference_c for e in made.effects if _follows(e)), math.nan)
-        return cls(made.baseline, bar, reference_c, own, bounds)
+        return cls(made.baseline, bar, reference_c, parameters, bounds)
 
     @property
     def baseline_class(self) -> Model:
@@ -229,7 +232,7 @@ def with_parameters(name: str, hanger: Hanger, names: Sequence[str], priors: str
 
 
 def unfit(name: str, hanger: Hanger) -> str:
-    """Why an adopted class cannot describe `hanger`; empty where it can.
+    """Return why an adopted class cannot describe `hanger`; empty where it can.
 
     Raises UsageError where the name is malformed or names what is not there.
     """
@@ -250,7 +253,7 @@ def checked(name: str, hanger: Hanger) -> AdoptedName:
 
 
 def variant_of(adopted: AdoptedEffect, hanger: Hanger) -> Variant:
-    """Where an adopted effect acts; raises UsageError for what cannot be adopted."""
+    """Return where an adopted effect acts; raises UsageError for what cannot be adopted."""
     effect = _effect(adopted.effect)
     if _follows(adopted) and math.isnan(adopted.reference_c):
         raise UsageError(
@@ -272,11 +275,11 @@ def places_of(effect: str, hanger: Hanger) -> tuple[str, ...]:
 
 
 def missed_by_one_test(effect: str, hanger: Hanger) -> str:
-    """Why the frequencies of a single test cannot show an effect; empty where they can."""
+    """Return why frequencies of a single test cannot show an effect; empty where they can."""
     return _effect(effect).invisible(hanger, _ONE_TEST)
 
 
-def own_name(parameter: Parameter) -> str:
+def parameter_name(parameter: Parameter) -> str:
     """Return the name that a parameter of an effect has in the class."""
     effect, dot, name = parameter.name.rpartition(".")
     return f"{effect}{dot}log10_{name}" if in_log(parameter) else parameter.name
@@ -300,7 +303,7 @@ def _effect(name: str) -> Effect:
 
 
 def _refuse_ranges(adopted: AdoptedEffect, variant: Variant, hanger: Hanger) -> None:
-    known = [own_name(each) for each in EFFECTS[adopted.effect].parameters(hanger, variant)]
+    known = [parameter_name(each) for each in EFFECTS[adopted.effect].parameters(hanger, variant)]
     for name in adopted.ranges:
         if name not in known:
             raise UsageError(
@@ -313,7 +316,7 @@ def _follows(adopted: AdoptedEffect) -> bool:
 
 
 def in_log(parameter: Parameter) -> bool:
-    """Whether a parameter of an effect is uniform in its log10 in the class."""
+    """Return True for a parameter of an effect that is uniform in its log10 in the class."""
     return parameter.spread == "logarithmic" and not parameter.signed
 
 
@@ -367,7 +370,7 @@ class AdoptedName:
 
 
 def is_adopted(name: str) -> bool:
-    """Whether a model class's name is that of a baseline with effects."""
+    """Return True for the name of a model class that is a baseline with effects."""
     return "+" in name
 
 

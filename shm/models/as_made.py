@@ -75,12 +75,12 @@ class AsMade(Model):
         deck_m, arch_m = self.fittings_m = super().stiff_ends_m
         self.swaps = model.swaps if deck_m == arch_m else ()
         self.has_terms = with_terms and isinstance(model, Beam) and hanger.as_hanger
-        own = [name for name in model.parameter_names if name not in (TENSION, LENGTH)]
-        self.springs = tuple(own)
+        springs = [name for name in model.parameter_names if name not in (TENSION, LENGTH)]
+        self.springs = tuple(springs)
         self.length_is_open = hanger.plate is not None and isinstance(model, Beam)
         assumed = hanger.assumptions
         bounds = {TENSION: assumed.tension_ratio.bounds, LENGTH: self._length_range()}
-        bounds |= {name: self.spring_range(name) for name in own}
+        bounds |= {name: self.spring_range(name) for name in springs}
         scatter = hanger.scatter
         deviations = {SECTION: scatter.section, DENSITY: scatter.density, MODULUS: scatter.modulus}
         bounds |= {name: (-_MOST_SD * sd, _MOST_SD * sd) for name, sd in deviations.items()}
@@ -113,7 +113,7 @@ class AsMade(Model):
 
     @property
     def is_strand(self) -> bool:
-        """Whether the share of the solid section's stiffness that it has is a parameter."""
+        """Return True where its share of the solid section's stiffness is a parameter."""
         return self.hanger.kind == "strand"
 
     def spring_range(self, name: str) -> tuple[float, float]:
@@ -168,8 +168,8 @@ class AsMade(Model):
             kg: Any = mass.mass_kg / (per_length * length)
             conditions = replace(conditions, added_mass=replace(mass, mass_kg=kg))
         if not self.has_terms:
-            own, factor = self.as_described(theta)
-            return self.model.frequencies_at(own, modes, conditions) * factor[:, None, None]
+            described, factor = self.as_described(theta)
+            return self.model.frequencies_at(described, modes, conditions) * factor[:, None, None]
         places = () if mass is None else (mass.x_m,)
         radii = () if mass is None else (radius_m(self.hanger, mass),)
         bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes, places, radii)
@@ -215,8 +215,8 @@ class AsMade(Model):
         stiffness, mass, length = self.stiffness_mass_length(theta)
         tension_n = self._column(theta, TENSION) * hanger.nominal_tension_n
         held = isinstance(self.model, Beam1) and not self.has_terms
-        kept = PhysicalHanger.held if held else PhysicalHanger.clamped
-        bar = kept(hanger, tension_n, sensors)
+        build = PhysicalHanger.held if held else PhysicalHanger.clamped
+        bar = build(hanger, tension_n, sensors)
         deck_m, arch_m = self._ends_m
         over_m = (1 - length) * hanger.length_m / 2 if self.length_is_open else 0.0
         deck_end_m = deck_m + over_m + np.zeros(len(theta))
@@ -232,8 +232,8 @@ class AsMade(Model):
             bar = bar.on_springs(self.springs_n_m_rad(theta))
         if self._shears:
             section = np.exp(self._column(theta, SECTION))
-            own = SHEAR in self.bounds and self.has_terms
-            flexible = self._column(theta, SHEAR) if own else np.ones(len(theta))
+            has_shear = SHEAR in self.bounds and self.has_terms
+            flexible = self._column(theta, SHEAR) if has_shear else np.ones(len(theta))
             turning = hanger.second_moment_m4 / hanger.area_m2 * section
             bar = replace(
                 bar,
@@ -288,14 +288,14 @@ class AsMade(Model):
         stiffness, _, length = self.stiffness_mass_length(theta)
         one = np.ones(len(theta))
         terms = {name: self._column(theta, name) for name in self.terms}
-        own = [terms.get(name, one) for name in FITTING_STIFFNESS]
+        fittings = [terms.get(name, one) for name in FITTING_STIFFNESS]
         tension = self._column(theta, TENSION) * length**2 / stiffness
         unit = self.hanger.bending_stiffness_n_m2 / self.hanger.length_m
         springs = np.stack(self.springs_n_m_rad(theta), axis=1)
         return BarValues(
             tension_n=tension * self.hanger.nominal_tension_n,
             springs=springs * (length / stiffness)[:, None, None] / unit,
-            fitting_stiffness=np.stack(own, axis=1),
+            fitting_stiffness=np.stack(fittings, axis=1),
             fitting_mass=terms.get(FITTING_MASS, one),
             turnbuckle_stiffness=terms.get(TURNBUCKLE_STIFFNESS, one),
             turnbuckle_mass=terms.get(TURNBUCKLE_MASS, one),
@@ -335,11 +335,11 @@ class AsMade(Model):
 
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         names = [self.parameter_names.index(n) for n in self.model.parameter_names if n != LENGTH]
-        own = theta[:, names]
+        values = theta[:, names]
         if LENGTH in self.model.parameter_names:
             at = self.model.parameter_names.index(LENGTH)
-            own = np.insert(own, at, self._column(theta, LENGTH), axis=1)
-        return self.model.springs_n_m_rad(own)
+            values = np.insert(values, at, self._column(theta, LENGTH), axis=1)
+        return self.model.springs_n_m_rad(values)
 
     def _column(self, theta: FloatArray, name: str) -> FloatArray:
         return np.asarray(theta[:, self.parameter_names.index(name)])

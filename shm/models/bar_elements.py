@@ -55,13 +55,13 @@ class BarElements:
         element = (np.searchsorted(self.edges, x, side="right") - 1).clip(0, len(self.degrees) - 1)
         found = np.zeros((len(x), len(self.area)))
         columns = _columns(self.degrees)
-        for index, own in enumerate(columns):
+        for index, functions in enumerate(columns):
             rows = np.flatnonzero(element == index)
             if not len(rows):
                 continue
             start, length = self.edges[index], self.edges[index + 1] - self.edges[index]
             table = _functions((x[rows] - start) / length, length, self.degrees[index])
-            for function, column in enumerate(own):
+            for function, column in enumerate(functions):
                 if column >= 0:
                     found[rows, column] += table[order][function]
         return found
@@ -85,9 +85,9 @@ def bar_elements(
         max(_BUBBLES, int(np.ceil(np.pi / 2 * (modes + 2) * length)) + 5) for length in lengths
     )
     columns = _columns(degrees)
-    w_count = 1 + max(max(own) for own in columns)
+    w_count = 1 + max(max(indices) for indices in columns)
     strains = _strain_columns(degrees, w_count) if shears else [[] for _ in degrees]
-    count = w_count + (1 + max(max(own) for own in strains) - w_count if shears else 0)
+    count = w_count + (1 + max(max(indices) for indices in strains) - w_count if shears else 0)
     bending, mass, turning = (np.zeros((len(zones) + 1, count, count)) for _ in range(3))
     tension, gradient, shear = (np.zeros((count, count)) for _ in range(3))
     area, rotation = np.zeros(count), np.zeros((2, count))
@@ -95,7 +95,7 @@ def bar_elements(
         points, weights = np.polynomial.legendre.leggauss(degree + 5)
         x, weight = (points + 1) / 2, weights / 2 * length
         w, slope, curvature = _functions(x, length, degree)
-        own = np.array([*columns[index], *strains[index]])
+        indices = np.array([*columns[index], *strains[index]])
         if shears:
             g, change = _strains(x, length, degree)
             none = np.zeros((len(g), len(x)))
@@ -104,18 +104,18 @@ def bar_elements(
             turn = slope - strain
         else:
             strain, turn = 0 * w, slope
-        kept = own >= 0
-        place = np.ix_(own[kept], own[kept])
+        free = indices >= 0
+        place = np.ix_(indices[free], indices[free])
         middle = start + length / 2
         zone = next((k for k, (a, b) in enumerate(zones, 1) if a < middle < b), 0)
 
-        bending[zone][place] += _energy(curvature[kept], weight)
-        mass[zone][place] += _energy(w[kept], weight)
-        turning[zone][place] += _energy(turn[kept], weight)
-        tension[place] += _energy(slope[kept], weight)
-        gradient[place] += _energy(slope[kept], weight * (start + x * length - 0.5))
-        shear[place] += _energy(strain[kept], weight)
-        area[own[kept]] += w[kept] @ weight
+        bending[zone][place] += _energy(curvature[free], weight)
+        mass[zone][place] += _energy(w[free], weight)
+        turning[zone][place] += _energy(turn[free], weight)
+        tension[place] += _energy(slope[free], weight)
+        gradient[place] += _energy(slope[free], weight * (start + x * length - 0.5))
+        shear[place] += _energy(strain[free], weight)
+        area[indices[free]] += w[free] @ weight
     first, last = np.array(columns[0]), np.array(columns[-1])
     rotation[0, first[1]], rotation[1, last[3]] = 1.0, 1.0
     if shears:
@@ -165,9 +165,9 @@ def _strain_columns(degrees: tuple[int, ...], first: int) -> list[list[int]]:
     """Return the same of the strain: values at all nodes, then inner functions."""
     found, inner = [], first + len(degrees) + 1
     for index, degree in enumerate(degrees):
-        own = list(range(inner, inner + degree + 1))
+        inside = list(range(inner, inner + degree + 1))
         inner += degree + 1
-        found.append([first + index, first + index + 1, *own])
+        found.append([first + index, first + index + 1, *inside])
     return found
 
 

@@ -1,4 +1,4 @@
-"""What a model class is: named parameters with a prior, and a map from them to frequencies.
+"""Define a model class: named parameters with a prior, and a map from them to frequencies.
 
 Besides, what a known mass, clamped on for one test, does to the frequencies of any class.
 """
@@ -32,7 +32,10 @@ def silent(fraction: float) -> None:
 
 
 def held_otherwise(hanger: Hanger) -> str:
-    """Why no model class can be updated for `hanger`; empty where it is clamped and in tension."""
+    """Return why no model class can be updated for `hanger`; empty where one can.
+
+    One can where the hanger is clamped and in tension.
+    """
     if hanger.nominal_tension_n == 0:
         return "the hanger carries no tension (nominal_tension_n = 0) that could be updated."
     if not hanger.supports.clamped:
@@ -95,7 +98,7 @@ class Model:
 
     @classmethod
     def unfit(cls, hanger: Hanger) -> str:
-        """Why this class cannot describe `hanger`; empty where it can."""
+        """Return why this class cannot describe `hanger`; empty where it can."""
         return ""
 
     @property
@@ -280,7 +283,7 @@ def radius_m(hanger: Hanger, added_mass: AddedMass) -> float:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What one test was made under, as far as an effect may depend on it.
+    """Describe the conditions of one test, as far as an effect may depend on them.
 
     `temperature_shift_k` counts from the reference (the mean of the tests), 0 where unknown: the
     diagnosis says so; `amplitude` is relative to the reference level, 1 where unknown.

@@ -9,7 +9,7 @@ import numpy as np
 
 from shm.models import tensioned_beam
 from shm.models.base import RATIOS, Model
-from shm.models.end_effects import alike_from_both_ends, coupled_bar
+from shm.models.end_effects import coupled_bar, has_symmetric_turnbuckles
 from shm.models.hanger import PhysicalHanger, solve
 from shm.values import PLANES, FloatArray, Hanger
 
@@ -23,7 +23,7 @@ class Beam(Model):
 
     def __init__(self, hanger: Hanger):
         super().__init__(hanger)
-        if not alike_from_both_ends(hanger):
+        if not has_symmetric_turnbuckles(hanger):
             self.swaps = ()
 
     @classmethod

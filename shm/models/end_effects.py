@@ -1,4 +1,4 @@
-"""What the ends of a real hanger do to its frequencies: fittings that stiffen, supports that give.
+"""Compute how the ends of a real hanger change its frequencies: by fittings and supports.
 
 Near an end at x = 0 a mode of a tensioned beam is
 
@@ -103,7 +103,7 @@ class EndWaves:
         return np.asarray(self.cos * np.sin(self.q * x_m) - self.sin * wave)
 
 
-_ALIKE = 1e-9  # rounding
+_EQUAL = 1e-9  # rounding
 
 
 def coupled_bar(hanger: Hanger, length_m: FloatArray, tension_n: FloatArray) -> PhysicalHanger:
@@ -121,15 +121,15 @@ def coupled_bar(hanger: Hanger, length_m: FloatArray, tension_n: FloatArray) -> 
     described = PhysicalHanger.clamped(hanger, tension_n)
     stretch = (length_m - fixed) / (hanger.length_m - fixed)
     zones = []
-    for own, zone in zip(hanger.turnbuckles, described.zones, strict=True):
-        below = sum(each.length_m for each in hanger.turnbuckles if each.x_m < own.x_m)
-        start = below + (own.x_m - own.length_m / 2 - below) * stretch
-        zones.append(replace(zone, start_m=start, end_m=start + own.length_m))
+    for turnbuckle, zone in zip(hanger.turnbuckles, described.zones, strict=True):
+        below = sum(each.length_m for each in hanger.turnbuckles if each.x_m < turnbuckle.x_m)
+        start = below + (turnbuckle.x_m - turnbuckle.length_m / 2 - below) * stretch
+        zones.append(replace(zone, start_m=start, end_m=start + turnbuckle.length_m))
     return replace(described, arch_end_m=length_m, zones=tuple(zones))
 
 
-def alike_from_both_ends(hanger: Hanger) -> bool:
-    """Whether the turnbuckles look the same from the arch end as from the deck end."""
+def has_symmetric_turnbuckles(hanger: Hanger) -> bool:
+    """Return True where the turnbuckles look the same from the arch end as from the deck end."""
     if not hanger.turnbuckles:
         return True
     rows = np.array(
@@ -137,4 +137,4 @@ def alike_from_both_ends(hanger: Hanger) -> bool:
     ).reshape(-1, 4)
     turned = rows * [-1, 1, 1, 1] + [hanger.length_m, 0, 0, 0]
     order, back = rows[:, 0].argsort(), turned[:, 0].argsort()
-    return bool(np.allclose(rows[order], turned[back], rtol=_ALIKE))
+    return bool(np.allclose(rows[order], turned[back], rtol=_EQUAL))

@@ -28,30 +28,30 @@ class PlugInSkipped(UserWarning):
     """A plug-in was left out; the message names it, its package and the reason."""
 
 
-def members_with_plug_ins(group: str, own: Mapping[str, M], kind: type) -> dict[str, M]:
-    """Return the members of our `own` and those installed under `group`, which are of `kind`.
+def members_with_plug_ins(group: str, built_in: Mapping[str, M], kind: type) -> dict[str, M]:
+    """Return the `built_in` members and those installed under `group`, which are of `kind`.
 
-    Our own are all instances of `kind` or all classes of it, and what is plugged in becomes the
-    same: of a class of effects an instance is made.
+    The built-in ones are all instances of `kind` or all classes of it, and what is plugged in
+    becomes the same: of a class of effects an instance is made.
     """
-    classes = all(isinstance(each, type) for each in own.values())
-    found, home = dict(own), dict.fromkeys(own, "shm")
+    classes = all(isinstance(each, type) for each in built_in.values())
+    found, home = dict(built_in), dict.fromkeys(built_in, "shm")
     for entry in sorted(entry_points(group=group), key=lambda each: (each.name, each.value)):
         try:
             name, member = _loaded(entry, kind, classes)
         except Exception as error:  # noqa: BLE001 - another's code may raise anything
             warnings.warn(
-                f"{_told(entry)} of {group} is left out: {type(error).__name__}: {error}",
+                f"{_describe(entry)} of {group} is left out: {type(error).__name__}: {error}",
                 PlugInSkipped,
                 stacklevel=2,
             )
             continue
         if name in found:
             raise UsageError(
-                f"{group}: two are called {name!r}, that of {home[name]} and {_told(entry)}.",
+                f"{group}: two are called {name!r}, that of {home[name]} and {_describe(entry)}.",
                 remedy="Rename the plug-in's, or uninstall its package.",
             )
-        found[name], home[name] = member, _told(entry)
+        found[name], home[name] = member, _describe(entry)
     return found
 
 
@@ -68,6 +68,6 @@ def _loaded(entry: EntryPoint, kind: type, as_class: bool) -> tuple[str, Any]:
     return name, member
 
 
-def _told(entry: EntryPoint) -> str:
+def _describe(entry: EntryPoint) -> str:
     package = entry.dist.name if entry.dist else "an unknown package"
     return f"plug-in {entry.name} = {entry.value} (package {package})"

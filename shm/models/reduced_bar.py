@@ -187,8 +187,8 @@ class _Matrices:
         """Return the same, with the note whether masses like `usual` are diagonal."""
         mass = _sum(self.factors(usual, 0)[1], self.mass)
         size = np.sqrt(np.einsum("nii->ni", mass))
-        beside = np.abs(mass / size[:, :, None] / size[:, None, :] - np.eye(mass.shape[1]))
-        return replace(self, diagonal_mass=bool(beside.max() < _BESIDE))
+        off_diagonal = np.abs(mass / size[:, :, None] / size[:, None, :] - np.eye(mass.shape[1]))
+        return replace(self, diagonal_mass=bool(off_diagonal.max() < _OFF_DIAGONAL))
 
     def factors(self, terms: BarTerms, plane: int) -> tuple[FloatArray, FloatArray]:
         """Return the factors (n, terms) of stiffness and mass in one plane."""
@@ -268,8 +268,8 @@ class _Matrices:
                 _products(each, shape, modes) for each in (self.stiffness, self.mass)
             )
             apart = square[:, None, :modes] - square[:, :, None]
-            own = np.eye(square.shape[1], modes, dtype=bool)
-            share = np.where(own, 0.0, 1 / np.where(own | (apart == 0), np.inf, apart))
+            identity = np.eye(square.shape[1], modes, dtype=bool)
+            share = np.where(identity, 0.0, 1 / np.where(identity | (apart == 0), np.inf, apart))
             seen = table @ shape
             found.append(_modes(lowest, seen[:, :, :modes]))
             for index, each in enumerate(shifted):
@@ -277,7 +277,7 @@ class _Matrices:
                 heavier_by = np.einsum("nt,ntjm->njm", heavier - heavy, mass)
                 change = np.einsum("nt,ntjm->njm", stiffer - stiff, stiffness)
                 change -= square[:, None, :modes] * heavier_by
-                moved = seen @ (share * change - 0.5 * own * heavier_by)
+                moved = seen @ (share * change - 0.5 * identity * heavier_by)
                 by = np.einsum("nmm->nm", change[:, :modes])
                 near[index].append(_modes(lowest + by, seen[:, :, :modes] + moved))
         return _of_planes(found), [_of_planes(each) for each in near]
@@ -314,7 +314,7 @@ def _of_planes(planes: Sequence[Modes]) -> Modes:
     )
 
 
-_BESIDE = 1e-4
+_OFF_DIAGONAL = 1e-4
 """Numerical: of the diagonal, off it; a frequency changes by its square."""
 
 
@@ -352,5 +352,5 @@ def _basis(whole: _Matrices, usual: BarTerms, modes: int) -> FloatArray:
             size = root.T @ vectors
             found.append(size / np.linalg.norm(size, axis=0))
     left, values, _ = np.linalg.svd(np.hstack(found), full_matrices=False)
-    kept = values**2 > _LEFT_OUT[whole.shears] * np.sum(values**2)
-    return np.asarray(scipy.linalg.solve_triangular(root.T, left[:, kept]))
+    significant = values**2 > _LEFT_OUT[whole.shears] * np.sum(values**2)
+    return np.asarray(scipy.linalg.solve_triangular(root.T, left[:, significant]))

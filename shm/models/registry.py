@@ -12,9 +12,9 @@ from shm.models.plug_ins import MODELS_GROUP, members_with_plug_ins
 from shm.models.solid import S1, S2, Solid0, Solid1, Solid2
 from shm.values import Hanger
 
-_OWN = (Beam1, Beam2, Beam3, S1, S2, Solid0, Solid1, Solid2)
+_BUILT_IN = (Beam1, Beam2, Beam3, S1, S2, Solid0, Solid1, Solid2)
 MODELS: dict[str, type[Model]] = members_with_plug_ins(
-    MODELS_GROUP, {model.name: model for model in _OWN}, Model
+    MODELS_GROUP, {model.name: model for model in _BUILT_IN}, Model
 )
 
 

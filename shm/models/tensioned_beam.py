@@ -74,7 +74,7 @@ _MOST_STEPS = 8
 
 @dataclass(frozen=True, eq=False)
 class _Sets:
-    """What A, B and C of a block of parameter sets share over all q.
+    """Hold what A, B and C of a block of parameter sets share over all q.
 
     The factors of the terms of no, one and two springs, each (sets,); `twice_both_signed` holds
     the sign (-1)^n of C as well and has shape (modes, sets).
@@ -243,15 +243,15 @@ def shapes(waves: Waves, ka: FloatArray, x: FloatArray) -> FloatArray:
     free = 1 / (1 + ka)
     held = 1 - free
     decay, cosine, sine = np.exp(-waves.p), np.cos(waves.q), np.sin(waves.q)
-    # b = own + slope c by the arch's deflection, a = -(c + decay b) by the deck's.
+    # b = constant + slope c by the arch's deflection, a = -(c + decay b) by the deck's.
     apart = 1 - decay**2
-    own, slope = -sine / apart, (decay - cosine) / apart
+    constant, slope = -sine / apart, (decay - cosine) / apart
     moment = free * waves.turn_p * waves.p
     near, far = moment + held * waves.turn_p, decay * (moment - held * waves.turn_p)
     others = free * waves.turn_q * waves.q
     by_c = others + near * (1 + decay * slope) - far * slope
-    c = (far * own - near * decay * own - held * waves.turn_q) / by_c
-    b = own + slope * c
+    c = (far * constant - near * decay * constant - held * waves.turn_q) / by_c
+    b = constant + slope * c
     a = -(c + decay * b)
     p, q = waves.p[..., None], waves.q[..., None]
     decaying = a[..., None] * np.exp(-p * x) + b[..., None] * np.exp(-p * (1 - x))

@@ -23,7 +23,7 @@ from shm.models.adopted import (
     bounds_of,
     in_log,
     missed_by_one_test,
-    own_name,
+    parameter_name,
     places_of,
     variant_of,
 )
@@ -268,7 +268,7 @@ def _part(
         )
     found = _estimates(effect, cause) if cause is not None and told else {}
     ranges = {
-        own_name(each): _range(each, found[each.name])
+        parameter_name(each): _range(each, found[each.name])
         for each in parameters_of(effect, hanger, variant_of(part, hanger))
         if each.name in found and (missed or math.isnan(each.zero))
     }

@@ -182,7 +182,7 @@ def test_exclude_gross_errors_leaves_enough(
     )
     rng = np.random.default_rng(1)
     found = exclude_gross_errors(problem, GapOptions(), rng)  # type: ignore[arg-type]
-    assert [each.row for each in found.aside] == list(range(aside))
+    assert [each.row for each in found.excluded] == list(range(aside))
     assert [each.row for each in found.doubted] == [aside]
     assert found.rows.tolist() == list(range(aside, frequencies))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.gap.contract import Hypothesis
-from shm.gap.observations import observed, rounding_covariance, told_of_rounding
+from shm.gap.observations import observed, remark_on_rounding, rounding_covariance
 from shm.gap.problem import GapProblem
 from shm.gap.search import fit_alone, hypotheses
 from shm.inference.data_checks import step_hz
@@ -42,7 +42,7 @@ def test_there_is_none_of_full_numbers_nor_where_errors_are_stated() -> None:
     assert step_hz(rounded(0.0)) == 0.0
     stated = rounded(0.1, sd_hz=0.03)
     assert step_hz(stated) == 0.0
-    assert told_of_rounding([stated]) == ""
+    assert remark_on_rounding([stated]) == ""
 
 
 def test_low_modes_err_most_and_equal_numbers_are_one_datum() -> None:
@@ -83,6 +83,6 @@ def test_what_rounding_does_to_a_sound_hanger_is_no_evidence_of_a_cause() -> Non
 
 
 def test_the_owner_is_told_what_rounding_costs() -> None:
-    said = told_of_rounding([rounded(0.0), rounded(0.1)])
+    said = remark_on_rounding([rounded(0.0), rounded(0.1)])
     assert "rounded to 0.1 Hz" in said
-    assert told_of_rounding([rounded(0.0)]) == ""
+    assert remark_on_rounding([rounded(0.0)]) == ""

@@ -7,7 +7,7 @@ import pytest
 
 from shm.gap.contract import Hypothesis
 from shm.gap.noise import MEAN_MODEL_ERROR
-from shm.gap.scan import VISIBLE, Scan, scan, scan_beside
+from shm.gap.scan import VISIBLE, Scan, scan, scan_pair
 from shm.gap.search import fit_alone
 from shm.inference.linear import Linear
 from shm.models.effects import Variant
@@ -106,7 +106,7 @@ def test_scan_beside_adds_shifts() -> None:
     likelihood = problem.likelihood(Hypothesis())
     alone = scan(problem, before, Linear(likelihood, before.slopes), STIFFER)
     leader = fit_of(problem, CLAMP)
-    found = scan_beside(problem, leader, Linear(likelihood, leader.slopes), alone)
+    found = scan_pair(problem, leader, Linear(likelihood, leader.slopes), alone)
     assert found.hypothesis == pair
     np.testing.assert_array_equal(found.shift, alone.shift)
     assert found.log_evidence > leader.log_evidence + 3

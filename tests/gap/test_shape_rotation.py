@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.gap.noise import nodes
-from shm.gap.observations import observed, told_apart
+from shm.gap.observations import observed, separate_turn
 from shm.gap.repeated_errors import turn_loads
 from shm.simulate import HangerState
 from shm.values import ModalTest, Mode
@@ -43,20 +43,20 @@ def _turned(mode: Mode, rad: float) -> Mode:
 
 
 def test_what_grows_with_the_shape_is_the_turn() -> None:
-    own, turn = told_apart(np.hypot(0.005, 0.1 * SIZE), SIZE, 0.004)
+    own, turn = separate_turn(np.hypot(0.005, 0.1 * SIZE), SIZE, 0.004)
     assert turn == pytest.approx(0.1)
     assert own == pytest.approx(0.005)
 
 
 def test_standard_deviations_that_do_not_grow_with_the_shape_stay_as_they_are() -> None:
     for sd in (np.full(4, 0.005), np.array([0.0055, 0.005, 0.006, 0.0052])):
-        own, turn = told_apart(sd, SIZE, 0.005)
+        own, turn = separate_turn(sd, SIZE, 0.005)
         assert turn == 0
         assert own is sd
 
 
 def test_own_deviations_are_never_smaller_than_the_least() -> None:
-    own, turn = told_apart(0.2 * SIZE, SIZE, 0.005)
+    own, turn = separate_turn(0.2 * SIZE, SIZE, 0.005)
     assert own == pytest.approx(0.005)
     assert turn == pytest.approx(0.2, rel=0.01)
 

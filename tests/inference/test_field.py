@@ -159,7 +159,7 @@ def test_a_wrong_class_gets_a_wide_error_and_the_right_one_a_usual_one() -> None
     assert np.median(right) < 6e-4
     # An error of each mode by itself is half of tau's variance.
     assert np.median(wide) == pytest.approx(0.02, rel=0.3)
-    assert likelihood.likeliest_sigma(wrong)[0] == pytest.approx(0.02, rel=0.4)
+    assert likelihood.most_likely_sigma(wrong)[0] == pytest.approx(0.02, rel=0.4)
     # So much that a prior of at most 3e-3 would have refused the class as it stands.
     assert likelihood.marginal(wrong)[0] > likelihood.marginal(exact)[0] - 80
 

@@ -49,7 +49,7 @@ def test_sigma_stands_for_the_mean_square_of_the_groups() -> None:
     predicted = np.tile(PREDICTED[:1], (1, 100))
     drawn = grouped.draw_sigma(np.repeat(predicted, 200, axis=0), np.random.default_rng(1))
     assert drawn.mean() == pytest.approx(np.sqrt((0.01**2 + 0.03**2) / 2), rel=0.05)
-    assert grouped.likeliest_sigma(predicted)[0] == pytest.approx(drawn.mean(), rel=0.1)
+    assert grouped.most_likely_sigma(predicted)[0] == pytest.approx(drawn.mean(), rel=0.1)
 
 
 def test_of_groups_of_orders_it_is_the_product_over_both_planes() -> None:

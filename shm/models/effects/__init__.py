@@ -98,8 +98,8 @@ def parameters_of(name: str, hanger: Hanger, variant: Variant) -> tuple[Paramete
 
 
 def _narrowed(parameter: Parameter, ranges: Mapping[str, EffectPrior]) -> Parameter:
-    own = ranges.get(parameter.name)
-    return parameter if own is None else replace(parameter, lower=own.lower, upper=own.upper)
+    prior = ranges.get(parameter.name)
+    return parameter if prior is None else replace(parameter, lower=prior.lower, upper=prior.upper)
 
 
 def check_effect_priors(hanger: Hanger) -> None:

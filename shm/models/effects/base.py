@@ -1,4 +1,4 @@
-"""What an effect of the catalogue is: places where it may act, parameters, and a physical term.
+"""Define an effect of the catalogue: places where it may act, parameters and a physical term.
 
 Where effects may act: ends, planes, any place along the hanger.
 
@@ -26,7 +26,7 @@ STEEP = (0.8, 1.0, 1.2)
 
 @dataclass(frozen=True)
 class Survey:
-    """What the tests of a hanger measure and vary; each field sorted, without repeats or NaN."""
+    """List what a hanger's tests measure and vary; each field sorted, without repeats or NaN."""
 
     tests: tuple[str, ...]
     planes: tuple[Plane, ...]
@@ -40,11 +40,11 @@ class Survey:
 
 @dataclass(frozen=True)
 class Variant:
-    """Where an effect acts: `ends` (deck 0, arch 1), `planes`, the index of a sensor, a test.
+    """Name where an effect acts: `ends` (deck 0, arch 1), `planes`, the index of a sensor, a test.
 
     `at` says it in words; `key` in a word that may stand in the name of a model class. `places_m`
-    are those of the sensors where the effect acts at each of them. With `alike` one value serves
-    all its planes. `law` counts the effect's `other_laws` from 1; 0 is its own.
+    are those of the sensors where the effect acts at each of them. With `isotropic` one value
+    serves all its planes. `law` counts the effect's `other_laws` from 1; 0 is its own.
     """
 
     at: str = "everywhere"
@@ -53,7 +53,7 @@ class Variant:
     sensor: int | None = None
     test: str = ""
     places_m: tuple[float, ...] = ()
-    alike: bool = False
+    isotropic: bool = False
     law: int = 0
 
     @property
@@ -167,11 +167,11 @@ class Effect:
     localised_as: ClassVar[str] = ""
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
-        """Why these data cannot show the effect, a sentence for people; empty where they can."""
+        """Return a sentence on why these data cannot show the effect; empty where they can."""
         return ""
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        """Where it may act, of what these data could show."""
+        """Return the places where it may act, of those that these data could show."""
         return (Variant(),)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
@@ -225,20 +225,22 @@ def springs(survey: Survey) -> tuple[Variant, ...]:
     pay for a freedom that it does not have.
     """
     both = len(survey.planes) == len(PLANES)
-    alike = tuple(
-        Variant(f"{at}, both planes alike", ends=where, alike=True) for at, where in _ENDS if both
+    equal = tuple(
+        Variant(f"{at}, both planes alike", ends=where, isotropic=True)
+        for at, where in _ENDS
+        if both
     )
-    return ends_and_planes(survey) + alike
+    return ends_and_planes(survey) + equal
 
 
 def at_ends(variants: tuple[Variant, ...], ends: tuple[int, ...]) -> tuple[Variant, ...]:
-    """Those of `variants` that act at no other ends."""
+    """Return those of `variants` that act at no other ends."""
     return tuple(each for each in variants if set(each.ends) <= set(ends))
 
 
 def free_planes(variant: Variant) -> tuple[int, ...]:
     """Return the planes with a spring of their own; the first stands for all alike."""
-    return variant.planes[:1] if variant.alike else variant.planes
+    return variant.planes[:1] if variant.isotropic else variant.planes
 
 
 def place_along(hanger: Hanger) -> Parameter:
@@ -290,13 +292,13 @@ def rotational_stiffness(name: str, hanger: Hanger, hinge: bool = False) -> Para
 
     No effect is an infinite stiffness, or none at all where the description has a `hinge`.
     """
-    own = Model(hanger).wave_stiffness_n_m_rad(_MIDDLE_ORDER)
+    stiffness = Model(hanger).wave_stiffness_n_m_rad(_MIDDLE_ORDER)
     pinned, clamped = hanger.assumptions.end_restraint.bounds
     return Parameter(
         name,
         "N m/rad",
-        math.log10(pinned * own),
-        math.log10(clamped * own),
+        math.log10(pinned * stiffness),
+        math.log10(clamped * stiffness),
         -np.inf if hinge else np.inf,
         f"{pinned:g} to {clamped:g} times EI p, what the bar itself resists with in mode 4: "
         "softer is a hinge, stiffer a clamp; nobody knows the order of magnitude.",

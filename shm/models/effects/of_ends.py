@@ -60,9 +60,11 @@ class RotationalEndFlexibility(Effect):
         compliance = bar.rotational_compliance_rad_n_m.copy()
         for end in case.variant.ends:
             for plane in case.variant.planes:
-                column = 0 if case.variant.alike else case.variant.planes.index(plane)
-                own, added = compliance[:, end, plane, plane], 10.0 ** -values[:, column]
-                compliance[:, end, plane, plane] = np.where(np.isinf(own), added, own + added)
+                column = 0 if case.variant.isotropic else case.variant.planes.index(plane)
+                present, added = compliance[:, end, plane, plane], 10.0 ** -values[:, column]
+                compliance[:, end, plane, plane] = np.where(
+                    np.isinf(present), added, present + added
+                )
         return replace(bar, rotational_compliance_rad_n_m=compliance)
 
 
@@ -94,13 +96,13 @@ class TranslationalEndFlexibility(Effect):
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         first = 1 + 2 * variant.ends[0]
-        own = _lateral_stiffness_n_m(hanger)
+        stiffness = _lateral_stiffness_n_m(hanger)
         return tuple(
             Parameter(
                 f"log10_kt{first + plane}",
                 "N/m",
-                math.log10(_SOFT * own),
-                math.log10(_STIFF * own),
+                math.log10(_SOFT * stiffness),
+                math.log10(_STIFF * stiffness),
                 np.inf,
                 "3 to 3000 times T/L + 100 EI/L^3, what the bar itself resists with: what holds a "
                 "hanger is stiffer than the hanger, nobody knows by how many orders of magnitude.",
@@ -112,7 +114,7 @@ class TranslationalEndFlexibility(Effect):
         compliance = bar.translational_compliance_m_n.copy()
         for end in case.variant.ends:
             for plane in case.variant.planes:
-                column = 0 if case.variant.alike else case.variant.planes.index(plane)
+                column = 0 if case.variant.isotropic else case.variant.planes.index(plane)
                 compliance[:, end, plane] += 10.0 ** -values[:, column]
         return replace(bar, translational_compliance_m_n=compliance)
 
@@ -306,12 +308,12 @@ class SupportMotion(Effect):
         return tuple(each for each in everywhere if len(each.ends) == len(each.planes) == 1)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        own_kg = base.mass_kg(hanger)
+        hanger_kg = base.mass_kg(hanger)
         size = Parameter(
             "support_mass_kg",
             "kg",
-            0.3 * own_kg,
-            1000 * own_kg,
+            0.3 * hanger_kg,
+            1000 * hanger_kg,
             np.inf,
             "0.3 to 1000 times the hanger's mass: from a light bracket to a span of the deck.",
             spread="logarithmic",

@@ -84,12 +84,12 @@ class UnknownPointMass(Effect):
     other_laws = ("it turns with the bar, with a radius of gyration of 0.1 m",)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        own_kg = base.mass_kg(hanger)
+        hanger_kg = base.mass_kg(hanger)
         size = Parameter(
             "mass_kg",
             "kg",
-            5e-5 * own_kg,
-            0.1 * own_kg,
+            5e-5 * hanger_kg,
+            0.1 * hanger_kg,
             0.0,
             "0.005 to 10 % of the hanger's mass: from a cable tie to a coupler or a heavy clamp.",
             spread="logarithmic",
@@ -218,12 +218,12 @@ class IntermediateSupport(Effect):
         return base.planes(survey)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        own = _lateral_stiffness_n_m(hanger)
+        stiffness = _lateral_stiffness_n_m(hanger)
         size = Parameter(
             "stiffness_n_m",
             "N/m",
-            1e-3 * own,
-            100 * own,
+            1e-3 * stiffness,
+            100 * stiffness,
             0.0,
             "0.001 to 100 times T/L, what the tension itself resists with (without any, 100 "
             "EI/L^3, the bar): from a cable that leans on the hanger to a stiff tie.",

@@ -171,9 +171,9 @@ class SkewedPrincipalAxes(Effect):
     def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         angle = np.radians(values[:, 1])
         axis = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        own = 10.0 ** -values[:, 0, None, None] * axis[:, :, None] * axis[:, None, :]
+        added = 10.0 ** -values[:, 0, None, None] * axis[:, :, None] * axis[:, None, :]
         compliance = bar.rotational_compliance_rad_n_m.copy()
-        compliance[:, list(case.variant.ends)] += own[:, None]
+        compliance[:, list(case.variant.ends)] += added[:, None]
         return replace(bar, rotational_compliance_rad_n_m=compliance)
 
 

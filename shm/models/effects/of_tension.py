@@ -149,24 +149,24 @@ class JointSoftening(Effect):
     def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         ends = list(case.variant.ends)
         power = _SLIP if case.variant.law else 1.0
-        own = case.conditions.amplitude**power * 10.0 ** -values[:, 0]
+        joint = case.conditions.amplitude**power * 10.0 ** -values[:, 0]
         compliance = bar.rotational_compliance_rad_n_m.copy()
-        compliance[:, ends] += own[:, None, None, None] * np.eye(2)
+        compliance[:, ends] += joint[:, None, None, None] * np.eye(2)
         loss = bar.joint_loss_factor.copy()
         loss[:, ends] += (_LOSS_AT_REFERENCE_LEVEL * case.conditions.amplitude - loss[:, ends]) * (
-            _share(own, compliance[:, ends])
+            _share(joint, compliance[:, ends])
         )
         return replace(bar, rotational_compliance_rad_n_m=compliance, joint_loss_factor=loss)
 
 
-def _share(own: FloatArray, compliance: FloatArray) -> FloatArray:
+def _share(joint: FloatArray, compliance: FloatArray) -> FloatArray:
     """Return the joint's part (n, ends) of compliances (n, ends, 2, 2), the mean of both planes.
 
     Springs in series share their strain energy as they share the compliance, so that the loss
     factor of both is the mean weighted by it.
     """
     whole = np.trace(compliance, axis1=-2, axis2=-1)
-    part = np.broadcast_to(2 * own[:, None], whole.shape)
+    part = np.broadcast_to(2 * joint[:, None], whole.shape)
     return np.asarray(np.divide(part, whole, out=np.zeros_like(whole), where=whole > 0))
 
 
@@ -211,7 +211,7 @@ class Sag(Effect):
 
 
 def missing_levels(survey: Survey) -> str:
-    """Why an effect of the amplitude cannot be seen; empty where the levels differ enough."""
+    """Return why an effect of the amplitude is not seen; empty where the levels differ enough."""
     levels = survey.amplitudes
     if levels and max(levels) >= _LEAST_RATIO * min(levels):
         return ""

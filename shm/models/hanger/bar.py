@@ -31,7 +31,7 @@ _RIDGE = 1e-10
 
 @dataclass(frozen=True)
 class Counts:
-    """How many polynomials, and how many functions of shear strain (0: none)."""
+    """Count the polynomials and the functions of shear strain (0: none)."""
 
     polynomials: int
     shear: int
@@ -50,7 +50,7 @@ class Spans:
     mass_factor: FloatArray
 
     @property
-    def alike(self) -> bool:
+    def are_equal(self) -> bool:
         """Return True where all rows have the same stretches."""
         apart = np.ptp(self.start, axis=0).max(), np.ptp(self.length, axis=0).max()
         return bool(max(apart) < _AT_END)
@@ -80,7 +80,7 @@ class Bar:
 
     @property
     def hats(self) -> int:
-        """How many functions, the last ones, are shear strains that deflect nothing."""
+        """Return the number of functions, the last ones, of shear strain that deflect nothing."""
         return max(self.counts.shear - SHEAR_ENDS, 0)
 
     def deflections(self, x: FloatArray) -> FloatArray:
@@ -114,7 +114,7 @@ def uniform_bar(counts: Counts) -> Bar:
 
 def broken_bar(counts: Counts, spans: Spans, kinks: Kinks) -> Bar:
     """Return bars with zones, and functions with kinks."""
-    if spans.alike and np.ptp(kinks.places, axis=0).max(initial=0.0) < _AT_END:
+    if spans.are_equal and np.ptp(kinks.places, axis=0).max(initial=0.0) < _AT_END:
         return _bar_of_pieces(counts, spans, kinks)
     x, weight, which = _composite(spans, counts.polynomials + HERMITE)
     stiff = weight * np.take_along_axis(spans.stiffness_factor, which[None], axis=2)
@@ -138,10 +138,10 @@ def _bar_of_pieces(counts: Counts, spans: Spans, kinks: Kinks) -> Bar:
     """
     level = np.round(np.log(kinks.decay.clip(1.0, _MOST_DECAY)) / _DECAY_STEP).astype(int)
     level = level if kinks.count else 0 * level
-    own, which = np.unique(level, return_inverse=True)
+    levels, which = np.unique(level, return_inverse=True)
     places = tuple(kinks.forces[0].tolist()), tuple(kinks.steps[0].tolist())
     start, length = tuple(spans.start[0].tolist()), tuple(spans.length[0].tolist())
-    pieces = [_pieces(counts, start, length, *places, int(each)) for each in own]
+    pieces = [_pieces(counts, start, length, *places, int(each)) for each in levels]
 
     def each_row(name: str) -> FloatArray:
         found = [getattr(piece, name) for piece in pieces]
@@ -220,8 +220,8 @@ def _pieces(
     parts = []
     for stretch in range(count):
         rows = np.flatnonzero(which[0] == stretch)
-        own = weight[:, rows]
-        parts.append(_bar(x[:, rows], table.part(rows), own, own[None], own, counts))
+        weights = weight[:, rows]
+        parts.append(_bar(x[:, rows], table.part(rows), weights, weights[None], weights, counts))
     return _Pieces(
         np.concatenate([each.bending[:, 0] for each in parts]),
         np.concatenate([each.mass for each in parts]),
@@ -386,11 +386,11 @@ def _columns(values: list[FloatArray], rows: int) -> FloatArray:
 def _inside(places: FloatArray) -> FloatArray:
     """Return the columns that lie inside the bar in any row, each once."""
     inside = np.any((places > _AT_END) & (places < 1 - _AT_END), axis=0)
-    kept: list[FloatArray] = []
+    distinct: list[FloatArray] = []
     for column in places.T[inside]:
-        if not any(np.array_equal(column, other) for other in kept):
-            kept.append(column)
-    return _columns(kept, len(places))
+        if not any(np.array_equal(column, other) for other in distinct):
+            distinct.append(column)
+    return _columns(distinct, len(places))
 
 
 def _forces(physical: PhysicalHanger) -> FloatArray:
@@ -422,5 +422,5 @@ def _spans(physical: PhysicalHanger, edges: FloatArray, kinks: Kinks) -> Spans:
 
 def _planes(physical: PhysicalHanger) -> int:
     """1 where no zone tells the planes apart."""
-    alike = all(np.array_equal(each[:, 0], each[:, -1]) for each in map(by_plane, physical.zones))
-    return 1 if alike else physical.bending_stiffness_n_m2.shape[1]
+    equal = all(np.array_equal(each[:, 0], each[:, -1]) for each in map(by_plane, physical.zones))
+    return 1 if equal else physical.bending_stiffness_n_m2.shape[1]

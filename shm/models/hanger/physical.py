@@ -176,7 +176,7 @@ class PhysicalHanger:
 
     @property
     def gives_way(self) -> BoolArray:
-        """Which ends (ends,) are not held in all the hangers and planes."""
+        """Return True for ends (ends,) that are not held in all the hangers and planes."""
         compliances = [each.compliance_m_n for each in self.support_modes]
         moving = [np.any(c, axis=(0, 2)) for c in (self.translational_compliance_m_n, *compliances)]
         return np.asarray(np.any(moving, axis=0))
@@ -188,7 +188,7 @@ class PhysicalHanger:
 
 @dataclass(frozen=True, eq=False)
 class HangerModes:
-    """What the logger would report of `n` hangers.
+    """Hold what the logger would report of `n` hangers.
 
     `frequency_hz` (n, planes, modes), ascending in each plane; `shape` (n, planes, modes, places,
     2): the transverse and longitudinal components that the sensors at the places see, largest of

@@ -17,7 +17,7 @@ import numpy as np
 from shm.models.hanger.bar import Bar, along, bar_of, by_plane, gradient_ratio, stiffness_ratio
 from shm.models.hanger.functions import SLOPES
 from shm.models.hanger.physical import HangerModes, LateralSpring, PhysicalHanger, SupportMode
-from shm.models.hanger.system import Swing, System, are_coupled, rotational_n_m_rad, system
+from shm.models.hanger.system import Oscillator, System, are_coupled, rotational_n_m_rad, system
 from shm.values import PLANES, BoolArray, FloatArray, IntArray
 
 _PLANES = len(PLANES)
@@ -60,7 +60,7 @@ def _solve_motion(
     physical: PhysicalHanger, modes: int, with_vectors: bool
 ) -> tuple[Bar, System, Motion]:
     """Return the motion with the bar and the system it is of; one plane where both are alike."""
-    asked = one_plane(physical) if planes_alike(physical) else physical
+    asked = one_plane(physical) if are_planes_equal(physical) else physical
     extra = _PLANES if asked.gives_way.any() else 0
     bar = bar_of(asked, modes + extra)
     parts = system(asked, bar)
@@ -124,8 +124,8 @@ def _both_axes(vectors: FloatArray) -> FloatArray:
     return both
 
 
-def planes_alike(physical: PhysicalHanger) -> bool:
-    """Whether all the hangers are the same in both planes."""
+def are_planes_equal(physical: PhysicalHanger) -> bool:
+    """Return True where all the hangers are the same in both planes."""
     compliance = physical.rotational_compliance_rad_n_m
     pairs = [
         physical.bending_stiffness_n_m2,
@@ -141,8 +141,8 @@ def planes_alike(physical: PhysicalHanger) -> bool:
         ),
         *(by_plane(zone) for zone in physical.zones),
     ]
-    alike = all(np.array_equal(pair[..., 0], pair[..., -1]) for pair in pairs)
-    return alike and not are_coupled(physical)
+    equal = all(np.array_equal(pair[..., 0], pair[..., -1]) for pair in pairs)
+    return equal and not are_coupled(physical)
 
 
 def one_plane(physical: PhysicalHanger) -> PhysicalHanger:
@@ -184,7 +184,7 @@ def shapes_seen(
 
 def _deflected(bar: Bar, parts: System, vectors: FloatArray, x: FloatArray) -> FloatArray:
     """Deflections at `x` (n, points): (n, planes, axes, points, modes)."""
-    w = bar.deflections(x)[:, :, parts.kept]
+    w = bar.deflections(x)[:, :, parts.free]
     return np.asarray(w[:, None, None] @ vectors)
 
 
@@ -200,7 +200,7 @@ def _turned(moved: FloatArray, angle: FloatArray) -> FloatArray:
 
 
 def has_losses(physical: PhysicalHanger) -> bool:
-    """Whether anything adds damping."""
+    """Return True where anything adds damping."""
     springs = any(np.any(spring.loss_factor) for spring in physical.springs)
     return springs or bool(np.any(physical.joint_loss_factor))
 
@@ -254,18 +254,18 @@ def motion(physical: PhysicalHanger, parts: System, modes: int, with_vectors: bo
     rows, planes, unknowns = parts.stiffness.shape[:3]
     mass = np.broadcast_to(parts.mass, parts.stiffness.shape).reshape(-1, unknowns, unknowns)
     stiffness = parts.stiffness.reshape(mass.shape)
-    supported = any(np.any(swing.mass) for swing in parts.swings)
+    supported = any(np.any(oscillator.mass) for oscillator in parts.oscillators)
     found = spectrum(stiffness, mass, _shift(physical).ravel(), with_vectors or supported)
     axes = None if found.vectors is None else found.vectors[:, None]
     whole = _motions_as_a_whole(physical).ravel()
-    found = _without_supports(found, axes, parts.swings, whole).first(modes)
+    found = _without_supports(found, axes, parts.oscillators, whole).first(modes)
     omega = np.sqrt(found.omega_squared).reshape(rows, planes, modes) * _unit(physical)[..., None]
     if not with_vectors or found.vectors is None:
         return Motion(omega, None)
-    own = found.vectors.reshape(rows, planes, unknowns, modes)[:, :, : len(parts.kept)]
-    vectors = np.zeros((rows, planes, *own.shape[1:]))
+    of_bar = found.vectors.reshape(rows, planes, unknowns, modes)[:, :, : len(parts.free)]
+    vectors = np.zeros((rows, planes, *of_bar.shape[1:]))
     for plane in range(planes):
-        vectors[:, plane, plane] = own[:, plane]
+        vectors[:, plane, plane] = of_bar[:, plane]
     return Motion(omega, vectors)
 
 
@@ -291,13 +291,13 @@ def _coupled(physical: PhysicalHanger, parts: System, modes: int) -> Motion:
     assert found.vectors is not None
     axes = found.vectors.reshape(rows, 2, unknowns, -1)
     whole = _motions_as_a_whole(physical).sum(axis=1)
-    found = _without_supports(found, axes, parts.swings, whole)
+    found = _without_supports(found, axes, parts.oscillators, whole)
     found = found.first(_SEARCHED * modes)
     axes = _axes(found, unknowns)
     share = np.einsum("num,nuv,nvm->nm", axes[:, 0], parts_mass[:, 0], axes[:, 0], optimize=True)
     mine = [found.taken(order) for order in families(share, modes)]
     omega = np.stack([np.sqrt(each.omega_squared) for each in mine], axis=1)
-    vectors = np.stack([_axes(each, unknowns)[:, :, : len(parts.kept)] for each in mine], axis=1)
+    vectors = np.stack([_axes(each, unknowns)[:, :, : len(parts.free)] for each in mine], axis=1)
     return Motion(omega * _unit(physical)[:, :1, None], vectors)
 
 
@@ -367,7 +367,7 @@ def _ends_move(physical: PhysicalHanger) -> BoolArray:
 
 
 def _without_supports(
-    found: Spectrum, axes: FloatArray | None, swings: tuple[Swing, ...], whole: IntArray
+    found: Spectrum, axes: FloatArray | None, oscillators: tuple[Oscillator, ...], whole: IntArray
 ) -> Spectrum:
     """Without the `whole` (rows,) motions of a free bar as a whole and the supports' own modes.
 
@@ -375,9 +375,9 @@ def _without_supports(
     """
     out = np.arange(found.omega_squared.shape[1]) < whole[:, None]
     if axes is not None:
-        for swing in swings:
-            mass = swing.mass.reshape(*axes.shape[:2], 1)
-            out = _largest_out(out, mass * swing.deflection(axes) ** 2)
+        for oscillator in oscillators:
+            mass = oscillator.mass.reshape(*axes.shape[:2], 1)
+            out = _largest_out(out, mass * oscillator.deflection(axes) ** 2)
     return found.without(out) if out.any() else found
 
 

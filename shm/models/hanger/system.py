@@ -28,7 +28,7 @@ _HELD_TURNED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Swing:
+class Oscillator:
     """One mode of the support at an end: a mass on a spring, without units, both (n, planes).
 
     It deflects by the sum of the unknowns `at`, each with its `sign`.
@@ -44,60 +44,64 @@ class Swing:
         return np.asarray((vectors[:, :, self.at] * self.sign[:, None]).sum(axis=2))
 
 
-def swings(physical: PhysicalHanger, kept: IntArray) -> tuple[Swing, ...]:
-    """Those of the ends whose deflections are among the functions `kept`; first modes first.
+def find_oscillators(physical: PhysicalHanger, free: IntArray) -> tuple[Oscillator, ...]:
+    """Return those of ends whose deflections are among the functions `free`; first modes first.
 
-    The unknowns of further modes follow the kept functions'.
+    The unknowns of further modes follow the free functions'.
     """
-    firsts: list[Swing] = []
-    others: list[Swing] = []
+    firsts: list[Oscillator] = []
+    others: list[Oscillator] = []
     for end in np.flatnonzero(physical.gives_way):
-        deflection = int(np.flatnonzero(kept == DEFLECTIONS[end])[0])
-        first, *further = _at_end(physical, int(end), deflection, len(kept) + len(others))
+        deflection = int(np.flatnonzero(free == DEFLECTIONS[end])[0])
+        first, *further = _at_end(physical, int(end), deflection, len(free) + len(others))
         firsts.append(first)
         others += further
     return (*firsts, *others)
 
 
-def _at_end(physical: PhysicalHanger, end: int, deflection: int, unknown: int) -> Iterator[Swing]:
+def _at_end(
+    physical: PhysicalHanger, end: int, deflection: int, unknown: int
+) -> Iterator[Oscillator]:
     """Return the first mode, then the further ones, whose own unknowns begin with `unknown`."""
     first = SupportMode(physical.translational_compliance_m_n, physical.support_mass_kg)
     further = [each for each in physical.support_modes if np.any(each.compliance_m_n[:, end])]
-    own = np.arange(unknown, unknown + len(further))
-    alone = np.where(np.arange(1 + len(own)) == 0, 1.0, -1.0)
-    yield _swing(physical, first, end, np.array([deflection, *own]), alone)
-    for each, at in zip(further, own, strict=True):
-        yield _swing(physical, each, end, np.array([at]), np.ones(1))
+    unknowns = np.arange(unknown, unknown + len(further))
+    alone = np.where(np.arange(1 + len(unknowns)) == 0, 1.0, -1.0)
+    yield _build_oscillator(physical, first, end, np.array([deflection, *unknowns]), alone)
+    for each, at in zip(further, unknowns, strict=True):
+        yield _build_oscillator(physical, each, end, np.array([at]), np.ones(1))
 
 
-def _swing(
+def _build_oscillator(
     physical: PhysicalHanger, mode: SupportMode, end: int, at: IntArray, sign: FloatArray
-) -> Swing:
+) -> Oscillator:
     spring_n_m = translational_n_m(physical, mode.compliance_m_n)[:, end]
     mass_kg = np.where(mode.compliance_m_n > 0, mode.mass_kg, 0.0)[:, end]
     bar_kg = (physical.mass_per_length_kg_m * physical.length_m)[:, None]
-    return Swing(spring_n_m / bending_unit(physical, 3), mass_kg / bar_kg, at, sign)
+    return Oscillator(spring_n_m / bending_unit(physical, 3), mass_kg / bar_kg, at, sign)
 
 
-def on_swings(
-    stiffness: FloatArray, mass: FloatArray, found: tuple[Swing, ...]
+def add_oscillators(
+    stiffness: FloatArray, mass: FloatArray, found: tuple[Oscillator, ...]
 ) -> tuple[FloatArray, FloatArray]:
     """Return a bar's stiffness and mass with those of what swings at its ends.
 
     The bar's stiffness may be overwritten.
     """
-    more = max((int(swing.at[-1]) + 1 for swing in found), default=0) - stiffness.shape[-1]
+    more = (
+        max((int(oscillator.at[-1]) + 1 for oscillator in found), default=0) - stiffness.shape[-1]
+    )
     if more > 0:
         around = [(0, 0), (0, 0), (0, more), (0, more)]
         stiffness, mass = np.pad(stiffness, around), np.pad(mass, around)
-    if any(np.any(swing.mass) for swing in found):
+    if any(np.any(oscillator.mass) for oscillator in found):
         mass = np.broadcast_to(mass, stiffness.shape).copy()
-    for swing in found:
-        square = (..., swing.at[:, None], swing.at)
-        signs = np.outer(swing.sign, swing.sign)
-        stiffness[square] += swing.stiffness[..., None, None] * signs
-        if np.any(swing.mass):
-            mass[square] += swing.mass[..., None, None] * signs
+    for oscillator in found:
+        square = (..., oscillator.at[:, None], oscillator.at)
+        signs = np.outer(oscillator.sign, oscillator.sign)
+        stiffness[square] += oscillator.stiffness[..., None, None] * signs
+        if np.any(oscillator.mass):
+            mass[square] += oscillator.mass[..., None, None] * signs
     return stiffness, mass
 
 
@@ -107,7 +111,7 @@ def bending_unit(physical: PhysicalHanger, power: int) -> FloatArray:
 
 
 def are_coupled(physical: PhysicalHanger) -> bool:
-    """Whether a deflection in one plane bends any of the hangers in the other."""
+    """Return True where a deflection in one plane bends any of the hangers in the other."""
     compliance = physical.rotational_compliance_rad_n_m
     return compliance.shape[-1] > 1 and bool(np.any(compliance[..., 0, 1]))
 
@@ -115,15 +119,18 @@ def are_coupled(physical: PhysicalHanger) -> bool:
 def rotational_n_m_rad(physical: PhysicalHanger) -> FloatArray:
     """Of the end springs (n, ends, planes, planes)."""
     compliance = physical.rotational_compliance_rad_n_m
-    own = np.einsum("nepp->nep", compliance)
+    diagonal = np.einsum("nepp->nep", compliance)
     unit = 1 / bending_unit(physical, 1)[:, None]
     if not are_coupled(physical):
-        stiffness = 1 / np.maximum(own, _HELD * unit)
-        return np.asarray(stiffness[..., None] * np.eye(own.shape[-1]))
-    own = own + _HELD_TURNED * unit
+        stiffness = 1 / np.maximum(diagonal, _HELD * unit)
+        return np.asarray(stiffness[..., None] * np.eye(diagonal.shape[-1]))
+    diagonal = diagonal + _HELD_TURNED * unit
     both = compliance[..., 0, 1]
-    determinant = own[..., 0] * own[..., 1] - both**2
-    matrix = np.stack([own[..., 1], -both, -both, own[..., 0]], axis=-1) / determinant[..., None]
+    determinant = diagonal[..., 0] * diagonal[..., 1] - both**2
+    matrix = (
+        np.stack([diagonal[..., 1], -both, -both, diagonal[..., 0]], axis=-1)
+        / determinant[..., None]
+    )
     return np.asarray(matrix.reshape(compliance.shape))
 
 
@@ -140,17 +147,17 @@ _RIGID_IN_SHEAR = 1e12  # numerical: a share of shear below 1e-12 is lost in rou
 class System:
     """Stiffness and mass (n, planes, unknowns, unknowns).
 
-    The first unknowns are the functions `kept` of the bar, the others `swings`' own.
+    The first unknowns are the functions `free` of the bar, the others `oscillators`' own.
     """
 
     stiffness: FloatArray
     mass: FloatArray
-    kept: IntArray
-    swings: tuple[Swing, ...]
+    free: IntArray
+    oscillators: tuple[Oscillator, ...]
 
     def unknown(self, function: int) -> int | None:
-        """Which unknown a function is; None where nothing lets it move."""
-        found = np.flatnonzero(self.kept == function)
+        """Return the unknown that a function is; None where nothing lets it move."""
+        found = np.flatnonzero(self.free == function)
         return int(found[0]) if len(found) else None
 
 
@@ -163,13 +170,13 @@ def system(physical: PhysicalHanger, bar: Bar) -> System:
         stiffness[:, :, SLOPES[end], SLOPES[end]] += turning[:, end]
     if bar.hats:
         stiffness, mass = _condensed(stiffness, mass, bar.hats)
-    first, kept = _kept(physical, stiffness.shape[-1])
-    stiffness, mass = _window(stiffness, first, kept), _window(mass, first, kept)
-    found = swings(physical, kept)
-    stiffness, mass = on_swings(stiffness, mass, found)
+    first, free = _find_free(physical, stiffness.shape[-1])
+    stiffness, mass = _window(stiffness, first, free), _window(mass, first, free)
+    found = find_oscillators(physical, free)
+    stiffness, mass = add_oscillators(stiffness, mass, found)
     if np.any(physical.sag_parameter):
-        stiffness = stiffness + _sag(physical, bar, stiffness, kept)
-    return System(stiffness, mass, kept, found)
+        stiffness = stiffness + _sag(physical, bar, stiffness, free)
+    return System(stiffness, mass, free, found)
 
 
 def _condensed(
@@ -180,8 +187,8 @@ def _condensed(
     They are shear strains without deflection. Rotary inertia alone acts on them, and it changes the
     shear strain by (radius of gyration x wave number)^2, some 1e-2: frequencies by 1e-6.
     """
-    own = np.linalg.inv(stiffness[..., -count:, -count:])
-    follow = -own @ stiffness[..., -count:, :-count]
+    inverse = np.linalg.inv(stiffness[..., -count:, -count:])
+    follow = -inverse @ stiffness[..., -count:, :-count]
     cross, transposed = mass[..., :-count, -count:] @ follow, np.swapaxes(follow, -1, -2)
     turned = transposed @ mass[..., -count:, -count:] @ follow
     return (
@@ -190,19 +197,19 @@ def _condensed(
     )
 
 
-def _window(matrix: FloatArray, first: int, kept: IntArray) -> FloatArray:
-    """Rows and columns of the kept functions; a view where the first ones alone are left out."""
-    if len(kept) == matrix.shape[-1] - first:
+def _window(matrix: FloatArray, first: int, free: IntArray) -> FloatArray:
+    """Return rows and columns of the free functions; a view where only first ones are left out."""
+    if len(free) == matrix.shape[-1] - first:
         return matrix[..., first:, first:]
-    return matrix[..., kept[:, None], kept]
+    return matrix[..., free[:, None], free]
 
 
-def _kept(physical: PhysicalHanger, functions: int) -> tuple[int, IntArray]:
-    """All functions but those of ends that nothing lets move, and the least of them."""
+def _find_free(physical: PhysicalHanger, functions: int) -> tuple[int, IntArray]:
+    """Return the least of the functions that may move, and all: not those of ends held fast."""
     turning = np.any(physical.rotational_compliance_rad_n_m, axis=(0, 2, 3))
     ends = [*np.array(SLOPES)[turning], *np.array(DEFLECTIONS)[physical.gives_way]]
-    kept = np.array(sorted([*ends, *range(HERMITE, functions)]), dtype=np.int64)
-    return int(kept[0]), kept
+    free = np.array(sorted([*ends, *range(HERMITE, functions)]), dtype=np.int64)
+    return int(free[0]), free
 
 
 def _stiffness(physical: PhysicalHanger, bar: Bar) -> FloatArray:
@@ -222,7 +229,7 @@ def _stiffness(physical: PhysicalHanger, bar: Bar) -> FloatArray:
     return np.asarray(total)
 
 
-def _sag(physical: PhysicalHanger, bar: Bar, stiffness: FloatArray, kept: IntArray) -> FloatArray:
+def _sag(physical: PhysicalHanger, bar: Bar, stiffness: FloatArray, free: IntArray) -> FloatArray:
     """Return the stiffness that sag adds (n, planes, unknowns, unknowns).
 
     A motion w stretches it by the integral of y' w', y the curve at rest: a string's parabola or,
@@ -231,14 +238,14 @@ def _sag(physical: PhysicalHanger, bar: Bar, stiffness: FloatArray, kept: IntArr
     as under tension.
     """
     pull = np.zeros(stiffness.shape[:3])
-    pull[..., : len(kept)] = bar.area[:, None, kept]
+    pull[..., : len(free)] = bar.area[:, None, free]
     if physical.sags_as_it_bends:
         rest, slope = np.linalg.solve(stiffness, pull[..., None])[..., 0], np.zeros_like(pull)
-        slope[..., : len(kept)] = np.einsum(
-            "npj,nij->npi", rest[..., : len(kept)], bar.tension[:, kept[:, None], kept]
+        slope[..., : len(free)] = np.einsum(
+            "npj,nij->npi", rest[..., : len(free)], bar.tension[:, free[:, None], free]
         )
-        alike = (pull * rest).sum(axis=-1) / (slope * rest).sum(axis=-1)
-        pull = alike[..., None] * slope
+        scale = (pull * rest).sum(axis=-1) / (slope * rest).sum(axis=-1)
+        pull = scale[..., None] * slope
     dyad = pull[..., :, None] * pull[..., None, :]
     stretch = np.abs(stiffness_ratio(physical)) * physical.sag_parameter
     return np.asarray(stretch[..., None, None] * dyad)

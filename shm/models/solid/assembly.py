@@ -64,16 +64,16 @@ def bending_plane(solid: Solid, support: Support, plane: Plane) -> AffineSystem:
     free = ~_held(solid, support, axis).ravel()
     springs = _springs(solid, support, plane)
 
-    def kept(matrix: csr_array) -> csr_array:
+    def restrict(matrix: csr_array) -> csr_array:
         return csr_array(matrix[free][:, free])
 
     axis_deflection, axis_m = _deflections(solid, free, axis)
     return AffineSystem(
-        kept(solid.stiffness),
-        kept(solid.by_tension),
-        kept(solid.by_square),
-        {name: kept(matrix) for name, matrix in springs.items()},
-        kept(solid.mass),
+        restrict(solid.stiffness),
+        restrict(solid.by_tension),
+        restrict(solid.by_square),
+        {name: restrict(matrix) for name, matrix in springs.items()},
+        restrict(solid.mass),
         axis_deflection,
         axis_m,
     )
@@ -129,7 +129,7 @@ def _deflections(solid: Solid, free: BoolArray, axis: int) -> tuple[csr_array, F
 
 
 def _held(solid: Solid, support: Support, axis: int) -> BoolArray:
-    """Which displacements (nodes, 3) are zero."""
+    """Return True for displacements (nodes, 3) that are zero."""
     mesh, other = solid.mesh, 1 - axis
     held = np.zeros((mesh.nodes, 3), dtype=bool)
     held[mesh.on_plane(axis), other] = True
@@ -307,11 +307,11 @@ class Mesh:
         return int(self.grid.shape[1])
 
     def on_plane(self, axis: int) -> BoolArray:
-        """Which nodes (nodes,) lie on the plane of symmetry x = 0 (axis 0) or y = 0 (axis 1)."""
+        """Return True for nodes (nodes,) on the plane of symmetry x = 0 (axis 0) or y = 0 (1)."""
         return np.asarray(self.grid[axis] == 0)
 
     def on_end(self, arch: bool) -> BoolArray:
-        """Which nodes (nodes,) lie on the face at the deck end or the arch end."""
+        """Return True for nodes (nodes,) on the face at the deck end or the arch end."""
         return np.asarray(self.grid[2] == self._level(arch))
 
     def face_shares(self, arch: bool) -> FloatArray:

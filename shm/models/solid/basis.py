@@ -110,7 +110,7 @@ _log = logging.getLogger(__name__)
 
 
 def folder() -> Path:
-    """Where the bases are kept."""
+    """Return the folder of the stored bases."""
     if "SHM_CACHE" in os.environ:
         return Path(os.environ["SHM_CACHE"])
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "shm"

@@ -155,7 +155,7 @@ class SolidModel(Model):
         lower, upper = self.prior.lower.copy(), self.prior.upper.copy()
         lower[0] *= self.hanger.nominal_tension_n
         upper[0] *= self.hanger.nominal_tension_n
-        kept = [0, *(self.parameter_names.index(n) for n in self._slots("transverse"))]
+        columns = [0, *(self.parameter_names.index(n) for n in self._slots("transverse"))]
         geometry = Geometry(
             length_m=float(np.diff(self._ends_m())[0]),
             diameter_m=self.hanger.diameter_m,
@@ -168,10 +168,12 @@ class SolidModel(Model):
             self.hanger.mass_per_length_kg_m / self.hanger.area_m2,
             self.is_unstressed,
         )
-        return Description(geometry, material, self.support, tuple(lower[kept]), tuple(upper[kept]))
+        return Description(
+            geometry, material, self.support, tuple(lower[columns]), tuple(upper[columns])
+        )
 
     def _ends_m(self) -> tuple[float, float]:
-        """Where the model begins and ends along the hanger."""
+        """Return where the model begins and ends along the hanger."""
         return 0.0, self.hanger.length_m
 
     def _points(self, theta: FloatArray, plane: Plane) -> FloatArray:
@@ -187,7 +189,7 @@ class SolidModel(Model):
 
 
 def _not_a_round_rod(hanger: Hanger) -> str:
-    """Why the hanger is not the uniform round rod that is meshed; empty where it is."""
+    """Return why the hanger is not the uniform round rod that is meshed; empty where it is."""
     if math.isnan(hanger.diameter_m):
         return "it models a round rod: give diameter_m."
     disc = math.pi * hanger.diameter_m**2 / 4

@@ -186,7 +186,7 @@ Edge = tuple[bool, bool]
 
 @dataclass(frozen=True)
 class Support:
-    """Whether the end faces stand on springs along the axis, and on springs in their plane.
+    """Tell whether the end faces stand on springs along the axis, and in their plane.
 
     What is not on springs is held.
     """

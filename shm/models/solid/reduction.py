@@ -154,8 +154,8 @@ class Reservoir:
         rest = self._beyond(self._beyond(new))
         gram = rest.T @ (self.reference @ rest)
         strength, direction = np.linalg.eigh(gram)
-        kept = strength > _NEGLIGIBLE**2
-        added = self._beyond(rest @ (direction[:, kept] / np.sqrt(strength[kept])))
+        significant = strength > _NEGLIGIBLE**2
+        added = self._beyond(rest @ (direction[:, significant] / np.sqrt(strength[significant])))
         self.matrices = self._grown(added)
         self.vectors = np.hstack([self.vectors, added])
         padding = np.zeros((added.shape[1], self.coordinates.shape[1]))
@@ -200,8 +200,8 @@ class Reservoir:
         strongest = np.linalg.svd(self.coordinates, full_matrices=False)[0][:, :unknowns]
         mass = strongest.T @ self.matrices[0] @ strongest
         share, direction = np.linalg.eigh(mass)
-        kept = share > _LOST_IN_ROUNDING * share[-1]
-        basis = strongest @ (direction[:, kept] / np.sqrt(share[kept]))
+        significant = share > _LOST_IN_ROUNDING * share[-1]
+        basis = strongest @ (direction[:, significant] / np.sqrt(share[significant]))
         projected = basis.T @ self.matrices[1:] @ basis
         return basis, Projected((projected + projected.swapaxes(1, 2)) / 2)
 
@@ -260,8 +260,8 @@ def _solution(system: AffineSystem, point: FloatArray, modes: int) -> Modes:
 
 def _error(projected: Projected, points: FloatArray, truth_hz: FloatArray) -> FloatArray:
     """Return the worst fractional error (m,) of each point's frequencies (m, modes)."""
-    own = projected.frequencies_hz(points, truth_hz.shape[1])
-    return np.asarray(np.abs(own / truth_hz - 1).max(axis=1))
+    reduced_hz = projected.frequencies_hz(points, truth_hz.shape[1])
+    return np.asarray(np.abs(reduced_hz / truth_hz - 1).max(axis=1))
 
 
 def _least_certain(

@@ -51,9 +51,9 @@ class GroupedLikelihood(ThesisLikelihood):
         parts = zip(self._parts, self.by_name.items(), strict=True)
         return {name: part.draw_sigma(predicted[:, own], rng) for part, (name, own) in parts}
 
-    def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
+    def most_likely_sigma(self, predicted: FloatArray) -> FloatArray:
         parts = zip(self._parts, self.by_name.values(), strict=True)
-        return self._mean([part.likeliest_sigma(predicted[:, own]) for part, own in parts])
+        return self._mean([part.most_likely_sigma(predicted[:, own]) for part, own in parts])
 
     def _mean(self, sigmas: Sequence[FloatArray]) -> FloatArray:
         weights = [len(own) for own in self.by_name.values()]
