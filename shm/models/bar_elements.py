@@ -26,13 +26,14 @@ _BUBBLES = 6
 class BarElements:
     """Energies of a bar without lateral deflection at its ends; all matrices (d, d) are symmetric.
 
-    `bending`, `mass` and `turning` have a matrix for each zone: 0 is the bar itself, then the
-    zones in order. `shear` is empty for a bar that does not shear. `end_rotation` (2, d) are the
-    rotations of the deck's and the arch's section, `area` (d,) the integral of the deflection.
-    `gradient` is that of a tension x - 1/2, which grows along the bar.
+    `mass` and `turning` have a matrix for each zone: 0 is the bar itself, then the zones in order.
+    `curvature` (points, d) of each is weighted so that its square is the energy of bending. `shear`
+    is empty for a bar that does not shear. `end_rotation` (2, d) are the rotations of the deck's
+    and the arch's section, `area` (d,) the integral of the deflection. `gradient` is that of a
+    tension x - 1/2, which grows along the bar.
     """
 
-    bending: FloatArray
+    curvature: tuple[FloatArray, ...]
     tension: FloatArray
     gradient: FloatArray
     mass: FloatArray
@@ -42,6 +43,11 @@ class BarElements:
     area: FloatArray
     edges: FloatArray
     degrees: tuple[int, ...]
+
+    @property
+    def bending(self) -> FloatArray:
+        """Return the matrices (zones, d, d) of bending."""
+        return np.array([each.T @ each for each in self.curvature])
 
     def deflection(self, x: FloatArray) -> FloatArray:
         """Return the deflection (points, d) of each function at places `x` from 0 to 1."""
@@ -88,7 +94,8 @@ def bar_elements(
     w_count = 1 + max(max(indices) for indices in columns)
     strains = _strain_columns(degrees, w_count) if shears else [[] for _ in degrees]
     count = w_count + (1 + max(max(indices) for indices in strains) - w_count if shears else 0)
-    bending, mass, turning = (np.zeros((len(zones) + 1, count, count)) for _ in range(3))
+    mass, turning = (np.zeros((len(zones) + 1, count, count)) for _ in range(2))
+    curvatures: list[list[FloatArray]] = [[] for _ in range(len(zones) + 1)]
     tension, gradient, shear = (np.zeros((count, count)) for _ in range(3))
     area, rotation = np.zeros(count), np.zeros((2, count))
     for index, (start, length, degree) in enumerate(zip(edges[:-1], lengths, degrees, strict=True)):
@@ -109,7 +116,9 @@ def bar_elements(
         middle = start + length / 2
         zone = next((k for k, (a, b) in enumerate(zones, 1) if a < middle < b), 0)
 
-        bending[zone][place] += _energy(curvature[free], weight)
+        bent = np.zeros((len(x), count))
+        bent[:, indices[free]] = (curvature[free] * np.sqrt(weight)).T
+        curvatures[zone].append(bent)
         mass[zone][place] += _energy(w[free], weight)
         turning[zone][place] += _energy(turn[free], weight)
         tension[place] += _energy(slope[free], weight)
@@ -120,8 +129,9 @@ def bar_elements(
     rotation[0, first[1]], rotation[1, last[3]] = 1.0, 1.0
     if shears:
         rotation[0, strains[0][0]], rotation[1, strains[-1][1]] = -1.0, -1.0
+    curvature = tuple(np.vstack([np.zeros((0, count)), *each]) for each in curvatures)
     return BarElements(
-        bending, tension, gradient, mass, turning, shear if shears else np.empty((0, 0)),
+        curvature, tension, gradient, mass, turning, shear if shears else np.empty((0, 0)),
         rotation, area, edges, degrees,
     )  # fmt: skip
 

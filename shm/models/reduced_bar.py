@@ -146,7 +146,7 @@ class _Matrices:
 
     stiffness: FloatArray
     mass: FloatArray
-    zones: int
+    curvature: tuple[FloatArray, ...]
     shears: bool
     diagonal_mass: bool = False
 
@@ -163,13 +163,19 @@ class _Matrices:
         moved, turned = elements.deflection(masses_at), elements.slope(masses_at)
         for w, turn in zip(moved, radii[:, None] * turned, strict=True):
             mass.append(np.outer(w, w) + np.outer(turn, turn))
-        zones = len(elements.bending) - 1
-        return cls(np.array(stiffness), np.array(mass), zones, shears)
+        return cls(np.array(stiffness), np.array(mass), elements.curvature, shears)
 
     def projected(self, basis: FloatArray) -> _Matrices:
-        """Return the same in a reduced basis (d, r)."""
+        """Return the same in a reduced basis (d, r).
+
+        Bending by its curvature: a short zone moves nearly as a rigid body, and the difference of
+        its large stiffnesses would be rounding.
+        """
         stiffness, mass = (basis.T @ each @ basis for each in (self.stiffness, self.mass))
-        return _Matrices(stiffness, mass, self.zones, self.shears)
+        curvature = tuple(each @ basis for each in self.curvature)
+        for zone, each in enumerate(curvature):
+            stiffness[zone] = each.T @ each
+        return _Matrices(stiffness, mass, curvature, self.shears)
 
     def diagonalised(self, usual: BarTerms) -> FloatArray:
         """Return a change of basis (d, d) in which masses like `usual` are as diagonal as can be.
