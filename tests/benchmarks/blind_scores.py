@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import beta
 
 from shm.diagnosis_document import diagnosis_of
+from shm.report.diagnosis_summary import write_lead
 from shm.values import Diagnosis, Outcome
 from shm.values.leading import MIN_NO_GAP_PROBABILITY
 from shm.values.posterior import ENOUGH_EFFECTIVE
@@ -165,7 +166,7 @@ def find_contradictions(found: Diagnosis) -> list[str]:
     if is_settled and (failed or found.effective_draws < ENOUGH_EFFECTIVE):
         said.append("settled, though the sampler failed")
     doubted = [each for each in found.remarks if each.startswith("Doubtful")]
-    if doubted and not verdict.is_doubted:
+    if doubted and "of this hanger" not in write_lead(found):
         said.append("a remark doubts that the tests are of this hanger, the verdict does not")
     before, after = found.tension_before_n, found.tension_after_n
     for each in (before, after):

@@ -264,7 +264,7 @@ def test_interval_of_fractions() -> None:
         (NO_GAP, ""),
         (replace(EXPLAINED, unexplained_probability=0.1), "add to"),
         (replace(EXPLAINED, remarks=("The sampler failed for sag: 8 draws.",)), "sampler"),
-        (replace(EXPLAINED, remarks=("Doubtful: test t1. Of another hanger.",)), "of this hanger"),
+        (replace(EXPLAINED, remarks=("Doubtful: test t1. Of another hanger.",)), ""),
         (replace(EXPLAINED, tension_after_n=replace(TENSION, q975=101.5)), "its mean"),
         (replace(NO_GAP, no_gap_probability=0.92, causes=(), unexplained_probability=0.08), ""),
         (
