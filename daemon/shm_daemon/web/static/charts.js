@@ -161,7 +161,7 @@
   }
 
   function tell(chart, text) {
-    chart.querySelector(".told").textContent = text;
+    chart.querySelector(".told").textContent = text.replaceAll("`", "");
   }
 
   function describe(chart, figure) {
