@@ -35,6 +35,7 @@ _COMMAND = re.compile(
     rf"`shm (?P<quoted>{_VERBS})(?![ -][a-z])(?P<options>[^`]*)`"
     rf"|\bshm (?P<bare>gap diagnose|drift rebaseline|drift bridge)(?P<rest>{_OPTIONS})"
 )
+_AGAIN = re.compile(r"\b([Dd])rop it again with `hanger = (\d+)` in its sidecar")
 _LINK = Markup('<a href="{}">{}</a>')
 _OF_PAGE: ContextVar[int | None] = ContextVar("hanger of the page", default=None)
 
@@ -46,6 +47,11 @@ def set_hanger(hanger: int | None) -> None:
 
 def with_links(text: str) -> Markup:
     """Return the text for a page: commands as links to pages, where there is one, else as code."""
+    if again := _AGAIN.search(text):
+        before, after = text[: again.start()], text[again.end() :]
+        verb = "Upload it again" if again[1] == "D" else "upload it again"
+        link = _LINK.format("/upload", verb)
+        return with_links(before) + link + f" as hanger {again[2]}" + with_links(after)
     parts, end = [], 0
     for found in _COMMAND.finditer(text):
         verb = found["quoted"] or found["bare"]
@@ -58,7 +64,7 @@ def with_links(text: str) -> Markup:
 
 def without_commands(text: str) -> str:
     """Return the text with the names of pages for their commands, where a link cannot stand."""
-    return str(with_links(text).striptags()) if "`" in text else text
+    return with_links(text).striptags()
 
 
 def _link(verb: str, options: str, text: str) -> Markup | None:

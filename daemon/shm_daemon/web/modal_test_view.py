@@ -76,9 +76,9 @@ class TestFigure:
 # Judgement: a figure of one panel fits a laptop's screen with its caption, one of several fills it.
 MEMBERS: tuple[TestFigure, ...] = (
     TestFigure("Response", RESPONSE, "both", lambda sheet: 620),
+    TestFigure("Response", STABILISATION, "file", lambda sheet: 520),
     TestFigure("Hits", TIME_HISTORY, "file", lambda sheet: 680),
     TestFigure("Hits", HITS, "file", lambda sheet: 760),
-    TestFigure("Response", STABILISATION, "file", lambda sheet: 520),
     TestFigure(
         "Shapes",
         SHAPES,
