@@ -77,8 +77,8 @@ class TestFigure:
 MEMBERS: tuple[TestFigure, ...] = (
     TestFigure("Response", RESPONSE, "both", lambda sheet: 620),
     TestFigure("Response", STABILISATION, "file", lambda sheet: 520),
-    TestFigure("Hits", TIME_HISTORY, "file", lambda sheet: 680),
-    TestFigure("Hits", HITS, "file", lambda sheet: 760),
+    TestFigure("Hits", TIME_HISTORY, "file", lambda sheet: 640),
+    TestFigure("Hits", HITS, "file", lambda sheet: 720),
     TestFigure(
         "Shapes",
         SHAPES,
