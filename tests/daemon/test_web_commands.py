@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 import pytest
 
-from shm_daemon.web.commands import set_hanger, with_links, without_commands
+from shm_daemon.web.commands import set_reader, with_links, without_commands
 
 
 @pytest.fixture(autouse=True)
 def no_hanger() -> Iterator[None]:
-    set_hanger(None)
+    set_reader(None)
     yield
-    set_hanger(None)
+    set_reader(None)
 
 
 @pytest.mark.parametrize(
@@ -44,8 +44,16 @@ def test_a_command_without_a_page_stays_as_code(command: str) -> None:
 def test_a_command_without_a_number_is_of_the_hanger_of_the_page() -> None:
     text = "Once it is explained, set a new baseline (`shm drift rebaseline`)."
     assert "<code>shm drift rebaseline</code>" in with_links(text)
-    set_hanger(3)
+    set_reader(3)
     assert '<a href="/hangers/3/baseline">' in with_links(text)
+
+
+def test_a_page_for_engineers_is_named_to_others_without_a_link() -> None:
+    set_reader(3, is_engineer=False)
+    assert with_links("set a new baseline (`shm drift rebaseline`)") == (
+        "set a new baseline (Baseline)"
+    )
+    assert '<a href="/hangers/3/diagnosis">' in with_links("ask `shm gap diagnose`")
 
 
 def test_words_of_others_are_escaped() -> None:

@@ -9,6 +9,7 @@ import httpx
 import pytest
 
 from shm.store import Workspace
+from shm.store.queries.hangers import find_latest_diagnosis
 from shm_daemon.web.background_work import BackgroundWorker
 from tests.daemon.test_web_baseline import outcome
 from tests.daemon.test_web_people import add_a_user_of_each_role, sign_in
@@ -53,7 +54,7 @@ def test_an_operator_has_it_diagnosed_and_reads_it_on_the_hangers_page(
     found = outcome(browser, ordered)
     assert found.status_code == 200
     with workspace.store() as store:
-        kept = store.posteriors.latest_diagnosis(3)
+        kept = find_latest_diagnosis(store, 3)
     assert kept is not None
     shown = browser.get("/hangers/3").text
     assert "Diagnose anew" in shown

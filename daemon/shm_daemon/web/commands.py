@@ -37,12 +37,15 @@ _COMMAND = re.compile(
 )
 _AGAIN = re.compile(r"\b([Dd])rop it again with `hanger = (\d+)` in its sidecar")
 _LINK = Markup('<a href="{}">{}</a>')
-_OF_PAGE: ContextVar[int | None] = ContextVar("hanger of the page", default=None)
+_FOR_ENGINEERS = frozenset({"Baseline", "Settings"})
+_HANGER: ContextVar[int | None] = ContextVar("hanger of the page", default=None)
+_IS_ENGINEER: ContextVar[bool] = ContextVar("an engineer reads the page", default=True)
 
 
-def set_hanger(hanger: int | None) -> None:
-    """Set the hanger that the page is about, which a command without a number means."""
-    _OF_PAGE.set(hanger)
+def set_reader(hanger: int | None, *, is_engineer: bool = True) -> None:
+    """Set the hanger of the page, which a command without a number means, and who reads it."""
+    _HANGER.set(hanger)
+    _IS_ENGINEER.set(is_engineer)
 
 
 def with_links(text: str) -> Markup:
@@ -70,11 +73,13 @@ def without_commands(text: str) -> str:
 def _link(verb: str, options: str, text: str) -> Markup | None:
     """Return the link to the page of a command; None where its hanger is not known."""
     address, name = next((address, name) for each, address, name in _PAGES if each == verb)
+    if name in _FOR_ENGINEERS and not _IS_ENGINEER.get():
+        return escape(name)
     numbered = re.match(r" (\d+)\b", options)
     address = address.replace("{number}", f"-{numbered[1]}" if numbered else "")
     if "{hanger}" in address:
         given = re.search(r"--hanger (\d+)", options) or re.match(r"Hanger (\d+)\b", text)
-        hanger = int(given[1]) if given else _OF_PAGE.get()
+        hanger = int(given[1]) if given else _HANGER.get()
         if hanger is None:
             return None
         address = address.replace("{hanger}", str(hanger))

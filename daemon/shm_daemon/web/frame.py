@@ -26,7 +26,7 @@ from shm.report.as_html import ENVIRONMENT as OF_REPORTS
 from shm.report.as_html import environment
 from shm.report.figures.style import PALETTE
 from shm.store.queries.alerts import count_alerts
-from shm_daemon.web.commands import set_hanger, with_links, without_commands
+from shm_daemon.web.commands import set_reader, with_links, without_commands
 from shm_daemon.web.health import notices
 from shm_daemon.web.site import Site
 
@@ -61,7 +61,8 @@ def page(request: Request, template: str, *, status: int = 200, **content: Any) 
     site = request.app.state.site
     assert isinstance(site, Site)
     number = request.path_params.get("hanger_id")
-    set_hanger(int(number) if str(number).isdecimal() else None)
+    hanger = int(number) if str(number).isdecimal() else None
+    set_reader(hanger, is_engineer=visitor is not None and visitor.is_engineer)
     text = _environment().get_template(template).render(
         visitor=visitor,
         bridge=site.workspace.bridge.name if visitor else "",
