@@ -60,7 +60,7 @@ def page(request: Request, template: str, *, status: int = 200, **content: Any) 
     visitor = getattr(request.state, "visitor", None)
     site = request.app.state.site
     assert isinstance(site, Site)
-    number = request.path_params.get("hanger_id")
+    number = request.path_params.get("hanger_id", "")
     hanger = int(number) if str(number).isdecimal() else None
     set_reader(hanger, is_engineer=visitor is not None and visitor.is_engineer)
     text = _environment().get_template(template).render(
