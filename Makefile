@@ -5,6 +5,8 @@
 #   make demo-live  the same with permanent sensors
 #   make lint       ruff, mypy, import-linter
 #   make docs       the manual: build/manual/index.html
+#   make wheel      dist/shm-VERSION-py3-none-any.whl, with the manual
+#   make image      the container's image, shm:VERSION, by podman or docker
 #   make bench      the slow tests and every benchmark: build/bench/table.md
 #   make ablation   ROOM=watch, identify or inference: what a room loses without each mechanism
 #   make lock       the pinned requirement files
@@ -20,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # With it set, each of the hundreds of processes that the tests start would compile all its imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo demo-live test lint docs bench ablation lock clean
+.PHONY: demo demo-live test lint docs wheel image bench ablation lock clean
 
 demo: .venv/runtime
 	$(BIN)/shm demo
@@ -45,6 +47,16 @@ docs: .venv/development
 	$(BIN)/sphinx-build --quiet -W --keep-going -b html -d build/manual-doctrees docs build/manual
 	@echo "The manual: build/manual/index.html"
 
+wheel: docs
+	$(BIN)/python -m build --wheel --no-isolation --outdir dist .
+	@echo "Install it with its extras: uv pip install --constraint requirements-dev.txt 'dist/NAME.whl[web]'"
+
+VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
+CONTAINER = $(shell command -v podman || command -v docker)
+image:
+	@test -n "$(CONTAINER)" || { echo "Install podman or docker first." >&2; exit 1; }
+	$(CONTAINER) build --file config/container/Containerfile --tag shm:$(VERSION) .
+
 # Goes on where it stopped, and after what fails: build/bench/table.md.
 bench: .venv/development
 	$(BIN)/python tests/benchmarks/every.py
@@ -59,7 +71,7 @@ lock: .venv/uv
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
 		--extra build pyproject.toml --output-file requirements.txt
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
-		--extra build --extra dev --extra alerts --extra campbell --extra distributed --extra export --extra miniseed --extra mqtt --extra postgres --extra seedlink --extra sso --extra tdms --extra web \
+		--extra build --extra dev --extra alerts --extra audio --extra campbell --extra distributed --extra export --extra miniseed --extra mqtt --extra postgres --extra seedlink --extra sso --extra tdms --extra web \
 		--constraint requirements.txt pyproject.toml --output-file requirements-dev.txt
 	echo "uv==0.13.8" | $(BIN)/uv pip compile --quiet --universal --python-version 3.11 \
 		--generate-hashes - --output-file requirements-uv.txt

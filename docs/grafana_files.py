@@ -386,13 +386,13 @@ def files() -> dict[str, str]:
 
 def _data_source(source: Source) -> Mapping[str, Any]:
     found: dict[str, Any] = {"name": "shm", "uid": source.uid, "type": source.kind}
-    found |= {"access": "proxy", "url": "$SHM_DATABASE_URL"}
+    found |= {"access": "proxy", "url": "$TIMESERIES_URL"}
     if source is INFLUX:
         found |= {
-            "user": "$SHM_DATABASE_USER",
+            "user": "$TIMESERIES_USER",
             "jsonData": {"dbName": "shm", "version": "InfluxQL"},
         }
-        found |= {"secureJsonData": {"password": "$SHM_DATABASE_PASSWORD"}}
+        found |= {"secureJsonData": {"password": "$TIMESERIES_PASSWORD"}}
     return {"apiVersion": 1, "datasources": [found]}
 
 

@@ -116,7 +116,7 @@ class _Shm(ModuleType):
 
     def __setattr__(self, name: str, value: object) -> None:
         if name == "values":
-            import_module("shm.values.showing").hand_over_to(self)
+            import_module("shm.values.showing").set_display_package(self)
         if name in _STEPS_AND_PACKAGES and type(value) is ModuleType:
             value.__class__ = _Package
             return  # the name is the step's, which `__getattr__` loads

@@ -79,7 +79,7 @@ T = TypeVar("T")
 _Hook = Callable[[Any, Any], Any]
 
 
-class Misfit(ValueError):
+class ValidationError(ValueError):
     """A part of a document that is not the expected value; `key` is the one at fault."""
 
     def __init__(self, message: str, key: str):
@@ -98,7 +98,7 @@ def value_of(kind: type[T], node: object, path: str = "", by: cattrs.Converter |
     except (cattrs.BaseValidationError, ValueError) as error:
         message, _, at = transform_error(error, path, _message)[0].rpartition(" @ ")
     label, _, key = at.rpartition(".")
-    raise Misfit(f"{label and label + ': '}{key} {message}".strip(), key.partition("[")[0])
+    raise ValidationError(f"{label and label + ': '}{key} {message}".strip(), key.partition("[")[0])
 
 
 def _message(error: BaseException, _: object) -> str:

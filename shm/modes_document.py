@@ -16,7 +16,7 @@ from typing import Any
 from cattrs import Converter
 from cattrs.gen import make_dict_structure_fn
 
-from shm.documents import Misfit, finite, key_meant, reader, value_of
+from shm.documents import ValidationError, finite, key_meant, reader, value_of
 from shm.errors import BadInput
 from shm.values import LONGEST_TEST_ID, AddedMass, ModalTest, Mode, is_test_id, outdoor_c
 
@@ -132,7 +132,7 @@ def _parse_test(test: Any, hanger: int | None, index: int, file: str | Path) -> 
     filled = {**test, "hanger": hanger, "id": _id(test.get("id", f"t{index + 1}"), label, file)}
     try:
         found = value_of(ModalTest, filled, label, _READER)
-    except Misfit as error:
+    except ValidationError as error:
         remedy = _REMEDIES.get(error.key, _LEAVE_OUT)
         raise BadInput(f"{error}.", file=file, remedy=remedy) from error
     for wrong, problem, remedy in _faults(found):

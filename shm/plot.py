@@ -34,9 +34,9 @@ from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.modal_test_modes import SHAPES, STABILISATION
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
-from shm.report.figures.modal_test_response import Shown
+from shm.report.figures.modal_test_response import ResponseCurves
 from shm.report.figures.recording_channels import FIGURE as CHANNELS
-from shm.report.figures.specification import Member, Specification
+from shm.report.figures.specification import FigureSpec, Specification
 from shm.values import Diagnosis, GapCheck, Hanger, ModalTest, Posterior, Recording
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def frequency_response(
         >>> test = shm.identify(shm.read("hanger3.csv"), hanger=hanger)
         >>> figure = shm.plot.frequency_response(test)
     """
-    return _drawn(RESPONSE, Shown.of(ModalTestReport(test, hanger=hanger)), ax)
+    return _drawn(RESPONSE, ResponseCurves.of(ModalTestReport(test, hanger=hanger)), ax)
 
 
 def stabilisation(test: Identification, hanger: Hanger | None = None, *, ax: Ax = None) -> Figure:
@@ -147,7 +147,7 @@ def stabilisation(test: Identification, hanger: Hanger | None = None, *, ax: Ax 
     Example:
         >>> figure = shm.plot.stabilisation(test)
     """
-    return _drawn(STABILISATION, Shown.of(ModalTestReport(test, hanger=hanger)), ax)
+    return _drawn(STABILISATION, ResponseCurves.of(ModalTestReport(test, hanger=hanger)), ax)
 
 
 def shapes(test: Identification, hanger: Hanger, *, ax: Ax = None) -> Figure:
@@ -156,7 +156,7 @@ def shapes(test: Identification, hanger: Hanger, *, ax: Ax = None) -> Figure:
     Example:
         >>> figure = shm.plot.shapes(test, hanger)
     """
-    return _drawn(SHAPES, Shown.of(ModalTestReport(test, hanger=hanger)), ax)
+    return _drawn(SHAPES, ResponseCurves.of(ModalTestReport(test, hanger=hanger)), ax)
 
 
 def gap(diagnosis: Diagnosis, hanger: Hanger, *, ax: Ax = None) -> Figure:
@@ -195,7 +195,7 @@ def recording(recording: Recording, *, ax: Ax = None) -> Figure:
     return _drawn(CHANNELS, recording, ax)
 
 
-def _drawn(member: Member[Data], data: Data, ax: Ax) -> Figure:
+def _drawn(member: FigureSpec[Data], data: Data, ax: Ax) -> Figure:
     """Draw a figure, on `ax` where that is given; raises NothingThere, UsageError."""
     specification = member.draw(data)
     if not isinstance(specification, Specification):

@@ -39,6 +39,13 @@ def unit_file(name: str) -> Path:
     return _locate(f"config/{name}")
 
 
+def manual() -> Path:
+    """Return the first page of the manual, which need not be there."""
+    inside_wheel = _PACKAGE / "manual"
+    folder = inside_wheel if inside_wheel.exists() else _PACKAGE.parent / "build" / "manual"
+    return folder / "index.html"
+
+
 def when_asked(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
     """Build the `__getattr__` of a package that imports each name from its module in `homes`."""
 

@@ -130,9 +130,11 @@ def command(
     _write([replace(each, temperature_c=temperature_c) for each in got.hits], out)
     if got.lost:
         many = counted(len(got.hits), "hit")
-        kept = f"{many} {'is' if len(got.hits) == 1 else 'are'} kept in {out}"
+        stored_words = f"{many} {'is' if len(got.hits) == 1 else 'are'} kept in {out}"
         remedy = "Check its cable, and repeat the test."
-        raise BadInput(f"{got.lost} {kept if got.hits else 'No hit was recorded'}.", remedy=remedy)
+        raise BadInput(
+            f"{got.lost} {stored_words if got.hits else 'No hit was recorded'}.", remedy=remedy
+        )
     answer(*_answer(got, out))
 
 

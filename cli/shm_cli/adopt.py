@@ -8,7 +8,7 @@ import rich_click as click
 
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
-from shm.pipeline.adopting import Wish, gap_watch
+from shm.pipeline.adopting import AdoptionRequest, gap_watch
 from shm.pipeline.adopting import adopt as adopt_in_store
 from shm.report.formatting import model_class
 from shm.store import Store, StoredAdoption
@@ -57,7 +57,7 @@ def adopt(
     \b
     Example: shm gap adopt --hanger 3 --effect point_mass --why "clamp of the lamp at 3.4 m"
     """
-    request = Wish(effects, at, baseline, why, who)
+    request = AdoptionRequest(effects, at, baseline, why, who)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         with progress_bar("adopting") as progress:

@@ -22,7 +22,7 @@ from shm.pipeline import Flow
 from shm.read import Peek, PeekChannel, bundle
 from shm.read.sandbox import load_modes, peek_test
 from shm.store import (
-    AGAIN_FROM,
+    RERUN_STAGES,
     Decision,
     Outcome,
     Receipt,
@@ -54,7 +54,7 @@ from shm_cli.working import finish, rerun_document, send_back, working
 @click.option(
     "--from",
     "stage",
-    type=click.Choice([stage.value for stage in AGAIN_FROM]),
+    type=click.Choice([stage.value for stage in RERUN_STAGES]),
     help="With --again: the first stage that is done again.  [default: identified]",
 )
 @click.option("--held", is_flag=True, help="Instead of files: show what is held, and why.")

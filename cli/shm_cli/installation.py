@@ -1,4 +1,4 @@
-"""`shm settings` and `shm notices`: what an installation holds: settings, other packages."""
+"""`shm settings`, `shm manual`, `shm notices`: what an installation holds."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm.errors import UsageError
+from shm.errors import NothingThere, UsageError
+from shm.resources import manual
 from shm.settings import TABLE, Setting
 from shm_cli import flags
 from shm_cli.assumed import assumptions_section, show_assumptions
-from shm_cli.common import markdown, show, show_rows
+from shm_cli.common import answer, markdown, show, show_rows
 
 _HEADS = ("setting", "default", "unit", "range", "meaning")
 
@@ -54,6 +55,25 @@ def settings_command(
         show({"settings": [_document(row) for row in TABLE]})
     else:
         show_rows("", _HEADS, [(row.name, *_cells(row)) for row in TABLE])
+
+
+@click.command("manual")
+@flags.json
+def manual_command() -> None:
+    """Print where the manual is.
+
+    Open the printed file in a browser. It needs no network.
+
+    \b
+    Example: shm manual
+    """
+    page = manual()
+    if not page.is_file():
+        raise NothingThere(
+            "this installation came without the manual.",
+            remedy="Install the wheel of `make wheel`, run `make docs`, or read docs/index.md.",
+        )
+    answer({"page": str(page)}, str(page))
 
 
 def settings_page() -> str:

@@ -96,6 +96,7 @@ GROUPS: dict[str, dict[str, Verb]] = {
         ),
         "doctor": Verb("shm_cli.checkup", "Check the installation and the workspace.", "doctor"),
         "completion": Verb("shm_cli.completion", "Print the completion script of bash or zsh."),
+        "manual": Verb("shm_cli.installation", "Print where the manual is.", "manual_command"),
         "notices": Verb(
             "shm_cli.installation", "List installed packages and licences.", "notices_command"
         ),

@@ -126,12 +126,21 @@ def web(
 
 
 _HOMES = (Path("/home"), Path("/root"), Path("/run/user"))
+_OF_ROOT = "# The workspace belongs to root: better give it to a user who can harm nothing else."
 _PLAIN = re.compile(r"[A-Za-z0-9_./:@+,=-]+")
 
 
 def print_unit(name: str, workspace: Path, words: Sequence[str], *writes: Path) -> None:
-    """Print the unit `name` of the shm that runs here: see `unit_text`."""
-    click.echo(unit_text(name, workspace, Path(sys.prefix), words, *writes), nl=False)
+    """Print the unit `name` of the shm that runs here: see `unit_text`; warn of root."""
+    text = unit_text(name, workspace, Path(sys.prefix), words, *writes)
+    if _OF_ROOT in text:
+        click.echo(
+            f"Warning: {workspace} belongs to root, so this service runs as root, and so do the "
+            "programs of its hooks. Give the workspace to a user of its own and print the unit "
+            f"again: useradd --system shm; chown -R shm {workspace}",
+            err=True,
+        )
+    click.echo(text, nl=False)
 
 
 def serving_words(host: str, port: int, files: Mapping[str, Path | None]) -> Sequence[str]:
@@ -163,7 +172,7 @@ def unit_text(name: str, workspace: Path, prefix: Path, words: Sequence[str], *w
     for key, value in values.items():
         line = re.compile(rf"^{re.escape(key)}=.*$", re.MULTILINE)
         text = line.sub(lambda _, key=key, value=value: f"{key}={value}", text, count=1)  # type: ignore[misc]
-    return text
+    return text.replace("\nUser=root\n", f"\n{_OF_ROOT}\nUser=root\n")
 
 
 def _refuse_odd(texts: Sequence[str]) -> None:

@@ -21,8 +21,8 @@ from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.controls import control_charts
-from shm.pipeline.telling import quiet_until
-from shm.pipeline.unheard import stream_leads
+from shm.pipeline.notification_plan import quiet_until
+from shm.pipeline.stream_health import stream_leads
 from shm.report.control_report import chart_document
 from shm.report.formatting import Interval, model_class, with_half
 from shm.report.hanger_status import Status, bridge_message
@@ -54,7 +54,7 @@ from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document
 from shm_daemon.heartbeat import duration_words, seconds_since_beat, why_turn_failed
-from shm_daemon.spool import never_taken, scan
+from shm_daemon.spool import scan, unsupported_entries
 
 if TYPE_CHECKING:
     from shm.store import FormerPosterior, FormerTest
@@ -269,7 +269,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "spool": len(scan(workspace.spool)),
         "never_taken": [
             {"path": str(path.relative_to(workspace.spool)), "what": what}
-            for path, what in sorted(never_taken(workspace.spool).items())
+            for path, what in sorted(unsupported_entries(workspace.spool).items())
         ],
         "quarantine": sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json")),
         "alerts": len(alerts),

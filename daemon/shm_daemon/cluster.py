@@ -48,7 +48,7 @@ class Cluster(Executor):
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Raises ShmError with `retry_after_s` where no cluster can be had or one is unlike us."""
-        step = partial(run_if_alike, traits(), partial(fn, *args, **kwargs))
+        step = partial(run_if_same_versions, traits(), partial(fn, *args, **kwargs))
         there = self._connected().get_executor(pure=False).submit(step)
         here: Future[T] = Future()
         here.add_done_callback(lambda done: there.cancel() if done.cancelled() else None)
@@ -79,7 +79,7 @@ def traits() -> dict[str, str]:
     }
 
 
-def run_if_alike(expected: Mapping[str, str], step: Callable[[], T]) -> T:
+def run_if_same_versions(expected: Mapping[str, str], step: Callable[[], T]) -> T:
     """Runs a step on a worker; raises ShmError where the worker is unlike the daemon."""
     _refuse_unlike(platform.node(), traits(), expected)
     return step()

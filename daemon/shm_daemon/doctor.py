@@ -25,12 +25,13 @@ from shm import __version__
 from shm.bridge import AppriseHook, Bridge, Hook, WebhookHook
 from shm.errors import NothingThere, ShmError
 from shm.models import competing_names
-from shm.pipeline.telling import quiet_until
+from shm.pipeline.notification_plan import quiet_until
 from shm.read import sandbox
 from shm.report.formatting import counted
 from shm.report.paper import read_logo
 from shm.settings import Settings
 from shm.store import Workspace
+from shm.store.point_outbox import PointOutbox
 from shm.store.rows import Delivery, DeliveryState, Silence
 from shm.store.stored_alerts import silenced_until
 from shm.store.workspace import FOLDERS
@@ -98,6 +99,20 @@ def check_other_bridges(workspace: Workspace) -> Iterator[Finding]:
         yield from _secrecy(workspace, check, other.token_file)
 
 
+def check_publications(examined: of_store.DoctorContext) -> Iterator[Finding]:
+    """Find databases that do not take the results; nothing where `bridge.toml` names none."""
+    workspace = examined.workspace
+    outbox = PointOutbox(workspace.folder)
+    for each in workspace.bridge.publications:
+        check, state = f"publish {each.name}", outbox.state(each.name)
+        if state.refused or state.why:
+            remedy = "The daemon tries again each minute, and sends what waits once it is taken."
+            yield warning(check, state.words or state.why, remedy)
+        else:
+            yield ok(check, f"{each.url}: {state.waiting} points wait")
+        yield from _secrecy(workspace, check, each.token_file)
+
+
 def check_logo(workspace: Workspace) -> Iterator[Finding]:
     """Check whether the logo of the reports can be read; nothing where none is named."""
     path = workspace.bridge.letterhead.logo
@@ -107,7 +122,7 @@ def check_logo(workspace: Workspace) -> Iterator[Finding]:
         yield ok("logo", path.name)
 
 
-def check_deliveries(examined: of_store.Examined) -> Iterator[Finding]:
+def check_deliveries(examined: of_store.DoctorContext) -> Iterator[Finding]:
     """Check whether alerts wait for their hooks, or were given up."""
     store, now = examined.store, examined.now
     waiting = store.alerts.list_deliveries(DeliveryState.WAITING)
@@ -180,7 +195,7 @@ _CHECKS: Sequence[tuple[str, of_store.Check]] = (
     ("deliveries", check_deliveries),
     ("hangers", of_store.check_hangers),
     ("streams", of_store.check_streams),
-    ("publish", of_store.check_publications),
+    ("publish", check_publications),
     ("settings", of_store.check_changed_settings),
 )
 _REPORT = "This is a fault of shm; please report it."
@@ -219,7 +234,7 @@ def _of_store(workspace: Workspace, now: datetime) -> Iterator[Finding]:
         return
     with store:
         for name, check in _CHECKS:
-            yield from _found(name, partial(check, of_store.Examined(workspace, store, now)))
+            yield from _found(name, partial(check, of_store.DoctorContext(workspace, store, now)))
 
 
 def _found(name: str, check: Callable[[], Iterable[Finding]]) -> list[Finding]:

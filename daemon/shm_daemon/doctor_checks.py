@@ -15,17 +15,16 @@ from enum import StrEnum
 from pathlib import Path
 
 from shm.pipeline.lineage import discarded_of_baselines, redescribed
-from shm.pipeline.unheard import REMEDIES, backlog_leads, heard, ring_leads
+from shm.pipeline.stream_health import REMEDIES, backlog_leads, heard, ring_leads
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
-from shm.store.point_outbox import PointOutbox
 from shm.store.queries.hangers import list_selected_models
 from shm.store.queries.recordings import count_stages, list_holds, list_recordings, list_under_way
 from shm.store.queries.tests import count_tests
 from shm.store.queries.upkeep import find_last_backup, find_newest_step, list_copies, list_removed
 from shm_daemon.heartbeat import duration_words, patience_s, seconds_since_beat, why_turn_failed
-from shm_daemon.spool import is_sidecar, left_alone, never_taken, scan
+from shm_daemon.spool import is_sidecar, scan, unfinished_uploads, unsupported_entries
 
 # Judgement: a step takes seconds to minutes, so that work which stands for longer than these is
 # looked into; shorter ones would warn of a burst of files, longer ones hide a fault for a shift.
@@ -64,7 +63,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Examined:
+class DoctorContext:
     """Subject of the checks: an open workspace with its open store, and the time."""
 
     workspace: Workspace
@@ -72,7 +71,7 @@ class Examined:
     now: datetime
 
 
-Check = Callable[[Examined], Iterator[Finding]]
+Check = Callable[[DoctorContext], Iterator[Finding]]
 """A check of a store that can be read; it may raise ShmError and OSError, which become findings."""
 
 
@@ -102,7 +101,7 @@ def some(names: list[str], most: int = 5) -> str:
     return ", ".join(names[:most]) + more
 
 
-def check_daemon(examined: Examined) -> Iterator[Finding]:
+def check_daemon(examined: DoctorContext) -> Iterator[Finding]:
     """Check whether a daemon is active, and its loop goes round."""
     workspace = examined.workspace
     holder, ago_s = workspace.holder(), seconds_since_beat(workspace)
@@ -125,7 +124,7 @@ def check_daemon(examined: Examined) -> Iterator[Finding]:
         yield ok("daemon", f"{holder} is active, {seen}")
 
 
-def check_spool(examined: Examined) -> Iterator[Finding]:
+def check_spool(examined: DoctorContext) -> Iterator[Finding]:
     """Check whether files wait in the spool, or lie there for ever."""
     spool = examined.workspace.spool
     ages = [_age(path, examined.now) for path in scan(spool)]
@@ -138,7 +137,7 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
         late = max(ages) > WAITS_LONG
         remedy = "Is a daemon active, and what does its log say of these files?"
         yield warning("spool", found, remedy) if late else ok("spool", found)
-    never = never_taken(spool)
+    never = unsupported_entries(spool)
     if never:
         named = [f"{path.relative_to(spool)} is {what}" for path, what in sorted(never.items())]
         yield warning(
@@ -146,7 +145,7 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
             f"never taken: {some(named)}",
             "Only files are taken: put the file itself there, readable by the daemon's user.",
         )
-    left = [(path, _age(path, examined.now)) for path in left_alone(spool)]
+    left = [(path, _age(path, examined.now)) for path in unfinished_uploads(spool)]
     sidecars = [path.name for path, age in left if is_sidecar(path) and age > _ALONE]
     if sidecars:
         yield warning(
@@ -163,7 +162,7 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
         )
 
 
-def check_under_way(examined: Examined) -> Iterator[Finding]:
+def check_under_way(examined: DoctorContext) -> Iterator[Finding]:
     """Check whether a recording has been standing still."""
     store, now = examined.store, examined.now
     unready = _without_baseline(examined)
@@ -189,7 +188,7 @@ def check_under_way(examined: Examined) -> Iterator[Finding]:
         yield ok("recordings", found)
 
 
-def check_quarantine(examined: Examined) -> Iterator[Finding]:
+def check_quarantine(examined: DoctorContext) -> Iterator[Finding]:
     """Check which files were refused, and since when."""
     folder = examined.workspace.quarantine.folder
     reasons = sorted(folder.glob("*.reason.json"), key=lambda path: path.stat().st_mtime)
@@ -198,8 +197,8 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
         return
     first, last = (_age(path, examined.now) for path in (reasons[0], reasons[-1]))
     try:
-        said = json.loads(reasons[-1].read_text(encoding="utf-8"))
-        why = f"{said['file']}: {said['message']}"
+        document = json.loads(reasons[-1].read_text(encoding="utf-8"))
+        why = f"{document['file']}: {document['message']}"
     except (OSError, ValueError, KeyError, TypeError):
         why = reasons[-1].name
     yield warning(
@@ -210,7 +209,7 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
     )
 
 
-def check_held(examined: Examined) -> Iterator[Finding]:
+def check_held(examined: DoctorContext) -> Iterator[Finding]:
     """Check whether recordings wait for a person to decide."""
     found = list_holds(examined.store)
     if not found:
@@ -224,7 +223,7 @@ def check_held(examined: Examined) -> Iterator[Finding]:
     )
 
 
-def check_raw_files(examined: Examined) -> Iterator[Finding]:
+def check_raw_files(examined: DoctorContext) -> Iterator[Finding]:
     """Check whether the raw files of the latest recordings are where the store says."""
     store, archive = examined.store, examined.workspace.archive
     latest = list_recordings(store)[-_LOOKED_AT:]
@@ -242,7 +241,7 @@ def check_raw_files(examined: Examined) -> Iterator[Finding]:
         yield warning("raw files", *of_no_recording(names))
 
 
-def _without_baseline(examined: Examined) -> set[int]:
+def _without_baseline(examined: DoctorContext) -> set[int]:
     """Hangers whose tests rightly wait until there are enough of them for a baseline."""
     wanted = examined.workspace.settings.baseline_tests
     selected = list_selected_models(examined.store)
@@ -259,7 +258,7 @@ def _age(path: Path, now: datetime) -> timedelta:
     return max(now - since, timedelta(0))
 
 
-def check_store(examined: Examined) -> Iterator[Finding]:
+def check_store(examined: DoctorContext) -> Iterator[Finding]:
     """Check whether the store is whole, as far as a quick look tells."""
     store = examined.store
     troubles = quick_troubles(store)
@@ -277,7 +276,7 @@ def check_store(examined: Examined) -> Iterator[Finding]:
         )
 
 
-def check_backup(examined: Examined) -> Iterator[Finding]:
+def check_backup(examined: DoctorContext) -> Iterator[Finding]:
     """Check how old the last backup is, and how many raw files have no copy."""
     store, now = examined.store, examined.now
     last = find_last_backup(store)
@@ -294,7 +293,7 @@ def check_backup(examined: Examined) -> Iterator[Finding]:
         yield warning("backup", f"raw files without a copy elsewhere: {alone}", remedy)
 
 
-def check_clock(examined: Examined) -> Iterator[Finding]:
+def check_clock(examined: DoctorContext) -> Iterator[Finding]:
     """Check whether the clock has jumped back, and whether anything sets it."""
     newest, now = find_newest_step(examined.store), examined.now
     if newest is not None and newest - now > _CLOCK_TOLERANCE:
@@ -313,7 +312,7 @@ def check_clock(examined: Examined) -> Iterator[Finding]:
         yield warning("clock", "not synchronised", "`timedatectl set-ntp true`.")
 
 
-def check_hangers(examined: Examined) -> Iterator[Finding]:
+def check_hangers(examined: DoctorContext) -> Iterator[Finding]:
     """Check which hangers have no test, none lately, or no baseline."""
     store, bridge = examined.store, examined.workspace.bridge
     settings, latest = examined.workspace.settings, count_tests(store)
@@ -349,7 +348,7 @@ def check_hangers(examined: Examined) -> Iterator[Finding]:
         yield ok("hangers", f"{len(ids)}, with a baseline and recent tests")
 
 
-def _outdated_baselines(examined: Examined) -> Iterator[Finding]:
+def _outdated_baselines(examined: DoctorContext) -> Iterator[Finding]:
     """Baselines that are not what they were made from any more."""
     store = examined.store
     baselines = [
@@ -367,7 +366,7 @@ def _outdated_baselines(examined: Examined) -> Iterator[Finding]:
             yield warning("hangers", f"{found}: {some(hangers)}", f"Set a new baseline: `{anew}`.")
 
 
-def check_streams(examined: Examined) -> Iterator[Finding]:
+def check_streams(examined: DoctorContext) -> Iterator[Finding]:
     """Nothing where `bridge.toml` describes no stream."""
     found = heard(examined.workspace, examined.store, examined.now)
     for state, remedy in REMEDIES.items():
@@ -383,19 +382,7 @@ def check_streams(examined: Examined) -> Iterator[Finding]:
         yield ok("streams", f"{counted(len(found), 'stream')}, heard within the hour")
 
 
-def check_publications(examined: Examined) -> Iterator[Finding]:
-    """Find databases that do not take the results; nothing where `bridge.toml` names none."""
-    outbox = PointOutbox(examined.workspace.folder)
-    for each in examined.workspace.bridge.publications:
-        check, state = f"publish {each.name}", outbox.state(each.name)
-        if state.refused or state.why:
-            remedy = "The daemon tries again each minute, and sends what waits once it is taken."
-            yield warning(check, state.words or state.why, remedy)
-        else:
-            yield ok(check, f"{each.url}: {state.waiting} points wait")
-
-
-def check_changed_settings(examined: Examined) -> Iterator[Finding]:
+def check_changed_settings(examined: DoctorContext) -> Iterator[Finding]:
     """List settings that hold instead of `bridge.toml`: who reads it must learn of them."""
     changed = examined.store.settings.list_current().values()
     yield ok("settings", "; ".join(map(str, changed)) or "all as bridge.toml says")

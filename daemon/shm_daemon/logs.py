@@ -80,17 +80,17 @@ class JsonFormatter(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         """The record as JSON."""
         time = datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
-        told: dict[str, object] = {
+        document: dict[str, object] = {
             "time": time.replace("+00:00", "Z"),
             "level": record.levelname.lower(),
             "logger": record.name,
             "message": record.getMessage(),
         }
         known = ((name, getattr(record, name, None)) for name in FIELDS)
-        told |= {name: value for name, value in known if value is not None}
+        document |= {name: value for name, value in known if value is not None}
         if record.exc_info:
-            told["traceback"] = self.formatException(record.exc_info)
-        return json.dumps(told, default=str)
+            document["traceback"] = self.formatException(record.exc_info)
+        return json.dumps(document, default=str)
 
 
 class JournalFormatter(logging.Formatter):

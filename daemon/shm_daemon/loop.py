@@ -132,7 +132,7 @@ def _begin(
         clock=clock,
         lanes=settings.workers + 1,
         wake=wakeup.ring,
-        meanwhile=(pulse := Pulse(workspace)),
+        on_progress=(pulse := Pulse(workspace)),
     )
     stack.callback(flow.close)
     streaming = Streaming(
@@ -280,7 +280,7 @@ class Daemon:
         return error.retry_after_s is None and (self._once or not mends)
 
     def _scan(self) -> None:
-        self._heed_description()
+        self._take_over_description()
         self._refuse_other_disks()
         whole = self._tracker.whole(scan(self._flow.workspace.spool, self._pulse))
         until, sharing = time.monotonic() + _RECEIVING_S, Sharing(self._pulse)
@@ -337,7 +337,7 @@ class Daemon:
                     retry_after_s=_UNREADABLE_S,
                 )
 
-    def _heed_description(self) -> None:
+    def _take_over_description(self) -> None:
         """Takes a changed `bridge.toml` or setting over; a wrong one leaves the last in force."""
         workspace = self._flow.workspace
         described = modified_ns(workspace), self._flow.store.settings.newest()

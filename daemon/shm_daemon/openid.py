@@ -131,8 +131,8 @@ class Provider:
             status = error.response.status_code
             raise _passing(f"{host} answers with status {status}.", _OTHERWISE) from error
         except (requests.RequestException, ValueError, KeyError, TypeError) as error:
-            said = f"{host} does not answer as OpenID Connect has it ({type(error).__name__})."
-            raise _passing(said, _DESCRIBE) from error
+            text = f"{host} does not answer as OpenID Connect has it ({type(error).__name__})."
+            raise _passing(text, _DESCRIBE) from error
         finally:
             self._places.release()
 
@@ -144,8 +144,8 @@ class Provider:
                 remedy="An engineer corrects client_id in [single_sign_on] of bridge.toml, or the "
                 f"secret in {self.described.client_secret_file.name}.",
             )
-        said = f"{self.described.host} does not confirm the sign-in: {error.error}."
-        return ShmError(said, remedy="Begin again.")
+        text = f"{self.described.host} does not confirm the sign-in: {error.error}."
+        return ShmError(text, remedy="Begin again.")
 
 
 def _session(

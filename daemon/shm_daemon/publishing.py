@@ -24,38 +24,30 @@ from shm.errors import ShmError
 from shm.pipeline import Clock
 from shm.pipeline.publishing import Progress, queue_results
 from shm.store import Store, Workspace
-from shm.store.point_outbox import PointOutbox, WaitingPoint
+from shm.store.point_outbox import PointOutbox
 from shm_daemon.hooks.contract import SHOWN_CHARACTERS, one_line
 from shm_daemon.hooks.webhook import Lines, reason_of, unchanged
 
-_POINTS_REFUSED = (
-    HTTPStatus.BAD_REQUEST,
-    HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
-    HTTPStatus.UNPROCESSABLE_ENTITY,
-)
+_POINTS_REFUSED = (HTTPStatus.BAD_REQUEST, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How often to look and to retry, in s; how many lines go at once (InfluxData: 5000).
-
-    With more than `max_refused` points refused it is not the points that are wrong.
-    """
+    """Define how often to look and to retry, in s, and the lines of one post (InfluxData: 5000)."""
 
     look_s: float = 10.0
     retry_s: float = 60.0
     at_once: int = 5000
-    max_refused: int = 20
 
 
 class NotTaken(ShmError):
-    """A database did not take points; `of_points` says that it is these, not who sends them."""
+    """A database took nothing of what it was sent; another try may help."""
 
-    def __init__(self, message: str, *, remedy: str, of_points: bool = False):
-        super().__init__(message, remedy=remedy)
-        self.of_points = of_points
+
+class PointsRefused(ShmError):
+    """A database understood and refused some of the points, and says why."""
 
 
 def token_of(publication: Publication, workspace: Workspace, environment: Mapping[str, str]) -> str:
@@ -78,7 +70,7 @@ def token_of(publication: Publication, workspace: Workspace, environment: Mappin
 def post(
     publication: Publication, token: str, lines: Sequence[str], web: Lines, timeout_s: float
 ) -> None:
-    """Post lines of the line protocol; raises NotTaken where not all of them were taken."""
+    """Post lines of the line protocol; raises NotTaken or PointsRefused."""
     headers = {"Content-Type": "text/plain; charset=utf-8", "User-Agent": "shm"}
     if token and publication.bucket:
         headers["Authorization"] = f"Token {token}"
@@ -106,7 +98,7 @@ def post(
         raise _refusal(publication, status, words)
 
 
-def _refusal(publication: Publication, status: int, words: bytes) -> NotTaken:
+def _refusal(publication: Publication, status: int, words: bytes) -> ShmError:
     try:
         document = json.loads(words)
         said = document.get("error") or document.get("message") or ""
@@ -120,11 +112,9 @@ def _refusal(publication: Publication, status: int, words: bytes) -> NotTaken:
     }.get(status, "See its log.")
     if 300 <= status < 400:
         remedy = "It is not followed: write the address that it sends to into [[publish]]."
-    return NotTaken(
-        f"{publication.url} answered {status}: {one_line(str(said)) or 'no message'}.",
-        remedy=remedy,
-        of_points=status in _POINTS_REFUSED,
-    )
+    kind = PointsRefused if status in _POINTS_REFUSED else NotTaken
+    message = f"{publication.url} answered {status}: {one_line(str(said)) or 'no message'}."
+    return kind(message, remedy=remedy)
 
 
 class Publisher:
@@ -137,7 +127,6 @@ class Publisher:
         self._store: Store | None = None
         self._progress: dict[str, Progress] = {}
         self._retry_at: dict[str, float] = {}
-        self._refused = 0
 
     def use(self, workspace: Workspace) -> None:
         """Take a changed description over, and try at once what it may have corrected."""
@@ -162,11 +151,18 @@ class Publisher:
     def _deliver(self, publication: Publication) -> None:
         """Post all that waits; note and log why where it is not taken."""
         name, before = publication.name, self._outbox.state(publication.name).why
-        self._refused = 0
+        timeout_s = self._workspace.settings.hook_timeout_seconds
         try:
             token = token_of(publication, self._workspace, os.environ)
             while waiting := self._outbox.list_waiting(name, self.pace.at_once):
-                self._send(publication, token, waiting)
+                lines = [each.line for each in waiting]
+                try:
+                    post(publication, token, lines, self._web, timeout_s)
+                except PointsRefused as error:  # it has taken the others
+                    log.warning("publish %s: %s", name, error)
+                    self._outbox.mark(waiting, "refused")
+                else:
+                    self._outbox.mark(waiting, "taken")
         except NotTaken as error:
             why = f"{error.message} {error.remedy}"
             self._retry_at[name] = time.monotonic() + self.pace.retry_s
@@ -175,26 +171,6 @@ class Publisher:
         if why != before and not self._web.closed:
             self._outbox.note_failure(name, why, self._clock())
             log.warning("publish %s: %s", name, why) if why else log.info("publish %s: works", name)
-
-    def _send(self, publication: Publication, token: str, points: Sequence[WaitingPoint]) -> None:
-        """Send points; halve those that are refused, until those at fault are known."""
-        timeout_s = self._workspace.settings.hook_timeout_seconds
-        try:
-            post(publication, token, [each.line for each in points], self._web, timeout_s)
-        except NotTaken as error:
-            if not error.of_points:
-                raise
-            if len(points) > 1:
-                for half in (points[: len(points) // 2], points[len(points) // 2 :]):
-                    self._send(publication, token, half)
-                return
-            self._refused += 1
-            if self._refused > self.pace.max_refused:
-                raise
-            log.warning("publish %s: refused: %s: %s", publication.name, points[0].line, error)
-            self._outbox.mark(points, "refused")
-        else:
-            self._outbox.mark(points, "taken")
 
     def close(self) -> None:
         if self._store is not None:

@@ -69,11 +69,12 @@ class Record:
 class Progress:
     """The record of each station from which on not all is on disk: its number and its time.
 
-    `known` are those that came after it and are on disk; `done_us` is up to when samples are.
+    `known` are number and time of those after it that are on disk; `done_us` is up to when samples
+    are.
     """
 
     last: dict[str, tuple[int, str]]
-    known: dict[str, list[int]]
+    known: dict[str, list[tuple[int, int]]]
     done_us: int = 0
 
     @classmethod
@@ -82,7 +83,9 @@ class Progress:
         with suppress(OSError, ValueError, KeyError, TypeError):
             found = json.loads(path.read_text(encoding="utf-8"))
             last = {key: (int(seq), str(time)) for key, (seq, time) in found["last"].items()}
-            known = {key: list(map(int, numbers)) for key, numbers in found["known"].items()}
+            known = {
+                key: [(int(n), int(us)) for n, us in some] for key, some in found["known"].items()
+            }
             return cls(last, known, int(found["done_us"]))
         return cls({}, {})
 
@@ -109,7 +112,7 @@ class StreamAsker:
     def run(self) -> None:
         """Receive until ended; what fails is noted, and tried again."""
         self._path.parent.mkdir(exist_ok=True)
-        with self._workspace.store() as self._store, suppress(asyncio.CancelledError):
+        with suppress(asyncio.CancelledError):
             asyncio.run(self._serve())
 
     def end(self) -> None:
@@ -121,21 +124,29 @@ class StreamAsker:
 
     async def _serve(self) -> None:
         self._loop, self._task = asyncio.get_running_loop(), asyncio.current_task()
+        known = (ShmError, OSError, _library().SeedLinkError)
         while not self._ended.is_set():
             try:
-                await self._receive()
+                with self._workspace.store() as self._store:
+                    await self._receive_or_note()
             except Exception as error:  # the daemon goes on without this stream
-                is_known = isinstance(error, (ShmError, OSError, _library().SeedLinkError))
+                is_known = isinstance(error, known)
                 name = self._stream.name
                 log.warning("stream %s waits: %s", name, error, exc_info=not is_known)
-                if not isinstance(error, ShmError) and not self._arrived:
-                    self._note_refused(error)
             await asyncio.sleep(self._pace.retry_s)
+
+    async def _receive_or_note(self) -> None:
+        try:
+            await self._receive()
+        except (OSError, _library().SeedLinkError) as error:
+            if not self._arrived:
+                self._note_refused(error)
+            raise
 
     def _note_refused(self, error: Exception) -> None:
         """Note once an hour why the server sends nothing, or something that cannot be used."""
         told = BadInput(
-            f"{self._feed.host}:{self._feed.port}: {one_line(str(error)) or 'connection closed'}.",
+            f"{self._feed.host}:{self._feed.port}: {one_line(str(error))}.",
             remedy="See that the server runs and has these channels; it is asked again.",
         )
         assert self._store is not None
@@ -166,7 +177,7 @@ class StreamAsker:
             log.info("stream %s: connected to %s", self._stream.name, client.server_id)
             async for packet in client.collect(reconnect=False):
                 self._take(packet)
-            raise library.SeedLinkError("")
+            raise library.SeedLinkError("the connection ended")
         except library.SeedLinkTimeout:
             self._flush_all()
             raise
@@ -187,7 +198,8 @@ class StreamAsker:
         of_packet = packet.station_id, packet.seqnum or 0, channel
         record = Record(*of_packet, start_us, end_us, packet.payload)
         self._arrived.setdefault(record.station, deque()).append(record)
-        if record.sequence in self._progress.known.get(record.station, ()):
+        of_record = record.sequence, record.start_us
+        if of_record in self._progress.known.get(record.station, ()):
             return
         if end_us <= self._progress.done_us:  # a clock went back, or a gap is filled
             self._flush_all()
@@ -273,8 +285,8 @@ class StreamAsker:
                 done = arrived.popleft()
                 time = time_of(done.start_us).isoformat()
                 self._progress.last[station] = done.sequence, time
-            numbers = [each.sequence for each in arrived if id(each) not in needed]
-            self._progress.known[station] = numbers
+            known = [(r.sequence, r.start_us) for r in arrived if id(r) not in needed]
+            self._progress.known[station] = known
         replace_text(self._path, dump(vars(self._progress)) + "\n")
 
 

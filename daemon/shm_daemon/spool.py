@@ -56,11 +56,11 @@ class Look:
     sidecar_size_bytes: int = 0
 
 
-def scan(spool: Path, meanwhile: Callable[[], object] = lambda: None) -> dict[Path, Look]:
-    """The files of the spool that may become recordings; calls `meanwhile` at each."""
+def scan(spool: Path, on_progress: Callable[[], object] = lambda: None) -> dict[Path, Look]:
+    """The files of the spool that may become recordings; calls `on_progress` at each."""
     found = {}
     for path in _entries(spool):
-        meanwhile()
+        on_progress()
         if not path.name.lower().endswith(LEFT_ALONE):
             look = _look(path)
             if look is not None:
@@ -73,7 +73,7 @@ def is_sidecar(path: Path) -> bool:
     return path.name.lower().endswith(SIDECAR_SUFFIX)
 
 
-def left_alone(spool: Path) -> list[Path]:
+def unfinished_uploads(spool: Path) -> list[Path]:
     """Uploads that are not finished, and sidecars whose file is not there."""
     files = [path for path in _entries(spool) if isinstance(_lying(path), os.stat_result)]
     awaited = {sidecar_path(path) for path in files if not is_sidecar(path)}
@@ -84,7 +84,7 @@ def left_alone(spool: Path) -> list[Path]:
     ]
 
 
-def never_taken(spool: Path) -> dict[Path, str]:
+def unsupported_entries(spool: Path) -> dict[Path, str]:
     """Return the entries of the spool that will never be taken, by what they are."""
     unlisted: dict[Path, str] = {}
 

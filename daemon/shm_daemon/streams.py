@@ -31,14 +31,14 @@ import numpy as np
 from shm.errors import BadInput, DoubledChunk, ShmError, retry_pause_s
 from shm.pipeline.faults import move_to_quarantine
 from shm.pipeline.lineage import read_limits
-from shm.pipeline.unheard import sweep_ring
+from shm.pipeline.stream_health import sweep_ring
 from shm.read import sidecar_path
 from shm.read.chunk_document import BY_TIME, chunk_document
 from shm.read.sandbox import read_test
 from shm.store import Store, Workspace
 from shm.store.archive import checksum, refuse_oversize
 from shm.store.queries.streams import list_stream_events
-from shm.store.ring import Kept, ring_of
+from shm.store.ring import StoredChunk, ring_of
 from shm.values import Channel, FloatArray, Recording
 from shm.values.stream import Chunk, Stream, StreamEvent
 from shm_daemon.spool import STREAMS, FileStabilityTracker, scan
@@ -48,7 +48,7 @@ log = logging.getLogger(__name__)
 
 def take_chunks(
     workspace: Workspace, store: Store, stream: str, contents: Sequence[bytes], now: datetime
-) -> list[Kept]:
+) -> list[StoredChunk]:
     """Keeps chunks of a stream: they are on disk when this returns.
 
     Raises BadInput where one cannot be used, which is noted, and ShmError with `retry_after_s`

@@ -23,7 +23,7 @@ Tell = Callable[[str], object]
 
 @dataclass(frozen=True)
 class AcquireOptions:
-    """How hits are recorded, and when they are enough.
+    """Define how hits are recorded, and when they are enough.
 
     `seconds` is the ring-down that is recorded of each hit, after `pre_trigger_s`; a hit begins
     where the force exceeds `trigger_share` of full scale. There are `least_hits` to `most_hits`;

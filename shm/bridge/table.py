@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
-from shm.documents import Misfit, finite, reader, value_of
+from shm.documents import ValidationError, finite, reader, value_of
 from shm.errors import BadInput, suggest
 
 _READER = reader(finite)
@@ -60,7 +60,7 @@ class Table:
             found = value_of(kind, self.values[key], by=_READER)
             if holds(found):
                 return found
-        except Misfit:
+        except ValidationError:
             pass  # the table says what is wrong in its own words
         raise self.refusal(f"{key} = {self.values[key]!r} {wrong}", remedy)
 

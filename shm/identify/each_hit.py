@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.identify.contract import FoundMode, Hit, Measurement
-from shm.identify.estimation.courses import Course, course_of, phases_of
+from shm.identify.estimation.courses import RingDownCourse, course_of, phases_of
 from shm.identify.measuring.signal_faults import DOUBLE_HIT
 from shm.values import NAN, Mode
 
@@ -53,7 +53,9 @@ def modes_of_each_hit(
     return tuple(sorted(rows, key=lambda row: (row.hit.record, row.hit.start)))
 
 
-def _in_course(course: Course, found: Sequence[FoundMode], mode: Mode) -> tuple[float, float]:
+def _in_course(
+    course: RingDownCourse, found: Sequence[FoundMode], mode: Mode
+) -> tuple[float, float]:
     """Return frequency and damping ratio of a mode in one ring-down, by weighted straight lines."""
     away = [abs(each.frequency_hz / mode.frequency_hz - 1) for each in found]
     index = int(np.argmin(away))

@@ -49,7 +49,7 @@ from shm.identify.setup_merging.hit_directions import (
     pool_hits,
     refine_by_direction,
 )
-from shm.identify.setup_merging.join_set_ups import Joined, join_set_ups
+from shm.identify.setup_merging.join_set_ups import JoinedFinding, join_set_ups
 from shm.identify.setup_merging.modal_participation import fitted
 from shm.identify.setup_merging.products import joined_response
 from shm.values import (
@@ -170,7 +170,7 @@ def identify(
 
 
 def _placed(
-    found: Joined,
+    found: JoinedFinding,
     measurements: Sequence[Measurement],
     hanger: Hanger | None,
     steady: Sequence[Tone],
@@ -181,8 +181,8 @@ def _placed(
 
 
 def _windowed_pass(
-    found: Joined, measurements: Sequence[Measurement], options: IdentifyOptions
-) -> Joined | None:
+    found: JoinedFinding, measurements: Sequence[Measurement], options: IdentifyOptions
+) -> JoinedFinding | None:
     """Return the finding completed by windows over the band; None where they show no more."""
     if len(measurements) > 1 or options.identifier != "ssi":
         return None
@@ -213,7 +213,7 @@ def _looked_at(
 
 def _of_placed(
     measurements: Sequence[Measurement],
-    found: Joined,
+    found: JoinedFinding,
     placement: Placement,
     hanger: Hanger | None,
     options: IdentifyOptions,
@@ -281,7 +281,9 @@ def _cross_check(
     return _found(measurements, name, options).finding
 
 
-def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOptions) -> Joined:
+def _found(
+    measurements: Sequence[Measurement], name: str, options: IdentifyOptions
+) -> JoinedFinding:
     """Run the identifier of that name on each set-up and return its findings joined."""
     function = identifier(name)
     # What tests differ by is allowed for once, not set-up by set-up.
@@ -296,11 +298,11 @@ def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOpti
     return replace(found, finding=_allowed_for(found.finding, options.shape_allowance))
 
 
-def _of_modes_alone(found: Joined) -> Joined:
+def _of_modes_alone(found: JoinedFinding) -> JoinedFinding:
     """Return the finding without the sidebands of modes."""
     finding = without_sidebands(found.finding)
-    kept = [any(mode is own for own in finding.modes) for mode in found.finding.modes]
-    apart = tuple(tuple(compress(modes, kept)) for modes in found.apart)
+    remains = [any(mode is other for other in finding.modes) for mode in found.finding.modes]
+    apart = tuple(tuple(compress(modes, remains)) for modes in found.apart)
     return replace(found, finding=finding, apart=apart)
 
 

@@ -32,10 +32,8 @@ _DAMPING_SD, _SLOPE_SD, _TILT_SD, _COHERENCE_SD, _FLOOR_SD = 0.7, 10.0, 0.05, 0.
 of two modes, and of the slope of the force and of what other modes, moved by the same wind, add to
 a mode's tails: R times what its own stiffness would, R of 3 to 5, is a slope of 2 R; of shapes as
 identified from one window, three degrees."""
-_ENOUGH = 0.02  # technical: of log likelihood in a step; the next one gains its square
 _MOST_COHERENT = 0.9
 _SAME_DIRECTION = 0.1  # judgement: modes of nearer shapes differ by frequency alone
-_RIDGE = 1e-9  # technical: what nothing is known of, a mode without power, still has an inverse
 _MOST_STEP = 1.0  # technical: a half bandwidth, and a factor of e
 _SIGNS = np.array([1.0, -1.0, -1.0, -1.0])[:, np.newaxis]
 
@@ -193,7 +191,8 @@ class Band:
             if better > value:
                 gain, value, modes, (gradient, information) = better - value, better, trial, others
                 damped /= 10
-                if gain < _ENOUGH:
+                # Technical: of log likelihood in a step; the next one gains its square
+                if gain < 0.02:
                     break
             elif damped > 1e2:
                 break
@@ -215,7 +214,8 @@ class Band:
         information = (trace * count) @ trace.T - crossed @ changes.reshape(len(changes), -1).T
         offset, precision = self._from_before(modes)
         value -= float(precision @ offset**2) / 2
-        return value, gradient - precision * offset, information + np.diag(precision + _RIDGE)
+        # Technical: what nothing is known of, a mode without power, still has an inverse
+        return value, gradient - precision * offset, information + np.diag(precision + 1e-9)
 
     def _covariances(self, modes: CloseModes) -> tuple[FloatArray, FloatArray]:
         """E (4, lines), and its change by each parameter (parameters, 4, lines)."""

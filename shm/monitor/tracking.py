@@ -36,7 +36,6 @@ _HALF_WIDTHS = 10.0
 """Of a peak, to either side of it in its band. What white force leaves out of the slope of the
 motion's spectrum moves a frequency by 0.6 n z^2 of it, n half widths to a side at a damping z."""
 _LEAST_LINES = 12  # judgement: to either side: a floor is known to a fifth by 24 lines
-_WIDEST = 0.03  # technical: of the frequency; a band's floor is taken as flat
 _OTHER_PLANE = 0.08
 """judgement: of the frequency; sensors that are a few degrees off see the other plane, too."""
 _LEAST_GAIN = 15.0
@@ -46,7 +45,6 @@ _NARROWER = 10.0
 """judgement: than the mode as it was known, or than a line: a tone, of trains or machines, near it.
 Two close modes that were taken for one had up to seven times the damping of each."""
 _FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
-_STEPS_WITHOUT = 6  # technical: from the fit with the mode; what is gained later is small
 _REVIEW_S, _REVIEW_FEW_S, _FEW = 12 * 3600, 3600, 2
 """judgement: how often modes are sought that were missed at first, by day and by night; each hour
 where so few are known, or most are lost. From scratch costs as much as twenty windows that are
@@ -292,7 +290,8 @@ def _half_hz(peaks: Peaks, stretches: Sequence[Stretch]) -> FloatArray:
     """To either side of each mode, how wide its band is."""
     hz = peaks.frequency_hz
     least = _LEAST_LINES / max(each.seconds for each in stretches)
-    wide = np.minimum(_HALF_WIDTHS * peaks.damping * hz, _WIDEST * hz)
+    # Technical: of the frequency; a band's floor is taken as flat
+    wide = np.minimum(_HALF_WIDTHS * peaks.damping * hz, 0.03 * hz)
     half: FloatArray = np.maximum(wide, least)
     return half
 
@@ -361,7 +360,8 @@ class _Group:
             gains = []
             for place in range(len(chosen)):
                 rest = [other for other in range(len(chosen)) if other != place]
-                without = band.only(rest).fitted(fit.modes.only(rest), _STEPS_WITHOUT)
+                # Technical: from the fit with the mode; what is gained later is small
+                without = band.only(rest).fitted(fit.modes.only(rest), 6)
                 gains.append(fit.log_likelihood - without.log_likelihood)
             weakest = int(np.argmin(gains))
             if gains[weakest] >= _LEAST_GAIN:

@@ -48,7 +48,7 @@ from shm.watch.options import reference_of
 
 
 @dataclass(frozen=True)
-class Wish:
+class AdoptionRequest:
     """Request to adopt `effects`, each at a place (`at`) unless the diagnosis tells it.
 
     `baseline` is the class to which they are added; empty: that of the latest diagnosis, or beam1.
@@ -105,7 +105,7 @@ def adopt(
     workspace: Workspace,
     store: Store,
     hanger: Hanger,
-    wish: Wish,
+    wish: AdoptionRequest,
     at: datetime,
     progress: Progress = silent,
 ) -> StoredAdoption:
@@ -160,7 +160,7 @@ def _refuse_second(store: Store, hanger: Hanger, model: str) -> None:
 def _adoption(
     name: AdoptedName,
     hanger: Hanger,
-    wish: Wish,
+    wish: AdoptionRequest,
     gaps: tuple[float, float],
     diagnosis_id: int | None,
 ) -> Adoption:

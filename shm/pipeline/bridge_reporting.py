@@ -16,11 +16,11 @@ import shm
 from shm.errors import NothingThere
 from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.lineage import discarded_of_baselines, redescribed, settings_words, software
-from shm.pipeline.unheard import blind_hangers, heard
+from shm.pipeline.stream_health import blind_hangers, heard
 from shm.report.contents import BridgeReport
 from shm.report.formatting import Interval
 from shm.report.hanger_status import findings, still_detected
-from shm.report.hanger_summary import Course, HangerSummary, LatestTest
+from shm.report.hanger_summary import HangerSummary, LatestTest, PeriodSummary
 from shm.report.open_warnings import (
     discarded,
     nearly_slack,
@@ -286,7 +286,7 @@ def _only(hangers: Sequence[Hanger]) -> int | None:
     return hangers[0].id if len(hangers) == 1 else None
 
 
-def _courses(store: Store, hangers: Sequence[Hanger], period: Period) -> dict[int, Course]:
+def _courses(store: Store, hangers: Sequence[Hanger], period: Period) -> dict[int, PeriodSummary]:
     """Return what became of each hanger in the period."""
     raised = Counter(
         each.alert.hanger for each in store.alerts.list_all() if period.holds(each.alert.time)
@@ -297,11 +297,11 @@ def _courses(store: Store, hangers: Sequence[Hanger], period: Period) -> dict[in
     }
 
 
-def _course(points: Sequence[TrendPoint], alerts: int) -> Course:
+def _course(points: Sequence[TrendPoint], alerts: int) -> PeriodSummary:
     if len(points) < 2:
-        return Course(len(points), alerts)
+        return PeriodSummary(len(points), alerts)
     first, last = (Interval.of_averaged(points[at].averaged) for at in (0, -1))
-    return Course(len(points), alerts, last.since(first))
+    return PeriodSummary(len(points), alerts, last.since(first))
 
 
 def _pattern_or_why(store: Store, order: Sequence[int]) -> tuple[BridgePattern | None, str]:

@@ -74,8 +74,8 @@ def _conditions(known: Sequence[StoredAlert], found: Evidence) -> Iterator[Condi
     for alert in found.called:
         if found.is_again and set(alert.kinds) & OF_CHANGES:
             if not why_over(alert, found) and not _is_past(alert, resolved):
-                said = f"{alert.message} Raised when the stored tests were judged again."
-                yield Condition(with_free_key(replace(alert, message=said), ended), "holds")
+                text = f"{alert.message} Raised when the stored tests were judged again."
+                yield Condition(with_free_key(replace(alert, message=text), ended), "holds")
         elif alert.test == found.newest and all(alert.key != each.alert.key for each in known):
             yield Condition(alert, "holds")
     if (anew := _shown_again(resolved, is_open, found)) is not None:

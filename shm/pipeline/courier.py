@@ -13,7 +13,7 @@ from typing import Any
 from shm.bridge import Hook
 from shm.errors import ShmError, StoreError
 from shm.pipeline import Clock
-from shm.pipeline.telling import Terms, held_messages, message_of, plan
+from shm.pipeline.notification_plan import NotificationPolicy, held_messages, message_of, plan
 from shm.settings import Settings
 from shm.store import Delivery, DeliveryState, Store, Workspace
 from shm.values import Alert
@@ -91,8 +91,8 @@ class Courier:
         if not unsent:
             return
         window_s, now = workspace.settings.alert_grouping_seconds, self._clock()
-        terms = Terms(window_s, hurry, workspace.bridge.hooks)
-        made = plan(unsent, self._store.silences.list_all(), now, terms)
+        policy = NotificationPolicy(window_s, hurry, workspace.bridge.hooks)
+        made = plan(unsent, self._store.silences.list_all(), now, policy)
         self._store.alerts.begin_messages(made.messages, made.not_needed, now)
 
     def _list_due(self, workspace: Workspace) -> list[tuple[Delivery, Alert]]:
@@ -144,8 +144,8 @@ class Courier:
         next_attempt_at = now + _wait_after(attempts, settings) if again else None
         self._store.alerts.save_failure(delivery, str(error), now, next_attempt_at)
         end = "" if again else "; given up: nobody is told of it by this hook"
-        said = "hook %s failed on %s: %s%s"
-        log.warning(said, delivery.hook, sent.message.key, error, end, extra=sent.log_fields)
+        text = "hook %s failed on %s: %s%s"
+        log.warning(text, delivery.hook, sent.message.key, error, end, extra=sent.log_fields)
 
 
 def alert_fields(alert: Alert) -> dict[str, object]:

@@ -21,13 +21,13 @@ from shm.pipeline import Clock, utc_now
 from shm.pipeline.courier import Courier, Notifier, alert_fields
 from shm.pipeline.faults import contained, explain_refusal
 from shm.pipeline.intake import Sharing, receive
-from shm.pipeline.limits import heed_limits
+from shm.pipeline.limits import evaluate_limit_alerts
 from shm.pipeline.lineage import competing
-from shm.pipeline.watching import JudgedAgain
+from shm.pipeline.watching import ReevaluationQueue
 from shm.pipeline.work import Queue, Task, Work
 from shm.read import sidecar_path
 from shm.store import Outcome, Receipt, Store, StoredAlert, Workspace
-from shm.store.archive import Meanwhile, nothing
+from shm.store.archive import ProgressCallback, do_nothing
 from shm.store.queries.hangers import list_selected_models
 from shm.store.queries.history import list_events
 from shm.store.queries.recordings import count_deaths, is_waiting
@@ -61,7 +61,7 @@ class Flow:
     """Takes files in and brings them through all stages.
 
     `lanes` is how many steps may be under way at once; without a `notifier` alerts wait in the
-    outbox; `wake` is called, from any thread, whenever something under way has ended; `meanwhile`
+    outbox; `wake` is called, from any thread, whenever something under way has ended; `on_progress`
     again and again while a file is copied. Use a flow while holding the workspace's lock.
     """
 
@@ -74,11 +74,11 @@ class Flow:
         notifier: Notifier | None = None,
         clock: Clock = utc_now,
         lanes: int = 1,
-        wake: Callable[[], object] = nothing,
-        meanwhile: Meanwhile = nothing,
+        wake: Callable[[], object] = do_nothing,
+        on_progress: ProgressCallback = do_nothing,
     ):
         self.store, self.executor, self.clock, self.lanes = store, executor, clock, lanes
-        self.wake, self.meanwhile = wake, meanwhile
+        self.wake, self.on_progress = wake, on_progress
         self._courier = Courier(store, notifier, clock, wake)
         self._running: dict[tuple[str, int], _Running] = {}
         self._stopped: dict[int, datetime] = {}  # hangers, and until when
@@ -98,7 +98,7 @@ class Flow:
             if hanger.id in selected:
                 competing(hanger, workspace.settings, selected)
         self.workspace = workspace
-        self._judged_again = JudgedAgain(workspace, self.store)
+        self._judged_again = ReevaluationQueue(workspace, self.store)
         self._limits_to_apply = list(workspace.bridge.hangers)
         self._queue = Queue(workspace, self.store, self.clock)
 
@@ -111,7 +111,7 @@ class Flow:
     def receive(self, path: Path, sharing: Sharing | None = None) -> Receipt:
         """Takes a whole file in; see `shm.pipeline.intake`."""
         now = self.clock()
-        receipt = receive(path, self.workspace, self.store, now, sharing, self.meanwhile)
+        receipt = receive(path, self.workspace, self.store, now, sharing, self.on_progress)
         recording = receipt.recording
         name = recording.file.file_name
         fields = {"recording": recording.id, "file": name, "stage": "received"}
@@ -162,7 +162,7 @@ class Flow:
         while self._limits_to_apply:
             hanger = self._limits_to_apply[0]
             with contained(log, "limits of hanger %d cannot be applied", hanger.id):
-                heed_limits(self.workspace, self.store, [hanger], now)
+                evaluate_limit_alerts(self.workspace, self.store, [hanger], now)
             self._limits_to_apply.pop(0)
         self._judged_again.go_on(now, postponed, stopped)
         for task in self._queue.list_waiting(2 * self.lanes, postponed):
@@ -241,8 +241,8 @@ class Flow:
             self._postponed.update(dict.fromkeys(task.recordings, until))
             names = ", ".join(map(str, task.recordings))
             self.delays |= dict.fromkeys(task.recordings, f"recording {names} waits: {error}")
-            said = "%s %s is tried again in %.0f s: %s"
-            log.warning(said, *task.key, wait_s, error, extra=task.log_fields)
+            text = "%s %s is tried again in %.0f s: %s"
+            log.warning(text, *task.key, wait_s, error, extra=task.log_fields)
         else:
             self._refuse(task, error)
 
@@ -306,7 +306,7 @@ class Flow:
         try:
             with self.workspace.archive.opened(recording.file) as path:
                 sidecar = sidecar_path(path)
-                self.workspace.quarantine.put(path, name, reason, sidecar, self.meanwhile)
+                self.workspace.quarantine.put(path, name, reason, sidecar, self.on_progress)
         except StoreError as damage:
             if damage.retry_after_s is not None:
                 raise

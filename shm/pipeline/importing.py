@@ -64,13 +64,13 @@ class Answers:
     @property
     def said(self) -> dict[str, Any]:
         """The same as the keys of a sidecar."""
-        said: dict[str, Any] = {
+        document: dict[str, Any] = {
             "hanger": self.hanger,
             "time": self.time,
             "temperature_c": self.temperature_c,
             "sampling_rate_hz": self.sampling_rate_hz,
         }
-        known = {k: v for k, v in said.items() if v is not None and v == v}
+        known = {k: v for k, v in document.items() if v is not None and v == v}
         tables = {name: dict(table) for name, table in self.channels.items() if table}
         return {**known, "channel": tables} if tables else known
 
@@ -372,8 +372,8 @@ def _is_in_doubt(column: SurveyedColumn) -> bool:
 def _of_unit(column: SurveyedColumn) -> Question:
     quoted = shlex.quote(column.name)
     if words.volts_of(column.unit) is None and column.unit not in WORTHS:
-        said = f"; {column.unit!r} is unknown or unlike its name" if column.unit else ""
-        units = f"N, kN, m/s2, g, s; 'none' leaves it out{said}"
+        message = f"; {column.unit!r} is unknown or unlike its name" if column.unit else ""
+        units = f"N, kN, m/s2, g, s; 'none' leaves it out{message}"
         text = f"In what unit is {column.name} recorded ({units})?"
         option = f"--unit {quoted}=UNIT or --leave-out {quoted}"
     else:
@@ -420,14 +420,14 @@ def _recording(
 
 
 def _entries(column: SurveyedColumn, path: Path) -> dict[str, Entry]:
-    said = {
+    document = {
         "unit": column.described_unit,
         "plane": column.plane,
         "x_m": column.x_m,
         "calibration": column.calibration,
         "full_scale": column.full_scale,
     }
-    known = {k: v for k, v in said.items() if v is not None and v == v and k in CHANNEL_KEYS}
+    known = {k: v for k, v in document.items() if v is not None and v == v and k in CHANNEL_KEYS}
     return {key: Entry(value, path) for key, value in known.items()}
 
 

@@ -28,10 +28,10 @@ from shm.read.stamps import may_hold_days, order_of_choice
 from shm.store import Hold, Receipt, ReceivedFile, Store, Workspace
 from shm.store.archive import (
     MODES_SUFFIX,
-    Kept,
-    Meanwhile,
-    entry_of,
-    nothing,
+    ArchivedFile,
+    ProgressCallback,
+    do_nothing,
+    inode_identity,
     refuse_oversize,
     safe_name,
 )
@@ -45,8 +45,8 @@ class Sharing:
     ten thousand times.
     """
 
-    def __init__(self, meanwhile: Meanwhile = nothing) -> None:
-        self._meanwhile = meanwhile
+    def __init__(self, on_progress: ProgressCallback = do_nothing) -> None:
+        self._meanwhile = on_progress
         self._waiting: dict[Path, Counter[Path]] = {}
 
     def others_need(self, sidecar: Path) -> bool:
@@ -74,7 +74,7 @@ def receive(
     store: Store,
     at: datetime,
     sharing: Sharing | None = None,
-    meanwhile: Meanwhile = nothing,
+    on_progress: ProgressCallback = do_nothing,
 ) -> Receipt:
     """Archives a whole file with its sidecar, enters it, and removes it where it was spooled.
 
@@ -87,7 +87,7 @@ def receive(
     path = path.parent.resolve() / path.name
     sidecar, modified_at = sidecar_path(path), _modified(path)
     try:
-        kept_sidecar, kept = _keep(path, sidecar, workspace, not spooled, meanwhile)
+        kept_sidecar, kept = _keep(path, sidecar, workspace, not spooled, on_progress)
     except TooLarge as error:
         if spooled:
             _set_aside(path, safe_name(name), error, workspace, store, at)
@@ -116,21 +116,21 @@ def _modified(path: Path) -> datetime | None:
 
 
 def _keep(
-    path: Path, sidecar: Path, workspace: Workspace, follow: bool, meanwhile: Meanwhile
-) -> tuple[Kept | None, Kept]:
+    path: Path, sidecar: Path, workspace: Workspace, follow: bool, on_progress: ProgressCallback
+) -> tuple[ArchivedFile | None, ArchivedFile]:
     archive, most = workspace.archive, workspace.settings.max_file_bytes
     refuse_oversize(path.stat(follow_symlinks=follow).st_size, most, path)
     kept_sidecar = None
     if _is_plain(sidecar):
-        kept_sidecar = archive.keep(sidecar, most_bytes=most, meanwhile=meanwhile)
+        kept_sidecar = archive.keep(sidecar, most_bytes=most, on_progress=on_progress)
     text = _learnt_sidecar(path, workspace, follow)
     if text is not None:
         with tempfile.TemporaryDirectory(prefix="shm-") as folder:
             made_up = Path(folder) / sidecar.name
             made_up.write_text(text, encoding="utf-8")
-            made = archive.keep(made_up, most_bytes=most, meanwhile=meanwhile)
+            made = archive.keep(made_up, most_bytes=most, on_progress=on_progress)
         kept_sidecar = replace(made, entry=kept_sidecar.entry) if kept_sidecar else made
-    return kept_sidecar, archive.keep(path, follow=follow, most_bytes=most, meanwhile=meanwhile)
+    return kept_sidecar, archive.keep(path, follow=follow, most_bytes=most, on_progress=on_progress)
 
 
 @contextmanager
@@ -232,7 +232,9 @@ def _place(path: Path, spool: Path) -> tuple[Path, bool]:
     return Path(path.name), False
 
 
-def _remove(path: Path, kept: Kept, kept_sidecar: Kept | None, sharing: Sharing) -> None:
+def _remove(
+    path: Path, kept: ArchivedFile, kept_sidecar: ArchivedFile | None, sharing: Sharing
+) -> None:
     """Empties the spool of a received file; its sidecar first, lest that be left alone.
 
     What has come under either name since it was read stays, to be taken in its turn.
@@ -244,9 +246,9 @@ def _remove(path: Path, kept: Kept, kept_sidecar: Kept | None, sharing: Sharing)
     sharing.taken(sidecar)
 
 
-def _remove_if_still(path: Path, kept: Kept) -> None:
+def _remove_if_still(path: Path, kept: ArchivedFile) -> None:
     try:
-        if entry_of(path.lstat()) == kept.entry:
+        if inode_identity(path.lstat()) == kept.entry:
             path.unlink(missing_ok=True)
     except FileNotFoundError:
         return

@@ -19,7 +19,7 @@ from shm.values import Alert, AlertKind, Averaged, CrossedLimit, Hanger
 _KIND: AlertKind = "limit"
 
 
-def heed_limits(
+def evaluate_limit_alerts(
     workspace: Workspace, store: Store, hangers: Iterable[Hanger], at: datetime
 ) -> None:
     """Open and close what the limits of hangers call for, by the latest test of each."""
@@ -51,8 +51,8 @@ def _conditions(
         for each in same:
             if each.resolution is None and probability < thresholds.end_probability:
                 yield Condition(each.alert, "over", f"test {point.test} has it within the limit")
-        is_told = same and not _is_another_crossing(store, hanger, same[-1])
-        if probability >= thresholds.alert_probability and not is_told:
+        is_already_covered = same and not _is_another_crossing(store, hanger, same[-1])
+        if probability >= thresholds.alert_probability and not is_already_covered:
             yield Condition(_alert(workspace, store, hanger, limit, point, same), "holds")
 
 

@@ -200,13 +200,13 @@ def discarded_of_baselines(store: Store) -> dict[int, tuple[str, ...]]:
 
 def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:
     """As it stands in a document; what an older version did not know has its default."""
-    told: dict[str, Any] = {}
+    document: dict[str, Any] = {}
     for each in fields(Hanger):
         default = each.default_factory() if each.default_factory is not MISSING else each.default
         if each.name in MOVES_NOTHING:
             continue
         if each.name == "assumptions":
-            told[each.name] = _assumed(described.get(each.name, {}))
+            document[each.name] = _assumed(described.get(each.name, {}))
             continue
         if is_dataclass(default) and not isinstance(default, type):
             default = asdict(default)
@@ -214,8 +214,8 @@ def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(default, dict) and isinstance(stated, Mapping):
             stated = {**default, **stated}
         if stated is not MISSING:
-            told[each.name] = stated
-    plain: dict[str, Any] = json.loads(dump(told))
+            document[each.name] = stated
+    plain: dict[str, Any] = json.loads(dump(document))
     return plain
 
 

@@ -13,7 +13,7 @@ from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
 from shm.report.hanger_summary import HangerSummary
 from shm.store import Store, StoredAlert, Workspace
-from shm.store.point_outbox import PointOutbox
+from shm.store.point_outbox import PointOutbox, key_of
 from shm.store.queries.history import find_newest_entry
 from shm.store.queries.streams import list_pooled
 from shm.store.queries.trends import list_trend
@@ -32,7 +32,7 @@ _SPECIAL_IN_TAG, _SPECIAL_IN_TEXT = re.compile(r"([,= \\])"), re.compile(r'(["\\
 
 @dataclass(frozen=True)
 class Point:
-    """What one measurement says at one time; unknown numbers are left out."""
+    """Values of one measurement at one time; unknown numbers are left out."""
 
     measurement: str
     tags: Mapping[str, str]
@@ -52,7 +52,7 @@ class Point:
     @property
     def key(self) -> str:
         """Return what makes it the same point to a database: it replaces what it had."""
-        return f"{self.series} {self.nanoseconds:020d}"
+        return key_of(self.series, self.nanoseconds)
 
     @property
     def line(self) -> str:
@@ -109,7 +109,7 @@ def _interval(name: str, unit: str, interval: Interval | None) -> dict[str, Valu
 
 @dataclass
 class Progress:
-    """What was looked at for one database since the daemon began; made anew, all is."""
+    """Results looked at for one database since the daemon began; made anew, all is."""
 
     tests: set[int] = field(default_factory=set)
     journal: int = -1
@@ -126,7 +126,7 @@ def queue_results(
     """Queue for a database all that is new or changed; return how many points."""
     look, newest = _Look(outbox, target, workspace, store, now), find_newest_entry(store)
     points = [*look.headlines(), *alert_points(store.alerts.list_all(), look.tags)]
-    lines = {}
+    lines: dict[str, str] = {}
     for hanger in workspace.bridge.hangers:
         points += look.hours(hanger)
         if newest != progress.journal:
@@ -135,13 +135,19 @@ def queue_results(
             lines |= look.no_longer_counted(hanger, {each.key for each in of_tests})
     lines |= {point.key: point.line for point in points if point.line}
     queued = outbox.queue(target, lines, now)
+    ends: dict[str, int] = {}
+    for point in points:
+        if point.measurement == HANGER or "stream" in point.tags:
+            ends[point.series] = max(point.nanoseconds, ends.get(point.series, 0))
+    reviewed_ns = 2 * (_HOURS_REVIEWED // timedelta(microseconds=1)) * 1000
+    outbox.forget(target, {series: end - reviewed_ns for series, end in ends.items()})
     progress.journal = newest
     return queued
 
 
 @dataclass(frozen=True)
 class _Look:
-    """What one database may lack at one time."""
+    """Results that one database may lack at one time."""
 
     outbox: PointOutbox
     target: str

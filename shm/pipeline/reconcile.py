@@ -90,10 +90,10 @@ def tells(known: Sequence[Alert], alert: Alert) -> bool:
         told = {each for one in known if BEYOND in one.kinds for each in subjects_of(one)}
         if not alert.drifts or not subjects_of(alert) <= told:
             return False
-    return kinds == {BEYOND} or any(tells_change(one, alert.change) for one in known)
+    return kinds == {BEYOND} or any(covers_change(one, alert.change) for one in known)
 
 
-def tells_change(told: Alert, change: Change | None) -> bool:
+def covers_change(told: Alert, change: Change | None) -> bool:
     """Return True where an alert tells of a change: of the same way, begun before it was told."""
     if change is None or not change.moved or not set(told.kinds) & OF_CHANGES:
         return False

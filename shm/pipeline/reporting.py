@@ -223,15 +223,15 @@ def _baseline_words(baseline: Baseline | None) -> dict[str, str]:
     if baseline is None:
         return {}
     tests = ", ".join(baseline.posterior.tests)
-    told = {"baseline": f"{tests}; set {baseline.set_at:%Y-%m-%d} by {baseline.who}"}
+    document = {"baseline": f"{tests}; set {baseline.set_at:%Y-%m-%d} by {baseline.who}"}
     check = baseline.posterior.baseline_check
     if check is None:
-        return {**told, "baseline_check": "not made: the baseline is of a former version"}
+        return {**document, "baseline_check": "not made: the baseline is of a former version"}
     if check.left_out:
-        told["left_out_of_the_baseline"] = "; ".join(check.left_out)
+        document["left_out_of_the_baseline"] = "; ".join(check.left_out)
     if check.unchecked:
-        told["baseline_check"] = f"could not be made: {check.unchecked}"
-    return told
+        document["baseline_check"] = f"could not be made: {check.unchecked}"
+    return document
 
 
 def _acknowledged(alerts: Sequence[StoredAlert]) -> dict[str, str]:

@@ -10,8 +10,8 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from shm.documents import parse_time
-from shm.pipeline.unheard import LATELY, State, last_samples, measure_unread, word_of
-from shm.report.figures.stream_course import Course
+from shm.pipeline.stream_health import LATELY, State, classify_stream, last_samples, measure_unread
+from shm.report.figures.stream_course import StreamHistory
 from shm.store import Store, Workspace
 from shm.store.queries.streams import (
     find_last_window,
@@ -99,7 +99,7 @@ def _state(
     received, lost = _received(state, now)
     return StreamCondition(
         stream=stream,
-        state=word_of(last, events, now),
+        state=classify_stream(last, events, now),
         last_sample=last,
         lag=None if last is None else max(timedelta(0), now - last),
         behind=None if last is None else unread,
@@ -202,7 +202,9 @@ _MOST_READINGS = 800
 """Technical: about as many as a screen shows: hours of a month, six hours of half a year, days."""
 
 
-def stream_course(store: Store, stream: Stream, since: datetime, until: datetime) -> Course | None:
+def stream_course(
+    store: Store, stream: Stream, since: datetime, until: datetime
+) -> StreamHistory | None:
     """Hours from `since` to `until`, or what more of them are pooled to where they are too many,
     and the spectra of the last week; None without any.
     """
@@ -220,7 +222,7 @@ def stream_course(store: Store, stream: Stream, since: datetime, until: datetime
         return None
     lines = len(windows[0][1]) if windows else 0
     alike = [(at, spectrum) for at, spectrum in windows if len(spectrum) == lines]
-    return Course(
+    return StreamHistory(
         stream=stream.name,
         window_times=[at for at, _ in alike],
         line_hz=(np.arange(lines) + 0.5) * stream.sampling_rate_hz / 2 / max(1, lines),

@@ -26,15 +26,15 @@ from shm.errors import BadInput, ShmError, StoreError
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.reconcile import Condition, is_same_event, reconcile
 from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day
-from shm.pipeline.unheard import (
+from shm.pipeline.stream_health import (
     compare_thermometers,
-    heed_silences,
+    evaluate_silent_streams,
     lateness_limit,
     list_unread,
     note_blindness,
 )
 from shm.store import Reconciled, Store, Workspace
-from shm.store.archive import nothing
+from shm.store.archive import do_nothing
 from shm.store.queries.streams import (
     find_first_unpooled,
     find_first_window,
@@ -102,7 +102,7 @@ class Streaming:
         *,
         clock: Clock = utc_now,
         lanes: int = 1,
-        wake: Callable[[], object] = nothing,
+        wake: Callable[[], object] = do_nothing,
     ):
         self.store, self.executor, self.clock = store, executor, clock
         self.lanes, self.wake = lanes, wake
@@ -170,7 +170,7 @@ class Streaming:
         self._first = (self._first + 1) % max(1, len(streams))
         if (now := self.clock()) >= self._heed_at:
             self._heed_at = now + _HEED
-            heed_silences(self.workspace, self.store, now)
+            evaluate_silent_streams(self.workspace, self.store, now)
             compare_thermometers(self.workspace, self.store, now)
         return bool(self._running)
 

@@ -83,7 +83,7 @@ def to_watch(store: Store, baseline: Baseline, newest: StoredTest) -> ToWatch:
     )
 
 
-def tests_beside(store: Store, baseline: Baseline, newest: StoredTest) -> Beside:
+def find_neighbouring_tests(store: Store, baseline: Baseline, newest: StoredTest) -> Beside:
     """The tests that a test may agree with: two each way, as they came in and by their clocks.
 
     What is held for its clock alone came in as any other: what it measured is in no doubt. Tests
@@ -130,8 +130,8 @@ def _key(tests: Sequence[TestRow], newest: StoredTest | None = None) -> str:
     """Of these tests in this order: one that came late, or is done again, makes another."""
     named = [(each.id, each.name, each.time) for each in tests]
     named += [(newest.id, newest.test.id, newest.time)] if newest else []
-    told = "\n".join(f"{id_} {name} {time.isoformat()}" for id_, name, time in named)
-    return f"{shm.__version__} {hashlib.sha256(told.encode()).hexdigest()}"
+    text = "\n".join(f"{id_} {name} {time.isoformat()}" for id_, name, time in named)
+    return f"{shm.__version__} {hashlib.sha256(text.encode()).hexdigest()}"
 
 
 _RECENT_TESTS = 64  # technical: two visits of so many tests each are none of hammer tests
@@ -139,7 +139,7 @@ _RECENT_TESTS = 64  # technical: two visits of so many tests each are none of ha
 log = logging.getLogger(__name__)
 
 
-class JudgedAgain:
+class ReevaluationQueue:
     """Sends back the tests of each hanger whose latest was judged with other thresholds.
 
     One hanger at a time, so that what comes in meanwhile waits for no other hanger's; those of a
@@ -182,8 +182,8 @@ class JudgedAgain:
         baseline_id, why = self._left.pop(hanger)
         self._judging = hanger
         count = self._store.watch.rerun(hanger, baseline_id, why, at)
-        said = "hanger %d: %d tests are judged again, %d hangers are left: %s"
-        log.info(said, hanger, count, len(self._left), why)
+        text = "hanger %d: %d tests are judged again, %d hangers are left: %s"
+        log.info(text, hanger, count, len(self._left), why)
         return count
 
 

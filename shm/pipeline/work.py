@@ -17,20 +17,28 @@ from shm.errors import NothingThere
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline import Clock
 from shm.pipeline.controls import campaign_warnings, control_charts
-from shm.pipeline.judging import judge
-from shm.pipeline.limits import heed_limits
+from shm.pipeline.limits import evaluate_limit_alerts
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
+from shm.pipeline.notification_plan import after_works, with_tension, works_before
+from shm.pipeline.plausibility_check import judge
 from shm.pipeline.registry import Opens, RemoteFile, WatchResult, registered, run_step
-from shm.pipeline.telling import after_works, with_tension, works_before
-from shm.pipeline.watching import reconciled, tests_beside, to_watch
+from shm.pipeline.watching import find_neighbouring_tests, reconciled, to_watch
 from shm.report.hanger_summary import HangerSummary, LatestTest
-from shm.store import KeptWatch, Stage, Store, StoredAlert, StoredRecording, TestRow, Workspace
-from shm.store.archive import nothing
+from shm.store import (
+    Stage,
+    Store,
+    StoredAlert,
+    StoredRecording,
+    TestRow,
+    WatchCheckpoint,
+    Workspace,
+)
+from shm.store.archive import do_nothing
 from shm.store.queries.hangers import list_detected_changes, list_selected_models
 from shm.store.queries.recordings import list_waiting_recordings
 from shm.store.queries.tests import list_waiting_tests
 from shm.store.queries.watching import find_latest_weighed, list_weighed
-from shm.values import NAN, WITHOUT_MODEL, Hanger, ModalTest
+from shm.values import NAN, WITHOUT_MODEL, Alert, Hanger, ModalTest
 from shm.values.stated_tension import averaged_now
 
 Work: TypeAlias = "Generator[Callable[[], Any], Any, Sequence[StoredAlert] | None]"
@@ -163,7 +171,7 @@ class Queue:
         store, settings = self.store, self.workspace.settings
         test, silences = store.tests.get(row.id), store.silences.list_all()
         if any(each.is_maintenance and each.covers(hanger.id, test.time) for each in silences):
-            yield nothing
+            yield do_nothing
             store.watch.pass_over(test, self.clock())
             return None
         current = store.posteriors.get(test.hanger, test.test.id)
@@ -177,7 +185,7 @@ class Queue:
         selection = store.posteriors.selection(hanger.id)
         compared = None if selection is None else selection.selection
         tension = averaged_now(current, compared, hanger.limits) if hanger.is_modelled else None
-        beside = tests_beside(store, baseline, test)
+        beside = find_neighbouring_tests(store, baseline, test)
         years = settings.false_call_years
         of_test = (baseline, tests, current, hanger, years, needed.kept, beside)
         found: WatchResult | None = yield partial(run_step, registered().watch, *of_test)
@@ -201,20 +209,25 @@ class Queue:
             works = works_before(alert, silences, earlier)
             alert = alert if works is None else after_works(alert, works)
         if alert is not None and self.workspace.bridge.controls:
-            charts, days = control_charts(self.workspace, store), settings.campaign_days
-            doubts = campaign_warnings(charts, hanger, test.time, days)
-            said, mark, details = alert.message.partition(" Details: ")
-            alert = replace(alert, message=f"{' '.join((said, *doubts))}{mark}{details}")
+            alert = self._add_doubts(alert, hanger, test.time)
         changes = reconciled(store, hanger, baseline, test, (watched, alert))
         stored = (test, baseline, watched, alert, hooks, self.clock())
-        state, level = KeptWatch(needed.key, test.time, kept), hanger.thresholds.alert_probability
+        state = WatchCheckpoint(needed.key, test.time, kept)
+        level = hanger.thresholds.alert_probability
         return store.watch.save(*stored, state, changes, level)
+
+    def _add_doubts(self, alert: Alert, hanger: Hanger, time: datetime) -> Alert:
+        """Return an alert that names what the control hangers put in doubt."""
+        charts = control_charts(self.workspace, self.store)
+        doubts = campaign_warnings(charts, hanger, time, self.workspace.settings.campaign_days)
+        text, mark, details = alert.message.partition(" Details: ")
+        return replace(alert, message=f"{' '.join((text, *doubts))}{mark}{details}")
 
     def _summarise(self, hanger: Hanger) -> None:
         if hanger.is_modelled:
             self.store.posteriors.save_summaries(hanger)
         if hanger.is_modelled and not hanger.is_control:
-            heed_limits(self.workspace, self.store, [hanger], self.clock())
+            evaluate_limit_alerts(self.workspace, self.store, [hanger], self.clock())
 
     def _find_taught(self, hanger: Hanger, before: datetime) -> Taught | None:
         """Return the last time before then that its tension was read, else a sibling's."""

@@ -295,7 +295,7 @@ def fit_bars(bars: Sequence[Bar], start: FloatArray | None = None) -> list[Fit]:
             [bar.sd for bar in bars],
         )
     )
-    orders = int(np.isfinite(log_f).any(axis=(0, 1)).nonzero()[0].max()) + 1
+    orders = int(np.flatnonzero(np.isfinite(log_f).any(axis=(0, 1))).max()) + 1
     solver = _Solver([bar.hanger for bar in bars for _ in range(starts)], orders)
     y = log_f[..., :orders].reshape(len(mean), -1)
     stated = stated[..., :orders].reshape(y.shape)

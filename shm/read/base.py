@@ -152,7 +152,7 @@ class Survey:
 class Layout:
     """The layout by which files of one logger are recognised, and facts of this one.
 
-    `hanger` and `says_rate` are what a profile must not say in its stead. `day_order`,
+    `hanger` and `has_rate` are what a profile must not say in its stead. `day_order`,
     `possible_times` and `local_time` are those of its table.
     """
 

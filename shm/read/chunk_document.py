@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shm.bridge.streams import is_stream_name
-from shm.documents import Misfit, compact, finite, reader, value_of
+from shm.documents import ValidationError, compact, finite, reader, value_of
 from shm.errors import BadInput, TooLarge
 from shm.values import NAN, FloatArray
 from shm.values.stream import Chunk
@@ -142,7 +142,7 @@ def _header(content: bytes) -> tuple[_Header, bytes]:
         except ValueError:
             node, body = json.loads(content), b""
         return value_of(_Header, node, by=_READER), body
-    except (Misfit, ValueError, RecursionError) as error:
+    except (ValidationError, ValueError, RecursionError) as error:
         raise _wrong(
             f"its first line is no header: {str(error)[:200]}",
             'Begin it with a line of JSON as {"schema": "shm.chunk/1", "stream": "h3", ...}.',

@@ -61,7 +61,7 @@ def heading_of(above: Sequence[str], dialect: Dialect) -> Heading:
     }
     at = _names_at(wide, dialect)
     split = [words.name_and_unit(cell) for cell in wide.get(at, [""] * len(dialect.kinds))]
-    if at in wide and _label(wide[at][0]) in _NAME_LABELS:
+    if at in wide and words.key_of(wide[at][0]) in _NAME_LABELS:
         split[0] = ("", "")
     others = {place: cells for place, cells in wide.items() if place != at}
     units_at = _units_at(others, at, dialect)
@@ -112,12 +112,8 @@ def _padded(cells: list[str], dialect: Dialect) -> list[str]:
     return (cells + [""] * len(dialect.kinds))[: max(len(dialect.kinds), 1)]
 
 
-def _label(text: str) -> str:
-    return words.key_of(text)
-
-
 def _no_label(text: str, is_first: bool) -> str:
-    return "" if is_first and _label(text) in _UNIT_LABELS else text.strip("[]() ")
+    return "" if is_first and words.key_of(text) in _UNIT_LABELS else text.strip("[]() ")
 
 
 def _names_at(rows: dict[int, list[str]], dialect: Dialect) -> int:
@@ -135,8 +131,8 @@ def _score(cells: Sequence[str], dialect: Dialect) -> float:
         return 0.0
     if any(not cell or is_number(cell, dialect.decimal) for cell in needed[1:]):
         return 0.0
-    labelled = _label(cells[0]) in _NAME_LABELS
-    if not labelled and (_label(cells[0]) in _UNIT_LABELS or any(map(parsed, named))):
+    labelled = words.key_of(cells[0]) in _NAME_LABELS
+    if not labelled and (words.key_of(cells[0]) in _UNIT_LABELS or any(map(parsed, named))):
         return 0.0
     understood = sum(_is_understood(cell) for cell in cells if cell)
     return 1.0 + understood + 0.5 * labelled
@@ -154,7 +150,7 @@ def _units_at(rows: dict[int, list[str]], names_at: int, dialect: Dialect) -> in
 
 
 def _are_units(cells: Sequence[str], dialect: Dialect) -> bool:
-    labelled = _label(cells[0]) in _UNIT_LABELS
+    labelled = words.key_of(cells[0]) in _UNIT_LABELS
     texts = [_no_label(cell, place == 0) for place, cell in enumerate(cells) if cell]
     texts = [cell for cell in texts if cell]
     measured = [cell for cell in texts if words.unit_of(cell) or words.volts_of(cell)]

@@ -300,13 +300,10 @@ def _temperature(heading: Heading, decimal: str, columns: Sequence[Column]) -> f
             if unit.lower() in ("", "°c", "c", "degc", "grad"):
                 return number
     graded = [(words.temperature_meant(c.name), c) for c in columns if words.is_celsius(c.unit)]
-    best = [c for how_well, c in graded if how_well and how_well == max(graded, key=_first)[0]]
+    most = max((how_well for how_well, _ in graded), default=0)
+    best = [column for how_well, column in graded if how_well and how_well == most]
     values = best[0].load() if len(best) == 1 else []
     return float(np.nanmedian(values)) if np.isfinite(values).any() else NAN
-
-
-def _first(pair: tuple[int, Column]) -> int:
-    return pair[0]
 
 
 def _layout(heading: Heading, block: DataRows) -> tuple[str, ...]:

@@ -59,7 +59,7 @@ def clock_of(
 ) -> Clock:
     """Return the times of the rows; raises BadInput naming the line where they are uneven.
 
-    `said_hz` is the rate by the preamble, which decides in what unit times are that have none;
+    `stated_hz` is the rate by the preamble, which decides in what unit times are that have none;
     `order` that of the file's days.
     """
     stamps = _stamp_columns(block)

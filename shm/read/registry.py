@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -42,7 +42,7 @@ from shm.read.table import Column, Table, describe
 from shm.read.tdms_file import FORMAT as TDMS
 from shm.read.universal_file import FORMAT as UFF
 from shm.read.wave_file import FORMAT as WAVE
-from shm.values import Channel, FloatArray, FrequencyResponse, ModalTest, Recording
+from shm.values import FrequencyResponse, ModalTest, Recording
 
 # The most particular first: any text may be comma-separated.
 FORMATS: tuple[Format, ...] = (
@@ -150,16 +150,6 @@ def libraries_for(path: Path) -> tuple[str, ...]:
         else [f for f in FORMATS if suffix in f.suffixes + f.shared_suffixes]
     )
     return tuple(each.library for each in formats if each.library)
-
-
-def write_single(recording: Recording, path: Path) -> None:
-    """Write an uncompressed .npz file: its size gives the numbers of samples and channels."""
-    write(replace(recording, channels=tuple(map(_single, recording.channels))), path)
-
-
-def _single(channel: Channel) -> Channel:
-    values = channel.values.astype(np.float32)
-    return replace(channel, values=cast(FloatArray, values))
 
 
 T = TypeVar("T")

@@ -19,7 +19,7 @@ import numpy as np
 from shm.errors import BadInput
 from shm.read.assemble import assemble
 from shm.read.base import Format, at_once
-from shm.read.header import KEYS, Entry
+from shm.read.header import KEYS, Entry, entries_of
 from shm.read.limits import guarded, refuse_large, refuse_many_samples
 from shm.read.logger_text import is_measured, stated_entries
 from shm.read.logger_words import name_and_unit
@@ -58,10 +58,12 @@ def _table(listed: Sequence[Any], path: Path, hanger: int | None = None) -> Tabl
             file=path,
             remedy="Cut them to one span.",
         )
-    said: dict[str, object] = {key: each[key] for key in _OF_ALL for each in listed if key in each}
-    said |= {"hanger": hanger} if hanger is not None else {}
-    said["time"] = next(iter(starts), None)
-    entries = {key: Entry(value, path) for key, value in said.items() if value is not None}
+    stated: dict[str, object] = {
+        key: each[key] for key in _OF_ALL for each in listed if key in each
+    }
+    stated |= {"hanger": hanger} if hanger is not None else {}
+    stated["time"] = next(iter(starts), None)
+    entries = entries_of(stated, path)
     return Table(path, tuple(columns), entries, (_NAME, *(column.name for column in columns)))
 
 
@@ -100,9 +102,11 @@ def _columns(channel: Any, path: Path) -> list[Column]:
             "its data are no single row.", file=path, channel=name, remedy="Split its columns."
         )
     role: Role = "channel" if is_measured(name, unit[1], None) else "other"
-    said = dict(stated_entries(name, unit[1], None, None, path))
-    said |= {key: Entry(channel[key], path) for key in _OF_CHANNEL if key in channel}
-    found = [Column(name, len(values), values.copy, unit[1], role, said, rate_hz=rate, label=name)]
+    stated = dict(stated_entries(name, unit[1], None, None, path))
+    stated |= {key: Entry(channel[key], path) for key in _OF_CHANNEL if key in channel}
+    found = [
+        Column(name, len(values), values.copy, unit[1], role, stated, rate_hz=rate, label=name)
+    ]
     if channel.get("fs") is None:
         found.append(Column(f"time of {name}", len(times), times.copy, "s", "times"))
     return found

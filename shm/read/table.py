@@ -28,10 +28,10 @@ RAW_UNITS = ("counts", "full scale")
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """A row of numbers in a file; `load` gives them as recorded, in `unit` ("" where none is said).
+    """A row of numbers in a file; `load` gives them as recorded, in `unit` ("" for unknown).
 
-    `role` is what the file alone shows it to be, `said` what the file says of it, by the keys of a
-    sidecar, and `facts` what it says there of the whole. `rate_hz` is its own, NaN without;
+    `role` is what the file alone shows it to be, `stated` its entries by the keys of a
+    sidecar, and `facts` those about the complete file. `rate_hz` is its rate, NaN without;
     `overloads` of its values were beyond the range. `label` names it where it is left out.
     `may_be_chosen` is False of what no person can make a channel.
     """

@@ -39,7 +39,7 @@ from reportlab.platypus import Table as SetTable
 
 from shm.report.figures.specification import Illustration
 from shm.report.figures.style import GRID, INK, QUIET, STATUS_COLOURS, VERDICT_COLOURS
-from shm.report.paper import Fact, Paper, Part, Table
+from shm.report.paper import Fact, Paper, Section, Table
 
 # Layout of an A4 page, in points unless it says mm: margins for a binder, type that reads on paper.
 WIDTH = 174 * mm
@@ -226,7 +226,7 @@ def _signature(paper: Paper) -> Flowable:
     )
 
 
-def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> list[Flowable]:
+def _part(part: Section, colour: str, figures: count[int], tables: count[int]) -> list[Flowable]:
     heading: list[Flowable] = [_mark(part.headline), Paragraph(escape(part.headline), _HEADING)]
     found: list[Flowable] = []
     for paragraph in part.paragraphs:

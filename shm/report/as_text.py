@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import zip_longest
 from operator import gt
 
-from shm.report.paper import Paper, Part, Table
+from shm.report.paper import Paper, Section, Table
 
 WIDTH = 100
 """Columns of a terminal that a text may fill, where nobody says how wide it is."""
@@ -39,7 +39,7 @@ def as_text(paper: Paper, width: int = WIDTH) -> str:
     return "\n".join([*blocks, _folded(paper.foot, width), ""])
 
 
-def _part(part: Part, width: int) -> Iterator[str]:
+def _part(part: Section, width: int) -> Iterator[str]:
     for paragraph in (*part.paragraphs, part.full_summary, part.details):
         if paragraph:
             yield f"{_folded(paragraph, width)}\n"

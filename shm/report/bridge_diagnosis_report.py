@@ -14,7 +14,7 @@ from shm.report.contents import BridgeDiagnosisSheet
 from shm.report.diagnosis_summary import write_lead
 from shm.report.diagnosis_wording import effect_phrase, tension_of
 from shm.report.figures.every_figure import bridge_diagnosis_figures
-from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
+from shm.report.paper import CREDIBLE, Paper, Section, Table, filled
 from shm.report.sizes import quantity, size
 from shm.values import BridgeDiagnosis, SharedCause, TensionEstimate, effect_label
 from shm.values.rounding import ForceUnit, force_unit
@@ -39,18 +39,18 @@ def bridge_diagnosis_paper(sheet: BridgeDiagnosisSheet) -> Paper:
         status=status,
         style=style,
         parts=(
-            Part(
+            Section(
                 "In short",
                 lead=shared_verdict(diagnosis),
                 summary=_consequences(diagnosis),
                 tables=filled(bars_table(sheet.bars)),
             ),
-            Part("Who has it", figures=lambda: bridge_diagnosis_figures(diagnosis)),
-            Part(
+            Section("Who has it", figures=lambda: bridge_diagnosis_figures(diagnosis)),
+            Section(
                 "The answer in numbers",
                 tables=filled(_causes(diagnosis), _members(diagnosis), _tensions(diagnosis)),
             ),
-            Part("Each hanger for itself", tables=(_alone(diagnosis),)),
+            Section("Each hanger for itself", tables=(_alone(diagnosis),)),
         ),
         closing=(
             f"From hangers {_hangers(diagnosis.hangers)}, baseline {diagnosis.baseline}, seed "

@@ -16,8 +16,8 @@ from shm.report.figures.every_figure import bridge_figures
 from shm.report.figures.specification import drawn
 from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
-from shm.report.hanger_summary import Course, HangerSummary
-from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, appendices, filled
+from shm.report.hanger_summary import HangerSummary, PeriodSummary
+from shm.report.paper import CREDIBLE, Fact, Paper, Section, Table, appendices, filled
 from shm.report.shared_tables import lineage, settings
 from shm.report.shifts import _day, pattern_tables, shift_cells
 from shm.report.states import period_json
@@ -37,7 +37,7 @@ def bridge_paper(data: BridgeReport) -> Paper:
         status=data.worst.value if data.worst else "",
         style=data.worst.name.lower() if data.worst else "first",
         parts=(
-            Part(
+            Section(
                 "In short",
                 lead=data.message.words,
                 summary=details(data),
@@ -45,10 +45,10 @@ def bridge_paper(data: BridgeReport) -> Paper:
                 tables=filled(bars_table([line.bar for line in data.hangers])),
                 brief=[_glance(data)],
             ),
-            Part("Along the bridge", figures=lambda: bridge_figures(data)),
+            Section("Along the bridge", figures=lambda: bridge_figures(data)),
             *(_control_part(each) for each in data.controls),
-            Part("Numbers", tables=tables(data)),
-            *appendices(Part("Settings", tables=filled(settings(data.settings)))),
+            Section("Numbers", tables=tables(data)),
+            *appendices(Section("Settings", tables=filled(settings(data.settings)))),
         ),
         generated_at=data.generated_at,
         version=data.version,
@@ -57,9 +57,9 @@ def bridge_paper(data: BridgeReport) -> Paper:
     )
 
 
-def _control_part(chart: ControlChart) -> Part:
+def _control_part(chart: ControlChart) -> Section:
     """Return the state of a control hanger and its chart."""
-    return Part(
+    return Section(
         f"Control hanger {chart.hanger.id}",
         paragraphs=[control_lead(chart).words],
         figures=lambda: drawn((CONTROL,), chart),
@@ -299,7 +299,7 @@ def _courses(data: BridgeReport) -> Table:
     )
 
 
-def _course(line: HangerSummary, course: Course) -> tuple[str, ...]:
+def _course(line: HangerSummary, course: PeriodSummary) -> tuple[str, ...]:
     change = course.change
     return (
         str(line.hanger.id),

@@ -34,7 +34,7 @@ from shm.report.paper import (
     CREDIBLE,
     LEAST_PROBABILITY,
     Paper,
-    Part,
+    Section,
     Table,
     filled,
     fold_improbable,
@@ -69,9 +69,9 @@ def diagnosis_paper(sheet: DiagnosisSheet) -> Paper:
         style=part.style,
         parts=(
             replace(part, figures=tuple, tables=(bar_table(sheet.bar),), status=""),
-            Part("Figures", figures=part.figures),
-            Part("The answer in numbers", tables=answers(sheet)),
-            Part(
+            Section("Figures", figures=part.figures),
+            Section("The answer in numbers", tables=answers(sheet)),
+            Section(
                 "What it rests on",
                 tables=(*evidence(sheet), *filled(assumptions_table(sheet.hanger))),
             ),
@@ -81,11 +81,11 @@ def diagnosis_paper(sheet: DiagnosisSheet) -> Paper:
     )
 
 
-def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] = ()) -> Part:
+def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] = ()) -> Section:
     """Return all of it: verdict, remarks on the data, figures, tables."""
     verdict = sheet.diagnosis.verdict
     outcome = verdict.outcome
-    return Part(
+    return Section(
         title,
         paragraphs,
         lead=write_lead(sheet.diagnosis),

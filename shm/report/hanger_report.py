@@ -24,7 +24,7 @@ from shm.report.formatting import Interval
 from shm.report.hanger_sentences import advice, further, summary, why
 from shm.report.hanger_summary import BASELINE_ALONE, BASELINE_AND_CHANGE
 from shm.report.open_warnings import dated_by_receipt
-from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, appendices, filled
+from shm.report.paper import CREDIBLE, Fact, Paper, Section, Table, appendices, filled
 from shm.report.shared_tables import settings
 from shm.report.states import period_json, temperature_documents
 from shm.values import Alert, ControlHanger, Drift, FrequencyResponse, Hanger
@@ -42,20 +42,20 @@ def hanger_paper(data: HangerReport) -> Paper:
         status=data.status.value,
         style=data.status.name.lower(),
         parts=(
-            Part(
+            Section(
                 "In short",
                 lead=data.now.message.words,
                 summary=why(data),
                 facts=facts(data),
                 tables=[bar_table(data.bar)],
             ),
-            Part(
+            Section(
                 "Sensors and formulas of practice",
                 figures=lambda: drawn((SKETCH,), data.bar),
                 tables=filled(tables.practice(data)),
             ),
             _trend_part(data),
-            Part(
+            Section(
                 "Fit of the model",
                 paragraphs=[further(data)],
                 figures=lambda: hanger_figures(data, FIT),
@@ -75,10 +75,10 @@ def hanger_paper(data: HangerReport) -> Paper:
     )
 
 
-def _trend_part(data: HangerReport) -> Part:
+def _trend_part(data: HangerReport) -> Section:
     """Return the tension over time; of a control hanger its control chart first."""
     chart = data.now.control
-    return Part(
+    return Section(
         "Tension over time",
         figures=lambda: (*drawn((CONTROL,), chart), *hanger_figures(data, TREND)),
         tables=filled(
@@ -91,9 +91,9 @@ def _trend_part(data: HangerReport) -> Part:
     )
 
 
-def _events_part(data: HangerReport) -> Part:
+def _events_part(data: HangerReport) -> Section:
     """Return what was doubted, reported, noted and measured with."""
-    return Part(
+    return Section(
         "Test, alerts and notes",
         paragraphs=[assumptions_line(data.hanger)],
         tables=filled(
@@ -105,11 +105,11 @@ def _events_part(data: HangerReport) -> Part:
     )
 
 
-def _appendices(data: HangerReport) -> tuple[Part, ...]:
+def _appendices(data: HangerReport) -> tuple[Section, ...]:
     """Return what only the page and `--full` show: figures, numbers, the gap, settings."""
     return appendices(
-        Part("Figures", figures=lambda: hanger_figures(data, _further_figures(data))),
-        Part(
+        Section("Figures", figures=lambda: hanger_figures(data, _further_figures(data))),
+        Section(
             "Numbers",
             tables=filled(
                 tables.parameters(data),
@@ -120,7 +120,7 @@ def _appendices(data: HangerReport) -> tuple[Part, ...]:
             ),
         ),
         *([gap_part(data)] if data.diagnosis else []),
-        Part(
+        Section(
             "Settings",
             tables=filled(
                 tables.sampling(data),
@@ -131,15 +131,15 @@ def _appendices(data: HangerReport) -> tuple[Part, ...]:
     )
 
 
-def gap_part(data: HangerReport) -> Part:
+def gap_part(data: HangerReport) -> Section:
     """Return how the gap has gone since an effect was adopted, then its latest diagnosis."""
     watched = [data.gap_watch] if data.gap_watch else []
     if sheet := diagnosed(data):
         return diagnosis_part(sheet, "Gap diagnosis", watched)
-    return Part("Gap diagnosis", paragraphs=[*watched, how_to_diagnose(data)])
+    return Section("Gap diagnosis", paragraphs=[*watched, how_to_diagnose(data)])
 
 
-def short_gap_part(data: HangerReport) -> Part:
+def short_gap_part(data: HangerReport) -> Section:
     """Return the same as a page of a report bears it: verdict, figures on top, causes."""
     part = gap_part(data)
     if (sheet := diagnosed(data)) is None:
@@ -378,13 +378,13 @@ def structure_paper(data: StructureReport) -> Paper:
         status="Alert" if data.open_alerts else "",
         style="alert" if data.open_alerts else "first",
         parts=(
-            Part(
+            Section(
                 "In short",
                 summary=statement,
                 facts=facts,
                 brief=filled(_structure_frequencies(data)),
             ),
-            Part("Numbers", tables=filled(_structure_frequencies(data), alerts)),
+            Section("Numbers", tables=filled(_structure_frequencies(data), alerts)),
         ),
         generated_at=data.generated_at,
         version=data.version,

@@ -45,7 +45,7 @@ class LatestTest:
 
 
 @dataclass(frozen=True)
-class Course:
+class PeriodSummary:
     """Tests and alerts of a hanger within the period of a report.
 
     `change` is that of the tension from the first test of the period to the last, as a fraction;
@@ -85,7 +85,7 @@ class HangerSummary:
     unwatched: Lead | None = None
     undated: Sequence[str] = ()
     sensors: tuple[ResponsePoint, ...] = ()
-    course: Course | None = None
+    course: PeriodSummary | None = None
     control: ControlChart | None = None
 
     @cached_property

@@ -17,7 +17,7 @@ from shm.report.figures.bar_sketch import FIGURE as SKETCH
 from shm.report.figures.every_figure import modal_test_figures
 from shm.report.figures.specification import drawn
 from shm.report.figures.style import VERDICT_STYLES
-from shm.report.paper import Fact, Paper, Part, Table, filled
+from shm.report.paper import Fact, Paper, Section, Table, filled
 from shm.report.shared_tables import added_mass, headline, lineage, overall, quality_table, settings
 from shm.values import PLANES, FrequencyResponse, Mode, Plane, QualityCheck, Recording, Verdict
 from shm.values.rounding import force_unit
@@ -32,19 +32,19 @@ def modal_test_paper(sheet: ModalTestReport) -> Paper:
         status=headline(sheet.identification.quality),
         style=VERDICT_STYLES[verdict],
         parts=(
-            Part(
+            Section(
                 "In short",
                 summary=summary(sheet),
                 facts=facts(sheet),
                 tables=(bar_table(sheet.bar),),
                 brief=filled(replace(modes(sheet), note="")),
             ),
-            Part("Modes and quality", tables=results(sheet)),
-            Part(
+            Section("Modes and quality", tables=results(sheet)),
+            Section(
                 "Figures",
                 figures=lambda: (*drawn((SKETCH,), sheet.bar), *modal_test_figures(sheet)),
             ),
-            Part("How it came about", tables=details(sheet)),
+            Section("How it came about", tables=details(sheet)),
         ),
         generated_at=sheet.generated_at,
         version=sheet.version,

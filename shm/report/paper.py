@@ -140,7 +140,7 @@ def filled(*tables: Table) -> tuple[Table, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class Section:
     """A headed part; what it has stands in the order of its fields.
 
     `lead` begins the summary and is stressed; `details` is the paragraph after it. `figures` are
@@ -176,7 +176,7 @@ class Part:
         return " ".join(word for word in (self.lead, self.summary) if word)
 
 
-def appendices(*parts: Part) -> tuple[Part, ...]:
+def appendices(*parts: Section) -> tuple[Section, ...]:
     """Return the parts as `Appendix A: ...`, `Appendix B: ...`."""
     lettered = zip(ascii_uppercase, parts, strict=False)
     return tuple(
@@ -198,7 +198,7 @@ class Paper:
     title: str
     status: str
     style: str
-    parts: Sequence[Part]
+    parts: Sequence[Section]
     closing: str
     bridge: str = ""
     period: str = ""

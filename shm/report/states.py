@@ -93,7 +93,6 @@ class QuantityOverTime:
     """One quantity at n tests: what each says by itself, filtered and smoothed, each (n,).
 
     The tension is in N, a stiffness the log10 of it in its `unit`. `title` is what people call it.
-    Thresholds are values, not shifts; NaN where there is none.
     """
 
     name: str
@@ -102,8 +101,6 @@ class QuantityOverTime:
     filtered: Band
     smoothed: Band
     baseline: float
-    lower_threshold: float
-    upper_threshold: float
     unit: str = ""
 
     @property
@@ -177,7 +174,7 @@ def states_over_time(watched: Watched, hanger: Hanger) -> StatesOverTime:
     """Return the states of a hanger at all tests, at the baseline's mean temperature."""
     outlier = np.array([each.change.outlier_probability for each in watched.watch.tests])
     explained = np.array([not off_the_baseline(each).any() for each in watched.readings])
-    calls = [change for _, change in watched.watch.calls]
+    calls = [call.change for call in watched.watch.calls]
     reference_c = watched.reader.reference_temperature_c
     options = StateOptions.of(hanger.assumptions, reference_temperature_c=reference_c)
     changes = set_free(calls, watched.readings)
@@ -188,31 +185,20 @@ def states_over_time(watched: Watched, hanger: Hanger) -> StatesOverTime:
         history.temperatures_c,
         history.reference_temperature_c,
         outlier > 0.5,
-        tuple(
-            _over_time(each, history, hanger).where(explained) for each in watched.reader.quantities
-        ),
+        tuple(_over_time(each, history).where(explained) for each in watched.reader.quantities),
         tuple(CalledChange(call.began_after, call.began_by, called_words(call)) for call in calls),
         history.temperature_coefficients(),
     )
 
 
-def _over_time(
-    quantity: WatchedQuantity, history: StateHistory, hanger: Hanger
-) -> QuantityOverTime:
-    thresholds, level = hanger.thresholds, quantity.baseline
-    if quantity.name == TENSION:
-        reach = thresholds.tension_shift_fraction * level
-    else:
-        reach = thresholds.stiffness_shift_decades
+def _over_time(quantity: WatchedQuantity, history: StateHistory) -> QuantityOverTime:
     return QuantityOverTime(
         quantity.name,
         quantity_words(quantity.name, quantity.end, quantity.plane),
         history.read(quantity.name),
         history.filtered(quantity.name),
         history.smoothed(quantity.name),
-        level,
-        level - reach,
-        level + reach,
+        quantity.baseline,
         quantity.unit,
     )
 

@@ -32,10 +32,10 @@ _ALONG = 401  # places along the hanger at which the largest deflection is looke
 
 @dataclass(frozen=True)
 class AmbientPlan:
-    """How long the crew listens, with which sensors and logger.
+    """Define how long ambient motion is recorded, with which sensors and logger.
 
-    `acceleration_m_s2` is the rms value at the sensor and in the plane that move most. The rest is
-    as in `HammerPlan`.
+    `acceleration_m_s2` is the rms value at the sensor and in the plane that move most. The rest
+    is as in `HammerPlan`.
     """
 
     seconds: float = 600.0
@@ -100,10 +100,10 @@ def _moved(
 
 
 def _steady_state(exponent: complex, samples: int, rng: np.random.Generator) -> ComplexArray:
-    """z[k + 1] = exp(exponent) z[k] + a unit normal impulse, as if driven for ever, (samples,).
+    """Return z[k + 1] = exp(exponent) z[k] + a unit normal impulse in steady state, (samples,).
 
-    Before the first sample z has the covariance that the recursion keeps: E|z|^2 = 1/(1 - |a|^2)
-    and E z^2 = 1/(1 - a^2), a = exp(exponent).
+    Before the first sample z has the covariance that the recursion keeps: E|z|^2 = 1/(1 -
+    |a|^2) and E z^2 = 1/(1 - a^2), a = exp(exponent).
     """
     factor = np.exp(exponent)
     power, pseudo = 1 / (1 - abs(factor) ** 2), 1 / (1 - factor**2)
@@ -135,9 +135,10 @@ class Loss:
 
 @dataclass(frozen=True)
 class MonitoringPlan:
-    """What the bridge lives through, and how it is measured.
+    """Define the loads and changes of the bridge, and how it is measured.
 
-    `per_kelvin` is the spread over the hangers of how tension follows temperature, as a fraction.
+    `per_kelvin` is the spread over the hangers of how tension follows temperature, as a
+    fraction.
     """
 
     chunk_s: float = 60.0
@@ -166,7 +167,7 @@ class Weather:
         return 5 * math.exp(0.5 * self._wander(at, 6.0, 2))
 
     def trains(self, start: datetime, seconds: float) -> tuple[float, ...]:
-        """When trains come within a stretch, in seconds from its start; none at night."""
+        """Return the times of trains within a stretch, in seconds from its start; none at night."""
         return self._events(start, seconds, self._plan.trains_a_day, 3, at_night=False)
 
     def knocks(self, start: datetime, seconds: float, hanger: int) -> tuple[float, ...]:
@@ -236,7 +237,7 @@ class _Ringing:
         self._largest = 0.0
 
     def moved(self, at: datetime, count: int, weather: Weather) -> FloatArray:
-        """Accelerations of all channels, (channels, samples), without the logger's noise."""
+        """Return accelerations of all channels, (channels, samples), without the logger's noise."""
         self._follow(at, weather)
         rate, channels = self._stream.sampling_rate_hz, self._stream.channels
         strength = self._strength(at, count, weather)
@@ -282,7 +283,7 @@ class _Ringing:
         self._largest = float(np.abs(self._modes[PLANES[0]].at(along_m)).max())
 
     def _strength(self, at: datetime, count: int, weather: Weather) -> FloatArray:
-        """How strongly modes are driven at each sample, as sd of the step of modal velocity."""
+        """Return the excitation at each sample, as sd of the step of modal velocity."""
         rate, plan = self._stream.sampling_rate_hz, self._plan
         lowest = float(self._modes[PLANES[0]].angular_frequency_rad_s[0])
         # A mode driven so has an rms acceleration of w sqrt(rate / (4 z w)) times this.
@@ -306,7 +307,7 @@ class _Ringing:
 
 
 def described_stream(hanger: Hanger, sampling_rate_hz: float = 200.0) -> Stream:
-    """Two places with a sensor in each plane, as an owner would mount them."""
+    """Return a stream of two positions with a sensor in each plane, as an owner mounts them."""
     places = spread_places_m(hanger, 2)
     channels = tuple(
         StreamChannel(f"acc_{2 * number + index + 1}", plane, round(x_m, 3), NAN)

@@ -63,9 +63,9 @@ def hammer_test(
     moved = turn_sensors(moved, bar.sensor_turn_rad[0])
     lines = sensor_lines(hanger, timed, force_of(pulses, plan.samples), moved)
     channels = tuple(logged(line, plan.adc_bits, rng) for line in lines)
-    rate_said_hz = rate_hz * fast
+    stated_rate_hz = rate_hz * fast
     return Recording(
-        source, channels, rate_said_hz, hanger.id, time=time, temperature_c=temperature_c
+        source, channels, stated_rate_hz, hanger.id, time=time, temperature_c=temperature_c
     )
 
 

@@ -91,7 +91,7 @@ class Strike:
         return first, replace(first, start_s=self.start_s + self.rebound_s, peak_n=peak_n)
 
     def share(self, plane: Plane) -> float:
-        """Part of the force that acts in a plane."""
+        """Return the fraction of the force in a plane."""
         angle = math.radians(self.angle_deg)
         return math.cos(angle) if plane == "transverse" else math.sin(angle)
 
@@ -150,7 +150,7 @@ def pulse_of(strike: Strike, sampling_rate_hz: float) -> Pulse:
 
 
 def samples_of(pulse: Pulse, samples: int) -> tuple[IntArray, FloatArray]:
-    """Which of the recording's samples a pulse touches, and the force at them."""
+    """Return the indices of the recording's samples in a pulse, and the force at them."""
     places = pulse.first + np.arange(len(pulse.fine_n))
     inside = (places >= 0) & (places < samples)
     return places[inside], pulse.fine_n[inside, 0]
@@ -166,13 +166,13 @@ def force_of(pulses: Sequence[Pulse], samples: int) -> FloatArray:
 
 
 def _steps(samples: float) -> int:
-    """Fine steps a sample, an even number: enough for the filter and for the pulse's shape."""
+    """Return the fine steps a sample, an even number: enough for filter and pulse."""
     return max(_LEAST_STEPS, 2 * math.ceil(_STEPS_PER_PULSE / samples / 2))
 
 
 @cache
 def _filter(steps: int) -> FloatArray:
-    """Linear-phase low-pass of the logger: flat to 0.4, closed from 0.5 of the sampling rate."""
+    """Return the logger's linear-phase low-pass: flat to 0.4, closed from 0.5 of the rate."""
     count, beta = scipy.signal.kaiserord(_STOP_BAND_DB, (_STOP - _PASS) * 2 / steps)
     half = math.ceil(count / (2 * steps)) * steps
     cutoff = (_PASS + _STOP) / steps
@@ -204,10 +204,10 @@ def accelerations(
     sampling_rate_hz: float,
     samples: int,
 ) -> FloatArray:
-    """Accelerations of a plane in m/s^2, shape (sensors, samples).
+    """Return accelerations of a plane in m/s^2, shape (sensors, samples).
 
-    Each pulse acts where and in which direction its blow struck. From a blow with a damping ratio
-    of its own up to the next blow, everything decays with that one.
+    Each pulse acts at its position in its direction. After a hit with its damping ratio
+    everything decays with that one up to the next hit.
     """
     seen = modes.at(np.array(sensors_x_m))
     out = np.zeros((len(seen), samples))
@@ -224,8 +224,8 @@ def accelerations(
             ])  # fmt: skip
             carried[block] = states[:, -1]
             ringing = (poles[block, None] ** 2 * states).imag / poles[block, None].imag
-            kept = slice(max(0, stretch.begin), stretch.end)
-            out[:, kept] += seen[:, block] @ ringing[:, kept.start - stretch.begin :]
+            recorded = slice(max(0, stretch.begin), stretch.end)
+            out[:, recorded] += seen[:, block] @ ringing[:, recorded.start - stretch.begin :]
     for pulse in pulses:
         places, force = samples_of(pulse, samples)
         out[:, places] += np.outer(seen @ _pushed(modes, plane, pulse), force)
@@ -237,8 +237,8 @@ def stretches(pulses: Sequence[Pulse], damping_ratio: float, samples: int) -> Se
     begin = min([0, *(pulse.first for pulse in pulses)])
     found: list[Stretch] = [Stretch(begin, samples, damping_ratio, ())]
     for pulse in pulses:
-        last, own = found[-1], pulse.strike.damping_ratio
-        ratio = damping_ratio if math.isnan(own) else own
+        last, stated_ratio = found[-1], pulse.strike.damping_ratio
+        ratio = damping_ratio if math.isnan(stated_ratio) else stated_ratio
         if ratio == last.damping_ratio:
             found[-1] = replace(last, pulses=(*last.pulses, pulse))
         else:
@@ -248,7 +248,7 @@ def stretches(pulses: Sequence[Pulse], damping_ratio: float, samples: int) -> Se
 
 
 def poles_of(angular_frequency: FloatArray, damping_ratio: float | FloatArray) -> ComplexArray:
-    """Poles in rad/s, (modes,)."""
+    """Return poles in rad/s, (modes,)."""
     return np.asarray(
         angular_frequency * (-damping_ratio + 1j * np.sqrt(1 - damping_ratio**2)), complex
     )
@@ -295,7 +295,7 @@ def state_of(
 
 
 def _pushed(modes: PlaneModes, plane: Plane, pulse: Pulse) -> FloatArray:
-    """Each mode's deflection where a pulse acts, times its share of the force, (modes,)."""
+    """Return each mode's deflection at a pulse, times its fraction of the force, (modes,)."""
     at_hammer = modes.at(np.array([pulse.strike.x_m]))[0]
     pushed = np.asarray(at_hammer * pulse.strike.share(plane))
     if modes.other is None:

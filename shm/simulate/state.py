@@ -1,4 +1,4 @@
-"""What is planted (the state of the hanger) and how the crew measures (the plan)."""
+"""Define the planted state of the hanger, and the plan of the measurement."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _HAMMER = 0.16
 
 
 def spread_places_m(hanger: Hanger, sensors: int) -> tuple[float, ...]:
-    """Places of 1 to 8 sensors within reach of the deck end."""
+    """Return the positions of 1 to 8 sensors within reach of the deck end."""
     shares = (*_SENSORS, *_MORE_SENSORS)
     _refuse_unless(1 <= sensors <= len(shares), f"1 to {len(shares)} sensors are possible")
     return tuple(sorted(share * hanger.length_m for share in shares[:sensors]))
@@ -38,7 +38,7 @@ class HangerState:
     length_m: float = NAN
 
     def springs_n_m_rad(self, plane: Plane) -> tuple[float, float]:
-        """Deck-end and arch-end spring of a plane."""
+        """Return deck-end and arch-end spring of a plane."""
         if plane == "transverse":
             return self.k1_n_m_rad, self.k3_n_m_rad
         return self.k2_n_m_rad, self.k4_n_m_rad
@@ -49,14 +49,14 @@ class HangerState:
 
 @dataclass(frozen=True)
 class HammerPlan:
-    """How the crew measures: hits, sensors, logger.
+    """Define the measurement: hits, sensors, logger.
 
-    Each place of `sensors_x_m` holds a biaxial accelerometer (two channels); empty means 0.21 and
-    0.37 of the hanger's length. A NaN `hammer_x_m` means 0.16 of it. `hammer_angle_deg` is 0 for a
-    transverse and 90 for a longitudinal hit. Each hit falls `pre_trigger_s` after the start of its
-    slot, later by up to `hit_time_scatter_s`; its peak scatters log-normally. The half-sine pulse
-    lasts `pulse_seconds`. Noise is white, as standard deviations; the converter has `adc_bits`
-    over plus and minus its range and clips beyond.
+    Each place of `sensors_x_m` holds a biaxial accelerometer (two channels); empty means 0.21
+    and 0.37 of the hanger's length. A NaN `hammer_x_m` means 0.16 of it. `hammer_angle_deg` is
+    0 for a transverse and 90 for a longitudinal hit. Each hit falls `pre_trigger_s` after the
+    start of its slot, later by up to `hit_time_scatter_s`; its peak scatters log-normally. The
+    half-sine pulse lasts `pulse_seconds`. Noise is white, as standard deviations; the converter
+    has `adc_bits` over plus and minus its range and clips beyond.
     """
 
     hits: int = 5

@@ -2,8 +2,8 @@
 
 from shm.store.archive import Archive, Quarantine
 from shm.store.disposition import Exclusion
-from shm.store.holding import Judged
-from shm.store.rerun import AGAIN_FROM
+from shm.store.holding import Judgement
+from shm.store.rerun import RERUN_STAGES
 from shm.store.rows import (
     ENDED,
     Acknowledgement,
@@ -21,7 +21,6 @@ from shm.store.rows import (
     HeldTest,
     Hold,
     IdentifiedTest,
-    KeptWatch,
     Lineage,
     News,
     Numbers,
@@ -45,17 +44,18 @@ from shm.store.rows import (
     StoredWatch,
     TestRow,
     TrendPoint,
+    WatchCheckpoint,
 )
 from shm.store.store import Store
 from shm.store.workspace import Workspace
 
 __all__ = [
-    "AGAIN_FROM", "ENDED", "Acknowledgement", "Adoption", "Archive", "Baseline",
-    "BaselineGlance", "Deaths", "Decision", "Delivery", "DeliveryState",
-    "EventKind", "Exclusion", "FormerPosterior", "FormerTest", "HangerEvent", "HeldTest", "Hold",
-    "IdentifiedTest", "Judged", "KeptWatch", "Lineage", "News", "Numbers", "Outcome", "Quarantine",
-    "Receipt", "ReceivedFile", "Reconciled", "Rerun", "Resolution", "Scope", "Silence", "Stage",
-    "Step", "Store", "StoredAdoption", "StoredAlert", "StoredDiagnosis", "StoredRecording",
-    "StoredSelection", "StoredTest", "StoredToken", "StoredWatch", "TestRow", "TrendPoint",
+    "ENDED", "RERUN_STAGES", "Acknowledgement", "Adoption", "Archive", "Baseline",
+    "BaselineGlance", "Deaths", "Decision", "Delivery", "DeliveryState", "EventKind", "Exclusion",
+    "FormerPosterior", "FormerTest", "HangerEvent", "HeldTest", "Hold", "IdentifiedTest",
+    "Judgement", "Lineage", "News", "Numbers", "Outcome", "Quarantine", "Receipt", "ReceivedFile",
+    "Reconciled", "Rerun", "Resolution", "Scope", "Silence", "Stage", "Step", "Store",
+    "StoredAdoption", "StoredAlert", "StoredDiagnosis", "StoredRecording", "StoredSelection",
+    "StoredTest", "StoredToken", "StoredWatch", "TestRow", "TrendPoint", "WatchCheckpoint",
     "Workspace",
 ]  # fmt: skip

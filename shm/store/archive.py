@@ -58,11 +58,11 @@ def _printable(part: str | Path) -> str:
     return printable(os.fsencode(part).decode(errors="replace"))
 
 
-Meanwhile = Callable[[], object]
+ProgressCallback = Callable[[], object]
 """What is called again and again while a file is copied or hashed, to show that all is well."""
 
 
-def nothing() -> None:
+def do_nothing() -> None:
     """Nothing to do meanwhile."""
 
 
@@ -78,13 +78,13 @@ def refuse_oversize(
         )
 
 
-def checksum(path: Path, meanwhile: Meanwhile = nothing) -> str:
+def checksum(path: Path, on_progress: ProgressCallback = do_nothing) -> str:
     """SHA-256 of a file, as 64 hexadecimal digits."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while chunk := file.read(_CHUNK):
             digest.update(chunk)
-            meanwhile()
+            on_progress()
     return digest.hexdigest()
 
 
@@ -97,7 +97,7 @@ def is_whole(path: Path) -> bool:
 
 
 @dataclass(frozen=True)
-class Kept:
+class ArchivedFile:
     """A file that is safe in the archive; `entry` tells what was read from a later file there."""
 
     sha256: str
@@ -118,8 +118,8 @@ class Archive:
         *,
         follow: bool = False,
         most_bytes: float = math.inf,
-        meanwhile: Meanwhile = nothing,
-    ) -> Kept:
+        on_progress: ProgressCallback = do_nothing,
+    ) -> ArchivedFile:
         """Copies a file in under its checksum; bytes that are there already are left alone.
 
         Where those have rotted, which their name tells, the good ones take their place.
@@ -133,7 +133,7 @@ class Archive:
         with self._incoming() as temporary, _opened(source, follow) as reading:
             before = os.fstat(reading.fileno())
             refuse_oversize(before.st_size, most_bytes, source)
-            sha256, size = _copy_hashed(reading, temporary, before.st_size, meanwhile)
+            sha256, size = _copy_hashed(reading, temporary, before.st_size, on_progress)
             now = source.stat(follow_symlinks=follow)
             if _mark(now) != _mark(before) or size != before.st_size:
                 raise ShmError(
@@ -143,7 +143,7 @@ class Archive:
                 )
             relative = Path(sha256[:2]) / f"{sha256}{suffix_of(source.name)}"
             self._place(temporary, self.folder / relative)
-        return Kept(sha256, size, relative.as_posix(), entry_of(before))
+        return ArchivedFile(sha256, size, relative.as_posix(), inode_identity(before))
 
     def refuse_damaged(self, file: ReceivedFile) -> None:
         """Raises StoreError where a file or its sidecar is missing or is not as it was kept."""
@@ -240,18 +240,18 @@ class Quarantine:
         name: str,
         reason: Mapping[str, Any],
         sidecar: Path,
-        meanwhile: Meanwhile = nothing,
+        on_progress: ProgressCallback = do_nothing,
     ) -> Path:
         """Lays a copy out with its reason and its sidecar, if there is one.
 
         Other files of that name are left as they are.
         """
-        same = partial(self._holds, source, str(reason["sha256"]), meanwhile)
+        same = partial(self._holds, source, str(reason["sha256"]), on_progress)
         target = self._free_place(Path(name).name, str(reason["sha256"])[:8], same)
         try:
             if sidecar.is_file():
-                _copy_whole(sidecar, sidecar_path(target), meanwhile)
-            _copy_whole(source, target, meanwhile)
+                _copy_whole(sidecar, sidecar_path(target), on_progress)
+            _copy_whole(source, target, on_progress)
             self._explain(target, reason)
         except OSError as error:
             raise disk_error(error, self.folder) from error
@@ -263,7 +263,7 @@ class Quarantine:
         Where that cannot be, as from another file system, it stays where it is, with its reason
         here. Gives where it lies then.
         """
-        entry = entry_of(source.lstat())
+        entry = inode_identity(source.lstat())
         target = self._free_place(Path(name).name, entry, lambda there: not there.exists())
         try:
             self._explain(target, reason)  # first: a file here is never without
@@ -291,14 +291,14 @@ class Quarantine:
         return self.folder / f"{name[: len(name) - len(suffix)]}-{mark}{suffix}"
 
     @staticmethod
-    def _holds(source: Path, sha256: str, meanwhile: Meanwhile, there: Path) -> bool:
+    def _holds(source: Path, sha256: str, on_progress: ProgressCallback, there: Path) -> bool:
         """Return True if a file holds the same as the source; one of another size is not read."""
         if there.stat().st_size != source.stat().st_size:
             return False
-        return checksum(there, meanwhile) == sha256
+        return checksum(there, on_progress) == sha256
 
 
-def entry_of(status: os.stat_result) -> str:
+def inode_identity(status: os.stat_result) -> str:
     """Return what tells one file of a folder from a later one of the same name and contents."""
     return f"{status.st_ino}-{status.st_ctime_ns}"
 
@@ -328,7 +328,7 @@ def _opened(source: Path, follow: bool) -> Iterator[BinaryIO]:
 
 
 def _copy_hashed(
-    reading: BinaryIO, target: Path, most_bytes: int, meanwhile: Meanwhile
+    reading: BinaryIO, target: Path, most_bytes: int, on_progress: ProgressCallback
 ) -> tuple[str, int]:
     """Copies no more than a chunk beyond `most_bytes`, should the file grow; holes stay holes."""
     digest, size, synced = hashlib.sha256(), 0, 0
@@ -344,18 +344,18 @@ def _copy_hashed(
                 writing.flush()
                 os.fdatasync(writing.fileno())
                 synced = size
-            meanwhile()
+            on_progress()
         writing.truncate(size)
         writing.flush()
         os.fsync(writing.fileno())
     return digest.hexdigest(), size
 
 
-def _copy_whole(source: Path, target: Path, meanwhile: Meanwhile) -> None:
+def _copy_whole(source: Path, target: Path, on_progress: ProgressCallback) -> None:
     temporary = target.with_name(f".{target.name}.part")
     temporary.unlink(missing_ok=True)
     with source.open("rb") as reading:
-        _copy_hashed(reading, temporary, os.fstat(reading.fileno()).st_size, meanwhile)
+        _copy_hashed(reading, temporary, os.fstat(reading.fileno()).st_size, on_progress)
     temporary.rename(target)
     sync(target.parent)
 

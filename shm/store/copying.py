@@ -102,8 +102,8 @@ def _write(connection: Connection, table: sa.Table, rows: Sequence[RowMapping]) 
 
 def _digest(row: RowMapping) -> int:
     """Return a SHA-256 of a row's values, the same in SQLite and in PostgreSQL."""
-    told = "\n".join(f"{name}={_plain_value(value)!r}" for name, value in row.items())
-    return int.from_bytes(hashlib.sha256(told.encode()).digest(), "big")
+    text = "\n".join(f"{name}={_plain_value(value)!r}" for name, value in row.items())
+    return int.from_bytes(hashlib.sha256(text.encode()).digest(), "big")
 
 
 def _plain_value(value: object) -> object:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,7 @@ def has_password(location: str) -> bool:
     return bool(url.password) or "password" in url.query
 
 
+@lru_cache(16)  # each transaction asks for it
 def shown(url: sa.URL) -> str:
     """An address as it may be told to anybody: without password and options."""
     name = url.get_backend_name()

@@ -15,7 +15,14 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError, sentence
 from shm.store.database import Repository
-from shm.store.files import advance_recordings, by_id, counts, end_recording, end_tests, in_force
+from shm.store.files import (
+    advance_recordings,
+    by_id,
+    end_recording,
+    end_tests,
+    is_counted,
+    is_current,
+)
 from shm.store.holding import (
     confirmed_values,
     decide,
@@ -105,17 +112,17 @@ class Dispositions(Repository):
                 hold = _decide(connection, hold, who, why, at)
                 _end_or_advance(connection, recording, hold, at)
                 return Exclusion(hold)
-            rows = _chosen(connection, recording_id, counts(tests), test)
+            rows = _chosen(connection, recording_id, is_counted(tests), test)
             if not rows or recording.stage == Stage.RECEIVED:
                 raise _not_counting(connection, recording)
             ids, weighed = [row.id for row in rows], _weighed(connection, rows)
             own = of_baselines(connection, rows)
             end_tests(connection, recording_id, ids, at)
             supersede_results(connection, ids, Stage.IDENTIFIED, at)
-            told = f"test discarded by {who}" + (f": {why}" if why else "")
+            text = f"test discarded by {who}" + (f": {why}" if why else "")
             raised = sa.select(alerts.c.id).where(alerts.c.test_id.in_(ids))
             for alert_id in connection.scalars(raised).all():
-                resolve(connection, alert_id, who, told, at)
+                resolve(connection, alert_id, who, text, at)
             again = _watch_again(connection, rows, weighed, at)
             named = [HeldTest(row.position, row.name, ()) for row in rows]
             hold = _unheld(recording, Decision.WITHDRAWN, named)
@@ -215,7 +222,7 @@ def _chosen(
     connection: Connection, recording_id: int, which: sa.ColumnElement[bool], test: str | None
 ) -> Sequence[Row[Any]]:
     query = sa.select(tests, recordings.c.received_at).join(recordings)
-    query = query.where(tests.c.recording_id == recording_id, in_force(tests), which)
+    query = query.where(tests.c.recording_id == recording_id, is_current(tests), which)
     if test is not None:
         query = query.where(tests.c.name == test)
     return connection.execute(query.order_by(tests.c.id)).all()
@@ -236,7 +243,7 @@ def _end_or_advance(connection: Connection, recording: Row[Any], hold: Hold, at:
 
 def _count_left(recording_id: int) -> sa.Select[Any]:
     """Return the query for the number of tests of a recording that count or are held."""
-    own = (tests.c.recording_id == recording_id) & in_force(tests)
+    own = (tests.c.recording_id == recording_id) & is_current(tests)
     return sa.select(sa.func.count()).where(own, tests.c.stage != Stage.REFUSED)
 
 

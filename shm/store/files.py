@@ -19,8 +19,7 @@ from shm.modes_document import test_document
 from shm.store.archive import suffix_of
 from shm.store.blobs import pack_response
 from shm.store.journal import RENAMED, write
-from shm.store.mapping import value_in
-from shm.store.rows import IdentifiedTest, Stage, StoredRecording, StoredTest
+from shm.store.rows import IdentifiedTest, Stage, StoredTest
 from shm.store.tables import journal, recordings, tests
 
 
@@ -37,17 +36,12 @@ def by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
     return connection.execute(query).one_or_none()
 
 
-def recording_from(row: Row[Any]) -> StoredRecording:
-    """Return a row of `recordings` as a value."""
-    return value_in(row, StoredRecording)
-
-
-def counts(table: sa.Table) -> sa.ColumnElement[bool]:
+def is_counted(table: sa.Table) -> sa.ColumnElement[bool]:
     """Select what is neither refused nor held: all that is shown and computed with."""
     return table.c.stage.not_in([Stage.REFUSED, Stage.HELD])
 
 
-def in_force(table: sa.Table) -> sa.ColumnElement[bool]:
+def is_current(table: sa.Table) -> sa.ColumnElement[bool]:
     """Select what no later run has replaced."""
     return table.c.superseded_at.is_(None)
 
@@ -102,8 +96,8 @@ def end_tests(
 def note_name(connection: Connection, known: Row[Any], file_name: str, at: datetime) -> None:
     """Keeps the former name of a file that comes again under another: it is found by both."""
     if known.file_name != file_name:
-        said = f"called {file_name} from now on."
-        write(connection, at, RENAMED, known.id, subject=known.file_name, detail=said)
+        text = f"called {file_name} from now on."
+        write(connection, at, RENAMED, known.id, subject=known.file_name, detail=text)
 
 
 def by_former_names(connection: Connection, which: str) -> list[int]:
@@ -161,7 +155,7 @@ def advance_recordings(connection: Connection, ids: Collection[int], at: datetim
     """A recording stands where the least advanced of its tests stands, and is held with one."""
     for recording_id in ids:
         query = sa.select(tests.c.stage).where(
-            tests.c.recording_id == recording_id, in_force(tests), tests.c.stage != Stage.REFUSED
+            tests.c.recording_id == recording_id, is_current(tests), tests.c.stage != Stage.REFUSED
         )
         stages = connection.scalars(query).all()
         stage = Stage.HELD if Stage.HELD in stages else min(stages, key=_PROGRESS.index)

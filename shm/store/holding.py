@@ -16,7 +16,7 @@ from shm.modes_document import test_document
 from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.columns import loads
 from shm.store.database import insert
-from shm.store.files import in_force, reason_document
+from shm.store.files import is_current, reason_document
 from shm.store.journal import REFUSED, write
 from shm.store.mapping import value_in
 from shm.store.outbox import acknowledge, raise_alert, resolve
@@ -31,11 +31,11 @@ from shm.store.tables import (
 )
 from shm.values import Alert, Fingerprint
 
-_holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(recordings)
+stored_holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(recordings)
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class Judgement:
     """Judgement of plausibility on a recording with the sidecar that it was judged with.
 
     `held` are its tests that are held, `notice` what to tell of that; None where none is.
@@ -52,7 +52,7 @@ class Judged:
 
 
 def keep_judgement(
-    connection: Connection, recording: Row[Any], judged: Judged, at: datetime
+    connection: Connection, recording: Row[Any], judged: Judgement, at: datetime
 ) -> StoredAlert | None:
     """Holds what is in doubt; the notice of that, None where nothing is."""
     if judged.fingerprint is not None:
@@ -117,7 +117,7 @@ def _mark(
     connection: Connection, recording_id: int, position: int, stage: Stage, at: datetime
 ) -> int:
     """Brings the test at a place of a file to a stage; its number."""
-    own = (tests.c.recording_id == recording_id) & in_force(tests)
+    own = (tests.c.recording_id == recording_id) & is_current(tests)
     here = own & (tests.c.position == position)
     number: int = connection.scalars(sa.select(tests.c.id).where(here)).one()
     connection.execute(sa.update(tests).where(here).values(stage=stage))
@@ -130,28 +130,20 @@ def reason_of(recording: Row[Any], message: str, at: datetime, remedy: str = "")
     return reason_document(recording.file_name, recording.sha256, message, remedy, at)
 
 
-def open_holds(connection: Connection, hanger: int | None = None) -> tuple[Hold, ...]:
-    """List holds that nobody has decided on, the oldest first; of one hanger where named."""
-    query = _holds.where(holds.c.decision.is_(None)).order_by(holds.c.id)
-    if hanger is not None:
-        query = query.where(recordings.c.hanger == hanger)
-    return tuple(_hold(row) for row in connection.execute(query))
-
-
 def holds_of(connection: Connection, recording_id: int) -> tuple[Hold, ...]:
     """All holds of a recording and decisions on it, the oldest first."""
-    query = _holds.where(holds.c.recording_id == recording_id).order_by(holds.c.id)
-    return tuple(_hold(row) for row in connection.execute(query))
+    query = stored_holds.where(holds.c.recording_id == recording_id).order_by(holds.c.id)
+    return tuple(hold_from(row) for row in connection.execute(query))
 
 
 def latest_hold(connection: Connection, recording_id: int) -> Hold | None:
     """Return why a recording is or was last held, and what a person made of it."""
     row = _latest(connection, recording_id)
-    return None if row is None else _hold(row)
+    return None if row is None else hold_from(row)
 
 
 def _latest(connection: Connection, recording_id: int) -> Row[Any] | None:
-    query = _holds.where(holds.c.recording_id == recording_id)
+    query = stored_holds.where(holds.c.recording_id == recording_id)
     return connection.execute(query.order_by(holds.c.id.desc()).limit(1)).one_or_none()
 
 
@@ -160,7 +152,7 @@ def standing_discard(connection: Connection, recording: Row[Any]) -> Hold | None
     if recording.stage != Stage.REFUSED:
         return None
     row = _latest(connection, recording.id)
-    hold = None if row is None else _hold(row)
+    hold = None if row is None else hold_from(row)
     if hold is None or not hold.is_out:
         return None
     refusals = sa.select(journal.c.kind).where(
@@ -190,7 +182,7 @@ def end_hold(connection: Connection, recording_id: int, at: datetime) -> None:
     """Nobody need decide any more: the recording is done again."""
     row = _latest(connection, recording_id)
     if row is not None and row.decision is None:
-        hold = replace(_hold(row), decision=Decision.REPLACED)
+        hold = replace(hold_from(row), decision=Decision.REPLACED)
         decide(connection, hold, "shm", "done again", at)
 
 
@@ -211,7 +203,7 @@ def held_rows(connection: Connection, recording_id: int) -> Sequence[Row[Any]]:
     """The tests of a recording that are held, each with the time of its receipt."""
     own = (tests.c.recording_id == recording_id) & (tests.c.stage == Stage.HELD)
     query = sa.select(tests, recordings.c.received_at).join(recordings)
-    return connection.execute(query.where(own, in_force(tests)).order_by(tests.c.id)).all()
+    return connection.execute(query.where(own, is_current(tests)).order_by(tests.c.id)).all()
 
 
 def confirmed_values(
@@ -241,23 +233,24 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
     """Notes a decision, and with it that the notice was seen to its end."""
     made = {"decision": hold.decision, "decided_at": at, "who": who, "why": why, "time": hold.time}
     connection.execute(sa.update(holds).where(holds.c.id == hold.id).values(**made))
-    told = f"{hold.decision}" + (f": {why}" if why else "")
+    text = f"{hold.decision}" + (f": {why}" if why else "")
     key = notice_key(hold.hanger, hold.id)
     notice = connection.scalar(sa.select(alerts.c.id).where(alerts.c.key == key))
     if notice is not None:
-        acknowledge(connection, notice, who, told, at)
-        resolve(connection, notice, who, told, at)
+        acknowledge(connection, notice, who, text, at)
+        resolve(connection, notice, who, text, at)
     if hold.decision in (Decision.WITHDRAWN, Decision.REINSTATED):
         names = ", ".join(test.name for test in hold.tests)
-        told = f"{names}: {why}" if why else names
+        text = f"{names}: {why}" if why else names
     else:
-        told = why
+        text = why
     subject, about = hold.file_name, hold.recording_id
-    write(connection, at, str(hold.decision), about, None, subject, told, who)
+    write(connection, at, str(hold.decision), about, None, subject, text, who)
     return replace(hold, decided_at=at, who=who, why=why)
 
 
-def _hold(row: Row[Any]) -> Hold:
+def hold_from(row: Row[Any]) -> Hold:
+    """Return a row of `stored_holds` as a value."""
     document = loads(row.document)
-    tests = value_of(tuple[HeldTest, ...], document.pop("tests"))
-    return value_in(row, Hold, tests=tests, **document)
+    known = {name: document[name] for name in ("message", "sidecar_as")}
+    return value_in(row, Hold, tests=value_of(tuple[HeldTest, ...], document["tests"]), **known)

@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import fields, is_dataclass, replace
 from datetime import datetime
 from enum import StrEnum
-from functools import cache
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -25,6 +24,7 @@ _TYPES: Mapping[Any, Any] = {
     str: sa.Text,
 }
 T = TypeVar("T")
+_FIELDS: dict[Any, tuple[tuple[str, Any], ...]] = {}
 
 
 def mapped(
@@ -78,7 +78,7 @@ def row_of(value: object, table: sa.Table) -> dict[str, Any]:
 def insert_value(connection: Connection, table: sa.Table, value: T, **others: Any) -> T:
     """Insert a value with other columns; return it with its number."""
     number = insert(connection, table, row_of(value, table) | others)
-    return replace(value, id=number)  # type: ignore[type-var, call-arg, misc]
+    return replace(value, id=number)  # type: ignore[type-var]
 
 
 def _value(row: Mapping[Any, Any], kind: type[T], given: Mapping[str, Any]) -> T:
@@ -110,13 +110,16 @@ def _flat(kind: type, without: Collection[str] = ()) -> list[tuple[str, Any]]:
     return found
 
 
-@cache
-def _fields(kind: type) -> tuple[tuple[str, type | None], ...]:
+def _fields(kind: Any) -> tuple[tuple[str, Any], ...]:
     """Return the stored fields of a dataclass, each with its own dataclass if it is one."""
-    hints = get_type_hints(kind)
-    stored = [each.name for each in fields(kind) if each.metadata.get("stored", True)]
-    plain = {name: _plain(hints[name]) for name in stored}
-    return tuple((name, each if is_dataclass(each) else None) for name, each in plain.items())
+    if kind not in _FIELDS:
+        hints = get_type_hints(kind)
+        stored = [each.name for each in fields(kind) if each.metadata.get("stored", True)]
+        plain = {name: _plain(hints[name]) for name in stored}
+        _FIELDS[kind] = tuple(
+            (n, each if is_dataclass(each) else None) for n, each in plain.items()
+        )
+    return _FIELDS[kind]
 
 
 def _plain(hint: Any) -> Any:

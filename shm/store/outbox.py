@@ -109,9 +109,16 @@ def acknowledge(connection: Connection, alert_id: int, who: str, why: str, at: d
 def _note_on(
     connection: Connection, alert_id: int, prefix: str, who: str, why: str, at: datetime
 ) -> bool:
-    once = (alerts.c.id == alert_id) & alerts.c[f"{prefix}_at"].is_(None)
     note = {f"{prefix}_at": at, f"{prefix}_who": who, f"{prefix}_why": why}
-    return bool(connection.execute(sa.update(alerts).where(once), note).rowcount)
+    return bool(connection.execute(_ONCE[prefix], {"alert": alert_id, **note}).rowcount)
+
+
+_ONCE = {
+    prefix: sa.update(alerts).where(
+        alerts.c.id == sa.bindparam("alert"), alerts.c[f"{prefix}_at"].is_(None)
+    )
+    for prefix in ("noted", "ended")
+}
 
 
 def owe_resolution(connection: Connection, alert_id: int, hook: str, at: datetime) -> None:
@@ -237,8 +244,8 @@ class Deliveries(Repository):
             if not connection.scalar(_any_waits):  # as a rule, and what follows takes six times it
                 return ()
         at, tried = deliveries.c.next_attempt_at, deliveries.c.attempts
-        counts = [tried == count for count in range(len(waits) - 1)] + [tried >= len(waits) - 1]
-        too_far = [of & (at > now + wait) for of, wait in zip(counts, waits, strict=False)]
+        is_counted = [tried == count for count in range(len(waits) - 1)] + [tried >= len(waits) - 1]
+        too_far = [of & (at > now + wait) for of, wait in zip(is_counted, waits, strict=False)]
         own = sa.func.coalesce(deliveries.c.message_id, deliveries.c.id) == deliveries.c.id
         due = (deliveries.c.state == DeliveryState.WAITING) & own & sa.or_(at <= now, *too_far)
         if begun:

@@ -28,6 +28,11 @@ WHERE line <> excluded.line
 """
 
 
+def key_of(series: str, nanoseconds: int) -> str:
+    """Return the key of a point; those of a series are in order of time."""
+    return f"{series} {nanoseconds:020d}"
+
+
 @dataclass(frozen=True)
 class WaitingPoint:
     """A point that a database has not taken yet, as a line of the line protocol."""
@@ -38,7 +43,7 @@ class WaitingPoint:
 
 @dataclass(frozen=True)
 class OutboxState:
-    """How far a database is behind; `why` is empty while it takes what it is sent."""
+    """State of a database that lags behind; `why` is empty while it takes what it is sent."""
 
     waiting: int
     refused: int
@@ -50,7 +55,7 @@ class OutboxState:
         """Return what is behind and why, for a person; empty where nothing is."""
         since = f" since {self.oldest_at:%Y-%m-%d %H:%M} UTC" if self.oldest_at else ""
         parts = [f"{self.waiting} points wait{since}"] if self.waiting else []
-        parts += [f"{self.refused} points were refused; the log names them"] if self.refused else []
+        parts += [f"{self.refused} points were refused; the log says why"] if self.refused else []
         return f"{'; '.join(parts)}. {self.why}".strip() if parts else ""
 
 
@@ -100,6 +105,14 @@ class PointOutbox:
         query = "UPDATE points SET state = ? WHERE id = ? AND line = ?"
         with self._connected() as connection:
             connection.executemany(query, ((state, each.id, each.line) for each in points))
+
+    def forget(self, target: str, before_ns: Mapping[str, int]) -> None:
+        """Remove points of each series of before a time that were taken and are not made again."""
+        query = "DELETE FROM points WHERE target = ? AND key >= ? AND key < ? AND state = 'taken'"
+        with self._connected() as connection:
+            connection.executemany(
+                query, ((target, f"{each} ", key_of(each, ns)) for each, ns in before_ns.items())
+            )
 
     def retry_refused(self, target: str) -> None:
         """Have the points wait again that a database refused."""

@@ -14,10 +14,11 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError
-from shm.store.files import begin_again, by_id, counts, in_force, move_numbers, recording_from
+from shm.store.files import begin_again, by_id, is_counted, is_current, move_numbers
 from shm.store.holding import discarded_reason, end_hold, standing_discard, taking_back
 from shm.store.journal import AGAIN, write
-from shm.store.rows import ReceivedFile, Rerun, Stage
+from shm.store.mapping import value_in
+from shm.store.rows import ReceivedFile, Rerun, Stage, StoredRecording
 from shm.store.tables import (
     baselines,
     drifts,
@@ -30,7 +31,7 @@ from shm.store.tables import (
     watches,
 )
 
-AGAIN_FROM = (Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
+RERUN_STAGES = (Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
 _BEFORE = {Stage.UPDATED: Stage.IDENTIFIED, Stage.WATCHED: Stage.UPDATED}
 
 
@@ -69,8 +70,8 @@ def rerun_watched(
     query = (
         sa.select(tests.c.id, tests.c.recording_id, tests.c.hanger)
         .join(watches)
-        .where(watches.c.hanger == hanger, which, in_force(watches))
-        .where(tests.c.stage == Stage.WATCHED, in_force(tests))
+        .where(watches.c.hanger == hanger, which, is_current(watches))
+        .where(tests.c.stage == Stage.WATCHED, is_current(tests))
         .distinct()
     )
     chosen = connection.execute(query).all()
@@ -92,8 +93,8 @@ def rerun_recording(
     recording = by_id(connection, recording_id)
     out = standing_discard(connection, recording)
     if out is not None and not _any_counts(connection, recording_id):
-        told = f"{recording.file_name} was {discarded_reason(out)}"
-        raise UsageError(told, remedy=taking_back(out))
+        text = f"{recording.file_name} was {discarded_reason(out)}"
+        raise UsageError(text, remedy=taking_back(out))
     chosen = _chosen(connection, recording, from_stage, test)
     own = of_baselines(connection, chosen)
     if from_stage is not Stage.IDENTIFIED:
@@ -102,10 +103,10 @@ def rerun_recording(
     superseded = rerun(connection, chosen, from_stage, at)
     if not chosen:  # it was refused before it was identified
         begin_again(connection, recording_id, at)
-    told = f"sent back by request, to be {from_stage} again."
+    text = f"sent back by request, to be {from_stage} again."
     name = recording.file_name
-    write(connection, at, AGAIN, recording_id, subject=name, detail=told, who="")
-    stored = recording_from(by_id(connection, recording_id))
+    write(connection, at, AGAIN, recording_id, subject=name, detail=text, who="")
+    stored = value_in(by_id(connection, recording_id), StoredRecording)
     names = tuple(row.name for row in chosen)
     return Rerun(stored, names, *superseded, tuple(row.name for row in chosen if row.id in own))
 
@@ -125,7 +126,7 @@ def redescribe(connection: Connection, known: Row[Any], file: ReceivedFile, at: 
 
     `known` is its row as it was.
     """
-    query = sa.select(tests).where(tests.c.recording_id == known.id, in_force(tests))
+    query = sa.select(tests).where(tests.c.recording_id == known.id, is_current(tests))
     rows = connection.execute(query).all()
     own = of_baselines(connection, rows)
     of_baseline = sorted(row.name for row in rows if row.id in own)
@@ -135,10 +136,10 @@ def redescribe(connection: Connection, known: Row[Any], file: ReceivedFile, at: 
     rerun(connection, rows, Stage.IDENTIFIED, at)
     if not rows:
         begin_again(connection, known.id, at)
-    told = f"the same bytes as {known.file_name} with another sidecar: done again with that."
+    text = f"the same bytes as {known.file_name} with another sidecar: done again with that."
     if of_baseline:
-        told += f" The baseline made from {', '.join(of_baseline)} stays: `shm drift rebaseline`."
-    return told
+        text += f" The baseline made from {', '.join(of_baseline)} stays: `shm drift rebaseline`."
+    return text
 
 
 def of_baselines(connection: Connection, chosen: Sequence[Row[Any]]) -> set[int]:
@@ -175,13 +176,13 @@ def _chosen(
     connection: Connection, recording: Row[Any], stage: Stage, test: str | None
 ) -> Sequence[Row[Any]]:
     """Return the tests that are sent back: those of a whole file, or the one that is named."""
-    query = sa.select(tests).where(tests.c.recording_id == recording.id, in_force(tests))
+    query = sa.select(tests).where(tests.c.recording_id == recording.id, is_current(tests))
     if test is not None and stage is not Stage.IDENTIFIED:
         query = query.where(tests.c.name == test)
     rows = connection.execute(query.order_by(tests.c.id)).all()
     waits = recording.stage == Stage.RECEIVED
     if stage is not Stage.IDENTIFIED:
-        reached = AGAIN_FROM[AGAIN_FROM.index(stage) :]
+        reached = RERUN_STAGES[RERUN_STAGES.index(stage) :]
         waits = not rows or any(row.stage not in reached for row in rows)
     if waits:
         raise UsageError(
@@ -194,11 +195,11 @@ def _chosen(
 
 def _any_counts(connection: Connection, recording_id: int) -> bool:
     own = sa.select(tests.c.id).where(tests.c.recording_id == recording_id)
-    return connection.execute(own.where(in_force(tests), counts(tests))).first() is not None
+    return connection.execute(own.where(is_current(tests), is_counted(tests))).first() is not None
 
 
 def _mark(
     connection: Connection, table: sa.Table, which: sa.ColumnElement[bool], at: datetime
 ) -> int:
-    found = sa.update(table).where(which, in_force(table)).values(superseded_at=at)
+    found = sa.update(table).where(which, is_current(table)).values(superseded_at=at)
     return connection.execute(found).rowcount

@@ -251,9 +251,9 @@ def _refused(reason: Path) -> Refused | None:
     """None for what is no reason of ours, or without its file."""
     path = reason.with_name(reason.name.removesuffix(REASON_SUFFIX))
     try:
-        told: Any = json.loads(reason.read_text(encoding="utf-8"))
-        sha256, refused_at = str(told["sha256"]), datetime.fromisoformat(str(told["time"]))
-        if told["sha256"] is None or checksum(path) != sha256:
+        document: Any = json.loads(reason.read_text(encoding="utf-8"))
+        sha256, refused_at = str(document["sha256"]), datetime.fromisoformat(str(document["time"]))
+        if document["sha256"] is None or checksum(path) != sha256:
             return None  # too large to have been read: it lies nowhere else
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -19,7 +19,7 @@ from types import MappingProxyType
 import numpy as np
 
 from shm.bridge.streams import stream_named
-from shm.documents import Misfit, dump, format_time, value_of
+from shm.documents import ValidationError, dump, format_time, value_of
 from shm.errors import BadInput, DoubledChunk, StoreBusy
 from shm.read.atomic import replace_text
 from shm.read.chunk_document import chunk_document, numbered, parse_chunk, refuse_long_chunk
@@ -123,7 +123,7 @@ _UNFINISHED = timedelta(hours=1)  # technical: no file takes so long; a killed p
 
 
 @dataclass(frozen=True)
-class Kept:
+class StoredChunk:
     """A chunk that is on disk; not `is_new` where it was there before."""
 
     stream: str
@@ -153,7 +153,7 @@ class Ring:
         self.folder, self._streams, self._clock = folder, streams, clock
         self._late, self._ahead, self._note = late, ahead, note
 
-    def append(self, content: bytes) -> Kept:
+    def append(self, content: bytes) -> StoredChunk:
         """Keeps a chunk: on disk when this returns. One that came before is not kept twice.
 
         Raises BadInput where it cannot be used, StoreError with `retry_after_s` where the disk is
@@ -161,7 +161,7 @@ class Ring:
         """
         return self.append_all([content])[0]
 
-    def append_all(self, contents: Sequence[bytes], stream: str = "") -> list[Kept]:
+    def append_all(self, contents: Sequence[bytes], stream: str = "") -> list[StoredChunk]:
         """Several at once, which is quicker; where one cannot be used, none is kept.
 
         Raises DoubledChunk for one of the number and time of another that has other samples.
@@ -211,9 +211,9 @@ class Ring:
         """Keeps the samples of a time for good, for a reason."""
         kept = self._folder(stream).folder / "kept"
         kept.mkdir(parents=True, exist_ok=True)
-        told = {"stream": stream, "start": start, "end": end, "why": why}
+        document = {"stream": stream, "start": start, "end": end, "why": why}
         path = kept / f"{microseconds(start):017d}-{microseconds(end):017d}.json"
-        replace_text(path, dump(told) + "\n")
+        replace_text(path, dump(document) + "\n")
         for each in (path, kept, kept.parent):
             sync(each)
 
@@ -243,7 +243,7 @@ class Ring:
             return value_of(Swept, json.loads((self.folder / _SWEEP).read_text(encoding="utf-8")))
         except FileNotFoundError:
             return None
-        except (Misfit, ValueError) as error:
+        except (ValidationError, ValueError) as error:
             log.warning("%s cannot be read: %s", self.folder / _SWEEP, error)
             return None
 
@@ -316,14 +316,14 @@ class Ring:
         known = self.state(chunk.stream).step_times
         return all(was_ahead(folder, known, each, chunk) for each in differing)
 
-    def _kept(self, chunk: Chunk, placed: tuple[Path, bytes] | None) -> Kept:
+    def _kept(self, chunk: Chunk, placed: tuple[Path, bytes] | None) -> StoredChunk:
         if placed is not None:
             folder = self._folder(chunk.stream)
             folder.make()
             self._refuse_crowd(folder)
             self._write(*placed)
         is_new = placed is not None
-        return Kept(chunk.stream, chunk.sequence, chunk.start, chunk.end, is_new)
+        return StoredChunk(chunk.stream, chunk.sequence, chunk.start, chunk.end, is_new)
 
     def _write(self, path: Path, content: bytes) -> None:
         temporary = path.with_name(f".{path.name}.{os.getpid()}.{id(content)}.part")

@@ -188,11 +188,11 @@ def exclude_ahead(
             leaving = _list_excluded(folder, waiting, step)
             count = sum(len(keys) for keys in leaving.values())
             chunks = "1 chunk is" if count == 1 else f"{count} chunks are"
-            said = f"{step.words}: {chunks} set aside; the samples that came later count"
+            text = f"{step.words}: {chunks} set aside; the samples that came later count"
             stream = folder.folder.name
-            yield step, StreamEvent(stream, "clock step", step.start, step.last_end, said), leaving
+            yield step, StreamEvent(stream, "clock step", step.start, step.last_end, text), leaving
             gone = {each for keys in leaving.values() for each in keys}
-            _move_to_aside(folder, waiting, leaving, said)
+            _move_to_aside(folder, waiting, leaving, text)
             found = {each: chunk for each, chunk in found.items() if each not in gone}
             waiting = [each for each in waiting if each.key not in gone]
 

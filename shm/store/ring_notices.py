@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shm.documents import Misfit, dump, parse_time, value_of
+from shm.documents import ValidationError, dump, parse_time, value_of
 from shm.read.atomic import replace_text
 from shm.read.chunk_document import BY_TIME, numbered
 from shm.read.ring_segment import ChunkKey, microseconds
@@ -72,7 +72,7 @@ def load_state(path: Path) -> StreamState:
         return value_of(StreamState, json.loads(path.read_text(encoding="utf-8")))
     except FileNotFoundError:
         return StreamState()
-    except (Misfit, ValueError) as error:
+    except (ValidationError, ValueError) as error:
         log.warning("%s begins anew: %s", path, error)
         return StreamState()
 
@@ -101,9 +101,9 @@ def notice(
     if late:
         delay_h = max((each.arrived - each.end).total_seconds() for each in late) / 3600
         many = "1 chunk" if len(late) == 1 else f"{len(late)} chunks"
-        said = f"{many} came up to {delay_h:.1f} hours late, now in place"
+        text = f"{many} came up to {delay_h:.1f} hours late, now in place"
         last = max(each.end for each in late)
-        events.append(StreamEvent(stream, "late", late[0].start, last, said))
+        events.append(StreamEvent(stream, "late", late[0].start, last, text))
     return state, events
 
 
@@ -122,12 +122,12 @@ def notice_overlap(
             f", {first.sequence} to {last.sequence}," if last.sequence < BY_TIME else " of files"
         )
         whose = f"{len(found)} chunks{named}"
-    said = (
+    text = (
         f"{samples} samples of {whose} are of a time that was there already: the first to come "
         "count, these are kept apart; see to the logger's clock"
     )
     end = max(chunk.end for chunk, _ in found)
-    return [_event(first.stream, "overlap", first.start, end, said)]
+    return [_event(first.stream, "overlap", first.start, end, text)]
 
 
 def notice_early(found: Mapping[ChunkKey, Chunk], keys: Collection[ChunkKey]) -> list[StreamEvent]:
@@ -135,12 +135,12 @@ def notice_early(found: Mapping[ChunkKey, Chunk], keys: Collection[ChunkKey]) ->
     if not keys:
         return []
     early = [found[key] for key in sorted(keys)]
-    said = (
+    text = (
         "the clock was ahead: samples came before the time they are dated; those that came in "
         "time count"
     )
     end = max(chunk.end for chunk in early)
-    return [_event(early[0].stream, "clock step", early[0].start, end, said)]
+    return [_event(early[0].stream, "clock step", early[0].start, end, text)]
 
 
 def find_misplaced(
@@ -183,11 +183,11 @@ def notice_misplaced(
     ours = [chunks[key] for key in sorted(found)]
     before, behind = found[min(found)]
     whose = " to ".join(dict.fromkeys(str(each.sequence) for each in (ours[0], ours[-1])))
-    said = (
+    text = (
         f"chunk {whose} is stamped between chunks {before} and {behind}, where its number does not "
         "belong: the clock stepped into a gap, and these samples are of another time"
     )
-    return [_event(stream, "clock step", ours[0].start, max(c.end for c in ours), said)]
+    return [_event(stream, "clock step", ours[0].start, max(c.end for c in ours), text)]
 
 
 def notice_missing(new: Mapping[ChunkKey, Chunk]) -> list[StreamEvent]:
@@ -203,8 +203,8 @@ def notice_missing(new: Mapping[ChunkKey, Chunk]) -> list[StreamEvent]:
     for place, channel in enumerate(first.channels):
         missing = sum(int(np.isnan(chunk.values[place]).sum()) for chunk in chunks)
         if 0 < missing < sum(chunk.values.shape[1] for chunk in chunks):
-            said = f"{missing} samples have no value (null or NaN)"
-            events.append(StreamEvent(first.stream, "gap", first.start, end, said, channel))
+            text = f"{missing} samples have no value (null or NaN)"
+            events.append(StreamEvent(first.stream, "gap", first.start, end, text, channel))
     return events
 
 
@@ -236,16 +236,16 @@ def _between(stream: str, before: PassedChunk | None, chunk: PassedChunk) -> Ite
         yield _stepped(stream, before, chunk)
     elif off_s > 0:
         samples = round(off_s * chunk.sampling_rate_hz)
-        said = f"{samples} samples are missing before {numbered(chunk.sequence)}"
-        yield _event(stream, "gap", before.end, chunk.start, said)
+        text = f"{samples} samples are missing before {numbered(chunk.sequence)}"
+        yield _event(stream, "gap", before.end, chunk.start, text)
 
 
 def _stepped(stream: str, before: PassedChunk, chunk: PassedChunk) -> StreamEvent:
     off_s = (chunk.start - before.end).total_seconds()
-    said = f"the clock jumped by {off_s:+.3f} s before chunk {chunk.sequence}, which is the next"
+    text = f"the clock jumped by {off_s:+.3f} s before chunk {chunk.sequence}, which is the next"
     if abs(off_s) > 1800 and abs(off_s - 3600 * round(off_s / 3600)) <= _slack_s(before, chunk):
-        said += ": whole hours (daylight saving?)"
-    return _event(stream, "clock step", before.end, chunk.start, said)
+        text += ": whole hours (daylight saving?)"
+    return _event(stream, "clock step", before.end, chunk.start, text)
 
 
 def _event(
@@ -273,5 +273,5 @@ def _counted(
     if abs(ppm) <= DRIFT_PPM:
         return begun, []
     what = "more" if ppm > 0 else "fewer"
-    said = f"{abs(ppm):.0f} ppm {what} samples came than the stamps say: frequencies are as wrong"
-    return begun, [StreamEvent(stream, "clock drift", since, chunk.start, said)]
+    text = f"{abs(ppm):.0f} ppm {what} samples came than the stamps say: frequencies are as wrong"
+    return begun, [StreamEvent(stream, "clock drift", since, chunk.start, text)]

@@ -188,10 +188,10 @@ def _doubled(found: Mapping[ChunkKey, Chunk], new: Set[ChunkKey]) -> list[ChunkK
 def _set_doubled_aside(
     folder: StreamFolder, waiting: Sequence[WaitingChunk], chunk: Chunk, key: ChunkKey, note: Note
 ) -> None:
-    said = f"{numbered(chunk.sequence)} came twice, with other samples; the first counts"
-    note(StreamEvent(chunk.stream, "doubled", chunk.start, chunk.end, said))
+    text = f"{numbered(chunk.sequence)} came twice, with other samples; the first counts"
+    note(StreamEvent(chunk.stream, "doubled", chunk.start, chunk.end, text))
     path = next(each.path for each in waiting if each.key == key)
-    folder.set_aside(path, BadInput(said))
+    folder.set_aside(path, BadInput(text))
 
 
 def _write_all(folder: StreamFolder, chunks: Mapping[ChunkKey, Chunk], new: Set[ChunkKey]) -> None:

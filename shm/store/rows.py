@@ -68,7 +68,7 @@ OTHER = "other"
 """Stands for whatever a row says that this version has no name for."""
 
 
-def counts_by_name(known: type[StrEnum], rows: Iterable[Sequence[Any]]) -> dict[str, int]:
+def sum_counts(known: type[StrEnum], rows: Iterable[Sequence[Any]]) -> dict[str, int]:
     """Sum the counts in pairs of a name and a count; unknown names are summed under `OTHER`.
 
     Each name of `known` is counted, 0 where there is none.
@@ -265,7 +265,7 @@ class StoredWatch:
 
 
 @dataclass(frozen=True)
-class KeptWatch:
+class WatchCheckpoint:
     """Stored state of a watch, made with what `key` tells."""
 
     key: str
@@ -502,7 +502,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Standing:
+class RecordingInProgress:
     """A recording that is not through: how far it has come, and since when it is there."""
 
     id: int
@@ -750,7 +750,7 @@ class ArchiveCopy:
 
 
 @dataclass(frozen=True)
-class KeptStreamWatch:
+class StreamWatchCheckpoint:
     """State of the watch of a hanger's sensors, and up to when it has seen readings."""
 
     reading_time: datetime

@@ -14,7 +14,7 @@ from shm.documents import posterior_document
 from shm.store.blobs import pack_samples, posterior_from, test_from_document
 from shm.store.columns import loads
 from shm.store.database import Repository, insert
-from shm.store.files import counts, in_force
+from shm.store.files import is_counted, is_current
 from shm.store.mapping import value_in
 from shm.store.rows import DESCRIBED, Baseline, Lineage, Stage, StoredSelection, StoredTest, TestRow
 from shm.store.tables import (
@@ -35,7 +35,7 @@ from shm.values import Hanger, Posterior, Selection
 _columns = (column for column in tests.columns if column is not tests.c.frequency_response)
 plain_tests = sa.select(*_columns, recordings.c.sha256).join(recordings)
 _undone = adoptions.c.undone_at.is_not(None)
-_undone_selections = sa.select(adoptions.c.selection_id).where(_undone)
+undone_selections = sa.select(adoptions.c.selection_id).where(_undone)
 _undone_baselines = sa.select(adoptions.c.baseline_id).where(_undone)
 WEIGHED = sa.type_coerce(tests.c.document, sa.Text).contains('"tension_read_n"')
 # Posteriors of the baseline's tests in a class that is not in force: it lost a selection that
@@ -43,7 +43,7 @@ WEIGHED = sa.type_coerce(tests.c.document, sa.Text).contains('"tension_read_n"')
 # a posterior each, which must still show what moved between them.
 hidden = sa.union(
     sa.select(selection_entries.c.posterior_id).where(
-        (selection_entries.c.rank > 0) != selection_entries.c.selection_id.in_(_undone_selections)
+        (selection_entries.c.rank > 0) != selection_entries.c.selection_id.in_(undone_selections)
     ),
     sa.select(baselines.c.posterior_id).where(baselines.c.since.is_not(None)),
 )
@@ -59,7 +59,7 @@ _OF_WORKS = (
         tests.c.time < sa.func.coalesce(silences.c.ended_at, silences.c.ends_at),
     )
     .correlate(tests)
-) & ~sa.exists().where(watches.c.test_id == tests.c.id, in_force(watches)).correlate(tests)
+) & ~sa.exists().where(watches.c.test_id == tests.c.id, is_current(watches)).correlate(tests)
 
 
 test_columns = tuple(tests.c[field.name] for field in fields(TestRow))
@@ -72,34 +72,30 @@ def test_row(row: Row[Any]) -> TestRow:
 
 def counted_tests(hanger: int | None = None) -> sa.Select[Any]:
     """The tests of a hanger, or of all, that are neither refused nor held, by time."""
-    query = plain_tests.where(counts(tests), in_force(tests))
+    query = plain_tests.where(is_counted(tests), is_current(tests))
     if hanger is not None:
         query = query.where(tests.c.hanger == hanger)
     return query.order_by(tests.c.time, tests.c.id)
 
 
-def compared_with(baseline: Baseline, *, or_of_works: bool = False) -> list[sa.ColumnElement[bool]]:
-    """Tests that were watched since a baseline, `or_of_works` those that were passed over."""
+def select_since_baseline(
+    baseline: Baseline, *, include_maintenance: bool = False
+) -> list[sa.ColumnElement[bool]]:
+    """Select tests watched since a baseline, with `include_maintenance` those passed over."""
     found = [
         tests.c.hanger == baseline.hanger,
         tests.c.stage == Stage.WATCHED,
         tests.c.name.not_in(baseline.posterior.tests),
-        in_force(tests),
+        is_current(tests),
     ]
-    if not or_of_works:
+    if not include_maintenance:
         found.append(~_OF_WORKS)
     return found if baseline.since is None else [*found, tests.c.time >= baseline.since]
 
 
-def read_tests(connection: Connection, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
-    """The tests of a query on `plain_tests`."""
-    return tuple(_test(row) for row in connection.execute(query))
-
-
 def load_tests(store: Repository, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
     """Read the tests of a query on `plain_tests`."""
-    with store.reading() as connection:
-        return read_tests(connection, query)
+    return tuple(map(_test, store.rows(query)))
 
 
 def _test(row: Row[Any]) -> StoredTest:
@@ -167,24 +163,17 @@ def selection_of(connection: Connection, hanger: int) -> StoredSelection | None:
     return StoredSelection(row.id, selection, row.selected_at, row.model)
 
 
-def selected_classes(connection: Connection) -> dict[int, str]:
-    """The name of the class in force of each hanger that has one."""
-    query = sa.select(selections.c.hanger, selections.c.model).order_by(selections.c.id)
-    held = query.where(selections.c.id.not_in(_undone_selections))
-    return {row.hanger: row.model for row in connection.execute(held)}
-
-
 def selection_numbers(connection: Connection) -> dict[int, int]:
     """The number of the selection in force of each hanger that has one."""
     query = sa.select(selections.c.hanger, sa.func.max(selections.c.id).label("id"))
-    query = query.where(selections.c.id.not_in(_undone_selections)).group_by(selections.c.hanger)
+    query = query.where(selections.c.id.not_in(undone_selections)).group_by(selections.c.hanger)
     return {row.hanger: row.id for row in connection.execute(query)}
 
 
 def selection_in_force(hanger: int) -> sa.Select[Any]:
     """The newest selection of a hanger that did not come with an adoption since undone."""
     query = sa.select(selections).where(
-        selections.c.hanger == hanger, selections.c.id.not_in(_undone_selections)
+        selections.c.hanger == hanger, selections.c.id.not_in(undone_selections)
     )
     return query.order_by(selections.c.id.desc()).limit(1)
 
@@ -198,7 +187,7 @@ def _in_force(hanger: int) -> sa.ColumnElement[bool]:
 def baselines_now(hanger: int | None = None) -> sa.Select[Any]:
     """The numbers of the newest baselines of all hangers or of one, each in its class in force."""
     newest = sa.select(sa.func.max(selections.c.id)).group_by(selections.c.hanger)
-    held = newest.where(selections.c.id.not_in(_undone_selections))
+    held = newest.where(selections.c.id.not_in(undone_selections))
     found = (
         sa.select(sa.func.max(baselines.c.id))
         .join(posteriors, posteriors.c.id == baselines.c.posterior_id)
@@ -219,7 +208,7 @@ def baseline_in_force(hanger: int) -> sa.Select[Any]:
     return query.where(_in_force(hanger)).order_by(baselines.c.id.desc()).limit(1)
 
 
-def among(
+def for_hangers(
     hanger: sa.ColumnElement[int], hangers: Sequence[Hanger] | None
 ) -> sa.ColumnElement[bool]:
     """Return the condition that a row is of one of `hangers`, or of any where None."""

@@ -12,7 +12,7 @@ from sqlalchemy.engine import Connection
 from shm.diagnosis_document import diagnosis_document
 from shm.errors import NothingThere, StoreBusy, UsageError
 from shm.store.database import insert
-from shm.store.files import all_at, in_force, move
+from shm.store.files import all_at, is_current, move
 from shm.store.journal import note
 from shm.store.mapping import row_of, value_in
 from shm.store.rows import (
@@ -190,20 +190,20 @@ def _has(connection: Connection, hanger: int) -> bool:
 
 
 def posteriors_of(hanger: int) -> sa.Select[Any]:
-    refused = (tests.c.hanger == hanger) & (tests.c.stage == Stage.REFUSED) & in_force(tests)
+    refused = (tests.c.hanger == hanger) & (tests.c.stage == Stage.REFUSED) & is_current(tests)
     of_refused = sa.select(posterior_tests.c.posterior_id).join(tests).where(refused)
     return sa.select(posteriors).where(
         posteriors.c.hanger == hanger,
         posteriors.c.id.not_in(hidden),
         posteriors.c.id.not_in(of_refused),
-        in_force(posteriors),
+        is_current(posteriors),
     )
 
 
 def _of_test(hanger: int, name: str) -> sa.Select[Any]:
     joined = posterior_tests.join(tests)
     query = sa.select(posterior_tests.c.posterior_id).select_from(joined)
-    return query.where(tests.c.hanger == hanger, tests.c.name == name, in_force(tests))
+    return query.where(tests.c.hanger == hanger, tests.c.name == name, is_current(tests))
 
 
 def _refuse_late(connection: Connection, adoption: Adoption, before: StoredSelection) -> None:

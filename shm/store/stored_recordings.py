@@ -16,12 +16,12 @@ from shm.store.files import (
     by_id,
     end_recording,
     end_tests,
-    in_force,
+    is_current,
     note_name,
-    recording_from,
 )
 from shm.store.holding import standing_discard
 from shm.store.journal import ARCHIVED, DIED, REFUSED, write
+from shm.store.mapping import value_in
 from shm.store.rerun import redescribe, reopen
 from shm.store.rows import Outcome, Receipt, ReceivedFile, Stage, StoredRecording
 from shm.store.tables import recordings, tests
@@ -43,7 +43,7 @@ class Recordings(Dispositions):
             else:
                 row_id = known.id
                 _notice(connection, known, file, outcome, at)
-            return Receipt(outcome, recording_from(by_id(connection, row_id)))
+            return Receipt(outcome, value_in(by_id(connection, row_id), StoredRecording))
 
     def refuse(
         self,
@@ -75,7 +75,7 @@ class Recordings(Dispositions):
     def get(self, recording_id: int) -> StoredRecording:
         """One recording by its number; raises NothingThere."""
         with self.reading() as connection:
-            return recording_from(by_id(connection, recording_id))
+            return value_in(by_id(connection, recording_id), StoredRecording)
 
     def note_death(self, recording_id: int, message: str, at: datetime) -> None:
         """Note that a process that worked on a recording died."""
@@ -128,7 +128,7 @@ def waits_at(
     if not test_ids:
         return bool(recording.stage == stage)
     own = _own(connection, recording.id, test_ids)
-    waiting = sa.select(tests.c.id).where(in_force(tests), tests.c.stage == stage)
+    waiting = sa.select(tests.c.id).where(is_current(tests), tests.c.stage == stage)
     return len(connection.scalars(waiting.where(tests.c.id.in_(own))).all()) == len(own)
 
 

@@ -128,10 +128,10 @@ def _document(reading: WindowReading | PooledReading) -> str:
 
 def _told(values: dict[str, Any], kind: type[Mode | ShapePoint]) -> dict[str, Any]:
     usual = {field.name: field.default for field in fields(kind)}
-    told = {name: value for name, value in values.items() if not _is_usual(value, usual[name])}
-    if "shape" in told:
-        told["shape"] = [_told(point, ShapePoint) for point in told["shape"]]
-    return told
+    document = {name: value for name, value in values.items() if not _is_usual(value, usual[name])}
+    if "shape" in document:
+        document["shape"] = [_told(point, ShapePoint) for point in document["shape"]]
+    return document
 
 
 def _is_usual(value: Any, usual: Any) -> bool:

@@ -11,8 +11,8 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere
 from shm.store.database import Repository, insert
-from shm.store.files import advance_recordings, counts, in_force, test_contents
-from shm.store.holding import Judged, keep_judgement
+from shm.store.files import advance_recordings, is_counted, is_current, test_contents
+from shm.store.holding import Judgement, keep_judgement
 from shm.store.journal import write
 from shm.store.rows import IdentifiedTest, Lineage, Stage, StoredAlert, StoredTest
 from shm.store.selects import counted_tests, load_tests, plain_tests
@@ -32,7 +32,7 @@ class Tests(Repository):
         found: Sequence[IdentifiedTest],
         lineage: Lineage,
         at: datetime,
-        judged: Judged | None = None,
+        judged: Judgement | None = None,
     ) -> StoredAlert | None:
         """Keeps the tests of a recording; does nothing where another process was first.
 
@@ -90,7 +90,9 @@ class Tests(Repository):
 
 
 def _positions(connection: Connection, recording_id: int) -> set[int]:
-    query = sa.select(tests.c.position).where(tests.c.recording_id == recording_id, in_force(tests))
+    query = sa.select(tests.c.position).where(
+        tests.c.recording_id == recording_id, is_current(tests)
+    )
     return set(connection.scalars(query))
 
 
@@ -117,10 +119,10 @@ def _free_name(connection: Connection, item: IdentifiedTest, recording: Row[Any]
     query = sa.select(tests.c.name).where(tests.c.hanger == item.test.hanger)
     here = (tests.c.recording_id == recording.id) & (tests.c.position == item.position)
     former = connection.scalar(query.where(here).order_by(tests.c.id.desc()).limit(1))
-    taken = query.where(tests.c.name == plain, in_force(tests))
+    taken = query.where(tests.c.name == plain, is_current(tests))
     free = former != own and connection.execute(taken).first() is None
     return plain if free else own
 
 
 def shown_tests(hanger: int) -> sa.ColumnElement[bool]:
-    return (tests.c.hanger == hanger) & in_force(tests) & counts(tests)
+    return (tests.c.hanger == hanger) & is_current(tests) & is_counted(tests)

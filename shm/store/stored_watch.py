@@ -15,20 +15,20 @@ from shm.documents import alert_document
 from shm.errors import StoreBusy
 from shm.store.blobs import watch_document, watch_in
 from shm.store.database import Repository, insert
-from shm.store.files import all_at, in_force, move
+from shm.store.files import all_at, is_current, move
 from shm.store.journal import note
 from shm.store.mapping import row_of, value_in
 from shm.store.outbox import acknowledge, resolve, settle
 from shm.store.rerun import rerun_watched
 from shm.store.rows import (
     Baseline,
-    KeptWatch,
     Lineage,
     Reconciled,
     Stage,
     StoredAlert,
     StoredTest,
     StoredWatch,
+    WatchCheckpoint,
 )
 from shm.store.selects import baseline_in_force, insert_baseline, insert_posterior, read_baseline
 from shm.store.tables import alerts, drifts, tests, watch_states, watches
@@ -46,7 +46,7 @@ class Watch(Repository):
         alert: Alert | None,
         hooks: Sequence[str],
         at: datetime,
-        state: KeptWatch | None = None,
+        state: WatchCheckpoint | None = None,
         changes: Reconciled | None = None,
         level: float = NAN,
     ) -> tuple[StoredAlert, ...]:
@@ -147,7 +147,7 @@ class Watch(Repository):
 
     def list_drifts(self, hanger: int | None = None) -> tuple[Drift, ...]:
         """Shifts from the baseline, by time; of one hanger where named."""
-        query = sa.select(drifts, tests.c.name.label("test")).join(tests).where(in_force(drifts))
+        query = sa.select(drifts, tests.c.name.label("test")).join(tests).where(is_current(drifts))
         if hanger is not None:
             query = query.where(drifts.c.hanger == hanger)
         return tuple(
@@ -159,7 +159,7 @@ class Watch(Repository):
     ) -> tuple[StoredWatch, ...]:
         """Return what the watch said after each test, or after the `last` so many, by time; of one
         hanger or baseline where named."""
-        query = sa.select(watches.c.id).where(in_force(watches))
+        query = sa.select(watches.c.id).where(is_current(watches))
         if hanger is not None:
             query = query.where(watches.c.hanger == hanger)
         if baseline_id is not None:
@@ -182,7 +182,7 @@ def load_watches(
     shifts: sa.Select[Any] = (
         sa.select(drifts, name)
         .select_from(drifts.join(tests).join(watches, together))
-        .where(watches.c.id.in_(chosen), in_force(drifts))
+        .where(watches.c.id.in_(chosen), is_current(drifts))
         .order_by(drifts.c.id)
     )
     with store.reading() as connection:
@@ -203,7 +203,7 @@ def _refuse_late(connection: Connection, before: Baseline) -> None:
         )
 
 
-def _keep_state(connection: Connection, baseline: Baseline, state: KeptWatch) -> None:
+def _keep_state(connection: Connection, baseline: Baseline, state: WatchCheckpoint) -> None:
     _drop_state(connection, baseline)
     own = {"hanger": baseline.hanger, "baseline_id": baseline.id}
     insert(connection, watch_states, row_of(state, watch_states) | own)

@@ -35,8 +35,6 @@ from shm.store.rows import (
     Delivery,
     Entry,
     Hold,
-    KeptStreamWatch,
-    KeptWatch,
     Scope,
     Silence,
     Stage,
@@ -47,7 +45,9 @@ from shm.store.rows import (
     StoredTest,
     StoredToken,
     StoredWatch,
+    StreamWatchCheckpoint,
     User,
+    WatchCheckpoint,
 )
 from shm.values import Alert, Drift, ForeignMode, QualityCheck
 from shm.values.notes import Note
@@ -228,7 +228,7 @@ watches = mapped(
 # with them all again. `key` tells with what it was made; a kept state may be thrown away at will.
 watch_states = mapped(
     "watch_states",
-    KeptWatch,
+    WatchCheckpoint,
     identity(),
     _hanger("hanger"),
     sa.Column("baseline_id", sa.ForeignKey("baselines.id"), nullable=False, unique=True),
@@ -414,14 +414,14 @@ stream_events = mapped(
 # What the watch on the readings of a hanger goes on from; it may be thrown away at will.
 stream_watch = mapped(
     "stream_watch",
-    KeptStreamWatch,
+    StreamWatchCheckpoint,
     sa.Column("hanger", sa.Integer, primary_key=True, autoincrement=False),
 )
 
 # The same as it was about a day apart, for hours that come late.
 stream_watch_days = mapped(
     "stream_watch_days",
-    KeptStreamWatch,
+    StreamWatchCheckpoint,
     sa.Column("hanger", sa.Integer, primary_key=True, autoincrement=False),
     reading_time=sa.Column(UtcTime, primary_key=True),
 )

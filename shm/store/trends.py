@@ -25,7 +25,7 @@ from shm.documents import averaged_document, number, value_of
 from shm.errors import UsageError
 from shm.store.columns import loads
 from shm.store.database import Repository
-from shm.store.files import in_force
+from shm.store.files import is_current
 from shm.store.rows import DESCRIBED, BaselineGlance, Numbers, TrendPoint
 from shm.store.selects import (
     baselines_now,
@@ -84,7 +84,7 @@ class Trends(Repository):
         )
         looked_at = posteriors.c.id.not_in(hidden) | posteriors.c.id.in_(of_baselines)
         query = sa.select(posteriors.c.id).where(
-            posteriors.c.hanger == hanger.id, in_force(posteriors), looked_at, ~up_to_date
+            posteriors.c.hanger == hanger.id, is_current(posteriors), looked_at, ~up_to_date
         )
         return list(self.scalars(query.order_by(posteriors.c.id)))
 
@@ -142,7 +142,7 @@ def baselines_in_numbers(
 
 
 def shown_posteriors() -> tuple[sa.ColumnElement[bool], ...]:
-    return posteriors.c.id.not_in(hidden), in_force(posteriors)
+    return posteriors.c.id.not_in(hidden), is_current(posteriors)
 
 
 def _numbers(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, Plane
 from shm.values.leading import MIN_NO_GAP_PROBABILITY, find_leading_cause, sum_group_probability
-from shm.values.showing import Shown, front, line, tension_words
+from shm.values.showing import Displayable, front, line, tension_words
 from shm.values.verdict import GapVerdict, judge
 
 if TYPE_CHECKING:
@@ -218,7 +218,7 @@ class NextMeasurement:
 
 
 @dataclass(frozen=True)
-class Diagnosis(Shown):
+class Diagnosis(Displayable):
     """Differences of a hanger between baseline and measurement, their causes and consequences.
 
     `causes` holds every effect that these data could show, best first, and the pairs that were

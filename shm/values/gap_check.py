@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from shm.values.kinds import NAN
-from shm.values.showing import Shown
+from shm.values.showing import Displayable
 
 Outcome = Literal["alone", "in a group", "another cause", "no gap", "unexplained", "refused"]
 """What the verdict says of a planted effect; `refused` if no explanation comes near the data."""
@@ -93,7 +93,7 @@ class EffectCheck:
 
 
 @dataclass(frozen=True)
-class GapCheck(Shown):
+class GapCheck(Displayable):
     """Effects that a diagnosis of these tests would find, and from which size on.
 
     The twin is the class `baseline` fitted to the tests (`tests` empty: the description with a

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 from shm.assumptions import DEFAULTS, Assumptions
 from shm.values.kinds import NAN
-from shm.values.showing import Shown
+from shm.values.showing import Displayable
 
 _ENDS_BELOW = 0.5  # judgement: so that a state at the limit does not come and go from test to test
 
@@ -192,7 +192,7 @@ class EffectPrior:
 
 
 @dataclass(frozen=True)
-class Hanger(Shown):
+class Hanger(Displayable):
     """One hanger as its owner describes it: geometry, material, nominal tension.
 
     `diameter_m` is NaN where the section is not round. `bending_stiffness_factor` is the share of

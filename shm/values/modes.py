@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from shm.values.kinds import NAN, Plane, Verdict
 from shm.values.recording import AddedMass
 from shm.values.rounding import NINETY_PERCENT
-from shm.values.showing import Shown, front, line, tension_words
+from shm.values.showing import Displayable, front, line, tension_words
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -128,7 +128,7 @@ def printable(text: str, instead: str = "_") -> str:
 
 
 @dataclass(frozen=True)
-class ModalTest(Shown):
+class ModalTest(Displayable):
     """One hammer test of a hanger: its identified modes and conditions.
 
     `id` is of 1 to LONGEST_TEST_ID printable characters, else that is a ValueError: no document

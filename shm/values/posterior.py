@@ -13,7 +13,7 @@ from shm.values.hanger import Hanger, Limits
 from shm.values.kinds import NAN, FloatArray, Plane
 from shm.values.modes import ModalTest
 from shm.values.rounding import force_unit, two_digits
-from shm.values.showing import Shown, front, line, tension_words
+from shm.values.showing import Displayable, front, line, tension_words
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -165,7 +165,7 @@ class PredictedFrequency:
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior(Shown):
+class Posterior(Displayable):
     """Samples of one model class's parameters given modal tests, and its evidence.
 
     `samples` (samples, parameters) are equally weighted draws; `log_likelihood` (samples,).
@@ -434,7 +434,7 @@ class Averaged:
 
 
 @dataclass(frozen=True, eq=False)
-class Selection(Shown):
+class Selection(Displayable):
     """Model classes compared on the same tests, most probable first."""
 
     posteriors: tuple[Posterior, ...]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shm.values.kinds import NAN, ComplexArray, FloatArray, IntArray, Plane, Quantity
-from shm.values.showing import Shown, front
+from shm.values.showing import Displayable, front
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +54,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording(Shown):
+class Recording(Displayable):
     """Accelerations over time, as received, with the hammer's force unless nobody hit.
 
     One file, one or many hits. The force channel's `x_m` and `plane` say where and in which

@@ -1,8 +1,8 @@
 """Display of values to a researcher: one line, a summary, a table in a notebook.
 
 The line is made here. Summaries and tables are made floors above, which values may not import: as
-`shm.values` is loaded, the front of the package gives itself to `hand_over_to`, and it loads what
-is asked for then.
+`shm.values` is loaded, the front of the package calls `set_display_package`, and it loads
+what is asked for then.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 
-class Shown:
+class Displayable:
     """A value that a person can read."""
 
     def summary(self) -> str:
@@ -29,7 +29,7 @@ class Shown:
 _front: Any = None
 
 
-def hand_over_to(package: Any) -> None:
+def set_display_package(package: Any) -> None:
     """Set the package whose `notebook` and `export` show values."""
     global _front
     _front = package

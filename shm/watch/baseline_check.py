@@ -35,7 +35,6 @@ from shm.values import (
 from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, log_mixture, sound_modes
 from shm.watch.quantities import MeasuredMode
 
-_ROUNDS = 3  # technical: of "what is mistaken" and "where the others lie"
 _MAD = 1.4826  # of a normal law
 # Mode by mode two tests of one state differ by more than is stated: judgement, as in readings.
 _SCATTER = 1e-3
@@ -131,8 +130,9 @@ def _against_each_other(tests: Sequence[ModalTest], model: Model) -> BaselineChe
         measured = {(mode.plane, mode.order): mode.frequency_hz for mode in known_modes(test)}
         for at, expected, is_sound in zip(each.at, each.expected, each.modes.sound, strict=True):
             if not is_sound:
-                key = comparison.keys[at]
-                modes.append(MistakenMode(test.id, *key, measured[key], math.exp(expected)))
+                plane, order = key = comparison.keys[at]
+                wrong = MistakenMode(test.id, plane, order, measured[key], math.exp(expected))
+                modes.append(wrong)
     count, misfit = sum(len(known_modes(test)) for test, _ in rest), ""
     if len(out) > MOST_MISTAKEN * len(tests):
         misfit = f"{len(out)} of its {len(tests)} tests do not agree with the others"
@@ -255,7 +255,8 @@ class _Comparison:
         bar = _Bar(self.at, self.at.typical_parameters(middle))
         still, spread = np.zeros(bar.count), _SCATTER
         moved, level = [still] * len(self.tests), middle - bar.log_frequency(still, Conditions())
-        for _ in range(_ROUNDS):
+        # Technical: of "what is mistaken" and "where the others lie"
+        for _ in range(3):
             found = [self._fit(n, bar, moved[n], level, spread) for n in range(len(self.tests))]
             moved = [each.modes.x for each in found]
             predicted = [

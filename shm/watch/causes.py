@@ -244,107 +244,81 @@ def structure_of(
     quantities: Sequence[WatchedQuantity], columns: Columns, options: WatchOptions
 ) -> Structure:
     """Return the hypotheses of a hanger."""
-    n, q = len(columns.modes), len(quantities)
-    steps = np.array([each.step_sd for each in quantities])
-    is_tension = np.array([each.name == TENSION for each in quantities])
-    per_kelvin = np.where(
-        is_tension, options.tension_per_kelvin_sd, options.spring_per_kelvin_sd_of_step * steps
-    )
-    per_amplitude = np.where(
-        is_tension,
-        options.tension_per_amplitude_sd,
-        options.spring_per_amplitude_sd_of_step * steps,
-    )
-    prior_sd = np.concatenate(
-        [
-            np.ones(n),
-            steps,
-            per_kelvin,
-            per_amplitude,
-            [options.bending_per_amplitude_sd],
-            [options.creep_per_year_sd],
-        ]
-    )
-    scattering, sds = _scattering(quantities, columns, options)
-    return Structure(
-        layout=Layout(n, q, prior_sd),
-        directions=tuple(_directions(quantities, columns)),
-        quantities=tuple(quantities),
-        scattering=scattering,
-        stiffening=columns.by_cause[BENDING_STIFFNESS][0, 0] / _STIFFER,
-        scatter_variance=sds**2,
-        scales=np.array(options.scatter_scales),
-    )
-
-
-def _scattering(
-    quantities: Sequence[WatchedQuantity], columns: Columns, options: WatchOptions
-) -> tuple[FloatArray, FloatArray]:
-    """Return what tests of one state scatter along (n, c) besides the quantities.
-
-    And the standard deviations (q + c,) of both before any test.
-    """
     n = len(columns.modes)
     steps = np.array([each.step_sd for each in quantities])
     is_tension = np.array([each.name == TENSION for each in quantities])
-    strength, axes = np.linalg.eigh(columns.sensors)
-    chosen = strength > _SEEN_OF_SENSORS * strength[-1]
-    # A joint that gives for a day does so along what it does as it loosens.
-    loosening = np.vstack([np.zeros((0, n)), *columns.loosening])
-    scattering = np.hstack(
-        [
-            options.spring_scatter_of_step * loosening.T,
-            axes[:, chosen] * np.sqrt(strength[chosen]),
-            columns.by_cause[BENDING_STIFFNESS][0].T,
-            np.ones((n, 1)),
-            np.eye(n),
-        ]
+
+    def each_sd(of_tension: float, of_step: float) -> FloatArray:
+        return np.where(is_tension, of_tension, of_step * steps)
+
+    per_kelvin = each_sd(options.tension_per_kelvin_sd, options.spring_per_kelvin_sd_of_step)
+    per_amplitude = each_sd(
+        options.tension_per_amplitude_sd, options.spring_per_amplitude_sd_of_step
     )
-    sds = np.concatenate(
+    last = [options.bending_per_amplitude_sd, options.creep_per_year_sd]
+    strength, axes = np.linalg.eigh(columns.sensors)
+    is_seen = strength > _SEEN_OF_SENSORS * strength[-1]
+    sensors = axes[:, is_seen] * np.sqrt(strength[is_seen])
+    stiffer = columns.by_cause[BENDING_STIFFNESS][0].T
+    # A joint that gives for a day does so along what it does as it loosens.
+    loosening = np.vstack([np.zeros((0, n)), *columns.loosening]).T
+    gives = options.spring_scatter_of_step
+    scatter_sd = np.concatenate(
         [
-            np.where(is_tension, options.tension_scatter, options.spring_scatter_of_step * steps),
-            np.ones(len(loosening) + int(chosen.sum())),
+            each_sd(options.tension_scatter, gives),
+            np.ones(loosening.shape[1] + sensors.shape[1]),
             [options.bending_scatter / _STIFFER, options.clock_scatter],
             np.full(n, options.mode_scatter),
         ]
     )
-    return scattering, sds
+    return Structure(
+        layout=Layout(
+            n, len(steps), np.concatenate([np.ones(n), steps, per_kelvin, per_amplitude, last])
+        ),
+        directions=tuple(_directions(quantities, columns, sensors)),
+        quantities=tuple(quantities),
+        scattering=np.hstack([gives * loosening, sensors, stiffer, np.ones((n, 1)), np.eye(n)]),
+        stiffening=stiffer[:, 0] / _STIFFER,
+        scatter_variance=scatter_sd**2,
+        scales=np.array(options.scatter_scales),
+    )
 
 
-def _directions(quantities: Sequence[WatchedQuantity], columns: Columns) -> list[Direction]:
+def _directions(
+    quantities: Sequence[WatchedQuantity], columns: Columns, sensors: FloatArray
+) -> list[Direction]:
     n, q = len(columns.modes), len(quantities)
     steps = np.array([each.step_sd for each in quantities])
-    its = _joint_moves(quantities)
+    moves = _joint_moves(quantities)
     found = []
-    for members, root in its:
+
+    def of_modes(factor: FloatArray) -> FloatArray:
+        return np.vstack([factor, np.zeros((q, factor.shape[1]))])
+
+    for members, root in moves:
         patterns = [columns.loosening[j] for j in members if columns.loosening]
-        nearby = np.vstack([np.zeros((0, n)), *patterns]).T
-        factor = np.zeros((n + q, len(members) + nearby.shape[1]))
-        factor[n:, : len(members)] = steps[:, None] * root
-        factor[:n, len(members) :] = nearby
+        extra = np.vstack([np.zeros((0, n)), *patterns]).T
+        of_quantities = np.vstack([np.zeros((n, len(members))), steps[:, None] * root])
+        factor = np.hstack([of_quantities, of_modes(extra)])
         alone = members == (0,) and quantities[0].name == TENSION
-        share = _SHARES[TENSION] if alone else _SHARES[SPRINGS] / max(len(its) - 1, 1)
+        share = _SHARES[TENSION] if alone else _SHARES[SPRINGS] / max(len(moves) - 1, 1)
         name = TENSION if alone else SPRINGS
-        found.append(Direction(name, factor, members, float(np.log(share))))
-    if len(its) == 1:
-        found[0] = replace(found[0], log_prior=float(np.log(_SHARES[TENSION] + _SHARES[SPRINGS])))
+        found.append(Direction(name, factor, members, math.log(share)))
+    if len(moves) == 1:
+        found[0] = replace(found[0], log_prior=math.log(_SHARES[TENSION] + _SHARES[SPRINGS]))
     for cause in (POINT_MASS, SECTION_LOSS, BENDING_STIFFNESS, TIMEBASE):
         places = columns.by_cause[cause]
-        for place in places:
-            factor = np.zeros((n + q, len(place)))
-            factor[:n] = place.T
-            log_prior = float(np.log(_SHARES[cause] / len(places)))
-            may_ramp = cause != TIMEBASE
-            found.append(Direction(cause, factor, (), log_prior, may_ramp))
-    strength, axes = np.linalg.eigh(2 * columns.sensors)
-    chosen = strength > _SEEN_OF_SENSORS * strength[-1]
-    moved = np.zeros((n + q, int(chosen.sum())))
-    moved[:n] = axes[:, chosen] * np.sqrt(strength[chosen])
-    sensor = Direction(SENSOR_MASS, moved, (), float(np.log(_SHARES[SENSOR_MASS])), False)
-    free = np.zeros((n + q, n))
-    free[:n] = _UNEXPLAINED * np.eye(n)
-    unknown = Direction(UNEXPLAINED, free, (), float(np.log(_SHARES[UNEXPLAINED])), False)
-    return [*found, sensor, unknown]
+        log_prior = math.log(_SHARES[cause] / len(places))
+        found += [
+            Direction(cause, of_modes(place.T), (), log_prior, cause != TIMEBASE)
+            for place in places
+        ]
+    # Sensors of two tests differ, each by its own.
+    for cause, factor in ((SENSOR_MASS, math.sqrt(2) * sensors), (UNEXPLAINED, np.eye(n))):
+        size = _UNEXPLAINED if cause == UNEXPLAINED else 1.0
+        log_prior = math.log(_SHARES[cause])
+        found.append(Direction(cause, of_modes(size * factor), (), log_prior, False))
+    return found
 
 
 def _joint_moves(quantities: Sequence[WatchedQuantity]) -> list[tuple[tuple[int, ...], FloatArray]]:

@@ -35,7 +35,6 @@ SIZES = np.array([1.0, 6.0])
 
 # Judgement: nine of ten changes are just what may not be missed.
 LOG_SHARES = np.log([0.9, 0.1])
-_ABSENT = 1e8  # technical: the variance of a mode that was not measured; no log frequency is 1e4
 _A_WEEK_YEARS = 7 / 365.25
 
 
@@ -53,7 +52,8 @@ def sums_of(
 ) -> Sums:
     """Of tests with `columns` (T, n, z), `values` and `variances` (T, n), infinite where a mode was
     not measured, and the `covariance` (T, K, n, n) of their scatter beside that."""
-    its = np.where(np.isfinite(variances), variances, _ABSENT)
+    # Technical: the variance of a mode that was not measured; no log frequency is 1e4
+    its = np.where(np.isfinite(variances), variances, 1e8)
     n = values.shape[1]
     joint = covariance + its[:, None, :, None] * np.eye(n)
     weight = np.linalg.inv(joint)
@@ -307,7 +307,7 @@ class _NullSums:
 
         def from_on(values: FloatArray, power: int) -> FloatArray:
             """Return sums over the tests from each beginning on, by powers of a ramp's years."""
-            found = 0.0
+            found: FloatArray = np.zeros(())
             for k in range(power + 1):
                 weight = years.reshape(-1, *[1] * (values.ndim - 1)) ** k
                 total = np.cumsum((values * weight)[::-1], axis=0)[::-1][beginnings]

@@ -8,6 +8,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from datetime import datetime
+from functools import partial
 from typing import Any, TypeVar, get_args, get_origin
 
 import cattrs
@@ -52,6 +53,10 @@ def _plain(node: object, arrays: list[np.ndarray[Any, Any]]) -> object:
     return node.isoformat() if isinstance(node, datetime) else node
 
 
+def _is_of(origin: Any, kind: Any) -> bool:
+    return get_origin(kind) is origin
+
+
 def _reader_of(rest: bytes) -> cattrs.Converter:
     """Return a converter whose arrays are parts of `rest`."""
 
@@ -64,6 +69,6 @@ def _reader_of(rest: bytes) -> cattrs.Converter:
         return {made.structure(k, key): made.structure(v, value) for k, v in node}
 
     made = reader()
-    made.register_structure_hook_func(lambda kind: get_origin(kind) is np.ndarray, array)
-    made.register_structure_hook_func(lambda kind: get_origin(kind) is Mapping, mapping)
+    for origin, hook in ((np.ndarray, array), (Mapping, mapping)):
+        made.register_structure_hook_func(partial(_is_of, origin), hook)
     return made

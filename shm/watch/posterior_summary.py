@@ -35,7 +35,6 @@ _TAIL = 0.05  # 90 % lie between
 _DIGITS = 3  # probabilities that read alike are ordered by tension first
 _TRADED = 0.25  # judgement: of what an end does, that looks like another tension
 _BEYOND_DOUBT = 1e4  # judgement: times what a detection takes
-_MOST = 24  # technical: changes that a mixture is made of, the likeliest
 # Technical: exact for polynomials of degree 13.
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
@@ -238,7 +237,8 @@ def _leading(
     if not is_last_counted:  # before the weights: those of the others may all underflow
         log_mass[-1] = -np.inf
     flat = log_mass.ravel()
-    most = min(_MOST, len(flat))
+    # Technical: changes that a mixture is made of, the likeliest
+    most = min(24, len(flat))
     best = np.argpartition(flat, len(flat) - most)[-most:]
     best = best[np.isfinite(flat[best])]
     weights = np.exp(flat[best] - np.logaddexp.reduce(flat[best])) if len(best) else flat[best]

@@ -44,13 +44,11 @@ _STIFFNESS = "log10_k"
 _TENSION_STEP = 0.05  # the default threshold: what an owner is told of
 _STIFFNESS_STEP_DECADES = 0.3  # a factor of 2
 _INVISIBLE = 1e-5  # of a frequency: a thirtieth of the best identification's sd
-_NODES_PER_DECADE = 4  # technical: frequencies are smooth in log k, and refined between
 _FINER = 10  # technical: points between two nodes
 # Judgement: bars with forks and turnbuckles go otherwise than their description, and how far their
 # frequencies go with a change is known to a tenth at best.
 _MODEL_OFF = 0.1
 _SLACK = 0.02  # judgement: of the baseline's tension, below it only its own weight strains it
-_TENSION_NODES = 201  # technical: interpolated between
 # Below this a rise is the model's rounding: nodes as near as that are one.
 _ROUNDING = 1e-10
 
@@ -174,7 +172,8 @@ def _tension(baseline: Posterior, model: Model, base: FloatArray) -> WatchedQuan
     column = model.parameter_names.index(_TENSION_RATIO)
     lower, upper = (ends[column] / base[column] for ends in (model.prior.lower, model.prior.upper))
     lower = min(lower, _SLACK)
-    between = np.linspace(min(np.log(lower), 0.0), max(np.log(upper), 0.0), _TENSION_NODES)
+    # Technical: interpolated between
+    between = np.linspace(min(np.log(lower), 0.0), max(np.log(upper), 0.0), 201)
     coordinates = np.union1d(between, 0.0)
     mean_n = float(baseline.tension_n.mean())
     values = mean_n * np.exp(coordinates)
@@ -231,7 +230,8 @@ def _spring(
     columns = [model.parameter_names.index(name) for name in names]
     centre = float(common_stiffness(base[None, columns])[0])
     lower, upper = model.prior.lower[columns[0]], model.prior.upper[columns[0]]
-    nodes = np.linspace(lower, upper, round((upper - lower) * _NODES_PER_DECADE) + 1)
+    # Technical: frequencies are smooth in log k, and refined between
+    nodes = np.linspace(lower, upper, round((upper - lower) * 4) + 1)
     # A node so near the base that both would be one by rounding gives way to it.
     grid = np.sort(np.append(nodes[np.abs(nodes - centre) > 0.01], centre))
     found = log_frequencies(model, moved(model, base, columns, grid - centre), modes)

@@ -70,7 +70,6 @@ from shm.watch.quantities import (
 
 _SELDOM = 1e-3
 """Of good tests, by their misfit (judgement): a worse one has larger errors than stated."""
-_SLOPE_STEP = 0.1  # technical: of a quantity's step, over which frequencies go nearly straight
 # Far above the rounding of a log frequency, far below what a test can tell.
 _LEAST_SLOPE_STEP = 1e-7
 _PULL_SD_IN_STEPS = 10.0
@@ -215,7 +214,8 @@ class Likelihood:
         Beyond the end of a table the model stands still, and frequencies go on straight.
         """
         count, inside = len(x), np.clip(x, self._lowest, self._highest)
-        half = np.maximum(_SLOPE_STEP * self._scale, _LEAST_SLOPE_STEP)
+        # Technical: of a quantity's step, over which frequencies go nearly straight
+        half = np.maximum(0.1 * self._scale, _LEAST_SLOPE_STEP)
         low = np.maximum(inside - half, self._lowest)
         high = np.minimum(inside + half, self._highest)
         places = np.vstack([inside, *(_with_diagonal(inside, ends) for ends in (low, high))])
@@ -339,12 +339,10 @@ class AmplitudeSlopes:
         return SHARE * slope, np.hypot(SHARE * sd, SHARE_SD * np.hypot(slope, sd))
 
 
-_A_LITTLE_DECADES = 0.3  # technical: half of its stiffness
 # Judgement: how stiff an end may be that is found to be stiffer, in units of the bending stiffness
 # over its length of decay, sqrt(EI / T): a clamp is infinite, and at 1 an end is half way.
 _MAY_BE = (20.0, 7.0, 2.5, 1.0)
 _SEEN = 1e-6  # of a mean log frequency: below it a pattern is rounding
-_OF_A_STEP = 0.05  # technical: patterns that add less are within a mode's own scatter
 
 
 def loosening_of(
@@ -384,7 +382,8 @@ def _patterns(
             start = base.copy()
             start[each] = np.minimum(start[each], level)
             before.append(start)
-            after.append(moved(model, start, each, np.array([-_A_LITTLE_DECADES]))[0])
+            # Technical: half of its stiffness
+            after.append(moved(model, start, each, np.array([-0.3]))[0])
     shifts = log_frequencies(model, np.array(after), modes)
     shifts = shifts - log_frequencies(model, np.array(before), modes)
     mean = shifts.mean(axis=1, keepdims=True)
@@ -394,7 +393,8 @@ def _patterns(
     like = quantity.step_sd * shifts[is_seen] / mean[is_seen]
     _, strength, axes = np.linalg.svd(like[1:] - like[0], full_matrices=False)
     strength = strength / math.sqrt(max(len(like) - 1, 1))
-    chosen = strength > _OF_A_STEP * np.linalg.norm(like[0])
+    # Technical: patterns that add less are within a mode's own scatter
+    chosen = strength > 0.05 * np.linalg.norm(like[0])
     return np.asarray(strength[chosen, None] * axes[chosen])
 
 

@@ -28,7 +28,6 @@ from shm.watch.options import reference_of
 from shm.watch.quantities import value_at
 
 _SECONDS_A_YEAR = 365.25 * 86400  # Julian
-_ROUNDING = 1e-9  # technical
 _FEW = 5  # fewer give an sd no better than to a third
 _A_STEP, _CLEAR = 0.5, 3  # likelier a step than a ramp; tests: judgement, see `set_free`
 _WIDEST = 4.0  # prior sds: beyond lies 1 in 16,000
@@ -245,7 +244,8 @@ def set_free(calls: Sequence[Change], readings: Sequence[Reading]) -> tuple[date
 def _check(readings: Sequence[Reading], outlier: FloatArray) -> None:
     if not readings:
         raise NothingThere("No test has a reading.", remedy="Ingest tests of this hanger first.")
-    if outlier.shape != (len(readings),) or not np.all(np.abs(outlier - 0.5) <= 0.5 + _ROUNDING):
+    # Technical: rounding of probabilities.
+    if outlier.shape != (len(readings),) or not np.all(np.abs(outlier - 0.5) <= 0.5 + 1e-9):
         raise UsageError(
             f"The outlier weights of {len(readings)} readings are not as many probabilities.",
             remedy="Give one in 0 to 1 for each reading.",

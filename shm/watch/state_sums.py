@@ -61,11 +61,9 @@ class WatchState:
 
 _LEAST_SHARE = 1e-6  # judgement: of a cause in a call, which later tests may yet speak for
 _PRIOR_TESTS = 6.0  # judgement: a dozen tests say more than what was assumed of any hanger
-_ROUNDS = 4  # technical: begun from what the tests before gave, it has nearly settled
 # Of a difference, in its own sds: up to the first all counts, from the second on nothing: what lies
 # that far is a change, and no scatter (Hampel 1974). One good one in 370 is beyond the first.
 _SCATTER_UP_TO, _CHANGE_FROM = 3.0, 6.0
-_ABSENT = 1e8  # technical: no log frequency differs by 1e4
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,11 +145,13 @@ class StateSums:
         values = np.where(known, np.diff(self._at_rest(state)[rows], axis=0)[:, :, None], 0.0)
         factors = np.where(known, self._factors(state)[rows[1:]], 0.0)
         open_left = np.concatenate([doubt[1:], doubt[:-1]], axis=2) * known
-        its = np.where(np.isfinite(spread), spread, _ABSENT)[:, :, None] * np.eye(len(spread.T))
+        # Technical: no log frequency differs by 1e4
+        its = np.where(np.isfinite(spread), spread, 1e8)[:, :, None] * np.eye(len(spread.T))
         covariance = its + open_left @ np.swapaxes(open_left, 1, 2)
         there = np.abs(factors).max(axis=1) > 0
         variance = np.maximum(state.scatter_variance, 1e-12)
-        for _ in range(_ROUNDS):
+        # Technical: begun from what the tests before gave, it has nearly settled
+        for _ in range(4):
             scaled = factors * np.sqrt(2 * variance)
             weight = np.linalg.inv(scaled @ np.swapaxes(scaled, 1, 2) + covariance)
             weighted = weight @ scaled

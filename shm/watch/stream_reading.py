@@ -52,7 +52,6 @@ LEAST_SD = 3e-5
 """Of an hourly log frequency: 1 Hz is read to 1/30 mHz at best, and clocks wander by as much."""
 _MEMORY_READINGS = 120.0  # judgement: five days of what modes differ by, ten times a night's
 _DEGREES = 4.0  # judgement: of Student's t, as robust regressions take (Lange et al. 1989)
-_ROUNDS = 4  # technical: of reweighting, from the weighted median on
 _HALVES = np.array([0.5, -0.5])  # by definition: of a contrast, in each of PLANES
 _CLIP = 4.0  # sds: what a mode may add to its spread at once
 _STEP = 0.01  # technical: of the tension, for a slope by central differences
@@ -336,7 +335,8 @@ def _read(
 def _read_plane(y: FloatArray, v: FloatArray, s: FloatArray) -> tuple[float, float]:
     """Reweighted least squares from the weighted median on; errors grow where the modes differ."""
     shift = _weighted_median(y / s, s / np.sqrt(v))
-    for _ in range(_ROUNDS):
+    # Technical: of reweighting, from the weighted median on
+    for _ in range(4):
         weight = (_DEGREES + 1) / (_DEGREES + (y - s * shift) ** 2 / v) / v
         weight = np.minimum(weight, 1 / v)  # no mode is better than it says
         information = float(weight @ s**2)

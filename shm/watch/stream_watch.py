@@ -276,10 +276,8 @@ def with_ring(
 
 
 _VERSION = "stream-watch-1"
-_DAY_SD = 1.25e-4  # of ln f: what a mode keeps for a day, by joints that seat anew. Judgement
 _EVENTS: dict[str, StreamEventKind] = {TIME_BASE: "clock drift", SWAPPED: "swapped"}
 _HOURS_OF_A_FAULT = 8  # judgement: of which a mistaken mode spoils one or two
-_CALLS_KEPT = 8  # technical: of changes that were told, so that what is kept stays bounded
 
 
 @dataclass(frozen=True)
@@ -384,7 +382,7 @@ class StreamWatch:
         expected = bank.along(bank.design(conditions))[0]
         state, modes = as_mounted(state, modes)
         contrast = state.contrast.advanced(day, NO_CONDITIONS)
-        between = contrast.along(_compensated(contrast))
+        between = contrast.along(compensated(contrast))
         table = state.table.with_new(self.baseline, self.hanger, modes, expected, between[0])
         seen = table.seen(modes, warmth(state), self.hanger.assumptions, between)
         if not state.is_learning:
@@ -410,8 +408,8 @@ class StreamWatch:
         days = self.options.learning_days
         # A night's gap is no end of learning: half of the hours at least.
         is_over = state.bank.day >= days and n >= days * HOURS_A_DAY / 2
-        compensated, _ = state.bank.along(_compensated(state.bank))
-        state = replace(state, zero=zero, compensated_zero=compensated, is_learning=not is_over)
+        at_rest, _ = state.bank.along(compensated(state.bank))
+        state = replace(state, zero=zero, compensated_zero=at_rest, is_learning=not is_over)
         since = f"{state.start:%Y-%m-%d %H:%M}"
         words = f"learning since {since}: {state.bank.day:.1f} of {days:g} days."
         return replace(_nothing(), learning="" if is_over else words), state
@@ -442,16 +440,14 @@ class StreamWatch:
                 else:
                     state = _absorbed(state, cause)
                 evidence, unlike = NOTHING, 0.0
-            elif cause.plane:
+            elif cause.plane or is_apart:
                 before = _contrast(state)[0]
-                state = _absorb_plane(state, cause, apart, None if is_apart else evidence)
+                if cause.plane:
+                    state = _absorb_plane(state, cause, apart, None if is_apart else evidence)
+                else:
+                    state = replace(state, contrast=state.contrast.changed(apart))
                 state = replace(state, apart=state.apart.after(before, _contrast(state)[0]))
                 moved, unlike, is_apart = cause.moved, 0.0, True
-            elif is_apart:
-                before = _contrast(state)[0]
-                state = replace(state, contrast=state.contrast.changed(apart))
-                state = replace(state, apart=state.apart.after(before, _contrast(state)[0]))
-                moved, unlike = cause.moved, 0.0
             else:
                 evidence = _sized(evidence, cause, state)
                 moved = tuple(
@@ -465,7 +461,8 @@ class StreamWatch:
                 state = replace(state, called=state.called.after(now - evidence.shift, now))
         test = self._watched_test(state, evidence, moved, is_apart, unlike, reading, end)
         reported, alert = after(state.told, test, self.hanger)
-        reported = replace(reported, called=reported.called[-_CALLS_KEPT:])
+        # Technical: of changes that were told, so that what is kept stays bounded
+        reported = replace(reported, called=reported.called[-8:])
         standing = (*state.standing, alert.key) if alert else state.standing
         in_force = alert or reported.beyond or reported.called or state.bank.day < state.settled_day
         ended = () if in_force else standing
@@ -554,7 +551,7 @@ def _nothing() -> StreamWatched:
     return StreamWatched(b"", NAN, NAN, NAN, NAN, None, None, (), (), "")
 
 
-def _compensated(bank: Bank) -> FloatArray:
+def compensated(bank: Bank) -> FloatArray:
     """Return the state without what the conditions do, as a direction (p,)."""
     direction = np.zeros(bank.mean.shape[1])
     direction[[LEVEL, SLOW, FAST]] = 1
@@ -563,13 +560,13 @@ def _compensated(bank: Bank) -> FloatArray:
 
 def _shift(state: StreamState) -> tuple[float, float]:
     """Since the baseline, under its conditions: a fraction of the tension."""
-    mean, sd = state.bank.along(_compensated(state.bank))
-    return _fraction(mean - state.compensated_zero, sd, state.table)
+    mean, sd = state.bank.along(compensated(state.bank))
+    return fraction_of(mean - state.compensated_zero, sd, state.table)
 
 
 def _contrast(state: StreamState) -> tuple[float, float]:
     """Return what one plane says of ln T more than the other, as at first, with its sd."""
-    mean, sd = state.contrast.along(_compensated(state.contrast))
+    mean, sd = state.contrast.along(compensated(state.contrast))
     return mean + state.absorbed, sd
 
 
@@ -580,48 +577,19 @@ def _find_contradiction(state: StreamState, seen: SeenReading, conditions: Float
     reach = off if off > CLIP * math.hypot(sd, math.sqrt(seen.variance)) else 0.0
     if not math.isfinite(seen.contrast):
         return reach
-    between, sd = state.contrast.along(_compensated(state.contrast))
+    between, sd = state.contrast.along(compensated(state.contrast))
     apart = abs(seen.contrast - between)
     if apart > CLIP * math.hypot(sd, math.sqrt(seen.contrast_variance)):
         reach = float(np.nanmax(np.abs(seen.by_plane - expected)))
     return reach
 
 
-def daily_shift(kept: bytes, hours: Sequence[PooledReading]) -> tuple[float, float]:
-    """Of the tension over a day since the stream's baseline, with its sd: by the day's `hours`.
-
-    The mean of what each hour says: the tension goes through the day by more than its mean is
-    known to, and not all hours have all modes. Without thermometer's or watch's corrections.
-    """
-    state = from_bytes(StreamState, kept)
-    seen, between = [], state.contrast.along(_compensated(state.contrast))
-    for reading in hours:
-        modes = usable(reading)
-        if state.table.are_exchanged(modes):
-            modes = exchanged(modes)
-        known = [mode for mode in modes if (mode.plane, mode.order) in state.table.modes]
-        if known:
-            kelvin = reading.temperature_c - state.reference[0]
-            warmer = kelvin if math.isfinite(kelvin) else 0.0
-            seen.append(state.table.seen(known, warmer, expected=between))
-    if not seen:
-        return NAN, NAN
-    shifts, n = np.array([each.shift for each in seen]), len(seen)
-    by_hour = float(np.mean([each.variance for each in seen])) / n
-    # Hours that lack are as the others; some of them follow each other, and are as one.
-    lacking = max(1 - n / HOURS_A_DAY, 0.0) * float(np.var(shifts)) * TOGETHER / n
-    # Joints and clocks are the day's, mode by mode, and that of the baseline's days.
-    day = 2 * _DAY_SD**2 / float(state.table.tension @ state.table.tension)
-    sd = math.sqrt(by_hour + lacking + day)
-    return _fraction(float(shifts.mean()) - state.zero, sd, state.table)
-
-
 def shift_of_reading(state: StreamState, seen: SeenReading) -> tuple[float, float]:
     """Since the baseline, as the tension is at a reading."""
-    return _fraction(seen.shift - state.zero, math.sqrt(seen.variance), state.table)
+    return fraction_of(seen.shift - state.zero, math.sqrt(seen.variance), state.table)
 
 
-def _fraction(log_shift: float, sd: float, table: ModeTable) -> tuple[float, float]:
+def fraction_of(log_shift: float, sd: float, table: ModeTable) -> tuple[float, float]:
     """A shift is off by what the sensitivities are: the share of bending is known to a fifth."""
     off = MODEL_OFF * float(np.mean(0.5 - table.tension) / np.mean(table.tension))
     return math.expm1(log_shift), math.hypot(sd, off * log_shift)

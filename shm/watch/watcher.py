@@ -41,10 +41,17 @@ from shm.watch.state_sums import StateSums, WatchState, begun_of, size_of
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
 _VERSION = 13
-_LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
 # Technical: what a test says goes nearly in proportion to its weight.
 _MOST_REPEATS, _NEARLY = 6, 0.5
 _CLEARLY_NATS = 3.0  # 20 to 1
+
+
+@dataclass(frozen=True, eq=False)
+class Call:
+    """A change that was called after the test at `index` of the watch; `change` as it was then."""
+
+    index: int
+    change: Change
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +61,10 @@ class Watch:
     tests: tuple[WatchedTest, ...]
 
     @property
-    def calls(self) -> tuple[tuple[int, Change], ...]:
-        """The changes that were called on the way, each with the index of its test."""
-        called = ((n, test.change) for n, test in enumerate(self.tests))
-        return tuple((n, change) for n, change in called if change.called)
+    def calls(self) -> tuple[Call, ...]:
+        """The changes that were called on the way."""
+        every = (Call(n, test.change) for n, test in enumerate(self.tests))
+        return tuple(each for each in every if each.change.called)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,14 +112,17 @@ class Watcher:
             )
         time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
         coefficients = q * self.structure.thermal_laws
+        none: dict[str, Any] = {
+            **dict.fromkeys(("values", "variances", "per_kelvin"), np.zeros((0, n))),
+            **dict.fromkeys(("years", "temperature_c", "log_amplitude", "weight"), np.zeros(0)),
+        }
         state = WatchState(
             key=self.key,
             start=time,
             last_time=time,
             reference_c=reference_of([reading.temperature_c for reading in readings]),
             slopes=np.zeros((0, n, q)),
-            **dict.fromkeys(("values", "variances", "per_kelvin"), np.zeros((0, n))),
-            **dict.fromkeys(("years", "temperature_c", "log_amplitude", "weight"), np.zeros(0)),
+            **none,
             counted=np.zeros(0, bool),
             coefficients=np.zeros(coefficients),
             coefficient_sd=self.structure.layout.prior_sd[n + q :][:coefficients],
@@ -180,7 +190,8 @@ class Watcher:
         self, state: WatchState, evidence: Evidence
     ) -> tuple[Evidence, Evidence, int]:
         """Return the bounded evidence, that for weighing causes, and tests against the baseline."""
-        if evidence.log_evidence <= math.log(_LOOKED_AT * self.options.limit_years):
+        # Technical: of the limit: below it nobody asks which cause it was
+        if evidence.log_evidence <= math.log(0.1 * self.options.limit_years):
             return evidence, evidence, 0
         # How sure it is that anything changed is bounded; which cause it was is for all to say.
         rows = _counting(state)

@@ -24,7 +24,7 @@ from shm.models import build
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Archive, IdentifiedTest, Lineage, Outcome, Store, Workspace
-from shm.store.archive import Kept
+from shm.store.archive import ArchivedFile
 from shm.store.columns import Document
 from shm.store.rows import Role
 from shm.store.tables import alerts, metadata, recordings, summaries
@@ -221,7 +221,7 @@ class _Made:
         return WatchedTest(self.name, self.time, self.temperature_c, drifts, change)
 
 
-def _raw(archive: Archive, hanger: Hanger) -> Kept:
+def _raw(archive: Archive, hanger: Hanger) -> ArchivedFile:
     """A recording as the logger writes it, which all recorded tests are said to come from."""
     state = HangerState(hanger.nominal_tension_n, 2e7, 2e7, 2e7, 2e7, damping_ratio=0.0015)
     plan = HammerPlan(hits=3, seconds_per_hit=8.0, acceleration_noise_m_s2=0.05)
@@ -232,7 +232,7 @@ def _raw(archive: Archive, hanger: Hanger) -> Kept:
         return archive.keep(path)
 
 
-def _take_in(store: Store, made: _Made, raw: Kept) -> None:
+def _take_in(store: Store, made: _Made, raw: ArchivedFile) -> None:
     number = int(made.name[-5:]) + 1
     file = a_file(number, file_name=f"{made.name}.modes.json", arrival=made.name)
     item = IdentifiedTest(made.test)

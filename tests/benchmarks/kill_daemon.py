@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.helpers.killing import (
     assert_nothing_lost_doubled_or_half_written,
     killed_again_and_again,
-    left_alone,
+    unfinished_uploads,
 )
 from tests.helpers.postgres import postgresql_server
 from tests.helpers.workspaces import make_workspace
@@ -50,7 +50,7 @@ def main() -> None:
     options = parser.parse_args()
     began, rng = time.monotonic(), random.Random(options.seed)
     with tempfile.TemporaryDirectory() as folder, a_store(options.store) as url:
-        undisturbed = left_alone(Path(folder) / "quiet", options.files)
+        undisturbed = unfinished_uploads(Path(folder) / "quiet", options.files)
         workspace = make_workspace(Path(folder) / "bridge", settings={"store": url})
         feed, seen = killed_again_and_again(
             workspace, options.kills, options.files, rng, options.longest

@@ -41,11 +41,10 @@ from shm.store import Workspace  # noqa: E402
 from shm.store.ring import ring_of  # noqa: E402
 from shm.values import Hanger  # noqa: E402
 from shm.values.stream import Chunk, PooledReading, Stream  # noqa: E402
-from shm.watch.kept_state import to_bytes  # noqa: E402
-from shm.watch.stream_watch import StreamOptions, StreamWatch, daily_shift  # noqa: E402
+from shm.watch.stream_watch import StreamOptions, StreamWatch  # noqa: E402
 from shm_daemon.loop import run  # noqa: E402
 from tests.benchmarks.stream_load import processor_s  # noqa: E402
-from tests.benchmarks.stream_trial import as_reading  # noqa: E402
+from tests.benchmarks.stream_trial import as_reading, daily_shift  # noqa: E402
 from tests.benchmarks.stream_windows import described  # noqa: E402
 from tests.helpers.workspaces import QUICK  # noqa: E402
 from tests.worlds import living_bridge as world  # noqa: E402
@@ -105,7 +104,7 @@ def daily(
             said, state = watch.after(state, each)
             told += [said.alert.time] if said.alert else []
         if state and not state.is_learning and len(hours) > 12:
-            found[day] = daily_shift(to_bytes(state), hours)[0]
+            found[day] = daily_shift(state, hours)[0]
     return found, told
 
 

@@ -48,11 +48,15 @@ from shm.values.stream import (  # noqa: E402
     WindowReading,
 )
 from shm.watch.kept_state import to_bytes  # noqa: E402
+from shm.watch.stream_reading import exchanged, usable  # noqa: E402
 from shm.watch.stream_watch import (  # noqa: E402
+    HOURS_A_DAY,
+    TOGETHER,
     StreamOptions,
     StreamState,
     StreamWatch,
-    daily_shift,
+    compensated,
+    fraction_of,
 )
 
 WORLDS = ("living_bridge", "road_bridge_hours")
@@ -186,7 +190,7 @@ def solved(world: ModuleType, name: str, seed: int, years: float) -> dict[str, A
                 alerts.append(found.alert)
             events += found.events
         if state and not state.is_learning and len(hours) > 12:
-            daily.append((hours[0].start, *daily_shift(to_bytes(state), hours)))
+            daily.append((hours[0].start, *daily_shift(state, hours)))
     seconds = time.process_time() - began
     return {
         "scenario": name, "seed": seed, "hanger": number, "readings": len(readings),
@@ -221,6 +225,33 @@ def with_lost_planes(
     # One hour more of what was lost before is no news.
     earlier = find_lost_planes(before, Stream("a", hour.hanger, 100.0, channels))
     return tuple(e for e in found if e.channel not in {each.channel for each in earlier})
+
+
+def daily_shift(state: StreamState, hours: Sequence[PooledReading]) -> tuple[float, float]:
+    """Return the shift of the tension over a day since the stream's baseline, with its sd.
+
+    The mean of the day's `hours`: the tension goes through the day by more than its mean is known
+    to, and not all hours have all modes. Without corrections of the thermometer or the watch.
+    """
+    seen, between = [], state.contrast.along(compensated(state.contrast))
+    for reading in hours:
+        modes = usable(reading)
+        if state.table.are_exchanged(modes):
+            modes = exchanged(modes)
+        known = [mode for mode in modes if (mode.plane, mode.order) in state.table.modes]
+        if known:
+            kelvin = float(np.nan_to_num(reading.temperature_c - state.reference[0]))
+            seen.append(state.table.seen(known, kelvin, expected=between))
+    if not seen:
+        return np.nan, np.nan
+    shifts, n = np.array([each.shift for each in seen]), len(seen)
+    by_hour = float(np.mean([each.variance for each in seen])) / n
+    # Hours that lack are as the others; some of them follow each other, and are as one.
+    lacking = max(1 - n / HOURS_A_DAY, 0.0) * float(np.var(shifts)) * TOGETHER / n
+    # Joints that seat anew and clocks keep 1.25e-4 of ln f for a day (judgement).
+    day = 2 * 1.25e-4**2 / float(state.table.tension @ state.table.tension)
+    sd = float(np.sqrt(by_hour + lacking + day))
+    return fraction_of(float(shifts.mean()) - state.zero, sd, state.table)
 
 
 def daily_figures(

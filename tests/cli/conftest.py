@@ -73,7 +73,7 @@ def hanger_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def modes_file(tmp_path: Path, bridge: Workspace) -> Path:
-    """A test of hanger 3 at 90 % of its nominal tension."""
+    """Return a test of hanger 3 at 90 % of its nominal tension."""
     path = tmp_path / "t9.modes.json"
     write_test(path, bridge, tension=0.9)
     return path

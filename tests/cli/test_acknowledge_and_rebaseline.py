@@ -22,7 +22,7 @@ ANEW = ("drift", "rebaseline", "--hanger", 3, "--why", "pin replaced")
 
 @pytest.fixture
 def workspace(bridge: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The bridge with a short history and one open alert, and a stand-in for the sampler."""
+    """Return the bridge with a short history and one open alert, and a stand-in for the sampler."""
     monkeypatch.setattr(
         rebaselining,
         "update",
@@ -122,7 +122,7 @@ def test_the_new_baseline_as_a_document(shm: Shm, workspace: Path) -> None:
 
 
 def after_works(folder: Path, tension: float) -> None:
-    """A test of the day after the loss was told."""
+    """Return a test of the day after the loss was told."""
     opened = Workspace.open(folder, {})
     write_test(opened.spool / "t3.modes.json", opened, day=61, tension=tension)
     ingest(opened)

@@ -20,7 +20,7 @@ ADOPT = ("gap", "adopt", "--hanger", 3, "--effect", "bending_stiffness", "--at",
 
 @pytest.fixture
 def workspace(bridge: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The bridge with a short history, and a stand-in for the sampler."""
+    """Return the bridge with a short history, and a stand-in for the sampler."""
     monkeypatch.setattr(
         adopting,
         "update",

@@ -23,7 +23,7 @@ def listener() -> Iterator[Listener]:
 
 @pytest.fixture
 def hooked(tmp_path: Path, listener: Listener) -> Workspace:
-    """A workspace with a command hook `mail` and a webhook `ops`."""
+    """Return a workspace with a command hook `mail` and a webhook `ops`."""
     workspace = make_workspace(
         tmp_path / "bridge", hooks={"mail": ["tee", "told.json"], "none": ["/no/such/program"]}
     )

@@ -22,7 +22,7 @@ SHIFTS = {5: 0.021, 6: -0.05, 7: 0.026}
 
 
 def watch(store: Store, hanger: int, shift: float) -> None:
-    """A baseline at 11.5 deg C and a test at 31.5 deg C of one hanger."""
+    """Return a baseline at 11.5 deg C and a test at 31.5 deg C of one hanger."""
     for day, temperature in ((0, 11.5), (1, 31.5)):
         recording = store.recordings.receive(a_file(10 * hanger + day), NOW).recording
         name = f"h{hanger}-{day}"

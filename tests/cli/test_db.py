@@ -19,14 +19,14 @@ from tests.helpers.workspaces import write_test
 
 @pytest.fixture
 def copied(bridge: Workspace, tmp_path: Path) -> Workspace:
-    """A bridge with a short history, to be changed at will."""
+    """Return a bridge with a short history, to be changed at will."""
     folder = Path(shutil.copytree(bridge.folder, tmp_path / "bridge"))
     return Workspace.open(folder)
 
 
 @pytest.fixture
 def url(postgresql: Databases) -> Iterator[str]:
-    """An empty store in PostgreSQL, its URL with a password."""
+    """Yield an empty store in PostgreSQL, its URL with a password."""
     with postgresql.store() as url:
         yield url.replace("postgres@", "postgres:hush@")
 

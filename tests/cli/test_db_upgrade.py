@@ -24,7 +24,7 @@ OLDER = [path for path in RELEASED if path.stem != f"schema_{SCHEMA}"]
 
 
 def of_a_release(released: Path, empty: Workspace) -> Workspace:
-    """A workspace whose store a former shm has made."""
+    """Return a workspace whose store a former shm has made."""
     for ending in ("-wal", "-shm"):
         empty.database.with_name(empty.database.name + ending).unlink(missing_ok=True)
     shutil.copyfile(released, empty.database)

@@ -69,7 +69,7 @@ def test_anchors_lead_to_headings(page: Path) -> None:
 
 
 def _anchors(page: Path) -> set[str]:
-    """The anchors of a page's headings, as readers of Markdown form them."""
+    """Return the anchors of a page's headings, as readers of Markdown form them."""
     text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S)
     headings = re.findall(r"^#+ (.+)$", text, re.M)
     return {

@@ -14,7 +14,6 @@ from scipy.io import savemat, wavfile
 from shm.modes_document import load_modes
 from shm.pipeline.intake import as_taken_in
 from shm.read import read, sidecar_path
-from shm.read.modal_sets import _frequency
 from shm.store import Stage, Workspace
 from shm.store.queries.recordings import list_recordings
 from shm.values import Channel, Recording
@@ -36,7 +35,7 @@ def workspace(tmp_path: Path) -> Workspace:
 
 
 def export(path: Path, seed: int = 1, columns: str = "A1") -> Path:
-    """A German export of numbers that look like a hammer test."""
+    """Return a German export of numbers that look like a hammer test."""
     rng = np.random.default_rng(seed)
     rate, count = 500.0, 4000
     times = np.arange(count) / rate
@@ -330,14 +329,6 @@ def test_modes_without_places_keep_no_shape_and_are_numbered_by_frequency(
     (test,) = load_modes(workspace.spool / "m.modes.json")
     assert [mode.order for mode in test.modes] == [1, 1, 2, 2]
     assert all(mode.shape == () for mode in test.modes)
-
-
-def test_hysteretic_damping_is_twice_the_viscous_ratio_at_resonance() -> None:
-    found = {"analysis_type": 2, "freq": 6.1, "modal_damp_vis": 0.0, "modal_damp_his": 0.008}
-    assert _frequency(found) == (6.1, 0.004)
-    frequency, damping = _frequency(found | {"modal_damp_his": 0.0})
-    assert frequency == 6.1
-    assert np.isnan(damping)
 
 
 def modes_file(path: Path, with_nodes: bool = True) -> Path:

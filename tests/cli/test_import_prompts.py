@@ -45,7 +45,7 @@ class Terminal:
         self.shown, self._seen = "", 0
 
     def answer(self, question: str, *answers: str) -> None:
-        """Waits for a question, and again for each further answer."""
+        """Wait for a question, and again for each further answer."""
         for answer in answers:
             self.wait_for(question)
             self.press(f"{answer}\n")
@@ -72,8 +72,10 @@ class Terminal:
         return self._code
 
     def leave(self, key: str) -> int:
-        """Its exit code after a key that is pressed until it ends: one in the moment between a
-        question and the wait for its answer is not seen."""
+        """Press a key until the command ends, and return its exit code.
+
+        A key in the moment between a question and the wait for its answer is not seen.
+        """
         deadline = time.monotonic() + PATIENCE_S
         while not self._has_ended() and time.monotonic() < deadline:
             self.press(key)
@@ -120,7 +122,7 @@ def terminal(workspace: Workspace, *arguments: object) -> Iterator[Terminal]:
 
 
 def _become(words: list[str]) -> NoReturn:
-    """The command at its terminal; of the tests' own streams and signals it has none."""
+    """Return the command at its terminal; of the tests' own streams and signals it has none."""
     code = 1
     try:
         signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -33,7 +33,7 @@ def shm_process(*arguments: object) -> subprocess.CompletedProcess[str]:
 def taken_in(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> tuple[Workspace, Path, subprocess.CompletedProcess[str]]:
-    """A baseline, two tests with a fifth less tension, an empty file, and the first one again."""
+    """Drop a baseline, two tests with a fifth less tension, an empty file, and a copy."""
     folder = tmp_path_factory.mktemp("ingest")
     workspace = make_workspace(folder / "bridge")
     write_test(folder / "a.modes.json", workspace)

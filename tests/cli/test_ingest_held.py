@@ -114,7 +114,7 @@ def test_what_is_discarded_says_that_its_raw_file_stays(shm: Shm, held: Workspac
 
 
 def a_visit(workspace: Workspace) -> str:
-    """A file of two sound tests and two that are held, `1970a` and `1970b`."""
+    """Return a file of two sound tests and two that are held, `1970a` and `1970b`."""
     test, reset = modelled_test("t", workspace.bridge.hanger(3)), datetime(1970, 1, 1, tzinfo=UTC)
     times = {
         "sound9": START + timedelta(days=9),

@@ -38,7 +38,7 @@ def _plated(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def described(tmp_path: Path) -> dict[str, Path]:
-    """The examples as hanger files, by their headings."""
+    """Return the examples as hanger files, by their headings."""
     files = {}
     for number, (heading, text) in enumerate(EXAMPLES):
         files[heading] = tmp_path / f"H{number}.toml"

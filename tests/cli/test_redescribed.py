@@ -40,7 +40,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 @pytest.fixture
 def before(made: Workspace, tmp_path: Path) -> Workspace:
-    """A copy of it."""
+    """Return a copy of it."""
     return Workspace.open(shutil.copytree(made.folder, tmp_path / "bridge"))
 
 

@@ -26,7 +26,7 @@ from tests.helpers.workspaces import make_workspace
 
 @pytest.fixture
 def start() -> datetime:
-    """The full ten minutes half an hour ago."""
+    """Return the full ten minutes half an hour ago."""
     return period_of(microseconds(utc_now() - 4 * PERIOD))
 
 

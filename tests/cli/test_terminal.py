@@ -30,6 +30,7 @@ EVIL = "EVIL\x1b[31m\x1b]8;;http://x\x07\x9b2J\u202etxt\u2066\u200f\u200e\x7f\rn
 
 # A line for each verb that shows what is stored, or what a file says.
 LINES = (
+    "acquire --device {evil} --hammer {evil} --sensor {evil} --hanger 3 --out {out}/a.zip",
     "alerts", "alerts ack 1 --why seen", "alerts resend 1", "alerts silences",
     "alerts silence --hanger 3 --until 2999-01-01 --why {evil}", "alerts unsilence 1",
     "alerts test mail", "archive fetch 1", "archive prune --keep-days 1 --dry-run", "audit",
@@ -53,13 +54,13 @@ LINES = (
 # They serve or work for long, or print nobody's words but ours.
 OTHERS = {
     "daemon", "demo", "web", "simulate", "completion", "db restore", "gap effects",
-    "notices", "settings",
+    "manual", "notices", "settings",
 }  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def hostile(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """A bridge in which everything that a person may write holds what no terminal should get."""
+    """Return a bridge whose written texts all hold what no terminal should get."""
     workspace = with_a_loss(tmp_path_factory.mktemp("hostile") / "bridge")
     path = workspace.folder / "bridge.toml"
     named = path.read_text().replace('"Test bridge"', json.dumps(EVIL))

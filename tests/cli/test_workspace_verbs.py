@@ -211,3 +211,15 @@ def test_a_wrong_description_names_the_key(shm: Shm, empty: Workspace) -> None:
 def test_json_of_every_reading_verb_is_one_document(shm: Shm, bridge: Workspace) -> None:
     for verb in (["status"], ["drift"], ["alerts"], ["report", "--hanger", 3]):
         assert isinstance(json.loads(shm("--workspace", bridge.folder, *verb, "--json").out), dict)
+
+
+def test_manual_page(shm: Shm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = tmp_path / "manual" / "index.html"
+    monkeypatch.setattr("shm_cli.installation.manual", lambda: page)
+    missing = shm("manual")
+    assert missing.code == 4
+    assert "make wheel" in missing.err
+    page.parent.mkdir()
+    page.touch()
+    assert shm("manual").out == f"{page}\n"
+    assert shm("manual", "--json").document == {"schema": "shm.manual/1", "page": str(page)}

@@ -233,14 +233,14 @@ def test_public_names_are_there() -> None:
 @pytest.mark.parametrize("scenario", SCENARIOS.values(), ids=SCENARIOS)
 def test_a_history_is_reported_as_the_table_says(scenario: Scenario) -> None:
     found = watch_of(scenario.make(), scenario.quantities)
-    called = [at for at, _ in found.calls]
+    called = [call.index for call in found.calls]
     if scenario.first is None:
         assert called == []
     else:
         assert called
         assert scenario.first <= called[0] <= scenario.last
         if scenario.cause:
-            assert found.calls[0][1].moved[0].quantity == scenario.cause
+            assert found.calls[0].change.moved[0].quantity == scenario.cause
     assert found.tests[-1].change.is_baseline_alone == scenario.is_baseline_doubted
 
 
@@ -251,6 +251,6 @@ def test_the_table_has_at_least_41_scenarios() -> None:
 def test_what_comes_often_needs_more_tests_than_what_never_came() -> None:
     scenario = SCENARIOS["load that never came before"]
     readings = list(scenario.make())
-    (never,) = [at for at, _ in watch_of(readings, scenario.quantities).calls]
+    (never,) = [call.index for call in watch_of(readings, scenario.quantities).calls]
     often = watch_of(load(readings, [2, 6, 10]), scenario.quantities).calls
-    assert not often or often[0][0] > never
+    assert not often or often[0].index > never

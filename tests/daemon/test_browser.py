@@ -289,7 +289,7 @@ def style(page: Page, selector: str, name: str) -> str:
 
 
 def printed(page: Page, selector: str, name: str) -> str:
-    """What the style of an element is while the page is printed."""
+    """Return the style of an element while the page is printed."""
     page.evaluate(
         """([selector, name]) => addEventListener("beforeprint", () => {
              window.printed = getComputedStyle(document.querySelector(selector))[name];

@@ -17,7 +17,7 @@ from shm.store import Stage, Workspace
 from shm.store.queries.recordings import count_stages
 from shm.store.queries.streams import list_windows
 from shm_daemon import run
-from shm_daemon.cluster import Cluster, run_if_alike, traits
+from shm_daemon.cluster import Cluster, run_if_same_versions, traits
 from shm_daemon.execution import executor_of
 from tests.helpers import clusters
 from tests.helpers.canonical import canonical
@@ -42,7 +42,7 @@ def pool(cluster: clusters.Cluster) -> Iterator[Cluster]:
 
 
 def worked_through(folder: Path, scheduler: str) -> Workspace:
-    """Tests with the real sampler, and a file that is refused."""
+    """Return tests with the real sampler, and a file that is refused."""
     settings = {"scheduler": scheduler, "workers": 2}
     workspace = make_workspace(folder, settings=settings, hooks={"mail": ["true"]})
     for day in range(FILES):
@@ -81,9 +81,9 @@ def test_a_worker_of_another_version_is_refused_and_the_step_tried_again(
 
 
 def test_a_worker_that_came_later_is_asked_too() -> None:
-    assert run_if_alike(traits(), lambda: 7) == 7
+    assert run_if_same_versions(traits(), lambda: 7) == 7
     with pytest.raises(ShmError, match="has numpy"):
-        run_if_alike({**traits(), "numpy": "0.1"}, lambda: 7)
+        run_if_same_versions({**traits(), "numpy": "0.1"}, lambda: 7)
 
 
 @pytest.mark.slow

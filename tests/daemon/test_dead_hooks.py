@@ -21,7 +21,7 @@ from tests.helpers.workspaces import make_workspace
 
 
 def with_webhook(folder: Path, url: str, **settings: object) -> Workspace:
-    """A workspace whose hook `ops`, which posts to `url`, is owed an alert."""
+    """Return a workspace whose hook `ops`, which posts to `url`, is owed an alert."""
     workspace = make_workspace(folder, settings=settings)
     described = Path(workspace.bridge.source)
     hook = f'\n[[hook]]\nname = "ops"\nurl = "{url}"\nsecret_file = "secret"\n'

@@ -31,7 +31,7 @@ from tests.helpers.workspaces import make_workspace, put, write_test
 
 
 def found(workspace: Workspace, check: str, now: datetime | None = None) -> list[Finding]:
-    """What one check finds, with the clock of the test machine unless told else."""
+    """Return the findings of one check, by default with the clock of the test machine."""
     findings = examine(workspace.folder, now or datetime.now(UTC))
     assert not [each for each in findings if "report it" in each.remedy], findings
     return [each for each in findings if each.check == check]
@@ -43,7 +43,7 @@ def only(workspace: Workspace, check: str, now: datetime | None = None) -> Findi
 
 
 def describe(workspace: Workspace, text: str) -> None:
-    """Puts text in front of the description, before its first table."""
+    """Put text in front of the description, before its first table."""
     path = workspace.folder / "bridge.toml"
     path.write_text(path.read_text().replace("[settings]", f"{text}\n\n[settings]"))
 

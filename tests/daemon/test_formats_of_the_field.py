@@ -13,6 +13,7 @@ from shm.read.base import PeekChannel
 from shm.read.sidecar import write_sidecar
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage
+from shm.store.queries.recordings import list_recordings
 from tests.helpers.flows import Clock, threads
 from tests.helpers.workspaces import START, make_workspace
 from tests.helpers.written import write
@@ -36,7 +37,7 @@ def test_daemon_reads_formats_of_field(tmp_path: Path, suffix: str) -> None:
 
     assert list(workspace.spool.iterdir()) == []
     with workspace.store() as store:
-        (stored,) = store.recordings.list_all()
+        (stored,) = list_recordings(store)
         assert (stored.stage, stored.hanger) == (Stage.DONE, 3), stored
         (test,) = store.tests.list_all(3)
         assert (test.test.id, test.time) == ("hanger3", START)

@@ -48,7 +48,7 @@ def spooled(workspace: Workspace) -> list[str]:
 
 
 def received(workspace: Workspace) -> list[Outcome]:
-    """Does what the daemon does with what waits in the spool."""
+    """Work on the spool as the daemon does."""
     with workspace.store() as store:
         return [
             receive(path, workspace, store, utc_now()).outcome for path in scan(workspace.spool)
@@ -57,7 +57,7 @@ def received(workspace: Workspace) -> list[Outcome]:
 
 @contextmanager
 def listening(workspace: Workspace, *, at_once: bool = True) -> Iterator[Listener]:
-    """Ends as if killed: what is not acknowledged by then never is on this connection."""
+    """End as if killed: what is not acknowledged by then never is on this connection."""
     listener = Listener(workspace, Address.of(workspace.settings.mqtt_url, {}))
     listener.begin()
     try:

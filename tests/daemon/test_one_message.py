@@ -72,7 +72,7 @@ class Hangers:
         return stored
 
     def watched(self, hanger: int, drifts: Sequence[Drift], change: Change, **more: object) -> None:
-        """A test after those there are, as the watch found it, with the alert it calls for."""
+        """Add a test after the others, as the watch found it, with the alert it calls for."""
         days = 30 * len(self.store.tests.list_all(hanger))
         test, baseline = self.test(hanger, days), self.store.watch.baseline(hanger)
         assert baseline is not None
@@ -148,7 +148,7 @@ def _gain(of: Hangers, hanger: int) -> None:
 
 
 def _two_quantities(of: Hangers, hanger: int) -> None:
-    """A loss stands; then an end loosens, too."""
+    """Return a loss stands; then an end loosens, too."""
     a_loss(of, hanger)
     later = [tension(-0.09, 0.005, 0.999), deck_end(-0.8, 0.99)]
     of.watched(hanger, later, replace(_QUIET, probability=0.99))
@@ -307,7 +307,7 @@ def status(bridge: Workspace) -> tuple[str, dict[int, dict[str, object]]]:
 
 
 def _read(page: str) -> str:
-    """A page's words."""
+    """Return a page's words."""
     return _flat(html.unescape(re.sub(r"<(?:.|\n)*?>", "", page)))
 
 

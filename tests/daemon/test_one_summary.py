@@ -20,8 +20,8 @@ from click.testing import CliRunner
 from shm.documents import alert_document, dump
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report, hanger_summaries
+from shm.pipeline.notification_plan import message_of
 from shm.pipeline.reporting import hanger_report
-from shm.pipeline.telling import message_of
 from shm.report.as_html import as_html
 from shm.report.as_pdf import as_pdf
 from shm.report.as_text import as_brief_text, as_text
@@ -78,7 +78,7 @@ def now(request: pytest.FixtureRequest, bridge: Workspace, store: Store) -> Hang
 def faces(
     now: HangerSummary, bridge: Workspace, store: Store, client: httpx.Client
 ) -> dict[str, str]:
-    """The words of every face that a person reads, of one hanger."""
+    """Return the words of every face that a person reads, of one hanger."""
     number = now.hanger.id
     paper = hanger_paper(hanger_report(bridge, store, number, utc_now()))
     with pytest.MonkeyPatch.context() as patch:
@@ -107,7 +107,7 @@ def _status(bridge: Workspace, *arguments: str) -> str:
 def documents(
     now: HangerSummary, bridge: Workspace, store: Store, client: httpx.Client
 ) -> dict[str, dict[str, Any]]:
-    """What every face for a program says of the hanger."""
+    """Return the hanger in every face for a program."""
     number, at = now.hanger.id, utc_now()
     every = json.loads(dump(bridge_json(bridge_report(bridge, store, at))))["hangers"]
     return {

@@ -35,7 +35,7 @@ def client(bridge: Workspace) -> Iterator[httpx.Client]:
 def stated(
     bridge: Workspace, client: httpx.Client, capsys: pytest.CaptureFixture[str]
 ) -> dict[str, int]:
-    """The number of open alerts of hanger 3, the only one that has any, by where it is said."""
+    """Return the number of open alerts of hanger 3, the only one with any, by its face."""
 
     def shm(*arguments: str) -> str:
         capsys.readouterr()

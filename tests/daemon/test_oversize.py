@@ -40,7 +40,7 @@ def on_disk(folder: Path) -> int:
 
 @contextmanager
 def serving(workspace: Workspace) -> Iterator[None]:
-    """A daemon that runs until the end of the block."""
+    """Yield a daemon that runs until the end of the block."""
     wakeup = Wakeup()
     daemon = threading.Thread(
         target=run, args=(workspace,), kwargs={"wakeup": wakeup, "make_executor": threads}
@@ -141,7 +141,7 @@ def test_a_file_that_grows_while_it_is_copied_is_not_followed_beyond_what_was_ju
             file.write(b"1" * (4 << 20))
 
     with pytest.raises(Exception, match="changed while it was read"):
-        archive.keep(path, most_bytes=4 << 20, meanwhile=grow)
+        archive.keep(path, most_bytes=4 << 20, on_progress=grow)
     assert copied <= 4
 
 

@@ -38,7 +38,7 @@ UNITS = {"force": "N", "acceleration": "m/s²"}
 
 @pytest.fixture(scope="module")
 def month(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Page, Workspace, str]]:
-    """The page of an engineer who has signed in, at a bridge with an alert and a test held."""
+    """Yield the page of a signed-in engineer, at a bridge with an alert and a test held."""
     folder = tmp_path_factory.mktemp("month") / "bridge"
     workspace = make_workspace(
         folder, hangers=(3, 4), settings={"cross_check": "none", "workers": 1}
@@ -142,7 +142,7 @@ def whole(page: Page) -> None:
 
 
 def answered(form: Locator) -> None:
-    """What the file does not say; the third sensor's plane is that of the first."""
+    """Answer what the file leaves open; the third sensor's plane is that of the first."""
     expect(form).to_be_visible()
     planes = 0
     for line in form.locator("div").all():
@@ -162,7 +162,7 @@ def answered(form: Locator) -> None:
 
 
 def written(logger: str, path: Path, workspace: Workspace, number: int) -> None:
-    """A hammer test of hanger 3 as a logger exports it."""
+    """Return a hammer test of hanger 3 as a logger exports it."""
     plan = HammerPlan(hits=3, seconds_per_hit=6.0, sensors_x_m=(PLACE_M,))
     struck = hammer_test(
         workspace.bridge.hanger(3),

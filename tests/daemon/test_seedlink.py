@@ -19,6 +19,7 @@ from pymseed import MS3Record, nslc2sourceid
 import shm_daemon
 from shm.errors import UsageError
 from shm.store import Workspace
+from shm.store.queries.streams import list_stream_events
 from shm.store.ring import Ring
 from shm.values import FloatArray
 from shm_daemon.doctor import examine
@@ -115,7 +116,7 @@ def n_stored(workspace: Workspace) -> int:
 
 def events(workspace: Workspace) -> list[tuple[str, str]]:
     with workspace.store() as store:
-        found = store.streams.list_events("h3", START - timedelta(days=1))
+        found = list_stream_events(store, "h3", START - timedelta(days=1))
     return [(each.kind, each.detail) for each in found]
 
 

@@ -29,7 +29,7 @@ def url(postgresql: Databases) -> Iterator[str]:
 def served(
     url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> Iterator[Workspace]:
-    """A workspace on the server, and a daemon that serves it from a thread."""
+    """Yield a workspace on the server, and a daemon that serves it from a thread."""
     caplog.set_level(logging.INFO)
     quick_update.stand_in(monkeypatch.setattr)
     monkeypatch.setenv("SHM_STORE", url.replace("postgres@", "postgres:hush@"))

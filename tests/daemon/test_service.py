@@ -11,10 +11,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from shm.errors import UsageError
 from shm.resources import unit_file
 from shm.store import Workspace
+from shm_cli.main import cli
 from shm_cli.services import unit_text
 from shm_daemon import Wakeup, run
 from tests.helpers.flows import threads
@@ -52,6 +54,23 @@ def test_the_printed_unit_passes_too_with_our_paths(tmp_path: Path) -> None:
     assert f"User={tmp_path.owner()}" in lines
 
 
+@pytest.mark.parametrize("owner", ["root", "ann"])
+@pytest.mark.parametrize("verb", ["daemon", "web"])
+def test_print_unit_warns_of_root(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, owner: str, verb: str
+) -> None:
+    workspace = make_workspace(tmp_path / "bridge")
+    monkeypatch.setattr(Path, "owner", lambda _: owner)
+    words = ["--workspace", str(workspace.folder), verb, "--print-unit"]
+    ended = CliRunner().invoke(cli, words)
+
+    assert ended.exit_code == 0
+    assert f"\nUser={owner}\n" in ended.stdout
+    is_root = owner == "root"
+    assert ("\n# The workspace belongs to root: better give it" in ended.stdout) == is_root
+    assert ("chown -R shm" in ended.stderr) == is_root
+
+
 def test_what_confines_the_daemon_confines_all() -> None:
     first, *others = ({*unit_file(name).read_text().splitlines()} for name in UNITS)
     confining = {line for line in first if line.startswith(("Protect", "Restrict", "NoNew", "Cap"))}
@@ -81,7 +100,7 @@ def hear(systemd: socket.socket) -> list[str]:
 
 
 def hear_until(systemd: socket.socket, word: str) -> list[str]:
-    """What is told in the first message that holds a word."""
+    """Return the first message that holds a word."""
     end = time.monotonic() + 120
     while word not in (said := hear(systemd)):
         assert time.monotonic() < end, f"{word} never came"

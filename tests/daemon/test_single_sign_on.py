@@ -291,7 +291,7 @@ def test_a_provider_that_is_down_is_told_on_page_and_by_the_doctor(tmp_path: Pat
 
 
 def found(workspace: Workspace) -> tuple[Level, str]:
-    """What the doctor says of the provider, the last of it."""
+    """Return the last finding of the doctor about the provider."""
     of_it = [e for e in examine(workspace.folder, utc_now()) if e.check == "single sign-on"]
     return of_it[-1].level, of_it[-1].found
 

@@ -207,7 +207,7 @@ def test_a_disk_that_is_full_holds_chunks_up_and_loses_none(
 
 
 def a_file(folder: Path, name: str, start: datetime | None, seconds: int = 90) -> np.ndarray:
-    """A recording of two channels in the format of the suffix."""
+    """Return a recording of two channels in the format of the suffix."""
     folder.mkdir(parents=True, exist_ok=True)
     values = np.random.default_rng(seconds).normal(size=(2, 100 * seconds))
     channels = tuple(

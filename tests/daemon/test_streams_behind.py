@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline import utc_now
-from shm.pipeline.unheard import stream_leads
+from shm.pipeline.stream_health import stream_leads
 from shm.read.chunk_document import chunk_document
 from shm.store import Workspace
 from shm.store.ring import ring_of

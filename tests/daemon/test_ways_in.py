@@ -66,7 +66,7 @@ def answers(port: int) -> bool:
 
 
 def servers_of(workspace: Workspace) -> list[int]:
-    """Processes that serve the workspace's web interface."""
+    """Return processes that serve the workspace's web interface."""
     mark = f"shm_daemon.web\0{workspace.folder}".encode()
     found = []
     for folder in Path("/proc").iterdir():

@@ -142,7 +142,7 @@ def test_older_alerts_are_a_link_away(
 
 
 def copied(bridge: Workspace, alert: int, key: str) -> int:
-    """The same alert raised for another reason; its number."""
+    """Return the same alert raised for another reason; its number."""
     with bridge.store() as store, store.writing() as connection:
         row = connection.execute(sa.select(alerts).where(alerts.c.id == alert)).one()
         changed = {"id": None, "key": key, "document": alert_document(row.document)}

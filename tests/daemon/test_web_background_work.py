@@ -80,11 +80,11 @@ def test_what_fails_says_why_and_stops_nothing_else(
     for how, told in (("refused", "is no word"), ("bug", "internal error")):
         order = Order("none", how)
         with pytest.raises(ShmError, match=told):
-            until(lambda order=order: background_worker.wanted(order))  # type: ignore[misc]
+            until(lambda order=order: background_worker.get_or_start(order))  # type: ignore[misc]
         with pytest.raises(ShmError, match=told):
-            background_worker.wanted(order)
+            background_worker.get_or_start(order)
     assert _MADE == ["none", "none"]
-    assert until(lambda: background_worker.wanted(Order("some"))) == Text("some")
+    assert until(lambda: background_worker.get_or_start(Order("some"))) == Text("some")
 
 
 def test_what_takes_too_long_is_given_up() -> None:
@@ -92,9 +92,11 @@ def test_what_takes_too_long_is_given_up() -> None:
     _LET_GO.clear()
     try:
         with pytest.raises(ShmError, match="more than 2 s"):
-            until(lambda: background_worker.wanted(Order("slow one", "slow")))
+            until(lambda: background_worker.get_or_start(Order("slow one", "slow")))
         # It hangs on, and nobody waits for it.
-        assert until(lambda: background_worker.wanted(Order("quick one"))) == Text("quick one")
+        assert until(lambda: background_worker.get_or_start(Order("quick one"))) == Text(
+            "quick one"
+        )
     finally:
         _LET_GO.set()
         background_worker.close()
@@ -104,8 +106,8 @@ def test_a_process_that_dies_is_told_and_replaced() -> None:
     background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=120.0, pool=a_process)
     try:
         with pytest.raises(ShmError, match="died"):
-            until(lambda: background_worker.wanted(Order("last words", "dies")))
-        assert until(lambda: background_worker.wanted(Order("next"))) == Text("next")
+            until(lambda: background_worker.get_or_start(Order("last words", "dies")))
+        assert until(lambda: background_worker.get_or_start(Order("next"))) == Text("next")
     finally:
         background_worker.close()
 
@@ -113,12 +115,12 @@ def test_a_process_that_dies_is_told_and_replaced() -> None:
 def test_closing_ends_the_work_at_once() -> None:
     background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=60.0, pool=a_process)
     _LET_GO.clear()
-    assert background_worker.wanted(Order("endless", "slow")) is None
+    assert background_worker.get_or_start(Order("endless", "slow")) is None
     time.sleep(0.2)
     closing = threading.Thread(target=background_worker.close)
     closing.start()
     closing.join(120)
     assert not closing.is_alive()  # the order would take ten minutes
-    assert background_worker.wanted(Order("endless", "slow")) is None
-    assert background_worker.wanted(Order("another")) is None
+    assert background_worker.get_or_start(Order("endless", "slow")) is None
+    assert background_worker.get_or_start(Order("another")) is None
     until(lambda: None if multiprocessing.active_children() else Text("all gone"))

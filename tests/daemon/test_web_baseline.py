@@ -42,7 +42,7 @@ def browser(workspace: Workspace) -> Iterator[httpx.Client]:
 
 
 def outcome(browser: httpx.Client, answer: httpx.Response) -> httpx.Response:
-    """What came of an order, once it was made."""
+    """Return the outcome of an order, once it was made."""
     assert answer.status_code == 303
     page = answer.headers["location"]
     assert f'data-fragment="{page.replace("?", "/outcome?")}"' in browser.get(page).text

@@ -28,7 +28,7 @@ from tests.helpers.workspaces import START, make_workspace, write_test
 
 
 def glance(hanger: Hanger, shift: float = 0.0, sd: float = 0.003) -> HangerGlance:
-    """A hanger whose tension moved by so much since its baseline."""
+    """Return a hanger whose tension moved by so much since its baseline."""
     moved = Drift(hanger.id, "t9", START, TENSION, 711e3, 711e3, shift, sd, 0.05, 0.1)
     tension = Interval.normal(711e3, 5e3)
     return HangerGlance(
@@ -159,7 +159,13 @@ def test_a_hanger_long_not_tested_is_said(bridge: Workspace) -> None:
     site = Site(Description(bridge), Address())
     later = START + timedelta(days=bridge.settings.quiet_days + 1000)
     try:
-        assert [each.is_quiet for each in bridge_view.glance(site, START).hangers] == [False, False]
-        assert [each.is_quiet for each in bridge_view.glance(site, later).hangers] == [True, False]
+        assert [each.is_quiet for each in bridge_view.summarize_hangers(site, START).hangers] == [
+            False,
+            False,
+        ]
+        assert [each.is_quiet for each in bridge_view.summarize_hangers(site, later).hangers] == [
+            True,
+            False,
+        ]
     finally:
         site.close()

@@ -18,7 +18,7 @@ from shm.report.hanger_sentences import details
 from shm.report.hanger_status import Status
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.store import Lineage, Workspace
-from shm_daemon.web.background_work import BackgroundWorker, Order
+from shm_daemon.web.background_work import BackgroundWorker, WorkRequest
 from shm_daemon.web.commands import set_reader, without_commands
 from shm_daemon.web.hanger_figures import FIGURES
 from tests.helpers.flows import Clock, ingest
@@ -53,9 +53,9 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 class AtTheSecondRequest(BackgroundWorker[Any]):
     """A background_worker without a process: nothing is made yet when it is first asked for."""
 
-    made: ClassVar[dict[Order, Any]] = {}
+    made: ClassVar[dict[WorkRequest, Any]] = {}
 
-    def wanted(self, order: Order) -> Any:
+    def get_or_start(self, order: WorkRequest) -> Any:
         if order not in self.made:
             self.made[order] = None
             return None
@@ -84,7 +84,7 @@ def page(site: Served) -> str:
 
 
 def words_of(page: str) -> str:
-    """What a person reads."""
+    """Return the visible text."""
     return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
 
 

@@ -20,7 +20,8 @@ from shm_daemon.web.hanger_view import HangerView
 from tests.helpers.workspaces import START
 from tests.report.diagnoses import HANGER
 
-TREND, STIFFNESS, TEMPERATURE = FIGURES[:3]
+_BY_NAME = {figure.name: figure for figure in FIGURES}
+TREND, STIFFNESS, TEMPERATURE = (_BY_NAME[n] for n in ("trend", "stiffness", "temperature"))
 BLUNDER = 700
 
 
@@ -68,7 +69,7 @@ BASELINE = BaselineGlance(
 
 
 def a_view(tests: int, **parts: Any) -> HangerView:
-    """A hanger of so many tests, one of which is far off."""
+    """Return a hanger of so many tests, one of which is far off."""
     points = [a_point(i, 500e3 if i == BLUNDER else 700e3 + 1e3 * (i % 7)) for i in range(tests)]
     view = SimpleNamespace(
         hanger=HANGER,
@@ -78,6 +79,7 @@ def a_view(tests: int, **parts: Any) -> HangerView:
         notes=(),
         calls=(),
         states=NOTHING_WATCHED,
+        report=None,
     )
     vars(view).update(parts)
     return cast(HangerView, view)

@@ -70,7 +70,7 @@ def odd_values(column: sa.Column[object]) -> Iterator[object]:
 
 @pytest.fixture(scope="module")
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """A store with a row in nearly every table; all its steps were made just now."""
+    """Return a store with a row in nearly every table; all its steps were made just now."""
     workspace = make_workspace(tmp_path_factory.mktemp("metrics") / "bridge")
     with workspace.store() as store:
         fill(store)
@@ -88,7 +88,7 @@ def client(bridge: Workspace) -> Iterator[httpx.Client]:
 
 
 def said(client: httpx.Client) -> dict[tuple[str, ...], float]:
-    """The samples by name and labels' values; the page must be one that Prometheus can read."""
+    """Return the samples by name and labels' values, as Prometheus parses them."""
     answer = client.get("/metrics")
     assert answer.status_code == 200, answer.text
     found = {}

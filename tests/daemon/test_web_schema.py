@@ -64,7 +64,7 @@ ROUTES = (
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    """A bridge with a history and an alert, whose daemon has just been seen."""
+    """Yield a bridge with a history and an alert, whose daemon has just been seen."""
     workspace = with_a_loss(tmp_path_factory.mktemp("schema") / "bridge")
     with served(workspace) as site:
         heartbeat = workspace.folder / HEARTBEAT

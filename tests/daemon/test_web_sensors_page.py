@@ -22,7 +22,7 @@ MODE = Mode("transverse", 1, 5.8, 1e-3)
 
 @pytest.fixture(scope="module")
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """A stream that was heard two hours ago, with a window, six hours and a dead sensor."""
+    """Return a stream that was heard two hours ago, with a window, six hours and a dead sensor."""
     workspace = with_live_streams(make_workspace(tmp_path_factory.mktemp("sensors") / "bridge"))
     start = (datetime.now(UTC) - 3 * HOUR).replace(minute=0, second=0, microsecond=0)
     send(workspace, hours=1 / 6, first=start)

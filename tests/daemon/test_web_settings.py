@@ -162,7 +162,7 @@ HOURS = "hook.night.watch.quiet_hours"
 
 @pytest.fixture
 def hooked(browser: httpx.Client, workspace: Workspace) -> httpx.Client:
-    """The bridge has a hook with quiet hours."""
+    """Return the bridge with a hook that has quiet hours."""
     with (workspace.folder / "bridge.toml").open("a") as file:
         file.write(
             '\n[[hook]]\nname = "night.watch"\ncommand = ["true"]\nquiet_hours = "22:00-06:00"\n'

@@ -102,7 +102,7 @@ def client(site: Site) -> Iterator[httpx.Client]:
 
 
 def at_last(client: httpx.Client, address: str) -> httpx.Response:
-    """The answer once nothing more is worked out."""
+    """Return the answer once nothing more is worked out."""
     for _ in range(600):
         answer = client.get(address)
         if "Retry-After" not in answer.headers:

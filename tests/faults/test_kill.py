@@ -14,7 +14,7 @@ from shm.store import Workspace
 from tests.helpers.killing import (
     assert_nothing_lost_doubled_or_half_written,
     killed_again_and_again,
-    left_alone,
+    unfinished_uploads,
 )
 from tests.helpers.postgres import Databases
 from tests.helpers.workspaces import make_workspace
@@ -24,7 +24,7 @@ KILLS, FILES, SEED = 4, 8, 20260501
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    return left_alone(tmp_path_factory.mktemp("quiet") / "bridge", FILES)
+    return unfinished_uploads(tmp_path_factory.mktemp("quiet") / "bridge", FILES)
 
 
 def kill(workspace: Workspace, undisturbed: Workspace) -> None:

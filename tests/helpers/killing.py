@@ -13,12 +13,12 @@ from tests.helpers.daemons import quick_daemons, until_serving
 from tests.helpers.feeds import Feed, assert_all_done_once
 from tests.helpers.workspaces import make_workspace
 
-Standing = tuple[int, ...]
+RecordingInProgress = tuple[int, ...]
 
 
 def killed_again_and_again(
     workspace: Workspace, kills: int, files: int, rng: random.Random, longest_s: float = 0.25
-) -> tuple[Feed, set[Standing]]:
+) -> tuple[Feed, set[RecordingInProgress]]:
     """Kills each life of the daemon at a random moment; the feed, and how the files stood then."""
     feed, seen = Feed(workspace), set()
     with quick_daemons(workspace.folder) as daemons:
@@ -36,7 +36,7 @@ def killed_again_and_again(
     return feed, seen
 
 
-def left_alone(folder: Path, files: int, **settings: object) -> Workspace:
+def unfinished_uploads(folder: Path, files: int, **settings: object) -> Workspace:
     """The same feed, taken in by one daemon that nobody kills."""
     workspace = make_workspace(folder, settings=settings)
     feed = Feed(workspace)
@@ -58,7 +58,7 @@ def assert_nothing_lost_doubled_or_half_written(feed: Feed, undisturbed: Workspa
         assert found[table] == rows, table
 
 
-def where_files_stand(workspace: Workspace, files: int) -> Standing:
+def where_files_stand(workspace: Workspace, files: int) -> RecordingInProgress:
     """How many files lie in the spool and how many at each stage: none less than were dropped."""
     with workspace.store() as store:
         counts = count_stages(store)

@@ -22,7 +22,7 @@ FIRST = 512
 def changed(
     name: str, change: Callable[[FloatArray], object], record: Recording = SOUND
 ) -> Recording:
-    """The record with a copy of one channel's values changed in place."""
+    """Return the record with a copy of one channel's values changed in place."""
     channels = []
     for channel in record.channels:
         values = channel.values.copy()

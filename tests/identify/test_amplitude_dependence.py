@@ -20,7 +20,7 @@ SHAPES = ((1.0, 0.7), (0.8, -0.6), (0.5, 1.0))
 
 
 def _recording(slope: float, half: float = math.inf) -> Recording:
-    """The change goes with A, or where `half` is finite with (1 + half) A / (A + half)."""
+    """Return the change goes with A, or where `half` is finite with (1 + half) A / (A + half)."""
     rng = np.random.default_rng(5)
     slot, before = int(SLOT_S * RATE_HZ), int(0.4 * RATE_HZ)
     motion = 1e-3 * rng.standard_normal((2, before + HITS * slot))

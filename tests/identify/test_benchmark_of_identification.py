@@ -46,7 +46,7 @@ def answer(case: Any, modes: tuple[Mode, ...], **more: Any) -> Identification:
 
 
 def right(case: Any) -> tuple[Mode, ...]:
-    """The truth, with an error of 1e-5 and standard deviations that cover it."""
+    """Return the truth, with an error of 1e-5 and standard deviations that cover it."""
     return tuple(
         Mode(t.plane, t.order, t.frequency_hz * (1 + 1e-5), t.frequency_hz * 1e-5,
              case.state.damping_ratio, 1e-4)

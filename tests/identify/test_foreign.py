@@ -23,7 +23,7 @@ STRING = replace(HANGER, second_moment_m4=6.4e-10)
 def found_at(
     frequency_hz: float, shape: np.ndarray, angle_deg: float = 0.0, damping: float = 0.003
 ) -> FoundMode:
-    """A mode that moves as `shape` over the places, at an angle from the transverse plane."""
+    """Return a mode of that `shape`, at an angle from the transverse plane."""
     angle = np.radians(angle_deg)
     values = np.outer(shape, [np.cos(angle), np.sin(angle)]).ravel()
     values = values / np.abs(values).max()

@@ -19,8 +19,10 @@ OPTIONS = IdentifyOptions(2.0, 50.0)
 
 
 def _records(apart: float) -> list[Recording]:
-    """A hanger whose planes are turned from the sensors' and `apart`, as a fraction, in frequency;
-    hit along others."""
+    """Return records of a hanger with rotated planes, `apart` in frequency, as a fraction.
+
+    The hits are along other directions.
+    """
     records: list[Recording] = []
     for number, plane in enumerate(PLANES):
         hit_deg = HIT_DEG + 90.0 * number

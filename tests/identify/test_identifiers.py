@@ -33,19 +33,19 @@ def _of_three_hits() -> Measurement:
 
 @cache
 def _found() -> Finding:
-    """What it finds in them."""
+    """Return the finding of the identifier."""
     return identify(_of_three_hits(), OPTIONS)
 
 
 def _sensing(record: Recording, values: Sequence[FloatArray]) -> Recording:
-    """The record with other accelerations."""
+    """Return the record with other accelerations."""
     pairs = zip(record.accelerations, values, strict=True)
     channels = [replace(channel, values=each) for channel, each in pairs]
     return replace(record, channels=(record.channels[0], *channels))
 
 
 def _first_hit_ringing(measurement: Measurement, frequency_hz: float) -> Measurement:
-    """The measurement with a ringing of the sensors after its first hit."""
+    """Return the measurement with a ringing of the sensors after its first hit."""
     assert measurement.spectra is not None
     assert measurement.frequency_response is not None
     pole = -0.5 + 2j * np.pi * frequency_hz

@@ -17,7 +17,7 @@ from tests.worlds.simulated.hammer import hammer_test
 
 @pytest.fixture(scope="module")
 def recording() -> Recording:
-    """The planes differ by their end springs, and no channel states which is whose."""
+    """Return the planes differ by their end springs, and no channel states which is whose."""
     state = HangerState(450e3, 5e6, 2e7, 5e6, 8e6)
     plan = HammerPlan(hits=3, seconds_per_hit=8.0, sensors_x_m=(2.52,))
     found = hammer_test(HANGER_3, state, plan, np.random.default_rng(1))

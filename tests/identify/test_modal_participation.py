@@ -29,7 +29,7 @@ def _residues(planted: list[Planted]) -> FloatArray:
 
 
 def _with_unused(measurement: Measurement, number: int) -> Measurement:
-    """The measurement with one hit left out."""
+    """Return the measurement with one hit left out."""
 
     def rest(parts: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
         return parts[:number] + parts[number + 1 :]
@@ -65,8 +65,11 @@ def test_where_every_used_hit_follows_another_rest_is_assumed() -> None:
 
 
 def test_the_level_is_the_amplitude_right_after_the_hit() -> None:
-    """A half sine of impulse I gives a mode of frequency w the velocity I, so w I cos(w T / 2) /
-    (1 - (w T / pi)^2) of acceleration: the transform of the pulse."""
+    """Compare with the transform of the pulse.
+
+    A half sine of impulse I gives a mode of frequency w the velocity I, so w I cos(w T / 2) /
+    (1 - (w T / pi)^2) of acceleration.
+    """
     mode = Planted(13.5, 0.001, (0.5, -0.8), 0.7)
     record = recording([mode], hits=1)
     (hit,) = (m := measurement_of_recordings([record], OPTIONS)).hits

@@ -31,7 +31,7 @@ ACCELERATIONS = tuple(channel.name for channel in SOUND.accelerations)
 
 
 def times(factor: float, *names: str) -> Recording:
-    """The recording with some channels in a wrong unit."""
+    """Return the recording with some channels in a wrong unit."""
     channels = (
         replace(c, values=c.values * factor) if c.name in names else c for c in SOUND.channels
     )

@@ -48,7 +48,7 @@ def _modelab_responses() -> list[FrequencyResponse]:
 
 
 def _signalcalc(file: Path, x_m: float) -> FrequencyResponse:
-    """A SignalCalc text export: headers, then frequency, real and imaginary part."""
+    """Return a SignalCalc text export: headers, then frequency, real and imaginary part."""
     with gzip.open(file, "rt", encoding="latin1") as lines:
         rows = [line.split() for line in lines if line[:1].isdigit()]
     frequency, real, imaginary = np.array(rows, dtype=float).T

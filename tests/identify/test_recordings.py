@@ -19,7 +19,7 @@ SLOT = 8 * 1024
 
 
 def _with(record: Recording, name: str, **spans: float) -> Recording:
-    """The record with samples `first` to `last` of a channel set to `value`."""
+    """Return the record with samples `first` to `last` of a channel set to `value`."""
     first, last, value = (int(spans["first"]), int(spans["last"]), spans["value"])
     channels = []
     for channel in record.channels:

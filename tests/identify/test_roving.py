@@ -70,7 +70,7 @@ def roving_sensor() -> Identification:
 
 @pytest.fixture(scope="module")
 def roving_hammer() -> Identification:
-    """A single-axis sensor stays; transverse hits, the hammer's direction stated."""
+    """Return a single-axis sensor stays; transverse hits, the hammer's direction stated."""
     plans = [
         replace(PLAN, sensors_x_m=(1.7,), hammer_x_m=place, hammer_angle_deg=0.0)
         for place in PLACES
@@ -146,7 +146,7 @@ def test_each_mode_knows_how_hard_it_rang(roving_sensor: Identification) -> None
 
 
 def _one_plane_at_a_time(hits: int) -> list[Recording]:
-    """A biaxial sensor; the first record is hit transversely, the second longitudinally."""
+    """Return a biaxial sensor; the first record is hit transversely, the second longitudinally."""
     records: list[Recording] = []
     for number, plane in enumerate(PLANES):
         modes = [

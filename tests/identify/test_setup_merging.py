@@ -9,7 +9,12 @@ import pytest
 
 from shm.identify import Dropped, IdentifyOptions, Poles
 from shm.identify.contract import Finding, FoundMode, Measurement
-from shm.identify.setup_merging.join_set_ups import LARGEST_SHIFT, Joined, join_set_ups, matched
+from shm.identify.setup_merging.join_set_ups import (
+    LARGEST_SHIFT,
+    JoinedFinding,
+    join_set_ups,
+    matched,
+)
 from shm.values import NAN, Plane, ResponsePoint
 
 OPTIONS = IdentifyOptions()
@@ -48,7 +53,7 @@ def _groups(
 ONE, OTHER = _ambient(_point(1.0), _point(2.0)), _ambient(_point(1.0), _point(3.0))
 
 
-def _joined(one: Finding, other: Finding, options: IdentifyOptions = OPTIONS) -> Joined:
+def _joined(one: Finding, other: Finding, options: IdentifyOptions = OPTIONS) -> JoinedFinding:
     return join_set_ups([ONE, OTHER], [one, other], options)
 
 

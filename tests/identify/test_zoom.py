@@ -18,7 +18,7 @@ RATE_HZ = 256.0
 
 
 def _decay(seed: int, pairs: int, noise: float) -> FloatArray:
-    """A free decay of 12 s at four points: `pairs` of modes half a bandwidth apart."""
+    """Return a free decay of 12 s at four points: `pairs` of modes half a bandwidth apart."""
     rng = np.random.default_rng(seed)
     t = np.arange(int(12 * RATE_HZ)) / RATE_HZ
     motion = noise * rng.standard_normal((4, len(t)))

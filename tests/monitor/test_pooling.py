@@ -69,22 +69,6 @@ def test_intervals_hold_what_they_say(period: Period, number: int) -> None:
     assert 0.80 < np.mean(held) <= 1.0
 
 
-def test_what_windows_share_widens_the_interval() -> None:
-    """Errors that last two hours: of 60 days the interval still holds four in five."""
-    rng = np.random.default_rng(3)
-    held, widths = [], []
-    for _ in range(60):
-        slow = np.convolve(rng.normal(size=155), np.ones(12) / math.sqrt(12), "valid")[:144]
-        hz = 5 + 5 * SD * (slow + rng.normal(size=144))
-        reading = pooled(_readings(hz), "day", START)
-        assert reading is not None
-        mode = reading.modes[0]
-        held.append(abs(mode.frequency_hz - 5) < 1.645 * mode.frequency_sd_hz)
-        widths.append(mode.frequency_sd_hz / (5 * SD / 12))
-    assert np.mean(held) > 0.75
-    assert np.median(widths) > 4
-
-
 def test_a_window_that_is_off_is_left_out_and_counted() -> None:
     rng = np.random.default_rng(4)
     hz = 5 + 5 * SD * rng.normal(size=6)

@@ -13,7 +13,7 @@ from shm.errors import BadInput, UsageError
 from shm.inference import UpdateOptions
 from shm.models import Model
 from shm.pipeline import adopting, steps
-from shm.pipeline.adopting import GapWatch, Wish, adopt, gap_watch
+from shm.pipeline.adopting import AdoptionRequest, GapWatch, adopt, gap_watch
 from shm.pipeline.reporting import hanger_report
 from shm.store import Adoption, Lineage, Store, StoredAdoption, Workspace
 from shm.store.queries.trends import list_history
@@ -64,8 +64,10 @@ def begun(workspace: Workspace) -> Workspace:
     return workspace
 
 
-def wish(*effects: str, at: Sequence[str] = (), baseline: str = "", why: str = "a lamp") -> Wish:
-    return Wish(effects, tuple(at), baseline, why, "engineer")
+def wish(
+    *effects: str, at: Sequence[str] = (), baseline: str = "", why: str = "a lamp"
+) -> AdoptionRequest:
+    return AdoptionRequest(effects, tuple(at), baseline, why, "engineer")
 
 
 def adopted(workspace: Workspace, *effects: str, at: Sequence[str] = ()) -> StoredAdoption:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import scipy
 
+from shm.pipeline.stream_health import StreamHealth, heard, leads_of
 from shm.pipeline.streaming import Streaming
-from shm.pipeline.unheard import Heard, heard, leads_of
 from shm.read.chunk_document import chunk_document
 from shm.simulate.ambient import streamed
 from shm.store import Store, Workspace
@@ -36,8 +36,8 @@ class Followed:
 
     windows: tuple[WindowReading, ...]
     events: tuple[StreamEvent, ...]
-    while_off: Heard
-    after: Heard
+    while_off: StreamHealth
+    after: StreamHealth
 
     def modes(self, plane: Plane, *, after: bool) -> list[Mode]:
         return [

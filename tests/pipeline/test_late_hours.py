@@ -65,7 +65,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     )
     monkeypatch.setattr(stream_steps, "read_stream_window", lambda *_: window(starts[-1]))
     monkeypatch.setattr(stream_days, "PERIOD", HOUR)
-    monkeypatch.setattr(streaming, "heed_silences", lambda *_: None)  # the ring is empty
+    monkeypatch.setattr(streaming, "evaluate_silent_streams", lambda *_: None)  # the ring is empty
     return made
 
 

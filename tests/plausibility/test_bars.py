@@ -13,7 +13,7 @@ import pytest
 
 from shm.models import build
 from shm.models.base import Conditions
-from shm.plausibility.bars import Known, Origin, OtherOrigin, _candidates, _said, doubt_of
+from shm.plausibility.bars import Known, OtherOrigin, doubt_of
 from shm.values import PLANES, AddedMass, Hanger, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 
@@ -165,40 +165,3 @@ def test_a_known_mass_clamped_on_is_allowed_for() -> None:
     mass = AddedMass(25.0, 2.7)
     test = replace(a_test(NINE, mass=mass), added_mass=mass)
     assert doubted(test, NINE, 3) is None
-
-
-@pytest.mark.parametrize("tests", [0, 2])
-def test_only_the_hanger_that_is_meant_may_have_had_something_hung_on_it(tests: int) -> None:
-    """What a mass at any place does comes near to any test: no rival may be excused by one."""
-    others = [known(hanger, tests) for hanger in BRIDGE if hanger != NINE]
-    own, rivals = _candidates(a_test(NINE), known(NINE, tests), others)
-    assert own.masses
-    assert {origin.kind for origin in rivals} >= {"hanger", "unknown bar", "time base"}
-    assert not any(evidence.masses for _, evidence in rivals.values())
-
-
-@pytest.mark.parametrize(
-    ("origin", "told"),
-    [
-        (Origin("hanger", 4), "The modes fit hanger 4 rather than hanger 3: right hanger?"),
-        (
-            Origin("unknown bar"),
-            "No tension and no ends of hanger 3 as described give these modes: right hanger, right "
-            "description?",
-        ),
-        (
-            Origin("time base", factor=2.0),
-            "All frequencies are 2 times those of hanger 3: right sampling rate?",
-        ),
-        (
-            Origin("planes"),
-            "The modes fit hanger 3 with its two planes exchanged: right axes of the sensors?",
-        ),
-    ],
-)
-def test_a_doubt_says_what_was_found_and_asks_for_what_may_be_wrong(
-    origin: Origin, told: str
-) -> None:
-    found = _said(origin, 0.97, NINE)
-    assert (found.text, found.kind, found.probability) == (told, origin.kind, 0.97)
-    assert (found.hanger, found.factor) == (origin.hanger, origin.factor)

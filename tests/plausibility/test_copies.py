@@ -17,10 +17,8 @@ from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.values import (
     Channel,
     Fingerprint,
-    FrequencyResponse,
     KnownSamples,
     Recording,
-    ResponsePoint,
 )
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import START, modelled_test
@@ -188,20 +186,6 @@ def test_hits_of_a_machine_are_no_copies(hits: int, bits: int) -> None:
     assert not any(is_copy(*pair) for pair in pairs)
 
 
-@pytest.mark.parametrize("hum_hz", [24.3, 50.0])
-def test_a_pump_or_the_mains_under_all_tests_makes_no_copies(hum_hz: float) -> None:
-    prints = []
-    for seed in range(5):
-        recording = a_recording(seed)
-        time_s = np.arange(len(recording.channels[0].values)) / 512
-        hum = sum(np.sin(2 * np.pi * k * hum_hz * time_s + seed) / k for k in (1, 2, 3))
-        humming = changed(recording, lambda c, hum=hum: replace(c, values=c.values + 0.05 * hum))
-        prints.append(fingerprint_of([humming]))
-    pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b]
-    assert len(pairs) == 10
-    assert not any(is_copy(*pair) for pair in pairs)
-
-
 def test_real_hits_of_one_structure_are_copies_of_their_own_halves_alone(shared_data: Path) -> None:
     paths = sorted((shared_data / "pyfrf_hits").glob("*.npy"))
     rows = [np.load(path)[2] for path in paths]
@@ -220,18 +204,3 @@ def test_one_file_of_a_test_of_several_is_a_copy() -> None:
     assert whole is not None
     assert part is not None
     assert is_copy(part, whole)
-
-
-def test_frequency_responses_are_compared_too() -> None:
-    rng = np.random.default_rng(1)
-    lines = rng.normal(size=(2, 400)) + 1j * rng.normal(size=(2, 400))
-    points = (ResponsePoint("a"), ResponsePoint("b"))
-    response = FrequencyResponse("a.uff", points, np.arange(400.0), lines)
-    scaled = replace(response, source="b.uff", accelerance=lines * 2)
-    another = replace(response, accelerance=lines + 0.01 * rng.normal(size=(2, 400)))
-    own, copy, other = (fingerprint_of([each]) for each in (response, scaled, another))
-    assert own is not None
-    assert copy is not None
-    assert other is not None
-    assert is_copy(own, copy)
-    assert not is_copy(own, other)

@@ -10,7 +10,7 @@ from shm.values import AddedMass, Channel, FrequencyResponse, Recording, Respons
 
 @pytest.fixture
 def recording() -> Recording:
-    """A force and two biaxial channels, with everything known."""
+    """Return a force and two biaxial channels, with everything known."""
     rng = np.random.default_rng(5)
     values = rng.standard_normal((3, 200))
     return Recording(

@@ -154,7 +154,7 @@ def test_gzipped_text_is_read_with_the_sidecar_of_its_plain_name(
 
 
 def packed(content: bytes) -> bytes:
-    """The same bytes at any time of the day, so that the test has one name."""
+    """Return the same bytes at any time of the day, so that the test has one name."""
     return gzip.compress(content, mtime=0)
 
 

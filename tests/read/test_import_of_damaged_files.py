@@ -74,7 +74,7 @@ def test_a_damaged_export_is_read_or_refused_with_a_remedy(
 
 
 def _remedy(verb: Callable[[Path], object], path: Path) -> str:
-    """What a refusal tells to do; "read" where nothing is refused. All else is a fault."""
+    """Return the remedy of a refusal; "read" where the file is read. All else is a fault."""
     try:
         verb(path)
     except BadInput as refusal:

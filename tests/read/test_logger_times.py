@@ -10,20 +10,28 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput
-from shm.read import logger_times
+from shm.read import logger_text
+from shm.read.table import Table
 from shm.values import NAN, FloatArray
 
+PATH = Path("a.csv")
 
-def refused(row: int, what: str) -> BadInput:
-    return BadInput(f"{what} in row {row}.", file=Path("a.csv"))
+
+def table(times: FloatArray, stated_hz: float = NAN, name: str = "Time [s]") -> Table:
+    """Return what is read of a logger's text with these times and one acceleration."""
+    preamble = [] if math.isnan(stated_hz) else [f"Sample rate;{stated_hz} Hz"]
+    rows = [f"{float(each)!r};{row % 7 / 8}" for row, each in enumerate(times)]
+    found = logger_text.table_in("\n".join([*preamble, f"{name};Acc [m/s2]", *rows]), PATH)
+    assert found is not None
+    return found
 
 
 def rate(seconds: FloatArray, stated_hz: float = NAN) -> float:
-    return logger_times._rate_of_coarse(seconds, stated_hz, refused)
+    return table(seconds, stated_hz).clock_rate_hz
 
 
 def whole_seconds(hz: int, seconds: int, late: int = 0) -> FloatArray:
-    """Times of a clock that counts seconds, begun `late` samples after one."""
+    """Return times of a clock that counts seconds, begun `late` samples after one."""
     return np.floor((np.arange(hz * seconds) + late) / hz)
 
 
@@ -52,42 +60,39 @@ def test_counts_that_differ_by_more_than_one_say_no_rate() -> None:
     assert rate(steady) == 50
     uneven = np.repeat(np.arange(20.0), [50, 52] * 10)
     assert math.isnan(rate(uneven))
-    assert math.isnan(rate(np.array([0.0, 0, 0, 1, 1, 1])))
+    assert math.isnan(rate(np.repeat([0.0, 1.0], 20)))
 
 
 def test_times_that_jump_or_go_back_are_refused_at_their_row() -> None:
-    back = np.array([0.0, 0, 1, 1, 0, 2])
-    with pytest.raises(BadInput, match="does not increase in row 4"):
+    back = np.repeat([0.0, 1, 0, 2], 8)
+    with pytest.raises(BadInput, match=r"line 18.*does not increase"):
         rate(back)
     jumped = whole_seconds(50, 20)
     jumped[500:] += 5
-    with pytest.raises(BadInput, match="the times are uneven in row"):
+    with pytest.raises(BadInput, match=r"line 501.*the times are uneven"):
         rate(jumped)
 
 
 @pytest.mark.parametrize(
-    ("first", "step", "start", "factor"),
+    ("first", "step", "hz"),
     [
-        (1_777_636_800.0, 0.01, datetime(2026, 5, 1, 12, tzinfo=UTC), 1.0),
-        (1_777_636_800e3, 10.0, datetime(2026, 5, 1, 12, tzinfo=UTC), 1e-3),
-        (1_777_636_800e6, 1e4, datetime(2026, 5, 1, 12, tzinfo=UTC), 1e-6),
-        (46143.5, 0.01 / 86400, datetime(2026, 5, 1, 12, tzinfo=UTC), 86400.0),
+        (1_777_636_800.0, 0.01, 100.0),
+        (1_777_636_800e3, 10.0, 100.0),
+        (1_777_636_800e6, 1e4, 100.0),
+        (46143.5, 0.25 / 86400, 4.0),
     ],
 )
-def test_times_since_an_epoch_say_the_start(
-    first: float, step: float, start: datetime, factor: float
-) -> None:
-    values = first + step * np.arange(5)
-    found = logger_times._since_epoch(values)
-    assert found is not None
-    assert abs((found[1] - start).total_seconds()) < 1e-3
-    np.testing.assert_allclose(found[0], factor * (values - values[0]), rtol=1e-12)
+def test_times_since_an_epoch_say_the_start(first: float, step: float, hz: float) -> None:
+    found = table(first + step * np.arange(9), name="Time")
+    assert found.clock_rate_hz == pytest.approx(hz, rel=1e-5)
+    start = datetime.fromisoformat(found.entries["time"].text)
+    assert abs((start - datetime(2026, 5, 1, 12, tzinfo=UTC)).total_seconds()) < 1e-3
 
 
 @pytest.mark.parametrize("first", [0.0, 29_000.0, 61_000.0, 1e8])
 def test_other_numbers_are_no_epoch(first: float) -> None:
-    assert logger_times._since_epoch(first + 0.01 / 86400 * np.arange(5)) is None
-    assert logger_times._since_epoch(45_000 + 2.0 * np.arange(5)) is None
+    assert "time" not in table(first + 0.25 * np.arange(9), name="Time").entries
+    assert "time" not in table(45_000 + 2.0 * np.arange(9), name="Time").entries
 
 
 @pytest.mark.parametrize(
@@ -101,8 +106,13 @@ def test_the_unit_of_times_follows_from_the_rate_that_is_said(
     hz: float, said: float, factor: float | None
 ) -> None:
     """A unit of 1/1000 s makes a rate of 0.2 per unit one of 200 Hz."""
-    assert logger_times._factor(np.arange(100) / hz, said) == factor
+    found = table(np.arange(100) / hz, said, name="Time")
+    if factor is None:
+        assert math.isnan(found.clock_rate_hz)
+        assert "the unit of Time is not said" in found.remarks[0]
+    else:
+        assert found.clock_rate_hz == pytest.approx(hz / factor)
 
 
 def test_times_that_stand_still_have_no_unit() -> None:
-    assert logger_times._factor(np.zeros(5), 200.0) is None
+    assert math.isnan(table(np.zeros(40), 200.0, name="Time").clock_rate_hz)

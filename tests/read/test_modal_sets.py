@@ -26,7 +26,7 @@ NODES = {
 
 
 def a_set(**changes: Any) -> dict[str, Any]:
-    """A normal mode of 5 Hz that moves along x most, along y half as much against it."""
+    """Return a normal mode of 5 Hz that moves along x most, along y half as much against it."""
     return {
         "type": 55,
         "id1": " ACME modal 3 ",

@@ -42,7 +42,7 @@ def tdms(folder: Path, channels: dict[str, tuple[Any, dict[str, Any]]], **root: 
 
 
 def version_7_3(folder: Path, arrays: dict[str, Any]) -> Path:
-    """A file as MATLAB's save -v7.3 lays it out: texts as codes, classes as attributes."""
+    """Return a file as MATLAB's save -v7.3 lays it out: texts as codes, classes as attributes."""
     path = folder / "test.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, value in arrays.items():

@@ -86,7 +86,7 @@ def test_a_real_roving_hammer_test_is_read_and_survives_as_a_test_of_several_fil
 
 
 def roving_beam(folder: Path, into: Path) -> list[Path]:
-    """The nine files of the crew, each with a sidecar that says where was hit."""
+    """Return the nine files of the crew, each with a sidecar that says where was hit."""
     paths = []
     for place in HAMMER_X_M:
         name = f"Hxysv0000{len(paths) + 1}.txt.gz"

@@ -212,7 +212,7 @@ def test_a_compressed_matlab_variable_that_unpacks_too_far_is_refused(tmp_path: 
 
 
 def claim_less_in_packed(path: Path, said: bytes, claimed: bytes) -> None:
-    """Changes the shape of the last variable of a file, within what is compressed."""
+    """Change the shape of the last variable of a file, within what is compressed."""
     head, *_, element = path.read_bytes()[:128], *elements_of(path.read_bytes())
     whole = zlib.decompress(element.packed)
     assert whole.count(said) == 1

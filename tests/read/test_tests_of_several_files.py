@@ -25,7 +25,7 @@ SUFFIXES = (".csv", ".uff", ".h5", ".mat", ".tdms", ".npz")
 
 @pytest.fixture
 def files(recording: Recording, tmp_path: Path) -> list[Path]:
-    """A roving hammer: one file a point, each in another format, two with a sidecar."""
+    """Return a roving hammer: one file a point, each in another format, two with a sidecar."""
     folder = tmp_path / "test"
     folder.mkdir()
     paths = [folder / f"point_{i}{suffix}" for i, suffix in enumerate(SUFFIXES, start=5)]
@@ -263,7 +263,7 @@ def test_a_damaged_archive_gives_whole_records_or_a_refusal(
 
 
 def channels_or_refused(archive: Path) -> int:
-    """The channels of each record, 2 for a refusal with a remedy too."""
+    """Return the channels of each record, 2 for a refusal with a remedy too."""
     try:
         (channels,) = {len(r.channels) for r in read_test(archive) if isinstance(r, Recording)}
     except BadInput as refusal:

@@ -22,7 +22,7 @@ POINTS = 64
 
 
 def time_set(unit: str, code: int, node: int, direction: int, **more: Any) -> dict[str, Any]:
-    """A time history as other software writes it."""
+    """Return a time history as other software writes it."""
     values = np.random.default_rng(node).standard_normal(POINTS)
     return {
         "type": 58, "func_type": 1, "rsp_node": node, "rsp_dir": direction, "ref_node": 0,
@@ -69,7 +69,7 @@ def uff(folder: Path, *sets: dict[str, Any], name: str = "test.uff") -> Path:
 
 
 def binary_set(values: FloatArray, code: int, unit: str, node: int, order: str = "<") -> bytes:
-    """A 58b data set in single precision, as analysers write it."""
+    """Return a 58b data set in single precision, as analysers write it."""
     data = struct.pack(f"{order}{len(values)}f", *values)
     head = [
         "    -1",

@@ -11,7 +11,7 @@ import pytest
 from shm.models import class_units
 from shm.report.contents import HangerReport, summary_of, trend_row
 from shm.report.figures import specification
-from shm.report.figures.specification import Illustration, Member, illustration
+from shm.report.figures.specification import FigureSpec, Illustration, illustration
 from shm.values import (
     Alert,
     Drift,
@@ -123,7 +123,7 @@ def season(hanger: Hanger) -> HangerReport:
 
 @pytest.fixture(scope="session")
 def bare(hanger: Hanger) -> HangerReport:
-    """A first test of which hardly anything is known: one mode, no time, no temperature."""
+    """Return a first test of which hardly anything is known: one mode, no time, no temperature."""
     test = ModalTest("only", (Mode("transverse", 1, 5.82),), 3)
     posterior = replace(
         make_posterior("only", "beam1", 711e3, 3),
@@ -152,10 +152,10 @@ def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The forms of one report share their figures, instead of drawing them anew."""
+    """Return the forms of one report share their figures, instead of drawing them anew."""
     kept: dict[tuple[int, str], tuple[object, Illustration | None]] = {}
 
-    def shared(of: Member[object], data: object) -> Illustration | None:
+    def shared(of: FigureSpec[object], data: object) -> Illustration | None:
         key = (id(getattr(data, "sheet", data)), of.name)
         if key not in kept:
             kept[key] = (data, illustration(of, data))

@@ -37,7 +37,7 @@ def make_cause(effect: str, probability: float, at: str = "everywhere", **more: 
 
 
 def make_residuals(tests: int = 5, orders: int = 8, seed: int = 4) -> tuple[Residual, ...]:
-    """The pattern of a point mass at 3.4 m, with noise."""
+    """Return the pattern of a point mass at 3.4 m, with noise."""
     rng, found = np.random.default_rng(seed), []
     for plane in PLANES:
         for order in range(1, orders + 1):

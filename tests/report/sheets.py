@@ -95,7 +95,7 @@ def make_recording(
     modes: Sequence[Mode], points: Sequence[ResponsePoint], hits: int, slot_s: float = SLOT_S,
     rate_hz: float = RATE_HZ,
 ) -> Recording:  # fmt: skip
-    """A hit a slot, half a second into it; none at all where `hits` is 0."""
+    """Return a hit a slot, half a second into it; none at all where `hits` is 0."""
     slot = round(slot_s * rate_hz)
     samples = max(hits, 3) * slot
     time_s = np.arange(slot) / rate_hz
@@ -150,7 +150,7 @@ def make_sheet(
     places_m: Sequence[float] = (2.5, 4.4),
     orders: int = 6,
 ) -> ModalTestReport:
-    """A test of both planes with biaxial sensors and every part of its identification."""
+    """Return a test of both planes with biaxial sensors and every part of its identification."""
     modes, points = make_modes(orders, places_m), make_points(places_m)
     response = make_response(modes, points, coherent=hits > 1)
     left = tuple(Dropped("hits", 1, reason) for reason in (dropped or {}).values())

@@ -140,7 +140,7 @@ def squeezed(text: str) -> str:
 
 
 def missing(text: str) -> list[str]:
-    """The values of the bar that a text does not have."""
+    """Return the values of the bar that a text does not have."""
     return [value for _, value in ROWS if squeezed(value) not in squeezed(text)]
 
 

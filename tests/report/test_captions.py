@@ -12,7 +12,7 @@ from typing import Any
 
 from shm.report.contents import HangerReport
 from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST
-from shm.report.figures.modal_test_response import Shown
+from shm.report.figures.modal_test_response import ResponseCurves
 from tests.report.conftest import bare, hanger, season
 from tests.report.diagnoses import sheet
 from tests.report.test_modal_test_figures import CASES as SHEETS
@@ -22,7 +22,7 @@ KEPT = Path(__file__).parent / "data" / "captions.txt"
 
 def written(season: HangerReport, bare: HangerReport) -> str:
     """Caption and description of each figure of each report, for data that have it."""
-    warned, ambient = (Shown.of(SHEETS[case]()) for case in ("warned", "ambient"))
+    warned, ambient = (ResponseCurves.of(SHEETS[case]()) for case in ("warned", "ambient"))
     shown: list[tuple[str, Any, Any]] = [
         *(("test", each, warned) for each in OF_MODAL_TEST),
         *(("ambient test", each, ambient) for each in OF_MODAL_TEST),
@@ -53,7 +53,7 @@ def test_the_words_beside_every_figure_are_those_that_were_agreed(
 
 
 def _plain(fixture: Any) -> Any:
-    """What a fixture calls."""
+    """Return the function that a fixture calls."""
     return getattr(fixture, "__wrapped__", None) or fixture._fixture_function
 
 

@@ -200,7 +200,7 @@ def test_directions_are_said_in_words_where_they_are_sure(
 
 
 def estimates(effect: str, at: str) -> Cause:
-    """A cause with each parameter of the effect in the middle of its prior."""
+    """Return a cause with each parameter of the effect in the middle of its prior."""
     variant = next(v for v in EFFECTS[effect].variants(HANGER, RICH) if v.at == at)
     found = []
     for parameter in EFFECTS[effect].parameters(HANGER, variant):

@@ -70,7 +70,7 @@ def test_several_forces_have_one_unit_by_the_largest() -> None:
 
 
 def of_size(season: HangerReport, tension_n: float) -> HangerReport:
-    """The season of a hanger that carries `tension_n` at its latest test, by its selected class."""
+    """Return the season with `tension_n` at the latest test, by its selected class."""
     factor = tension_n / season.trend[-1].tension_n.mean
 
     def scaled(posterior: Posterior) -> Posterior:

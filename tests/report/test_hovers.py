@@ -13,7 +13,7 @@ import pytest
 from shm.report.contents import HangerReport
 from shm.report.figures import gap_before_and_after, gap_causes, gap_map
 from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST
-from shm.report.figures.modal_test_response import Shown
+from shm.report.figures.modal_test_response import ResponseCurves
 from shm.report.figures.specification import Panel, Points, Rule, Specification
 from tests.report.diagnoses import CASES, sheet
 from tests.report.test_modal_test_figures import CASES as SHEETS
@@ -27,7 +27,7 @@ def specifications(season: HangerReport) -> Iterator[tuple[str, Specification]]:
     """Of every case of every report that a screen draws, as it draws them."""
     drawn: list[tuple[str, Any]] = []
     for case, make in SHEETS.items():
-        shown = Shown.of(make())
+        shown = ResponseCurves.of(make())
         drawn += [(f"{case}: {member.name}", member.draw(shown)) for member in OF_MODAL_TEST]
     for case in CASES:
         made = sheet(case)
@@ -53,7 +53,7 @@ def told(season: HangerReport) -> list[Told]:
 
 
 def labels(figure: Specification, panel: Panel) -> dict[str, str]:
-    """What the axes of a panel are called, those that it has from another one too."""
+    """Return the labels of a panel's axes, shared ones too."""
     row = next(k for k, panels in enumerate(figure.rows) if panel in panels)
     below = [each for panels in figure.rows[row:] for each in panels if each.x and each.x.label]
     own = panel.x.label if panel.x else ""
@@ -65,7 +65,7 @@ def labels(figure: Specification, panel: Panel) -> dict[str, str]:
 
 
 def rendered(mark: Any, place: int) -> str:
-    """What is told over one place of a mark, as plotly fills a template."""
+    """Return the hover text at one place of a mark, as plotly fills a template."""
     found = {"x": mark.at, "y": mark.at} if isinstance(mark, Rule) else _values(mark, place)
     if len(mark.texts):
         found["text"] = mark.texts[place]
@@ -162,7 +162,7 @@ def _is(number: str, value: float) -> bool:
 
 
 def said(told: list[Told], figure: str) -> list[str]:
-    """What each mark of a figure tells of its first place, each once."""
+    """Return the hover text of each mark's first place, each once."""
     lines = [rendered(mark, 0) for name, _, _, mark in told if name == figure]
     return list(dict.fromkeys(lines))
 

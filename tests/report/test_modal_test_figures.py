@@ -17,7 +17,7 @@ from shm.report.contents import ModalTestReport
 from shm.report.figures import style
 from shm.report.figures.every_figure import OF_MODAL_TEST
 from shm.report.figures.every_figure import modal_test_figures as report_test_figures
-from shm.report.figures.modal_test_response import Shown
+from shm.report.figures.modal_test_response import ResponseCurves
 from shm.report.figures.specification import Illustration
 from shm.report.figures.specification import drawn as members_drawn
 from shm.report.figures.style import PALETTE
@@ -75,7 +75,7 @@ def drawn() -> Drawn:
 def alone(name: str, sheet: ModalTestReport) -> Illustration:
     """One figure by itself: all of them take a second."""
     (item,) = members_drawn(
-        [member for member in OF_MODAL_TEST if member.name == name], Shown.of(sheet)
+        [member for member in OF_MODAL_TEST if member.name == name], ResponseCurves.of(sheet)
     )
     return item
 
@@ -221,8 +221,11 @@ def test_hits_are_laid_over_each_other_dropped_ones_in_red(drawn: Drawn) -> None
 
 
 def test_the_force_spectrum_reaches_as_far_as_its_pulse_allows() -> None:
-    """A pulse of samples 1/2, 1, 1/2 has the spectrum (1 + cos(2 pi f / rate))/2, a tenth of it
-    where the cosine is -0.8: at 0.398 of the sampling rate."""
+    """Compare with a pulse of samples 1/2, 1, 1/2.
+
+    Its spectrum is (1 + cos(2 pi f / rate))/2, a tenth of it where the cosine is -0.8: at 0.398
+    of the sampling rate.
+    """
     item = alone("hits", make_sheet())
     found = re.search(r"A tenth of the force is left at (\d+) Hz", item.alt)
     assert found is not None

@@ -50,7 +50,7 @@ def latest(mistaken: tuple[RepeatedMistake, ...] = (), **of_change: Any) -> Watc
 
 
 def row(*shares: float, families: str = "") -> str:
-    """What is said of the third of hangers with such tensions, over the nominal one."""
+    """Return the warning about the third of hangers with such relative tensions."""
     families = families or "a" * len(shares)
     hangers = [replace(HANGER_3, id=n, family=f) for n, f in enumerate(families)]
     return standing_out(hangers[2], hangers, {n: tension(each) for n, each in enumerate(shares)})

@@ -19,7 +19,7 @@ from shm.report.diagnosis_report import diagnosis_paper
 from shm.report.hanger_report import hanger_paper
 from shm.report.hanger_status import Status
 from shm.report.modal_test_report import modal_test_paper
-from shm.report.paper import Paper, Part, Table
+from shm.report.paper import Paper, Section, Table
 from shm.watch.neighbours import HangerShift, bridge_pattern
 from tests.helpers.nouns import a_summary
 from tests.helpers.pdf_words import Pdf
@@ -86,7 +86,7 @@ def texts(paper: Paper, renderer: str) -> Iterator[str]:
     yield paper.foot
 
 
-def _texts_of_part(part: Part, renderer: str, is_first: bool) -> Iterator[str]:
+def _texts_of_part(part: Section, renderer: str, is_first: bool) -> Iterator[str]:
     figures = () if renderer == "as_text" else part.figures()
     told = (*part.paragraphs, part.full_summary, *part.facts, *part.remarks, *figures, *part.tables)
     if not any(told):
@@ -123,7 +123,7 @@ def squeezed(text: str) -> str:
 
 
 def first_missing(paper: Paper, renderer: str, found: str) -> str | None:
-    """The first text of the paper that does not follow those before it.
+    """Return the first text of the paper that does not follow those before it.
 
     A PDF repeats headings and lines over pages, even amid a paragraph: there each word counts.
     """
@@ -196,7 +196,7 @@ def test_a_terminal_says_how_many_rows_it_leaves_out() -> None:
 
 def test_a_part_that_has_nothing_is_not_headed() -> None:
     paper = replace(_paper(Table("t", ("a",), (("1",),))), parts=[
-        Part("In short", summary="All."), Part("Figures"), Part("Numbers", tables=()),
+        Section("In short", summary="All."), Section("Figures"), Section("Numbers", tables=()),
     ])  # fmt: skip
     assert "Figures" not in as_text(paper)
     assert "Figures" not in as_html(paper)
@@ -204,7 +204,7 @@ def test_a_part_that_has_nothing_is_not_headed() -> None:
 
 
 def _paper(table: Table) -> Paper:
-    return Paper("Title", "", "first", [Part("In short", tables=[table])], "The end.")
+    return Paper("Title", "", "first", [Section("In short", tables=[table])], "The end.")
 
 
 @pytest.mark.parametrize("module", ["paper", *RENDERERS])

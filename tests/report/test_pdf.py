@@ -12,7 +12,7 @@ from shm.report.contents import HangerReport
 from shm.report.figures import style
 from shm.report.hanger_report import hanger_paper
 from shm.report.hanger_tables import alerts
-from shm.report.paper import Paper, Part, Table
+from shm.report.paper import Paper, Section, Table
 from tests.helpers.nouns import with_now
 from tests.helpers.painting import paint_blank
 from tests.helpers.pdf_words import Pdf
@@ -105,7 +105,7 @@ def test_a_long_table_goes_on_under_repeated_headings(
         for table in part.tables
         if table.title.startswith("Tests")
     ]
-    paper = Paper("Long", "", "first", [Part("In short", tables=[history])], "That is all.")
+    paper = Paper("Long", "", "first", [Section("In short", tables=[history])], "That is all.")
     pages = Pdf.parse(as_pdf(paper)).pages
     with_heading = [page for page in pages if "credible interval, kN" in page and "beam2" in page]
     assert len([page for page in with_heading if "t004" in page]) >= 2
@@ -115,7 +115,7 @@ def test_a_long_table_goes_on_under_repeated_headings(
 def test_a_cell_longer_than_a_page_is_set(bare: HangerReport, season: HangerReport) -> None:
     alert = replace(season.alerts[0], message="The tension fell. " * 700)
     table = alerts(replace(bare, alerts=(alert,)))
-    paper = Paper("Long", "", "first", [Part("In short", tables=[table])], "That is all.")
+    paper = Paper("Long", "", "first", [Section("In short", tables=[table])], "That is all.")
     assert Pdf.parse(as_pdf(paper)).words.count("fell.") == 700
 
 
@@ -145,7 +145,7 @@ def test_a_table_of_one_column_is_set(cell: str, marks: tuple[str, ...]) -> None
     table = Table("Alone", ("what",), ((cell,),), marks=marks)
     (only,) = widths(table, 300.0, 8.0, 6.0)
     assert 0 < only <= 300
-    paper = Paper("One column", "", "first", [Part("In short", tables=[table])], "That is all.")
+    paper = Paper("One column", "", "first", [Section("In short", tables=[table])], "That is all.")
     told = Pdf.parse(as_pdf(paper)).words
     assert "".join(cell.split()) in "".join(told.split())
 

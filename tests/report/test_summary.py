@@ -88,8 +88,10 @@ def test_a_rise_of_stiffness_is_told_as_a_factor(season: HangerReport) -> None:
 
 
 def test_the_change_without_a_drift_comes_from_both_posteriors(season: HangerReport) -> None:
-    """Two independent normal tensions, ratio 650/700, sd of each 0.012 * 711 kN: the interval of
-    the relative change has half width 1.645 * sqrt(1 + r^2) * 8.53/700."""
+    """Compare with two independent normal tensions, ratio 650/700, sd of each 0.012 * 711 kN.
+
+    The interval of the relative change has half width 1.645 * sqrt(1 + r^2) * 8.53/700.
+    """
     change = with_now(season, drifts=()).now.change
     assert change is not None
     ratio = 650 / 700

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.helpers.makefiles import dry_run, make_targets
 
 ROOT = Path(__file__).resolve().parents[2]
 BENCHMARKS = ROOT / "tests" / "benchmarks"
-AT_ROOT = {"demo", "demo-live", "test", "lint", "docs", "bench", "ablation", "lock", "clean"}
+AT_ROOT = {
+    "demo", "demo-live", "test", "lint", "docs", "wheel", "image", "bench", "ablation", "lock",
+    "clean",
+}  # fmt: skip
 
 
 def test_makefile_targets_at_root() -> None:
@@ -55,3 +60,13 @@ def test_long_test_files_exist() -> None:
     named = [word for word in shown if word.startswith("tests/") and word.endswith(".py")]
     assert named
     assert [name for name in named if not (ROOT / name).is_file()] == []
+
+
+def test_make_image_is_that_of_compose() -> None:
+    shown = dry_run(ROOT, "image", "CONTAINER=podman")
+    (tag,) = re.findall(r"--tag (\S+) ", shown)
+    compose = yaml.safe_load((ROOT / "config/container/compose.yaml").read_text())
+    assert compose["services"]["daemon"]["image"] == tag
+    (file,) = re.findall(r"--file (\S+)", shown)
+    assert (ROOT / file).is_file()
+    assert compose["services"]["daemon"]["build"]["dockerfile"] == file

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
 
-from shm.store import Adoption, HeldTest, IdentifiedTest, Judged, Lineage, Stage, Store
+from shm.store import Adoption, HeldTest, IdentifiedTest, Judgement, Lineage, Stage, Store
 from shm.store.rows import Role
 from shm.store.tables import SCHEMA
 from shm.values import Doubt, Fingerprint, Selection
@@ -93,7 +93,7 @@ def _hold(store: Store) -> None:
         held = HeldTest(0, f"t{number}", (doubt,), -0.1)
         notice = replace(an_alert("", f"t{number}"), hanger=5, drifts=(), kinds=("held",))
         print_ = Fingerprint(f"{number:064x}", np.ones((1, 256)) / 16)
-        judged = Judged(None, print_, (held,), notice, ["mail"])
+        judged = Judgement(None, print_, (held,), notice, ["mail"])
         found = [IdentifiedTest(a_test(f"t{number}", number, hanger=5))]
         store.tests.save(recording.id, found, LINEAGE, NOW, judged)
     later = NOW + timedelta(days=9)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shm.store import IdentifiedTest, Judged, Lineage, Outcome, Stage, Store
+from shm.store import IdentifiedTest, Judgement, Lineage, Outcome, Stage, Store
 from shm.store.queries.history import list_events, list_former_tests, list_steps
 from shm.store.queries.recordings import (
     is_waiting,
@@ -17,7 +17,7 @@ REASON = {"message": "no sampling rate.", "remedy": "Give it.", "sha256": "1"}
 def test_the_same_bytes_with_another_sidecar_are_done_again_with_that(store: Store) -> None:
     first = store.recordings.receive(a_file(1, sidecar_as="11/1.toml"), NOW).recording.id
     found = [IdentifiedTest(a_test())]
-    store.tests.save(first, found, LINEAGE, NOW, Judged("11/1.toml"))
+    store.tests.save(first, found, LINEAGE, NOW, Judgement("11/1.toml"))
     described = a_file(1, arrival="other", sidecar_as="22/2.toml")
     again = store.recordings.receive(described, NOW)
     assert again.outcome is Outcome.REDESCRIBED
@@ -27,7 +27,7 @@ def test_the_same_bytes_with_another_sidecar_are_done_again_with_that(store: Sto
     assert len(list_former_tests(store, first)) == 1
     assert "another sidecar" in list_events(store, "redescribed")[0].message
     assert store.recordings.receive(described, NOW).outcome is Outcome.RESUMED
-    late = Judged("11/1.toml")  # what was begun with the sidecar of before
+    late = Judgement("11/1.toml")  # what was begun with the sidecar of before
     store.tests.save(first, found, LINEAGE, NOW, late)
     assert store.recordings.get(first).stage is Stage.RECEIVED
 

@@ -7,7 +7,7 @@ from datetime import timedelta
 import pytest
 
 from shm.errors import NothingThere, UsageError
-from shm.store import Baseline, IdentifiedTest, KeptWatch, Lineage, Stage, Store, StoredTest
+from shm.store import Baseline, IdentifiedTest, Lineage, Stage, Store, StoredTest, WatchCheckpoint
 from shm.store.queries.history import list_events, list_former_tests
 from shm.store.queries.recordings import find_recording
 from shm.store.queries.tests import list_baseline_tests, list_waiting_tests
@@ -39,7 +39,7 @@ def watched(store: Store, test: StoredTest, baseline: Baseline, seed: int = 1) -
     name = test.test.id
     lineage = OLD if seed == 1 else NEW
     store.posteriors.save(test, a_posterior("beam1", (name,), seed=seed), lineage, NOW)
-    state = KeptWatch("a key", test.time, b"state")
+    state = WatchCheckpoint("a key", test.time, b"state")
     store.watch.save(test, baseline, a_watched_test(name), None, [], NOW, state)
 
 
@@ -111,7 +111,7 @@ def test_what_the_watch_kept_is_dropped_with_a_test_that_is_done_again(store: St
     baseline = with_baseline(store)
     second = identified(store, 2)
     watched(store, second, baseline)
-    assert find_watch_state(store, baseline) == KeptWatch("a key", second.time, b"state")
+    assert find_watch_state(store, baseline) == WatchCheckpoint("a key", second.time, b"state")
     store.recordings.rerun(second.recording_id, Stage.WATCHED, LATER)
     assert find_watch_state(store, baseline) is None
 

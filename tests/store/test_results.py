@@ -9,7 +9,7 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
-from shm.store import IdentifiedTest, Judged, Lineage, Stage, Store, StoredTest
+from shm.store import IdentifiedTest, Judgement, Lineage, Stage, Store, StoredTest
 from shm.store.blobs import unpack
 from shm.store.queries import judging
 from shm.store.queries.hangers import list_selected_models
@@ -163,7 +163,7 @@ def test_samples_are_compared_with_the_earliest_first_and_always_with_the_same_n
     for number, print_ in enumerate(prints, 1):
         recording = store.recordings.receive(a_file(number), NOW).recording
         items = [IdentifiedTest(a_test(f"t{number}", days=number))]
-        store.tests.save(recording.id, items, LINEAGE, NOW, Judged(None, print_))
+        store.tests.save(recording.id, items, LINEAGE, NOW, Judgement(None, print_))
     known = [each.fingerprint.digest for each in list_known_samples(store, 5, 3, prints[4])]
     assert known == [each.digest for each in prints[:4]]
     monkeypatch.setattr(judging, "_MOST_COMPARED", 2)

@@ -10,7 +10,7 @@ import pytest
 from shm.errors import StoreError
 from shm.store import Reconciled, Store
 from shm.store.queries.streams import (
-    KeptStreamWatch,
+    StreamWatchCheckpoint,
     find_first_unpooled,
     list_pooled,
     list_stream_events,
@@ -107,13 +107,13 @@ def test_the_watch_goes_back_to_a_day_before(file_store: Store) -> None:
     for day in range(3):
         streams.save_pooled(a_reading(24 * day), b"day %d" % day)
     end = [NOW + timedelta(days=day, hours=1) for day in range(3)]
-    assert load_stream_watch(file_store, 3) == KeptStreamWatch(end[2], b"day 2")
-    assert load_stream_watch(file_store, 3, end[1]) == KeptStreamWatch(end[1], b"day 1")
-    assert load_stream_watch(file_store, 3, end[1] - timedelta(seconds=1)) == KeptStreamWatch(
+    assert load_stream_watch(file_store, 3) == StreamWatchCheckpoint(end[2], b"day 2")
+    assert load_stream_watch(file_store, 3, end[1]) == StreamWatchCheckpoint(end[1], b"day 1")
+    assert load_stream_watch(file_store, 3, end[1] - timedelta(seconds=1)) == StreamWatchCheckpoint(
         end[0], b"day 0"
     )
     assert load_stream_watch(file_store, 3, end[0] - timedelta(seconds=1)) is None
     assert load_stream_watch(file_store, 4, end[2]) is None
     streams.go_back(3, end[1], b"anew")
-    assert load_stream_watch(file_store, 3) == KeptStreamWatch(end[1], b"anew")
-    assert load_stream_watch(file_store, 3, end[2]) == KeptStreamWatch(end[1], b"day 1")
+    assert load_stream_watch(file_store, 3) == StreamWatchCheckpoint(end[1], b"anew")
+    assert load_stream_watch(file_store, 3, end[2]) == StreamWatchCheckpoint(end[1], b"day 1")

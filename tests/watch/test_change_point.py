@@ -18,7 +18,6 @@ from shm.watch.change_point import (
     LOG_SHARES,
     RAMP,
     SIZES,
-    STEP,
     Evidence,
     evidence_of,
     sums_of,
@@ -153,56 +152,3 @@ def test_every_mass_is_that_of_the_dense_gaussian_likelihood(
         waited = math.log(example.years[beginning] - example.years[beginning - 1])
         prior = chosen.log_prior + LOG_SHARES[size] - math.log(1 + chosen.may_ramp)
         assert mass == pytest.approx(dense + waited + prior, abs=1e-5)
-
-
-def test_the_size_of_a_change_is_that_of_the_dense_gaussian_posterior() -> None:
-    example = small_world()
-    seen = example.values.ravel()[example.measured]
-
-    for index in [(2, 0, STEP, 0, 0), (3, 1, RAMP, 0, 1), (5, 1, STEP, 1, 1)]:
-        at, k, kind, d, size = index
-        change = example.of_change(int(example.evidence.beginnings[at]), kind, d, size)
-        gain = change.T @ np.linalg.inv(example.covariance(k) + change @ change.T)
-        unit = SIZES[size] * example.directions[d].factor
-        done = example.evidence.progress(at) if kind == RAMP else 1.0
-        ((mean, root),) = example.evidence.changes_at([index])
-        left = np.eye(change.shape[1]) - gain @ change
-        assert mean == pytest.approx(done * unit @ gain @ seen, abs=1e-6)
-        assert root @ root.T == pytest.approx(done**2 * unit @ left @ unit.T, abs=1e-6)
-
-
-YEARS = np.cumsum(np.random.default_rng(9).uniform(0.02, 0.15, 14))
-WATCHED_YEARS = float(YEARS[-1] - YEARS[BASELINE - 1])
-SCATTERS = np.array([0.5, 1.5])
-
-
-def unchanged(seed: int, k: int) -> Example:
-    """Nothing happens, by the second or the first scatter; changes are looked for that no one test
-    could show: the statistic's mean is then not that of a few large values."""
-    rng = np.random.default_rng(seed)
-    tests, n = len(YEARS), 2
-    columns = np.tile(np.array([[1.0, 0, 0.5], [0, 1.0, 0.4]]), (tests, 1, 1))
-    levels = 3.0 * rng.standard_normal(n)
-    values = levels + rng.standard_normal((tests, n)) * math.sqrt(0.5 + SCATTERS[k])
-    return Example(
-        layout=Layout(n, 1, np.array([3.0, 3.0, 0.2])),
-        years=YEARS,
-        columns=columns,
-        values=values,
-        variances=np.full((tests, n), 0.5),
-        scatter=np.tile(SCATTERS[:, None, None] * np.eye(n), (tests, 1, 1, 1)),
-        directions=(direction([[0.0], [0.0], [0.3]]), direction([[0.15], [0.0], [0.0]])),
-    )
-
-
-@pytest.mark.parametrize("most", [60, 6])
-def test_without_change_the_statistic_grows_by_a_year_in_a_year(most: int) -> None:
-    # The prior of scatters is even, that of all directions 0.8: the mean is 0.8 of the time. Its
-    # standard error follows from the sample; at 300 hangers it is 0.3 % of the time.
-    found = np.array([unchanged(seed, seed % 2).thinned(most).log_statistic for seed in range(300)])
-    statistic = np.exp(found)
-    error = statistic.std() / math.sqrt(len(statistic))
-
-    assert error < 0.01 * WATCHED_YEARS
-    assert statistic.mean() == pytest.approx(0.8 * WATCHED_YEARS, abs=3 * error)
-    assert statistic.std() > 0.03 * WATCHED_YEARS

@@ -13,8 +13,8 @@ import pytest
 from shm.errors import BadInput
 from shm.values import Hanger, ModalTest, Mode
 from shm.watch import WatchedFrequencies, WatchOptions, watch_frequencies
-from shm.watch.frequencies import FrequencyReader, frost_of
-from shm.watch.frequency_watch import FrequencyWatch, measured_levels, watch_newest_frequencies
+from shm.watch.frequencies import FrequencyReader
+from shm.watch.frequency_watch import watch_newest_frequencies
 
 START = datetime(2026, 5, 1, 12, tzinfo=UTC)
 MODES = (("transverse", 1, 2.0), ("longitudinal", 1, 2.12), ("transverse", 2, 4.1))
@@ -136,24 +136,6 @@ def test_its_urgency_names_no_traffic_and_no_hammer() -> None:
 # ---------------------------------------------------------------- reading
 
 
-def test_a_pool_is_the_median_of_its_tests_at_their_mean_temperature() -> None:
-    reader = FrequencyReader([one_test(0, noise=0.0)])
-    shifts = {1: 0.001, 2: 0.002, 3: 0.05}
-    pool = [
-        one_test(day, moved=lambda d, _, mode: shifts[d], warmth_c=float(day), noise=0.0)
-        for day in shifts
-    ]
-
-    found = reader.reading(pool, START)
-
-    assert found.modes is not None
-    assert found.modes.values == pytest.approx([0.002] * 3, abs=1e-9)
-    assert found.temperature_c == 2.0
-    alone = reader.reading(pool[:1], START).modes
-    assert alone is not None
-    assert (found.modes.variances < alone.variances).all()
-
-
 def test_two_close_modes_that_were_exchanged_are_put_right() -> None:
     reader = FrequencyReader([one_test(0, noise=0.0)])
     first, second, third = one_test(1, noise=0.0).modes
@@ -192,14 +174,6 @@ def test_a_true_loss_of_one_mode_is_no_exchange() -> None:
     assert sorted(found.values) == pytest.approx([-0.05, 0.0, 0.0], abs=1e-9)
 
 
-def test_frost_counts_below_zero_alone() -> None:
-    found = frost_of(np.array([20.0, -10.0, math.nan]), 1.5)
-
-    assert found.kelvin[0] == pytest.approx(0.0, abs=1e-6)
-    assert found.kelvin[1] == pytest.approx(-10.0, abs=1e-6)
-    assert found.sd[0] < 1e-6 < found.sd[1] < found.sd[2]
-
-
 def test_first_tests_without_modes_are_refused() -> None:
     with pytest.raises(BadInput, match="no mode"):
         FrequencyReader([ModalTest("x", ())])
@@ -210,14 +184,6 @@ def test_tests_need_times_and_as_many_as_the_baseline() -> None:
         watch([ModalTest("x", one_test(0).modes)], baseline=1)
     with pytest.raises(BadInput, match="fewer"):
         watch([one_test(0)], baseline=2)
-
-
-def test_what_is_kept_of_them_has_no_tension() -> None:
-    found = measured_levels([one_test(0, noise=0.0)], seed=1)
-
-    assert dict(zip(found.names, found.samples[0], strict=True)) == pytest.approx(
-        {f"frequency {plane} {order}": hz for plane, order, hz in MODES}
-    )
 
 
 # ---------------------------------------------------------------- going on
@@ -250,12 +216,3 @@ def test_watch_newest_frequencies_begins_anew_with_another_baseline() -> None:
     assert one is not None
     again = watch_newest_frequencies(tests[:20], tests[31:], hanger, WatchOptions(), one.kept)
     assert again is None
-
-
-def test_an_older_test_than_the_last_is_refused() -> None:
-    tests = dated(daily(range(40)))
-    watching = FrequencyWatch(tests[:30], Hanger.without_model(9), WatchOptions())
-    now, _ = watching.after(watching.begin(), tests[35])
-
-    with pytest.raises(BadInput, match="later"):
-        watching.after(now, tests[34])

@@ -7,11 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from shm.errors import BadInput
 from shm.models import described
-from shm.models.base import Conditions
 from shm.values import (
     PLANES,
     AddedMass,
@@ -23,9 +21,7 @@ from shm.watch.quantities import coordinate_of
 from shm.watch.readings import Reader
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import (
-    ALLOWANCE,
     EVERYTHING,
-    SD,
     WHEN,
     common_of,
     frequencies,
@@ -34,8 +30,6 @@ from tests.helpers.modelled_tests import (
 )
 
 SPRUNG = (1.1, 0.97, 7.0, 7.6, 8.6, 6.4)
-STRING = replace(HANGER_3, second_moment_m4=1e-9 * HANGER_3.second_moment_m4)
-"""A bar that is all tension: frequencies go as its root."""
 
 
 @pytest.fixture(scope="module")
@@ -70,16 +64,6 @@ def distance(reading: Reading, truth: FloatArray) -> float:
     return float(off @ reading.information @ off)
 
 
-def test_of_a_string_the_tension_goes_as_the_frequency_squared() -> None:
-    theta = (1.1, 0.97)
-    before = frequencies(theta, "beam1", STRING)
-    string = Reader(posterior(theta, "beam1", STRING), [measured(before)], STRING)
-    reading = string.reading(measured(0.93 * before), WHEN)
-    assert reading.mean == pytest.approx([2 * np.log(0.93)], abs=2e-5)
-    closed_form = len(EVERYTHING) / 4 / (SD**2 + ALLOWANCE**2)
-    assert reading.information[0, 0] == pytest.approx(closed_form, rel=1e-3)
-
-
 @pytest.mark.parametrize(
     "theta",
     [
@@ -102,21 +86,6 @@ def test_what_has_changed_is_read_without_bias(reader: Reader, theta: tuple[floa
     assert reading.mean[0] == pytest.approx(truth[0], abs=2e-4)
 
 
-@pytest.mark.parametrize("theta", [changed(), changed(tension=0.9, transverse=-0.5)])
-def test_noisy_tests_are_read_within_their_own_covariance(
-    reader: Reader, theta: tuple[float, ...]
-) -> None:
-    frequency_hz, truth = frequencies(theta), coordinates(reader, theta)
-    rng = np.random.default_rng(3)
-    readings = [reader.reading(measured(frequency_hz, rng=rng), WHEN) for _ in range(200)]
-    found = np.array([distance(each, truth) for each in readings])
-    # Three quantities; the mean of 200 has a standard deviation of 0.17.
-    assert found.mean() == pytest.approx(3.0, abs=0.6)
-    assert stats.kstest(found, stats.chi2(3).cdf).pvalue > 0.01
-    for reading in readings[:3]:
-        assert np.linalg.eigvalsh(reading.information).min() > 0
-
-
 def test_a_test_of_conditions_beyond_the_class_says_nothing(reader: Reader) -> None:
     off = measured(frequencies(SPRUNG), added_mass=AddedMass(25.0, 99.0))
     assert np.all(reader.reading(off, WHEN).information == 0)
@@ -125,30 +94,6 @@ def test_a_test_of_conditions_beyond_the_class_says_nothing(reader: Reader) -> N
 def test_a_baseline_without_modes_is_refused() -> None:
     with pytest.raises(BadInput, match="no test with a mode"):
         Reader(posterior(SPRUNG), [ModalTest("bare", ())], HANGER_3)
-
-
-def test_an_adopted_swing_with_the_temperature_is_no_change() -> None:
-    name = "beam1+temperature_tension@everywhere:reference_c=10"
-    made = described(name, HANGER_3)
-    values = dict.fromkeys(made.parameter_names, 0.0) | {"theta_F": 1.1}
-    values["tension_per_kelvin_n_k"] = -1000.0
-    theta = [values[each] for each in made.parameter_names]
-    cold, warm = (
-        frequencies(theta, name, conditions=Conditions(temperature_shift_k=shift))
-        for shift in (0.0, 20.0)
-    )
-    known = replace(posterior(theta, name), samples=np.tile(theta, (10, 1)))
-    adopted = Reader(known, [measured(cold, temperature_c=10.0)], HANGER_3)
-    assert [each.name for each in adopted.quantities] == ["tension"]
-    assert adopted.reading(measured(warm, temperature_c=30.0), WHEN).mean == pytest.approx(
-        [0.0], abs=1e-9
-    )
-    swing = np.log(1 - 20 * 1000.0 / (1.1 * HANGER_3.nominal_tension_n))
-    taken_as_cold = adopted.reading(measured(warm, temperature_c=10.0), WHEN)
-    assert taken_as_cold.mean == pytest.approx([swing], rel=1e-3)
-    unknown = adopted.reading(measured(warm), WHEN)
-    assert np.all(unknown.information == 0)
-    assert np.isnan(unknown.temperature_c)
 
 
 @pytest.mark.parametrize("theta", [SPRUNG, changed(tension=0.9), changed(tension=1.05)])

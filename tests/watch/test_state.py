@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -21,8 +20,6 @@ _GRID = np.linspace(-1, 1, 201)
 TENSION = WatchedQuantity("tension", BASELINE_N, _GRID, BASELINE_N * np.exp(_GRID), 0.05)
 SPRING = WatchedQuantity("log10_k1", 7.0, _GRID, 7 + 40 * np.tanh(_GRID), 0.01, end="deck")
 OPTIONS = StateOptions(reference_temperature_c=12.0)
-FIXED = replace(OPTIONS, rate_log_sd=1e-6, scatter_log_sd=1e-6)
-"""Rates and scatters as good as known, so that nothing is mixed over them."""
 SERIES = 50
 
 
@@ -75,81 +72,6 @@ def held(truth: FloatArray, mean: FloatArray, covariance: FloatArray) -> FloatAr
     """Whether the 90 % band holds the truth, (n,)."""
     reach = 1.645 * np.sqrt(covariance[:, 0, 0])
     return np.asarray(np.abs(mean[:, 0] - truth) < reach)
-
-
-def _per_kelvin(quantity: WatchedQuantity) -> float:
-    if quantity.name == "tension":
-        return OPTIONS.tension_per_kelvin_sd
-    return OPTIONS.spring_per_kelvin_sd_of_step * quantity.step_sd
-
-
-def jointly(history: StateHistory, upto: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Level (q,) and covariance at test `upto` - 1 by the joint normal law of all, no recursion.
-
-    Also the coefficients' means, and the log density of the readings; every reading sees all.
-    """
-    readings, q = history.readings[:upto], len(history.quantities)
-    warmth = [r.temperature_c - history.reference_temperature_c for r in readings]
-    years = [(b.time - a.time) / timedelta(days=365.25) for a, b in pairwise(readings)]
-    rows = np.block([[np.eye(q) * (s <= t) for s in range(upto)] for t in range(upto)])
-    rows = np.hstack([rows, np.kron(np.array(warmth)[:, None], np.eye(q))])
-    steps = [np.array([3 * each.step_sd for each in history.quantities]) ** 2]
-    steps += [history.level_rate**2 * dt for dt in years]
-    prior = np.diag(
-        np.concatenate([*steps, [_per_kelvin(each) ** 2 for each in history.quantities]])
-    )
-    noise = np.kron(np.eye(upto), np.diag(history.scatter**2))
-    for t, each in enumerate(readings):
-        noise[t * q : (t + 1) * q, t * q : (t + 1) * q] += np.linalg.inv(each.information)
-    total, y = rows @ prior @ rows.T + noise, np.concatenate([r.mean for r in readings])
-    gain = np.linalg.solve(total, rows @ prior).T
-    mean, covariance = gain @ y, prior - gain @ rows @ prior
-    last = np.hstack([*[np.eye(q)] * upto, np.zeros((q, q))])
-    density = -(y @ np.linalg.solve(total, y) + np.linalg.slogdet(2 * np.pi * total)[1]) / 2
-    return last @ mean, last @ covariance @ last.T, mean[-q:], float(density)
-
-
-def test_a_single_level_follows_a_hand_written_kalman_filter() -> None:
-    readings = [reading(day, [x]) for day, x in [(0, 0.001), (3, 0.004), (40, -0.002), (400, 0.01)]]
-    history = states(readings, [TENSION], options=FIXED)
-    mean, variance = 0.0, 0.15**2
-    rate, noise = history.level_rate[0], 1e-6 + history.scatter[0] ** 2
-    before = 0.0
-    for at, each in enumerate(readings):
-        day = (each.time - START) / timedelta(days=1)
-        variance += rate**2 * (day - before) / 365.25 * (at > 0)
-        gain, before = variance / (variance + noise), day
-        mean, variance = mean + gain * (each.mean[0] - mean), (1 - gain) * variance
-        assert history.filtered_mean[at, 0] == pytest.approx(mean, rel=1e-6)
-        assert history.filtered_covariance[at, 0, 0] == pytest.approx(variance, rel=1e-6)
-
-
-def two_quantities() -> list[Reading]:
-    rng = np.random.default_rng(5)
-    readings = []
-    for day in np.cumsum(rng.exponential(20, 12)):
-        root = rng.normal(size=(2, 2)) * 800
-        each = reading(float(day), rng.normal(0, 2e-3, 2), temperature_c=float(rng.normal(12, 9)))
-        readings.append(replace(each, information=root.T @ root + 1e5 * np.eye(2)))
-    return readings
-
-
-def test_rates_and_scatters_are_those_of_the_largest_posterior_density() -> None:
-    history = states(two_quantities(), [TENSION, SPRING], options=OPTIONS)
-    steps = np.array([TENSION.step_sd, SPRING.step_sd])
-
-    def density(rates: FloatArray, scatters: FloatArray) -> float:
-        z = np.log(rates / OPTIONS.rate_of_step / steps) / OPTIONS.rate_log_sd
-        w = np.log(scatters / OPTIONS.scatter_of_step / steps) / OPTIONS.scatter_log_sd
-        tried = replace(history, level_rate=rates, scatter=scatters)
-        return jointly(tried, 12)[3] - float(z @ z + w @ w) / 2
-
-    best = density(history.level_rate, history.scatter)
-    for j in range(2):
-        for factor in (0.8, 1.25):
-            other = np.where(np.arange(2) == j, factor, 1.0)
-            assert density(history.level_rate * other, history.scatter) < best
-            assert density(history.level_rate, history.scatter * other) < best
 
 
 @pytest.mark.trial
@@ -240,13 +162,6 @@ def test_bands_are_in_newtons_and_in_decades() -> None:
     assert spring.middle[-1] == pytest.approx(7.4, abs=0.02)
     assert tension.low[-1] < tension.middle[-1] < tension.high[-1]
     assert history.read("tension").middle[3] == pytest.approx(tension.middle[3], rel=1e-3)
-
-
-def test_readings_are_drawn_at_the_reference_temperature() -> None:
-    warmest = max(map(simulated, range(4)), key=lambda each: abs(each.coefficient))
-    read, level = warmest.history.read("tension"), BASELINE_N * np.exp(warmest.level)
-    raw = BASELINE_N * np.exp([r.mean[0] for r in warmest.history.readings])
-    assert np.std(read.middle - level) < np.std(raw - level) / 5
 
 
 def test_what_cannot_be_used_is_refused() -> None:

@@ -12,9 +12,7 @@ import pytest
 from shm.pipeline.stream_steps import Pooled, pool_stream
 from shm.values import outdoor_c
 from shm.values.stream import PooledReading, Window, WindowReading
-from shm.watch.kept_state import from_bytes
 from shm.watch.stream_thermometer import Thermometer, disagreeing
-from shm.watch.stream_watch import StreamState
 from tests.watch.test_stream_watch import HANGER, START, from_hour, hours
 
 Says = Callable[[int, float], float]
@@ -115,13 +113,6 @@ def _said(found: Sequence[Pooled], hour: int) -> list[WindowReading]:
 
 def _known(found: Sequence[Pooled]) -> list[Pooled]:
     return [each for each in found if math.isfinite(each.reading.temperature_c)]
-
-
-def test_while_it_learns_a_jump_is_what_it_learns_from() -> None:
-    found = watched(hours(60), from_on(30, lambda true_c: true_c - 15))
-
-    assert not any(each.events for each in found)
-    assert from_bytes(StreamState, found[-1].kept).thermometer.off_k == 0
 
 
 def test_one_that_stands_still_for_a_day_is_not_believed_until_it_moves() -> None:

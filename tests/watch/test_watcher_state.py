@@ -99,12 +99,6 @@ def test_a_state_of_another_watch_or_an_older_test_is_refused() -> None:
         WATCHER.begin(given)
 
 
-@pytest.mark.parametrize("content", [b"", b"not a state", b"PK\x03\x04 broken"])
-def test_content_that_is_no_state_is_refused(content: bytes) -> None:
-    with pytest.raises(BadInput, match="cannot be read"):
-        from_bytes(WatchState, content)
-
-
 def test_a_state_cut_short_is_refused() -> None:
     state, _ = WATCHER.begin(readings(4))
     content = to_bytes(state)

@@ -10,10 +10,10 @@ from shm.bridge import AppriseHook, CommandHook, Hook, WebhookHook
 from shm.values import Alert
 from shm_daemon.hooks.apprise import AppriseDeliverer
 from shm_daemon.hooks.command import CommandDeliverer
-from shm_daemon.hooks.contract import Deliverer, HookFailed, Surroundings
+from shm_daemon.hooks.contract import Deliverer, DeliveryContext, HookFailed
 from shm_daemon.hooks.webhook import WebhookDeliverer
 
-__all__ = ["KINDS", "Deliverer", "HookFailed", "HookNotifier", "Surroundings"]
+__all__ = ["KINDS", "Deliverer", "DeliveryContext", "HookFailed", "HookNotifier"]
 
 KINDS: Mapping[type[Hook], type[Any]] = {
     CommandHook: CommandDeliverer,
@@ -32,7 +32,7 @@ class HookNotifier:
         environment: Mapping[str, str],
         pages_address: str = "",
     ):
-        surroundings = Surroundings(folder, timeout_s, environment, pages_address)
+        surroundings = DeliveryContext(folder, timeout_s, environment, pages_address)
         self._deliverers: dict[type[Hook], Deliverer] = {
             kind: made(surroundings) for kind, made in KINDS.items()
         }

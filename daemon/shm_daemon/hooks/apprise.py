@@ -73,7 +73,7 @@ def _told(alert: Alert, addresses: Sequence[str], link: str) -> bytes:
     test, resolved = "test" in alert.kinds, "resolved" in alert.kinds
     title = f"shm: {len(alert.alerts)} hangers" if alert.alerts else f"shm: hanger {alert.hanger}"
     body = f"{alert.message}\n\nTest {alert.test} of {alert.time:%Y-%m-%d %H:%M} UTC."
-    told = {
+    document = {
         "addresses": list(addresses),
         "title": one_line(
             "shm: test of a hook" if test else f"{title}{': resolved' if resolved else ''}"
@@ -83,4 +83,4 @@ def _told(alert: Alert, addresses: Sequence[str], link: str) -> bytes:
         ),
         "type": "info" if test else "success" if resolved else "warning",
     }
-    return json.dumps(told).encode()
+    return json.dumps(document).encode()

@@ -19,7 +19,7 @@ from shm.bridge import CommandHook
 from shm.documents import dump
 from shm.values import Alert, printable
 from shm_daemon.hooks import reaper
-from shm_daemon.hooks.contract import SHOWN_CHARACTERS, HookFailed, Surroundings
+from shm_daemon.hooks.contract import SHOWN_CHARACTERS, DeliveryContext, HookFailed
 
 _PASSED_ON = ("PATH", "HOME", "LANG")
 
@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 class Processes:
     """Runs programs in the workspace's folder, each with a process that ends all it began."""
 
-    def __init__(self, surroundings: Surroundings):
+    def __init__(self, surroundings: DeliveryContext):
         self.surroundings = surroundings
         self.folder, self._timeout_s = surroundings.folder, surroundings.timeout_s
         given = surroundings.environment

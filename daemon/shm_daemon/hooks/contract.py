@@ -19,7 +19,7 @@ class HookFailed(ShmError):
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class DeliveryContext:
     """The workspace's folder, the longest a delivery may take, and the daemon's environment.
 
     `pages_address` is where the web interface answers; empty where that is not known.
@@ -46,7 +46,7 @@ class Surroundings:
 class Deliverer(Protocol):
     """Delivers alerts to hooks of one kind, from several threads at once."""
 
-    def __init__(self, surroundings: Surroundings): ...
+    def __init__(self, surroundings: DeliveryContext): ...
 
     def __call__(self, hook: object, alert: Alert) -> str:
         """Delivers one alert; what the hook answered.

@@ -17,7 +17,7 @@ from shm_daemon.hooks import HookNotifier
 
 @dataclass(frozen=True)
 class Trial:
-    """What a hook answered to a test alert, after how many seconds."""
+    """Hold the answer of a hook to a test alert, and its seconds."""
 
     alert: Alert
     answer: str

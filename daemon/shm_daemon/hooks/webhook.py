@@ -25,7 +25,7 @@ from shm.bridge import WebhookHook
 from shm.documents import dump
 from shm.pipeline import DeliveryRefused
 from shm.values import Alert
-from shm_daemon.hooks.contract import SHOWN_CHARACTERS, HookFailed, Surroundings, one_line
+from shm_daemon.hooks.contract import SHOWN_CHARACTERS, DeliveryContext, HookFailed, one_line
 
 _WORTH_ANOTHER_TRY = (
     HTTPStatus.REQUEST_TIMEOUT,
@@ -38,7 +38,7 @@ _LOOK = "See that its server runs, then try `shm alerts test`."
 class WebhookDeliverer:
     """Posts each alert; an answer of 200 to 299 says that it is delivered."""
 
-    def __init__(self, surroundings: Surroundings):
+    def __init__(self, surroundings: DeliveryContext):
         self._surroundings = surroundings
         self._lines = Lines()
 

@@ -41,7 +41,7 @@ _FORWARDED = ("forwarded", "x-forwarded-for", "x-forwarded-host", "x-real-ip")
 
 
 @dataclass(frozen=True)
-class Visitor:
+class Principal:
     """The caller: the name of the person or token, empty for this machine without one."""
 
     name: str
@@ -74,7 +74,7 @@ AtSite = Annotated[Site, Depends(site_of)]
 Credentials = Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]
 
 
-def reading(request: Request, site: AtSite, credentials: Credentials) -> Visitor:
+def reading(request: Request, site: AtSite, credentials: Credentials) -> Principal:
     """Let in who may read: this machine where only it can come in, else a token.
 
     `frame.page` shows who it is.
@@ -84,28 +84,28 @@ def reading(request: Request, site: AtSite, credentials: Credentials) -> Visitor
     elif _is_at_home(request, site):
         # Here reading needs no token: a cookie that is out of date takes nothing away.
         secret = request.cookies.get(COOKIE)
-        found = (_found(site, secret) if secret else None) or Visitor("")
+        found = (_found(site, secret) if secret else None) or Principal("")
     else:
         found = _signed_in(request, site, "Reading needs a user or a token here.", Role.READER)
     request.state.visitor = found
     return found
 
 
-def writing(request: Request, site: AtSite, credentials: Credentials) -> Visitor:
+def writing(request: Request, site: AtSite, credentials: Credentials) -> Principal:
     """Let in who may write: only signed in or with a token."""
     if credentials is not None:
         return _visitor(request, site, credentials.credentials, Role.OPERATOR)
     return _signed_in(request, site, "Writing needs a user or a token.", Role.OPERATOR)
 
 
-def engineering(request: Request, site: AtSite) -> Visitor:
+def engineering(request: Request, site: AtSite) -> Principal:
     """Let in engineers, in a browser: no token is one."""
     found = _signed_in(request, site, "This needs an engineer.", Role.ENGINEER)
     request.state.visitor = found
     return found
 
 
-def signed_in_person(request: Request, site: AtSite) -> Visitor:
+def signed_in_person(request: Request, site: AtSite) -> Principal:
     """Let in people who have signed in by name, with any role."""
     found = _signed_in(request, site, "This needs a person.", Role.READER)
     request.state.visitor = found
@@ -114,13 +114,13 @@ def signed_in_person(request: Request, site: AtSite) -> Visitor:
     return found
 
 
-Reader = Annotated[Visitor, Depends(reading)]
-Writer = Annotated[Visitor, Depends(writing)]
-Engineer = Annotated[Visitor, Depends(engineering)]
-Person = Annotated[Visitor, Depends(signed_in_person)]
+Reader = Annotated[Principal, Depends(reading)]
+Writer = Annotated[Principal, Depends(writing)]
+Engineer = Annotated[Principal, Depends(engineering)]
+Person = Annotated[Principal, Depends(signed_in_person)]
 
 
-async def uploading(request: Request, visitor: Writer) -> AsyncIterator[Visitor]:
+async def uploading(request: Request, visitor: Writer) -> AsyncIterator[Principal]:
     """Let in who may write, to no more than a third of the places of uploads at once.
 
     How long a body takes is up to its sender: nobody alone may keep all the others out.
@@ -144,7 +144,7 @@ async def uploading(request: Request, visitor: Writer) -> AsyncIterator[Visitor]
             del taken[who]
 
 
-Uploader = Annotated[Visitor, Depends(uploading)]
+Uploader = Annotated[Principal, Depends(uploading)]
 
 
 async def with_passwords(request: Request, does: Callable[[], Response]) -> Response:
@@ -168,7 +168,7 @@ def refuse_foreign(request: Request) -> None:
         raise Refused(403, "This was sent by a page of another site.", "Send it from our page.")
 
 
-def visitor_in_force(request: Request, site: Site, secret: str) -> Visitor:
+def visitor_in_force(request: Request, site: Site, secret: str) -> Principal:
     """Return the caller of a token or session; raises Refused if it is wrong or has ended.
 
     One in force is never kept waiting, whatever came from the same address.
@@ -206,7 +206,7 @@ def session_of(request: Request, site: Site, name: str, password: str) -> str:
 
 
 def change_password_of(
-    request: Request, site: Site, person: Visitor, old: str, password: str
+    request: Request, site: Site, person: Principal, old: str, password: str
 ) -> None:
     """Set a person's password; the browser that asks stays signed in.
 
@@ -236,17 +236,17 @@ def unless_throttled(request: Request, site: Site, name: str | None = None) -> s
     return caller
 
 
-def _found(site: Site, secret: str) -> Visitor | None:
+def _found(site: Site, secret: str) -> Principal | None:
     if secret.startswith(SESSION):
         user = site.store.people.user_of(secret, utc_now())
-        return None if user is None else Visitor(user.name, user.role, is_person=True)
+        return None if user is None else Principal(user.name, user.role, is_person=True)
     token = site.store.upkeep.token_of(secret, utc_now())
     if token is None:
         return None
-    return Visitor(token.name, Role.OPERATOR if Scope.WRITE in token.scopes else Role.READER)
+    return Principal(token.name, Role.OPERATOR if Scope.WRITE in token.scopes else Role.READER)
 
 
-def _visitor(request: Request, site: Site, secret: str, needed: Role) -> Visitor:
+def _visitor(request: Request, site: Site, secret: str, needed: Role) -> Principal:
     """Return the caller if its role is enough; raises Refused. No other place checks roles."""
     found = visitor_in_force(request, site, secret)
     if found.role.may(needed):
@@ -266,7 +266,7 @@ def _visitor(request: Request, site: Site, secret: str, needed: Role) -> Visitor
     )
 
 
-def _signed_in(request: Request, site: Site, otherwise: str, needed: Role) -> Visitor:
+def _signed_in(request: Request, site: Site, otherwise: str, needed: Role) -> Principal:
     """Return the person signed in with this browser; raises Refused with `otherwise` if none is."""
     secret = request.cookies.get(COOKIE)
     if not secret:

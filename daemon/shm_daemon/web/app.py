@@ -19,7 +19,7 @@ from shm.pipeline import utc_now
 from shm_daemon.web import frame, hangers, metrics, recordings, tests
 from shm_daemon.web.access import Reader
 from shm_daemon.web.background_work import BackgroundWorker
-from shm_daemon.web.bridge_view import glance
+from shm_daemon.web.bridge_view import summarize_hangers
 from shm_daemon.web.faults import answers, handle_faults
 from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.middleware import Pages
@@ -121,7 +121,7 @@ def warm_up(app: FastAPI) -> None:
     """Load what pages need, for about a second; requests are answered meanwhile."""
     frame.prepare_templates()
     try:
-        glance(app.state.site, utc_now())
+        summarize_hangers(app.state.site, utc_now())
     except ShmError as error:  # whoever asks is told too
         log.info("the first page will take longer: %s", error.message)
     app.openapi()

@@ -37,7 +37,7 @@ RETRY_AFTER = {"Retry-After": "2"}
 log = logging.getLogger(__name__)
 
 
-class Order(Protocol):
+class WorkRequest(Protocol):
     """A request for work: equal ones have the same result. `make` runs in the other process."""
 
     def __hash__(self) -> int: ...
@@ -57,36 +57,36 @@ class BackgroundWorker(Generic[Made]):
         pool: Callable[[int], ProcessPoolExecutor] = process_pool,
     ):
         self._longest_s, self._pool = longest_s, pool
-        self._kept: OrderedDict[Order, tuple[Made, int]] = OrderedDict()
-        self._failures: dict[Order, tuple[ShmError, float]] = {}
-        self._waiting: OrderedDict[Order, None] = OrderedDict()
-        self._lost: Order | None = None
+        self._kept: OrderedDict[WorkRequest, tuple[Made, int]] = OrderedDict()
+        self._failures: dict[WorkRequest, tuple[ShmError, float]] = {}
+        self._waiting: OrderedDict[WorkRequest, None] = OrderedDict()
+        self._lost: WorkRequest | None = None
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
         self._closed = False
 
-    def stored(self, order: Order) -> Made | None:
+    def stored(self, request: WorkRequest) -> Made | None:
         """Return the stored result of a request, None if there is none; start nothing."""
         with self._changed:
-            if order not in self._kept:
+            if request not in self._kept:
                 return None
-            self._kept.move_to_end(order)
-            return self._kept[order][0]
+            self._kept.move_to_end(request)
+            return self._kept[request][0]
 
-    def wanted(self, order: Order) -> Made | None:
+    def get_or_start(self, request: WorkRequest) -> Made | None:
         """Return the result of a request; None while it is computed, or while many others wait.
 
         Raises the ShmError with which it failed a short while ago.
         """
         with self._changed:
-            found = self.stored(order)
+            found = self.stored(request)
             if found is not None:
                 return found
-            error, failed_at_s = self._failures.get(order, (None, 0.0))
+            error, failed_at_s = self._failures.get(request, (None, 0.0))
             if error and time.monotonic() - failed_at_s < _FAILURE_LASTS_S:
                 raise error.with_traceback(None)
             if len(self._waiting) < _MOST_WAITING and not self._closed:
-                self._waiting[order] = None
+                self._waiting[request] = None
                 if self._thread is None:
                     self._thread = threading.Thread(target=self._work, name="workshop", daemon=True)
                     self._thread.start()
@@ -103,19 +103,19 @@ class BackgroundWorker(Generic[Made]):
             thread.join()
 
     def _work(self) -> None:
-        while self._shift():
+        while self._run():
             pass
 
-    def _shift(self) -> bool:
-        """Work with one process until no order waits or it is lost; return whether to go on.
+    def _run(self) -> bool:
+        """Work with one process until no request waits or it is lost; return whether to go on.
 
-        The order in work remains among those waiting, so that it is started only once.
+        The request in work remains among those waiting, so that it is started only once.
         """
         with children_ended():
             pool = self._pool(1)
             try:
-                while (order := self._next()) is not None:
-                    if not self._made(pool, order):
+                while (request := self._next()) is not None:
+                    if not self._run_request(pool, request):
                         return not self._closed
             finally:
                 pool.shutdown(wait=False, cancel_futures=True)
@@ -125,15 +125,15 @@ class BackgroundWorker(Generic[Made]):
             self._thread = None
             return False
 
-    def _next(self) -> Order | None:
+    def _next(self) -> WorkRequest | None:
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._closed, _IDLE_S)
             return next(iter(self._waiting), None)
 
-    def _made(self, pool: ProcessPoolExecutor, order: Order) -> bool:
-        """Run an order and record its result; return whether the process can be used further."""
+    def _run_request(self, pool: ProcessPoolExecutor, request: WorkRequest) -> bool:
+        """Run a request and record its result; return whether the process can be used further."""
         try:
-            future = pool.submit(_packed, order)
+            future = pool.submit(_packed, request)
             self._await(future)
             packed = future.result(timeout=0)
         except TimeoutError:
@@ -141,19 +141,19 @@ class BackgroundWorker(Generic[Made]):
                 "Have it written at leisure with `shm report`; see the log of the web interface."
             )
             problem = f"it took more than {self._longest_s:g} s and was given up."
-            self._failed(order, ShmError(problem, remedy=remedy))
+            self._failed(request, ShmError(problem, remedy=remedy))
             return False
         except BrokenProcessPool:
-            self._tried_again(order)
+            self._tried_again(request)
             return False
         except ShmError as error:
-            self._failed(order, error)
+            self._failed(request, error)
         except Exception:
-            log.exception("working out %r failed", order)
+            log.exception("working out %r failed", request)
             remedy = "The log of the web interface says more."
-            self._failed(order, ShmError("an internal error.", remedy=remedy))
+            self._failed(request, ShmError("an internal error.", remedy=remedy))
         else:
-            self._keep(order, packed)
+            self._keep(request, packed)
         return True
 
     def _await(self, future: Future[bytes]) -> None:
@@ -162,38 +162,38 @@ class BackgroundWorker(Generic[Made]):
             if wait([future], timeout=_LOOK_S).done:
                 return
 
-    def _keep(self, order: Order, packed: bytes) -> None:
+    def _keep(self, request: WorkRequest, packed: bytes) -> None:
         made: Made = pickle.loads(packed)  # noqa: S301 - our own process has made it
         with self._changed:
-            self._waiting.pop(order, None)
-            self._failures.pop(order, None)
-            self._kept[order] = made, len(packed)
+            self._waiting.pop(request, None)
+            self._failures.pop(request, None)
+            self._kept[request] = made, len(packed)
             while len(self._kept) > 1 and (
                 sum(size_bytes for _, size_bytes in self._kept.values()) > _MAX_STORED_BYTES
             ):
                 self._kept.popitem(last=False)
 
-    def _tried_again(self, order: Order) -> None:
+    def _tried_again(self, request: WorkRequest) -> None:
         """Fail a request whose process died twice.
 
         Once may be no fault of its own: who ends all our processes often ends that one first, and
         whoever asks in the moment before we end as well must not be told of a fault.
         """
-        if self._lost != order:
-            self._lost = order
+        if self._lost != request:
+            self._lost = request
             return
         self._lost = None
         remedy = "It may lack memory: see the log, and try again in a minute."
-        self._failed(order, ShmError("the process that worked on it died.", remedy=remedy))
+        self._failed(request, ShmError("the process that worked on it died.", remedy=remedy))
 
-    def _failed(self, order: Order, error: ShmError) -> None:
+    def _failed(self, request: WorkRequest, error: ShmError) -> None:
         now = time.monotonic()
         with self._changed:
             if self._closed:  # that is why it was not made
                 return
-            self._waiting.pop(order, None)
+            self._waiting.pop(request, None)
             fresh = {o: f for o, f in self._failures.items() if now - f[1] < _FAILURE_LASTS_S}
-            self._failures = {**fresh, order: (error, now)}
+            self._failures = {**fresh, request: (error, now)}
 
 
 def background_worker_of(request: Request) -> BackgroundWorker[Any]:
@@ -202,6 +202,6 @@ def background_worker_of(request: Request) -> BackgroundWorker[Any]:
     return found
 
 
-def _packed(order: Order) -> bytes:
+def _packed(request: WorkRequest) -> bytes:
     """Return the result of a request, packed in the other process: its length is its size here."""
-    return pickle.dumps(order.make())
+    return pickle.dumps(request.make())

@@ -103,7 +103,7 @@ class Comparison:
             return Compared(None, reason.message)
 
 
-def glance(site: Site, now: datetime) -> BridgeGlance:
+def summarize_hangers(site: Site, now: datetime) -> BridgeGlance:
     """Return the bridge as the store has it now."""
     workspace, store = site.workspace, site.store
     tests, quiet_before = count_tests(store), now - timedelta(days=workspace.settings.quiet_days)
@@ -130,7 +130,7 @@ def compared(request: Request, site: Site) -> Compared | None:
     wanted = Comparison(shifts, order)
     if len(order) <= QUICKLY_COMPARED:
         return wanted.make()
-    found: Compared | None = background_worker_of(request).wanted(wanted)
+    found: Compared | None = background_worker_of(request).get_or_start(wanted)
     return found
 
 
@@ -249,7 +249,10 @@ def _mark(glance: HangerGlance, x: float, top: float, number: bool) -> HangerMar
     kind, summary = kind_of(glance), glance.summary
     shift = summary.change
     hollow = shift is not None and shift.low < 0 < shift.high
-    words = [formatting.hanger_name(glance.hanger.id, glance.hanger.name), shift_words(glance)]
+    words = [
+        formatting.hanger_name(glance.hanger.id, glance.hanger.name),
+        shift_words(glance),
+    ]
     if summary.latest:
         words.append(f"last test {summary.latest.time:%Y-%m-%d}")
     if summary.open_alerts:

@@ -38,15 +38,17 @@ _LEAST_PROGRESS_BYTES = 10_000
 log = logging.getLogger(__name__)
 
 
-class Door:
+class ConnectionLimits:
     """All connections that wait, by address, in the order in which they began to."""
 
     def __init__(self, certificate: ssl.SSLContext | None = None):
         self.certificate = certificate
-        self._waiting: OrderedDict[Guarded, str] = OrderedDict()
-        self._of_address: defaultdict[str, OrderedDict[Guarded, None]] = defaultdict(OrderedDict)
+        self._waiting: OrderedDict[LimitedProtocol, str] = OrderedDict()
+        self._of_address: defaultdict[str, OrderedDict[LimitedProtocol, None]] = defaultdict(
+            OrderedDict
+        )
 
-    def waits(self, one: Guarded, address: str, *, makes_room: bool) -> None:
+    def waits(self, one: LimitedProtocol, address: str, *, makes_room: bool) -> None:
         """Register a waiting connection; where too many wait, cut one off.
 
         That is the first that `makes_room`, else the one that has waited longest.
@@ -61,7 +63,7 @@ class Door:
         elif len(self._waiting) > FROM_ALL:
             self._cut_off(next(iter(self._waiting)))
 
-    def leaves(self, one: Guarded) -> None:
+    def leaves(self, one: LimitedProtocol) -> None:
         """Remove a connection that is answered or gone from those that wait."""
         address = self._waiting.pop(one, None)
         if address is None:
@@ -71,15 +73,15 @@ class Door:
         if not same:
             del self._of_address[address]
 
-    def _cut_off(self, one: Guarded) -> None:
+    def _cut_off(self, one: LimitedProtocol) -> None:
         self.leaves(one)
         one.cut_off()
 
 
-class Guarded(H11Protocol):
+class LimitedProtocol(H11Protocol):
     """One connection; `door` is that of its server."""
 
-    door: ClassVar[Door]
+    door: ClassVar[ConnectionLimits]
 
     def __init__(self, *args: Any, **options: Any):
         super().__init__(*args, **options)
@@ -183,9 +185,9 @@ class Guarded(H11Protocol):
         return self.transport.get_write_buffer_size() + queued[0]
 
 
-def guarded_by(door: Door) -> type[Guarded]:
+def guarded_by(door: ConnectionLimits) -> type[LimitedProtocol]:
     """Return the protocol of a server with that door."""
-    return type("Guarded", (Guarded,), {"door": door})
+    return type("LimitedProtocol", (LimitedProtocol,), {"door": door})
 
 
 def _address(transport: asyncio.BaseTransport) -> str:

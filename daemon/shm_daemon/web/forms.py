@@ -71,7 +71,7 @@ FormOfAnybody = Annotated[dict[str, str], _up_to(_LONGEST_OF_ANYBODY_BYTES)]
 FormWithPhoto = Annotated[dict[str, bytes], Depends(_with_photo)]
 
 
-def done_or_again(
+def redirect_or_show_error(
     does: Callable[[], object], then: str, again: Callable[[str, int], Response]
 ) -> Response:
     """Send to the address `then` what a form asked for; `again` shows why it was not done."""

@@ -69,14 +69,14 @@ _HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {
 """What people did: name, symbol, whether it is filled, colour."""
 
 
-def _course(view: HangerView) -> hanger_trend.Course:
+def _course(view: HangerView) -> hanger_trend.TensionHistory:
     """Return the data of the trend; without the state over time while that is computed."""
     states, at = view.states, {point.time: place for place, point in enumerate(view.trend)}
     baseline = view.baseline
     baseline_n = baseline.averaged.tension_n.mean if baseline else None
     raised = [e for e in view.events if e.kind is EventKind.ALERT and e.at in at]
     changes = [call.watched.change for call in view.calls]
-    return hanger_trend.Course(
+    return hanger_trend.TensionHistory(
         times=[point.time for point in view.trend],
         names=[point.test for point in view.trend],
         tensions_n=[Interval.of_averaged(point.averaged) for point in view.trend],
@@ -89,7 +89,7 @@ def _course(view: HangerView) -> hanger_trend.Course:
         reference_temperature_c=states.reference_temperature_c if states else math.nan,
         changes=[CalledChange(c.began_after, c.began_by, called_words(c)) for c in changes],
         deeds=[
-            hanger_trend.Deed(*_HANDS[event.kind], event.at, f"by {event.who}: {event.why}")
+            hanger_trend.TrendEvent(*_HANDS[event.kind], event.at, f"by {event.who}: {event.why}")
             for kind in _HANDS
             for event in view.events
             if event.kind is kind
@@ -113,14 +113,14 @@ def _remark(view: HangerView) -> str:
     return " ".join(filter(None, sentences))
 
 
-def _courses(view: HangerView) -> list[hanger_stiffness.Course]:
+def _courses(view: HangerView) -> list[hanger_stiffness.StiffnessHistory]:
     states, named = view.states, {point.time: point.test for point in view.trend}
     watched = [] if states is None else [q for q in states.quantities if not q.is_tension]
     if states is None or not watched:
         return [_by_tests(view, name) for name in _names(view)]
     tests = [named.get(time, "test") for time in states.times]
     return [
-        hanger_stiffness.Course(
+        hanger_stiffness.StiffnessHistory(
             each.title, states.times, tests, each.read, each.baseline, each.filtered, each.unit
         )
         for each in watched
@@ -131,10 +131,10 @@ def _names(view: HangerView) -> list[str]:
     return hanger_stiffness.names_of(point.stiffness for point in view.trend)
 
 
-def _by_tests(view: HangerView, name: str) -> hanger_stiffness.Course:
+def _by_tests(view: HangerView, name: str) -> hanger_stiffness.StiffnessHistory:
     base = view.baseline.stiffness.get(name) if view.baseline else None
     found = [point.stiffness.get(name) for point in view.trend]
-    return hanger_stiffness.Course(
+    return hanger_stiffness.StiffnessHistory(
         formatting.quantity(name),
         [point.time for point in view.trend],
         [point.test for point in view.trend],

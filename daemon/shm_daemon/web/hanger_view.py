@@ -124,7 +124,9 @@ class HangerView:
         if self.baseline is None:
             return NOTHING_WATCHED
         try:
-            made: StatesOverTime | None = self._background_worker.wanted(self._order(self.baseline))
+            made: StatesOverTime | None = self._background_worker.get_or_start(
+                self._order(self.baseline)
+            )
         except ShmError as error:
             log.warning("states over time of hanger %d: %s", self.hanger.id, error)
             return NOTHING_WATCHED

@@ -130,10 +130,8 @@ class HangerTests(BaseModel):
 
 
 @dataclass(frozen=True)
-class TestLine:
+class ModalTestRow:
     """One test, its tension in `unit`; `point` is None before it has been through updating."""
-
-    __test__ = False  # no test, though named so
 
     row: TestRow
     point: StoredPoint | None
@@ -178,12 +176,12 @@ def headings(view: HangerView) -> tuple[str, ...]:
     return ("test", "time", "temperature", "model", *formatting.tension_headings(unit))
 
 
-def lines_before(view: HangerView, limit: int, before: int | None = None) -> list[TestLine]:
+def lines_before(view: HangerView, limit: int, before: int | None = None) -> list[ModalTestRow]:
     """Return `limit` tests, the newest first, that are older than the test number `before`."""
     points = {point.test_id: point for point in view.trend}
     rows = list_test_rows(view.store, view.hanger.id, limit, before)
     unit = tension_unit(view.trend)
-    return [TestLine(row, points.get(row.id), unit) for row in rows]
+    return [ModalTestRow(row, points.get(row.id), unit) for row in rows]
 
 
 _of_all = APIRouter(prefix="/api", tags=["state"])
@@ -367,7 +365,7 @@ def _states(states: StatesOverTime) -> list[dict[str, Any]]:
     ]
 
 
-def _test(line: TestLine) -> dict[str, Any]:
+def _test(line: ModalTestRow) -> dict[str, Any]:
     point = line.point
     return {
         "id": line.id,

@@ -15,7 +15,7 @@ from typing import Any
 
 from shm.errors import ShmError, sentence
 from shm.pipeline import utc_now
-from shm.pipeline.unheard import backlog_leads, heard, leads_of, ring_leads, stream_leads
+from shm.pipeline.stream_health import backlog_leads, heard, leads_of, ring_leads, stream_leads
 from shm.store.queries.alerts import count_alerts
 from shm.store.queries.recordings import list_holds
 from shm.store.queries.tests import count_tests
@@ -28,7 +28,7 @@ from shm_daemon.heartbeat import (
     seconds_since_beat,
     why_turn_failed,
 )
-from shm_daemon.spool import never_taken, scan
+from shm_daemon.spool import scan, unsupported_entries
 from shm_daemon.web.site import Site
 
 _NAMED = 5  # of many: the pages list them all
@@ -259,7 +259,7 @@ def _held(site: Site) -> list[str]:
 
 
 def _never_taken(site: Site) -> list[str]:
-    count = len(never_taken(site.workspace.spool))
+    count = len(unsupported_entries(site.workspace.spool))
     return [f"{count} of the spool will never be taken: see `shm doctor`."] if count else []
 
 

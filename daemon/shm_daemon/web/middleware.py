@@ -50,7 +50,7 @@ HTTPS_ONLY = {"Strict-Transport-Security": "max-age=31536000"}
 log = logging.getLogger(__name__)
 
 
-class Around:
+class HeadersMiddleware:
     """Wraps the app."""
 
     def __init__(self, app: ASGIApp, site: Site):
@@ -138,7 +138,7 @@ class Pages:
     warm_up: Callable[[], None]
 
 
-class Front:
+class LimitMiddleware:
     """An ASGI app before another, which `load` makes beside: the ways in are open meanwhile."""
 
     def __init__(self, site: Site, load: Callable[[], Pages], *, warms_up: bool = False):

@@ -25,9 +25,9 @@ from shm.report.contents import ModalTestReport
 from shm.report.figures.modal_test_hits import FIGURE as HITS
 from shm.report.figures.modal_test_modes import SHAPES, STABILISATION, rows_of
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
-from shm.report.figures.modal_test_response import Shown, Spectrum
+from shm.report.figures.modal_test_response import ResponseCurves, Spectrum
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
-from shm.report.figures.specification import Member, Specification
+from shm.report.figures.specification import FigureSpec, Specification
 from shm.report.modal_test_report import advice, conditions, dropped, hits, summary, trust
 from shm.report.paper import Table
 from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
@@ -52,7 +52,7 @@ class TestFigure:
     __test__ = False  # told to pytest
 
     tab: str
-    member: Member[Shown]
+    member: FigureSpec[ResponseCurves]
     source: Literal["store", "both", "file"]
     height_px: Callable[[ModalTestReport], int]
     is_wide: bool = False
@@ -65,7 +65,7 @@ class TestFigure:
     def title(self) -> str:
         return self.member.title
 
-    def document(self, shown: Shown) -> dict[str, Any] | None:
+    def document(self, shown: ResponseCurves) -> dict[str, Any] | None:
         """Return the plotly document with its words; None where there is nothing to show."""
         found = self.member.draw(shown)
         if not isinstance(found, Specification):
@@ -106,10 +106,8 @@ class Figure:
 
 
 @dataclass(frozen=True, eq=False)
-class TestView:
+class ModalTestView:
     """A stored test with its file, and the whole sheet of it where it was worked out lately."""
-
-    __test__ = False  # told to pytest
 
     workspace: Workspace
     store: Store
@@ -190,13 +188,13 @@ class TestView:
         """
         if self.missing:
             raise NothingThere(self.missing)
-        return self.background_worker.wanted(self.order)
+        return self.background_worker.get_or_start(self.order)
 
-    def shown(self, point: int = 0) -> Shown:
+    def shown(self, point: int = 0) -> ResponseCurves:
         """Return the data of the figures, without any record."""
         if self.worked:
-            return Shown(self.worked.sheet, self.worked.spectrum, point)
-        return Shown.of(self.as_stored, point)
+            return ResponseCurves(self.worked.sheet, self.worked.spectrum, point)
+        return ResponseCurves.of(self.as_stored, point)
 
     def figures(self) -> tuple[TestFigure, ...]:
         """Return the figures that this test has, or may have after a new identification."""
@@ -256,7 +254,7 @@ class ModalTestOrder:
         workspace = Workspace.open(self.folder)
         with workspace.store() as store:
             sheet = modal_test_report(workspace, store, self.hanger_id, self.name)
-        whole = Shown.of(sheet, point=0)
+        whole = ResponseCurves.of(sheet, point=0)
         documents = {figure.name: figure.document(whole) for figure in FROM_RECORDS}
         return WorkedOut(
             sheet=replace(sheet, records=()),

@@ -12,7 +12,7 @@ from fastapi import Request, Response
 from fastapi.responses import HTMLResponse
 
 from shm.errors import NothingThere, ShmError
-from shm_daemon.web.background_work import RETRY_AFTER, BackgroundWorker, Order
+from shm_daemon.web.background_work import RETRY_AFTER, BackgroundWorker, WorkRequest
 
 _MOST_REMEMBERED = 50  # technical: outcomes that a page may still ask for
 
@@ -21,7 +21,7 @@ _MOST_REMEMBERED = 50  # technical: outcomes that a page may still ask for
 class _Ordered:
     """One order: since when it is waited for, and what came of it."""
 
-    order: Order
+    order: WorkRequest
     begun_s: float
     outcome: object = None
 
@@ -33,10 +33,10 @@ class OrderedWork:
         self._worker = worker
         self._ordered: OrderedDict[str, _Ordered] = OrderedDict()
 
-    def place(self, order: Order) -> str:
+    def place(self, order: WorkRequest) -> str:
         """Have an order worked out, and return its word."""
         word = secrets.token_urlsafe(9)
-        self._worker.wanted(order)
+        self._worker.get_or_start(order)
         self._ordered[word] = _Ordered(order, time.monotonic())
         while len(self._ordered) > _MOST_REMEMBERED:
             self._ordered.popitem(last=False)
@@ -52,7 +52,7 @@ class OrderedWork:
             raise NothingThere("this order is not known any more.", remedy=remedy)
         if found.outcome is None:
             try:
-                found.outcome = self._worker.wanted(found.order)
+                found.outcome = self._worker.get_or_start(found.order)
             except ShmError as error:
                 found.outcome = error
         if isinstance(found.outcome, ShmError):

@@ -18,7 +18,7 @@ import requests
 
 import shm
 from shm.bridge import OtherBridge
-from shm.documents import Misfit, value_of
+from shm.documents import ValidationError, value_of
 from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm.values.messages import Lead
@@ -123,7 +123,7 @@ def _judged(bridge: OtherBridge, status: int, body: bytes | bytearray) -> Summar
     if status == 200 and "version" in document:
         try:
             return value_of(Summary, document)
-        except Misfit:
+        except ValidationError:
             theirs = one_line(str(document["version"]))[:20]
             raise NotTold(
                 f"Its shm {theirs} and this {shm.__version__} do not understand each other.",

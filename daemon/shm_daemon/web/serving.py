@@ -71,7 +71,7 @@ def make_app(
 
     It answers `/health` at once and loads its pages in the background.
     """
-    from shm_daemon.web.middleware import Around, Front, Pages
+    from shm_daemon.web.middleware import HeadersMiddleware, LimitMiddleware, Pages
     from shm_daemon.web.site import Description, Site
 
     def load() -> Pages:
@@ -80,7 +80,7 @@ def make_app(
         return load_pages(site)
 
     site = Site(Description(workspace), address or Address())
-    return Around(Front(site, load, warms_up=warms_up), site)
+    return HeadersMiddleware(LimitMiddleware(site, load, warms_up=warms_up), site)
 
 
 @contextmanager
@@ -127,13 +127,13 @@ def make_server(
     """Return a server that limits each caller and says little of itself and of callers."""
     import uvicorn
 
-    from shm_daemon.web.connections import Door, guarded_by
+    from shm_daemon.web.connections import ConnectionLimits, guarded_by
 
     config = uvicorn.Config(
         app,
         host=address.host,
         port=address.port,
-        http=guarded_by(Door(certificate)),
+        http=guarded_by(ConnectionLimits(certificate)),
         ws="none",
         loop="asyncio",
         log_config=None,

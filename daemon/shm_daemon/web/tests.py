@@ -22,14 +22,14 @@ from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import name_in
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
-from shm_daemon.web.modal_test_view import AT_WORK, FIGURES, TestView
+from shm_daemon.web.modal_test_view import AT_WORK, FIGURES, ModalTestView
 from shm_daemon.web.models import FigureDocument, HangerNumber, Underway
 from shm_daemon.web.site import described
 
 _AT_ONCE_S = 0.05  # what would be rounded to 0.0 s
 
 
-def origin(view: TestView) -> Table:
+def origin(view: ModalTestView) -> Table:
     """Return file, checksums and version; a checksum is complete, for comparison."""
     file, lineage = view.recording.file, view.stored.lineage
     size, is_now = file.size_bytes, view.order.terms == lineage
@@ -49,13 +49,13 @@ def origin(view: TestView) -> Table:
     return Table("Raw file and lineage", ("what", "value"), tuple(facts.items()))
 
 
-def steps_of(view: TestView) -> tuple[Step, ...]:
+def steps_of(view: ModalTestView) -> tuple[Step, ...]:
     """Return the steps of the file, and those of this test of it."""
     found = list_steps(view.store, view.recording.id)
     return tuple(step for step in found if step.test in (None, view.stored.test.id))
 
 
-def steps(view: TestView) -> Table:
+def steps(view: ModalTestView) -> Table:
     """Return each stage that was reached and when, with the time since the one before."""
     found = steps_of(view)
     before: list[datetime | None] = [None, *(step.at for step in found)]
@@ -72,13 +72,15 @@ def steps(view: TestView) -> Table:
     return Table("Steps", ("stage", "of", "reached", "after", "with"), rows)
 
 
-def formers_of(view: TestView) -> tuple[FormerTest, ...]:
+def formers_of(view: ModalTestView) -> tuple[FormerTest, ...]:
     """Return every identification of this test, in force or superseded, oldest first."""
     found = list_former_tests(view.store, view.recording.id)
     return tuple(each for each in found if each.name == view.stored.test.id)
 
 
-def _replaced(view: TestView) -> list[tuple[str | None, datetime, FormerTest | FormerPosterior]]:
+def _replaced(
+    view: ModalTestView,
+) -> list[tuple[str | None, datetime, FormerTest | FormerPosterior]]:
     """Return replaced results: model class (None for an identification), time, result."""
     found: list[tuple[str | None, datetime, FormerTest | FormerPosterior]] = []
     for test in formers_of(view):
@@ -87,7 +89,7 @@ def _replaced(view: TestView) -> list[tuple[str | None, datetime, FormerTest | F
     return [each for each in found if each[2].superseded_at]
 
 
-def superseded(view: TestView) -> Table:
+def superseded(view: ModalTestView) -> Table:
     """Return identifications and posteriors that later runs have replaced."""
     rows = tuple(
         (
@@ -229,15 +231,15 @@ Point = Annotated[
 ]
 
 
-def view_of(request: Request, site: AtSite, hanger_id: HangerNumber, test: Name) -> TestView:
+def view_of(request: Request, site: AtSite, hanger_id: HangerNumber, test: Name) -> ModalTestView:
     """Return the test that is asked for; raises NothingThere."""
     store = site.store
     stored = store.tests.named(described(site.workspace, hanger_id).id, name_in(test))
     recording = store.recordings.get(stored.recording_id)
-    return TestView(site.workspace, store, background_worker_of(request), stored, recording)
+    return ModalTestView(site.workspace, store, background_worker_of(request), stored, recording)
 
 
-View = Annotated[TestView, Depends(view_of)]
+View = Annotated[ModalTestView, Depends(view_of)]
 
 
 @router.get(

@@ -26,7 +26,7 @@ from shm.identify.contract import Finding, FoundMode, Measurement
 from shm.identify.estimation.courses import (
     OVERLAP,
     TINY,
-    Course,
+    RingDownCourse,
     Row,
     course_of,
     least_squares,
@@ -160,11 +160,11 @@ def _with_slope(
         share * _TO_ZERO * fit.slope * mode.frequency_hz,
     )
     as_found = mode.frequency_sd_hz if math.isnan(mode.damping_sd) else 0.0
-    kept = (1 - share) * mode.frequency_sd_hz
+    remaining_sd = (1 - share) * mode.frequency_sd_hz
     return replace(
         known,
         frequency_hz=mode.frequency_hz + shift_hz,
-        frequency_sd_hz=max(as_found, math.hypot(by_phase, kept)),
+        frequency_sd_hz=max(as_found, math.hypot(by_phase, remaining_sd)),
     )
 
 
@@ -181,7 +181,7 @@ def _leads_s(measurement: Measurement) -> list[float]:
 
 
 def _fits(
-    mode: FoundMode, index: int, courses: Sequence[Course], leads_s: Sequence[float]
+    mode: FoundMode, index: int, courses: Sequence[RingDownCourse], leads_s: Sequence[float]
 ) -> _Fit | None:
     """Return the estimate averaged over the laws; None where too little of the phase is known."""
     decay = 2 * math.pi * mode.frequency_hz * mode.damping_ratio
@@ -206,7 +206,7 @@ def _unlike_hz(rows: Sequence[Row]) -> float:
 
 
 def _unlike(
-    mode: FoundMode, index: int, courses: Sequence[Course], as_found: FoundMode
+    mode: FoundMode, index: int, courses: Sequence[RingDownCourse], as_found: FoundMode
 ) -> FoundMode:
     """Widen the mode's intervals where its amplitudes decay otherwise than its pole does.
 
@@ -223,10 +223,10 @@ def _unlike(
     )
 
 
-def _from_largest(course: Course, index: int, decay: float) -> Course:
+def _from_largest(course: RingDownCourse, index: int, decay: float) -> RingDownCourse:
     now = np.abs(course.motion[:, index]) * np.exp(-decay * course.middle_s)
     first = int(np.argmax(now[: max(1, len(now) // 2)]))
-    return Course(course.middle_s[first:], course.motion[first:], course.sd[first:])
+    return RingDownCourse(course.middle_s[first:], course.motion[first:], course.sd[first:])
 
 
 def _averaged(laws: Sequence[_Fit]) -> _Fit | None:

@@ -44,7 +44,7 @@ TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class RingDownCourse:
     """One ring-down in stretches, whose middles are at `middle_s`.
 
     `motion` (stretches, modes): complex amplitudes referred to its beginning, with standard
@@ -56,7 +56,7 @@ class Course:
     sd: FloatArray
 
 
-def course_of(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> Course:
+def course_of(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> RingDownCourse:
     samples = decay.shape[1]
     hop = max(int(_STRETCH_SECONDS * rate_hz) // 2, samples // _MOST_STRETCHES, 1)
     length = min(2 * hop, samples)
@@ -90,7 +90,7 @@ def course_of(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> 
     sd = np.hypot(sd, np.sqrt(np.abs(motion * _leaks(modes)) ** 2 @ unresolved))
     turned = np.exp(-np.outer(begin_s, poles))
     middle_s = begin_s + length / (2 * rate_hz)
-    return Course(middle_s, motion * turned, sd * np.abs(turned))
+    return RingDownCourse(middle_s, motion * turned, sd * np.abs(turned))
 
 
 def _leaks(modes: Sequence[FoundMode]) -> FloatArray:
@@ -103,7 +103,7 @@ Row = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 """Times, phases, their standard deviations; amplitudes referred to the beginning."""
 
 
-def phases_of(course: Course, index: int, decay: float) -> Row | None:
+def phases_of(course: RingDownCourse, index: int, decay: float) -> Row | None:
     """Return the stretches from the start in which the mode is above the rest; None for few."""
     motion, sd = course.motion[:, index], course.sd[:, index]
     now = np.abs(motion) * np.exp(-decay * course.middle_s)
@@ -162,7 +162,7 @@ def common_drift(drifts: Sequence[float], sds: Sequence[float]) -> Drift | None:
     return Drift(mean, mean_sd, len(value), sure)
 
 
-def with_drift(found: Finding, courses: Sequence[Course], hits: Sequence[Hit]) -> Finding:
+def with_drift(found: Finding, courses: Sequence[RingDownCourse], hits: Sequence[Hit]) -> Finding:
     """Return the finding with its drift; where that is sure, frequencies are known no closer.
 
     Which end of it is right nobody knows: half of it either way, as far as hits are in the
@@ -187,7 +187,7 @@ def with_drift(found: Finding, courses: Sequence[Course], hits: Sequence[Hit]) -
 
 
 def _drift(
-    mode: FoundMode, index: int, courses: Sequence[Course], shares: FloatArray
+    mode: FoundMode, index: int, courses: Sequence[RingDownCourse], shares: FloatArray
 ) -> tuple[float, float] | None:
     """Return the relative change from first to last hit and its standard deviation.
 

@@ -95,10 +95,10 @@ class _Candidate:
 
 @dataclass(frozen=True, eq=False)
 class _Numbered:
-    """Candidates with their orders, and of modes without one, by identity, the order or why not.
+    """Hold candidates with their orders, and modes without one by identity.
 
-    `askew` are of the other plane; `unsure` may have two orders; `undecided` counts the orders of
-    one axis of which nothing tells which mode is whose.
+    `cross_axis` are of the other plane; `unsure` may have two orders; `undecided` counts the orders
+    of one axis with two modes that cannot be assigned.
     """
 
     ordered: list[_Candidate]

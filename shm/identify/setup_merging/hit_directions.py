@@ -27,7 +27,7 @@ from shm.identify.estimation.poles import modal_assurance
 from shm.identify.estimation.repeats import LEAST_HITS
 from shm.identify.measuring.responses import place_of
 from shm.identify.mode_ordering.planes import transverse_share
-from shm.identify.setup_merging.join_set_ups import LARGEST_SHIFT, Joined, matched
+from shm.identify.setup_merging.join_set_ups import LARGEST_SHIFT, JoinedFinding, matched
 from shm.identify.setup_merging.modal_participation import ringing, with_levels
 from shm.values import PLANES, FloatArray, ResponsePoint
 
@@ -62,8 +62,8 @@ def pool_hits(measurements: Sequence[Measurement]) -> Measurement:
 
 
 def refine_by_direction(
-    measurements: Sequence[Measurement], apart: Joined, found: Finding
-) -> Joined:
+    measurements: Sequence[Measurement], apart: JoinedFinding, found: Finding
+) -> JoinedFinding:
     """Return the modes of all hits, completed by modes found `apart` in one direction.
 
     Those replace modes whose direction is unknown in all hits together, and add missing ones.
@@ -86,7 +86,7 @@ def _by_frequency(modes: Sequence[FoundMode]) -> tuple[FoundMode, ...]:
     return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
 
 
-def _as_joined(measurements: Sequence[Measurement], found: Finding) -> Joined:
+def _as_joined(measurements: Sequence[Measurement], found: Finding) -> JoinedFinding:
     """Return a finding over the points of all set-ups, with the levels at which its modes ring."""
     modes = found.modes
     if modes:
@@ -95,7 +95,7 @@ def _as_joined(measurements: Sequence[Measurement], found: Finding) -> Joined:
         )
     note = f"the hits of {len(measurements)} directions are identified together"
     apart = (modes,) * len(measurements)
-    return Joined(measurements[0].points, replace(found, modes=modes), apart, (note,))
+    return JoinedFinding(measurements[0].points, replace(found, modes=modes), apart, (note,))
 
 
 def _better(

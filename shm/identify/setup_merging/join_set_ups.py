@@ -39,7 +39,7 @@ _SEEN = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Joined:
+class JoinedFinding:
     """The modes of a test over `points`; `apart` are the same modes as each set-up has them."""
 
     points: tuple[ResponsePoint, ...]
@@ -50,7 +50,7 @@ class Joined:
 
 def join_set_ups(
     measurements: Sequence[Measurement], findings: Sequence[Finding], options: IdentifyOptions
-) -> Joined:
+) -> JoinedFinding:
     """Join the modes of all set-ups over all points; those of a single one are unchanged.
 
     Frequency and damping are pooled. A mode seen by one set-up only is accepted if three hits
@@ -64,29 +64,31 @@ def join_set_ups(
     dropped = _summed([d for finding in findings for d in finding.dropped]) + lost
     poles = _all_poles([finding.poles for finding in findings])
     if not accepted:
-        return Joined(measurements[0].points, Finding((), dropped, poles), ((),) * len(findings))
+        return JoinedFinding(
+            measurements[0].points, Finding((), dropped, poles), ((),) * len(findings)
+        )
     pools = [_pool(group, options.frequency_allowance) for group in accepted]
     apart = tuple(_as_seen(accepted, pools, number) for number in range(len(measurements)))
     points, modes = _over_all_points(measurements, pools, apart, accepted)
     drifts = [finding.drift for finding in findings if finding.drift is not None]
     drift = max(drifts, key=lambda each: (each.sure, abs(each.change)), default=None)
-    return Joined(
+    return JoinedFinding(
         points, Finding(modes, dropped, poles, drift=drift), apart, (_note(measurements),)
     )
 
 
-def _single(measurement: Measurement, found: Finding) -> Joined:
+def _single(measurement: Measurement, found: Finding) -> JoinedFinding:
     modes = found.modes
     if measurement.driven and modes:
         modes = with_levels(modes, [ringing(measurement, modes)])
-    return Joined(measurement.points, replace(found, modes=modes), (modes,))
+    return JoinedFinding(measurement.points, replace(found, modes=modes), (modes,))
 
 
 def _over_all_points(
     measurements: Sequence[Measurement],
     pools: Sequence[FoundMode],
     apart: Sequence[Sequence[FoundMode]],
-    groups: Sequence[Sequence[Seen]],
+    groups: Sequence[Sequence[ModeInSetUp]],
 ) -> tuple[tuple[ResponsePoint, ...], tuple[FoundMode, ...]]:
     """Return the pooled modes with their shapes over all points."""
     if measurements[0].driven:
@@ -124,8 +126,8 @@ def _note(measurements: Sequence[Measurement]) -> str:
 
 
 def _sorted_out(
-    groups: Sequence[list[Seen]], set_ups: int, hammered: bool
-) -> tuple[list[list[Seen]], tuple[Dropped, ...]]:
+    groups: Sequence[list[ModeInSetUp]], set_ups: int, hammered: bool
+) -> tuple[list[list[ModeInSetUp]], tuple[Dropped, ...]]:
     accepted, lost = [], []
     for group in groups:
         reason = _doubt(group, set_ups, hammered)
@@ -136,7 +138,7 @@ def _sorted_out(
     return accepted, tuple(lost)
 
 
-def _doubt(group: Sequence[Seen], set_ups: int, hammered: bool) -> str:
+def _doubt(group: Sequence[ModeInSetUp], set_ups: int, hammered: bool) -> str:
     """Return the reason why a mode is not accepted; empty where it is."""
     if not hammered and len(group) < set_ups:
         return "not seen in all set-ups, so its shape is not known at all points"
@@ -145,7 +147,7 @@ def _doubt(group: Sequence[Seen], set_ups: int, hammered: bool) -> str:
     return ""
 
 
-def _pool(group: Sequence[Seen], allowance: float) -> FoundMode:
+def _pool(group: Sequence[ModeInSetUp], allowance: float) -> FoundMode:
     """Return the mode with pooled frequency and damping, still without a shape."""
     modes = [seen.mode for seen in group]
     damping_sds = np.array([mode.damping_sd for mode in modes])
@@ -165,7 +167,7 @@ def _pool(group: Sequence[Seen], allowance: float) -> FoundMode:
 
 
 def _as_seen(
-    groups: Sequence[list[Seen]], pools: Sequence[FoundMode], number: int
+    groups: Sequence[list[ModeInSetUp]], pools: Sequence[FoundMode], number: int
 ) -> tuple[FoundMode, ...]:
     """Return each mode as this set-up has it, or as all have where it does not see it."""
     return tuple(
@@ -233,7 +235,7 @@ def _between(values: FloatArray, variances: FloatArray) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class ModeInSetUp:
     """A mode as one set-up sees it."""
 
     set_up: int
@@ -242,17 +244,17 @@ class Seen:
     transverse: float
 
     @staticmethod
-    def of(set_up: int, mode: FoundMode, measurement: Measurement) -> Seen:
+    def of(set_up: int, mode: FoundMode, measurement: Measurement) -> ModeInSetUp:
         places = [place_of(point) for point in measurement.points]
         both = not set(PLANES) - {point.plane for point in measurement.points}
         share = transverse_share(mode.shape, measurement.points) if both else np.nan
         shape = dict(zip(places, mode.shape.tolist(), strict=True))
-        return Seen(set_up, mode, shape, share)
+        return ModeInSetUp(set_up, mode, shape, share)
 
 
 def matched(
     measurements: Sequence[Measurement], found: Sequence[Sequence[FoundMode]]
-) -> list[list[Seen]]:
+) -> list[list[ModeInSetUp]]:
     """Return the modes of all set-ups in groups that are one mode each, by rising frequency.
 
     Set-ups are taken from the one with most modes on; each of its modes joins the nearest
@@ -260,16 +262,16 @@ def matched(
     allow.
     """
     seen = [
-        [Seen.of(index, mode, measurement) for mode in modes]
+        [ModeInSetUp.of(index, mode, measurement) for mode in modes]
         for index, (measurement, modes) in enumerate(zip(measurements, found, strict=True))
     ]
-    groups: list[list[Seen]] = []
+    groups: list[list[ModeInSetUp]] = []
     for modes in sorted(seen, key=len, reverse=True):
         _take_in(groups, modes)
     return sorted(groups, key=_frequency)
 
 
-def _take_in(groups: list[list[Seen]], modes: Sequence[Seen]) -> None:
+def _take_in(groups: list[list[ModeInSetUp]], modes: Sequence[ModeInSetUp]) -> None:
     cost = np.array([[_cost(group, mode) for group in groups] for mode in modes])
     cost = cost.reshape(len(modes), len(groups))
     joined = {
@@ -284,11 +286,11 @@ def _take_in(groups: list[list[Seen]], modes: Sequence[Seen]) -> None:
             groups.append([mode])
 
 
-def _frequency(group: Sequence[Seen]) -> float:
+def _frequency(group: Sequence[ModeInSetUp]) -> float:
     return float(np.mean([seen.mode.frequency_hz for seen in group]))
 
 
-def _cost(group: Sequence[Seen], mode: Seen) -> float:
+def _cost(group: Sequence[ModeInSetUp], mode: ModeInSetUp) -> float:
     shift = abs(mode.mode.frequency_hz / _frequency(group) - 1)
     likeness = float(np.mean([_likeness(member, mode) for member in group]))
     if shift > LARGEST_SHIFT or likeness < LEAST_LIKENESS:
@@ -296,7 +298,7 @@ def _cost(group: Sequence[Seen], mode: Seen) -> float:
     return shift / LARGEST_SHIFT + 1 - likeness
 
 
-def _likeness(one: Seen, other: Seen) -> float:
+def _likeness(one: ModeInSetUp, other: ModeInSetUp) -> float:
     """Return the MAC on common points; else of the directions; 1 where nothing is common."""
     common = sorted(one.shape.keys() & other.shape.keys(), key=str)
     shapes = [np.array([seen.shape[place] for place in common]) for seen in (one, other)]

@@ -12,9 +12,9 @@ from shm.report.contents import BridgeReport
 from shm.report.figures.specification import (
     Axis,
     Bars,
+    FigureSpec,
     Illustration,
     Mark,
-    Member,
     Panel,
     Points,
     Rule,
@@ -144,7 +144,7 @@ def _alt_of_shifts(pattern: BridgePattern) -> str:
     return f"Shifts of the tension of {len(pattern.rows)} hangers along the bridge: {which}."
 
 
-SHIFTS = Member(
+SHIFTS = FigureSpec(
     "bridge_shift", "Shifts along the bridge", specify_shifts, _caption_of_shifts, _alt_of_shifts
 )
 
@@ -233,7 +233,7 @@ def _alt_of_tensions(data: BridgeReport) -> str:
     return f"Tension over nominal of {formatting.counted(len(each), 'hanger')}: {', '.join(each)}."
 
 
-TENSIONS = Member(
+TENSIONS = FigureSpec(
     "bridge_tension",
     "Tension of the hangers",
     specify_tensions,

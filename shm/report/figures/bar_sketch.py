@@ -107,4 +107,4 @@ def _alt(bar: BarDescription) -> str:
     )
 
 
-FIGURE = spec.Member[BarDescription]("sketch", "Sensors and hits", specify, _caption, _alt)
+FIGURE = spec.FigureSpec[BarDescription]("sketch", "Sensors and hits", specify, _caption, _alt)

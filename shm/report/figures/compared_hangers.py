@@ -25,7 +25,7 @@ MOST = len(_MARKS)
 
 
 @dataclass(frozen=True)
-class Course:
+class TensionShifts:
     """A hanger's n tests: shifts of the tension as fractions, with 90 % of their repeatability."""
 
     name: str
@@ -34,7 +34,7 @@ class Course:
     shifts: Sequence[Interval]
 
 
-def specify(courses: Sequence[Course]) -> spec.Specification:
+def specify(courses: Sequence[TensionShifts]) -> spec.Specification:
     """Return one panel in which each hanger has its colour and symbol."""
     marks: list[spec.Mark] = [level(0.0, "baseline", "quiet", "dot")]
     for course, (colour, symbol) in zip(courses, _MARKS, strict=False):
@@ -44,7 +44,7 @@ def specify(courses: Sequence[Course]) -> spec.Specification:
     return spec.stacked([spec.Panel(y=axis, marks=marks, x=time_axis(times))], 3.8, MOST + 1)
 
 
-def _marks(course: Course, colour: str, symbol: spec.Symbol) -> list[spec.Mark]:
+def _marks(course: TensionShifts, colour: str, symbol: spec.Symbol) -> list[spec.Mark]:
     bounds = bounds_of(course.shifts)
     chosen = places(bounds.middle, bounds.low, bounds.high)
     shown = part(bounds, chosen, 100)  # in percent
@@ -66,7 +66,7 @@ def _words(shift: Interval) -> str:
     return rounded_percent(shift.mean, shift.width / 2, "+")
 
 
-def caption(courses: Sequence[Course]) -> str:
+def caption(courses: Sequence[TensionShifts]) -> str:
     """Explain what is seen."""
     return (
         "Tension of each test since the hanger's own baseline, with 90 % of what a repetition of "
@@ -77,7 +77,7 @@ def caption(courses: Sequence[Course]) -> str:
     )
 
 
-def alt(courses: Sequence[Course]) -> str:
+def alt(courses: Sequence[TensionShifts]) -> str:
     """Return the latest value of each hanger for a blind reader."""
     latest = [
         f"{each.name} {_words(each.shifts[-1])} over {formatting.counted(len(each.times), 'test')}"

@@ -43,7 +43,7 @@ def _tests(points: list[ControlPoint], colour: str, symbol: spec.Symbol, name: s
     )  # fmt: skip
 
 
-FIGURE = spec.Member[ControlChart | None](
+FIGURE = spec.FigureSpec[ControlChart | None](
     "control",
     "Control chart",
     specify,

@@ -18,20 +18,20 @@ from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.modal_test_hits import FIGURE as HITS
 from shm.report.figures.modal_test_modes import SHAPES, STABILISATION
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
-from shm.report.figures.modal_test_response import Shown
+from shm.report.figures.modal_test_response import ResponseCurves
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
-from shm.report.figures.specification import Illustration, Member, drawn
+from shm.report.figures.specification import FigureSpec, Illustration, drawn
 from shm.values import BridgeDiagnosis, GapCheck
 
-OF_HANGER: tuple[Member[HangerReport], ...] = (
+OF_HANGER: tuple[FigureSpec[HangerReport], ...] = (
     TREND, TENSION, FREQUENCIES, STIFFNESS
 )  # fmt: skip
-OF_MODAL_TEST: tuple[Member[Shown], ...] = (
+OF_MODAL_TEST: tuple[FigureSpec[ResponseCurves], ...] = (
     TIME_HISTORY, HITS, RESPONSE, STABILISATION, SHAPES
 )  # fmt: skip
-OF_DIAGNOSIS: tuple[Member[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER)
-OF_BRIDGE_DIAGNOSIS: tuple[Member[BridgeDiagnosis], ...] = (SHARED,)
-OF_GAP_CHECK: tuple[Member[GapCheck], ...] = (CHECK,)
+OF_DIAGNOSIS: tuple[FigureSpec[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER)
+OF_BRIDGE_DIAGNOSIS: tuple[FigureSpec[BridgeDiagnosis], ...] = (SHARED,)
+OF_GAP_CHECK: tuple[FigureSpec[GapCheck], ...] = (CHECK,)
 OF_HANGER_NAMES = frozenset(each.name for each in OF_HANGER)
 
 
@@ -50,7 +50,7 @@ def bridge_figures(data: BridgeReport) -> tuple[Illustration, ...]:
 
 def modal_test_figures(sheet: ModalTestReport) -> tuple[Illustration, ...]:
     """Return all of one hammer test."""
-    return drawn(OF_MODAL_TEST, Shown.of(sheet))
+    return drawn(OF_MODAL_TEST, ResponseCurves.of(sheet))
 
 
 def diagnosis_figures(sheet: DiagnosisSheet) -> tuple[Illustration, ...]:

@@ -119,7 +119,7 @@ def _rms(residuals: Sequence[Residual], plane: Plane, field: str) -> str:
     return f"{formatting.plain(float(np.sqrt(np.mean(np.square(known)))), 2)} %"
 
 
-BEFORE_AND_AFTER = spec.Member(
+BEFORE_AND_AFTER = spec.FigureSpec(
     "before_and_after",
     "The gap before and after by mode",
     specify,

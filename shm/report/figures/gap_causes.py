@@ -185,7 +185,7 @@ def _alt(sheet: DiagnosisSheet) -> str:
     return f"{write_lead(sheet.diagnosis)} Probabilities: {'; '.join(bars)}."
 
 
-FIGURE = spec.Member("causes", "What causes the gap", specify, caption, _alt)
+FIGURE = spec.FigureSpec("causes", "What causes the gap", specify, caption, _alt)
 
 
 _INCHES = 4.2  # technical: two panels of the height that others have
@@ -262,6 +262,6 @@ def _shared_alt(diagnosis: BridgeDiagnosis) -> str:
     return f"Probability of {what}: {', '.join(wording)}."
 
 
-SHARED = spec.Member(
+SHARED = spec.FigureSpec(
     "shared", "Who has it, and of which size", specify_shared, shared_caption, _shared_alt
 )

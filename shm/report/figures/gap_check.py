@@ -107,4 +107,4 @@ def _alt(check: GapCheck) -> str:
     return f"{'; '.join(HEADINGS)}: {'. '.join(wording)}."
 
 
-FIGURE = spec.Member("gap_check", "What a diagnosis would find", specify, caption, _alt)
+FIGURE = spec.FigureSpec("gap_check", "What a diagnosis would find", specify, caption, _alt)

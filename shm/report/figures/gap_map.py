@@ -296,4 +296,4 @@ def _alt(sheet: DiagnosisSheet) -> str:
     return f"{count} of frequencies; the largest: {wording}.{gross_words}{there}"
 
 
-FIGURE = spec.Member("gap_map", "Where the gap lies", specify, caption, _alt)
+FIGURE = spec.FigureSpec("gap_map", "Where the gap lies", specify, caption, _alt)

@@ -108,4 +108,6 @@ def _alt(data: HangerReport) -> str:
     )
 
 
-FIGURE = spec.Member("frequencies", "Predicted over measured frequencies", specify, _caption, _alt)
+FIGURE = spec.FigureSpec(
+    "frequencies", "Predicted over measured frequencies", specify, _caption, _alt
+)

@@ -24,7 +24,7 @@ END_STIFFNESS_UNIT = "N m/rad"
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class StiffnessHistory:
     """One stiffness over time, as the log10 of it in `unit` (N/m a node for a solid class).
 
     `baseline` is NaN where there is none; `state` is what all tests up to each say together.
@@ -40,7 +40,7 @@ class Course:
 
 
 def specify(
-    courses: Sequence[Course], reach_decades: float, is_on_screen: bool = False
+    courses: Sequence[StiffnessHistory], reach_decades: float, is_on_screen: bool = False
 ) -> spec.Specification | None:
     """Return side by side on paper, one below the other on a screen, which may be narrow."""
     if not courses:
@@ -72,7 +72,7 @@ def _in_millions(decades: Bounds) -> Bounds:
     return Bounds(*(10.0 ** (each - 6) for each in (decades.low, decades.middle, decades.high)))
 
 
-def _panel(course: Course, reach: float, is_on_screen: bool) -> spec.Panel:
+def _panel(course: StiffnessHistory, reach: float, is_on_screen: bool) -> spec.Panel:
     alone = course.alone
     chosen = time_axes.places(alone.middle, alone.low, alone.high)
     when = [course.times[place] for place in chosen.tolist()]
@@ -109,7 +109,7 @@ def _panel(course: Course, reach: float, is_on_screen: bool) -> spec.Panel:
     )  # fmt: skip
 
 
-def caption(courses: Sequence[Course], reach_decades: float, remark: str = "") -> str:
+def caption(courses: Sequence[StiffnessHistory], reach_decades: float, remark: str = "") -> str:
     what = (
         "Stiffness of the ends in MN m/rad (MN/m per node for a solid class), by each test "
         "and as a state from all tests up to each, with 90 % intervals; the ends stand apart where "
@@ -132,12 +132,12 @@ def caption(courses: Sequence[Course], reach_decades: float, remark: str = "") -
     )
 
 
-def alt(courses: Sequence[Course]) -> str:
+def alt(courses: Sequence[StiffnessHistory]) -> str:
     wording = "; ".join(_last(course) for course in courses)
     return f"End stiffness over time; at last: {wording}."
 
 
-def _last(course: Course) -> str:
+def _last(course: StiffnessHistory) -> str:
     bounds = course.alone if course.state is None else course.state
     low, middle, high = (float(each[-1]) for each in (bounds.low, bounds.middle, bounds.high))
     if math.isnan(middle):
@@ -145,11 +145,11 @@ def _last(course: Course) -> str:
     return f"{course.title} {size_of('log10_k', course.unit, Interval(middle, low, high))}"
 
 
-def _courses(data: HangerReport) -> list[Course]:
+def _courses(data: HangerReport) -> list[StiffnessHistory]:
     rows = time_axes.dated(data)
     base = end_stiffness(data.baseline, data.hanger) if data.baseline else {}
     return [
-        Course(
+        StiffnessHistory(
             formatting.quantity(name),
             [row.time for row in rows],
             [row.row.test for row in rows],
@@ -169,7 +169,7 @@ def _reach(data: HangerReport) -> float:
     return data.hanger.thresholds.stiffness_shift_decades
 
 
-FIGURE = spec.Member[HangerReport](
+FIGURE = spec.FigureSpec[HangerReport](
     "stiffness",
     "Trend of the end stiffness",
     lambda data: specify(_courses(data), _reach(data)),

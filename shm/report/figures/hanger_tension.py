@@ -83,6 +83,6 @@ def _alt(data: HangerReport) -> str:
     return f"Histogram of {len(data.posterior.samples)} posterior samples of tension, {tension}."
 
 
-FIGURE = spec.Member[HangerReport](
+FIGURE = spec.FigureSpec[HangerReport](
     "tension", "Posterior of the tension by the latest test", specify, _caption, _alt
 )

@@ -32,7 +32,7 @@ _SYMBOLS: dict[NoteKind, tuple[spec.Symbol, bool]] = {
 
 
 @dataclass(frozen=True)
-class Deed:
+class TrendEvent:
     """An action of a person, and why: it is drawn at the foot of the figure."""
 
     kind: str
@@ -44,7 +44,7 @@ class Deed:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class TensionHistory:
     """The tension of a hanger over time: n tests in N, and what is known beside them.
 
     `alerts` say by the place of a test why it raised one. `state` is at `state_times`; `changes`
@@ -63,7 +63,7 @@ class Course:
     state_times: Sequence[datetime] = ()
     reference_temperature_c: float = math.nan
     changes: Sequence[CalledChange] | None = None
-    deeds: Sequence[Deed] = ()
+    deeds: Sequence[TrendEvent] = ()
     notes: Sequence[Note] = ()
     excluded: Collection[int] = ()
     remark: str = ""
@@ -78,7 +78,7 @@ class Course:
         return force_unit(*(each.mean for each in self.tensions_n))
 
 
-def specify(course: Course) -> spec.Specification | None:
+def specify(course: TensionHistory) -> spec.Specification | None:
     if not course.times:
         return None
     scale, bounds = 1 / course.unit.newtons, course.bounds_n
@@ -107,7 +107,7 @@ def specify(course: Course) -> spec.Specification | None:
     )
 
 
-def _shown(course: Course) -> list[datetime]:
+def _shown(course: TensionHistory) -> list[datetime]:
     """Return the times of the tests, and of what was noted after the last of them."""
     last = max(course.times)
     return [*course.times, *(each.at for each in course.notes if each.at > last)]
@@ -117,7 +117,7 @@ def _picked(times: Sequence[datetime], chosen: list[int]) -> list[datetime]:
     return [times[place] for place in chosen]
 
 
-def _state(course: Course, scale: float) -> list[spec.Mark]:
+def _state(course: TensionHistory, scale: float) -> list[spec.Mark]:
     if course.state is None:
         return []
     band = course.state.filtered
@@ -126,11 +126,11 @@ def _state(course: Course, scale: float) -> list[spec.Mark]:
     return time_axes.band(when, time_axes.part(band, chosen, scale), "blue", "state, 90 % band")
 
 
-def _has_repeats(course: Course) -> bool:
+def _has_repeats(course: TensionHistory) -> bool:
     return course.state is None and any(e.repeatability_sd is not None for e in course.tensions_n)
 
 
-def _repeats(course: Course, chosen: list[int], scale: float) -> list[spec.Mark]:
+def _repeats(course: TensionHistory, chosen: list[int], scale: float) -> list[spec.Mark]:
     """Return the interval in which the same test would repeat, within the absolute one."""
     if not _has_repeats(course):
         return []
@@ -150,7 +150,7 @@ def _repeats(course: Course, chosen: list[int], scale: float) -> list[spec.Mark]
     ]  # fmt: skip
 
 
-def _levels(course: Course, scale: float) -> list[spec.Mark]:
+def _levels(course: TensionHistory, scale: float) -> list[spec.Mark]:
     levels: list[spec.Mark] = [time_axes.level(scale * course.nominal_n, "nominal", "ink", "dot")]
     if course.baseline_n is not None:
         mean = scale * course.baseline_n
@@ -162,7 +162,7 @@ def _levels(course: Course, scale: float) -> list[spec.Mark]:
     return levels
 
 
-def _alerts(course: Course, scale: float) -> list[spec.Mark]:
+def _alerts(course: TensionHistory, scale: float) -> list[spec.Mark]:
     """Return a triangle at each test that raised an alert."""
     if not course.alerts:
         return []
@@ -176,7 +176,7 @@ def _alerts(course: Course, scale: float) -> list[spec.Mark]:
     ]  # fmt: skip
 
 
-def _excluded(course: Course, scale: float) -> list[spec.Mark]:
+def _excluded(course: TensionHistory, scale: float) -> list[spec.Mark]:
     """Mark tests taken for blunders; where they lie beyond the view, at its edge."""
     low, high = _range(course, scale)
     found: list[spec.Mark] = []
@@ -198,7 +198,7 @@ def _excluded(course: Course, scale: float) -> list[spec.Mark]:
     return found
 
 
-def _deeds(course: Course) -> list[spec.Mark]:
+def _deeds(course: TensionHistory) -> list[spec.Mark]:
     """Return the marks of what people did and noted, by kind."""
     deeds = [*course.deeds, *_noted(course.notes)]
     kinds = {deed.kind: deed for deed in deeds}
@@ -213,9 +213,9 @@ def _deeds(course: Course) -> list[spec.Mark]:
     ]  # fmt: skip
 
 
-def _noted(notes: Sequence[Note]) -> list[Deed]:
+def _noted(notes: Sequence[Note]) -> list[TrendEvent]:
     return [
-        Deed(
+        TrendEvent(
             each.kind,
             *_SYMBOLS[each.kind],
             "ink",
@@ -226,7 +226,7 @@ def _noted(notes: Sequence[Note]) -> list[Deed]:
     ]
 
 
-def _range(course: Course, scale: float) -> tuple[float, float]:
+def _range(course: TensionHistory, scale: float) -> tuple[float, float]:
     """Return the range of tests, state, baseline, thresholds and a nominal tension close by.
 
     Single wide intervals may exceed it.
@@ -248,12 +248,12 @@ def _range(course: Course, scale: float) -> tuple[float, float]:
     return scale * low, scale * (high + written * (high - low))
 
 
-def caption(course: Course) -> str:
+def caption(course: TensionHistory) -> str:
     parts = (_tests(course), _lines(course), _marks(course), course.remark)
     return " ".join(part for part in parts if part)
 
 
-def _tests(course: Course) -> str:
+def _tests(course: TensionHistory) -> str:
     if course.state is None:
         repeats = (
             " Capped orange bars: where the same test would fall again with 90 % probability "
@@ -277,7 +277,7 @@ def _tests(course: Course) -> str:
     )
 
 
-def _lines(course: Course) -> str:
+def _lines(course: TensionHistory) -> str:
     if course.baseline_n is None:
         return "Dotted: nominal."
     return (
@@ -286,7 +286,7 @@ def _lines(course: Course) -> str:
     )
 
 
-def _marks(course: Course) -> str:
+def _marks(course: TensionHistory) -> str:
     wording = [
         "triangles: alerts" if course.alerts else "",
         "upright spans: when a detected change began, with 90 % probability"
@@ -302,7 +302,7 @@ def _marks(course: Course) -> str:
     return ((found[:1].upper() + found[1:] + "." if found else "") + fewer).strip()
 
 
-def alt(course: Course) -> str:
+def alt(course: TensionHistory) -> str:
     first, last = (
         f"{formatting.tension(course.tensions_n[place], course.unit)} on "
         f"{course.times[place]:%Y-%m-%d}"
@@ -317,14 +317,14 @@ def alt(course: Course) -> str:
     return f"Tension over {count}, {first} at first, {last} at last.{called}"
 
 
-def _course(data: HangerReport) -> Course:
+def _course(data: HangerReport) -> TensionHistory:
     rows = time_axes.dated(data)
     alerted = {alert.test: alert.message for alert in data.alerts}
     undated = len(data.trend) - len(rows)
     baseline_n = data.now.baseline_n
     states = data.states.within(data.period)
     left = f"{formatting.counted(undated, 'test')} without a time left out." if undated else ""
-    return Course(
+    return TensionHistory(
         times=[row.time for row in rows],
         names=[row.row.test for row in rows],
         tensions_n=[row.row.tension_n for row in rows],
@@ -364,7 +364,7 @@ def excluded(times: Sequence[datetime], states: StatesOverTime) -> tuple[int, ..
     return tuple(place for place, time in enumerate(times) if time in outliers)
 
 
-FIGURE = spec.Member[HangerReport](
+FIGURE = spec.FigureSpec[HangerReport](
     "trend",
     "Trend of the tension",
     lambda data: specify(_course(data)),

@@ -14,7 +14,7 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
 from shm.report.figures import specification as spec
-from shm.report.figures.modal_test_response import Shown, searched_range
+from shm.report.figures.modal_test_response import ResponseCurves, searched_range
 from shm.values import NAN, BoolArray, Channel, FloatArray, Recording
 
 if TYPE_CHECKING:
@@ -263,7 +263,7 @@ _DROPPED_DASHES: tuple[spec.Dash, ...] = ("dash", "dot", "dashdot", "longdash")
 _FADE_ROOM = 1.3  # layout: room to the right of the last hit
 
 
-def _draw(shown: Shown) -> spec.Specification | None:
+def _draw(shown: ResponseCurves) -> spec.Specification | None:
     hits = shown_hits(shown.sheet)
     if not hits:
         return None
@@ -305,7 +305,7 @@ def _pulses(hits: Sequence[HitRecord]) -> spec.Panel:
     )  # fmt: skip
 
 
-def _force_spectra(shown: Shown, hits: Sequence[HitRecord]) -> spec.Panel:
+def _force_spectra(shown: ResponseCurves, hits: Sequence[HitRecord]) -> spec.Panel:
     highest = float(hits[0].spectrum_hz[-1])
     low, high = searched_range(shown.sheet)
     high = min(high, highest)
@@ -353,7 +353,7 @@ def _fades(hits: Sequence[HitRecord]) -> spec.Panel:
     )  # fmt: skip
 
 
-def _caption(shown: Shown) -> str:
+def _caption(shown: ResponseCurves) -> str:
     sheet = shown.sheet
     some = formatting.some(len(shown_hits(sheet)), len(sheet.hits), "hits")
     return (
@@ -364,7 +364,7 @@ def _caption(shown: Shown) -> str:
     )
 
 
-def _alt(shown: Shown) -> str:
+def _alt(shown: ResponseCurves) -> str:
     hits = shown_hits(shown.sheet)
     reaches = [b.reach_hz for b in hits if b.hit.used and np.isfinite(b.reach_hz)]
     forces = [hit_record.hit.peak_force_n for hit_record in hits]
@@ -375,4 +375,4 @@ def _alt(shown: Shown) -> str:
     )
 
 
-FIGURE = spec.Member("hits", "Hits: pulses, force spectra, ring-downs", _draw, _caption, _alt)
+FIGURE = spec.FigureSpec("hits", "Hits: pulses, force spectra, ring-downs", _draw, _caption, _alt)

@@ -11,7 +11,7 @@ from shm.report import formatting
 from shm.report.contents import ModalTestReport
 from shm.report.figures import specification as spec
 from shm.report.figures.modal_test_response import (
-    Shown,
+    ResponseCurves,
     Spectrum,
     mode_marks,
     shown_range,
@@ -25,7 +25,7 @@ _BINS = 550
 _LEAST_SPAN = 2.0
 
 
-def _draw_poles(shown: Shown) -> spec.Specification | None:
+def _draw_poles(shown: ResponseCurves) -> spec.Specification | None:
     poles = shown.sheet.identification.poles
     if not len(poles.order):
         return None
@@ -48,7 +48,7 @@ def _draw_poles(shown: Shown) -> spec.Specification | None:
 
 
 def _poles(
-    shown: Shown, which: BoolArray, name: str, symbol: spec.Symbol, colour: str
+    shown: ResponseCurves, which: BoolArray, name: str, symbol: spec.Symbol, colour: str
 ) -> spec.Points:
     poles = shown.sheet.identification.poles
     return spec.Points(
@@ -81,7 +81,7 @@ def _background(
     ]  # fmt: skip
 
 
-def _poles_caption(shown: Shown) -> str:
+def _poles_caption(shown: ResponseCurves) -> str:
     poles = shown.sheet.identification.poles
     stable = int(np.sum(poles.stable))
     return (
@@ -91,12 +91,12 @@ def _poles_caption(shown: Shown) -> str:
     )
 
 
-def _poles_alt(shown: Shown) -> str:
+def _poles_alt(shown: ResponseCurves) -> str:
     listed = ", ".join(f"{m.plane} {m.order} at {m.frequency_hz:.2f} Hz" for m in shown.sheet.modes)
     return f"Stabilisation diagram with {len(shown.sheet.modes)} chosen modes: {listed}."
 
 
-STABILISATION = spec.Member(
+STABILISATION = spec.FigureSpec(
     "stabilisation", "Stabilisation diagram", _draw_poles, _poles_caption, _poles_alt
 )
 
@@ -177,7 +177,7 @@ _MOST_ON_SCREEN = 4
 _PANEL_INCHES = 1.12
 
 
-def _draw_shapes(shown: Shown) -> spec.Specification | None:
+def _draw_shapes(shown: ResponseCurves) -> spec.Specification | None:
     sheet = shown.sheet
     if not shown_modes(sheet):
         return None
@@ -239,7 +239,7 @@ def _shape_panel(sheet: ModalTestReport, mode: Mode) -> spec.Panel:
     )  # fmt: skip
 
 
-def _shapes_caption(shown: Shown) -> str:
+def _shapes_caption(shown: ResponseCurves) -> str:
     sheet = shown.sheet
     line = (
         "The thin line is no measurement: it is the shape of a taut string of that order, brought "
@@ -255,11 +255,11 @@ def _shapes_caption(shown: Shown) -> str:
     )
 
 
-def _shapes_alt(shown: Shown) -> str:
+def _shapes_alt(shown: ResponseCurves) -> str:
     modes = shown_modes(shown.sheet)
     places = len({point.x_m for mode in modes for point in mode.shape})
     listed = ", ".join(f"{mode.plane} {mode.order}" for mode in modes)
     return f"Shapes of {len(modes)} modes at {formatting.counted(places, 'place')}: {listed}."
 
 
-SHAPES = spec.Member("shapes", "Mode shapes", _draw_shapes, _shapes_caption, _shapes_alt)
+SHAPES = spec.FigureSpec("shapes", "Mode shapes", _draw_shapes, _shapes_caption, _shapes_alt)

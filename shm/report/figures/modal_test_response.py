@@ -59,7 +59,7 @@ def spectrum(sheet: ModalTestReport) -> Spectrum | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ResponseCurves:
     """A sheet, the curve its modes are peaks of, and on screen which response of it is asked for.
 
     `point` is an index into the points of `spectrum`; None on paper, where several are shown.
@@ -70,7 +70,7 @@ class Shown:
     point: int | None = None
 
     @classmethod
-    def of(cls, sheet: ModalTestReport, point: int | None = None) -> Shown:
+    def of(cls, sheet: ModalTestReport, point: int | None = None) -> ResponseCurves:
         """Return the curves computed from the records of the sheet, which must be there."""
         return cls(sheet, spectrum(sheet), point)
 
@@ -215,7 +215,7 @@ _BINS = 550
 _HOVER = "%{x:.2f} Hz: %{y:.4g}"
 
 
-def _draw(shown: Shown) -> spec.Specification | None:
+def _draw(shown: ResponseCurves) -> spec.Specification | None:
     found, points = shown.spectrum, _points(shown)
     if found is None or not points:
         return None
@@ -233,7 +233,7 @@ def _draw(shown: Shown) -> spec.Specification | None:
     return spec.stacked(panels, sum(panel.height for panel in panels) + 0.7, legend_columns=3)
 
 
-def _points(shown: Shown) -> list[int]:
+def _points(shown: ResponseCurves) -> list[int]:
     """Return indices of the points that are drawn."""
     if shown.spectrum is None:
         return []
@@ -249,7 +249,7 @@ def _lines(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> slice:
 
 
 def _magnitude(
-    shown: Shown, found: Spectrum, index: int, band_hz: tuple[float, float]
+    shown: ResponseCurves, found: Spectrum, index: int, band_hz: tuple[float, float]
 ) -> spec.Panel:  # fmt: skip
     point, fit = found.points[index], shown.sheet.identification.fit
     lines = _lines(found.frequency_hz, band_hz)
@@ -282,7 +282,7 @@ def _curve(
 
 
 def _phase(
-    shown: Shown, response: FrequencyResponse, index: int, band_hz: tuple[float, float]
+    shown: ResponseCurves, response: FrequencyResponse, index: int, band_hz: tuple[float, float]
 ) -> spec.Panel:
     """Return phase from -90 to 270 degrees, so that 0 and 180, where it jumps, are inside."""
     lines, fit = _lines(response.frequency_hz, band_hz), shown.sheet.identification.fit
@@ -304,7 +304,10 @@ def _degrees(values: ComplexArray) -> FloatArray:
 
 
 def _coherence(
-    shown: Shown, response: FrequencyResponse, points: Sequence[int], band_hz: tuple[float, float]
+    shown: ResponseCurves,
+    response: FrequencyResponse,
+    points: Sequence[int],
+    band_hz: tuple[float, float],
 ) -> spec.Panel:
     assert response.coherence is not None
     lines, marks, seen = _lines(response.frequency_hz, band_hz), [], set()
@@ -322,7 +325,7 @@ def point_name(point: ResponsePoint) -> str:
     return formatting.place(point.name, point.plane, point.x_m)
 
 
-def _caption(shown: Shown) -> str:
+def _caption(shown: ResponseCurves) -> str:
     found, identified = shown.spectrum, shown.sheet.identification
     assert found is not None
     response = identified.frequency_response
@@ -356,7 +359,7 @@ def _begun(text: str) -> str:
 _MARKS = "Marks and lines: modes by plane, with their order where there is room."
 
 
-def _alt(shown: Shown) -> str:
+def _alt(shown: ResponseCurves) -> str:
     sheet = shown.sheet
     modes = sorted(sheet.modes, key=lambda mode: mode.frequency_hz)
     listed = ", ".join(f"{m.plane} {m.order} at {m.frequency_hz:.2f} Hz" for m in modes)
@@ -366,4 +369,4 @@ def _alt(shown: Shown) -> str:
     return f"{kind} with {len(modes)} identified modes: {listed}."
 
 
-FIGURE = spec.Member("response", "Response and modes", _draw, _caption, _alt)
+FIGURE = spec.FigureSpec("response", "Response and modes", _draw, _caption, _alt)

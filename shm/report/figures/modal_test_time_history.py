@@ -23,7 +23,7 @@ from shm.report.figures.modal_test_hits import (
     thinned,
     unknown_times_s,
 )
-from shm.report.figures.modal_test_response import Shown
+from shm.report.figures.modal_test_response import ResponseCurves
 from shm.values import FloatArray
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ _MARKS_AT, _ROOM = 0.84, 0.35
 above the curve that is left to them, as a share of the curve's."""
 
 
-def _draw(shown: Shown) -> spec.Specification | None:
+def _draw(shown: ResponseCurves) -> spec.Specification | None:
     sheet, records = shown.sheet, shown.sheet.recordings
     if not records or not records[0].accelerations:
         return None
@@ -195,7 +195,7 @@ def _zoom(
     return [curve, spec.Rule(at=0, axis="x", colour="green", width=0.7)]
 
 
-def _caption(shown: Shown) -> str:
+def _caption(shown: ResponseCurves) -> str:
     sheet = shown.sheet
     channels = len(sheet.recordings[0].accelerations)
     some = formatting.some(len(shown_rows(sheet)), channels, "accelerations")
@@ -212,7 +212,7 @@ def _caption(shown: Shown) -> str:
     )
 
 
-def _alt(shown: Shown) -> str:
+def _alt(shown: ResponseCurves) -> str:
     sheet = shown.sheet
     seconds = sum(record.duration_s for record in sheet.recordings)
     used = formatting.counted(len(sheet.used_hits), "hit")
@@ -225,4 +225,4 @@ def _alt(shown: Shown) -> str:
     return f"The signals of {seconds:.3g} s of records; {used} used{left}."
 
 
-FIGURE = spec.Member("time_history", "Time histories with the hits", _draw, _caption, _alt)
+FIGURE = spec.FigureSpec("time_history", "Time histories with the hits", _draw, _caption, _alt)

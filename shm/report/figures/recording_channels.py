@@ -51,4 +51,4 @@ def _alt(recording: Recording) -> str:
     return f"Time histories of {names} over {recording.duration_s:.4g} s."
 
 
-FIGURE = spec.Member[Recording]("recording", "Channels over time", specify, _caption, _alt)
+FIGURE = spec.FigureSpec[Recording]("recording", "Channels over time", specify, _caption, _alt)

@@ -269,7 +269,7 @@ _COLUMNS_AN_INCH = 17  # layout: letters of the smallest size, about half as wid
 
 
 @dataclass(frozen=True)
-class Member(Generic[Data]):
+class FigureSpec(Generic[Data]):
     """Define a figure: `draw` gives None where `Data` lacks what it shows.
 
     `caption` explains what is seen, `alt` says what a blind reader needs. Figures on paper only
@@ -312,13 +312,13 @@ class Illustration:
         return png(self.figure, dots_per_inch)
 
 
-def drawn(members: Sequence[Member[Data]], data: Data) -> tuple[Illustration, ...]:
+def drawn(members: Sequence[FigureSpec[Data]], data: Data) -> tuple[Illustration, ...]:
     """Return every figure that `data` holds enough for, in the order of `members`."""
     made = (illustration(member, data) for member in members)
     return tuple(each for each in made if each is not None)
 
 
-def illustration(member: Member[Data], data: Data) -> Illustration | None:
+def illustration(member: FigureSpec[Data], data: Data) -> Illustration | None:
     """Return the figure with its words; None where `data` lacks what it shows."""
     figure = member.figure(data)
     if figure is None:

@@ -23,7 +23,7 @@ _OF_HEALTH = ("dead", "drifting", "swapped", "saturated", "clock step", "lost mo
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class StreamHistory:
     """`spectrum_db` (windows, lines) over `line_hz` (lines,), empty where none was kept.
 
     `hours` are the middles of hours, or of what they are pooled to (`period`). `modes` are their
@@ -54,7 +54,7 @@ class Course:
         return {name: self.modes[name] for name in names if seen[name]}
 
 
-def specify(course: Course) -> spec.Specification:
+def specify(course: StreamHistory) -> spec.Specification:
     """Return panels over one time axis: spectrum, frequencies, tension with sensor events."""
     when = [*course.window_times, *course.hours]
     time = spec.Axis(label="time (UTC)", scale="date", range=(min(when), max(when)))
@@ -65,7 +65,7 @@ def specify(course: Course) -> spec.Specification:
     return spec.stacked(panels, 6.4)
 
 
-def _spectrogram(course: Course) -> spec.Panel:
+def _spectrogram(course: StreamHistory) -> spec.Panel:
     z = course.spectrum_db.T
     floor, top = np.nanquantile(z, [0.1, 0.995])
     heat = spec.Heat(
@@ -77,7 +77,7 @@ def _spectrogram(course: Course) -> spec.Panel:
     )  # fmt: skip
 
 
-def _frequencies(course: Course) -> spec.Panel:
+def _frequencies(course: StreamHistory) -> spec.Panel:
     marks: list[spec.Mark] = []
     for (name, (hz, sd)), hue in zip(course.followed.items(), _HUES, strict=False):
         middle = float(np.nanmedian(hz))
@@ -94,7 +94,7 @@ def _frequencies(course: Course) -> spec.Panel:
     )
 
 
-def _tension(course: Course) -> spec.Panel:
+def _tension(course: StreamHistory) -> spec.Panel:
     low, middle, high = course.tension.low, course.tension.middle, course.tension.high
     times, middle, reach = _broken(course, middle, (high - low) / 2)
     texts = [f"{each:+.2f} %" for each in middle]
@@ -121,7 +121,9 @@ def _health(events: Sequence[StreamEvent]) -> list[spec.Span]:
     ]  # fmt: skip
 
 
-def _broken(course: Course, *values: FloatArray) -> tuple[list[datetime], FloatArray, FloatArray]:
+def _broken(
+    course: StreamHistory, *values: FloatArray
+) -> tuple[list[datetime], FloatArray, FloatArray]:
     """Return two courses with a NaN in each long gap, so that no line bridges it."""
     hours, longest = course.hours, _BREAK * PERIODS[course.period]
     places = [n for n in range(1, len(hours)) if hours[n] - hours[n - 1] > longest]
@@ -132,7 +134,7 @@ def _broken(course: Course, *values: FloatArray) -> tuple[list[datetime], FloatA
     return times, first, second
 
 
-def caption(course: Course) -> str:
+def caption(course: StreamHistory) -> str:
     """Explain what is seen, panel by panel."""
     below = (
         "Below: the change of tension that they mean, and when a sensor or the clock was at fault."
@@ -145,7 +147,7 @@ def caption(course: Course) -> str:
     )
 
 
-def alt(course: Course) -> str:
+def alt(course: StreamHistory) -> str:
     """Return how many modes are followed and the last tension, for a blind reader."""
     known = np.flatnonzero(np.isfinite(course.tension.middle))
     modes = formatting.counted(len(course.followed), "mode")

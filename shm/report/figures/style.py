@@ -72,14 +72,6 @@ def new_figure(height_inches: float = 3.4) -> Figure:
     return Figure(figsize=(WIDTH_INCHES, height_inches), layout="constrained", facecolor="none")
 
 
-def one_panel(x_label: str, y_label: str, height_inches: float = 3.4) -> tuple[Figure, Axes]:
-    """Return a figure of one panel, dressed."""
-    figure = new_figure(height_inches)
-    axes = figure.subplots()
-    dress(axes, x_label, y_label)
-    return figure, axes
-
-
 def stacked(figure: FigureBase, heights: Sequence[float]) -> list[Axes]:
     """Return panels one below the other over one axis, with these fractions of the height."""
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False)

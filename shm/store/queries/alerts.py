@@ -9,7 +9,7 @@ import sqlalchemy as sa
 
 from shm.store.database import Repository
 from shm.store.outbox import stored_alert, stored_alerts
-from shm.store.rows import DeliveryState, EventKind, HangerEvent, StoredAlert, counts_by_name
+from shm.store.rows import DeliveryState, EventKind, HangerEvent, StoredAlert, sum_counts
 from shm.store.tables import adoptions, alerts, baselines, deliveries
 
 _is_open = alerts.c.noted_at.is_(None) & alerts.c.ended_at.is_(None)
@@ -73,11 +73,11 @@ def list_hanger_events(
 
 
 def count_deliveries(store: Repository) -> dict[str, int]:
-    """Count the deliveries in each state; see `counts_by_name`."""
+    """Count the deliveries in each state; see `sum_counts`."""
     query = sa.select(sa.type_coerce(deliveries.c.state, sa.Text), sa.func.count()).group_by(
         deliveries.c.state
     )
-    return counts_by_name(DeliveryState, store.rows(query))
+    return sum_counts(DeliveryState, store.rows(query))
 
 
 def _events(hanger: int) -> dict[EventKind, sa.Select[Any]]:

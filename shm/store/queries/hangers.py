@@ -13,12 +13,20 @@ from shm.diagnosis_document import diagnosis_of
 from shm.store.blobs import change_in
 from shm.store.columns import Number, loads
 from shm.store.database import Repository
-from shm.store.files import in_force
+from shm.store.files import is_current
 from shm.store.mapping import value_in
 from shm.store.rows import BaselineGlance, StoredAdoption, StoredDiagnosis, StoredWatch
-from shm.store.selects import among, baselines_now, selected_classes
+from shm.store.selects import baselines_now, for_hangers, undone_selections
 from shm.store.stored_watch import load_watches
-from shm.store.tables import adoptions, baselines, diagnoses, posterior_tests, tests, watches
+from shm.store.tables import (
+    adoptions,
+    baselines,
+    diagnoses,
+    posterior_tests,
+    selections,
+    tests,
+    watches,
+)
 from shm.store.trends import baselines_in_numbers
 from shm.values import Change, Hanger
 
@@ -27,8 +35,9 @@ log = logging.getLogger(__name__)
 
 def list_selected_models(store: Repository) -> dict[int, str]:
     """Return the selected or adopted class of each hanger that has one."""
-    with store.reading() as connection:
-        return selected_classes(connection)
+    query = sa.select(selections.c.hanger, selections.c.model).order_by(selections.c.id)
+    held = query.where(selections.c.id.not_in(undone_selections))
+    return {row.hanger: row.model for row in store.rows(held)}
 
 
 def find_latest_diagnosis(store: Repository, hanger: int) -> StoredDiagnosis | None:
@@ -91,7 +100,7 @@ def find_latest_watches(
         .where(
             watches.c.hanger == held.c.hanger,
             watches.c.baseline_id == held.c.id,
-            in_force(watches),
+            is_current(watches),
         )
         .order_by(watches.c.time.desc(), watches.c.id.desc())
         .limit(1)
@@ -100,7 +109,7 @@ def find_latest_watches(
     ids = (
         sa.select(latest)
         .select_from(held)
-        .where(held.c.id.in_(baselines_now()), among(held.c.hanger, hangers))
+        .where(held.c.id.in_(baselines_now()), for_hangers(held.c.hanger, hangers))
     )
     found = [id_ for id_ in store.scalars(ids) if id_ is not None]
     return {each.hanger: each for each in load_watches(store, found)}
@@ -110,7 +119,7 @@ def list_detected_changes(
     store: Repository, hangers: Sequence[Hanger] | None = None
 ) -> dict[int, tuple[Change, ...]]:
     """List the changes of each (or these) hanger from its baseline in force, by time."""
-    query = sa.select(watches).where(*_called(), among(watches.c.hanger, hangers))
+    query = sa.select(watches).where(*_called(), for_hangers(watches.c.hanger, hangers))
     found = defaultdict[int, list[Change]](list)
     for row in store.rows(query.order_by(watches.c.time, watches.c.id)):
         found[row.hanger].append(change_in(row.document))
@@ -121,7 +130,7 @@ def list_detections(store: Repository, hanger: int, baseline_id: int) -> tuple[S
     """Return the watches that detected a change from a baseline, and the latest of it, by
     time."""
     against = sa.select(watches.c.id).where(
-        watches.c.hanger == hanger, watches.c.baseline_id == baseline_id, in_force(watches)
+        watches.c.hanger == hanger, watches.c.baseline_id == baseline_id, is_current(watches)
     )
     latest = against.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(1)
     with store.reading() as connection:
@@ -132,4 +141,4 @@ def list_detections(store: Repository, hanger: int, baseline_id: int) -> tuple[S
 def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:
     """Select watches that detected a change from the baseline in force, of all hangers or one."""
     against = watches.c.baseline_id.in_(baselines_now(hanger))
-    return watches.c.called, against, in_force(watches)
+    return watches.c.called, against, is_current(watches)

@@ -9,7 +9,7 @@ import sqlalchemy as sa
 
 from shm.store.database import Repository
 from shm.store.disposition import decided_with
-from shm.store.files import counts, in_force
+from shm.store.files import is_counted, is_current
 from shm.store.holding import fingerprint_from
 from shm.store.rows import Hold, Stage, StoredTest
 from shm.store.selects import load_tests, plain_tests
@@ -33,7 +33,7 @@ def list_tests_taken_at(
 ) -> tuple[StoredTest, ...]:
     """List the tests of a hanger with the very same time, in other recordings."""
     others = _before(tests.c.recording_id, tests.c.stage, recording_id)
-    same = (tests.c.hanger == hanger) & (tests.c.taken_at == time) & in_force(tests)
+    same = (tests.c.hanger == hanger) & (tests.c.taken_at == time) & is_current(tests)
     return load_tests(store, plain_tests.where(same, others).order_by(tests.c.id))
 
 
@@ -44,7 +44,7 @@ def list_latest_tests(
     or, `as_received`, as they came in."""
     order = tests.c.recording_id if as_received else tests.c.time
     mine = (tests.c.hanger == hanger) & (tests.c.recording_id != recording_id)
-    query = plain_tests.where(mine, counts(tests), in_force(tests))
+    query = plain_tests.where(mine, is_counted(tests), is_current(tests))
     latest = query.order_by(order.desc(), tests.c.id.desc()).limit(limit)
     return load_tests(store, latest)[::-1]
 

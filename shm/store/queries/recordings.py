@@ -11,21 +11,22 @@ import sqlalchemy as sa
 
 from shm.errors import NothingThere, UsageError
 from shm.store.database import Repository
-from shm.store.files import by_checksum, by_former_names, by_id, in_force, recording_from
-from shm.store.holding import latest_hold, open_holds, standing_discard
+from shm.store.files import by_checksum, by_former_names, by_id, is_current
+from shm.store.holding import hold_from, latest_hold, standing_discard, stored_holds
 from shm.store.journal import DIED, is_step
+from shm.store.mapping import value_in
 from shm.store.rows import (
     ENDED,
     ON_THE_WAY,
     Deaths,
     Hold,
+    RecordingInProgress,
     Stage,
-    Standing,
     StoredRecording,
-    counts_by_name,
+    sum_counts,
 )
 from shm.store.stored_recordings import waits_at
-from shm.store.tables import journal, recordings, tests
+from shm.store.tables import holds, journal, recordings, tests
 
 
 def is_waiting(
@@ -40,7 +41,7 @@ def find_by_checksum(store: Repository, sha256: str) -> StoredRecording | None:
     """Return the recording with these bytes, if it was received."""
     with store.reading() as connection:
         row = by_checksum(connection, sha256)
-    return None if row is None else recording_from(row)
+    return None if row is None else value_in(row, StoredRecording)
 
 
 def find_recording(store: Repository, which: str) -> tuple[int, str | None]:
@@ -54,7 +55,7 @@ def find_recording(store: Repository, which: str) -> tuple[int, str | None]:
             by_number = sa.select(recordings.c.id).where(recordings.c.id == int(which))
             if connection.scalar(by_number) is not None:
                 return int(which), None
-        by_name = sa.select(tests.c.recording_id).where(tests.c.name == which, in_force(tests))
+        by_name = sa.select(tests.c.recording_id).where(tests.c.name == which, is_current(tests))
         found = connection.scalars(by_name.order_by(tests.c.recording_id)).all()
         if found:
             return _single(found, f"{len(found)} hangers have a test {which!r}."), which
@@ -81,7 +82,7 @@ def list_waiting_recordings(
     return _load(store, query.order_by(recordings.c.id).limit(limit))
 
 
-def list_under_way(store: Repository) -> tuple[Standing, ...]:
+def list_under_way(store: Repository) -> tuple[RecordingInProgress, ...]:
     """List recordings under way, each with the time of its last step."""
     reached = sa.func.max(journal.c.at).label("reached_at")
     query = (
@@ -93,7 +94,7 @@ def list_under_way(store: Repository) -> tuple[Standing, ...]:
     )
     rows = store.rows(query)
     return tuple(
-        Standing(
+        RecordingInProgress(
             row.id,
             row.file_name,
             row.stage,
@@ -112,11 +113,11 @@ def find_oldest_waiting(store: Repository) -> datetime | None:
 
 
 def count_stages(store: Repository) -> dict[str, int]:
-    """Count the recordings at each stage; see `counts_by_name`."""
+    """Count the recordings at each stage; see `sum_counts`."""
     query = sa.select(sa.type_coerce(recordings.c.stage, sa.Text), sa.func.count()).group_by(
         recordings.c.stage
     )
-    return counts_by_name(Stage, store.rows(query))
+    return sum_counts(Stage, store.rows(query))
 
 
 def list_stage_seconds(store: Repository, since: datetime) -> dict[str, list[float]]:
@@ -159,8 +160,10 @@ def count_deaths(store: Repository) -> dict[int, Deaths]:
 
 def list_holds(store: Repository, hanger: int | None = None) -> tuple[Hold, ...]:
     """Return the holds that nobody has decided on, the oldest first; of one hanger if named."""
-    with store.reading() as connection:
-        return open_holds(connection, hanger)
+    query = stored_holds.where(holds.c.decision.is_(None)).order_by(holds.c.id)
+    if hanger is not None:
+        query = query.where(recordings.c.hanger == hanger)
+    return tuple(map(hold_from, store.rows(query)))
 
 
 def find_latest_hold(store: Repository, recording_id: int) -> Hold | None:
@@ -183,4 +186,4 @@ def _single(found: Sequence[int], several: str) -> int:
 
 
 def _load(store: Repository, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
-    return tuple(map(recording_from, store.rows(query)))
+    return tuple(value_in(row, StoredRecording) for row in store.rows(query))

@@ -12,7 +12,7 @@ import sqlalchemy as sa
 from shm.documents import parse_time
 from shm.store.database import Repository
 from shm.store.mapping import value_in
-from shm.store.rows import KeptStreamWatch
+from shm.store.rows import StreamWatchCheckpoint
 from shm.store.tables import (
     pooled_readings,
     stream_events,
@@ -155,7 +155,7 @@ def list_hours_near(
 
 def load_stream_watch(
     store: Repository, hanger: int, until: datetime | None = None
-) -> KeptStreamWatch | None:
+) -> StreamWatchCheckpoint | None:
     """Return what the watch of a hanger's sensors goes on from; with `until` as it was at the
     last kept time up to then."""
     table = stream_watch if until is None else stream_watch_days
@@ -163,7 +163,7 @@ def load_stream_watch(
     if until is not None:
         own = own.where(table.c.reading_time <= until)
     row = store.first(own.order_by(table.c.reading_time.desc()).limit(1))
-    return None if row is None else KeptStreamWatch(*row)
+    return None if row is None else StreamWatchCheckpoint(*row)
 
 
 def list_stream_events(

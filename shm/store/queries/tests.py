@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from shm.store.blobs import unpack_response
 from shm.store.database import Repository
-from shm.store.files import counts, in_force
+from shm.store.files import is_counted, is_current
 from shm.store.rows import Baseline, LatestTest, Stage, StoredTest, TestRow
 from shm.store.selects import baselines_now, load_tests, plain_tests, test_columns, test_row
 from shm.store.stored_tests import shown_tests
@@ -39,7 +39,7 @@ def list_waiting_tests(
     place = sa.func.row_number().over(partition_by=groups, order_by=by_time).label("place")
     on_the_way = tests.c.stage.in_([Stage.IDENTIFIED, Stage.UPDATED])
     query = sa.select(*test_columns).add_columns(place)
-    query = query.where(on_the_way, in_force(tests), tests.c.recording_id.not_in(excluding))
+    query = query.where(on_the_way, is_current(tests), tests.c.recording_id.not_in(excluding))
     found = query.subquery()
     chosen = sa.select(found).order_by(found.c.hanger, found.c.time, found.c.id)
     if limit is not None:
@@ -74,7 +74,7 @@ def list_refused_of_baselines(store: Repository) -> tuple[tuple[int, str, int], 
 
 def count_tests(store: Repository) -> dict[int, LatestTest]:
     """Count the tests in force of each hanger, with the time of the latest."""
-    shown = counts(tests) & in_force(tests)
+    shown = is_counted(tests) & is_current(tests)
     counted = (tests.c.hanger, sa.func.count().label("tests"), sa.func.max(tests.c.time))
     rows = store.rows(sa.select(*counted).where(shown).group_by(tests.c.hanger))
     return {row[0]: LatestTest(int(row[1]), row[2]) for row in rows}
@@ -82,7 +82,7 @@ def count_tests(store: Repository) -> dict[int, LatestTest]:
 
 def list_undated_names(store: Repository) -> dict[int, tuple[str, ...]]:
     """Return the names of the tests that are dated by their receipt, by hanger."""
-    undated = counts(tests) & in_force(tests) & tests.c.taken_at.is_(None)
+    undated = is_counted(tests) & is_current(tests) & tests.c.taken_at.is_(None)
     query = sa.select(tests.c.hanger, tests.c.name).where(undated).order_by(tests.c.id)
     found: dict[int, tuple[str, ...]] = {}
     for hanger, name in store.rows(query):

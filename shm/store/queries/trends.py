@@ -9,10 +9,10 @@ from typing import Any
 import sqlalchemy as sa
 
 from shm.store.database import Repository
-from shm.store.files import counts, in_force
+from shm.store.files import is_counted, is_current
 from shm.store.mapping import value_in
 from shm.store.rows import StoredPosterior, StoredTest, TrendPoint
-from shm.store.selects import counted_tests, posterior_of_row, read_tests
+from shm.store.selects import counted_tests, load_tests, posterior_of_row
 from shm.store.stored_posteriors import posteriors_of
 from shm.store.tables import posterior_tests, posteriors, tests
 from shm.store.trends import load_points, shown_posteriors
@@ -39,8 +39,7 @@ def list_history(store: Repository, hanger: int) -> tuple[tuple[StoredTest, Post
     stored = {row.id: row.posterior for row in list_posteriors(store, hanger)}
     with store.reading() as connection:
         newest_of = {row[0]: row[1] for row in connection.execute(newest)}
-    with store.reading() as connection:
-        known = read_tests(connection, counted_tests(hanger))
+    known = load_tests(store, counted_tests(hanger))
     return tuple(
         (test, stored[newest_of[test.id]]) for test in known if newest_of.get(test.id) in stored
     )
@@ -60,7 +59,7 @@ def find_latest_trends(store: Repository, hangers: Iterable[Hanger]) -> dict[int
     """Return the latest point of the trend of each hanger that has one."""
     known = list(hangers)
     one = [tests.c.hanger == each.id for each in known] if len(known) == 1 else []
-    of_hangers = sa.select(tests.c.hanger).where(in_force(tests), *one).distinct().subquery()
+    of_hangers = sa.select(tests.c.hanger).where(is_current(tests), *one).distinct().subquery()
     latest = (
         _shown_tests()
         .where(tests.c.hanger == of_hangers.c.hanger, tests.c.id.in_(_of_shown(tests.c.id)))
@@ -80,4 +79,4 @@ def _of_shown(test_id: sa.ColumnElement[int]) -> sa.Select[Any]:
 
 
 def _shown_tests() -> sa.Select[Any]:
-    return sa.select(tests.c.id).where(in_force(tests), counts(tests))
+    return sa.select(tests.c.id).where(is_current(tests), is_counted(tests))

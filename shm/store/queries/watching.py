@@ -9,14 +9,14 @@ from typing import Any
 import sqlalchemy as sa
 
 from shm.store.database import Repository
-from shm.store.files import counts, in_force
+from shm.store.files import is_counted, is_current
 from shm.store.mapping import value_in
-from shm.store.rows import Baseline, KeptWatch, Stage, StoredTest, TestRow
+from shm.store.rows import Baseline, Stage, StoredTest, TestRow, WatchCheckpoint
 from shm.store.selects import (
     WEIGHED,
-    compared_with,
     load_tests,
     plain_tests,
+    select_since_baseline,
     test_columns,
     test_row,
 )
@@ -30,7 +30,7 @@ def list_tests_by_time(
 
     Those passed over for planned works are among them.
     """
-    compared = compared_with(baseline, or_of_works=True)
+    compared = select_since_baseline(baseline, include_maintenance=True)
     query = plain_tests.where(*compared, tests.c.id != test.id)
     order = sa.tuple_(tests.c.time, tests.c.id)
     return _around(store, query, order, (test.time, test.id), limit)
@@ -41,8 +41,8 @@ def list_tests_by_receipt(
 ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
     """List the same by receipt, with those held of the recordings `held`."""
     is_held = (tests.c.hanger == baseline.hanger) & (tests.c.stage == Stage.HELD)
-    is_held &= tests.c.recording_id.in_(held) & in_force(tests)
-    counted = sa.and_(*compared_with(baseline, or_of_works=True))
+    is_held &= tests.c.recording_id.in_(held) & is_current(tests)
+    counted = sa.and_(*select_since_baseline(baseline, include_maintenance=True))
     query = plain_tests.where(counted | is_held, tests.c.id != test.id)
     order = sa.tuple_(tests.c.recording_id, tests.c.id)
     return _around(store, query, order, (test.recording_id, test.id), limit)
@@ -55,8 +55,8 @@ def find_latest_weighed(
     query = plain_tests.where(
         tests.c.hanger.in_(hangers),
         tests.c.time < before,
-        counts(tests),
-        in_force(tests),
+        is_counted(tests),
+        is_current(tests),
         WEIGHED,
     )
     found = load_tests(store, query.order_by(tests.c.time.desc(), tests.c.id.desc()).limit(1))
@@ -77,16 +77,16 @@ def is_watched_again(store: Repository, test: StoredTest, baseline: Baseline) ->
 
 def is_caught_up(store: Repository, test: StoredTest, baseline: Baseline) -> bool:
     """Return True where no other test waits to be compared with a baseline once more."""
-    waiting = tests.c.stage.in_([Stage.IDENTIFIED, Stage.UPDATED]) & in_force(tests)
+    waiting = tests.c.stage.in_([Stage.IDENTIFIED, Stage.UPDATED]) & is_current(tests)
     query = sa.select(tests.c.id).join(watches).where(watches.c.baseline_id == baseline.id)
     return store.first(query.where(waiting, tests.c.id != test.id)) is None
 
 
-def find_watch_state(store: Repository, baseline: Baseline) -> KeptWatch | None:
+def find_watch_state(store: Repository, baseline: Baseline) -> WatchCheckpoint | None:
     """Return what the watch goes on from at the next test compared with a baseline."""
     query = sa.select(watch_states).where(watch_states.c.baseline_id == baseline.id)
     row = store.first(query)
-    return None if row is None else value_in(row, KeptWatch)
+    return None if row is None else value_in(row, WatchCheckpoint)
 
 
 def list_watched_tests(
@@ -97,7 +97,7 @@ def list_watched_tests(
     Tests that were watched against an earlier baseline count, but for those before a day since
     which the hanger is compared anew.
     """
-    query = sa.select(*test_columns).where(*compared_with(baseline))
+    query = sa.select(*test_columns).where(*select_since_baseline(baseline))
     if before is not None:
         at_once = (tests.c.time == before.time) & (tests.c.id < before.id)
         query = query.where((tests.c.time < before.time) | at_once)

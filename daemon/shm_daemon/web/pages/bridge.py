@@ -39,8 +39,8 @@ from shm_daemon.web.bridge_view import (
     HangerGlance,
     compared,
     elevation,
-    glance,
     shift_words,
+    summarize_hangers,
     triangles,
 )
 from shm_daemon.web.frame import page
@@ -59,7 +59,7 @@ _COMPARING = "The hangers are being compared …"
 def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
     """Return the whole bridge at a glance."""
     now = utc_now()
-    bridge = glance(site, now)
+    bridge = summarize_hangers(site, now)
     found = compared(request, site) if len(bridge.hangers) <= QUICKLY_COMPARED else None
     unit = hangers_unit(each.summary for each in bridge.hangers)
     return page(
@@ -98,7 +98,7 @@ def moved_fragment(request: Request, site: AtSite, _: Reader) -> Response:
 @router.get("/api/bridge", response_model=BridgeState, summary="The whole bridge at a glance")
 def bridge(site: AtSite, _: Reader) -> Any:
     """Each hanger's tension, against its baseline too."""
-    found = glance(site, utc_now())
+    found = summarize_hangers(site, utc_now())
     return {
         "bridge": found.name,
         **found.message.document,

@@ -15,7 +15,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report import formatting
 from shm.report.contents import hangers_unit
-from shm.report.figures.compared_hangers import MOST, Course, alt, caption, specify
+from shm.report.figures.compared_hangers import MOST, TensionShifts, alt, caption, specify
 from shm.report.formatting import Interval
 from shm.report.hanger_summary import HangerSummary
 from shm.report.paper import Table
@@ -122,7 +122,7 @@ def _day(text: str) -> date | None:
         raise BadInput(f"{text} is no day.", remedy="Give it as 2026-05-31.") from error
 
 
-def _courses(site: Site, chosen: Sequence[Hanger], since: date | None) -> list[Course]:
+def _courses(site: Site, chosen: Sequence[Hanger], since: date | None) -> list[TensionShifts]:
     """Return the courses of the hangers with a baseline and tests since that day."""
     begin = _begin(since) if since else None
     baselines = list_baselines_in_force(site.store, chosen)
@@ -132,7 +132,7 @@ def _courses(site: Site, chosen: Sequence[Hanger], since: date | None) -> list[C
         if hanger.id in baselines and points:
             base = Interval.of_averaged(baselines[hanger.id].averaged)
             found.append(
-                Course(
+                TensionShifts(
                     formatting.hanger_name(hanger.id, hanger.name),
                     [point.time for point in points],
                     [point.test for point in points],

@@ -236,7 +236,7 @@ def _refuse_untested(store: Store, hanger: Hanger) -> None:
 
 def _awaited(worker: BackgroundWorker[bytes], order: ReportOrder) -> bytes:
     ends_at = time.monotonic() + _LONGEST_S
-    while (made := worker.wanted(order)) is None:
+    while (made := worker.get_or_start(order)) is None:
         if time.monotonic() > ends_at:
             raise Refused(503, "the report is not made yet.", "Ask again.", RETRY_AFTER)
         time.sleep(_LOOK_S)

@@ -22,7 +22,7 @@ from shm_daemon.web.access import Reader
 from shm_daemon.web.address import test_json, test_page
 from shm_daemon.web.background_work import RETRY_AFTER
 from shm_daemon.web.frame import page
-from shm_daemon.web.modal_test_view import AT_WORK, TestFigure, TestView
+from shm_daemon.web.modal_test_view import AT_WORK, ModalTestView, TestFigure
 from shm_daemon.web.tests import MOST_RESPONSES, View, origin, steps, superseded
 
 router = APIRouter(include_in_schema=False)
@@ -76,13 +76,13 @@ def one_test(
     )
 
 
-def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
+def _hit_tables(view: ModalTestView) -> tuple[Table, ...] | None:
     """Return the tables of hits; None where they are not computed."""
     whole = None if view.missing else view.background_worker.stored(view.order)
     return filled(whole.hits) if whole else None
 
 
-def _details(view: TestView) -> tuple[Table, ...]:
+def _details(view: ModalTestView) -> tuple[Table, ...]:
     """Return tables of details; dropped data are separate if computed, else among the notes."""
     notes = modal_test_report.notes(view.sheet)
     if view.worked:
@@ -92,7 +92,7 @@ def _details(view: TestView) -> tuple[Table, ...]:
     return filled(notes, replace(found, rows=rows))
 
 
-def _drawings(view: TestView, chosen: int) -> dict[str, list[tuple[TestFigure, str, int]]]:
+def _drawings(view: ModalTestView, chosen: int) -> dict[str, list[tuple[TestFigure, str, int]]]:
     """Return the figures of each tab with their addresses and heights."""
     found: dict[str, list[tuple[TestFigure, str, int]]] = {}
     for each in view.figures():
@@ -100,7 +100,7 @@ def _drawings(view: TestView, chosen: int) -> dict[str, list[tuple[TestFigure, s
     return found
 
 
-def _chart(view: TestView, figure: TestFigure, chosen: int) -> tuple[str, int]:
+def _chart(view: ModalTestView, figure: TestFigure, chosen: int) -> tuple[str, int]:
     """Return the address of a figure's document, and its height."""
     address = f"{test_json(view.stored.hanger, view.stored.test.id)}/figures/{figure.name}"
     if figure.source == "both":
@@ -108,7 +108,7 @@ def _chart(view: TestView, figure: TestFigure, chosen: int) -> tuple[str, int]:
     return address, figure.height_px(view.sheet)
 
 
-def _facts(view: TestView) -> tuple[tuple[str, str, str], ...]:
+def _facts(view: ModalTestView) -> tuple[tuple[str, str, str], ...]:
     """Return the figures on top: what, value, what stands beside it."""
     test, sheet = view.stored.test, view.sheet
     planes = {mode.plane for mode in sheet.modes}
@@ -130,7 +130,7 @@ def _temperature(celsius: float) -> str:
     return formatting.number(celsius, ".1f") + " °C" if celsius == celsius else "not recorded"
 
 
-def _tension(view: TestView) -> tuple[str, str, str]:
+def _tension(view: ModalTestView) -> tuple[str, str, str]:
     try:
         posterior = view.store.posteriors.get(view.stored.hanger, view.stored.test.id)
     except NothingThere:

@@ -252,7 +252,7 @@ def _examination(request: Request, site: Site) -> Table | None:
 def _examined(request: Request, site: Site) -> tuple[Finding, ...] | None:
     order = Examine(site.workspace.folder, int(utc_now().timestamp() // _FRESH_S))
     try:
-        found: tuple[Finding, ...] | None = background_worker_of(request).wanted(order)
+        found: tuple[Finding, ...] | None = background_worker_of(request).get_or_start(order)
     except ShmError as error:
         return (Finding("examination", Level.UNKNOWN, error.message, error.remedy),)
     return found

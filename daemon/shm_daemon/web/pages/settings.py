@@ -26,7 +26,7 @@ from shm.values import Hanger
 from shm_daemon.hooks.trial import send_test_alert
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.faults import Refused
-from shm_daemon.web.forms import Form, FormOfSettings, done_or_again
+from shm_daemon.web.forms import Form, FormOfSettings, redirect_or_show_error
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import Before
 from shm_daemon.web.site import Site
@@ -107,7 +107,9 @@ def change(request: Request, site: AtSite, engineer: Engineer, form: FormOfSetti
         finally:
             site.forget_description()  # ours, or somebody else's change, which it may not show yet
 
-    return done_or_again(change, address, partial(_page, request, site, hanger, typed=form))
+    return redirect_or_show_error(
+        change, address, partial(_page, request, site, hanger, typed=form)
+    )
 
 
 @router.post("/settings/hooks/test")
@@ -118,10 +120,13 @@ def try_hook(request: Request, site: AtSite, _: Engineer, form: Form) -> Respons
     if hook is None:
         raise Refused(404, "bridge.toml describes no such hook.", "Load the page again.")
     try:
-        told, status = send_test_alert(workspace, hook, os.environ, utc_now()).sentence(hook), 200
+        outcome, status = (
+            send_test_alert(workspace, hook, os.environ, utc_now()).sentence(hook),
+            200,
+        )
     except ShmError as error:
-        told, status = f"{error.message} {error.remedy}", 409
-    return _page(request, site, None, told, status)
+        outcome, status = f"{error.message} {error.remedy}", 409
+    return _page(request, site, None, outcome, status)
 
 
 def _changes(keys: list[str], form: Mapping[str, str]) -> dict[str, float | str | None]:

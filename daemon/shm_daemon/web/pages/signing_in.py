@@ -35,7 +35,7 @@ from shm_daemon.web.access import (
     with_passwords,
 )
 from shm_daemon.web.faults import Refused
-from shm_daemon.web.forms import Form, FormOfAnybody, done_or_again
+from shm_daemon.web.forms import Form, FormOfAnybody, redirect_or_show_error
 from shm_daemon.web.frame import for_a_person, page
 from shm_daemon.web.middleware import is_https
 from shm_daemon.web.site import Site
@@ -135,7 +135,7 @@ async def change_password(request: Request, site: AtSite, person: Person, form: 
     def again(message: str, status: int) -> Response:
         return page(request, "password.html.j2", status=status, message=message, changed=False)
 
-    done = partial(done_or_again, change, "/password?changed=true", again)
+    done = partial(redirect_or_show_error, change, "/password?changed=true", again)
     return await with_passwords(request, done)
 
 

@@ -13,7 +13,7 @@ from shm.report.paper import Table
 from shm.store.queries.history import list_changes
 from shm.store.rows import Role
 from shm_daemon.web.access import AtSite, Engineer, with_passwords
-from shm_daemon.web.forms import Form, done_or_again
+from shm_daemon.web.forms import Form, redirect_or_show_error
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import Before, paged
 from shm_daemon.web.site import Site
@@ -53,7 +53,7 @@ async def change_user(request: Request, site: AtSite, engineer: Engineer, form: 
                 raise UsageError("nothing was asked for.", remedy="Choose a button of this page.")
 
     again = partial(_page, request, site)
-    return await with_passwords(request, partial(done_or_again, change, "/users", again))
+    return await with_passwords(request, partial(redirect_or_show_error, change, "/users", again))
 
 
 def _page(request: Request, site: Site, message: str = "", status: int = 200) -> Response:

@@ -14,7 +14,7 @@ import pytest
 from shm.bridge import Hook
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import Flow, utc_now
-from shm.pipeline.telling import after_works, quiet_until, works_before
+from shm.pipeline.notification_plan import after_works, quiet_until, works_before
 from shm.store import IdentifiedTest, Lineage, Silence, Store, StoredTest, Workspace
 from shm.store.stored_alerts import silenced_until
 from shm.values import Alert, Selection

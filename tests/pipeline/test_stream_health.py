@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline.bridge_reporting import hanger_summaries, unwatched
-from shm.pipeline.unheard import (
-    Heard,
+from shm.pipeline.stream_health import (
     State,
+    StreamHealth,
     blind_hangers,
+    classify_stream,
     compare_thermometers,
+    evaluate_silent_streams,
     heard,
-    heed_silences,
     note_blindness,
-    word_of,
 )
 from shm.read.chunk_document import chunk_document
 from shm.report.hanger_status import Status
@@ -48,14 +48,14 @@ def an_event(kind: str, end: datetime) -> StreamEvent:
     ],
 )
 def test_a_stream_is_in_one_state(ago: timedelta, kind: str, state: State) -> None:
-    assert word_of(NOW - ago, [an_event(kind, NOW - ago)], NOW) == state
+    assert classify_stream(NOW - ago, [an_event(kind, NOW - ago)], NOW) == state
 
 
 def test_of_a_hanger_whose_stream_is_silent_nobody_says_that_nothing_needs_doing(
     tmp_path: Path,
 ) -> None:
     workspace = make_workspace(tmp_path / "bridge")
-    blind = blind_hangers([Heard(STREAM, "silent", NOW)])
+    blind = blind_hangers([StreamHealth(STREAM, "silent", NOW)])
     lead = unwatched(workspace, 3, NOW, blind, NOW)
     assert lead is not None
     assert (lead.urgency, lead.state) == (
@@ -74,7 +74,7 @@ def test_a_silence_of_a_day_is_one_alert_which_ends_with_it(tmp_path: Path) -> N
     day, last = timedelta(days=1), NOW + HOUR / 6
     with workspace.store() as store:
         for later, alerts in ((day, 0), (day + 3 * HOUR, 1), (5 * day, 1)):
-            heed_silences(workspace, store, last + later)
+            evaluate_silent_streams(workspace, store, last + later)
             assert len(store.alerts.list_all(standing=True)) == alerts
         (raised,) = store.alerts.list_all()
         assert raised.alert.message.startswith(
@@ -84,7 +84,7 @@ def test_a_silence_of_a_day_is_one_alert_which_ends_with_it(tmp_path: Path) -> N
         lines = hanger_summaries(workspace, store, last + 5 * day)
         assert {each.message.status for each in lines if each.hanger.id == 3} == {Status.UNCLEAR}
         send(workspace, hours=1 / 6, first=NOW + 5 * day)
-        heed_silences(workspace, store, NOW + 5 * day + HOUR / 2)
+        evaluate_silent_streams(workspace, store, NOW + 5 * day + HOUR / 2)
         (over,) = store.alerts.list_all()
         assert over.resolution is not None
         assert over.resolution.why == "stream hanger03 sends again"
@@ -103,7 +103,7 @@ def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(
                 start = NOW + hours * HOUR
                 event = StreamEvent(name, "lost modes", start, start + HOUR / 6, "no mode")
                 store.streams.save_event(event)
-            heed_silences(workspace, store, NOW + (hours + 0.2) * HOUR)
+            evaluate_silent_streams(workspace, store, NOW + (hours + 0.2) * HOUR)
             return len(store.alerts.list_all(standing=True))
 
         sends(0, blind=True)
@@ -119,7 +119,9 @@ def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(
             e for e in hanger_summaries(workspace, store, NOW + 27.2 * HOUR) if e.hanger.id == 3
         )
         assert line.message.status is Status.UNCLEAR
-        heed_silences(workspace, store, NOW + 60 * HOUR)  # silent, too: it does not see again
+        evaluate_silent_streams(
+            workspace, store, NOW + 60 * HOUR
+        )  # silent, too: it does not see again
         assert len(store.alerts.list_all(standing=True)) == 2
         assert sends(70, blind=False) == 0
         assert {each.resolution.why for each in store.alerts.list_all() if each.resolution} == {

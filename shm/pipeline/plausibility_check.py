@@ -19,7 +19,7 @@ from shm.store import (
     HeldTest,
     Hold,
     IdentifiedTest,
-    Judged,
+    Judgement,
     Stage,
     Store,
     StoredRecording,
@@ -44,7 +44,7 @@ _OF_OTHERS = 2  # of every other hanger's: where its modes lie now
 
 def judge(
     workspace: Workspace, store: Store, recording: StoredRecording, found: Sequence[IdentifiedTest]
-) -> tuple[tuple[IdentifiedTest, ...], Judged]:
+) -> tuple[tuple[IdentifiedTest, ...], Judgement]:
     """The tests to keep, and which of them to hold.
 
     What a person has confirmed with this sidecar is not doubted again, and has the time that they
@@ -55,7 +55,7 @@ def judge(
     out = tuple(n for n, hold in decided.items() if hold.is_out)
     if set(out) >= {item.position for item in found}:  # sent anew, to be asked of once more
         out = ()
-    judged = Judged(sidecar_as, fingerprint, out=out)
+    judged = Judgement(sidecar_as, fingerprint, out=out)
     confirmed = [hold for hold in decided.values() if hold.is_in]
     if confirmed:
         newest = max(confirmed, key=lambda hold: hold.id)

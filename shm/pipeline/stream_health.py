@@ -59,7 +59,7 @@ _BLIND: dict[State, tuple[str, str]] = {
 
 
 @dataclass(frozen=True)
-class Heard:
+class StreamHealth:
     """A stream and how it is, by its last sample; `unread` is how much the watch has not read."""
 
     stream: Stream
@@ -74,7 +74,7 @@ class Heard:
         return f"{self.stream.name}{since}"
 
 
-def heard(workspace: Workspace, store: Store, now: datetime) -> tuple[Heard, ...]:
+def heard(workspace: Workspace, store: Store, now: datetime) -> tuple[StreamHealth, ...]:
     """Each stream that `bridge.toml` describes, in its order."""
     if not workspace.bridge.streams:
         return ()
@@ -84,9 +84,11 @@ def heard(workspace: Workspace, store: Store, now: datetime) -> tuple[Heard, ...
     ring = ring_of(workspace)
     last = last_samples(workspace, ring, store)
     return tuple(
-        Heard(
+        StreamHealth(
             each,
-            word_of(last[each.name], list_stream_events(store, each.name, now - LATELY), now),
+            classify_stream(
+                last[each.name], list_stream_events(store, each.name, now - LATELY), now
+            ),
             last[each.name],
             measure_unread(workspace, ring, store, each.name, now),
         )
@@ -104,7 +106,7 @@ def last_samples(workspace: Workspace, ring: Ring, store: Store) -> dict[str, da
     return {name: latest.get(name) or find_progress(store, name) for name in names}
 
 
-def word_of(last: datetime | None, events: Sequence[StreamEvent], now: datetime) -> State:
+def classify_stream(last: datetime | None, events: Sequence[StreamEvent], now: datetime) -> State:
     """Return how a stream is by its last sample and the `events` of a day."""
     if last is None:
         return "never sent"
@@ -127,7 +129,7 @@ def stream_leads(workspace: Workspace, store: Store, now: datetime) -> tuple[Lea
 
 
 def backlog_leads(
-    found: Sequence[Heard], longest: timedelta = timedelta(hours=1)
+    found: Sequence[StreamHealth], longest: timedelta = timedelta(hours=1)
 ) -> tuple[Lead, ...]:
     """Return what to say of streams of which more than `longest` is not read yet."""
     behind = [each for each in found if each.unread > longest]
@@ -148,7 +150,7 @@ def backlog_leads(
     )
 
 
-def leads_of(found: Sequence[Heard]) -> tuple[Lead, ...]:
+def leads_of(found: Sequence[StreamHealth]) -> tuple[Lead, ...]:
     """Of each state that somebody should know of, the streams that are in it, and the remedy."""
     leads = []
     for state, remedy in REMEDIES.items():
@@ -224,7 +226,7 @@ def _gigabytes(size: int) -> str:
     return f"{size / 1e9:.3g} GB"
 
 
-def blind_hangers(found: Sequence[Heard]) -> dict[int, Lead]:
+def blind_hangers(found: Sequence[StreamHealth]) -> dict[int, Lead]:
     """Return what is said first of each hanger whose stream says nothing."""
     leads = {}
     for each in found:
@@ -250,7 +252,7 @@ _LONG = timedelta(hours=26)
 """judgement: what a logger begins anew by itself, or sends as one file a day, needs nobody."""
 
 
-def heed_silences(workspace: Workspace, store: Store, at: datetime) -> None:
+def evaluate_silent_streams(workspace: Workspace, store: Store, at: datetime) -> None:
     """Open and close what streams call for that say nothing."""
     found = {each.stream.name: each for each in heard(workspace, store, at)}
     standing = [each for each in store.alerts.list_all(standing=True) if _KIND in each.alert.kinds]
@@ -301,7 +303,7 @@ def _told(stored: StoredAlert) -> tuple[str, str]:
     return word, stream
 
 
-def _why_ended(stored: StoredAlert, found: Mapping[str, Heard]) -> str:
+def _why_ended(stored: StoredAlert, found: Mapping[str, StreamHealth]) -> str:
     word, name = _told(stored)
     if name not in found:
         return "bridge.toml does not describe the stream any more"
@@ -310,7 +312,7 @@ def _why_ended(stored: StoredAlert, found: Mapping[str, Heard]) -> str:
     return f"stream {name} {'sends' if word == 'silent' else 'sees its hanger'} again"
 
 
-def _alert(told: Heard, word: str, since: datetime) -> Alert:
+def _alert(told: StreamHealth, word: str, since: datetime) -> Alert:
     stream = told.stream
     said = blind_hangers([told])[stream.hanger]
     state = f"{said.state.rstrip('.')} for longer than a day."

@@ -30,8 +30,8 @@ _LISTED = 60  # technical: hangers that a message names; the bridges we know hav
 
 
 @dataclass(frozen=True)
-class Terms:
-    """Terms of messages: the window in which similar alerts are gathered, and the hooks.
+class NotificationPolicy:
+    """Policy of messages: the window in which similar alerts are gathered, and the hooks.
 
     Some are in quiet hours, or receive only what nobody has acknowledged. With `hurry` nothing is
     gathered any longer: who asks is about to end.
@@ -55,33 +55,36 @@ class Plan:
 
 
 def plan(
-    unsent: Sequence[Delivery], silences: tuple[Silence, ...], now: datetime, terms: Terms
+    unsent: Sequence[Delivery],
+    silences: tuple[Silence, ...],
+    now: datetime,
+    policy: NotificationPolicy,
 ) -> Plan:
     """Return what to do now with the deliveries whose first attempt has not begun."""
     not_needed: dict[int, str] = {}
     gathered: defaultdict[object, list[tuple[datetime, int]]] = defaultdict(list)
     seen: Counter[object] = Counter()
     for each in unsent:
-        if why := _no_need(each, silences, terms):
+        if why := _no_need(each, silences, policy):
             not_needed[each.id] = why
             continue
-        ready_at = _ready_at(each, silences, now, terms)
+        ready_at = _ready_at(each, silences, now, policy)
         if ready_at is None:
             continue
-        alike = (each.hook, each.news, *_condition(each.alert)) if terms.window_s else (each.id,)
+        alike = (each.hook, each.news, *_condition(each.alert)) if policy.window_s else (each.id,)
         # One alert a hanger: a second one is news of its own.
         seen[alike, each.alert.hanger] += 1
         gathered[alike, seen[alike, each.alert.hanger]].append((ready_at, each.id))
-    escalated = {each.id for each in unsent if each.hook in terms.escalation_s}
+    escalated = {each.id for each in unsent if each.hook in policy.escalation_s}
     messages = [
         tuple(sorted(id_ for at, id_ in found if at <= now))
         for found in gathered.values()
-        if _is_whole([at for at, _ in found], now, terms, is_late=found[0][1] in escalated)
+        if _is_whole([at for at, _ in found], now, policy, is_late=found[0][1] in escalated)
     ]
     return Plan(tuple(sorted(filter(None, messages))), not_needed)
 
 
-def _no_need(delivery: Delivery, silences: tuple[Silence, ...], terms: Terms) -> str:
+def _no_need(delivery: Delivery, silences: tuple[Silence, ...], policy: NotificationPolicy) -> str:
     """Return why a hook need not be told that something is raised; empty where it must be."""
     stored = delivery.stored
     if delivery.news is News.RESOLVED:
@@ -91,11 +94,11 @@ def _no_need(delivery: Delivery, silences: tuple[Silence, ...], terms: Terms) ->
     noted = stored.acknowledgement
     if noted is None:
         return ""
-    if delivery.hook in terms.escalation_s:
+    if delivery.hook in policy.escalation_s:
         return f"acknowledged by {noted.who} in time"
     if _held_back_until(delivery, silences, noted.at) is not None:
         return f"acknowledged by {noted.who} while it was silenced"
-    if quiet_until(delivery, terms.hooks, noted.at) is not None:
+    if quiet_until(delivery, policy.hooks, noted.at) is not None:
         return f"acknowledged by {noted.who} in the quiet hours"
     return ""
 
@@ -135,7 +138,7 @@ def _held_back_until(
 
 
 def _ready_at(
-    delivery: Delivery, silences: tuple[Silence, ...], now: datetime, terms: Terms
+    delivery: Delivery, silences: tuple[Silence, ...], now: datetime, policy: NotificationPolicy
 ) -> datetime | None:
     """From when on a hook may be told; None while it is silenced or the time has not come."""
     stored, hanger = delivery.stored, delivery.alert.hanger
@@ -146,12 +149,12 @@ def _ready_at(
     if delivery.news is News.RESOLVED and resolution is not None:
         since = max(since, resolution.at)
     if since > now:  # the clock was ahead, and is set right: then it is told at once
-        return now - _MOST_WINDOWS * timedelta(seconds=terms.window_s)
+        return now - _MOST_WINDOWS * timedelta(seconds=policy.window_s)
     ready_at = max(since, _held_back_until(delivery, silences, now) or since)
-    if delivery.news is News.RAISED and delivery.hook in terms.escalation_s:
-        ready_at = _first_told(delivery.alert, terms.hooks, ready_at)
-        ready_at += timedelta(seconds=terms.escalation_s[delivery.hook])
-    if (quiet := quiet_until(delivery, terms.hooks, ready_at)) is not None:
+    if delivery.news is News.RAISED and delivery.hook in policy.escalation_s:
+        ready_at = _first_told(delivery.alert, policy.hooks, ready_at)
+        ready_at += timedelta(seconds=policy.escalation_s[delivery.hook])
+    if (quiet := quiet_until(delivery, policy.hooks, ready_at)) is not None:
         ready_at = quiet.astimezone(UTC)
     return ready_at if ready_at <= now else None
 
@@ -163,11 +166,13 @@ def _first_told(alert: Alert, hooks: Sequence[Hook], at: datetime) -> datetime:
     return min((each.astimezone(UTC) if each else at for each in ends), default=at)
 
 
-def _is_whole(times: Sequence[datetime], now: datetime, terms: Terms, *, is_late: bool) -> bool:
+def _is_whole(
+    times: Sequence[datetime], now: datetime, policy: NotificationPolicy, *, is_late: bool
+) -> bool:
     """Return True if alike alerts wait for no further one; those of an escalation wait for less."""
-    if terms.hurry or not terms.window_s:
+    if policy.hurry or not policy.window_s:
         return True
-    window = timedelta(seconds=terms.window_s)
+    window = timedelta(seconds=policy.window_s)
     latest = min(times) + _MOST_WINDOWS * window
     if is_late:
         latest = min(latest, min(times) + timedelta(seconds=_LATEST_ESCALATION_S))
@@ -305,9 +310,9 @@ def works_before(
 
 def after_works(alert: Alert, works: Silence) -> Alert:
     """The same alert, which says that works lie in between and how to accept what they changed."""
-    said = (
+    text = (
         f"Planned works lie in between ({works.why.rstrip('.')}), until {works.until:%Y-%m-%d}. If "
         f"they explain it, accept the new state: `shm drift rebaseline --hanger {alert.hanger} "
         f"--since {works.until:%Y-%m-%d}`."
     )
-    return replace(alert, message=f"{alert.message} {said}")
+    return replace(alert, message=f"{alert.message} {text}")
