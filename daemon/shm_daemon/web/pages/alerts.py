@@ -21,7 +21,7 @@ from shm.store import Delivery, DeliveryState, News, Silence, StoredAlert
 from shm.store.queries.alerts import count_open_alerts, list_alert_page
 from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values.messages import Lead
-from shm_daemon.web.access import AtSite, Reader, Visitor, Writer
+from shm_daemon.web.access import AtSite, Principal, Reader, Writer
 from shm_daemon.web.address import test_page
 from shm_daemon.web.faults import answers
 from shm_daemon.web.forms import Form, reason_in, time_in
@@ -196,7 +196,7 @@ def acknowledge_by_form(site: AtSite, writer: Writer, alert_id: Row, form: Form)
 
 
 def _note(
-    site: Site, writer: Visitor, alert_id: int, person: str | None, why: str, is_resolved: bool
+    site: Site, writer: Principal, alert_id: int, person: str | None, why: str, is_resolved: bool
 ) -> None:
     """Acknowledge or resolve an alert; `person` is who came with the token of a program."""
     named = person is not None and not writer.is_person  # who signed in has a name
