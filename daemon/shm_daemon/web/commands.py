@@ -53,8 +53,8 @@ def with_links(text: str) -> Markup:
     if again := _AGAIN.search(text):
         before, after = text[: again.start()], text[again.end() :]
         verb = "Upload it again" if again[1] == "D" else "upload it again"
-        link = _LINK.format("/upload", verb)
-        return with_links(before) + link + f" as hanger {again[2]}" + with_links(after)
+        to_upload = _LINK.format("/upload", verb)
+        return with_links(before) + to_upload + f" as hanger {again[2]}" + with_links(after)
     parts, end = [], 0
     for found in _COMMAND.finditer(text):
         verb = found["quoted"] or found["bare"]
