@@ -8,6 +8,8 @@ alert; the fourth is a recording, so that its page has every figure.
 
 from __future__ import annotations
 
+import csv
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import timedelta
@@ -33,7 +35,7 @@ from tests.helpers.daemons import real_daemon
 from tests.helpers.flows import ingest
 from tests.helpers.slow import few_of
 from tests.helpers.web_servers import Served, a_thread, served
-from tests.helpers.workspaces import START, make_workspace, write_loss, write_test
+from tests.helpers.workspaces import START, make_workspace, write_held, write_loss, write_test
 
 RECORDED = "recorded"
 PASSWORD = "correct horse battery"
@@ -51,6 +53,8 @@ PAGES = {
 CHARTS = {"hanger": 3, "recording": 5}
 PAPER, INK = "rgb(255, 255, 255)", "rgb(29, 35, 48)"
 PAPER_WIDE = "640px"
+HIGHEST_PX = 2500
+COMMANDS = re.compile(r"`|\bshm (drift|gap|alerts|doctor|ingest|import|stream|status)\b")
 
 
 @dataclass(frozen=True)
@@ -136,6 +140,29 @@ def test_a_page_is_whole_for_everybody_by_day_and_night_on_desk_and_phone(
         expect(page.locator(".xtitle").first).not_to_have_css("fill", INK)
     page.emulate_media(media="print", color_scheme="dark")
     assert style(page, "body", "backgroundColor") == PAPER
+
+
+@pytest.mark.parametrize("name", few_of(PAGES, 3))
+def test_each_part_of_a_page_is_short_and_names_no_command_of_a_shell(
+    signed_in: Browser, site: Site, name: str
+) -> None:
+    page = signed_in.open(site.url + PAGES[name])
+    page.set_viewport_size({"width": 1280, "height": 900})
+    for show in [tab.click for tab in page.get_by_role("tab").all()] or [lambda: None]:
+        show()
+        assert page.evaluate("document.documentElement.scrollHeight") <= HIGHEST_PX
+        assert COMMANDS.findall(page.inner_text("main")) == []
+
+
+def test_a_table_is_kept_as_a_file_that_a_spreadsheet_reads(signed_in: Browser, site: Site) -> None:
+    page = signed_in.open(site.url)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Keep as CSV").first.click()
+    text = download.value.path().read_text(encoding="utf-8-sig")
+    heading, row = csv.reader(text.splitlines())
+    assert heading[:2] == ["hanger", "tension, kN"]
+    assert row[0] == "Hanger 3"
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d .*ago.*", row[heading.index("last test")])
 
 
 def test_the_keyboard_reaches_the_content_and_every_hanger(signed_in: Browser, site: Site) -> None:
@@ -227,6 +254,23 @@ def test_on_a_phone_what_matters_does_not_lie_off_to_the_side(
     page.get_by_label("Recordings of hammer tests").set_input_files(files=[file])  # type: ignore[list-item]
     expect(page.locator("form.questions")).to_be_visible()
     assert width_px(page) == PHONE["width"]
+
+
+def test_a_held_upload_says_why_and_is_decided_there(
+    signed_in: Browser, site: Site, tmp_path: Path
+) -> None:
+    write_held(site.workspace, 3, tmp_path)
+    (path,) = tmp_path.iterdir()
+    page = signed_in.open(f"{site.url}/upload")
+    page.get_by_label("Recordings of hammer tests").set_input_files(path)
+    card = page.locator("#list > li")
+    expect(card).to_contain_text("is held", timeout=60_000)
+    assert "1970" in card.inner_text()
+    assert faults(page) == []
+    card.get_by_text("Decide", exact=True).click()
+    card.get_by_label("Why").fill("The clock of the logger was not set.")
+    card.get_by_role("button", name="Discard").click()
+    expect(page.locator("#main")).to_contain_text("discarded by Anna: The clock of the logger")
 
 
 def write_recording(workspace: Workspace) -> None:

@@ -83,6 +83,21 @@ def test_alerts_of_one_hanger_stand_alone(site: Served) -> None:
         assert client.get("/alerts?hanger=x").status_code == 422
 
 
+def test_an_alert_is_acknowledged_without_a_script(
+    bridge: Workspace, writer: httpx.Client, alert: int
+) -> None:
+    number = copied(bridge, alert, "without a script")
+    address = f"/alerts/{number}/acknowledgement"
+    assert f'action="{address}"' in writer.get("/alerts").text
+    assert writer.post(address, data={"why": " "}).status_code == 409
+    noted = writer.post(address, data={"who": "Ada", "why": "Seen."})
+    assert (noted.status_code, noted.headers["Location"]) == (303, f"/alerts#alert-{number}")
+    with bridge.store() as store:
+        acknowledged = store.alerts.get(number).acknowledgement
+    assert acknowledged
+    assert (acknowledged.who, acknowledged.why) == ("Ada (token write)", "Seen.")
+
+
 def test_person_token_and_reason_go_on_the_record(writer: httpx.Client, alert: int) -> None:
     address = f"/api/alerts/{alert}/acknowledgement"
     empty = writer.post(address, json={"who": " ", "why": "seen"})

@@ -44,7 +44,9 @@ def test_a_page_shows_what_is_held_and_what_to_do(client: httpx.Client, page: st
     assert ("epoch3.modes.json" in text) is not hanger_4_alone
     assert ("epoch4.modes.json" in text) is (page != "/hangers/3")
     number = 3 if hanger_4_alone else 2
-    assert f"shm ingest --confirm {number} --time TIME" in text
+    assert f'<a href="/operation#held-{number}">Confirm</a>' in text
+    assert f'id="held-{number}"' in text
+    assert "shm ingest" not in text
     assert "Held until you decide" in text
 
 
@@ -54,6 +56,15 @@ def test_a_held_test_has_no_page_and_no_place_in_the_lists(client: httpx.Client)
     alerts = client.get("/alerts").text
     assert 'href="/operation#held"' in alerts
     assert "/hangers/3/tests/epoch3" not in alerts
+
+
+def test_an_upload_that_is_held_says_why_and_leads_to_the_decision(client: httpx.Client) -> None:
+    text = client.get("/upload/outcome/2").text
+    assert "<html" not in text
+    assert "epoch3.modes.json" in text
+    assert "1970" in text
+    assert 'href="/operation#held-2"' in text
+    assert client.get("/upload/outcome/99").status_code == 404
 
 
 def test_health_asks_for_attention_and_does_not_fail(client: httpx.Client) -> None:

@@ -87,6 +87,32 @@ def test_who_saves_on_what_another_has_changed_meanwhile_is_shown_it_and_overwri
         assert list_changes(store, limit=1)[0].detail == "from 0.9 to 0.7"
 
 
+def test_a_wrong_value_saves_nothing_and_what_was_typed_stays_in_the_form(
+    browser: httpx.Client, workspace: Workspace
+) -> None:
+    attempts = "settings.hook_attempts"
+    told = filled_in(attempts, "0", value="9") | filled_in(LEVEL, "0", value="minus ten")
+    refused = browser.post("/settings", data=told)
+    assert refused.status_code == 422
+    assert "alert_probability: &#39;minus ten&#39; is not a number." in refused.text
+    assert f'name="value.{attempts}" value="9"' in refused.text
+    assert f'name="value.{LEVEL}" value="minus ten"' in refused.text
+    with workspace.store() as store:
+        assert not store.settings.list_current()
+
+
+def test_what_another_changed_is_shown_in_a_refused_form_beside_what_was_typed(
+    browser: httpx.Client,
+) -> None:
+    attempts = "settings.hook_attempts"
+    put(browser, LEVEL, "0.9")
+    told = filled_in(LEVEL, "0", value="0.7") | filled_in(attempts, "0", value="9")
+    refused = browser.post("/settings", data=told)
+    assert refused.status_code == 409
+    assert f'name="value.{LEVEL}" value="0.9"' in refused.text
+    assert f'name="value.{attempts}" value="9"' in refused.text
+
+
 def test_what_nobody_changed_is_not_set_though_all_is_one_form(
     browser: httpx.Client, workspace: Workspace
 ) -> None:

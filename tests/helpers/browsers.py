@@ -33,6 +33,7 @@ _DRAW_ALL = """async (longest_ms) => {
   for (const chart of charts) {
     const part = chart.closest("[data-tab]");
     if (part?.hidden) document.getElementById(`tab-${part.id}`).click();
+    chart.closest("details")?.setAttribute("open", "");
     chart.scrollIntoView();
     while (undrawn(chart) && Date.now() < end) await new Promise((done) => setTimeout(done, 30));
   }

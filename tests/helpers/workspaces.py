@@ -120,8 +120,8 @@ def put(path: Path, content: str | bytes) -> None:
     temporary.rename(path)
 
 
-def write_held(workspace: Workspace, hanger: int) -> None:
-    """A test of 1970, which is held until a person decides."""
+def write_held(workspace: Workspace, hanger: int, folder: Path | None = None) -> None:
+    """Write a test of 1970 into the spool or a folder; it is held until a person decides."""
     test = modelled_test(f"epoch{hanger}", workspace.bridge.hanger(hanger), tension=0.9)
     test = replace(test, time=datetime(1970, 1, 1, tzinfo=UTC))
-    put(workspace.spool / f"{test.id}.modes.json", dump(modes_document([test])))
+    put((folder or workspace.spool) / f"{test.id}.modes.json", dump(modes_document([test])))

@@ -26,6 +26,7 @@ from shm.report.as_html import ENVIRONMENT as OF_REPORTS
 from shm.report.as_html import environment
 from shm.report.figures.style import PALETTE
 from shm.store.queries.alerts import count_alerts
+from shm_daemon.web.commands import set_reader, with_links, without_commands
 from shm_daemon.web.health import notices
 from shm_daemon.web.site import Site
 
@@ -59,6 +60,9 @@ def page(request: Request, template: str, *, status: int = 200, **content: Any) 
     visitor = getattr(request.state, "visitor", None)
     site = request.app.state.site
     assert isinstance(site, Site)
+    number = request.path_params.get("hanger_id", "")
+    hanger = int(number) if str(number).isdecimal() else None
+    set_reader(hanger, is_engineer=visitor is not None and visitor.is_engineer)
     text = _environment().get_template(template).render(
         visitor=visitor,
         bridge=site.workspace.bridge.name if visitor else "",
@@ -118,6 +122,7 @@ def _environment() -> Environment:
     assert OF_REPORTS.loader is not None
     of_reports = PrefixLoader({"report": OF_REPORTS.loader})
     made = environment(ChoiceLoader([PackageLoader("shm_daemon.web", "templates"), of_reports]))
+    made.filters.update(with_code=with_links, without_commands=without_commands)
     made.globals.update(
         asset=asset,
         moment=formatting.moment,

@@ -285,7 +285,7 @@ FIGURES: tuple[HangerFigure, ...] = (
     HangerFigure(
         "gap_map",
         gap_map.FIGURE.title,
-        "gap",
+        "gap_details",
         lambda view: view.sheet is not None and bool(measured(view.sheet)),
         lambda view: gap_map.specify(_sheet(view), is_on_screen=True),
         lambda view: gap_map.caption(_sheet(view), is_on_screen=True),
@@ -295,7 +295,7 @@ FIGURES: tuple[HangerFigure, ...] = (
     HangerFigure(
         "gap_places",
         "Where along the hanger",
-        "gap",
+        "gap_details",
         lambda view: view.sheet is not None and bool(gap_map.local(view.sheet)),
         lambda view: stacked([gap_map.profiles(_sheet(view))], 2.2),
         lambda view: (
@@ -313,12 +313,12 @@ FIGURES: tuple[HangerFigure, ...] = (
         lambda view: gap_causes.specify_on_screen(_sheet(view)),
         lambda view: gap_causes.caption(_sheet(view), is_on_screen=True),
         lambda view: gap_causes.FIGURE.alt(_sheet(view)),
-        height_px=430,  # some 20 px, a line of text, for each of 20 effects
+        height_px=560,  # judgement: three lines of text for each of ten causes
     ),
     HangerFigure(
         "before_and_after",
         "How far the gap shrinks",
-        "gap",
+        "gap_details",
         _shrinks,
         lambda view: gap_before_and_after.specify(_sheet(view), is_on_screen=True),
         lambda view: gap_before_and_after.BEFORE_AND_AFTER.caption(_sheet(view)),

@@ -45,12 +45,13 @@ class TestFigure:
     """A figure of the report as the page shows it.
 
     `source` says what it needs: what the store holds; the raw file, identified once more; or
-    `both`, where the store has enough to begin with and the raw file adds to it. `is_wide`: a phone
-    shows it by and by, not narrower.
+    `both`, where the store has enough to begin with and the raw file adds to it. `tab` is the part
+    of the page that holds it. `is_wide`: a phone scrolls it sideways.
     """
 
     __test__ = False  # told to pytest
 
+    tab: str
     member: FigureSpec[ResponseCurves]
     source: Literal["store", "both", "file"]
     height_px: Callable[[ModalTestReport], int]
@@ -74,11 +75,12 @@ class TestFigure:
 
 # Judgement: a figure of one panel fits a laptop's screen with its caption, one of several fills it.
 MEMBERS: tuple[TestFigure, ...] = (
-    TestFigure(RESPONSE, "both", lambda sheet: 620),
-    TestFigure(TIME_HISTORY, "file", lambda sheet: 680),
-    TestFigure(HITS, "file", lambda sheet: 760),
-    TestFigure(STABILISATION, "file", lambda sheet: 520),
+    TestFigure("Response", RESPONSE, "both", lambda sheet: 620),
+    TestFigure("Response", STABILISATION, "file", lambda sheet: 520),
+    TestFigure("Hits", TIME_HISTORY, "file", lambda sheet: 640),
+    TestFigure("Hits", HITS, "file", lambda sheet: 720),
     TestFigure(
+        "Shapes",
         SHAPES,
         "store",
         lambda sheet: _REST_PX + _ROW_PX * len(rows_of(sheet, is_on_screen=True)),

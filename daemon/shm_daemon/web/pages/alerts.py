@@ -21,7 +21,7 @@ from shm.store import Delivery, DeliveryState, News, Silence, StoredAlert
 from shm.store.queries.alerts import count_open_alerts, list_alert_page
 from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values.messages import Lead
-from shm_daemon.web.access import AtSite, Reader, Writer
+from shm_daemon.web.access import AtSite, Principal, Reader, Writer
 from shm_daemon.web.address import test_page
 from shm_daemon.web.faults import answers
 from shm_daemon.web.forms import Form, reason_in, time_in
@@ -183,12 +183,26 @@ def alerts(
 )
 def acknowledge(site: AtSite, writer: Writer, alert_id: Row, comment: Acknowledge) -> Any:
     """Record that somebody has seen an alert, or with `resolved` that it has ended."""
-    named = comment.who is not None and not writer.is_person  # who signed in has a name
-    who = f"{comment.who} (token {writer.name})" if named else writer.name
-    alerts = site.store.acting_as(writer.actor).alerts
-    note = alerts.resolve if comment.resolved else alerts.acknowledge
-    note(alert_id, who, comment.why, utc_now())
+    _note(site, writer, alert_id, comment.who, comment.why, comment.resolved)
     return alert_documents([site.store.alerts.get(alert_id)], site)[0]
+
+
+@router.post("/alerts/{alert_id}/acknowledgement", include_in_schema=False)
+def acknowledge_by_form(site: AtSite, writer: Writer, alert_id: Row, form: Form) -> Response:
+    """Record what a person wrote in the form of a page, which works without a script."""
+    why, person = reason_in(form, "an alert"), form.get("who", "").strip()
+    _note(site, writer, alert_id, person or None, why, "resolved" in form)
+    return RedirectResponse(f"/alerts#alert-{alert_id}", 303)
+
+
+def _note(
+    site: Site, writer: Principal, alert_id: int, person: str | None, why: str, is_resolved: bool
+) -> None:
+    """Acknowledge or resolve an alert; `person` is who came with the token of a program."""
+    named = person is not None and not writer.is_person  # who signed in has a name
+    who = f"{person} (token {writer.name})" if named else writer.name
+    alerts = site.store.acting_as(writer.actor).alerts
+    (alerts.resolve if is_resolved else alerts.acknowledge)(alert_id, who, why, utc_now())
 
 
 def alert_documents(found: Sequence[StoredAlert], site: Site) -> list[dict[str, Any]]:

@@ -19,11 +19,11 @@ from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.reporting import hanger_report
 from shm.report import formatting, hanger_tables
 from shm.report.bar_table import bar_table
-from shm.report.contents import HangerReport
-from shm.report.diagnosis_report import answers, evidence
+from shm.report.contents import DiagnosisSheet, HangerReport
+from shm.report.diagnosis_report import answers, evidence, next_measurements, tension
 from shm.report.hanger_report import facts, gap_part, hanger_paper
 from shm.report.hanger_sentences import details
-from shm.report.paper import Table
+from shm.report.paper import Table, filled
 from shm.report.states import called_words, temperature_table
 from shm.store import EventKind, Store, TrendPoint, Workspace
 from shm.store.queries.trends import find_latest_trends, list_trend
@@ -132,15 +132,24 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
         "is_called": bool(report.now.called),
         "charts": {
             part: [_chart(view, e) for e in FIGURES if e.part == part and e.is_there(view)]
-            for part in ("trends", "model", "gap")
+            for part in ("trends", "model", "gap", "gap_details")
         },
         "tables": {part: [each for each in of if each.rows] for part, of in tables.items()},
         "alerts": hanger_tables.alerts(report),
         "events": _events(view),
         "gap": gap_part(report),
-        "answers": answers(view.sheet) if view.sheet else (),
-        "evidence": evidence(view.sheet) if view.sheet else (),
+        **_diagnosis_tables(view.sheet),
     }
+
+
+def _diagnosis_tables(sheet: DiagnosisSheet | None) -> dict[str, tuple[Table, ...]]:
+    """Return the tables that decide what to do, and those that few read, which are folded."""
+    if sheet is None:
+        return {"answers": (), "evidence": ()}
+    shown = filled(tension(sheet), next_measurements(sheet))
+    titles = {each.title for each in shown}
+    others = tuple(each for each in answers(sheet) if each.title not in titles)
+    return {"answers": shown, "evidence": (*others, *evidence(sheet))}
 
 
 def _chart(view: HangerView, figure: HangerFigure) -> Chart:

@@ -62,12 +62,9 @@ def one_test(
         missing=view.missing,
         before=before and (before, test_page(hanger_id, before)),
         after=after and (after, test_page(hanger_id, after)),
-        results=filled(
-            modal_test_report.modes(sheet),
-            modal_test_report.quality(sheet),
-            modal_test_report.foreign_modes(sheet),
-        ),
-        charts=[(each, *_chart(view, each, chosen)) for each in view.figures()],
+        checks=filled(modal_test_report.quality(sheet)),
+        results=filled(modal_test_report.modes(sheet), modal_test_report.foreign_modes(sheet)),
+        drawings=_drawings(view, chosen),
         points=[point_name(point) for point in points],
         chosen=chosen,
         address=address,
@@ -93,6 +90,14 @@ def _details(view: ModalTestView) -> tuple[Table, ...]:
     found = modal_test_report.conditions(view.as_stored)
     rows = tuple(row for row in found.rows if row[0] not in _NOT_STORED)
     return filled(notes, replace(found, rows=rows))
+
+
+def _drawings(view: ModalTestView, chosen: int) -> dict[str, list[tuple[TestFigure, str, int]]]:
+    """Return the figures of each tab with their addresses and heights."""
+    found: dict[str, list[tuple[TestFigure, str, int]]] = {}
+    for each in view.figures():
+        found.setdefault(each.tab, []).append((each, *_chart(view, each, chosen)))
+    return found
 
 
 def _chart(view: ModalTestView, figure: TestFigure, chosen: int) -> tuple[str, int]:

@@ -39,7 +39,7 @@ router = APIRouter(tags=["operation"])
 
 _SHOWN = 100  # technical: refused files on a page
 _FRESH_S = 300  # technical: looking at all takes seconds and a trial of each hook; read by people
-_BEING_LOOKED = {"message": "All is being looked at …"}
+_BEING_LOOKED = {"message": "The checks are running …"}
 _MARKS = {
     Level.OK: "good",
     Level.UNKNOWN: "unknown",
@@ -241,7 +241,7 @@ def _examination(request: Request, site: Site) -> Table | None:
     order = list(Level)
     worst_first = sorted(findings, key=lambda each: order.index(each.level), reverse=True)
     return Table(
-        "What `shm doctor` finds",
+        "All checks",
         ("check", "it is", "found", "what to do"),
         tuple((each.check, each.level.value, each.found, each.remedy) for each in worst_first),
         marks=tuple(_MARKS[each.level] for each in worst_first),

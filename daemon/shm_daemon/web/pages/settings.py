@@ -93,14 +93,12 @@ def change(request: Request, site: AtSite, engineer: Engineer, form: FormOfSetti
     def change() -> None:
         store = site.store.acting_as(engineer.actor)
         try:
-            for key in wanted:
-                if form.get(f"back.{key}") is None and not _is_changed(key, form):
-                    continue
+            for key, value in _changes(wanted, form).items():
                 based_on = form[f"based_on.{key}"]
                 workspace.change_setting(
                     store,
                     key,
-                    _value(key, form),
+                    value,
                     utc_now(),
                     engineer.name,
                     based_on=int(based_on) if based_on.isdecimal() else 0,
@@ -109,7 +107,9 @@ def change(request: Request, site: AtSite, engineer: Engineer, form: FormOfSetti
         finally:
             site.forget_description()  # ours, or somebody else's change, which it may not show yet
 
-    return redirect_or_show_error(change, address, partial(_page, request, site, hanger))
+    return redirect_or_show_error(
+        change, address, partial(_page, request, site, hanger, typed=form)
+    )
 
 
 @router.post("/settings/hooks/test")
@@ -129,6 +129,12 @@ def try_hook(request: Request, site: AtSite, _: Engineer, form: Form) -> Respons
     return _page(request, site, None, outcome, status)
 
 
+def _changes(keys: list[str], form: Mapping[str, str]) -> dict[str, float | str | None]:
+    """Return the new values of all settings to change; raises BadInput before any is saved."""
+    given_back = {key for key in keys if form.get(f"back.{key}") is not None}
+    return {key: _value(key, form) for key in keys if key in given_back or _is_changed(key, form)}
+
+
 def _is_changed(key: str, form: Mapping[str, str]) -> bool:
     """Return True where a field is not as the page showed it."""
     parts = ("begins", "ends") if key.endswith(QUIET_HOURS) else ("value",)
@@ -140,24 +146,33 @@ def _value(key: str, form: Mapping[str, str]) -> float | str | None:
     if form.get(f"back.{key}") is not None:
         return None
     if not key.endswith(QUIET_HOURS):
-        return _number(form.get(f"value.{key}", ""))
+        return _number(key.rpartition(".")[2], form.get(f"value.{key}", ""))
     begins, ends = form.get(f"begins.{key}", ""), form.get(f"ends.{key}", "")
     return f"{begins}-{ends}" if begins or ends else ""
 
 
-def _number(text: str) -> float:
+def _number(name: str, text: str) -> float:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise BadInput(f"{text!r} is not a number.", remedy="Write one, with a decimal point.")
+        raise BadInput(
+            f"{name}: {text!r} is not a number.",
+            remedy="Write one, with a decimal point. Nothing was saved.",
+        )
     return value
 
 
 def _page(
-    request: Request, site: Site, hanger: int | None, message: str = "", status: int = 200
+    request: Request,
+    site: Site,
+    hanger: int | None,
+    message: str = "",
+    status: int = 200,
+    typed: Mapping[str, str] | None = None,
 ) -> Response:
+    """Show the form; `typed` is what a form held that was refused, to be corrected there."""
     workspace = site.workspace
     bridge, changed = workspace.bridge, site.store.settings.list_current()
     known, judged = [each for each in bridge.watched if each.id == hanger], ""
@@ -180,8 +195,19 @@ def _page(
         hanger=hanger,
         judged=judged,
         changed=tuple(changed.values()),
+        typed=_to_correct(typed or {}, changed),
         hooks=tuple(each.name for each in bridge.hooks),
     )
+
+
+def _to_correct(typed: Mapping[str, str], changed: Mapping[str, ChangedSetting]) -> dict[str, str]:
+    """Return the fields of a refused form, less those of settings that another person changed."""
+    ids = {key: str(each.id) for key, each in changed.items()}
+    return {
+        field: value
+        for field, value in typed.items()
+        if typed.get(f"based_on.{field.partition('.')[2]}") == ids.get(field.partition(".")[2], "0")
+    }
 
 
 def _judged(site: Site, hanger: Hanger) -> str:

@@ -35,8 +35,9 @@ from shm_daemon.web.access import AtSite, Reader, Uploader
 from shm_daemon.web.address import IMPORTS
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
-from shm_daemon.web.models import LARGEST_NUMBER, plain
+from shm_daemon.web.models import LARGEST_NUMBER, Row, plain
 from shm_daemon.web.recordings import PLAIN_BODY, receive_body
+from shm_daemon.web.site import held_documents
 
 router = APIRouter(tags=["recordings"])
 
@@ -54,6 +55,15 @@ def upload_page(request: Request, site: AtSite, _: Reader) -> Response:
         max_mb=workspace.settings.max_file_bytes / 1e6,
         max_bytes=workspace.settings.max_file_bytes,
     )
+
+
+@router.get("/upload/outcome/{recording}", include_in_schema=False)
+def outcome(request: Request, site: AtSite, _: Reader, recording: Row) -> Response:
+    """Return, without the frame, why a recording is held, with the form to decide, or refused."""
+    stored = site.store.recordings.get(recording)
+    held = [each for each in held_documents(site) if each["recording"] == stored.id]
+    reason = stored.reason or {"message": "the reason was not noted.", "remedy": ""}
+    return page(request, "upload_outcome.html.j2", held=held, reason=reason)
 
 
 _MOST_ANSWERS = 4000  # technical: of an address, 64 kB at most when each character is escaped

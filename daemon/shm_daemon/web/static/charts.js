@@ -141,7 +141,10 @@
     form.addEventListener("change", () => {
       const [first, last] = extent();
       const stretch = [from.value || first, to.value ? `${to.value}T23:59:59Z` : last];
-      if (stretch[0] && stretch[0] < stretch[1]) show(stretch);
+      const isSpan = stretch[0] && stretch[0] < stretch[1];
+      to.setCustomValidity(isSpan || !to.value ? "" : "The last day is before the first.");
+      to.reportValidity();
+      if (isSpan) show(stretch);
     });
     form.addEventListener("submit", (event) => event.preventDefault());
   }
@@ -161,7 +164,7 @@
   }
 
   function tell(chart, text) {
-    chart.querySelector(".told").textContent = text;
+    chart.querySelector(".told").textContent = text.replaceAll("`", "");
   }
 
   function describe(chart, figure) {

@@ -8,24 +8,29 @@
     const note = document.createElement("p");
     note.className = "note";
     note.setAttribute("role", "status");
-    note.textContent = text;
+    note.textContent = text.replaceAll("`", "");
     place.replaceChildren(note);
+  }
+
+  const isPage = (answer) => (answer.headers.get("Content-Type") ?? "").startsWith("text/html");
+
+  async function show(place, answer) {
+    if (isPage(answer)) {
+      place.innerHTML = await answer.text();
+    } else {
+      const { message, remedy } = await answer.json();
+      tell(place, [message, remedy].filter(Boolean).join(" "));
+    }
   }
 
   async function fill(place) {
     try {
       for (;;) {
         const answer = await fetch(place.dataset.fragment);
+        await show(place, answer);
         if (answer.status === 202) {
-          place.innerHTML = await answer.text();
           await wait(Number(answer.headers.get("Retry-After")) || 2);
           continue;
-        }
-        if (answer.ok) {
-          place.innerHTML = await answer.text();
-        } else {
-          const { message, remedy } = await answer.json();
-          tell(place, [message, remedy].filter(Boolean).join(" "));
         }
         return;
       }

@@ -3,7 +3,15 @@
 
 (() => {
   const [SORTED, CHOSEN] = [4, 16]; // rows: a shorter table is read at a glance
-  const written = (cell) => cell.innerText.trim().replaceAll("−", "-");
+  const plain = (text) => text.replace(/\s+/g, " ").trim().replaceAll("−", "-");
+
+  // The text of a cell without what is there for screen readers alone.
+  function written(cell) {
+    const copy = cell.cloneNode(true);
+    copy.querySelectorAll(".unseen").forEach((each) => each.remove());
+    return plain(copy.textContent);
+  }
+
   const number = (text) => (/^[<>]?\s*[-+]?[\d.]/.test(text)
     ? parseFloat(text.replace(/^[<>]\s*/, "")) : NaN);
   const isDay = (text) => /^\d{4}-\d\d-\d\d/.test(text);
@@ -38,24 +46,27 @@
   }
 
   function inCsv(table) {
-    const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
-    return [...table.rows].map((row) => [...row.cells].map((cell) => quoted(written(cell))).join(","))
+    // No formula for a spreadsheet: a test is named by whoever uploads its file.
+    const inert = (text) => (/^([=@]|[-+](?!\s*[\d.]))/.test(text) ? `'${text}` : text);
+    const quoted = (text) => (/[",]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+    const line = (row) => [...row.cells].map((cell) => quoted(inert(written(cell)))).join(",");
+    return [...table.rows].map(line)
       .join("\r\n");
   }
 
   function keep(table, title) {
     const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([`${inCsv(table)}\r\n`], { type: "text/csv" }));
+    link.href = URL.createObjectURL(new Blob([`\ufeff${inCsv(table)}\r\n`], { type: "text/csv" }));
     link.download = `${title.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "")}.csv`;
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 0);
   }
 
   function choose(table, words) {
-    const wanted = words.toLowerCase().split(/\s+/);
+    const wanted = plain(words).toLowerCase();
     for (const row of table.tBodies[0].rows) {
-      const text = row.innerText.toLowerCase();
-      row.hidden = !wanted.every((each) => text.includes(each));
+      const text = [...row.cells].map(written).join(" ").toLowerCase();
+      row.hidden = !text.includes(wanted);
     }
   }
 

@@ -12,7 +12,7 @@
   };
   const FIRST_S = 1;
   const LONGEST_S = 15;
-  const said = (fault) => [fault.message, fault.remedy].filter(Boolean).join(" ");
+  const said = (fault) => [fault.message, fault.remedy].filter(Boolean).join(" ").replaceAll("`", "");
   const size = (bytes) => bytes < 1e6
     ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
   const made = (name, values = {}) => Object.assign(document.createElement(name), values);
@@ -135,13 +135,14 @@
       });
       const carried = made("input", { id: `carried-${row.number}`, type: "checkbox" });
       if (found.questions.some(({ about }) => about === "hanger")) {
-        const line = made("div");
-        const textContent = "This logger goes from hanger to hanger: ask each time";
-        line.append(carried, made("label", { htmlFor: carried.id, textContent }));
-        box.append(line);
+        const label = made("label", { htmlFor: carried.id, className: "carried" });
+        label.append(carried, " This logger goes from hanger to hanger: ask each time");
+        box.append(label);
       }
-      const plain = made("button", { type: "button", textContent: "Send as it is" });
-      box.append(made("button", { textContent: "Keep for this logger, and send" }), plain);
+      const plain = made("button", { type: "button", className: "plain", textContent: "Send as it is" });
+      const buttons = made("p", { className: "carried" });
+      buttons.append(made("button", { textContent: "Keep for this logger, and send" }), " ", plain);
+      box.append(buttons);
       part.append(tableOf(found), box);
       row.item.append(part);
       const ended = (answers) => { part.remove(); resolve(answers); };
@@ -241,16 +242,26 @@
         return;
       }
       const [recording] = found.recordings ?? []; // none while it is in the spool
-      if (recording && shown(recording, row)) return;
+      if (recording && await shown(recording, row)) return;
     }
   }
 
-  function shown(recording, row) {
+  // Shows why a file is held or refused, with a link or form for what to do.
+  async function stopped({ id, stage }, row) {
+    const answer = await fetch(`/upload/outcome/${id}`);
+    if (!answer.ok) return false;
+    row.bar.remove();
+    state(row, stage === "held" ? "Held: it counts in nothing until somebody decides." : "", "failed");
+    const outcome = made("div", { className: "outcome" });
+    outcome.innerHTML = await answer.text();
+    row.item.append(outcome);
+    told.textContent = `${row.name} is ${stage}.`;
+    return true;
+  }
+
+  async function shown(recording, row) {
     const { stage } = recording;
-    if (stage === "refused") {
-      failed(row, `Refused: ${said(recording.reason ?? {}) || "the reason was not noted."}`);
-      return true;
-    }
+    if (stage === "refused" || stage === "held") return stopped(recording, row);
     state(row, WORDS[stage] ?? stage, stage === "done" ? "done" : "");
     links(recording, row);
     if (stage === "done") {
