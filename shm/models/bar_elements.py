@@ -129,9 +129,9 @@ def bar_elements(
     rotation[0, first[1]], rotation[1, last[3]] = 1.0, 1.0
     if shears:
         rotation[0, strains[0][0]], rotation[1, strains[-1][1]] = -1.0, -1.0
-    curvature = tuple(np.vstack([np.zeros((0, count)), *each]) for each in curvatures)
+    weighted = tuple(np.vstack([np.zeros((0, count)), *each]) for each in curvatures)
     return BarElements(
-        curvature, tension, gradient, mass, turning, shear if shears else np.empty((0, 0)),
+        weighted, tension, gradient, mass, turning, shear if shears else np.empty((0, 0)),
         rotation, area, edges, degrees,
     )  # fmt: skip
 

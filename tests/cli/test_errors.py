@@ -18,7 +18,7 @@ from tests.cli.conftest import Ended, Shm
 from tests.helpers.command_lines import commands, examples, words_of
 
 NEEDS_NO_WORKSPACE = {
-    "init", "demo", "completion", "notices", "settings", "gap effects",
+    "init", "demo", "completion", "manual", "notices", "settings", "gap effects",
 }  # fmt: skip
 """They make one, or do without; `doctor` ends with a finding, which is its answer."""
 FINDS = {"doctor"}
