@@ -27,6 +27,7 @@ from shm_daemon.heartbeat import HEARTBEAT, beat
 from shm_daemon.hooks.webhook import Lines
 from shm_daemon.web.address import SUMMARY, Address
 from shm_daemon.web.bridge_summary import BridgeRow, Summary
+from shm_daemon.web.commands import without_commands
 from shm_daemon.web.other_bridges import NotTold, OtherBridges, ask
 from tests.helpers.listeners import Answer, Listener, a_listener, a_silent_listener
 from tests.helpers.nouns import NOW
@@ -136,7 +137,7 @@ def test_a_bridge_is_said_in_the_words_of_its_own_home_page(
     row = there.rows()[name]["summary"]
     keys = ("bridge", "status", "state", "action", "urgency", "notes")
     assert {key: row[key] for key in keys} == {key: state[key] for key in keys}
-    said = words_of(value_of(Summary, row).words)
+    said = words_of(without_commands(value_of(Summary, row).words))
     assert said in home_page
     assert said in there.page()
     for notice in row["notices"]:
