@@ -526,16 +526,6 @@ _STRANDS = (
         most=1.0,
     ),
     Assumption(
-        "strand_bending_per_amplitude_sd",
-        0.3,
-        "1/ln(amplitude)",
-        JUDGEMENT,
-        "As bending_per_amplitude_sd, of a strand: from wires that stick to wires that slip within "
-        "four e-folds of the motion.",
-        least=1e-6,
-        most=10.0,
-    ),
-    Assumption(
         "strand_bending_log_sd",
         0.3,
         "of the logarithm",

@@ -249,12 +249,9 @@ def watch_newest(
 
 
 def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:
-    """Return the options with a hanger's own: its baseline, its false calls, wires that slip."""
-    its = hanger.thresholds.false_call_years
-    if hanger.kind == "strand":
-        slip = hanger.assumptions.strand_bending_per_amplitude_sd.value
-        options = replace(options, bending_per_amplitude_sd=slip)
-    limit_years = options.limit_years if its is None else its
+    """Return the options with a hanger's own baseline and mean time between false calls."""
+    stated = hanger.thresholds.false_call_years
+    limit_years = options.limit_years if stated is None else stated
     return replace(options, baseline_tests=baseline_tests, limit_years=limit_years)
 
 
