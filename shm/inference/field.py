@@ -24,12 +24,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import scipy
 
 from shm.assumptions import Assumptions
-from shm.inference.likelihood import Covariance, NoiseNode
+from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
 from shm.inference.measured import MeasuredFrequencies, conditions_of, predicted_hz
 from shm.inference.shapes import SHAPES, MeasuredShapes
 from shm.inference.systematic_errors import (
@@ -227,7 +228,12 @@ class FieldLikelihood(MeasuredFrequencies):
             for phi, log_phi in zip(self._phi, self._log_phi, strict=True)
         ]
 
-    def nodes(self, step_in_sd: float) -> list[NoiseNode]:
+    @cached_property
+    def likelihood(self) -> Likelihood:
+        return Likelihood(self._nodes()) if self.shapes.size else self._coarse
+
+    def _nodes(self) -> list[NoiseNode]:
+        """Return the possible errors of frequencies and shapes."""
         return [
             replace(
                 node,
@@ -238,7 +244,7 @@ class FieldLikelihood(MeasuredFrequencies):
                 ),
                 log_weight=node.log_weight + log_weight,
             )
-            for node in self.frequency_nodes(step_in_sd)
+            for node in self.frequency_nodes(self.steps[0])
             for factor, log_weight in self.shapes.factors
         ]
 

@@ -53,10 +53,6 @@ class MeasuredFrequencies(ABC):
     def frequency_nodes(self, step_in_sd: float) -> list[NoiseNode]:
         """Return the possible errors of frequencies, those of one sigma of the grid together."""
 
-    def nodes(self, step_in_sd: float) -> list[NoiseNode]:
-        """Return the possible errors of all data."""
-        return self.frequency_nodes(step_in_sd)
-
     def log_shapes(self, misfit: FloatArray) -> FloatArray:
         """Return the log likelihood (n,) of what is no frequency in misfits (n, data)."""
         return np.zeros(len(misfit))
@@ -74,7 +70,7 @@ class MeasuredFrequencies(ABC):
     @cached_property
     def likelihood(self) -> Likelihood:
         """Return the likelihood of residuals, which are misfits with the other sign."""
-        return Likelihood(self.nodes(self.steps[0]))
+        return self._coarse
 
     @cached_property
     def _coarse(self) -> Likelihood:
