@@ -60,12 +60,19 @@ _BLIND: dict[State, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class StreamHealth:
-    """A stream and how it is, by its last sample; `unread` is how much the watch has not read."""
+    """State of a stream.
+
+    `last_sample` is when its last sample was taken, `heard_at` when it was last heard of, by that
+    sample or by whatever came later: a backlog is old, and no silence. `unread` is how much the
+    watch has not read, `events` are those of the last day.
+    """
 
     stream: Stream
     state: State
     last_sample: datetime | None
+    heard_at: datetime | None = None
     unread: timedelta = timedelta(0)
+    events: tuple[StreamEvent, ...] = ()
 
     @property
     def named(self) -> str:
@@ -75,44 +82,40 @@ class StreamHealth:
 
 
 def heard(workspace: Workspace, store: Store, now: datetime) -> tuple[StreamHealth, ...]:
-    """Each stream that `bridge.toml` describes, in its order."""
+    """Return the state of each stream that `bridge.toml` describes, in its order.
+
+    Where the ring is empty, after a restore or a long silence, the end of the last window counts.
+    """
     if not workspace.bridge.streams:
         return ()
     # It brings h5py, and most bridges have no streams.
     from shm.store.ring import ring_of
 
     ring = ring_of(workspace)
-    last = last_samples(workspace, ring, store)
-    return tuple(
-        StreamHealth(
-            each,
-            classify_stream(
-                last[each.name], list_stream_events(store, each.name, now - LATELY), now
-            ),
-            last[each.name],
-            measure_unread(workspace, ring, store, each.name, now),
-        )
-        for each in workspace.bridge.streams
-    )
+    latest, arrivals = ring.latest(), ring.last_arrivals()
+    found = []
+    for stream in workspace.bridge.streams:
+        last = latest.get(stream.name) or find_progress(store, stream.name)
+        # An arrival that is yet to come was noted by a clock that was ahead.
+        times = [at for at in (last, arrivals.get(stream.name)) if at and at - now <= _AHEAD]
+        heard_at = max(times, default=last)
+        events = list_stream_events(store, stream.name, now - LATELY)
+        state = classify_stream(last, heard_at, events, now)
+        unread = measure_unread(workspace, ring, store, stream.name, now)
+        found.append(StreamHealth(stream, state, last, heard_at, unread, events))
+    return tuple(found)
 
 
-def last_samples(workspace: Workspace, ring: Ring, store: Store) -> dict[str, datetime | None]:
-    """Return when the last sample of each described stream ended, None where it never sent.
-
-    Where the ring is empty, after a restore or a long silence, it is when the last window ended.
+def classify_stream(
+    last: datetime | None, heard_at: datetime | None, events: Sequence[StreamEvent], now: datetime
+) -> State:
+    """Return how a stream is by its last sample, when it was last heard of, and a day's `events`.
     """
-    latest = ring.latest()
-    names = [stream.name for stream in workspace.bridge.streams]
-    return {name: latest.get(name) or find_progress(store, name) for name in names}
-
-
-def classify_stream(last: datetime | None, events: Sequence[StreamEvent], now: datetime) -> State:
-    """Return how a stream is by its last sample and the `events` of a day."""
-    if last is None:
+    if last is None or heard_at is None:
         return "never sent"
     if last - now > _AHEAD:  # whether it still sends cannot be told by its stamps
         return "clock ahead"
-    if now - last > _SILENT:
+    if now - heard_at > _SILENT:
         return "silent"
     if now - last > _LATE:
         return "late"
@@ -261,10 +264,10 @@ def evaluate_silent_streams(workspace: Workspace, store: Store, at: datetime) ->
     ]
     told = {_told(each) for each in standing}
     for name, each in found.items():
-        word, last = _WORD.get(each.state, ""), each.last_sample
-        if not word or last is None or (word, name) in told:
+        word, heard_at = _WORD.get(each.state, ""), each.heard_at
+        if not word or heard_at is None or (word, name) in told:
             continue
-        since = last if word == "silent" else _blind_since(store, name, at)
+        since = heard_at if word == "silent" else _blind_since(store, name, at)
         if at - since > _LONG:
             conditions.append(Condition(_alert(each, word, since), "holds"))
     hooks = [hook.name for hook in workspace.bridge.hooks]

@@ -41,12 +41,14 @@ def send(
     *,
     first: datetime = FIRST,
     seed: int = 3,
+    at: datetime | None = None,
     **said: float,
 ) -> None:
-    """Some hours of the first stream, in chunks of ten minutes."""
+    """Send some hours of the first stream in chunks of ten minutes, each at its end or all `at`."""
     stream, hanger = workspace.bridge.streams[0], workspace.bridge.hangers[0]
     for chunk in streamed(hanger, stream, CALM, first, hours * 3600, seed):
-        ring_of(workspace).append(chunk_document(replace(chunk, **said)))
+        ring = ring_of(workspace, lambda now=at or chunk.end: now)  # type: ignore[misc]
+        ring.append(chunk_document(replace(chunk, **said)))
 
 
 def drain(streaming: Streaming, clock: Clock) -> None:

@@ -37,18 +37,39 @@ def an_event(kind: str, end: datetime) -> StreamEvent:
 
 
 @pytest.mark.parametrize(
-    ("ago", "kind", "state"),
+    ("ago", "heard_ago", "kind", "state"),
     [
-        (timedelta(minutes=4), "gap", "live"),
-        (timedelta(minutes=4), "dead", "sensor at fault"),
-        (timedelta(minutes=4), "lost modes", "sees nothing"),
-        (timedelta(minutes=6), "lost modes", "late"),
-        (2 * HOUR, "dead", "silent"),
-        (-HOUR, "dead", "clock ahead"),
+        (HOUR / 15, HOUR / 15, "gap", "live"),
+        (HOUR / 15, HOUR / 15, "dead", "sensor at fault"),
+        (HOUR / 15, HOUR / 15, "lost modes", "sees nothing"),
+        (HOUR / 10, HOUR / 10, "lost modes", "late"),
+        (2 * HOUR, 2 * HOUR, "dead", "silent"),
+        (96 * HOUR, HOUR / 15, "dead", "late"),  # it sends what it stored
+        (-HOUR, -HOUR, "dead", "clock ahead"),
     ],
 )
-def test_a_stream_is_in_one_state(ago: timedelta, kind: str, state: State) -> None:
-    assert classify_stream(NOW - ago, [an_event(kind, NOW - ago)], NOW) == state
+def test_a_stream_is_in_one_state(
+    ago: timedelta, heard_ago: timedelta, kind: str, state: State
+) -> None:
+    events = [an_event(kind, NOW - ago)]
+    assert classify_stream(NOW - ago, NOW - heard_ago, events, NOW) == state
+
+
+def test_a_backlog_of_days_that_comes_now_is_no_silence(tmp_path: Path) -> None:
+    workspace = with_live_streams(make_workspace(tmp_path / "bridge"))
+    sent_at = NOW + timedelta(days=4)
+    send(workspace, hours=0.5, first=NOW, at=sent_at)
+    with workspace.store() as store:
+        for sealed in (False, True):
+            if sealed:
+                ring_of(workspace).seal(sent_at + HOUR / 60)
+            (found,) = heard(workspace, store, sent_at + HOUR / 2)
+            assert (found.state, found.last_sample) == ("late", NOW + HOUR / 2)
+            evaluate_silent_streams(workspace, store, sent_at + HOUR / 2)
+        assert store.alerts.list_all() == ()
+        evaluate_silent_streams(workspace, store, sent_at + timedelta(days=2))
+        (raised,) = store.alerts.list_all()
+        assert raised.alert.time == sent_at  # from then on nothing came
 
 
 def test_of_a_hanger_whose_stream_is_silent_nobody_says_that_nothing_needs_doing(
