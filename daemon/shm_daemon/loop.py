@@ -20,7 +20,7 @@ from shm.errors import (
     TooLarge,
     retry_pause_s,
 )
-from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
+from shm.pipeline import Clock, Flow, Notifier, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
 from shm.store import Workspace
@@ -283,11 +283,11 @@ class Daemon:
         self._take_over_description()
         self._refuse_other_disks()
         whole = self._tracker.whole(scan(self._flow.workspace.spool, self._pulse))
-        until, sharing = time.monotonic() + _RECEIVING_S, Sharing(self._pulse)
+        until = time.monotonic() + _RECEIVING_S
         for path in whole:
             if self._wakeup.stopped:
                 break
-            self._receive(path, sharing)
+            self._receive(path)
             if time.monotonic() > until:  # after one at least, however slow the disk is
                 break
         pause = min(
@@ -295,10 +295,10 @@ class Daemon:
         )
         self._scan_at = time.monotonic() + pause
 
-    def _receive(self, path: Path, sharing: Sharing) -> None:
+    def _receive(self, path: Path) -> None:
         """One file that cannot be taken must not hold up the others; a store that cannot, must."""
         try:
-            self._flow.receive(path, sharing)
+            self._flow.receive(path)
         except StoreError:
             raise
         except TooLarge as error:

@@ -109,8 +109,7 @@ def heard(workspace: Workspace, store: Store, now: datetime) -> tuple[StreamHeal
 def classify_stream(
     last: datetime | None, heard_at: datetime | None, events: Sequence[StreamEvent], now: datetime
 ) -> State:
-    """Return how a stream is by its last sample, when it was last heard of, and a day's `events`.
-    """
+    """Return how a stream is by its last sample, when it was heard of, and a day's `events`."""
     if last is None or heard_at is None:
         return "never sent"
     if last - now > _AHEAD:  # whether it still sends cannot be told by its stamps

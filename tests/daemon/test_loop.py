@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from shm.errors import ShmError, StoreBusy, StoreError
-from shm.pipeline import Flow, Sharing, steps, utc_now
+from shm.pipeline import Flow, steps, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
 from shm.store import Archive, Delivery, DeliveryState, Stage, Workspace
@@ -220,10 +220,10 @@ def test_receive_raises_anything(
     """A file that cannot be taken in for a fault of shm keeps no other file from being done."""
     receive = Flow.receive
 
-    def fail_on_a(self: Flow, path: Path, sharing: Sharing | None = None) -> object:
+    def fail_on_a(self: Flow, path: Path) -> object:
         if path.name.startswith("a"):
             raise KeyError("layout")
-        return receive(self, path, sharing)
+        return receive(self, path)
 
     monkeypatch.setattr(Flow, "receive", fail_on_a)
     for name in "ab":
@@ -310,13 +310,13 @@ def test_a_file_that_cannot_be_taken_holds_up_nobody(
 ) -> None:
     receive, seen = Flow.receive, []
 
-    def fail_on_a(self: Flow, path: Path, sharing: Sharing | None = None) -> object:
+    def fail_on_a(self: Flow, path: Path) -> object:
         seen.append(path.name)
         if path.name.startswith("a") and seen.count(path.name) == 1:
             raise ShmError("changed while it was read.", retry_after_s=0.2)
         if path.name.startswith("b") and seen.count(path.name) == 1:
             raise FileNotFoundError(path)
-        return receive(self, path, sharing)
+        return receive(self, path)
 
     monkeypatch.setattr(Flow, "receive", fail_on_a)
     monkeypatch.setattr("shm_daemon.loop._UNREADABLE_S", 0.2)
