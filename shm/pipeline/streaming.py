@@ -104,7 +104,8 @@ class Streaming:
         self.lanes, self.wake = lanes, wake
         self._running: dict[str, tuple[Work, Future[Any]]] = {}
         self._done: dict[str, datetime] = {}
-        self._waiting: dict[str, list[datetime]] = {}  # ten minutes, of streams that are recalled
+        self._waiting: defaultdict[str, list[datetime]] = defaultdict(list)  # ten minutes, by time
+        self._recalled: set[str] = set()
         self._pooled: dict[tuple[str, Period], datetime] = {}
         self._changed: dict[str, datetime] = {}
         self._settled: dict[str, datetime] = {}
@@ -146,9 +147,7 @@ class Streaming:
                 del self._running[name]
                 self._finish(name, work, future)
         while not self._news.empty():
-            name, start = self._news.get()
-            if name in self._waiting:  # else all that is unread is recalled
-                self._note(name, start)
+            self._note(*self._news.get())
         streams = self.workspace.bridge.streams
         # Each turn begins with another, or the first would keep all lanes while they catch up.
         for stream in (*streams[self._first :], *streams[: self._first]):
@@ -187,7 +186,7 @@ class Streaming:
 
     def _next_work(self, stream: Stream) -> Work | None:
         name = stream.name
-        if name not in self._waiting:
+        if name not in self._recalled:
             self._recall(stream)
         done, waiting = self._done.get(name), self._waiting[name]
         is_late = done is not None and bool(waiting) and waiting[0] < done
@@ -212,7 +211,9 @@ class Streaming:
             self._settled[name] = hours[1] + PERIODS["hour"]
         if (done := find_progress(store, name)) is not None:
             self._done[name] = done
-        self._waiting[name] = sorted(list_unread(self.workspace, self.ring, store, name, now))
+        for start in list_unread(self.workspace, self.ring, store, name, now):
+            self._note(name, start)
+        self._recalled.add(name)
 
     def _go_back(self, stream: Stream, changed: datetime) -> None:
         """Pool again from the earliest window on that came late.
@@ -421,7 +422,7 @@ class Streaming:
                 else:
                     work.throw(error)
         except StoreError:
-            self._waiting.pop(name, None)
+            self._recalled.discard(name)
             raise
         except Exception as error:  # noqa: BLE001 - it must stop neither stream nor files
             self._retry_later(name)
@@ -430,7 +431,7 @@ class Streaming:
     def _retry_later(self, name: str) -> None:
         """Leave a stream alone for a minute, then look for its unread windows again."""
         self._not_before[name] = self.clock() + _AGAIN
-        self._waiting.pop(name, None)
+        self._recalled.discard(name)
 
 
 def _is_passing(error: Exception) -> bool:

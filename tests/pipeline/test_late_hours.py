@@ -57,10 +57,10 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
         return stream_steps.WindowFound(WindowReading(kept, modes, "tracked"), (), {})
 
     starts: list[datetime] = []
-    real = Streaming._begin_window
+    real = Streaming._read
     monkeypatch.setattr(
         Streaming,
-        "_begin_window",
+        "_read",
         lambda self, stream, start: (starts.append(start), real(self, stream, start))[1],
     )
     monkeypatch.setattr(stream_steps, "read_stream_window", lambda *_: window(starts[-1]))
