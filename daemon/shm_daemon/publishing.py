@@ -10,7 +10,6 @@ import base64
 import json
 import logging
 import os
-import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -23,6 +22,7 @@ from shm.pipeline import Clock
 from shm.pipeline.publishing import Progress, queue_results
 from shm.store import Store, Workspace
 from shm.store.point_outbox import PointOutbox
+from shm_daemon.background import repeated
 from shm_daemon.hooks.contract import SHOWN_CHARACTERS, one_line
 from shm_daemon.http_client import HttpClient, NoAnswer
 
@@ -175,28 +175,17 @@ def results_published(
 
     For the holder of the workspace's lock.
     """
-    publisher, ended = Publisher(workspace, clock, pace), threading.Event()
-    thread = threading.Thread(target=_work, args=(publisher, ended), name="publish")
+    publisher = Publisher(workspace, clock, pace)
+    pauses = {"pause_s": publisher.pace.look_s, "retry_s": publisher.pace.retry_s}
     try:
-        if not when_done:
-            thread.start()
-        yield publisher
         if when_done:
+            yield publisher
             publisher.turn()
+            return
+        with repeated("publish", publisher.turn, **pauses):
+            try:
+                yield publisher
+            finally:
+                publisher.break_off()
     finally:
-        ended.set()
-        if thread.ident is not None:
-            publisher.break_off()
-            thread.join()
         publisher.close()
-
-
-def _work(publisher: Publisher, ended: threading.Event) -> None:
-    while not ended.is_set():
-        pause_s = publisher.pace.look_s
-        try:
-            publisher.turn()
-        except Exception as error:  # the daemon goes on without publishing rather than not at all
-            log.warning("results wait: %s", error, exc_info=not isinstance(error, ShmError))
-            pause_s = getattr(error, "retry_after_s", None) or publisher.pace.retry_s
-        ended.wait(pause_s)
