@@ -63,7 +63,7 @@ def test_an_evidence_is_right_after_five_runs_of_small_bias_and_spread(
 
 
 def test_the_bounds_hold_where_a_right_peer_is_dear_and_a_cheap_one_wrong() -> None:
-    dear, cheap = rows("dynesty", 50.0, FIVE), rows("blackjax", 2.0, (-3.0, -2.9))
+    dear, cheap = rows("dynesty", 50.0, FIVE), rows("emcee", 2.0, (-3.0, -2.9))
     assert table.failed_bounds([*OURS, *dear, *cheap]) == []
 
 
@@ -77,7 +77,7 @@ def test_our_wrong_evidence_breaks_a_bound() -> None:
     assert "bias +0.55" in failed
 
 
-FAILED = {"peer": "uqpy", "problem": "thesis", "repeat": 1, "sigma": "sampled", "seed": 1} | {
+FAILED = {"peer": "ultranest", "problem": "thesis", "repeat": 1, "sigma": "sampled", "seed": 1} | {
     "failure": "no memory",
     "limit": 900,
 }
@@ -121,7 +121,7 @@ def test_ours_is_planned_with_sigma_integrated_out_and_more_seeds() -> None:
 
 def test_a_run_is_done_when_it_finished_or_failed_with_as_much_time() -> None:
     case = command.Case("thesis", 1, "sampled")
-    finished, failed = command.Job("dynesty", case, 2), command.Job("uqpy", case, 1)
+    finished, failed = command.Job("dynesty", case, 2), command.Job("ultranest", case, 1)
     kept = [*rows("dynesty", 50.0, FIVE), FAILED]
     assert finished.done(kept, limit=900)
     assert not command.Job("dynesty", case, 6).done(kept, limit=900)
@@ -131,10 +131,10 @@ def test_a_run_is_done_when_it_finished_or_failed_with_as_much_time() -> None:
 
 
 def test_no_other_seed_is_tried_where_one_failed_with_as_much_time() -> None:
-    other = command.Job("uqpy", command.Case("thesis", 1, "sampled"), 2)
+    other = command.Job("ultranest", command.Case("thesis", 1, "sampled"), 2)
     assert other.hopeless([FAILED], limit=900)
     assert not other.hopeless([FAILED], limit=1800)
-    assert not other.hopeless(rows("uqpy", 50.0, (0.0,)), limit=900)
+    assert not other.hopeless(rows("ultranest", 50.0, (0.0,)), limit=900)
 
 
 def test_each_run_replaces_its_own_line_and_keeps_the_others(

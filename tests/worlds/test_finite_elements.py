@@ -9,13 +9,11 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.worlds.finite_elements import (
-    CAUSES,
     COWPER_ROUND,
     Array,
     Bar,
     Case,
     Nuisances,
-    hangers_with_a_cause,
     natural_frequencies_hz,
     sound_hangers,
 )
@@ -160,25 +158,3 @@ def test_errors_of_the_frequencies_are_those_stated() -> None:
 def test_the_seed_decides(cases: list[Case]) -> None:
     assert sound_hangers(2026, 12) == cases[:12]  # whatever the count
     assert sound_hangers(2027, 12) != cases[:12]
-    assert hangers_with_a_cause(4, 5) == hangers_with_a_cause(4, 9)[:5]
-
-
-def test_hangers_with_a_cause() -> None:
-    cases = hangers_with_a_cause(8, 240)
-    causes = [str(c.truth["cause"]) for c in cases]
-    assert 0.4 < causes.count("") / len(causes) < 0.6
-    assert all(causes.count(name) > 20 for name in CAUSES)
-    assert {c.truth["kind"] for c in cases} == {"rod"}
-    assert {c.truth["planes"] for c in cases} == {2.0}
-    for case in cases:
-        truth = case.truth
-        assert 0.5 <= float(truth["tension_ratio"]) <= 1.5
-        assert all(3 <= float(truth[f"spring_k{i}"]) <= 1000 for i in range(1, 5))
-        assert len(case.modes["tests"]) in (1, 2, 3)  # type: ignore[arg-type]
-        if truth["cause"]:
-            place = float(truth["cause_place_m"]) / float(truth["length_m"])
-            assert 0.15 <= place <= 0.85
-            low, high = {"point_mass": (2, 15), "section_loss": (0.2, 0.6)}.get(
-                str(truth["cause"]), (0, math.inf)
-            )
-            assert low <= float(truth["cause_size"]) <= high
