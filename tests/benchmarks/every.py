@@ -74,10 +74,8 @@ SHORT = {
 TESTS = {
     "test-slow": "The slow tests.",
     "test-trials": "The statistical trials among the tests.",
-    "numerics": "The quick numerics on this processor.",
-    "without-avx512": "The quick numerics as on a processor without AVX-512.",
-    "slow-without-avx512": "The slow numerics as on a processor without AVX-512.",
-    "slow-without-avx2": "The slow numerics as on a processor without AVX2.",
+    "without-avx512": "The numerics as on a processor without AVX-512.",
+    "without-avx2": "The numerics as on a processor without AVX2 and FMA.",
 }
 # One that hangs must not keep the others waiting. `kill_workers` gives up after four hours.
 LONGEST_S, LONGEST_SHORT_S = 8 * 3600, 90
