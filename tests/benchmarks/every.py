@@ -2,7 +2,7 @@
 
     python tests/benchmarks/every.py                     # what `make bench` runs: a day or two
     python tests/benchmarks/every.py --short             # small cases and no other tests: an hour
-    python tests/benchmarks/every.py --only evidence,golden --anew
+    python tests/benchmarks/every.py --only evidence,week --anew
 
 A benchmark is each file beside this one that can be run, but those that make environments of other
 packages (`make -C tests/benchmarks bench-peers`). What it prints is kept in `build/bench/NAME.txt`,
@@ -61,7 +61,7 @@ SHORT = {
     "mutants": "--mutants 1", "power_cuts": "--files 1 --minutes 0.3",
     "recordings_trial": "--kinds softening --seeds 0:1",
     "right_signals": "--tests 2", "sharp_evidence": "--cases 2", "solid_models": "--held-out 2",
-    "stream_load": "--hangers 2 --hours 0.2", "stream_oracle": "--hangers 1",
+    "stream_load": "--hangers 2 --hours 0.2",
     "stream_trial": "--hangers 1 --years 0.2", "stream_windows": "--seeds 1 --hours 0.3",
     "tension_coverage": "--cases 2",
     "validate": "--table A.6",

@@ -117,27 +117,6 @@ AREAS = np.array([3.0, 4, 5, 5, 4, 6]) * 1e-3
 FRAME = _frame(PLACES, LENGTHS, AREAS)
 
 
-def test_frame_and_its_arch_alone_are_in_equilibrium() -> None:
-    load = FRAME.unit(
-        arch_k=15.0,
-        tie_k=3.0,
-        tie_difference_k=6.0,
-        line_n_m=2000.0,
-        longer_m=(0.0, 0.0, -2e-3, 0.0, 0.0, 1e-3),
-        weights=((25.0, 1e5),),
-    )
-    (answer,) = FRAME.respond([load])
-    right = 2000.0 * 80 / 2 + 1e5 * 25 / 80  # levers
-    assert answer.reactions_n == pytest.approx([0.0, 260e3 - right, right], abs=1e-2)
-    left_end, right_end = FRAME.arch_end_forces(load, answer)
-    tension = answer.tension_n
-    scale = np.abs(tension).sum()
-    assert left_end[0] + right_end[0] == pytest.approx(0.0, abs=1e-6 * scale)
-    assert left_end[1] + right_end[1] == pytest.approx(tension.sum(), abs=1e-6 * scale)
-    moment = left_end[2] + right_end[2] + 80 * right_end[1] - tension @ PLACES
-    assert moment == pytest.approx(0.0, abs=1e-5 * scale)
-
-
 def test_losing_a_hanger_is_the_frame_without_it() -> None:
     gone = list(FRAME.hanger_stiffness_n_m)
     gone[2] *= 1e-9
