@@ -12,15 +12,12 @@ All are summed over grids. L_i is the likelihood of the effect against all that 
 R_i that of one too small to see against none. A size far below what is visible says neither yes nor
 no. Hierarchies of this kind: Gelman et al., Bayesian Data Analysis, 2013, chapter 5.
 
-Groups are hangers that are similar in something. What a description says is compared as written:
-hangers of one delivery, of one section, with similar ends, of about one length, and those measured
-on the same days.
+Groups are all hangers, and those that their owner says to be of one family.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,9 +29,6 @@ from shm.values import FloatArray, IntArray
 LEAST = 2
 """Members of a group: one alone shares nothing."""
 
-_CLASSES = 2.0
-"""Lengths are of one class from one power of the root of this to the next: judgement, ends of
-hangers as unlike as that are mostly made otherwise."""
 # Numerical: shares of a group, with prior 1 each; a twentieth is finer than 20 hangers can tell.
 _SHARES = (np.arange(10) + 0.5) / 10
 # Judgement: from bridges on which every hanger has something of its own to those on which one in
@@ -56,43 +50,16 @@ class Group:
 
 
 def find_groups(hangers: Sequence[HangerEvidence]) -> tuple[Group, ...]:
-    """Return all hangers, then the parts of them that are similar in something, each set once."""
+    """Return all hangers, then those of each stated family, each set once."""
+    families: dict[str, list[int]] = {}
+    for index, each in enumerate(hangers):
+        if each.hanger.family:
+            families.setdefault(each.hanger.family, []).append(index)
     found = {tuple(range(len(hangers))): "all hangers"}
-    for likeness, describe in _LIKENESSES.items():
-        parts: dict[Hashable, list[int]] = {}
-        for index, each in enumerate(hangers):
-            if (key := describe(each)) is not None:
-                parts.setdefault(key, []).append(index)
-        for members in parts.values():
-            if len(members) >= LEAST:
-                found.setdefault(tuple(members), likeness)
+    for members in families.values():
+        if len(members) >= LEAST:
+            found.setdefault(tuple(members), "hangers of one delivery")
     return tuple(Group(likeness, members) for members, likeness in found.items())
-
-
-def _days(each: HangerEvidence) -> Hashable | None:
-    """Return the days on which it was tested; None where a test does not say."""
-    days = {test.time.date() if test.time else None for test in each.tests}
-    return None if None in days else frozenset(days)
-
-
-_LIKENESSES: dict[str, Callable[[HangerEvidence], Hashable | None]] = {
-    "hangers of one delivery": lambda each: each.hanger.family or None,
-    "hangers of one section": lambda each: (
-        each.hanger.area_m2,
-        each.hanger.second_moment_m4,
-        each.hanger.mass_per_length_kg_m,
-        each.hanger.elastic_modulus_pa,
-    ),
-    "hangers with ends alike": lambda each: (
-        each.hanger.plate,
-        each.hanger.supports,
-        each.hanger.fittings_m,
-    ),
-    "hangers tested on the same days": _days,
-    "hangers of about one length": lambda each: math.floor(
-        math.log(each.hanger.length_m) / math.log(_CLASSES) * 2
-    ),
-}
 
 
 @dataclass(frozen=True, eq=False)

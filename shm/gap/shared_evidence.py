@@ -21,7 +21,7 @@ from shm.gap.search import Attribution, Search, possible
 from shm.inference.linear import Linear
 from shm.inference.mixture import normalised, systematic
 from shm.models.effects import Parameter, Variant, parameters_of
-from shm.values import BoolArray, Diagnosis, FloatArray, Hanger, ModalTest
+from shm.values import BoolArray, Diagnosis, FloatArray, Hanger
 
 Place = tuple[str, str]
 """An effect of the catalogue and where it acts, in words."""
@@ -108,7 +108,6 @@ class HangerEvidence:
     """
 
     hanger: Hanger
-    tests: tuple[ModalTest, ...]
     diagnosis: Diagnosis
     no_gap: float
     gap: float
@@ -119,7 +118,6 @@ class HangerEvidence:
 
 def weigh_hanger(
     hanger: Hanger,
-    tests: Sequence[ModalTest],
     diagnosis: Diagnosis,
     attribution: Attribution,
     rng: np.random.Generator,
@@ -130,7 +128,6 @@ def weigh_hanger(
     tension_n = _resampled(parts, rng)[0]
     return HangerEvidence(
         hanger=hanger,
-        tests=tuple(tests),
         diagnosis=diagnosis,
         no_gap=none / NO_GAP,
         gap=(1 - none) / (1 - NO_GAP),
