@@ -88,7 +88,7 @@ def examined(
     after = attribution.leading.best.fit if attribution.leading else None
     best = answer[0][1]
     excluded, doubted = (describe_outliers(clear, e, best) for e in (clear.excluded, clear.doubted))
-    held = held_out(problem, before, after, options.hold_out, rng)
+    held = held_out(problem, before, after, options.hold_out)
     after_n = _tension(problem, possible(attribution), rng)
     before_n = _tension(problem, [(1.0, before)], rng)
     where = residuals(problem, before, after, held)
