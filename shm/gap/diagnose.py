@@ -26,7 +26,7 @@ from shm.gap.outliers import (
 )
 from shm.gap.places import AS_LIKELY, list_other_places, places, split_place
 from shm.gap.problem import GapProblem
-from shm.gap.residuals import check_hold_out, held_out, residuals, sensor_remarks, shrinkage, trends
+from shm.gap.residuals import check_hold_out, held_out, residuals, shrinkage, trends
 from shm.gap.search import Attribution, Explanation, answered, check_effects, possible
 from shm.inference.data_checks import CheckedData
 from shm.inference.mixture import systematic
@@ -43,7 +43,6 @@ from shm.values import (
     Hanger,
     ModalTest,
     NextMeasurement,
-    Outlier,
     TensionEstimate,
 )
 from shm.values.verdict import DOUBTFUL
@@ -115,7 +114,9 @@ def examined(
             *doubts,
             *_states(problem, before, after, (before_n, after_n)),
             *remark_on_damping(clear.whole.observations),
-            *_on_the_way(found, clear, excluded, doubted, after or before),
+            *found.remarks,
+            *describe_excluded(clear, excluded),
+            *describe_doubtful(doubted),
         ),
         seed=options.seed,
         seconds=time.perf_counter() - started,
@@ -182,19 +183,6 @@ def _following(
     found = ranked(problem, _contenders(attribution))
     progress("next measurement", 1.0)
     return found
-
-
-def _on_the_way(
-    found: CheckedData,
-    clear: Cleared,
-    excluded: Sequence[Outlier],
-    doubted: Sequence[Outlier],
-    best: Fit,
-) -> tuple[str, ...]:
-    """Return remarks on the data's checks, on gross errors and on errors of the measurement."""
-    gross = (*describe_excluded(clear, excluded), *describe_doubtful(doubted))
-    measured = sensor_remarks(clear.problem, best)
-    return (*found.remarks, *gross, *measured)
 
 
 def _of_another(tests: Sequence[ModalTest], hanger: Hanger) -> tuple[str, ...]:

@@ -1,13 +1,9 @@
-"""Residuals of a fit: of every frequency, over conditions, held out, and what they say of sensors.
+"""Residuals of a fit: of every frequency, over conditions, and held out.
 
 A predictive p-value tells how often the fit would produce data that lie as far off.
 
 Residuals are weighed by the identification's errors alone, not by the model error that a fit may
 have taken up to live with the gap: else a large gap would look like none.
-A sensor that is turned, sits elsewhere or reads too much does so in every mode and test; that is in
-the errors of every explanation (`shm.gap.repeated_errors`), as normal with the owner's or usual
-standard deviations. Given what the best explanation leaves, each has a normal posterior.
-
 How far the gap shrinks is said of the fit and of modes and tests held out of it: it is fitted again
 on the others to first order about the full fit, which on the golden cases is right to 0.001 %.
 """
@@ -23,7 +19,6 @@ import scipy
 from shm.errors import UsageError
 from shm.gap.contract import Design, Fit, Observations
 from shm.gap.problem import GapProblem
-from shm.gap.repeated_errors import SensorError
 from shm.inference.likelihood import Covariance, Likelihood, ShapeErrors
 from shm.models.effects import Conditions
 from shm.values import (
@@ -33,7 +28,6 @@ from shm.values import (
     FloatArray,
     IntArray,
     Residual,
-    Scatter,
     Shrinkage,
     Trend,
 )
@@ -220,68 +214,6 @@ def _means(design: Design) -> FloatArray:
     """Rows (m, F) that average each mode over the tests in which it was measured."""
     rows = (design.mode == np.unique(design.mode)[:, None]).astype(float)
     return np.asarray(rows / rows.sum(axis=1, keepdims=True))
-
-
-_SURE = 3.0  # of its standard deviations: by chance one in 370
-_OF_NOTE = 0.7  # of what is usual: a crew cares about a degree, a centimetre and a percent
-_MOST = 4  # judgement: more is not read; the largest come first
-
-
-def sensor_remarks(problem: GapProblem, fit: Fit) -> tuple[str, ...]:
-    """Return one remark on errors of sensors that these data are sure of; none without any."""
-    remarks = [
-        _describe_error(problem, error, mean, sd)
-        for error, mean, sd in sorted(_posterior(problem, fit), key=lambda each: -abs(each[1]))
-        if abs(mean) > max(_SURE * sd, _OF_NOTE)
-    ]
-    if not remarks:
-        return ()
-    more = f", and {len(remarks) - _MOST} more" if len(remarks) > _MOST else ""
-    return (
-        f"The measurement's own, allowed for in every explanation and no part of the gap: "
-        f"{'; '.join(remarks[:_MOST])}{more}.",
-    )
-
-
-def _posterior(problem: GapProblem, fit: Fit) -> list[tuple[SensorError, float, float]]:
-    """Mean and standard deviation of each error, in those that are usual."""
-    repeated, count = problem.repeated, problem.design.frequencies
-    if not repeated.sensor_errors:
-        return []
-    left = (problem.observations.value - fit.predicted)[count:]
-    # The fit's own parameters follow shapes a little, and so know less of the sensors.
-    loads = np.column_stack([repeated.sensors, fit.slopes[count:]])
-    weighed = loads / fit.noise.shape[:, None]
-    prior = np.eye(loads.shape[1])
-    covariance = np.linalg.inv(prior + loads.T @ weighed)
-    mean, sd = covariance @ (weighed.T @ left), np.sqrt(np.diag(covariance))
-    return list(zip(repeated.sensor_errors, mean.tolist(), sd.tolist(), strict=False))
-
-
-def _describe_error(problem: GapProblem, error: SensorError, mean: float, sd: float) -> str:
-    kind, place, component = error
-    usual: Scatter = problem.hanger.scatter
-    at = f"the sensor at {problem.design.places_m[place]:.2f} m"
-    factor = {
-        "gain": 100 * usual.sensor_gain,
-        "place": 100 * usual.sensor_place_m,
-        "turn": float(np.degrees(usual.sensor_turn)),
-        "cross": 100 * usual.sensor_cross_mean,
-    }[kind]
-    off, uncertainty = factor * mean, factor * sd
-    match kind:
-        case "gain":
-            much = "much" if mean > 0 else "little"
-            return (
-                f"{at} reads {abs(off):.1f} +- {uncertainty:.1f} % too {much} {PLANES[component]}"
-            )
-        case "place":
-            end = "arch" if mean > 0 else "deck"
-            return f"{at} sits {abs(off):.1f} +- {uncertainty:.1f} cm nearer to the {end} end"
-        case "turn":
-            return f"{at} is turned by {off:.1f} +- {uncertainty:.1f} degrees"
-        case "cross":
-            return f"{at} reads {off:.1f} +- {uncertainty:.1f} % of each axis in the other"
 
 
 _FEWEST = 4  # frequencies: three to fit (tension, stiffness and a size), one to predict
