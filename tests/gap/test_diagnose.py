@@ -26,6 +26,7 @@ from tests.worlds.simulated.campaign import CampaignPlan, campaign
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
 FEW_EFFECTS = GapOptions(without=all_but("timebase", "bending_stiffness"))
 CLAMPS_ALONE = GapOptions(without=all_but("point_mass"))
+SOME = GapOptions(without=all_but("point_mass", "section_loss", "bending_stiffness", "timebase"))
 ONE_TEST = CampaignPlan(modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0)
 
 
@@ -46,7 +47,7 @@ def clamped_on() -> Diagnosis:
 @pytest.fixture(scope="module")
 def untouched() -> Diagnosis:
     """Of a hanger that nothing was planted on."""
-    return diagnose(planted(), PLAIN)
+    return diagnose(planted(), PLAIN, SOME)
 
 
 def test_a_planted_clamp_is_named_with_its_size_and_place(clamped_on: Diagnosis) -> None:
