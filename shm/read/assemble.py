@@ -88,12 +88,9 @@ def assemble(table: Table, described: Description | None = None) -> Recording | 
     if not found.used:
         raise _no_channel(found)
     _samples(found)
-    rate = _measured_rate(found, with_times=False)
-    values = _rows(found.used, path)
+    rate, values = measured_rate(found), _rows(found.used, path)
     if found.times is not None:
-        seconds = found.seconds * np.asarray(found.times.load(), float)
-        values, by_times = on_even_grid(seconds, values, table.uneven(found.times))
-        rate = _unless_same(by_times, header, path)
+        values, _ = on_even_grid(_seconds(found), values, table.uneven(found.times))
     made = replace(recording(header, values, path, rate), source=table.source)
     possible = tuple(dict.fromkeys(each.time for each in table.possible_times))
     return made if made.time else replace(made, possible_times=possible)
@@ -114,7 +111,7 @@ def peek(table: Table, file_format: str) -> Peek:
         look = _peeked_response(header, file_format, lambda: listed.load(), path, attempt)
     else:
         samples = attempt(lambda: _samples(found), 0)
-        rate = partial(_measured_rate, found, with_times=True)
+        rate = partial(measured_rate, found)
         look = _peeked(header, file_format, samples, rate, path, attempt)
         for column in found.used or table.columns:
             attempt(partial(_refuse_raw, column, header, path), None)
@@ -151,21 +148,21 @@ def _rows(used: Sequence[Column], path: Path) -> FloatArray:
     return np.array([column.load() for column in used], dtype=np.float64)
 
 
-def _measured_rate(found: Description, *, with_times: bool) -> float:
-    """Return the rate that the data tell, NaN where nothing does or it agrees with what is said.
-
-    The times are loaded only where they are asked for and nothing else says the rate.
-    """
-    table, header = found.table, found.header
+def measured_rate(found: Description) -> float:
+    """Return the rate that the data tell, NaN where nothing does or it agrees with what is said."""
     _refuse_different_rates(found)
-    rate = table.clock_rate_hz
-    if math.isnan(rate):
-        shown = found.used or table.choosable
-        rate = next((c.rate_hz for c in shown if not math.isnan(c.rate_hz)), NAN)
-    if found.times is not None and with_times and math.isnan(header.sampling_rate_hz):
-        seconds = found.seconds * np.asarray(found.times.load(), float)
-        rate = rate_of(seconds, table.uneven(found.times))
+    table, header = found.table, found.header
+    shown = found.used or table.choosable
+    rate = next((c.rate_hz for c in shown if not math.isnan(c.rate_hz)), NAN)
+    if found.times is not None:
+        uneven = table.uneven(found.times)
+        rate = rate_of(_seconds(found), uneven, header.sampling_rate_hz)
     return _unless_same(rate, header, table.path)
+
+
+def _seconds(found: Description) -> FloatArray:
+    assert found.times is not None
+    return found.seconds * np.asarray(found.times.load(), float)
 
 
 def _unless_same(rate_hz: float, header: Header, path: Path) -> float:
