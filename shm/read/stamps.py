@@ -25,7 +25,8 @@ _CLOCK = r"(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2}(?:[.,:]\d+)?))?\s*(?P<half
 _ZONE = r"\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2})?"
 _STAMP = re.compile(rf"(?:{_DAY})?(?:(?:\s*[T ,;]\s*|^){_CLOCK}{_ZONE})?")
 _NAMED_DAYS = (
-    "%d-%b-%Y", "%d %b %Y", "%d. %B %Y", "%d %B %Y", "%B %d, %Y", "%b %d, %Y", "%a %b %d %Y",
+    "%d-%b-%Y", "%d-%b-%y", "%d %b %Y", "%d. %B %Y", "%d %B %Y", "%B %d, %Y", "%b %d, %Y",
+    "%a %b %d %Y",
 )  # fmt: skip
 _NAMED = re.compile(r"(jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)", re.IGNORECASE)
 _DAY_IN_BYTES = re.compile(rb"(?<!\d)\d{1,2}([-/])\d{1,2}\1\d{2}")

@@ -340,19 +340,6 @@ def test_infinite_numbers_are_refused(tmp_path: Path) -> None:
     assert refusal.value.channel == "force"
 
 
-def test_our_files_tell_everything_without_their_sidecar(
-    recording: Recording, tmp_path: Path
-) -> None:
-    path = tmp_path / "test.uff"
-    write(recording, path)
-    sidecar_path(path).unlink()
-    found = read(path)
-    assert isinstance(found, Recording)
-    assert (found.hanger, found.time, found.temperature_c) == (3, recording.time, -2.5)
-    for one, other in zip(found.channels, recording.channels, strict=True):
-        assert (one.name, one.plane, one.x_m) == (other.name, other.plane, other.x_m)
-
-
 def test_our_files_are_plain_to_other_software(recording: Recording, tmp_path: Path) -> None:
     path = tmp_path / "test.uff"
     write(recording, path)
