@@ -18,7 +18,7 @@ import numpy as np
 from shm import modes_document
 from shm.errors import BadInput, UsageError
 from shm.read import logger_words as words
-from shm.read.assemble import assemble, collecting, measured_rate, read_of_test
+from shm.read.assemble import assemble, collecting, read_of_test, sampling_rate
 from shm.read.assemble import peek as look
 from shm.read.base import Format, Layout, Peek, PeekChannel, Survey, SurveyedColumn
 from shm.read.bundles import each_member, entries_of_test, holds_test
@@ -372,7 +372,7 @@ def _layout(table: Table, file_format: str, columns: Sequence[SurveyedColumn]) -
     plain = describe(table, with_sidecars=False)
     rates = (
         attempt(lambda: in_file.sampling_rate_hz, NAN),
-        attempt(lambda: measured_rate(plain), NAN),
+        attempt(lambda: sampling_rate(plain), NAN),
     )
     return Layout(
         digest[:_FINGERPRINT_DIGITS],
