@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.io import wavfile
 
 from shm.errors import BadInput
 from shm.read import peek, read
@@ -164,16 +163,6 @@ def test_a_load_cell_in_g_is_no_accelerometer(tmp_path: Path) -> None:
     path = tmp_path / "test.csv"
     path.write_text(f"Time [s],Load cell [g],Acc [g]\n{PLAIN}")
     assert [c.quantity for c in survey(path).columns] == [None, "acceleration"]
-
-
-def test_a_streamed_wav_is_read_to_its_end(tmp_path: Path) -> None:
-    path = tmp_path / "test.wav"
-    wavfile.write(path, 500, np.arange(400, dtype=np.int16).reshape(200, 2))
-    content = path.read_bytes()
-    place = content.index(b"data") + 4
-    for size in (bytes(4), b"\xff" * 4):
-        path.write_bytes(content[:4] + size + content[8:place] + size + content[place + 4 :])
-        assert survey(path).samples == 200
 
 
 def test_bytes_without_a_channel_are_no_tdms(tmp_path: Path) -> None:
