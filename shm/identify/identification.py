@@ -34,11 +34,10 @@ from shm.identify.measuring.setups import (
     without_unused_force,
 )
 from shm.identify.mode_ordering.placement import STATE_PLANES, Placement, place_modes
-from shm.identify.mode_ordering.planes import directions
 from shm.identify.options import AUTO_CROSS_CHECK, NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
 from shm.identify.quality.of_modes import first_orders
-from shm.identify.quality.of_sensors import sensor_gain, sensor_places
+from shm.identify.quality.of_sensors import directions, sensor_gain, sensor_places
 from shm.identify.setup_merging.calm_part import (
     LEFT_OUT,
     late_part_level,

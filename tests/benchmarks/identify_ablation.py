@@ -220,11 +220,11 @@ def turned(seed: int) -> Iterator[Test]:
 HZ = (6.0, 13.5, 23.0)
 Draw = Callable[[int], Iterator[Test]]
 STEPS: Mapping[str, tuple[tuple[tuple[Any, str, Any], ...], Draw]] = {
-    "close pairs": (((stabilise, "told_apart", lambda one, again, *_: (one, again)),), simulated()),
-    "hits of both directions": (((identification, "alike", lambda _: False),), turned),
+    "close pairs": (((stabilise, "split_close_pairs", lambda one, again, *_: (one, again)),), simulated()),
+    "hits of both directions": (((identification, "have_same_sensors", lambda _: False),), turned),
     "calm part": (((identification, "_once_calm", lambda *_: None),), guided),
     "closer look through the band": (
-        ((identification, "_closer", lambda *_: None),),
+        ((identification, "_windowed_pass", lambda *_: None),),
         of_world("low_signal", "short_record", "one_axis", "close_planes"),
     ),
     "closer look at gaps": (
@@ -234,7 +234,7 @@ STEPS: Mapping[str, tuple[tuple[tuple[Any, str, Any], ...], Draw]] = {
         ((placement, "without_tones", lambda found, *_, **__: (list(found), [])),),
         of_world("hum_at_mode"),
     ),
-    "tones as modes, machines": (
+    "tones as modes of machines": (
         ((placement, "without_tones", lambda found, *_, **__: (list(found), [])),),
         simulated("mains", "machine"),
     ),
