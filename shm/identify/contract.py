@@ -8,13 +8,42 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shm.identify.options import IdentifyOptions
-from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, ResponsePoint
+from shm.values import (
+    NAN,
+    Channel,
+    ComplexArray,
+    FloatArray,
+    FrequencyResponse,
+    Plane,
+    ResponsePoint,
+)
+
+LEAST_HITS = 3
+"""Student's 95 % quantile is 1.8 times the normal one with two degrees of freedom, 3.8 with one."""
+FREQUENCY_FLOOR = 0.001
+"""With fewer than three hits nothing says how well hits repeat. The frequency then gets this
+standard deviation, as a fraction: what hangers' frequencies differ by from one day to the next.
+Damping and shape stay without."""
+
+Place: TypeAlias = tuple[Plane | None, float | None, str]
+"""Plane, position in m where stated, else the name: equal for one point in several set-ups."""
+
+
+def point_of(channel: Channel) -> ResponsePoint:
+    """Return the point where a channel's sensor is mounted, or its hammer hits."""
+    return ResponsePoint(channel.name, channel.plane, channel.x_m)
+
+
+def place_of(point: ResponsePoint) -> Place:
+    """Return what identifies a point in several set-ups."""
+    if math.isnan(point.x_m):
+        return point.plane, None, point.name
+    return point.plane, point.x_m, ""
 
 
 @dataclass(frozen=True)
@@ -139,9 +168,3 @@ class Finding:
     poles: Poles
     doubtful: tuple[FoundMode, ...] = ()
     drift: Drift | None = None
-
-
-class Identifier(Protocol):
-    """Finds the modes of a measurement; an empty finding is a valid answer."""
-
-    def __call__(self, measurement: Measurement, options: IdentifyOptions) -> Finding: ...

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import compress
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import (
+    FREQUENCY_FLOOR,
+    LEAST_HITS,
     Dropped,
     Finding,
     FoundMode,
     Hit,
-    Identifier,
     Measurement,
     Poles,
     Tone,
@@ -25,9 +26,7 @@ from shm.identify.contract import (
 from shm.identify.each_hit import HitModes, modes_of_each_hit
 from shm.identify.estimation.postprocess import postprocess, without_sidebands
 from shm.identify.estimation.pyoma import identify_with_pyoma2
-from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.estimation.ssi import search_windows, summed_hankel_ssi
-from shm.identify.estimation.stabilise import merge_findings
 from shm.identify.measuring.setups import (
     measure_set_ups,
     refuse_off_the_hanger,
@@ -43,11 +42,6 @@ from shm.identify.setup_merging.calm_part import (
     late_part_level,
     late_parts,
     linear_below_level,
-)
-from shm.identify.setup_merging.hit_directions import (
-    have_same_sensors,
-    pool_hits,
-    refine_by_direction,
 )
 from shm.identify.setup_merging.join_set_ups import JoinedFinding, join_set_ups
 from shm.identify.setup_merging.modal_participation import fitted
@@ -129,8 +123,6 @@ def identify(
     steady = tones(measurements, recordings, options)
     found = _found(measurements, options.identifier, options)
     placement = _placed(found, measurements, hanger, steady, options)
-    if not placement.modes and (closer := _windowed_pass(found, measurements, options)):
-        found, placement = closer, _placed(closer, measurements, hanger, steady, options)
     second = _cross_check(measurements, options, hanger)
     quality = assess(Inspection(recordings, measurements, options, steady, found.finding, second))
     if turned := directions(found.finding.modes, found.points):
@@ -179,21 +171,6 @@ def _placed(
 ) -> Placement:
     look = partial(_looked_at, measurements, found.finding, options)
     return place_modes(found.finding.modes, found.points, hanger, steady, look)
-
-
-def _windowed_pass(
-    found: JoinedFinding, measurements: Sequence[Measurement], options: IdentifyOptions
-) -> JoinedFinding | None:
-    """Return the finding completed by windows over the band; None where they show no more."""
-    if len(measurements) > 1 or options.identifier != "ssi":
-        return None
-    again = search_windows(measurements[0], options)
-    if again is None or not again.modes:
-        return None
-    more = _allowed_for(postprocess(again, measurements[0], options), options.shape_allowance)
-    return _of_modes_alone(
-        join_set_ups(measurements, [merge_findings(found.finding, more)], options)
-    )
 
 
 def _looked_at(
@@ -290,12 +267,7 @@ def _found(
     # What tests differ by is allowed for once, not set-up by set-up.
     alone = options if len(measurements) == 1 else replace(options, frequency_allowance=0.0)
     findings = [postprocess(function(m, alone), m, options) for m in measurements]
-    found = join_set_ups(measurements, findings, options)
-    if name == "ssi" and have_same_sensors(measurements):
-        every = pool_hits(measurements)
-        whole = postprocess(function(every, options), every, options)
-        found = refine_by_direction(measurements, found, whole)
-    found = _of_modes_alone(found)
+    found = _of_modes_alone(join_set_ups(measurements, findings, options))
     return replace(found, finding=_allowed_for(found.finding, options.shape_allowance))
 
 
@@ -385,6 +357,8 @@ def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
     return float(np.median(forces)) / options.reference_force_n if forces else NAN
 
 
+Identifier: TypeAlias = Callable[[Measurement, IdentifyOptions], Finding]
+"""Finds the modes of a measurement; an empty finding is a valid answer."""
 IDENTIFIERS: dict[str, Identifier] = {
     "ssi": summed_hankel_ssi,
     "pyoma2": identify_with_pyoma2,

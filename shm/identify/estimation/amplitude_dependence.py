@@ -20,9 +20,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
-from shm.identify.contract import Finding, FoundMode, Measurement
+from shm.identify.contract import LEAST_HITS, Finding, FoundMode, Measurement
 from shm.identify.estimation.courses import (
     OVERLAP,
     TINY,
@@ -33,12 +32,10 @@ from shm.identify.estimation.courses import (
     phases_of,
     with_drift,
 )
-from shm.identify.estimation.repeats import LEAST_HITS, widening
-from shm.values import NAN, BoolArray, FloatArray
+from shm.identify.estimation.spread import are_sure, widening
+from shm.values import NAN, FloatArray
 from shm.values.modes import MOST_SLOPE, SURE_SDS
 
-_LEAST_SLOPE = 2e-5
-"""Relative. A phase is known so well that a clock's shaking would show; no one needs less."""
 _TO_ZERO = 0.01
 """Of a slope: by how much the frequency of small amplitude is off by the law's form at most; 1 % of
 1e-3 is four standard deviations of all else in tests/identify/test_amplitude_dependence.py."""
@@ -54,9 +51,6 @@ _SHIFT_ERROR = 0.02
 """Of a shift: the phase of a stretch is that of its middle, the amplitude is smoothed."""
 _HALVES = (0.1, 0.3, 1.0)
 """Of A_hit: h. Above, it is friction; below, ring-downs end before it shows (judgement)."""
-_BY_CHANCE = 0.01
-"""Probability that as many modes, or one by so much, are sure by chance, above which none is. Of a
-test of twenty modes one is beyond `SURE_SDS` by chance in 22 %."""
 _ALONE = 1e-3
 """A shift beyond that of one mode while the others stay: no joint does it. It only widens."""
 _INDEPENDENT = 8.0
@@ -81,23 +75,6 @@ class _Fit:
     left: float
     misfit: float
     freedom: int
-
-
-def are_sure(slopes: FloatArray, sds: FloatArray) -> BoolArray:
-    """Return which frequencies depend on amplitude by more than chance and less than nonsense.
-
-    Where several are beyond `SURE_SDS` that is no chance; one alone must be by more, the more modes
-    there are. `slopes` and `sds` (modes,) are NaN where they are not known.
-    """
-    known = int(np.sum(np.isfinite(slopes)))
-    size = np.where(np.isfinite(slopes), np.abs(slopes), 0.0)
-    possible = (size > _LEAST_SLOPE) & (size < MOST_SLOPE)
-    sure = possible & (size > SURE_SDS * sds)
-    count, one = int(np.sum(sure)), 2 * scipy.special.ndtr(-SURE_SDS)
-    if not count or scipy.special.bdtrc(count - 1, known, one) < _BY_CHANCE:
-        return np.asarray(sure)
-    alone = -scipy.special.ndtri(_BY_CHANCE / (2 * known))
-    return np.asarray(possible & (size > alone * sds))
 
 
 def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Finding:

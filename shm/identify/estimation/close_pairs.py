@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shm.identify.contract import LEAST_HITS
 from shm.identify.estimation.poles import Candidate, Pole, PoleSet
-from shm.identify.estimation.repeats import LEAST_HITS, Repeats, doubt, repeats_of
+from shm.identify.estimation.repeats import Repeats, doubt, repeats_of
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray, FloatArray, IntArray
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Dropped, Hit
-from shm.identify.measuring.frf import least_seconds
+from shm.identify.measuring.band import least_seconds
 from shm.identify.measuring.hits import (
     LEAST_SHARE_OF_HARDEST,
     PULSE_SECONDS,
@@ -32,6 +32,8 @@ from shm.identify.measuring.signal_faults import (
     CLIPPED,
     CUT_OFF,
     DOUBLE_HIT,
+    FEWEST_TO_COMPARE,
+    MOST_UNLIKE,
     NOT_A_NUMBER,
     OUTLIER,
     clipped_ends,
@@ -43,16 +45,10 @@ from shm.identify.options import IdentifyOptions
 from shm.values import NAN, BoolArray, Channel, ComplexArray, FloatArray, Plane, Recording
 
 _LEAST_SHARE_OF_LONGEST = 0.25  # judgement: a quarter as sharp, it blurs the others
-FEWEST_TO_COMPARE = 3
-"""Of two that differ nobody can say which is right."""
-# identify_limits.py (docs/trials/identification_benchmarks.md): sound hits lie below 0.013, planted
-# outliers above 0.23 and 136 times the median. 0.05 is midway; the factor is judgement, for tests
-# in which all hits differ
-LIMIT = 0.05
-_TIMES_OTHERS = 5.0
+_TIMES_OTHERS = 5.0  # judgement: for tests in which all hits differ
 # judgement: long enough to tell lines 1 % apart, short enough to end before the next hit
 _PERIODS_OF_BAND = 100.0
-LEAST_SAMPLES = 32  # judgement: sixteen lines
+_LEAST_SAMPLES = 32  # judgement: sixteen lines
 _HARDLY = 0.1  # 20 dB below the largest, usual in impact testing (Ewins 2000, 3.4)
 
 
@@ -294,7 +290,7 @@ def outliers(apart: FloatArray) -> BoolArray:
     judged = apart[np.isfinite(apart)]
     if len(judged) < FEWEST_TO_COMPARE:
         return np.zeros(len(apart), dtype=bool)
-    found = apart > max(LIMIT, _TIMES_OTHERS * float(np.median(judged)))
+    found = apart > max(MOST_UNLIKE, _TIMES_OTHERS * float(np.median(judged)))
     return np.asarray(found if 2 * np.sum(found) < len(judged) else np.zeros_like(found))
 
 
@@ -303,7 +299,7 @@ def _step(hits: Sequence[HitRecord], sampling_rate_hz: float, band_hz: tuple[flo
     gap = _gap(sampling_rate_hz)
     room = min((hit.pulse.stop - hit.pulse.start for hit in hits), default=0)
     wanted = int(_PERIODS_OF_BAND / band_hz[1] * sampling_rate_hz)
-    return max(min(wanted, room // 3), min(LEAST_SAMPLES, room)) + gap
+    return max(min(wanted, room // 3), min(_LEAST_SAMPLES, room)) + gap
 
 
 def _gap(sampling_rate_hz: float) -> int:

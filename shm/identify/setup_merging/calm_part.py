@@ -16,9 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.identify.contract import Measurement
-from shm.identify.estimation.repeats import LEAST_HITS
-from shm.identify.setup_merging.hit_directions import have_same_sensors, pool_hits
+from shm.identify.contract import LEAST_HITS, Measurement
 from shm.values import ComplexArray, FloatArray, Mode
 
 LEFT_OUT = (1 / 4, 1 / 2, 3 / 4)
@@ -37,15 +35,10 @@ _UNSURE = 0.3  # judgement: of a damping without standard deviation
 
 
 def late_parts(measurements: Sequence[Measurement], left_out: float) -> tuple[Measurement, ...]:
-    """Return the measurements without the beginnings of their ring-downs.
-
-    Hits in several directions count together, since what the force says of them went with the
-    beginning.
-    """
-    whole = (pool_hits(measurements),) if have_same_sensors(measurements) else tuple(measurements)
+    """Return the measurements without the beginnings of their ring-downs."""
     return tuple(
         replace(each, decays=tuple(_later(decay, left_out) for decay in each.decays), driven=())
-        for each in whole
+        for each in measurements
     )
 
 

@@ -14,10 +14,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from shm.identify.contract import Dropped, Finding, FoundMode, Measurement, Poles
+from shm.identify.contract import (
+    FREQUENCY_FLOOR,
+    LEAST_HITS,
+    Dropped,
+    Finding,
+    FoundMode,
+    Measurement,
+    Place,
+    Poles,
+    place_of,
+)
 from shm.identify.estimation.poles import FAR, modal_assurance
-from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS, widening
-from shm.identify.measuring.responses import Place, place_of
+from shm.identify.estimation.spread import widening
 from shm.identify.mode_ordering.planes import transverse_share
 from shm.identify.options import IdentifyOptions
 from shm.identify.setup_merging.modal_participation import levels, ringing, with_levels
