@@ -48,7 +48,7 @@ from shm.identify.estimation import (  # noqa: E402
     amplitude_dependence,
     courses,
     postprocess,
-    stabilise,
+    ssi,
 )
 from shm.identify.measuring import screening  # noqa: E402
 from shm.identify.mode_ordering import placement  # noqa: E402
@@ -195,14 +195,7 @@ def guided(seed: int) -> Iterator[Test]:
 
 Draw = Callable[[int], Iterator[Test]]
 STEPS: Mapping[str, tuple[tuple[tuple[Any, str, Any], ...], Draw]] = {
-    "close pairs": (
-        ((stabilise, "split_close_pairs", lambda one, again, *_: (one, again)),), simulated(),
-    ),
     "calm part": (((identification, "_once_calm", lambda *_: None),), guided),
-    "closer look through the band": (
-        ((identification, "_windowed_pass", lambda *_: None),),
-        of_world("low_signal", "short_record", "one_axis", "close_planes"),
-    ),
     "closer look at gaps": (
         ((placement, "_in_gaps", lambda *_: []),), of_world("plain", "close_planes", "low_signal"),
     ),
@@ -218,14 +211,14 @@ STEPS: Mapping[str, tuple[tuple[tuple[Any, str, Any], ...], Draw]] = {
         ((identification, "without_sidebands", lambda found: found),), of_world("sidebands"),
     ),
     "hits unlike the others": (
-        ((screening, "_with_outliers", lambda _, reasons, *__: list(reasons)),),
+        ((screening, "outliers", lambda apart: np.zeros(len(apart), dtype=bool)),),
         simulated("outlier_hit"),
     ),
     "disturbed ring-downs": (
         ((screening, "until_disturbed", lambda _, downs, faults, *__: (downs, faults)),),
         simulated("double_hit", "cable", "drop_out"),
     ),
-    "delays of channels": (((stabilise, "delays_s", lambda *_: None),), of_world("plain")),
+    "delays of channels": (((ssi, "delays_s", lambda *_: None),), of_world("plain")),
 }  # fmt: skip
 """What is put in place of each step, and the records that it was made for."""
 
