@@ -7,6 +7,7 @@ hits, files, planes or orders; a new one is one file and one line in `IDENTIFIER
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -19,6 +20,7 @@ from shm.values import (
     ComplexArray,
     FloatArray,
     FrequencyResponse,
+    Mode,
     Plane,
     ResponsePoint,
 )
@@ -168,3 +170,10 @@ class Finding:
     poles: Poles
     doubtful: tuple[FoundMode, ...] = ()
     drift: Drift | None = None
+
+
+def poles_of_modes(modes: Sequence[FoundMode] | Sequence[Mode]) -> ComplexArray:
+    """Return the poles in rad/s above the real axis, (modes,)."""
+    omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])
+    damping = np.array([mode.damping_ratio for mode in modes])
+    return np.asarray(omega * (-damping + 1j * np.sqrt(1 - damping**2)))

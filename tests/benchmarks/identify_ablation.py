@@ -195,6 +195,9 @@ def guided(seed: int) -> Iterator[Test]:
 
 Draw = Callable[[int], Iterator[Test]]
 STEPS: Mapping[str, tuple[tuple[tuple[Any, str, Any], ...], Draw]] = {
+    "close pairs": (
+        ((ssi, "split_close_pairs", lambda one, again, *_: (one, again)),), simulated(),
+    ),
     "calm part": (((identification, "_once_calm", lambda *_: None),), guided),
     "closer look at gaps": (
         ((placement, "_in_gaps", lambda *_: []),), of_world("plain", "close_planes", "low_signal"),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from shm.identify.contract import FoundMode
+from shm.identify.contract import FoundMode, poles_of_modes
 from shm.values import ComplexArray, FloatArray
 
 _LEAK = 0.01
@@ -50,9 +50,7 @@ def course_of(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> 
     hop = max(int(_STRETCH_SECONDS * rate_hz) // 2, samples // _MOST_STRETCHES, 1)
     length = min(2 * hop, samples)
     shapes = np.array([mode.shape for mode in modes])  # (modes, channels)
-    omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])
-    damping = np.array([mode.damping_ratio for mode in modes])
-    poles = omega * (-damping + 1j * np.sqrt(1 - damping**2))
+    poles = poles_of_modes(modes)
     waves = np.exp(np.outer(poles, np.arange(length) / rate_hz))  # (modes, length)
     # Columns Re and -Im of shape times wave, for all channels: the same in every stretch.
     window = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
@@ -72,7 +70,7 @@ def course_of(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> 
     half = len(modes)
     motion = solved[:, :half] + 1j * solved[:, half:]
     begin_s = np.arange(len(flat)) * hop / rate_hz
-    hertz = omega / (2 * np.pi)
+    hertz = np.array([mode.frequency_hz for mode in modes])
     unresolved = np.abs(hertz[:, np.newaxis] - hertz) < _RESOLUTION_HZ
     np.fill_diagonal(unresolved, False)
     sd = np.sqrt(np.outer(noise, variance[:half] + variance[half:]) / 2)

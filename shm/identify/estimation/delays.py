@@ -13,7 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.identify.estimation.poles import Candidate, PoleSet, collinearity
+from shm.identify.estimation.poles import Candidate, PoleSet
+from shm.identify.estimation.shapes import collinearity
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray, FloatArray
 

@@ -27,7 +27,8 @@ from shm.identify.contract import (
     Measurement,
     Poles,
 )
-from shm.identify.estimation.poles import PoleSet, real_shape
+from shm.identify.estimation.poles import PoleSet
+from shm.identify.estimation.shapes import real_shape
 from shm.identify.options import IdentifyOptions
 from shm.values import NAN, FloatArray
 

@@ -19,17 +19,13 @@ from functools import reduce
 import numpy as np
 
 from shm.identify.contract import LEAST_HITS, Dropped, Finding, FoundMode, Measurement, Poles
+from shm.identify.estimation.close_pairs import split_close_pairs
 from shm.identify.estimation.delays import delays_s, remove_candidate_delays, remove_delays
 from shm.identify.estimation.hankel import STOPPED, Window, hankel, references, windows
-from shm.identify.estimation.poles import (
-    PoleSet,
-    diagram,
-    modal_assurance,
-    resolved,
-    stable_candidates,
-)
+from shm.identify.estimation.poles import PoleSet, diagram, find_again, resolved, stable_candidates
 from shm.identify.estimation.pyoma import poles_of_orders
-from shm.identify.estimation.repeats import find_again, validate_candidates
+from shm.identify.estimation.shapes import modal_assurance
+from shm.identify.estimation.validation import doubt, validate_candidates
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
 
@@ -227,7 +223,12 @@ def stabilised(
         candidates = [remove_candidate_delays(candidate, late_s) for candidate in candidates]
     single, doubles = resolved(candidates, seconds)
     again = find_again(single, without_each_hit)
-    modes, accepted, doubtful, refused = validate_candidates(single, again, options)
+    final = [poles for poles in sets if poles.order in orders]
+    separated, again = split_close_pairs(
+        single, again, (final, without_each_hit), seconds,
+        lambda candidate, repeat: not doubt(candidate, repeat, options),
+    )  # fmt: skip
+    modes, accepted, doubtful, refused = validate_candidates(separated, again, options)
     lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in accepted)
     followed = Dropped("poles", lost, "stable, but of a mode that was dropped")
     dropped = (*unstable, followed, *doubles, *refused)

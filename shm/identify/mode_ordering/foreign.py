@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from shm.identify.contract import FoundMode, Tone
-from shm.identify.estimation.poles import modal_assurance
+from shm.identify.estimation.shapes import modal_assurance
 from shm.values import ForeignMode, Plane
 
 MULTIPLES = (2, 3)  # judgement: rattling contacts give the first two, higher ones are fainter

@@ -1,27 +1,15 @@
-"""Repeat candidates with each hit left out: validation and standard deviations.
-
-The choice of model order adds to the standard deviations.
-"""
+"""Decide which candidates are modes, and how sure they are, by hits left out and model orders."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from shm.identify.contract import LEAST_HITS, Dropped, FoundMode
-from shm.identify.estimation.poles import (
-    Candidate,
-    Pole,
-    PoleSet,
-    aligned,
-    continued,
-    median_shape,
-    modal_assurance,
-    real_shape,
-)
+from shm.identify.estimation.poles import Candidate, Repeats
+from shm.identify.estimation.shapes import aligned, modal_assurance, real_shape
 from shm.identify.estimation.spread import frequency_sd, jackknife_sd, order_sd, smooth_sds
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
@@ -47,75 +35,6 @@ and 1 track of noise, 16 and none of three, 7 and none of more, where it may be 
 _STEADY_SHAPE = 0.998
 """What is as steady as that from order to order need not stay closer together where hits are few:
 in the same records, 35 modes and 2 tracks of noise more; with 0.99, 53 and 15."""
-
-
-@dataclass(frozen=True, eq=False)
-class Repeats:
-    """One candidate found again with each hit left out in turn.
-
-    `frequency_hz`, `damping_ratio` (hits,) and `shape` (hits, channels); NaN where not found.
-    """
-
-    frequency_hz: FloatArray
-    damping_ratio: FloatArray
-    shape: FloatArray
-
-
-def find_again(
-    candidates: Sequence[Candidate], models: Sequence[Sequence[PoleSet]]
-) -> list[Repeats]:
-    """Return the repeats of each candidate; `models` has pole sets for each left-out hit."""
-    matches = [_in_one_model(candidates, sets) for sets in models]
-    return [
-        repeats_of(candidate, [of_model[index] for of_model in matches])
-        for index, candidate in enumerate(candidates)
-    ]
-
-
-def repeats_of(candidate: Candidate, matches: Sequence[Sequence[tuple[Pole, Pole]]]) -> Repeats:
-    """Return the repeats from matches: for each left-out hit, old poles and the same again."""
-    rows = [_repeat(candidate, of_model) for of_model in matches]
-    return Repeats(
-        np.array([frequency for frequency, _, _ in rows]),
-        np.array([damping for _, damping, _ in rows]),
-        np.array([shape for _, _, shape in rows]).reshape(len(rows), len(candidate.shape)),
-    )
-
-
-def _in_one_model(
-    candidates: Sequence[Candidate], sets: Sequence[PoleSet]
-) -> list[list[tuple[Pole, Pole]]]:
-    matches: list[list[tuple[Pole, Pole]]] = [[] for _ in candidates]
-    for poles in sets:
-        known = [
-            (index, pole)
-            for index, candidate in enumerate(candidates)
-            for pole in candidate.poles
-            if pole.order == poles.order
-        ]
-        again = continued([pole for _, pole in known], poles)
-        for (index, pole), match in zip(known, again, strict=True):
-            if match is not None:
-                matches[index].append((pole, match))
-    return matches
-
-
-def _repeat(
-    candidate: Candidate, matches: Sequence[tuple[Pole, Pole]]
-) -> tuple[float, float, FloatArray]:
-    """Return frequency, damping and shape of a repeat: the candidate's plus the median change."""
-    if 2 * len(matches) < len(candidate.poles):
-        return np.nan, np.nan, np.full(len(candidate.shape), np.nan)
-    change = [
-        (b.frequency_hz - a.frequency_hz, b.damping_ratio - a.damping_ratio) for a, b in matches
-    ]
-    frequency, damping = np.median(change, axis=0)
-    shape = aligned(median_shape([match.shape for _, match in matches]), candidate.shape)
-    return (
-        candidate.frequency_hz + float(frequency),
-        candidate.damping_ratio + float(damping),
-        shape,
-    )
 
 
 def validate_candidates(
