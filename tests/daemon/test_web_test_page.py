@@ -184,7 +184,7 @@ def test_the_response_is_chosen_and_has_the_fit_over_it(site: Site, client: http
     for point, name in enumerate(names):
         answer = at_last(client, f"{document_of(3, site.odd)}/figures/response?point={point}")
         document = answer.json()
-        assert name in document["caption"]
+        assert name in str(document["layout"]["annotations"])
         captions.append(document["caption"])
         curves = {trace.get("name"): trace for trace in document["data"]}
         assert {"measured", "fit of the modes", "transverse mode"} <= set(curves)

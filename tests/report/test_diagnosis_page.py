@@ -155,7 +155,7 @@ def test_a_report_holds_the_latest_diagnosis_and_how_the_gap_has_gone(bare: Hang
     outline = parsed(as_html(hanger_paper(diagnosed)))
     assert outline.open == []
     names = {attributes.get("id") for _, attributes in outline.tags}
-    assert {"causes-title", "gap_map-title", "before_and_after-title"} <= names
+    assert {"causes-title", "gap_map-title"} <= names
     for written in (told(outline), " ".join(as_text(hanger_paper(diagnosed)).split())):
         assert "explained by point mass" in written
         assert watched in written
@@ -165,10 +165,10 @@ def test_a_report_holds_the_latest_diagnosis_and_how_the_gap_has_gone(bare: Hang
     assert document["gap_watch"] == watched
 
 
-def test_a_frequency_set_aside_leads_the_table_and_is_marked() -> None:
+def test_an_excluded_frequency_leads_the_table() -> None:
     text = as_text(diagnosis_paper(sheet("blunder")))
     rows = text[text.index("WHERE THE GAP LIES") :].splitlines()
-    marked = [line for line in rows if "set aside" in line]
+    marked = [line for line in rows if "excluded" in line]
     assert len(marked) == 1
     assert marked[0].split()[:3] == ["transverse", "3", "t4"]
     others = [line for line in rows if re.search(r" t\d ", line) and line is not marked[0]]

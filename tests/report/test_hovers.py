@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 
 from shm.report.contents import HangerReport
-from shm.report.figures import gap_before_and_after, gap_causes, gap_map
 from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST
 from shm.report.figures.modal_test_response import ResponseCurves
 from shm.report.figures.specification import Panel, Points, Rule, Specification
@@ -32,10 +31,6 @@ def specifications(season: HangerReport) -> Iterator[tuple[str, Specification]]:
     for case in CASES:
         made = sheet(case)
         drawn += [(f"{case}: {member.name}", member.draw(made)) for member in OF_DIAGNOSIS]
-        if case != "nothing known":
-            drawn.append((f"{case}: map on a screen", gap_map.specify(made, True)))
-            drawn.append((f"{case}: gaps on a screen", gap_before_and_after.specify(made, True)))
-            drawn.append((f"{case}: causes on a screen", gap_causes.specify_on_screen(made)))
     drawn += [(f"season: {member.name}", member.draw(season)) for member in OF_HANGER]
     return ((name, each) for name, each in drawn if isinstance(each, Specification))
 
@@ -77,14 +72,6 @@ def rendered(mark: Any, place: int) -> str:
 def _values(mark: Any, place: int) -> dict[str, Any]:
     y = mark.y if hasattr(mark, "y") else mark.high
     return {"x": mark.x[place], "y": y[place]}
-
-
-def test_there_is_something_to_hover_over(told: list[Told]) -> None:
-    figures = {name.partition(": ")[2] for name, *_ in told}
-    assert figures >= {
-        "time_history", "hits", "response", "stabilisation", "shapes",
-        "causes", "gap_map", "before_and_after", "trend", "frequencies", "stiffness",
-    }  # fmt: skip
 
 
 def test_a_template_asks_for_nothing_but_what_the_mark_has(told: list[Told]) -> None:
@@ -196,16 +183,9 @@ WORDS: dict[str, list[str]] = {
     "blunder: gap_map": [
         "transverse 1, t1: -0.69 %, measured 5.760 Hz",
         "transverse 3, t4: +30.00 %, measured 28.178 Hz",
-        "longitudinal 1, t1: -0.41 %, measured 5.776 Hz",
-        "0.00 m",
-        "3.40 m",
-        "5.10 m",
-    ],
-    "blunder: gaps on a screen": [
-        "transverse, baseline: -0.61 %",
         "transverse, with the cause: -0.03 %",
         "transverse, with the cause, held out: -0.02 %",
-        "longitudinal, baseline: -0.50 %",
+        "longitudinal 1, t1: -0.41 %, measured 5.776 Hz",
         "longitudinal, with the cause: 0.12 %",
         "longitudinal, with the cause, held out: 0.34 %",
     ],

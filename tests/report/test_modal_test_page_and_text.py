@@ -93,7 +93,7 @@ def test_the_page_begins_with_what_was_measured_what_came_of_it_and_what_to_do(
         "4 acceleration channels at 2 places in both planes and 6 hits: 5 used",
         "1 dropped (1 double hit)",
         "12 modes were identified: transverse 1 to 6 (5.8 to 34.8 Hz) and longitudinal 1 to 6",
-        "Set aside as no modes of the hanger: harmonic at 11.6 Hz, tone at 50 Hz and deck at",
+        "Excluded, as they are no modes of the hanger: harmonic at 11.6 Hz, tone at 50 Hz and",
         "The modes can be used with care: 2 of 4 checks warn (double hits and tones)",
         "Next: Hit freely. Move the cables",
     ):

@@ -66,7 +66,7 @@ def test_the_status_follows_the_probability_of_a_shift(
 
 def test_a_hanger_without_earlier_tests_is_at_its_first(bare: HangerReport) -> None:
     assert bare.status is Status.FIRST
-    assert "There is no earlier test to compare with" in summary(bare)
+    assert "No test was made since its baseline" in summary(bare)
 
 
 def test_the_baseline_test_is_not_compared_with_itself(season: HangerReport) -> None:
@@ -216,10 +216,10 @@ def test_the_paragraph_reads_so_from_beginning_to_end(
         "measure next: known mass of 25 kg at 3.6 m."
     )
     assert summary(bare) == (
-        "Hanger 3: tension 711 ± 14 kN by its first test. Choose a warmer or colder day at "
-        "the next planned test, so that the baseline covers temperature. Its tension is 711 ± "
-        "14 kN by test only. The tension agrees with the nominal one (+0.0 ± 2.0 %). "
-        "There is no earlier test to compare with: this one is the baseline. The model class "
+        "Hanger 3: tension 711 ± 14 kN, and no test after its baseline. Choose a warmer or colder "
+        "day at the next planned test, so that the baseline covers temperature. Its tension is "
+        "711 ± 14 kN by test only. The tension agrees with the nominal one (+0.0 ± 2.0 %). "
+        "No test was made since its baseline. The model class "
         "is beam1. It predicts one measured frequency to 0.34 % (root mean square). Each lies "
         "within its 90 % interval: the model explains what was measured. Record the "
         "temperature with the next test: it moves the tension."
