@@ -141,21 +141,6 @@ def test_every_figure_of_the_page_is_one_that_plotly_draws(client: httpx.Client,
         assert len(document["alt"]) > 20, name
 
 
-@pytest.mark.parametrize(
-    ("name", "unit"),
-    [
-        ("trend", "(kN)"),
-        ("temperature", "(kN)"),
-        ("frequencies", "measured"),
-        ("gap_map", "(%)"),
-    ],
-)
-def test_axes_have_labels_with_units(client: httpx.Client, name: str, unit: str) -> None:
-    layout = figure(client, name)["layout"]
-    assert unit in layout["yaxis"]["title"]["text"]
-    assert layout["xaxis"]["title"]["text"]
-
-
 def test_the_trend_marks_the_alert_the_change_and_the_baseline(client: httpx.Client) -> None:
     document = figure(client, "trend")
     assert {"alert", "baseline", "threshold", "nominal", "baseline set"} <= names_in(document)

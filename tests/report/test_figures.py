@@ -6,6 +6,7 @@ import io
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -13,8 +14,14 @@ import pytest
 from PIL import Image
 
 from shm.report.contents import DiagnosisSheet, HangerReport
-from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, modal_test_figures
-from shm.report.figures.specification import Illustration, drawn, png
+from shm.report.figures.every_figure import (
+    OF_DIAGNOSIS,
+    OF_HANGER,
+    OF_MODAL_TEST,
+    modal_test_figures,
+)
+from shm.report.figures.modal_test_response import ResponseCurves
+from shm.report.figures.specification import Illustration, Specification, drawn, png
 from shm.report.figures.style import PALETTE
 from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, sheet
 from tests.report.sheets import make_sheet, warned
@@ -174,3 +181,26 @@ def test_an_excluded_frequency_does_not_squeeze_the_others(figures: Figures) -> 
     assert "+30.00 %" in [text.get_text() for text in axes.texts]
     assert axes.get_ylim()[1] < 5
     assert "Excluded as a gross error: transverse 3 in t4." in item.alt
+
+
+def test_hovers_ask_for_what_their_mark_has(season: HangerReport) -> None:
+    curves = ResponseCurves.of(warned(make_sheet()))
+    specifications = [
+        *(each.draw(season) for each in OF_HANGER),
+        *(each.draw(sheet("blunder")) for each in OF_DIAGNOSIS),
+        *(each.draw(curves) for each in OF_MODAL_TEST),
+    ]
+    marks: list[Any] = [
+        mark
+        for each in specifications
+        if isinstance(each, Specification)
+        for panel in each.panels
+        for mark in panel.marks
+        if mark.hover or len(mark.texts)
+    ]
+    assert len(marks) > 50
+    for mark in marks:
+        fields = set(re.findall(r"%\{(\w+)(?::[^}]+)?\}", mark.hover))
+        assert fields <= {"x", "y"} | ({"text"} if len(mark.texts) else set())
+        assert not len(mark.texts) or len(mark.texts) == len(mark.x)
+        assert not any(re.search(r"\bnan\b|\bNone\b", text) for text in mark.texts)

@@ -177,10 +177,10 @@ def test_a_notebook_shows_that_unit(season: HangerReport, tension_n: float, unit
     data = of_size(season, tension_n)
     assert data.selection is not None
     shown = notebook.sheet(data.posterior).html
-    (row,) = re.findall(r"<tr><td>tension</td>.*?</tr>", shown)
+    (row,) = re.findall(r"<tr><th[^>]*>tension</th>.*?</tr>", shown)
     assert f"tension in {unit}" in row
     assert not NOTHING.search(row)
-    assert f"<th>tension, {unit}</th>" in notebook.sheet(data.selection).html
-    (nominal,) = re.findall(r"nominal tension</td><td>([^<]*)", notebook.sheet(data.hanger).html)
+    assert f">tension, {unit}</th>" in notebook.sheet(data.selection).html
+    (nominal,) = re.findall(r"nominal tension</th><td[^>]*>([^<]*)", notebook.sheet(data.hanger).html)
     assert nominal.endswith(f" {unit}")
     assert not NOTHING.search(nominal)

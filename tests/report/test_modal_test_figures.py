@@ -86,10 +86,6 @@ def marks(axes: Axes, label: str) -> int:
     return sum(np.size(line.get_xdata()) for line in lines_named(axes, label))
 
 
-def words_of(figure: Figure) -> list[str]:
-    return [text.get_text() for text in figure.findobj(match=lambda o: hasattr(o, "get_text"))]
-
-
 def legend_of(figure: Figure) -> list[str]:
     parents = [figure, *figure.subfigs]
     return [t.get_text() for part in parents for each in part.legends for t in each.get_texts()]
@@ -194,21 +190,6 @@ def test_the_fit_lies_over_the_response_and_every_mode_is_marked(drawn: Drawn) -
         (measured,), (fitted,) = (lines_named(axes, e) for e in ("measured", "fit of the modes"))
         assert np.max(fitted.get_ydata()) == pytest.approx(np.max(measured.get_ydata()), rel=0.02)
     assert figure.axes[-1].get_ylabel() == "coherence"
-
-
-def test_of_sixteen_points_four_are_drawn_two_of_each_plane(drawn: Drawn) -> None:
-    item = drawn["eight sensors"]["response"]
-    titles = [axes.get_title(loc="right") for axes in item.figure.axes[0:8:2]]
-    assert sorted(title.split(", ")[1] for title in titles) == [
-        "longitudinal", "longitudinal", "transverse", "transverse",
-    ]  # fmt: skip
-    assert "4 of 16 measured points are drawn" in item.caption
-
-
-def test_a_single_hit_shows_no_coherence_and_says_so(drawn: Drawn) -> None:
-    item = drawn["single hit"]["response"]
-    assert "coherence" not in {axes.get_ylabel() for axes in item.figure.axes}
-    assert "The coherence is not known" in item.caption
 
 
 def test_ambient_motion_is_shown_by_its_spectral_density_with_peaks_at_the_modes(
