@@ -88,7 +88,6 @@ def _trend_part(data: HangerReport) -> Section:
             *([control_table(chart)] if chart else []),
             tables.results(data),
             tables.period(data),
-            tables.temperatures(data),
             tables.neighbours(data),
         ),
     )
@@ -117,6 +116,7 @@ def _appendices(data: HangerReport) -> tuple[Section, ...]:
             tables=filled(
                 tables.parameters(data),
                 tables.models(data),
+                tables.temperatures(data),
                 tables.quality(data),
                 tables.history(data),
                 tables.alerts(data),
