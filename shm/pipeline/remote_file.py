@@ -1,15 +1,9 @@
-"""The registry of steps: which function of `shm.pipeline.steps` does a kind of job, with its type.
-
-They are loaded by whoever begins or computes one. With them `import shm.pipeline.flow` takes 0.72 s
-of processor time instead of 0.42 s (medians of 7).
-
-A recording that is carried to a machine which does not see the archive.
-"""
+"""A step where it is computed: a recording for a machine that does not see the archive."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,20 +15,7 @@ from shm.resources import give_back_memory
 from shm.store import Archive, ReceivedFile
 
 if TYPE_CHECKING:
-    from shm.bridge import Bridge
-    from shm.pipeline.lineage import Terms
-    from shm.settings import Settings
-    from shm.store import Baseline, IdentifiedTest, StoredRecording
-    from shm.values import (
-        Alert,
-        Beside,
-        Hanger,
-        ModalTest,
-        Posterior,
-        Selection,
-        WatchedTest,
-    )
-    from shm.watch import DatedTest
+    from shm.values import Alert, WatchedTest
 
 
 @dataclass(frozen=True)
@@ -84,36 +65,6 @@ WatchResult: TypeAlias = "tuple[WatchedTest, Alert | None, bytes]"
 
 P = ParamSpec("P")
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Steps:
-    """By kind of job. Functions of plain values alone: a process elsewhere can be sent them."""
-
-    identify: Callable[
-        [StoredRecording, Opens, Bridge, Settings, Mapping[int, str]], tuple[IdentifiedTest, ...]
-    ]
-    select: Callable[[Sequence[ModalTest], Hanger, Sequence[str], Terms], Selection]
-    update: Callable[[ModalTest, Hanger, str, Posterior | None, Terms], Posterior]
-    watch: Callable[
-        [
-            Baseline,
-            tuple[Sequence[DatedTest], Sequence[DatedTest]],
-            Posterior,
-            Hanger,
-            float,
-            bytes | None,
-            Beside | None,
-        ],
-        WatchResult | None,
-    ]
-
-
-def registered() -> Steps:
-    """The steps, loaded."""
-    from shm.pipeline import steps
-
-    return Steps(steps.identify_file, steps.select_model, steps.update_test, steps.watch_test)
 
 
 def run_step(step: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:

@@ -1,28 +1,16 @@
-"""Repeat candidates with each hit left out: validation and standard deviations.
-
-The choice of model order adds to the standard deviations.
-"""
+"""Decide which candidates are modes, and how sure they are, by hits left out and model orders."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
-from shm.identify.contract import Dropped, FoundMode
-from shm.identify.estimation.poles import (
-    Candidate,
-    Pole,
-    PoleSet,
-    aligned,
-    continued,
-    median_shape,
-    modal_assurance,
-    real_shape,
-)
+from shm.identify.contract import LEAST_HITS, Dropped, FoundMode
+from shm.identify.estimation.poles import Candidate, Repeats
+from shm.identify.estimation.shapes import aligned, modal_assurance, real_shape
+from shm.identify.estimation.spread import frequency_sd, jackknife_sd, order_sd, smooth_sds
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
 
@@ -47,84 +35,6 @@ and 1 track of noise, 16 and none of three, 7 and none of more, where it may be 
 _STEADY_SHAPE = 0.998
 """What is as steady as that from order to order need not stay closer together where hits are few:
 in the same records, 35 modes and 2 tracks of noise more; with 0.99, 53 and 15."""
-# Student's 95 % quantile is 1.8 times the normal one with two degrees of freedom, 3.8 with one
-LEAST_HITS = 3
-# With it 90 % intervals cover 92 %: docs/trials/identification_benchmarks.md, identify_simulated.py
-_SHARE_OF_ORDERS = 0.5
-_REACH, _LEAST_NEIGHBOURS = 2, 3  # judgement; what they do was counted: see `steadied`
-FREQUENCY_FLOOR = 0.001
-"""With fewer than three hits nothing says how well hits repeat. The frequency then gets this
-standard deviation, as a fraction: what hangers' frequencies differ by from one day to the next.
-Damping and shape stay without."""
-
-
-@dataclass(frozen=True, eq=False)
-class Repeats:
-    """One candidate found again with each hit left out in turn.
-
-    `frequency_hz`, `damping_ratio` (hits,) and `shape` (hits, channels); NaN where not found.
-    """
-
-    frequency_hz: FloatArray
-    damping_ratio: FloatArray
-    shape: FloatArray
-
-
-def find_again(
-    candidates: Sequence[Candidate], models: Sequence[Sequence[PoleSet]]
-) -> list[Repeats]:
-    """Return the repeats of each candidate; `models` has pole sets for each left-out hit."""
-    matches = [_in_one_model(candidates, sets) for sets in models]
-    return [
-        repeats_of(candidate, [of_model[index] for of_model in matches])
-        for index, candidate in enumerate(candidates)
-    ]
-
-
-def repeats_of(candidate: Candidate, matches: Sequence[Sequence[tuple[Pole, Pole]]]) -> Repeats:
-    """Return the repeats from matches: for each left-out hit, old poles and the same again."""
-    rows = [_repeat(candidate, of_model) for of_model in matches]
-    return Repeats(
-        np.array([frequency for frequency, _, _ in rows]),
-        np.array([damping for _, damping, _ in rows]),
-        np.array([shape for _, _, shape in rows]).reshape(len(rows), len(candidate.shape)),
-    )
-
-
-def _in_one_model(
-    candidates: Sequence[Candidate], sets: Sequence[PoleSet]
-) -> list[list[tuple[Pole, Pole]]]:
-    matches: list[list[tuple[Pole, Pole]]] = [[] for _ in candidates]
-    for poles in sets:
-        known = [
-            (index, pole)
-            for index, candidate in enumerate(candidates)
-            for pole in candidate.poles
-            if pole.order == poles.order
-        ]
-        again = continued([pole for _, pole in known], poles)
-        for (index, pole), match in zip(known, again, strict=True):
-            if match is not None:
-                matches[index].append((pole, match))
-    return matches
-
-
-def _repeat(
-    candidate: Candidate, matches: Sequence[tuple[Pole, Pole]]
-) -> tuple[float, float, FloatArray]:
-    """Return frequency, damping and shape of a repeat: the candidate's plus the median change."""
-    if 2 * len(matches) < len(candidate.poles):
-        return np.nan, np.nan, np.full(len(candidate.shape), np.nan)
-    change = [
-        (b.frequency_hz - a.frequency_hz, b.damping_ratio - a.damping_ratio) for a, b in matches
-    ]
-    frequency, damping = np.median(change, axis=0)
-    shape = aligned(median_shape([match.shape for _, match in matches]), candidate.shape)
-    return (
-        candidate.frequency_hz + float(frequency),
-        candidate.damping_ratio + float(damping),
-        shape,
-    )
 
 
 def validate_candidates(
@@ -191,11 +101,11 @@ def doubt(candidate: Candidate, repeat: Repeats, options: IdentifyOptions) -> st
         return ""
     sure = _SURE_SHAPE if not options.ambient_s and _like(candidate, repeat.shape) else 1.0
     by_hits_hz = float(jackknife_sd(repeat.frequency_hz))
-    frequency_sd = math.hypot(by_hits_hz, _within(candidate)) / candidate.frequency_hz
+    sd = math.hypot(by_hits_hz, _within(candidate)) / candidate.frequency_hz
     damping_sd = jackknife_sd(repeat.damping_ratio) / candidate.damping_ratio
-    if frequency_sd > max(sure * options.max_frequency_sd, frequency_wide):
+    if sd > max(sure * options.max_frequency_sd, frequency_wide):
         return "its frequency changes from hit to hit"
-    sharp = sure > 1 or frequency_sd <= _SHARP * options.max_frequency_sd
+    sharp = sure > 1 or sd <= _SHARP * options.max_frequency_sd
     if damping_sd > max(options.max_damping_sd, damping_wide) and not sharp:
         return "its frequency and damping change from hit to hit"
     return ""
@@ -260,63 +170,3 @@ def _mode(
         shape=candidate.shape,
         shape_sd=np.hypot(jackknife_sd(repeat.shape), shapes),
     )
-
-
-def jackknife_sd(estimates: FloatArray) -> FloatArray:
-    """Return the standard deviation from delete-one replicates (hits, ...) of an estimate: (...).
-
-    Efron (1982), eq. 3.1, widened by the ratio of Student's 95 % quantile with hits - 1 degrees
-    of freedom to the normal one, so that a 90 % interval of a normal distribution with this
-    standard deviation covers the truth in 90 %. NaN below three hits.
-    """
-    hits = len(estimates)
-    if hits < LEAST_HITS:
-        return np.full(estimates.shape[1:], np.nan)
-    spread = np.sum((estimates - estimates.mean(axis=0)) ** 2, axis=0)
-    return np.asarray(np.sqrt((hits - 1) / hits * spread) * widening(hits - 1))
-
-
-def order_sd(estimates: Sequence[float] | Sequence[FloatArray]) -> FloatArray:
-    """Return the standard deviation that the choice of the model order adds: (...).
-
-    `estimates` (orders, ...) of a median over orders come from the same hits, so no hit left
-    out shows it. It is half of their spread: measured to make the intervals of all identifiers
-    right.
-    """
-    values = np.asarray(estimates)
-    if len(values) < 2:
-        return np.zeros(values.shape[1:])
-    return np.asarray(_SHARE_OF_ORDERS * np.std(values, axis=0, ddof=1))
-
-
-def smooth_sds(sds: FloatArray, hits: int) -> FloatArray:
-    """Smooth standard deviations (modes,) over neighbouring modes.
-
-    From a few hits one may be far too small by chance. As in G. K. Smyth's moderated variances
-    (Statistical Applications in Genetics and Molecular Biology 3, 2004), a variance with hits -
-    1 degrees of freedom is averaged with what the others lead to expect, here the median of up
-    to four neighbours with one degree of freedom. On 576 simulated frequencies of 5 hits, none
-    of them used to choose that, 0.9 % lay beyond 3 standard deviations instead of 1.9 %.
-    Unchanged below three hits or three modes.
-    """
-    if hits < LEAST_HITS or len(sds) < _LEAST_NEIGHBOURS:
-        return sds
-    expected = np.array([_neighbours_sd(sds, index) for index in range(len(sds))])
-    return np.asarray(np.sqrt(((hits - 1) * sds**2 + expected**2) / hits))
-
-
-def _neighbours_sd(sds: FloatArray, index: int) -> float:
-    near = np.arange(max(0, index - _REACH), min(len(sds), index + _REACH + 1))
-    return float(np.median(sds[near[near != index]]))
-
-
-def widening(freedom: int) -> float:
-    """Return Student's 95 % quantile over the normal one."""
-    return float(scipy.special.stdtrit(freedom, 0.95) / scipy.special.ndtri(0.95))
-
-
-def frequency_sd(frequency_hz: float, estimates_hz: FloatArray) -> float:
-    """Return the standard deviation of a frequency; the stated floor below three hits."""
-    if len(estimates_hz) < LEAST_HITS or not np.all(np.isfinite(estimates_hz)):
-        return FREQUENCY_FLOOR * frequency_hz
-    return float(jackknife_sd(estimates_hz))
