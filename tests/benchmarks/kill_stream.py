@@ -17,7 +17,7 @@ from tests.helpers.stream_killing import assert_none_lost_none_doubled, killed_a
 
 
 def main() -> int:
-    """Runs the trial and prints its figures."""
+    """Run the trial and print its figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
