@@ -59,11 +59,11 @@ def choose_tests(
     since = tuple(each for each in stored if each.time >= began_by) or stored[-1:]
     if len(since) == len(stored):
         return ChosenTests(stored)
-    tests = "test" if len(since) == 1 else f"{len(since)} tests"
+    tests, are = ("test", "is") if len(since) == 1 else (f"{len(since)} tests", "are")
     remark = (
-        f"Only the {tests} since {began_by:%Y-%m-%d}, when the watch reports a change, "
-        f"{'is' if len(since) == 1 else 'are'} diagnosed; {len(stored) - len(since)} earlier left "
-        f"out. To diagnose them together: `shm gap diagnose --hanger {hanger.id} --all-tests`."
+        f"Only the {tests} since {began_by:%Y-%m-%d} {are} diagnosed: the watch reports a change "
+        f"before. Earlier ones left out: {len(stored) - len(since)}. To diagnose all together: "
+        f"`shm gap diagnose --hanger {hanger.id} --all-tests`."
     )
     return ChosenTests(since, remark)
 
