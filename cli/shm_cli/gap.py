@@ -26,8 +26,9 @@ from shm.report.as_text import as_text
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_json, bridge_diagnosis_paper
 from shm.report.contents import BridgeDiagnosisSheet, DiagnosisSheet
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
-from shm.report.figures.every_figure import bridge_diagnosis_figures, diagnosis_figures
-from shm.report.figures.specification import Illustration
+from shm.report.figures.every_figure import OF_DIAGNOSIS
+from shm.report.figures.gap_causes import SHARED
+from shm.report.figures.specification import Illustration, drawn
 from shm.report.paper import Paper
 from shm.store import Store
 from shm.store.queries.tests import load_frequency_response
@@ -233,7 +234,7 @@ def diagnose(
     options = GapOptions(baseline, without, hold_out, seed=seed)
     if bridge or len(files) > 1:
         joint = _jointly(ctx, files, bridge, (hanger_id, hanger_file), (count, all_tests), options)
-        draw = partial(bridge_diagnosis_figures, joint.diagnosis)
+        draw = partial(drawn, (SHARED,), joint.diagnosis)
         _show(bridge_diagnosis_paper(joint), bridge_diagnosis_json(joint), draw, html, figures)
         return
     if not files:
@@ -244,7 +245,7 @@ def diagnose(
         tests, hanger = tests_and_hanger(ctx, files[0], hanger_file, hanger_id)
         found = _diagnosis(tests, hanger, options)
         sheet = DiagnosisSheet(found, hanger, sensors=_sensors(tests))
-    draw = partial(diagnosis_figures, sheet)
+    draw = partial(drawn, OF_DIAGNOSIS, sheet)
     _show(diagnosis_paper(sheet), diagnosis_json(sheet), draw, html, figures)
 
 

@@ -219,21 +219,23 @@ class LeftOut:
 
     @property
     def log_rest(self) -> FloatArray:
-        """Log evidence (nodes, r) of all data but each frequency."""
+        """Return the log evidence (nodes, r) of all data but each frequency."""
         return np.asarray(
             self.log_all[:, None] - scipy.stats.norm.logpdf(self.deviation, scale=self.sd)
         )
 
     @property
     def rest(self) -> FloatArray:
-        """Log evidence (r,) of all data but each frequency, relative to that of all data."""
+        """Return the log evidence (r,) of all data but each, relative to that of all data."""
         whole = scipy.special.logsumexp(self.log_all)
         return np.asarray(scipy.special.logsumexp(self.log_rest, axis=0) - whole)
 
     @property
     def gross_or_ordinary(self) -> FloatArray:
-        """Return log densities (2, r) given all other data: of a gross error, and of an ordinary
-        datum, whose error has the tails of Student's t."""
+        """Return log densities (2, r) given all other data: of a gross error, of an ordinary one.
+
+        An ordinary error has the tails of Student's t.
+        """
         rest, share = self.log_rest, self.gross_share
         both = log_gross(self.deviation, share), log_ordinary(self.deviation, self.sd, share)
         together = scipy.special.logsumexp(rest, axis=0)
@@ -241,7 +243,7 @@ class LeftOut:
 
     @property
     def expected(self) -> tuple[FloatArray, FloatArray]:
-        """Mean and standard deviation (r,) of the deviations, over the possibilities."""
+        """Return mean and standard deviation (r,) of the deviations, over the possibilities."""
         weight = np.exp(self.log_rest - scipy.special.logsumexp(self.log_rest, axis=0))
         mean = (weight * self.deviation).sum(axis=0)
         square = (weight * (self.sd**2 + self.deviation**2)).sum(axis=0)

@@ -23,7 +23,7 @@ from shm.report.as_text import as_text
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_report import causes, diagnosis_json, diagnosis_paper, diagnosis_part
 from shm.report.diagnosis_summary import write_lead, write_summary
-from shm.report.figures import gap_before_and_after, gap_causes
+from shm.report.figures import gap_causes, gap_map
 from shm.values import NAN, Cause, Diagnosis, Outcome, Outlier, Shrinkage
 from shm.values.verdict import Reason
 from tests.benchmarks.blind_scores import find_contradictions
@@ -203,7 +203,7 @@ def test_text_page_and_document_agree(key: tuple[Outcome, Reason, bool]) -> None
     assert document["summary"].startswith(lead)
     assert lead in " ".join(diagnosis.summary().split())
     assert outcome.value.lower() in repr(diagnosis)
-    is_drawn = gap_before_and_after.specify(sheet) is not None
+    is_drawn = gap_map.has_cause(sheet)
     assert is_drawn <= (diagnosis.verdict.claim is not None)
     assert lead in gap_causes.FIGURE.alt(sheet)
 
