@@ -174,7 +174,7 @@ class SimulatorProblem:
         return {n: p for each in self.effects(hypothesis) for n, p in each.parameters.items()}
 
     def priors(self, hypothesis: Hypothesis) -> dict[str, Prior]:
-        """Return those of the simulator, then of the effects: a coordinate z each, in this order."""
+        """Return those of the simulator, then of the effects: a coordinate z each, in order."""
         return {**self.simulator.parameters, **self.effect_priors(hypothesis)}
 
     def dimension(self, hypothesis: Hypothesis) -> int:
@@ -286,7 +286,7 @@ class SimulatorProblem:
         )
 
     def _patterns(self) -> list[FloatArray]:
-        """Return correlations (data, data) that a remainder may have: in all observables, in each."""
+        """Return correlations (data, data) of a remainder: in all observables, and in each."""
         same = self.same_observable
         varied = self._varied_conditions()
         apart = sum(((each[:, None] - each) ** 2 for each in varied), np.zeros_like(same))
