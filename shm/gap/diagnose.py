@@ -256,7 +256,7 @@ def _estimates(problem: GapProblem, fit: Fit) -> tuple[EffectEstimate, ...]:
 
 
 def _contenders(attribution: Attribution) -> list[Fit]:
-    """The fits that further measurements should tell apart, the likeliest first."""
+    """Return the fits that further measurements should tell apart, the likeliest first."""
     weighed = [(attribution.no_gap_probability, attribution.baseline)]
     weighed += [
         (each.probability, each.best.fit) for each in attribution.explanations if each.best.fit

@@ -309,10 +309,9 @@ def _seen_from(problem: GapProblem, fit: Fit, row: int) -> LeftOut:
 def acts_alone(
     design: Design, remaining: Design, row: int, deviation: float, gross_share: float
 ) -> float:
-    """Return how probably the frequency `row` of `design`, off by `deviation` of its logarithm,
-    is no slip but moved by something unknown that acts on this mode alone.
+    """Return how probably an excluded frequency is no slip, but moved by what acts on it alone.
 
-    `remaining` are the frequencies that were not set aside.
+    It is `row` of `design`, off by `deviation` of its logarithm; `remaining` are the frequencies that were not set aside.
     """
     if abs(deviation) > _LARGEST or _right_elsewhere(design, remaining, row):
         return 0.0
