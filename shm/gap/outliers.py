@@ -311,7 +311,8 @@ def acts_alone(
 ) -> float:
     """Return how probably an excluded frequency is no slip, but moved by what acts on it alone.
 
-    It is `row` of `design`, off by `deviation` of its logarithm; `remaining` are the frequencies that were not set aside.
+    It is `row` of `design`, off by `deviation` of its logarithm; `remaining` are the frequencies
+    that were kept.
     """
     if abs(deviation) > _LARGEST or _right_elsewhere(design, remaining, row):
         return 0.0
