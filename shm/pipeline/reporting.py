@@ -14,7 +14,7 @@ from shm.inference import UpdateOptions, refresh
 from shm.inference.reference_level import at_level
 from shm.models import build
 from shm.pipeline.adopting import gap_watch
-from shm.pipeline.bridge_reporting import hanger_summaries, stored_pattern
+from shm.pipeline.bridge_reporting import hanger_summaries, pattern_or_why
 from shm.pipeline.diagnosing import latest_diagnosis
 from shm.pipeline.lineage import (
     IDENTIFY_SETTINGS,
@@ -46,7 +46,6 @@ from shm.values import Hanger, ResponsePoint, WatchedTest
 from shm.values.stated_tension import averaged_now
 from shm.watch import WatchOptions, watch_hanger
 from shm.watch.alert_text import frequency_words, watch_words
-from shm.watch.neighbours import BridgePattern
 
 log = logging.getLogger(__name__)
 
@@ -75,7 +74,7 @@ def hanger_report(
         states=hanger_states(
             workspace, store, hanger, store.watch.baseline(hanger_id, report.posterior.model)
         ),
-        neighbours=_neighbours(workspace, store) if report.now.called else None,
+        neighbours=pattern_or_why(workspace, store)[0] if report.now.called else None,
         period=period,
         at_level=_at_level(workspace, report),
     )
@@ -250,14 +249,6 @@ def _watched_against(store: Store, baseline: Baseline | None) -> tuple[WatchedTe
     """The watches that call a change, and the latest one."""
     found = list_detections(store, baseline.hanger, baseline.id) if baseline else ()
     return tuple(each.watched for each in found)
-
-
-def _neighbours(workspace: Workspace, store: Store) -> BridgePattern | None:
-    """Return what moved over the bridge; None where fewer than three hangers can be compared."""
-    try:
-        return stored_pattern(store, [hanger.id for hanger in workspace.bridge.hangers])
-    except NothingThere:
-        return None
 
 
 def hanger_states(
