@@ -24,25 +24,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shm.errors import UsageError
-from shm.read.base import names_in
-from shm.read.header import CHANNEL_KEYS, KEYS, condition_entries, known_values
-from shm.read.logger_words import ACCELERANCE, SI
-from shm.values import (
-    Channel,
-    ComplexArray,
-    FloatArray,
-    FrequencyResponse,
-    Recording,
-    ResponsePoint,
-)
+from shm.read.header import CHANNEL_KEYS
 
 # judgement: twice the 16 accelerations of setting max_channels; a wider table is no recording
 _MOST_COLUMNS = 32
 _MOST_TEXT = 1000  # characters; longer texts say nothing about a channel
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")
-_FREQUENCY = "frequency_hz"
-_COHERENCE = "_coherence"
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,71 +150,3 @@ def _parts(variable: Variable) -> list[Variable]:
 
 def _row(load: Callable[[], NDArray[Any]], row: int, lies: bool) -> Callable[[], NDArray[Any]]:
     return lambda: load()[row] if lies else load()[:, row]
-
-
-@dataclass(frozen=True, eq=False)
-class NamedArray:
-    """An array to be written, with what is said about it."""
-
-    name: str
-    values: FloatArray | ComplexArray
-    attributes: Mapping[str, str | float]
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """The arrays of a file to be written, and what is said about the whole."""
-
-    arrays: tuple[NamedArray, ...]
-    attributes: Mapping[str, str | float]
-
-    @property
-    def flat(self) -> dict[str, FloatArray | ComplexArray | str | float]:
-        """All by name: what belongs to a channel becomes NAME_unit and so on."""
-        found: dict[str, FloatArray | ComplexArray | str | float] = dict(self.attributes)
-        for array in self.arrays:
-            found[array.name] = array.values
-            found.update({f"{array.name}_{key}": v for key, v in array.attributes.items()})
-        return found
-
-
-def layout_of(described: Recording | FrequencyResponse) -> Layout:
-    """Return the arrays of a recording or of frequency responses.
-
-    Raises UsageError for names that some program could not take or take apart.
-    """
-    for name in names_in(described):
-        reserved = name in (*KEYS, _FREQUENCY) or name.endswith(_suffixes())
-        if reserved or not _NAME.fullmatch(name):
-            raise UsageError(
-                f"the channel name {name!r} cannot name an array.",
-                remedy="Begin with a letter and use letters, digits and underscores, as in acc_1.",
-            )
-    known = condition_entries(described)
-    if isinstance(described, FrequencyResponse):
-        return Layout(_response(described), known)
-    known["sampling_rate_hz"] = described.sampling_rate_hz
-    return Layout(tuple(map(_channel, described.channels)), known_values(known))
-
-
-def _suffixes() -> tuple[str, ...]:
-    return tuple(f"_{key}" for key in CHANNEL_KEYS)
-
-
-def _channel(channel: Channel) -> NamedArray:
-    facts = {"unit": SI[channel.quantity], **_place(channel), "full_scale": channel.full_scale}
-    return NamedArray(channel.name, channel.values, known_values(facts))
-
-
-def _response(response: FrequencyResponse) -> tuple[NamedArray, ...]:
-    arrays = [NamedArray(_FREQUENCY, response.frequency_hz, {"unit": "Hz"})]
-    for row, point in enumerate(response.points):
-        facts = known_values({"unit": ACCELERANCE, **_place(point)})
-        arrays.append(NamedArray(point.name, response.accelerance[row], facts))
-        if response.coherence is not None:
-            arrays.append(NamedArray(f"{point.name}{_COHERENCE}", response.coherence[row], {}))
-    return tuple(arrays)
-
-
-def _place(point: Channel | ResponsePoint) -> dict[str, str | float | None]:
-    return {"plane": point.plane, "x_m": point.x_m}
