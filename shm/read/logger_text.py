@@ -46,7 +46,7 @@ from shm.read.logger_rows import (
 )
 from shm.read.logger_times import Clock, clock_of, day_order_of
 from shm.read.logger_words import UNIT_MISSING
-from shm.read.stamps import DayOrder, PossibleTime, is_stamp, moment, names_zone, possible_times
+from shm.read.stamps import DayOrder, PossibleTime, is_stamp, possible_times, stamp_of
 from shm.read.table import Column, Table
 from shm.read.time_axis import rate_of
 from shm.values import NAN
@@ -256,37 +256,29 @@ def _hanger(heading: Heading) -> int | None:
     return numbers.pop() if len(numbers) == 1 else None
 
 
-def _dates(heading: Heading) -> list[str]:
-    return [v for k, v in heading.facts if words.means_date(k) and is_stamp(v)]
-
-
-def _moments(heading: Heading) -> list[str]:
-    """Return the times of a heading, catman's `T0 = ...` among them."""
-    named = ((k, v) for k, v in heading.facts if is_stamp(v))
-    return [v for k, v in named if words.means_moment(k) or k.strip().upper() == "T0"]
-
-
 def _days(heading: Heading) -> list[str]:
-    """Return all days and times of a heading, as they are written."""
-    return [*_dates(heading), *_moments(heading)]
+    """Return all days and times of a heading, as written: the clocks, with each day, and the days.
+
+    catman writes `T0 = ...`.
+    """
+    facts = [(key, value) for key, value in heading.facts if is_stamp(value)]
+    days = [value for key, value in facts if words.means_date(key)]
+    clocks = [v for key, v in facts if words.means_moment(key) or key.strip().upper() == "T0"]
+    return [*clocks, *(f"{day} {clock}" for day in days for clock in clocks), *days]
 
 
 def _time(heading: Heading, order: DayOrder | None) -> tuple[datetime | None, bool]:
     """Return the time that a heading says, and whether its clock names no zone."""
-    days, clocks = _dates(heading), _moments(heading)
-    whole = [v for v in clocks if moment("", v, order) is not None]
-    if whole:
-        return moment("", whole[0], order), not names_zone(whole[0])
-    clock = clocks[0] if clocks else ""
-    local = not names_zone(clock) and not any(map(names_zone, days[:1]))
-    return (moment(days[0], clock, order), local) if days else (None, False)
+    for text in _days(heading):
+        found = stamp_of(text)
+        if found is not None and found.is_certain(order):
+            return found.time(order), not found.has_zone
+    return None, False
 
 
 def _possible_times(heading: Heading) -> tuple[PossibleTime, ...]:
     """Return the times of a heading whose day can be read in several orders; empty for others."""
-    days, clocks = _dates(heading), _moments(heading)
-    texts = [*clocks, *(f"{day} {clock}" for day in days for clock in clocks), *days]
-    return next((each for text in texts if (each := possible_times(text))), ())
+    return next((each for text in _days(heading) if (each := possible_times(text))), ())
 
 
 def _temperature(heading: Heading, decimal: str, columns: Sequence[Column]) -> float:
