@@ -101,7 +101,7 @@ def _possible_times(table: Table) -> tuple[datetime, ...]:
 
 def read_of_test(header: Header, attempt: Attempt) -> dict[str, Any]:
     """Return what a header says of the complete test; None and NaN where that is faulty."""
-    unknown = dict.fromkeys(TEST_CONDITIONS) | {"temperature_c": NAN}
+    unknown = dict.fromkeys(TEST_CONDITIONS) | {"temperature_c": NAN, "operator": ""}
     return {key: attempt(partial(getattr, header, key), none) for key, none in unknown.items()}
 
 

@@ -40,9 +40,11 @@ KEYS = (
     "added_mass_kg",
     "added_mass_at_m",
     "added_mass_radius_m",
+    "operator",
     "sampling_rate_hz",
 )
 CHANNEL_KEYS = ("unit", "x_m", "plane", "calibration", "full_scale", "leave_out", "coherence")
+_MOST_NAME = 100  # judgement: letters; a name of a person or a crew
 _OF_ALL_CHANNELS = ("unit", "calibration", "full_scale")
 
 
@@ -135,6 +137,12 @@ class Header:
         if radius is not None and not radius_m >= 0:
             raise radius.refusal(f"added_mass_radius_m = {radius.text} is negative.", of_radius)
         return AddedMass(mass_kg, x_m, None if radius is None else radius_m)
+
+    @property
+    def operator(self) -> str:
+        """Who measured; empty where nothing says it."""
+        entry = self._given("operator")
+        return "" if entry is None else entry.text[:_MOST_NAME]
 
     @property
     def sampling_rate_hz(self) -> float:

@@ -308,6 +308,7 @@ def _surveyed(tables: Sequence[Table], file_format: str, path: Path) -> Survey:
         hanger=seen.hanger,
         time=seen.time,
         temperature_c=seen.temperature_c,
+        operator=seen.operator,
         layout=_layout(table, file_format, columns),
         lines=seen.lines,
         remarks=(*table.remarks, *([several] if len(tables) > 1 else [])),
