@@ -44,7 +44,6 @@ KEYS = (
     "sampling_rate_hz",
 )
 CHANNEL_KEYS = ("unit", "x_m", "plane", "calibration", "full_scale", "leave_out", "coherence")
-_MOST_NAME = 100  # judgement: letters; a name of a person or a crew
 _OF_ALL_CHANNELS = ("unit", "calibration", "full_scale")
 
 
@@ -142,7 +141,7 @@ class Header:
     def operator(self) -> str:
         """Who measured; empty where nothing says it."""
         entry = self._given("operator")
-        return "" if entry is None else entry.text[:_MOST_NAME]
+        return "" if entry is None else entry.text
 
     @property
     def sampling_rate_hz(self) -> float:
