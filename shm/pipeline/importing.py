@@ -27,12 +27,13 @@ from shm.pipeline.lineage import read_limits
 from shm.read import logger_words as words
 from shm.read.assemble import assemble
 from shm.read.base import Survey, SurveyedColumn
+from shm.read.describe import describe
 from shm.read.header import CHANNEL_KEYS, Entry
 from shm.read.profiles import Profile, completed, profile_for, save_profile, with_day_order
 from shm.read.sandbox import survey
 from shm.read.sidecar import Described, sidecar_document
 from shm.read.stamps import DayOrder, in_zone, order_of_choice
-from shm.read.table import Column, Table, describe
+from shm.read.table import Column, Table
 from shm.store import Workspace
 from shm.values import NAN, PLANES, Channel, Plane, Quantity, Recording
 
@@ -429,7 +430,7 @@ def _recording(
         ]  # fmt: skip
         rates = {} if math.isnan(rate) else {"sampling_rate_hz": Entry(rate, path)}
         table = Table(path, tuple(columns), rates)
-        made = assemble(table, describe(table, with_sidecars=False))
+        made = assemble(describe(table, with_sidecars=False))
         assert isinstance(made, Recording)
         return made, ""
     except BadInput as error:

@@ -16,18 +16,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import datetime
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shm.read.header import CHANNEL_KEYS
-
-# judgement: twice the 16 accelerations of setting max_channels; a wider table is no recording
-_MOST_COLUMNS = 32
 _MOST_TEXT = 1000  # characters; longer texts say nothing about a channel
 
 
@@ -69,26 +64,6 @@ class Arrays:
     left_out: tuple[str, ...] = ()
 
 
-def flatten_tables(arrays: Arrays) -> Arrays:
-    """Return arrays with single numbers and texts as attributes, and tables as single rows.
-
-    `acc_1_unit` becomes the attribute `unit` of `acc_1`; other facts become general attributes.
-    The rows or columns of a table DATA, whichever are longer, become DATA_1, DATA_2, ...
-    """
-    facts = {v.name: _fact(v) for v in arrays.variables if v.is_fact}
-    series = [part for v in arrays.variables if not v.is_fact for part in _parts(v)]
-    facts_of = {v.name: facts_about(v.name, facts) for v in series}
-    taken = {f"{name}_{key}" for name, about in facts_of.items() for key in about}
-    general = {name: value for name, value in facts.items() if name not in taken}
-    variables = (replace(v, attributes={**facts_of[v.name], **v.attributes}) for v in series)
-    return Arrays(tuple(variables), {**general, **arrays.attributes}, arrays.left_out)
-
-
-def facts_about(name: str, facts: Mapping[str, object]) -> dict[str, object]:
-    """Return the facts about `name` by channel key: `acc_1_unit` is the unit of acc_1."""
-    return {key: facts[f"{name}_{key}"] for key in CHANNEL_KEYS if f"{name}_{key}" in facts}
-
-
 def plain(value: object) -> object:
     """Return an attribute as text, number or time; None for any other type."""
     if isinstance(value, np.ndarray):
@@ -118,35 +93,3 @@ def unique_names(paths: Sequence[tuple[str, ...]]) -> list[str]:
     """Return the last part of each path where that is unique, else the path with slashes."""
     last = [path[-1] for path in paths]
     return [path[-1] if last.count(path[-1]) == 1 else "/".join(path) for path in paths]
-
-
-def _fact(variable: Variable) -> object:
-    values = variable.load()
-    if variable.kind == "U":
-        return "".join(str(text) for text in np.ravel(values)).strip()
-    return plain(values)
-
-
-def _parts(variable: Variable) -> list[Variable]:
-    """Return the variable itself in one row, or the rows of a table."""
-    lengths = [length for length in variable.shape if length != 1]
-    if variable.kind not in "iufc" or len(lengths) < 2:
-        shape = tuple(lengths) or (1,)
-        return [replace(variable, shape=shape, load=lambda: variable.load().reshape(shape))]
-    if len(variable.shape) != 2 or min(lengths) > _MOST_COLUMNS:
-        return [variable]
-    loaded = cache(variable.load)
-    lies = variable.shape[0] <= variable.shape[1]
-    return [
-        replace(
-            variable,
-            name=f"{variable.name}_{row + 1}",
-            shape=(max(lengths),),
-            load=_row(loaded, row, lies),
-        )
-        for row in range(min(lengths))
-    ]
-
-
-def _row(load: Callable[[], NDArray[Any]], row: int, lies: bool) -> Callable[[], NDArray[Any]]:
-    return lambda: load()[row] if lies else load()[:, row]

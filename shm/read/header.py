@@ -18,6 +18,8 @@ from shm.read.logger_words import (
     UNIT_MISSING,
     Unit,
     accelerance_si,
+    means_force_alone,
+    plane_meant,
     unit_of,
 )
 from shm.values import (
@@ -258,6 +260,29 @@ def quantity_named(name: str) -> Quantity | None:
     if lowered.startswith(("force", "hammer")):
         return "force"
     return "acceleration" if lowered.startswith("acc") else None
+
+
+def is_measured(name: str, unit: str) -> bool:
+    """Return whether a file itself says that a column is a force or an acceleration, in a unit."""
+    return unit_of(unit) is not None and not _is_doubtful(name, unit)
+
+
+def _is_doubtful(name: str, unit: str) -> bool:
+    """Return whether a load cell, by its name, is in a unit of acceleration: g may be its grams."""
+    known = unit_of(unit)
+    in_g = known is not None and known.quantity == "acceleration"
+    return in_g and means_force_alone(name)
+
+
+def stated_entries(name: str, unit: str, path: Path, line: int | None = None) -> dict[str, Entry]:
+    """Return what a logger's name and unit say of a channel, by the keys of a sidecar."""
+    measured, plane = unit_of(unit), plane_meant(name)
+    if _is_doubtful(name, unit) or (quantity_named(name) and not unit):
+        unit = UNIT_MISSING  # a name such as force promises newtons in our own files alone
+    entries = {"unit": unit}
+    if plane is not None and measured is not None and measured.quantity == "acceleration":
+        entries["plane"] = plane
+    return {key: Entry(value, path, line) for key, value in entries.items() if value}
 
 
 def is_true(entry: Entry) -> bool:

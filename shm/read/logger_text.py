@@ -24,7 +24,14 @@ from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read import logger_words as words
 from shm.read.content import LINE_BREAK, cells_of, mark_between
-from shm.read.header import CHANNEL_KEYS, KEYS, Entry, entries_of, quantity_named
+from shm.read.header import (
+    CHANNEL_KEYS,
+    KEYS,
+    entries_of,
+    is_measured,
+    quantity_named,
+    stated_entries,
+)
 from shm.read.limits import refuse_long_header
 from shm.read.logger_heading import (
     Heading,
@@ -45,7 +52,6 @@ from shm.read.logger_rows import (
     values_of,
 )
 from shm.read.logger_times import Clock, clock_of, day_order_of
-from shm.read.logger_words import UNIT_MISSING
 from shm.read.stamps import DayOrder, PossibleTime, is_stamp, possible_times, stamp_of
 from shm.read.table import Column, Table
 from shm.read.time_axis import rate_of
@@ -305,29 +311,3 @@ def _layout(heading: Heading, block: DataRows) -> tuple[str, ...]:
     serials = [value for key, value in heading.facts if words.means_serial(key)]
     columns = [f"{n} [{u}]" for n, u in zip(heading.names, heading.units, strict=True)]
     return (f"{dialect.mark}{dialect.decimal}", *keys, *serials, *columns)
-
-
-# ---------------------------------------------------------------- channels
-
-
-def is_measured(name: str, unit: str) -> bool:
-    """Return whether a file itself says that a column is a force or an acceleration, in a unit."""
-    return words.unit_of(unit) is not None and not _is_doubtful(name, unit)
-
-
-def _is_doubtful(name: str, unit: str) -> bool:
-    """Return whether a load cell, by its name, is in a unit of acceleration: g may be its grams."""
-    known = words.unit_of(unit)
-    in_g = known is not None and known.quantity == "acceleration"
-    return in_g and words.means_force_alone(name)
-
-
-def stated_entries(name: str, unit: str, path: Path, line: int | None = None) -> dict[str, Entry]:
-    """Return what a logger's name and unit say of a channel, by the keys of a sidecar."""
-    measured, plane = words.unit_of(unit), words.plane_meant(name)
-    if _is_doubtful(name, unit) or (quantity_named(name) and not unit):
-        unit = UNIT_MISSING  # a name such as force promises newtons in our own files alone
-    entries = {"unit": unit}
-    if plane is not None and measured is not None and measured.quantity == "acceleration":
-        entries["plane"] = plane
-    return {key: Entry(value, path, line) for key, value in entries.items() if value}

@@ -11,7 +11,6 @@ import re
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,12 +19,10 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from shm.errors import BadInput, UsageError
-from shm.read.array_reading import format_of_arrays
 from shm.read.arrays import Arrays, Variable
 from shm.read.atomic import replace_file
 from shm.read.base import names_in
-from shm.read.bundles import FIRST_DAY
-from shm.read.content import checked_members
+from shm.read.content import FIRST_DAY, checked_members
 from shm.read.header import CHANNEL_KEYS, KEYS, condition_entries, known_values
 from shm.read.limits import guarded, refuse_large
 from shm.read.logger_words import ACCELERANCE, SI
@@ -40,13 +37,13 @@ _SUFFIXES = tuple(f"_{key}" for key in CHANNEL_KEYS)
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
-def _recognises(head: bytes) -> bool:
+def recognises(head: bytes) -> bool:
     packed = head.startswith(b"PK\x03\x04") and b".npy" in head[30:300]
     return packed or head.startswith(_MAGIC)
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Arrays]:
+def opened(path: Path) -> Iterator[Arrays]:
     with guarded(path):
         with path.open("rb") as stream:
             single = stream.read(len(_MAGIC)) == _MAGIC
@@ -100,7 +97,7 @@ def _values(opened: Callable[[], IO[bytes]]) -> NDArray[Any]:
     return np.char.decode(values, "latin-1") if dtype.kind == "S" else values
 
 
-def _write(described: Recording | FrequencyResponse, path: Path) -> None:
+def write(described: Recording | FrequencyResponse, path: Path) -> None:
     if path.suffix.lower() == ".npy":
         raise UsageError("a .npy file holds one array without names.", remedy="Write a .npz file.")
     arrays = {name: np.asarray(value) for name, value in arrays_of(described).items()}
@@ -148,6 +145,3 @@ def _save(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
             member = zipfile.ZipInfo(f"{name}.npy", FIRST_DAY)
             with archive.open(member, "w") as stream:
                 npy.write_array(stream, values, allow_pickle=False)
-
-
-FORMAT = replace(format_of_arrays("NumPy", (".npz", ".npy"), _recognises, _opened), write=_write)

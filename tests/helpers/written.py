@@ -25,7 +25,7 @@ from pymseed import MS3TraceList, nslc2sourceid
 
 from shm.read import FORMATS, Format
 from shm.read import write as write_ours
-from shm.read.arrays import facts_about
+from shm.read.array_reading import facts_about
 from shm.read.base import PeekChannel
 from shm.read.comma_separated import recording_text, response_text
 from shm.read.header import condition_entries
