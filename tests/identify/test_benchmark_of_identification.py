@@ -17,7 +17,6 @@ from shm.errors import NotIdentifiable
 from shm.identify import Identification
 from shm.identify.contract import Hit, Poles
 from shm.values import ForeignMode, ModalTest, Mode, QualityCheck
-from tests.worlds.simulated.disturbances.registry import DISTURBANCES
 
 FOLDER = Path(__file__).resolve().parents[1] / "benchmarks" / "identification"
 
@@ -93,17 +92,6 @@ def test_a_shifted_order_is_missed_and_misplaced_and_an_odd_frequency_is_false(
     assert score.false == 1
 
 
-def test_a_dropped_hit_and_one_that_was_not_seen_count(
-    bench: dict[str, ModuleType], case: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    full = answer(case, right(case))
-    hits = (replace(full.hits[0], used=False, reason="double hit"), *full.hits[2:])
-    score = scored(bench, case, monkeypatch, replace(full, hits=hits))
-    assert score.sound_hits_dropped == 2
-    assert any("double hit" in remark for remark in score.remarks)
-    assert any("not seen" in remark for remark in score.remarks)
-
-
 @pytest.mark.parametrize(("verdict", "told"), [("warning", True), ("good", False)])
 def test_a_fault_is_flagged_by_a_check_of_its_kind_that_is_not_good(
     bench: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch, verdict: Any, told: bool
@@ -112,17 +100,6 @@ def test_a_fault_is_flagged_by_a_check_of_its_kind_that_is_not_good(
     check = QualityCheck("tones", verdict, 1.0, 0.5, "", "a line at 50 Hz")
     score = scored(bench, faulty, monkeypatch, answer(faulty, right(faulty), quality=(check,)))
     assert score.flagged is told
-
-
-def test_dropping_the_hit_with_the_fault_tells_it_too(
-    bench: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    faulty = bench["cases"].random_case(1, 0, "double_hit")
-    (bad,) = faulty.planted.hits
-    full = answer(faulty, right(faulty))
-    hits = tuple(replace(hit, used=place != bad) for place, hit in enumerate(full.hits))
-    assert scored(bench, faulty, monkeypatch, replace(full, hits=hits)).flagged
-    assert scored(bench, faulty, monkeypatch, full).flagged is False
 
 
 def test_noise_must_be_refused(
@@ -143,36 +120,3 @@ def test_a_foreign_resonance_must_be_set_aside_as_what_it_is(
     assert scored(bench, deck, monkeypatch, told).flagged is True
     other = answer(deck, right(deck), set_aside=(replace(aside, kind="tone"),))
     assert scored(bench, deck, monkeypatch, other).flagged is not True
-
-
-def test_every_disturbance_has_checks_that_may_tell_it(bench: dict[str, ModuleType]) -> None:
-    scoring = bench["scoring"]
-    assert {*scoring.CHECKS, *scoring.FOREIGN, "noise_only"} == set(DISTURBANCES)
-
-
-def test_two_tests_of_ten_carry_each_disturbance_in_turn(bench: dict[str, ModuleType]) -> None:
-    own = [bench["cases"]._own_disturbance(number) for number in range(70)]
-    assert sum(map(bool, own)) == 14
-    assert [name for names in own for name in names] == list(DISTURBANCES)
-
-
-def test_by_frequency_alone_an_answer_counts_for_one_mode(
-    bench: dict[str, ModuleType], case: Any
-) -> None:
-    worth = bench["comparing"].worth
-    truth = max(case.truths, key=lambda t: t.snr_db)
-    good = worth(case, [truth.frequency_hz])
-    assert (good.found, good.false, good.errors) == (1, 0, (0.0,))
-    twice = worth(case, [truth.frequency_hz, 1.0001 * truth.frequency_hz, 1.5])
-    assert twice.found + twice.false == twice.reported == 2
-    assert worth(case, []).expected == good.expected > 5
-
-
-def test_a_fragment_replaces_only_what_stands_between_its_marks(
-    bench: dict[str, ModuleType], tmp_path: Path
-) -> None:
-    page = tmp_path / "page.md"
-    page.write_text("before\n<!-- one -->\nold\n<!-- /one -->\nafter\n")
-    bench["page"].put(page, "one", "new")
-    assert page.read_text() == "before\n<!-- one -->\nnew\n<!-- /one -->\nafter\n"
-    assert bench["page"].DOCS.is_file()

@@ -96,13 +96,3 @@ def test_poles_of_one_shape_are_not_made_into_two_modes() -> None:
     candidates, repeats = _before(models)
     after, _ = split_close_pairs(candidates, repeats, (models[0], models[1:]), SECONDS, _is_trusted)
     assert after == candidates
-
-
-def test_two_hits_prove_no_pair() -> None:
-    models = _models(mixing=0.05)
-    candidates = _candidates(models[0])
-    repeats = find_again(candidates, models[1:3])
-    after, _ = split_close_pairs(
-        candidates, repeats, (models[0], models[1:3]), SECONDS, _is_trusted
-    )
-    assert after == candidates

@@ -97,11 +97,6 @@ def test_what_is_no_hanger_is_counted_and_a_note_says_so() -> None:
     assert any("counted" in note for note in placement.notes)
 
 
-def test_nothing_found_is_nothing_placed() -> None:
-    placement = place_modes([], POINTS, HANGER)
-    assert (placement.modes, placement.foreign_modes) == ((), ())
-
-
 def _turned(mode: FoundMode, degrees: float) -> FoundMode:
     cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     values = mode.shape.reshape(-1, 2) @ np.array([[cosine, sine], [-sine, cosine]])

@@ -137,8 +137,3 @@ def test_the_angle_between_places_decides(degrees: float, verdict: str) -> None:
     check = directions(turned(degrees), TWO_PLACES)
     assert check is not None
     assert (check.verdict, check.value) == (verdict, pytest.approx(abs(degrees)))
-
-
-def test_nothing_is_said_near_nodes_and_of_one_place() -> None:
-    assert directions(turned(88, amplitude=0.1), TWO_PLACES) is None
-    assert directions(turned(88), [*TWO_PLACES[:2], *TWO_PLACES[:2]]) is None

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from shm.identify.estimation.poles import Candidate, Pole, Repeats
-from shm.identify.estimation.ssi import _few_sums
 from shm.identify.estimation.validation import doubt
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
@@ -60,11 +57,6 @@ def test_the_same_shape_at_three_points_bears_twice_the_scatter(
     assert (doubt(candidate, _repeats(_vague(times), shape, last), OPTIONS) == "") == trusted
 
 
-def test_in_ambient_motion_no_shape_bears_it() -> None:
-    ambient = replace(OPTIONS, ambient_s=600.0, ambient_width=0.0)
-    assert doubt(_candidate(), _repeats(_vague(1.5)), ambient)
-
-
 @pytest.mark.parametrize(
     ("off", "last", "trusted"),
     [
@@ -89,12 +81,3 @@ def test_of_few_hits_a_shape_that_stays_from_order_to_order_bears_its_scatter(
     shape = np.array([1.0, 0.9, -0.8, 0.7])
     found = doubt(_candidate(spread, shape, turned), _repeats([0.0, 0.0], shape, shape), OPTIONS)
     assert (found == "") == trusted
-
-
-@pytest.mark.parametrize(("parts", "sums"), [(3, 3), (10, 10), (25, 10)])
-def test_parts_are_left_out_as_ten_sums_at_most(parts: int, sums: int) -> None:
-    matrices = [np.full((2, 3), float(n)) for n in range(parts)]
-    found = _few_sums(matrices)
-    assert len(found) == sums
-    np.testing.assert_array_equal(sum(found), sum(matrices))
-    assert found[0][0, 0] == sum(range(0, parts, 10))
