@@ -93,11 +93,10 @@ def sensor_gain(
         return None
     value = float(np.median(factors))
     times, side = max(value, 1 / value), "more" if value > 1 else "less"
-    text = (
-        f"the hanger moves {times:.2g} times {side} for the force than its described mass lets it"
-    )
     if times < LARGEST_FACTOR:
+        text = f"the response agrees with the described mass (ratio {value:.2f})"
         return QualityCheck("gain", "good", value, LARGEST_FACTOR, "", text)
+    text = f"the hanger moves {times:.2g} times {side} than its described mass allows"
     cause = ", as accelerations in g do under the name m/s2" if 7 < 1 / value < 14 else ""
     return QualityCheck(
         "gain", "warning", value, LARGEST_FACTOR, "", text + cause,
