@@ -16,7 +16,7 @@ import pytest
 from shm.errors import NotIdentifiable
 from shm.identify import Identification
 from shm.identify.contract import Hit, Poles
-from shm.values import ForeignMode, ModalTest, Mode, QualityCheck
+from shm.values import ModalTest, Mode, QualityCheck
 
 FOLDER = Path(__file__).resolve().parents[1] / "benchmarks" / "identification"
 
@@ -109,14 +109,3 @@ def test_noise_must_be_refused(
     score = scored(bench, noise, monkeypatch, NotIdentifiable("no hit", remedy="hit"))
     assert (score.flagged, score.expected) == (True, 0)
     assert scored(bench, noise, monkeypatch, answer(noise, right(noise))).flagged is False
-
-
-def test_a_foreign_resonance_must_be_set_aside_as_what_it_is(
-    bench: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    deck = bench["cases"].random_case(1, 0, "deck")
-    aside = ForeignMode("deck", deck.planted.frequency_hz, 0.01, "rigid")
-    told = answer(deck, right(deck), set_aside=(aside,))
-    assert scored(bench, deck, monkeypatch, told).flagged is True
-    other = answer(deck, right(deck), set_aside=(replace(aside, kind="tone"),))
-    assert scored(bench, deck, monkeypatch, other).flagged is not True

@@ -85,7 +85,7 @@ def _free_free_shape(order: int, position: np.ndarray) -> np.ndarray:
     return np.asarray(np.cosh(b) + np.cos(b) - s * (np.sinh(b) + np.sin(b)))
 
 
-@pytest.mark.parametrize("band", [(500.0, 4500.0), (700.0, 4000.0), (200.0, 6000.0)])
+@pytest.mark.parametrize("band", [(500.0, 4500.0), (200.0, 6000.0)])
 def test_five_hits_on_a_structure_give_its_published_frequencies(
     band: tuple[float, float],
 ) -> None:

@@ -34,14 +34,6 @@ def _channels(record: Recording, *channels: Channel) -> Recording:
     return replace(record, channels=channels)
 
 
-def test_no_ring_down_holds_its_hit() -> None:
-    """The free motion of a mode at 13.5 Hz has no step or bump where the pulse was."""
-    measurement = measure_recordings([recording(hanger_modes()[1:2])], OPTIONS)[0]
-    for decay in measurement.decays:
-        begin, later = np.abs(decay[0, :20]).max(), np.abs(decay[0, 20:60]).max()
-        assert begin == pytest.approx(later, rel=0.2)
-
-
 def test_a_not_a_number_sample_of_the_force_drops_its_hit_alone() -> None:
     record = _with(RECORD, "force", first=SLOT + 4000, last=SLOT + 4001, value=np.nan)
     measurement = measure_recordings([record], OPTIONS)[0]

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-import pytest
 
 from shm.identify import IdentifyOptions
 from shm.identify.contract import Measurement
 from shm.identify.estimation.hankel import Window, windows
 from shm.identify.estimation.ssi import through_windows
 from shm.values import FloatArray, ResponsePoint
-from tests.benchmarks.recordings_limit import ring_down_covariance
-from tests.worlds.recordings import ModeTruth
 
 RATE_HZ = 256.0
 
@@ -69,14 +64,3 @@ def test_a_short_ring_down_among_long_ones_does_not_shorten_the_lags() -> None:
     )
     assert [mode.frequency_hz for mode in found] == [mode.frequency_hz for mode in without]
     assert len(found) == 12
-
-
-def test_the_bound_of_one_decay_is_the_closed_one() -> None:
-    """A exp(-s t) cos(w t + p) in noise of density S for ever: var w = 8 s^3 S / A^2."""
-    hz, damping, density, amplitude = 10.0, 0.004, 1e-6, 0.5
-    mode = ModeTruth(
-        "x", 1, hz, hz, 0.0, hz, damping, 60.0, (1.0,), (density,), (complex(amplitude),)
-    )
-    (covariance,) = ring_down_covariance((mode,), np.array([200.0]))
-    decay = 2 * math.pi * hz * damping
-    assert covariance[0, 0] == pytest.approx(8 * decay**3 * density / amplitude**2, rel=1e-3)
