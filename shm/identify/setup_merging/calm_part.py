@@ -37,11 +37,12 @@ _UNSURE = 0.3  # judgement: of a damping without standard deviation
 def late_parts(measurements: Sequence[Measurement], left_out: float) -> tuple[Measurement, ...]:
     """Return the measurements without the beginnings of their ring-downs.
 
-    Those of the same sensors count together, since what the force says of them went with the
-    beginning.
+    Those of the same sensors with hits enough count together, since what the force says of them
+    went with the beginning.
     """
     whole = list(measurements)
-    if len({tuple(place_of(point) for point in each.points) for each in measurements}) == 1:
+    layouts = {tuple(place_of(point) for point in each.points) for each in measurements}
+    if len(layouts) == 1 and all(len(each.decays) >= LEAST_HITS for each in measurements):
         decays = tuple(decay for each in measurements for decay in each.decays)
         hits = tuple(hit for each in measurements for hit in each.hits)
         whole = [replace(measurements[0], decays=decays, hits=hits)]
