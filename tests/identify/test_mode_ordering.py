@@ -42,7 +42,7 @@ def _truth(found: list[FoundMode]) -> dict[FoundMode, int]:
     return orders
 
 
-@pytest.mark.parametrize("factor", [0.4, 0.7, 1.3, 1.8])
+@pytest.mark.parametrize("factor", [0.4, 1.8])
 def test_a_nominal_tension_far_off_does_not_shift_the_orders(factor: float) -> None:
     hanger = replace(HANGER, nominal_tension_n=HANGER.nominal_tension_n / factor)
     kept = hanger_modes()[4:]

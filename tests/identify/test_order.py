@@ -46,13 +46,13 @@ def test_a_missing_mode_of_the_measured_hanger_does_not_shift_the_others(missing
 
 
 def test_a_whole_hanger_is_counted() -> None:
-    for seed in range(5):
+    for seed in range(2):
         frequencies = _hanger_frequencies(seed)
         counted = list(range(1, 10))
         assert _orders([_plane(f) for f in frequencies]) == [counted, counted]
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_orders_missing_at_random_in_both_planes_are_left_open(seed: int) -> None:
     rng = np.random.default_rng(100 + seed)
     kept = [np.sort(rng.choice(9, 7, replace=False)) for _ in range(2)]
