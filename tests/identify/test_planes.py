@@ -27,11 +27,6 @@ def test_three_sensors_one_way_do_not_outvote_one_the_other_way() -> None:
     assert planes_of([mode], points(sensors)) == ["longitudinal"]
 
 
-def test_of_two_close_modes_the_one_that_leans_over_is_moved() -> None:
-    pair = [_mode(10.0, 1.0, 0.1), _mode(10.05, 1.0, 0.9)]
-    assert planes_of(pair, points(BIAXIAL)) == ["transverse", "longitudinal"]
-
-
 def test_a_mode_is_not_moved_where_the_other_plane_is_taken_or_the_shape_says_no() -> None:
     taken = [_mode(9.95, 0.1, 1.0), _mode(10.0, 1.0, 0.1), _mode(10.05, 1.0, 0.9)]
     assert planes_of(taken, points(BIAXIAL)) == ["longitudinal", "transverse", "transverse"]

@@ -107,11 +107,3 @@ def test_responses_of_different_lines_are_refused() -> None:
     with pytest.raises(BadInput, match="lines differ") as caught:
         _identified([_response(0), other])
     assert caught.value.file == "point1.frf"
-
-
-def test_too_few_lines_are_not_identifiable() -> None:
-    short = replace(
-        _response(0), frequency_hz=np.arange(9) * 60.0, accelerance=np.ones((1, 9), complex)
-    )
-    with pytest.raises(NotIdentifiable):
-        _identified([short])

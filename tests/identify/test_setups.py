@@ -46,15 +46,6 @@ def test_a_hammer_elsewhere_or_in_another_direction_is_another_set_up() -> None:
     assert [len(m.hits) for m in measurements] == [4, 2, 2]
 
 
-def test_all_set_ups_have_the_same_lines_and_the_same_window() -> None:
-    measurements = measure_set_ups([_record(2.0, seconds=6.0), _record(3.0, seconds=4.0)], OPTIONS)
-    one, other = (m.frequency_response for m in measurements)
-    assert one is not None
-    assert other is not None
-    np.testing.assert_allclose(one.frequency_hz, other.frequency_hz, rtol=1e-12)
-    assert len({m.window_time_constant_s for m in measurements}) == 1
-
-
 def test_a_set_up_without_usable_hits_is_left_out_and_said_so() -> None:
     silent = _record(3.0)
     force = replace(silent.channels[0], values=np.zeros(silent.samples))
