@@ -1,4 +1,4 @@
-"""The later part of ring-downs, of a hanger that at first does not ring as a bar does.
+"""Take the later part of ring-downs, of a hanger that at first does not ring as a bar does.
 
 A guide with play knocks, a joint slips through, a crack opens: in the first seconds energy wanders
 between the modes and no frequency is one. Once the swing has died away below what that takes, the
