@@ -10,23 +10,22 @@ from shm.documents import drift_document
 from shm.report import formatting
 from shm.report.bar_table import bar_document, bars_table
 from shm.report.contents import BridgeReport, hangers_unit
-from shm.report.control_report import chart_document, control_lead
+from shm.report.control_report import chart_document
+from shm.report.figures.along_the_bridge import SHIFTS, TENSIONS
 from shm.report.figures.control_chart import FIGURE as CONTROL
-from shm.report.figures.every_figure import bridge_figures
-from shm.report.figures.specification import drawn
+from shm.report.figures.specification import Illustration, drawn
 from shm.report.formatting import Interval
-from shm.report.hanger_status import Status
+from shm.report.hanger_status import Status, control_lead
 from shm.report.hanger_summary import HangerSummary, PeriodSummary
 from shm.report.paper import CREDIBLE, Fact, Paper, Section, Table, appendices, filled
 from shm.report.shared_tables import lineage, settings
-from shm.report.shifts import _day, pattern_tables, shift_cells
+from shm.report.shifts import _day, pattern_json, pattern_tables, shift_cells
 from shm.report.states import period_json
 from shm.values import Drift
 from shm.values.messages import NEXT_TEST
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm.values.stated_tension import stated
 from shm.watch.control_chart import ControlChart
-from shm.watch.neighbours import BridgePattern
 
 
 def bridge_paper(data: BridgeReport) -> Paper:
@@ -45,7 +44,7 @@ def bridge_paper(data: BridgeReport) -> Paper:
                 tables=filled(bars_table([line.bar for line in data.hangers])),
                 brief=[_glance(data)],
             ),
-            Section("Along the bridge", figures=lambda: bridge_figures(data)),
+            Section("Along the bridge", figures=lambda: _figures(data)),
             *(_control_part(each) for each in data.controls),
             Section("Numbers", tables=tables(data)),
             *appendices(Section("Settings", tables=filled(settings(data.settings)))),
@@ -55,6 +54,12 @@ def bridge_paper(data: BridgeReport) -> Paper:
         closing=f"{CREDIBLE}; times are UTC.",
         more="All of it: `shm report --bridge --full`, or `--out bridge.pdf`.",
     )
+
+
+def _figures(data: BridgeReport) -> tuple[Illustration, ...]:
+    """Draw what moved, where it was compared, and what each hanger carries."""
+    shifts = drawn((SHIFTS,), data.pattern) if data.pattern else ()
+    return (*shifts, *drawn((TENSIONS,), data))
 
 
 def _control_part(chart: ControlChart) -> Section:
@@ -336,12 +341,6 @@ def _origin(data: BridgeReport) -> Table:
 
 
 REPORT_SCHEMA = "shm.bridge_report/1"
-PATTERN_SCHEMA = "shm.bridge_pattern/1"
-
-
-def pattern_json(pattern: BridgePattern) -> dict[str, Any]:
-    """Return the document that `shm drift bridge --json` prints."""
-    return {"schema": PATTERN_SCHEMA, **asdict(pattern)}
 
 
 def bridge_json(data: BridgeReport) -> dict[str, Any]:

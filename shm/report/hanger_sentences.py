@@ -109,26 +109,6 @@ def _further_advice(data: HangerReport) -> tuple[str, ...]:
     return tuple(each for make in made if (each := make(data)))
 
 
-def misfits_percent(data: HangerReport) -> list[tuple[PredictedFrequency, Interval]]:
-    """Return predicted over measured frequency less one of each measured mode, in percent.
-
-    The interval is that of prediction and measurement together; of the prediction alone where
-    the measurement came without a standard deviation.
-    """
-    sds_hz = {(mode.plane, mode.order): mode.frequency_sd_hz for mode in data.latest.modes}
-    return [
-        (each, _misfit(each, sds_hz.get((each.plane, each.order), math.nan)))
-        for each in data.predicted
-        if math.isfinite(each.measured_hz)
-    ]
-
-
-def _misfit(each: PredictedFrequency, measured_sd_hz: float) -> Interval:
-    sd_hz = math.hypot(each.sd_hz, measured_sd_hz if math.isfinite(measured_sd_hz) else 0.0)
-    off = Interval.normal(each.mean_hz - each.measured_hz, sd_hz)
-    return off.scaled(100 / each.measured_hz)
-
-
 def _tension(data: HangerReport) -> str:
     now = data.now
     if not now.is_determined:
@@ -170,7 +150,8 @@ def _against_baseline(data: HangerReport) -> str:
     if change is None:
         return "The change since the baseline is not known: its latest test does not show it."
     size = rounded_percent(change.mean, change.width / 2, "+")
-    statement = f"Since the baseline of {counted_tests(data.baseline.tests)} it changed by {size}"
+    tests = formatting.counted_tests(data.baseline.tests)
+    statement = f"Since the baseline of {tests} it changed by {size}"
     if not data.now.is_found:
         statement = f"No significant change since the baseline ({size})"
     later = [
@@ -179,11 +160,6 @@ def _against_baseline(data: HangerReport) -> str:
     if not later:
         return f"{statement}."
     return f"{statement}, by a test made before the alert of {max(later):%Y-%m-%d}."
-
-
-def counted_tests(tests: tuple[str, ...]) -> str:
-    """Return `test t001`, `5 tests`."""
-    return f"test {tests[0]}" if len(tests) == 1 else f"{len(tests)} tests"
 
 
 def _unseen(data: HangerReport) -> str:
@@ -218,7 +194,7 @@ def _course(data: HangerReport) -> str:
 
 
 def _model(data: HangerReport) -> str:
-    misfits = misfits_percent(data)
+    misfits = data.misfits_percent
     if not misfits:
         return f"{_chosen(data)}."
     count = (
@@ -233,7 +209,7 @@ def _model(data: HangerReport) -> str:
 
 def _rms_percent(data: HangerReport) -> float:
     """Return the root mean square of the misfits; NaN where no mode was measured."""
-    residuals = [off.mean for _, off in misfits_percent(data)]
+    residuals = [off.mean for _, off in data.misfits_percent]
     return float(np.sqrt(np.mean(np.square(residuals)))) if residuals else math.nan
 
 
@@ -255,7 +231,7 @@ def _gap(data: HangerReport) -> str:
 
 def _outside(data: HangerReport) -> str:
     """Name the modes that the model class misses by more than both uncertainties."""
-    misfits = [] if _misses(data) else misfits_percent(data)
+    misfits = [] if _misses(data) else data.misfits_percent
     outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
     if not misfits:
         return ""
@@ -281,7 +257,7 @@ def _outliers(modes: Sequence[PredictedFrequency]) -> str:
 def _diagnosed_on(diagnosis: Diagnosis) -> str:
     return (
         f"What the plain class {diagnosis.baseline} would leave unexplained was diagnosed on "
-        f"{counted_tests(diagnosis.tests)}."
+        f"{formatting.counted_tests(diagnosis.tests)}."
     )
 
 

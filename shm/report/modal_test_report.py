@@ -14,13 +14,26 @@ from shm.report import formatting, shared_tables
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.contents import ModalTestReport
 from shm.report.figures.bar_sketch import FIGURE as SKETCH
-from shm.report.figures.every_figure import modal_test_figures
-from shm.report.figures.specification import drawn
+from shm.report.figures.modal_test_axes import ResponseCurves
+from shm.report.figures.modal_test_hits import FIGURE as HITS
+from shm.report.figures.modal_test_modes import SHAPES, STABILISATION
+from shm.report.figures.modal_test_response import FIGURE as RESPONSE
+from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
+from shm.report.figures.specification import FigureSpec, Illustration, drawn
 from shm.report.figures.style import VERDICT_STYLES
 from shm.report.paper import Fact, Paper, Section, Table, filled
 from shm.report.shared_tables import headline, lineage, overall, quality_table, settings
 from shm.values import PLANES, FrequencyResponse, Mode, Plane, QualityCheck, Recording, Verdict
 from shm.values.rounding import force_unit
+
+FIGURES: tuple[FigureSpec[ResponseCurves], ...] = (
+    TIME_HISTORY, HITS, RESPONSE, STABILISATION, SHAPES
+)  # fmt: skip
+
+
+def modal_test_figures(sheet: ModalTestReport) -> tuple[Illustration, ...]:
+    """Draw all of one hammer test."""
+    return drawn(FIGURES, ResponseCurves.of(sheet))
 
 
 def modal_test_paper(sheet: ModalTestReport) -> Paper:

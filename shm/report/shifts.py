@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
+from typing import Any
 
 from shm.report import formatting
 from shm.report.formatting import Interval
@@ -141,3 +143,11 @@ def _signed(interval: Interval, places: int) -> str:
 
 def _day(time: object) -> str:
     return f"{time:%Y-%m-%d}" if time else "none"
+
+
+PATTERN_SCHEMA = "shm.bridge_pattern/1"
+
+
+def pattern_json(pattern: BridgePattern) -> dict[str, Any]:
+    """Return the document that `shm drift bridge --json` prints."""
+    return {"schema": PATTERN_SCHEMA, **asdict(pattern)}

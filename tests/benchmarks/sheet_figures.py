@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from shm.report.as_html import as_html
 from shm.report.contents import ModalTestReport
-from shm.report.figures.every_figure import modal_test_figures as report_test_figures
+from shm.report.modal_test_report import modal_test_figures as report_test_figures
 from shm.report.modal_test_report import modal_test_paper
 from tests.report.sheets import make_points, make_recording, make_sheet, warned
 

@@ -14,18 +14,20 @@ import pytest
 from PIL import Image
 
 from shm.report.contents import DiagnosisSheet, HangerReport
-from shm.report.figures.every_figure import (
-    OF_DIAGNOSIS,
-    OF_HANGER,
-    OF_MODAL_TEST,
-    modal_test_figures,
-)
-from shm.report.figures.modal_test_response import ResponseCurves
+from shm.report.diagnosis_report import FIGURES as OF_DIAGNOSIS
+from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
+from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
+from shm.report.figures.hanger_temperature import FIGURE as TEMPERATURE
+from shm.report.figures.hanger_trend import FIGURE as TREND
+from shm.report.figures.modal_test_axes import ResponseCurves
 from shm.report.figures.specification import Illustration, Specification, drawn, png
 from shm.report.figures.style import PALETTE
+from shm.report.modal_test_report import FIGURES as OF_MODAL_TEST
+from shm.report.modal_test_report import modal_test_figures
 from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, sheet
 from tests.report.sheets import make_sheet, warned
 
+OF_HANGER = (TREND, FREQUENCIES, STIFFNESS, TEMPERATURE)
 SVG = "{http://www.w3.org/2000/svg}"
 Figures = dict[str, dict[str, Illustration]]
 

@@ -22,10 +22,10 @@ from shm.identify import Identification, Poles
 from shm.pipeline.lineage import identify_lineage
 from shm.pipeline.reporting import modal_test_report
 from shm.report.contents import ModalTestReport
+from shm.report.figures.modal_test_axes import ResponseCurves, Spectrum
 from shm.report.figures.modal_test_hits import FIGURE as HITS
 from shm.report.figures.modal_test_modes import SHAPES, STABILISATION, rows_of
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
-from shm.report.figures.modal_test_response import ResponseCurves, Spectrum
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
 from shm.report.figures.specification import FigureSpec, Specification
 from shm.report.modal_test_report import advice, conditions, dropped, hits, summary, trust
