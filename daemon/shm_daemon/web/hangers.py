@@ -232,7 +232,7 @@ def hanger(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Any:
 def _now(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
     """Return the state of many hangers with as many queries as for one."""
     store = site.store
-    known = HangersNow.of(site.workspace, store, hangers, utc_now())
+    known = HangersNow(site.workspace, store, hangers, utc_now())
     tests = count_tests(store)
     set_at = {id_: each.set_at for id_, each in known.baselines.items()}
     return [

@@ -7,13 +7,25 @@ from collections import Counter
 
 import numpy as np
 
-from shm.identify.contract import Hit
-from shm.identify.estimation.repeats import LEAST_HITS
+from shm.identify.contract import LEAST_HITS, Hit
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES
-from shm.identify.measuring.screening import FEWEST_TO_COMPARE, LIMIT
-from shm.identify.measuring.signal_faults import CUT_OFF, DOUBLE_HIT, KNOCK, OUTLIER
-from shm.identify.quality.inspection import Inspection, hits_for, hits_of, places
-from shm.identify.quality.table import Reading, Row, fault_reading
+from shm.identify.measuring.signal_faults import (
+    CUT_OFF,
+    DOUBLE_HIT,
+    FEWEST_TO_COMPARE,
+    KNOCK,
+    MOST_UNLIKE,
+    OUTLIER,
+)
+from shm.identify.quality.table import (
+    Inspection,
+    Reading,
+    Row,
+    fault_reading,
+    hits_for,
+    hits_of,
+    places,
+)
 from shm.values import NAN, FloatArray
 
 _RUNG_DOWN_DB = -3.0
@@ -181,7 +193,7 @@ RING_DOWN = Row(
     "Wait longer before the next hit and before stopping the logger: until nothing moves.",
 )  # fmt: skip
 REPEATABILITY = Row(
-    "repeatability", _repeatability, LIMIT, "", "the hits agree",
+    "repeatability", _repeatability, MOST_UNLIKE, "", "the hits agree",
     "the hits differ, and not one against the rest",
     "Hit the same point in the same direction, and let nobody touch the hanger.",
 )  # fmt: skip
