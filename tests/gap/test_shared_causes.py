@@ -18,7 +18,7 @@ from shm.models.effects import EFFECTS, Variant
 from shm.report.as_text import as_text
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_paper
 from shm.report.contents import BridgeDiagnosisSheet
-from shm.report.figures.gap_causes import SHARED
+from shm.report.figures.gap_causes import SHARED as SHARED_FIGURE
 from shm.report.figures.specification import drawn
 from shm.values import BridgeDiagnosis, Hanger
 from tests.helpers.diagnoses import a_diagnosis
@@ -155,5 +155,5 @@ def test_fewer_than_two_hangers_or_twice_the_same_are_wrong_usage() -> None:
 def test_the_report_says_who_shares_what_in_plain_words(family: BridgeDiagnosis) -> None:
     text = as_text(bridge_diagnosis_paper(BridgeDiagnosisSheet(family, "Arch")), 100)
     assert "Distributed mass is shared by hangers 1, 2, 4 and 6 (" in " ".join(text.split())
-    assert [each.name for each in drawn((SHARED,), family)] == ["shared"]
+    assert [each.name for each in drawn((SHARED_FIGURE,), family)] == ["shared"]
     assert max(map(len, text.splitlines())) <= 100
