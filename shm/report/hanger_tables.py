@@ -101,7 +101,7 @@ def neighbours(data: HangerReport) -> Table:
     made = shift_table(replace(pattern, rows=near, not_compared=()))
     wording = " ".join((pattern.sentence, *pattern.remarks))
     note = f"{wording} The whole bridge: shm report --bridge."
-    return replace(made, title=title, note=note, terminal_column=())
+    return replace(made, title=title, note=note)
 
 
 def frequencies(data: HangerReport) -> Table:
