@@ -277,8 +277,8 @@ def _since_baseline(data: BridgeReport) -> Table:
             for line in data.hangers
             if line.drift
         ),
-        note="Shift of the tension at the latest test, if there is any, the swing with the "
-        "temperature taken out; how probable it is that it lies beyond the hanger's threshold; "
+        note="Shift of the tension at the latest test, if there is any, without the effect of the "
+        "temperature; how probable it is that it lies beyond the hanger's threshold; "
         "what was called since. Hangers that have nothing but their baseline are left out.",
     )
 
@@ -299,7 +299,7 @@ def _courses(data: BridgeReport) -> Table:
             if line.course and (line.course.tests or line.course.alerts)
         ),
         note="Change from the first test of the period to the last, by these two alone, taken as "
-        "independent; the swing with the temperature is in it. Hangers without a test in the "
+        "independent; the effect of the temperature is in it. Hangers without a test in the "
         "period are left out.",
     )
 

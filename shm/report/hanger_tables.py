@@ -293,7 +293,7 @@ def period(data: HangerReport) -> Table:
                 if name in first.stiffness
             ),
         ),
-        note="By these two tests alone, taken as independent of one another; the swing with the "
+        note="By these two tests alone, taken as independent of one another; the effect of the "
         "temperature is in the change. The intervals of stiffness are of log10.",
     )  # fmt: skip
 
@@ -435,7 +435,7 @@ _WIDE_K = 10.0
 
 
 _FEWEST = 3
-"""Of two tests at two temperatures nobody can tell a swing from a change."""
+"""Of two tests at two temperatures nobody can tell an effect of the temperature from a change."""
 
 
 def temperature_table(states: StatesOverTime) -> Table:
@@ -456,8 +456,8 @@ def temperature_table(states: StatesOverTime) -> Table:
         ("quantity", "change per K", "90 % interval"),
         rows,
         note="In percent of the quantity, mean and standard deviation, beside what the softening "
-        "of steel explains (0.03 % of its modulus per K). States over time have this swing taken "
-        "out; for the shifts the watch learns one of its own.",
+        "of steel explains (0.03 % of its modulus per K). States over time are free of it; "
+        "for the shifts the watch learns a coefficient of its own.",
     )
 
 

@@ -91,7 +91,7 @@ def shift_table(pattern: BridgePattern) -> Table:
         ("hanger", f"shift, {unit.name} (90 %)", "shift, % (90 %)", "it has", "test of"),
         tuple(rows),
         note="Shift of the tension since the baseline at each hanger's latest test, if there is "
-        "any, the swing with the temperature taken out, with 90 % intervals; whether it has lost "
+        "any, without the effect of the temperature, with 90 % intervals; whether it has lost "
         "or gained, with the probability of that.",
     )
 
