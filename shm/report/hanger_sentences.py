@@ -9,8 +9,7 @@ import numpy as np
 
 from shm.report import formatting, open_warnings
 from shm.report.contents import HangerReport
-from shm.report.diagnosis_summary import next_step, write_summary
-from shm.report.formatting import Interval
+from shm.report.diagnosis_summary import next_step
 from shm.report.hanger_status import UNDETERMINED
 from shm.report.hanger_summary import (
     BASELINE_ALONE,
@@ -18,10 +17,9 @@ from shm.report.hanger_summary import (
     BASELINE_TESTS,
     LATEST_TEST,
 )
-from shm.values import Diagnosis, PredictedFrequency
+from shm.values import PredictedFrequency
 from shm.values.posterior import MOST_R_HAT
 from shm.values.rounding import rounded_percent
-from shm.values.stated_tension import stated
 
 # Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
 # three names are what a sentence bears.
@@ -74,14 +72,9 @@ def further(data: HangerReport) -> str:
 
 
 def _sentences(data: HangerReport) -> tuple[str, ...]:
-    known = data.now.is_determined
     found = (
         *_doubts(data),
         _tension(data),
-        _latest_test(data),
-        # How well a test repeats it, and the probabilities that the owner's limits ask for.
-        *(stated(data.averaged, data.tension_unit).sentences[1:] if known else ()),
-        _against_nominal(data),
         _against_baseline(data),
         _unseen(data),
         "Once the change is explained, set a new baseline (`shm drift rebaseline`)."
@@ -91,7 +84,7 @@ def _sentences(data: HangerReport) -> tuple[str, ...]:
         in_period(data),
         data.neighbours.sentence if data.neighbours else "",
         _model(data),
-        _gap(data),
+        _outside(data),
         *_further_advice(data),
         open_warnings.dated_by_receipt(data.now.undated),
     )
@@ -117,28 +110,6 @@ def _tension(data: HangerReport) -> str:
     tension = formatting.with_half(data.tension_n, data.tension_unit)
     day = f" of {data.latest.time:%Y-%m-%d}" if data.latest.time else ""
     return _BASIS[now.basis].format(tension=tension, test=data.latest.id, day=day)
-
-
-def _latest_test(data: HangerReport) -> str:
-    """Return the tension by the latest test alone, where the headline is another estimate."""
-    if data.now.basis not in (BASELINE_AND_CHANGE, BASELINE_ALONE):
-        return ""
-    alone = formatting.with_half(Interval.of_averaged(data.by_latest_test), data.tension_unit)
-    return f"Test {data.latest.id} alone gives {alone}."
-
-
-def _against_nominal(data: HangerReport) -> str:
-    nominal = data.hanger.nominal_tension_n
-    if not nominal > 0:
-        return "It has no nominal tension to compare with."
-    if not data.now.is_determined:
-        return ""
-    share = data.tension_n.scaled(1 / nominal)
-    half, off = share.width / 2, share.mean - 1
-    if abs(off) <= half:
-        return f"The tension agrees with the nominal one ({rounded_percent(off, half, '+')})."
-    size, side = rounded_percent(abs(off), half), "above" if off > 0 else "below"
-    return f"The tension is {size} {side} nominal."
 
 
 def _against_baseline(data: HangerReport) -> str:
@@ -221,17 +192,9 @@ def _misses(data: HangerReport) -> bool:
     return not data.posterior.fits
 
 
-def _gap(data: HangerReport) -> str:
-    """Return what the model does not explain, and why as far as that was diagnosed."""
-    if data.diagnosis is None:
-        return _outside(data)
-    wording = [_diagnosed_on(data.diagnosis), write_summary(data.diagnosis)]
-    return " ".join(part for part in (*wording, data.gap_watch) if part)
-
-
 def _outside(data: HangerReport) -> str:
     """Name the modes that the model class misses by more than both uncertainties."""
-    misfits = [] if _misses(data) else data.misfits_percent
+    misfits = [] if _misses(data) or data.diagnosis else data.misfits_percent
     outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
     if not misfits:
         return ""
@@ -252,13 +215,6 @@ def _outliers(modes: Sequence[PredictedFrequency]) -> str:
     named = f"{wording[0].upper()}{wording[1:]}"
     who = named if len(modes) <= _MOST_NAMED else formatting.counted(len(modes), "mode")
     return f"{who} {'lies' if len(modes) == 1 else 'lie'} outside the 90 % interval"
-
-
-def _diagnosed_on(diagnosis: Diagnosis) -> str:
-    return (
-        f"What the plain class {diagnosis.baseline} would leave unexplained was diagnosed on "
-        f"{formatting.counted_tests(diagnosis.tests)}."
-    )
 
 
 def _chosen(data: HangerReport) -> str:
