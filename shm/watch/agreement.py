@@ -28,7 +28,7 @@ from shm.values.drift import threshold_of
 from shm.watch.alert_text import alert_of, message_of_agreeing
 from shm.watch.options import WatchOptions
 from shm.watch.persistence import LARGE
-from shm.watch.posterior_summary import beyond, drift_of, shift_of_mixture
+from shm.watch.posterior_summary import drift_of_normal
 from shm.watch.quantities import shift_of
 from shm.watch.readings import Reader
 
@@ -201,8 +201,6 @@ def _drift(
 ) -> Drift:
     """Return what tests that agree show, as if their errors were all of each alone: the larger."""
     weights = [1 / each.variance for each in alike]
-    mean, alone = np.average([each.mean for each in alike], weights=weights), np.ones(1)
-    at = alone * mean, alone * math.sqrt(max(each.variance for each in alike))
-    chance = beyond(quantity, alone, *at, threshold_of(quantity.name, hanger))
-    of_test = newest[0].id, newest[1]
-    return drift_of(quantity, hanger, of_test, shift_of_mixture(quantity, alone, *at), chance)
+    mean = float(np.average([each.mean for each in alike], weights=weights))
+    sd = math.sqrt(max(each.variance for each in alike))
+    return drift_of_normal(quantity, hanger, (newest[0].id, newest[1]), mean, sd)

@@ -263,8 +263,7 @@ def _shown(
 
     The latter is that of any log frequency.
     """
-    ((change, _),) = evidence.changes_at([index])
-    ((null,), _) = evidence.of_null([index], np.eye(evidence.null_mean.shape[1]))
+    change, null = evidence.mean_of(index)
     measured = np.isfinite(course.variances)
     weight = np.where(measured, 1 / np.where(measured, course.variances, 1.0), 0.0)
     moves = course.changing @ change
