@@ -42,8 +42,8 @@ BY_A_LOAD = 0.1
 _PULL_STEPS = 10.0
 """Standard deviation, in steps, of what a test does not see: far beyond any threshold."""
 
-_SCATTER, _SCATTER_OF_STEP = 0.01, 0.2
-"""Of a test beyond its errors, of the tension and of a spring's step: the most that is usual."""
+_MOST_SCATTER = 2.0
+"""Of what a test scatters by beyond its errors: the most that is usual over what is assumed."""
 
 _APART = timedelta(days=3)
 """Tests that far apart by their clocks are two visits."""
@@ -163,7 +163,7 @@ def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[S
     if reading.modes is not None:
         slopes = reading.modes.slopes[np.isfinite(reading.modes.variances)].mean(axis=0)
     for j, quantity in enumerate(reader.quantities):
-        scatter = scatter_of(quantity)
+        scatter = _MOST_SCATTER * _scatter_of(quantity, options)
         per_kelvin = (
             options.tension_per_kelvin_sd
             if quantity.name == TENSION
@@ -176,9 +176,11 @@ def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[S
     return found
 
 
-def scatter_of(quantity: WatchedQuantity) -> float:
-    """Standard deviation of a test of an unchanged hanger beyond its errors, in the coordinate."""
-    return _SCATTER if quantity.name == TENSION else _SCATTER_OF_STEP * quantity.step_sd
+def _scatter_of(quantity: WatchedQuantity, options: WatchOptions) -> float:
+    """Return what a test of an unchanged hanger scatters by, in the coordinate."""
+    if quantity.name == TENSION:
+        return options.tension_scatter
+    return options.spring_scatter_of_step * quantity.step_sd
 
 
 def drifts_of(
