@@ -15,6 +15,7 @@ from shm.inference.reference_level import at_level
 from shm.models import build
 from shm.pipeline.adopting import gap_watch
 from shm.pipeline.bridge_reporting import hanger_summaries, pattern_or_why
+from shm.pipeline.diagnosing import latest_diagnosis
 from shm.pipeline.lineage import (
     IDENTIFY_SETTINGS,
     discarded_of_baselines,
@@ -33,7 +34,7 @@ from shm.report.hanger_report import StructureReport
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
 from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
 from shm.store.queries.alerts import count_open_alerts
-from shm.store.queries.hangers import find_latest_diagnosis, list_detections
+from shm.store.queries.hangers import list_detections
 from shm.store.queries.tests import (
     count_tests,
     list_baseline_tests,
@@ -155,7 +156,7 @@ def hanger_now(
         store.watch.baseline(hanger.id, posterior.model),
     )
     in_force = store.watch.baseline(hanger.id)
-    diagnosis, watch = find_latest_diagnosis(store, hanger.id), gap_watch(store, hanger.id)
+    watch = gap_watch(store, hanger.id)
     watched, alerts = _watched_against(store, baseline), store.alerts.list_all(hanger.id)
     (now,) = hanger_summaries(workspace, store, generated_at, [hanger])
     return HangerReport(
@@ -172,7 +173,7 @@ def hanger_now(
         alerts=tuple(stored.alert for stored in alerts),
         acknowledged=_acknowledged(alerts),
         quality=latest.quality,
-        diagnosis=diagnosis.diagnosis if diagnosis else None,
+        diagnosis=latest_diagnosis(store, hanger),
         gap_watch=str(watch) if watch else "",
         drift_watch=watch_words(watched),
         creep=watched[-1].creep_per_year if watched else None,
