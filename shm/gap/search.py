@@ -107,8 +107,10 @@ class Search:
         self.baseline = fit_alone(problem, rng, options.draws)
         self.fits: dict[Hypothesis, Fit] = {ALONE: self.baseline}
         self.rough: dict[Hypothesis, float] = {ALONE: laplace(self.baseline.peaks)}
-        # What sampling finds beyond Laplace's method is nearly common: the hanger's own part.
-        self._beyond = self.baseline.log_evidence - self.rough[ALONE]
+        # What sampling finds beyond Laplace's method is nearly common: the hanger's own part. Where
+        # the hanger alone misses the data by far, both are extrapolations and share nothing.
+        beyond = self.baseline.log_evidence - self.rough[ALONE]
+        self._beyond = beyond if abs(beyond) < HOPELESS else 0.0  # record 0013
         linear = Linear(problem.likelihood(ALONE), self.baseline.slopes)
         every = hypotheses(problem, options.without)
         scans = {h: scan(problem, self.baseline, linear, h) for h in every}
