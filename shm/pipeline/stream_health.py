@@ -182,7 +182,7 @@ def measure_unread(
     workspace: Workspace, ring: Ring, store: Store, stream: str, now: datetime
 ) -> timedelta:
     """Return the length of all ten minutes with samples that the watch has not read."""
-    from shm.store.ring_files import PERIOD
+    from shm.values.stream import PERIOD
 
     unread = set(list_unread(workspace, ring, store, stream, now))
     return len(unread | ring.unsealed_periods(stream)) * PERIOD
@@ -285,7 +285,7 @@ def _blind_since(store: Store, name: str, at: datetime) -> datetime:
 def note_blindness(store: Store, stream: Stream, start: datetime) -> None:
     """Save the events that the windows of a stream up to one do not see the hanger, or a plane."""
     from shm.monitor.sensor_health import SEEN_BEFORE, find_lost_planes, sees_nothing  # compute
-    from shm.store.ring_files import PERIOD
+    from shm.values.stream import PERIOD
 
     since = start - SEEN_BEFORE
     found = list_windows(store, stream.hanger, since, start + PERIOD)

@@ -16,7 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +28,17 @@ from numpy.typing import NDArray
 
 from shm.errors import BadInput
 from shm.read.array_reading import format_of_arrays
-from shm.read.arrays import Arrays, Variable, attributes_of, natural_sort_key, unique_names
+from shm.read.arrays import (
+    Arrays,
+    Variable,
+    attributes_of,
+    layout_of,
+    natural_sort_key,
+    unique_names,
+)
+from shm.read.atomic import replace_file
 from shm.read.limits import guarded, refuse_large
+from shm.values import FrequencyResponse, Recording
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 # judgement: a recording has some tens of objects, two or three groups deep
@@ -58,7 +68,24 @@ def _general(nodes: list[Node]) -> dict[str, object]:
     return {key: value for group in groups for key, value in group.attributes.items()}
 
 
-FORMAT = format_of_arrays("HDF5", (".h5", ".hdf5"), lambda head: head.startswith(_MAGIC), _opened)
+def _write(described: Recording | FrequencyResponse, path: Path) -> None:
+    """Write a file that is made in memory first: HDF5 ends the process where the disk is full."""
+    layout, image = layout_of(described), BytesIO()
+    with h5py.File(image, "w", track_order=True) as file:
+        file.attrs.update(layout.attributes)
+        for array in layout.arrays:
+            file.create_dataset(array.name, data=array.values).attrs.update(array.attributes)
+    replace_file(path, lambda temporary: _save(temporary, image.getvalue()))
+
+
+def _save(path: Path, content: bytes) -> None:
+    path.write_bytes(content)
+
+
+FORMAT = replace(
+    format_of_arrays("HDF5", (".h5", ".hdf5"), lambda head: head.startswith(_MAGIC), _opened),
+    write=_write,
+)
 
 
 @dataclass(frozen=True, eq=False)

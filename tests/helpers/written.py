@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import csiio
-import h5py
 import numpy as np
 import openpyxl
 import pandas as pd
@@ -34,7 +33,7 @@ from shm.values import FrequencyResponse, Recording
 
 
 def write(described: Recording | FrequencyResponse, path: Path) -> None:
-    """Writes as `shm.read.write` does, and HDF5, MATLAB and TDMS in the same layout.
+    """Writes as `shm.read.write` does, and MATLAB and TDMS in the same layout.
 
     A format that `shm` only reads needs a line of `_WRITERS`.
     """
@@ -51,13 +50,6 @@ def needs_responses(file_format: Format) -> None:
     """Skips a test of frequency responses where the format holds time records alone."""
     if not file_format.holds_responses:
         pytest.skip(f"{file_format.name} holds time records alone")
-
-
-def _hdf5(layout: Layout, path: Path) -> None:
-    with h5py.File(path, "w", track_order=True) as file:
-        file.attrs.update(layout.attributes)
-        for array in layout.arrays:
-            file.create_dataset(array.name, data=array.values).attrs.update(array.attributes)
 
 
 def _matlab(layout: Layout, path: Path) -> None:
@@ -201,8 +193,6 @@ def _of_layout(
 
 
 _WRITERS: dict[str, Callable[[Recording | FrequencyResponse, Path], None]] = {
-    ".h5": _of_layout(_hdf5),
-    ".hdf5": _of_layout(_hdf5),
     ".mat": _of_layout(_matlab),
     ".tdms": _of_layout(_tdms),
     ".xlsx": _excel,
