@@ -23,6 +23,7 @@ loads U: the covariance is phi^2 S + tau^2 R + U U' with S = diag(s^2).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 
@@ -104,7 +105,8 @@ class FieldLikelihood(MeasuredFrequencies):
         self._shapes_factor = SHAPES.loose
         # Of no shape there are no places, and none costs anything.
         self._places_m = self.shapes.places_m if self.shapes.size else np.empty(0)
-        self._modes = max(self.highest_order, self.shapes.highest_order)
+        # One more for what is `renumbered`, which so has the same reduced basis.
+        self._modes = 1 + max(self.highest_order, self.shapes.highest_order)
         self._tension = model.parameter_names.index(TENSION)
         self._together = self._goes_together()
         self._shift, self._loads = self._systematic(model, self._typical(model))
@@ -147,6 +149,14 @@ class FieldLikelihood(MeasuredFrequencies):
                 moved = self.shapes.misfits_of(modes.deflection) - here
                 changes.append(np.hstack([np.log(np.hstack([ratio, read])), moved]))
         return np.stack(changes, axis=2)
+
+    def renumbered(self, by: int, model: Model, theta: FloatArray) -> FieldLikelihood:
+        """Return the same with all orders higher `by` 1, or -1, settled at `theta` (d,)."""
+        found = copy(self)
+        found._order, found.shapes = self._order + by, self.shapes.renumbered(by)
+        found._together = found._goes_together()
+        found.settle(model, theta)
+        return found
 
     def settle(self, model: Model, theta: FloatArray) -> None:
         super().settle(model, theta)

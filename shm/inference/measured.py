@@ -67,6 +67,11 @@ class MeasuredFrequencies(ABC):
         """Return the highest order of a measured mode, which a model has to reach."""
         return int(self._order.max()) + 1
 
+    @property
+    def lowest_order(self) -> int:
+        """Return the lowest order of a measured mode."""
+        return int(self._order.min()) + 1
+
     @cached_property
     def likelihood(self) -> Likelihood:
         """Return the likelihood of residuals, which are misfits with the other sign."""

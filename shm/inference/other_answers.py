@@ -7,19 +7,17 @@ that the frequencies contradict: none of these widens its interval.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy
 
 from shm.inference.described import DescribedCoordinates
-from shm.inference.options import silent
 from shm.inference.posterior import climb
 from shm.inference.priors import TensionReading
 from shm.inference.problem import Problem
-from shm.values import NAN, FloatArray, ModalTest
+from shm.values import NAN, FloatArray
 
 _AS_WELL = 1.0
 """A fit that is worse by less in its log likelihood is as good (judgement)."""
@@ -48,7 +46,7 @@ class Outcome:
     method: str
 
 
-def other_answers(problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]) -> dict[str, Any]:
+def other_answers(problem: Problem, outcome: Outcome) -> dict[str, Any]:
     """Return fields of a `Posterior` that its draws do not show, of a bar as made."""
     coordinates = problem.coordinates
     if not isinstance(coordinates, DescribedCoordinates):
@@ -61,7 +59,7 @@ def other_answers(problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]
     return {
         **off_sd,
         "tension_of_other_orders_n": _tension_of_other_orders_n(
-            problem, z[fits.argmax()], float(fits.max()), outcome.samples[:, 0], tests
+            problem, z[fits.argmax()], float(fits.max()), outcome.samples[:, 0]
         ),
     }
 
@@ -94,7 +92,6 @@ def _tension_of_other_orders_n(
     best: FloatArray,
     fit: float,
     ratio: FloatArray,
-    tests: Sequence[ModalTest],
 ) -> float:
     """Return the tension if all orders were one higher, or one lower, where that fits as well as
     the `best` point (d,) and lies nearer to the nominal tension than `ratio` (draws,), theta_F; NaN
@@ -105,13 +102,12 @@ def _tension_of_other_orders_n(
     """
     coordinates, nominal_n = problem.coordinates, problem.model.hanger.nominal_tension_n
     theta = coordinates.theta(best[None])
-    middle = float(np.mean([mode.order for test in tests for mode in test.regular_modes]))
+    middle = float(np.mean([mode.order for mode in problem.measured.modes]))
     nearest, found = abs(math.log(float(np.median(ratio)))), NAN
     for by in (1, -1):
-        renumbered = _renumbered(tests, by)
-        if renumbered is None:
+        other = problem.rough.renumbered(by, theta[0])
+        if other is None:
             continue
-        other = Problem.of(renumbered, problem.model, silent, problem.calibration)
         start = theta.copy()
         start[0, 0] *= (middle / (middle + by)) ** 2
         starts = coordinates.places(start).repeat(len(_STARTS), axis=0)
@@ -133,13 +129,3 @@ def reading_off_sd(log_tension: FloatArray, reading: TensionReading, nominal_n: 
     low, middle, high = np.quantile(log_tension, [0.25, 0.5, 0.75])
     sd = (high - low) / (2 * scipy.stats.norm.ppf(0.75))
     return float(abs(math.log(reading.tension_n / nominal_n) - middle) / math.hypot(sd, reading.sd))
-
-
-def _renumbered(tests: Sequence[ModalTest], by: int) -> tuple[ModalTest, ...] | None:
-    """The tests with every order changed; None where one would fall below 1."""
-    if min(mode.order for test in tests for mode in test.regular_modes) + by < 1:
-        return None
-    return tuple(
-        replace(test, modes=tuple(replace(mode, order=mode.order + by) for mode in test.modes))
-        for test in tests
-    )

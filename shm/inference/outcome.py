@@ -54,7 +54,7 @@ def posterior_of(
     )
     found = assembled(problem, outcome, tests, options, started)
     found = with_shares(problem, found)
-    return replace(found, **other_answers(problem, outcome, tests))
+    return replace(found, **other_answers(problem, outcome))
 
 
 def assembled(

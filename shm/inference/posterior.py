@@ -70,6 +70,11 @@ class Density(ABC):
         return 0.06
 
     @property
+    def rough(self) -> Density:
+        """Return nearly the same density at less cost, for a search."""
+        return self
+
+    @property
     @abstractmethod
     def likelihood(self) -> Likelihood:
         """Return the likelihood of residuals."""

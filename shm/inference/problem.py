@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -76,6 +78,25 @@ class Problem(Density):
         """Return predictions (n, data) of parameter sets (n, d)."""
         self.evaluations += len(theta)
         return self.measured.predict(self.model, theta)
+
+    @cached_property
+    def rough(self) -> Problem:
+        """Return the problem with a rougher model of the bar, the noise and coordinates shared."""
+        found = copy(self)
+        if isinstance(self.model, AsMade):
+            found.model = self.model.rough
+        return found
+
+    def renumbered(self, by: int, theta: FloatArray) -> Problem | None:
+        """Return the problem with all orders higher `by` so many, its noise taken from `theta`
+        (d,); None where an order would fall below 1.
+        """
+        measured = self.measured
+        if not isinstance(measured, FieldLikelihood) or measured.lowest_order + by < 1:
+            return None
+        found = copy(self)
+        found.measured = measured.renumbered(by, self.model, theta)
+        return found
 
     @property
     def likelihood(self) -> Likelihood:

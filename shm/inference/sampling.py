@@ -80,14 +80,15 @@ def sample(
     the prior, or at `centres` (n, d).
     """
     wanted = max(_SET.enough * samples, _SET.fewest_effective)
-    points, nearest = draw_along(density, peaks, rng, centres)
+    rough = density.rough
+    points, nearest = draw_along(rough, peaks, rng, centres)
     on_progress(0.4)
     for attempt in range(_SET.attempts):
-        best = points[[int(density.log(points).argmax())]]
-        whitening = most_likely_error(density, best).whitening
-        valleys = [Valley(density, points, whitening)]
+        best = points[[int(rough.log(points).argmax())]]
+        whitening = most_likely_error(rough, best).whitening
+        valleys = [Valley(rough, points, whitening)]
         if attempt == 0:
-            valleys = valleys_through(density, points, nearest, whitening)
+            valleys = valleys_through(rough, points, nearest, whitening)
         first = Proposal.through(valleys, points, _SET.clusters, rng)
         final = weigh(density, first, wanted, rng)
         if final.effective_sample_size > _SET.poor * wanted:

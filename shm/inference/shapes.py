@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,6 +81,12 @@ class MeasuredShapes:
         share = hanger.assumptions.gross_error_share.value
         self._log_weight = np.log(np.append((1 - share) * usual[1], share * gross[1]))
         self._is_gross = np.arange(len(self._log_phi)) >= len(usual[0])
+
+    def renumbered(self, by: int) -> MeasuredShapes:
+        """Return the same of modes whose orders are higher `by` so many."""
+        found = copy(self)
+        found._order, found.highest_order = self._order + by, self.highest_order + by
+        return found
 
     def misfits(self, model: Model, theta: FloatArray) -> FloatArray:
         """Return the misfits (n, size) of parameter sets `theta` (n, parameters)."""

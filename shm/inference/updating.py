@@ -91,10 +91,11 @@ def infer(
     Where fewer than 200 are effective, emcee continues.
     """
     centres = known_places(problem, known, rng) if known is not None else None
-    peaks = find_peaks(problem, find_starts(problem, rng, centres))
+    rough = problem.rough
+    peaks = find_peaks(rough, find_starts(rough, rng, centres))
     # The noise near the peak, which may move it.
     problem.settle(peaks[0].z)
-    peaks = find_peaks(problem, np.array([peak.z for peak in peaks]))
+    peaks = find_peaks(rough, np.array([peak.z for peak in peaks]))
     name = problem.model.name
     progress(name, 0.3)
     return sample(

@@ -26,7 +26,7 @@ import numpy as np
 import scipy
 
 from shm.assumptions import Assumption, Assumptions
-from shm.models.bar_of_terms import BarValues, bar_of_terms
+from shm.models.bar_of_terms import BarOfTerms, BarValues, bar_of_terms
 from shm.models.base import DESCRIPTION, Conditions, Model, radius_m, silent
 from shm.models.beam import Beam, Beam1, Beam3
 from shm.models.hanger import PhysicalHanger, Zone
@@ -62,6 +62,7 @@ class AsMade(Model):
     priors = DESCRIPTION
     effect_names: tuple[str, ...] = ()
     """Parameters of effects of the catalogue, which stand last and have uniform priors."""
+    is_rough = False
 
     def __init__(self, model: Model, with_terms: bool = True):
         super().__init__(model.hanger)
@@ -172,7 +173,7 @@ class AsMade(Model):
             return self.model.frequencies_at(described, modes, conditions) * factor[:, None, None]
         places = () if mass is None else (mass.x_m,)
         radii = () if mass is None else (radius_m(self.hanger, mass),)
-        bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes, places, radii)
+        bar = self._bar(modes, places, radii)
         kilograms = None if mass is None else np.asarray(kg)[:, None]
         found = bar.frequencies_hz(self._values(theta), kilograms)
         return found * self._factor(theta)[:, None, None]
@@ -182,7 +183,7 @@ class AsMade(Model):
 
         Only for a class with terms, as `modes_near`.
         """
-        bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes)
+        bar = self._bar(modes)
         found = bar.modes_at(self._values(theta), self._places_of_described(theta, x_m))
         return self._of_real(theta, found)
 
@@ -190,7 +191,7 @@ class AsMade(Model):
         self, theta: FloatArray, others: Sequence[FloatArray], modes: int, x_m: FloatArray
     ) -> tuple[Modes, list[Modes]]:
         """Return the same and, to first order, the modes of near parameter sets (n, parameters)."""
-        bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes)
+        bar = self._bar(modes)
         found, near = bar.modes_about(
             self._values(theta),
             [self._values(each) for each in others],
@@ -198,6 +199,25 @@ class AsMade(Model):
         )
         moved = [self._of_real(*each) for each in zip(others, near, strict=True)]
         return self._of_real(theta, found), moved
+
+    @property
+    def rough(self) -> AsMade:
+        """Return the same class for a search: a fraction of the time, 1e-4 of a frequency off.
+
+        A class without terms is its own.
+        """
+        if not self.has_terms:
+            return self
+        found = copy(self)
+        found.is_rough = True
+        return found
+
+    def _bar(
+        self, modes: int, places_m: tuple[float, ...] = (), radii_m: tuple[float, ...] = ()
+    ) -> BarOfTerms:
+        hanger = self.hanger
+        bar = bar_of_terms(hanger, self.fittings_m, self._shears, modes, places_m, radii_m)
+        return bar.rough if self.is_rough else bar
 
     def _of_real(self, theta: FloatArray, described: Modes) -> Modes:
         """Return the modes of the real bars from those of the described ones."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -82,6 +83,13 @@ class BarOfTerms:
     def _bar(self) -> ReducedBar:
         usual = self._snapshots(len(self._places))
         return ReducedBar(self.zones, usual, self.modes, self._places, self._radii)
+
+    @cached_property
+    def rough(self) -> BarOfTerms:
+        """Return the same with fewer functions: a fraction of the time, 1e-4 of a frequency off."""
+        found = copy(self)
+        found._bar = self._bar.rough
+        return found
 
     def frequencies_hz(self, values: BarValues, masses_kg: FloatArray | None = None) -> FloatArray:
         """Return frequencies (n, 2, modes), with known masses (n, places) on the bar."""

@@ -260,6 +260,18 @@ class Ring:
                 ends[days.folder.name] = time_of(int(end_us))
         return ends
 
+    def last_arrivals(self) -> dict[str, datetime]:
+        """Return when something of each stream last came, whatever the time of its samples."""
+        found = {}
+        for days in self._all_days():
+            if paths := days.paths():
+                since_us = microseconds(_day_of(paths[-1]) - self._late)
+                sql = "SELECT MAX(arrived_us) FROM chunks"
+                times = [row[0] for path in days.paths(since_us) for row in query(path, sql)]
+                if known := [each for each in times if each is not None]:
+                    found[days.folder.name] = time_of(max(known))
+        return found
+
     def periods(self, stream: str, since: datetime) -> tuple[datetime, ...]:
         """Return the beginnings of the ten minutes from `since` on that have sealed samples."""
         sql = (

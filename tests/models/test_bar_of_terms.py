@@ -180,6 +180,16 @@ def test_a_bar_that_shears_has_its_frequencies_whatever_its_section(bar: Hanger)
     np.testing.assert_allclose(found, exact, rtol=1e-5)
 
 
+@pytest.mark.parametrize("bar", [ROD, TUBE, STRAND], ids=["rod", "tube", "strand"])
+def test_a_rough_bar_has_nearly_the_same_frequencies(bar: Hanger) -> None:
+    model = as_made("beam3", replace(bar, fittings_m=(0.3, 0.3)))
+    of = bar_of_terms(model.hanger, model.fittings_m, True, MODES)
+    terms = of._snapshots(0)
+    off = of.rough._bar.frequencies(terms) / of._bar.frequencies(terms) - 1
+    assert 0 < np.median(np.abs(off)) < 1e-4
+    assert len(of.rough._bar.basis.T) < 0.8 * len(of._bar.basis.T)
+
+
 @pytest.mark.parametrize("lambda_squared", [2.0, 40.0])
 def test_a_cable_that_sags_has_the_first_mode_of_irvine(lambda_squared: float) -> None:
     """Solve tan(x/2) = x/2 - 4/lambda2 (x/2)3 (Irvine and Caughey 1974), of sag_shape 1."""
