@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -27,17 +27,11 @@ from h5py import h5d, h5g, h5l, h5o
 from numpy.typing import NDArray
 
 from shm.errors import BadInput
-from shm.read.array_reading import format_of_arrays
-from shm.read.arrays import (
-    Arrays,
-    Variable,
-    attributes_of,
-    layout_of,
-    natural_sort_key,
-    unique_names,
-)
+from shm.read.arrays import Arrays, Variable, attributes_of, natural_sort_key, unique_names
 from shm.read.atomic import replace_file
+from shm.read.header import CHANNEL_KEYS
 from shm.read.limits import guarded, refuse_large
+from shm.read.numpy_file import arrays_of
 from shm.values import FrequencyResponse, Recording
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -53,8 +47,13 @@ _COMPLEX = ("real", "imag")
 _PLAIN = "Store plain datasets in the file itself."
 
 
+def recognises(head: bytes) -> bool:
+    """Return whether the first bytes of a file are those of HDF5."""
+    return head.startswith(_MAGIC)
+
+
 @contextmanager
-def _opened(path: Path) -> Iterator[Arrays]:
+def opened(path: Path) -> Iterator[Arrays]:
     with opened_nodes(path) as nodes:
         found = variables(nodes)
         readable = tuple(v for v in found if v.kind in "iufcU")
@@ -68,24 +67,24 @@ def _general(nodes: list[Node]) -> dict[str, object]:
     return {key: value for group in groups for key, value in group.attributes.items()}
 
 
-def _write(described: Recording | FrequencyResponse, path: Path) -> None:
+def write(described: Recording | FrequencyResponse, path: Path) -> None:
     """Write a file that is made in memory first: HDF5 ends the process where the disk is full."""
-    layout, image = layout_of(described), BytesIO()
+    found, image = arrays_of(described), BytesIO()
+    arrays = {name: value for name, value in found.items() if isinstance(value, np.ndarray)}
+    facts = {f"{name}_{key}": (name, key) for name in arrays for key in CHANNEL_KEYS}
     with h5py.File(image, "w", track_order=True) as file:
-        file.attrs.update(layout.attributes)
-        for array in layout.arrays:
-            file.create_dataset(array.name, data=array.values).attrs.update(array.attributes)
+        file.update(arrays)
+        for name, value in found.items():
+            if name in facts:
+                array, key = facts[name]
+                file[array].attrs[key] = value
+            elif name not in arrays:
+                file.attrs[name] = value
     replace_file(path, lambda temporary: _save(temporary, image.getvalue()))
 
 
 def _save(path: Path, content: bytes) -> None:
     path.write_bytes(content)
-
-
-FORMAT = replace(
-    format_of_arrays("HDF5", (".h5", ".hdf5"), lambda head: head.startswith(_MAGIC), _opened),
-    write=_write,
-)
 
 
 @dataclass(frozen=True, eq=False)
