@@ -70,6 +70,18 @@ _QUIET = timedelta(seconds=10)  # technical: a window is not read again for each
 _DAY = timedelta(days=1)
 _STEP_REACH_US = 96 * 3_600_000_000  # as late_hours: how long ago a clock may have stepped ahead
 
+_LATEST_END = """SELECT MAX(end_us) FROM chunks
+WHERE start_us >= (SELECT MAX(start_us) FROM chunks) - 2 * 600000000"""
+_PERIODS = """WITH RECURSIVE found (period) AS (
+SELECT (SELECT start_us / 600000000 FROM chunks
+    WHERE start_us >= ? AND is_sealed AND excluded = '' ORDER BY start_us LIMIT 1)
+UNION ALL
+SELECT (SELECT start_us / 600000000 FROM chunks
+    WHERE start_us >= (period + 1) * 600000000 AND is_sealed AND excluded = ''
+    ORDER BY start_us LIMIT 1) FROM found WHERE period IS NOT NULL
+) SELECT period FROM found WHERE period IS NOT NULL"""
+"""From one ten minutes to the next, which passes over the other chunks in them."""
+
 Note = Callable[[StreamEvent], object]
 
 
@@ -253,8 +265,7 @@ class Ring:
         """Return when the last sample of each stream ended."""
         ends = {}
         for days in self._all_days():
-            sql = "SELECT MAX(end_us) FROM chunks"
-            found = (query(path, sql) for path in reversed(days.paths()))
+            found = (query(path, _LATEST_END) for path in reversed(days.paths()))
             end_us = next((rows[0][0] for rows in found if rows and rows[0][0]), None)
             if end_us is not None:
                 ends[days.folder.name] = time_of(int(end_us))
@@ -274,14 +285,10 @@ class Ring:
 
     def periods(self, stream: str, since: datetime) -> tuple[datetime, ...]:
         """Return the beginnings of the ten minutes from `since` on that have sealed samples."""
-        sql = (
-            "SELECT DISTINCT start_us / 600000000 AS period FROM chunks "
-            "WHERE start_us >= ? AND is_sealed AND excluded = '' ORDER BY period"
-        )
         since_us = -(-microseconds(since) // PERIOD_US) * PERIOD_US
         paths = self._days(stream).paths(since_us)
         return tuple(
-            time_of(int(row[0]) * PERIOD_US) for p in paths for row in query(p, sql, since_us)
+            time_of(int(row[0]) * PERIOD_US) for p in paths for row in query(p, _PERIODS, since_us)
         )
 
     def unsealed_periods(self, stream: str) -> frozenset[datetime]:
