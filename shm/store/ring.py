@@ -18,6 +18,7 @@ from datetime import UTC, datetime, timedelta
 from itertools import groupby
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,8 +54,10 @@ from shm.store.ring_fit import (
     repeats,
     runs_on,
 )
-from shm.store.workspace import Workspace
 from shm.values.stream import PERIOD, Chunk, Piece, Stream, StreamEvent, microseconds, time_of
+
+if TYPE_CHECKING:
+    from shm.store.workspace import Workspace
 
 log = logging.getLogger(__name__)
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shm.documents import format_time
 from shm.errors import BadInput, NothingThere, UsageError
-from shm.store.ring import Ring
 from shm.values import NAN, Channel, Recording, outdoor_c
 from shm.values.stream import Piece, Stream
+
+if TYPE_CHECKING:
+    from shm.store.ring import Ring
 
 
 def recording_of(
