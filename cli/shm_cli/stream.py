@@ -24,7 +24,7 @@ from shm.report.formatting import number
 from shm.store import Store, Workspace
 from shm.store.queries.streams import list_stream_events
 from shm.store.ring import ring_of
-from shm.store.ring_pieces import recording_of
+from shm.store.ring_export import recording_of
 from shm.values import NAN
 from shm.watch.ambient_hammer import AmbientBias
 from shm_cli import completion, flags
@@ -109,7 +109,7 @@ def keep(ctx: click.Context, name: str, start: datetime, end: datetime, why: str
 def export(ctx: click.Context, name: str, start: datetime, end: datetime, file: Path) -> None:
     """Write the samples of a period as a recording for `shm identify`.
 
-    FILE ends with .csv, .npz or .uff. What is missing is an empty value.
+    FILE ends with .h5, .csv, .npz or .uff. What is missing is an empty value.
 
     \b
     Example: shm stream export h3 2026-05-01T10:00Z 2026-05-01T10:10Z h3.csv

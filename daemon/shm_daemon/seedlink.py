@@ -30,11 +30,10 @@ from shm.pipeline.lineage import read_limits
 from shm.read import sidecar_path
 from shm.read.atomic import replace_text
 from shm.read.chunk_document import BY_TIME, chunk_document
-from shm.read.ring_segment import microseconds, time_of
 from shm.read.sandbox import read_test
 from shm.store import Store, Workspace
 from shm.values import Recording
-from shm.values.stream import Chunk, SeedLinkFeed, Stream
+from shm.values.stream import Chunk, SeedLinkFeed, Stream, microseconds, time_of
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.streams import note_refused, take_chunks
 

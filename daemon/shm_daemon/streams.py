@@ -1,4 +1,4 @@
-"""Keeps the ring while the daemon serves: rolling files in, segments sealed, what is old out.
+"""Keeps the ring while the daemon serves: rolling files in, ten minutes sealed, what is old out.
 
 In a thread of its own, so that neither holds up the other: a recording that takes long, and samples
 that come every few seconds. What was under way when it ends is done the next time.
@@ -206,7 +206,7 @@ class StreamKeeper:
         self._workspace = workspace
 
     def turn(self) -> int:
-        """Files in, segments sealed and, once an hour, what is old out; how many files are left.
+        """Files in, ten minutes sealed and, once an hour, what is old out; how many files are left.
 
         Nothing where nobody has thought of streams.
         """

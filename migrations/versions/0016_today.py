@@ -51,7 +51,7 @@ _FIRST_STEPS = (
 
 
 def upgrade() -> None:
-    """Copy the rows; a SQLite file and its log grow to four times its size meanwhile."""
+    """Copy the rows, table by table; in a file the next one takes the pages of the one before."""
     connection = op.get_bind()
     former = sa.MetaData()
     former.reflect(connection)
@@ -61,17 +61,23 @@ def upgrade() -> None:
     for table in metadata.sorted_tables:
         _make(table)
     columns = {each.name: {column.name for column in each.columns} for each in tables}
-    for table in metadata.sorted_tables:
+    # A server wants what is referred to first. What refers to a table is dropped before it.
+    first = metadata.sorted_tables if is_server else [metadata.tables["alerts"]]
+    if not is_server:
+        op.execute("PRAGMA defer_foreign_keys = ON")
+    for table in first:
         if table.name in columns:
             _copy(table, columns[table.name])
     _fill_journal(columns)
     for prefix, former_table in (("noted", "acknowledgements"), ("ended", "resolutions")):
         if former_table in columns:
             _note_on_alerts(prefix, former_table)
+    for each in reversed(tables):
+        if each.name in metadata.tables and metadata.tables[each.name] not in first:
+            _copy(metadata.tables[each.name], columns[each.name])
+        op.execute(f'DROP TABLE "old_{each.name}"')
     if "taken_at" not in columns["tests"]:
         _note_conditions()
-    for each in reversed(tables):
-        op.execute(f'DROP TABLE "old_{each.name}"')
     if is_server:
         _count_on()
 

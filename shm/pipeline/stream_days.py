@@ -15,9 +15,8 @@ from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX
 from shm.store.queries.streams import find_first_window, find_pooled_range, list_window_starts
 from shm.store.queries.tests import list_test_rows
-from shm.store.ring_files import PERIOD
 from shm.values import ModalTest, Posterior
-from shm.values.stream import PERIODS, Stream, period_start
+from shm.values.stream import PERIOD, PERIODS, Stream, period_start
 
 _OWN_DAYS = 7  # judgement: by then every class has been selected and the watch has learnt
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from shm.pipeline.reconcile import Condition, reconcile
 from shm.store import Store, Workspace
@@ -21,13 +21,11 @@ from shm.store.queries.streams import (
     list_window_starts,
     list_windows,
 )
+from shm.store.ring import Ring, ring_of
 from shm.values import Alert, AlertKind
 from shm.values.messages import WEEK, Lead
 from shm.values.rounding import listed
-from shm.values.stream import PooledReading, Stream, StreamEvent
-
-if TYPE_CHECKING:
-    from shm.store.ring import Ring
+from shm.values.stream import PERIOD, PooledReading, Stream, StreamEvent
 
 State = Literal[
     "live", "late", "silent", "never sent", "sensor at fault", "sees nothing", "clock ahead"
@@ -92,9 +90,6 @@ def heard(workspace: Workspace, store: Store, now: datetime) -> tuple[StreamHeal
     """
     if not workspace.bridge.streams:
         return ()
-    # It brings h5py, and most bridges have no streams.
-    from shm.store.ring import ring_of
-
     ring = ring_of(workspace)
     latest, arrivals = ring.latest(), ring.last_arrivals()
     found = []
@@ -177,16 +172,17 @@ def list_unread(
     """Return when the sealed ten minutes of a stream begin that the watch has not read."""
     done, since = find_progress(store, stream), lateness_limit(workspace, now)
     begin = datetime.min.replace(tzinfo=UTC) if done is None else min(done, since)
-    read = list_window_starts(store, stream, begin)
-    return tuple(start for start in ring.periods(stream, begin) if start not in read)
+    periods = ring.periods(stream, begin)
+    if not periods:
+        return ()
+    read = list_window_starts(store, stream, periods[0])
+    return tuple(start for start in periods if start not in read)
 
 
 def measure_unread(
     workspace: Workspace, ring: Ring, store: Store, stream: str, now: datetime
 ) -> timedelta:
     """Return the length of all ten minutes with samples that the watch has not read."""
-    from shm.store.ring_files import PERIOD
-
     unread = set(list_unread(workspace, ring, store, stream, now))
     return len(unread | ring.unsealed_periods(stream)) * PERIOD
 
@@ -203,8 +199,6 @@ def ring_leads(workspace: Workspace) -> tuple[Lead, ...]:
     """Return what to say of a ring that is larger than `ring_bytes` though it was swept."""
     if not (workspace.folder / "ring").is_dir():
         return ()
-    from shm.store.ring import ring_of  # it brings h5py, and most bridges have no streams
-
     limit, swept = workspace.settings.ring_bytes, ring_of(workspace).last_sweep()
     if swept is None:
         return ()
@@ -298,7 +292,6 @@ def _alert(health: StreamHealth, since: datetime) -> Alert:
 def note_blindness(store: Store, stream: Stream, start: datetime) -> None:
     """Save the events that the windows of a stream up to one do not see the hanger, or a plane."""
     from shm.monitor.sensor_health import SEEN_BEFORE, find_lost_planes, sees_nothing  # compute
-    from shm.store.ring_files import PERIOD
 
     since = start - SEEN_BEFORE
     found = list_windows(store, stream.hanger, since, start + PERIOD)

@@ -9,7 +9,6 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from shm.documents import parse_time
 from shm.pipeline.stream_health import LATELY, StreamHealth, heard
 from shm.report.figures.stream_course import StreamHistory
 from shm.store import Store, Workspace
@@ -22,12 +21,11 @@ from shm.store.queries.streams import (
     list_stream_events,
 )
 from shm.store.queries.tests import list_test_rows
-from shm.store.ring import Ring
-from shm.store.ring_files import PERIOD
-from shm.store.ring_notices import StreamState as RingState
+from shm.store.ring import ReceivedSamples, Ring
 from shm.values import NAN, FloatArray
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import (
+    PERIOD,
     PERIODS,
     Period,
     PooledReading,
@@ -75,14 +73,14 @@ def stream_states(
 
 def _state(health: StreamHealth, ring: Ring, store: Store, now: datetime) -> StreamCondition:
     stream, last = health.stream, health.last_sample
-    in_ring = ring.state(stream.name)
-    received, lost = _received(in_ring, now)
+    samples = ring.received(stream.name, now - LATELY - PERIOD)
+    received, lost = _received(samples, now)
     return StreamCondition(
         **{**vars(health), "events": joined(health.events)},
         lag=None if last is None else max(timedelta(0), now - last),
         received_hz=received * stream.sampling_rate_hz,
         lost_share=lost,
-        apart_s=_lately_s(in_ring.apart_s, now),
+        apart_s=sum(each.apart_s for start, each in samples.items() if start >= now - LATELY),
         ring_bytes=ring.size_bytes(stream.name),
         window=find_last_window(store, stream.name),
         hour=_last_hour(store, stream),
@@ -107,14 +105,13 @@ def _as_one(run: Sequence[StreamEvent]) -> StreamEvent:
     return replace(run[-1], start=run[0].start, detail=run[-1].detail + times)
 
 
-def _received(state: RingState, now: datetime) -> tuple[float, float]:
+def _received(samples: Mapping[datetime, ReceivedSamples], now: datetime) -> tuple[float, float]:
     """Return the received fraction of the last ten minutes, and the lost fraction of a day.
 
     Of samples from the first one on up to the last one. Ten minutes are those of the chunks that
     begin in them: what these have beyond the edges counts.
     """
-    came_s = {parse_time(start): seconds for start, seconds in state.received_s.items()}
-    spans = {parse_time(start): span for start, span in state.spans.items()}
+    spans = {at: (each.start, each.end) for at, each in samples.items() if each.start and each.end}
     since = period_start(now - LATELY, PERIOD) + PERIOD
     lately = sorted(start for start in spans if start >= since)
     if not lately:
@@ -125,13 +122,8 @@ def _received(state: RingState, now: datetime) -> tuple[float, float]:
     until_last = max((spans[start][1] for start in spans if start < last), default=spans[last][0])
     expected_s = max((end - begin).total_seconds(), 1.0)
     of_last_s = max((end - max(last, until_last)).total_seconds(), 1.0)
-    lost = 1 - sum(came_s[start] for start in lately) / expected_s
-    return min(came_s[last] / of_last_s, 1.0), min(max(lost, 0.0), 1.0)
-
-
-def _lately_s(seconds: Mapping[str, float], now: datetime) -> float:
-    since = now - LATELY
-    return sum(each for start, each in seconds.items() if parse_time(start) >= since)
+    lost = 1 - sum(samples[start].received_s for start in lately) / expected_s
+    return min(samples[last].received_s / of_last_s, 1.0), min(max(lost, 0.0), 1.0)
 
 
 def _last_hour(store: Store, stream: Stream) -> PooledReading | None:

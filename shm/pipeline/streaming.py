@@ -20,7 +20,6 @@ from functools import partial
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
-from shm.documents import format_time
 from shm.errors import BadInput, ShmError, StoreError
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.reconcile import Condition, is_same_event, reconcile
@@ -46,9 +45,9 @@ from shm.store.queries.streams import (
     load_stream_watch,
 )
 from shm.store.ring import ring_of
-from shm.store.ring_files import PERIOD
 from shm.values import Mode, Plane
 from shm.values.stream import (
+    PERIOD,
     PERIODS,
     Period,
     Stream,
@@ -256,8 +255,8 @@ class Streaming:
     def _is_whole(self, name: str, start: datetime) -> bool:
         if self.clock() >= start + WINDOW + _PATIENCE:
             return True
-        received_s = self.ring.state(name).received_s.get(format_time(start) or "", 0.0)
-        return received_s >= _WHOLE * WINDOW.total_seconds()
+        received = self.ring.received(name, start).get(start)
+        return received is not None and received.received_s >= _WHOLE * WINDOW.total_seconds()
 
     def _read(self, stream: Stream, start: datetime) -> Work:
         from shm.pipeline.steps import identify_options

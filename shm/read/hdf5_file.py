@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,11 @@ from numpy.typing import NDArray
 
 from shm.errors import BadInput
 from shm.read.arrays import Arrays, Variable, attributes_of, natural_sort_key, unique_names
+from shm.read.atomic import replace_file
+from shm.read.header import CHANNEL_KEYS
 from shm.read.limits import guarded, refuse_large
+from shm.read.numpy_file import arrays_of
+from shm.values import FrequencyResponse, Recording
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 # judgement: a recording has some tens of objects, two or three groups deep
@@ -60,6 +65,26 @@ def _general(nodes: list[Node]) -> dict[str, object]:
     """Return the attributes of the groups; those closest to the root take precedence."""
     groups = sorted((n for n in nodes if n.dataset is None), key=lambda n: -len(n.path))
     return {key: value for group in groups for key, value in group.attributes.items()}
+
+
+def write(described: Recording | FrequencyResponse, path: Path) -> None:
+    """Write a file that is made in memory first: HDF5 ends the process where the disk is full."""
+    found, image = arrays_of(described), BytesIO()
+    arrays = {name: value for name, value in found.items() if isinstance(value, np.ndarray)}
+    facts = {f"{name}_{key}": (name, key) for name in arrays for key in CHANNEL_KEYS}
+    with h5py.File(image, "w", track_order=True) as file:
+        file.update(arrays)
+        for name, value in found.items():
+            if name in facts:
+                array, key = facts[name]
+                file[array].attrs[key] = value
+            elif name not in arrays:
+                file.attrs[name] = value
+    replace_file(path, lambda temporary: _save(temporary, image.getvalue()))
+
+
+def _save(path: Path, content: bytes) -> None:
+    path.write_bytes(content)
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,7 +70,9 @@ def open_text(text: str, path: Path, preamble: Sequence[str] = ()) -> tuple[Tabl
 
 # The most particular first: any text may be comma-separated.
 FORMATS: tuple[Format, ...] = (
-    format_of_arrays("HDF5", (".h5", ".hdf5"), hdf5_file.recognises, hdf5_file.opened),
+    format_of_arrays(
+        "HDF5", (".h5", ".hdf5"), hdf5_file.recognises, hdf5_file.opened, "", hdf5_file.write
+    ),
     format_of_arrays("MATLAB", (".mat",), matlab_file.recognises, matlab_file.opened),
     format_of_arrays("TDMS", (".tdms",), tdms_file.recognises, tdms_file.opened, "nptdms"),
     format_of_arrays(

@@ -1,7 +1,7 @@
 """The raw ring of permanent sensors: chunks, durable before they are acknowledged.
 
 Beside the database and never in its way. Any process may append and read; only the holder of the
-workspace's lock seals and sweeps.
+workspace's lock seals and sweeps. Whether a chunk counts is decided when it comes.
 
 What may leave the ring: the old, and the oldest where it grows too large.
 """
@@ -9,110 +9,58 @@ What may leave the ring: the old, and the oldest where it grows too large.
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
+import logging
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
+from itertools import groupby
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shm.bridge.streams import stream_named
 from shm.documents import ValidationError, dump, format_time, value_of
-from shm.errors import BadInput, DoubledChunk, StoreBusy
+from shm.errors import BadInput, DoubledChunk
 from shm.read.atomic import replace_text
-from shm.read.chunk_document import chunk_document, numbered, parse_chunk, refuse_long_chunk
-from shm.read.ring_segment import ChunkKey, microseconds, time_of
+from shm.read.chunk_document import BY_TIME, numbered, parse_chunk, refuse_long_chunk
 from shm.store.archive import disk_error, sync
-from shm.store.ring_clock import was_ahead
-from shm.store.ring_files import PERIOD, Segment, StreamFolder, checksum_of_chunk, log, period_of
-from shm.store.ring_notices import DRIFT_PPM, StreamState, load_state
-from shm.store.ring_pieces import agree, came_early, joined
-from shm.store.ring_sealing import Note, seal_stream
-from shm.store.workspace import Workspace
-from shm.values.stream import Chunk, Piece, Stream
+from shm.store.ring_conversion import convert_former_files
+from shm.store.ring_days import PERIOD_US, Row, StreamDays, query, row_of, size_of, writing
+from shm.store.ring_events import (
+    DRIFT_PPM,
+    DRIFT_US,
+    EARLY,
+    GRACE,
+    HOURS_AHEAD,
+    OVERLAP,
+    find_drift,
+    hours_ahead,
+    is_of_clock,
+    list_clock_events,
+    list_events,
+)
+from shm.store.ring_fit import (
+    agree,
+    came_early,
+    find_hour_step,
+    find_taken,
+    is_half,
+    join,
+    repeats,
+    runs_on,
+)
+from shm.values.stream import PERIOD, Chunk, Piece, Stream, StreamEvent, microseconds, time_of
 
+if TYPE_CHECKING:
+    from shm.store.workspace import Workspace
 
-@dataclass(frozen=True)
-class Swept:
-    """Count the segments that were removed, and what is left in the ring.
+log = logging.getLogger(__name__)
 
-    `unread_bytes` are of samples that the watch has not read, `recent_bytes` of the day before
-    them, `kept_bytes` of what is kept for good: none of these is removed to meet a limit.
-    """
-
-    segments: int
-    freed_bytes: int
-    left_bytes: int
-    unread_bytes: int = 0
-    recent_bytes: int = 0
-    kept_bytes: int = 0
-
-
-def sweep(
-    folders: Sequence[StreamFolder],
-    now: datetime,
-    longest: timedelta,
-    most_bytes: int,
-    unread: Mapping[str, Collection[datetime]],
-    recent: timedelta = timedelta(days=1),
-) -> Swept:
-    """Remove segments older than `longest`, and the oldest beyond so many bytes.
-
-    `unread` are the beginnings of the ten minutes that nobody has read, by stream. They stay, and
-    so does what is `recent` before them or before now: an alert keeps it for good.
-    """
-    kept = {folder.folder: _kept(folder) for folder in folders}
-    found = [
-        (segment, segment.path.stat().st_size, folder)
-        for folder in folders
-        for segment in folder.segments()
-    ]
-    total = left = sum(size for _, size, _ in found)
-    held_bytes = {"unread": 0, "recent": 0, "kept": 0}
-    removed = 0
-    for segment, size, folder in sorted(found, key=lambda each: each[0]):
-        waiting = unread.get(folder.folder.name, ())
-        is_old = segment.start + PERIOD <= now - longest
-        since = min(waiting, default=now) - recent
-        if segment.start in waiting:
-            held_bytes["unread"] += size
-        elif _is_kept(segment, kept[folder.folder]):
-            held_bytes["kept"] += size
-        elif segment.start >= since and not is_old:
-            held_bytes["recent"] += size
-        elif is_old or left > most_bytes:
-            segment.path.unlink(missing_ok=True)
-            left, removed = left - size, removed + 1
-    for folder in folders:
-        _remove_empty(folder)
-    held = {f"{name}_bytes": size for name, size in held_bytes.items()}
-    return Swept(removed, total - left, left, **held)
-
-
-def _kept(folder: StreamFolder) -> list[tuple[datetime, datetime]]:
-    names = (path.stem.split("-") for path in (folder.folder / "kept").glob("[0-9]*.json"))
-    return [(time_of(int(start)), time_of(int(end))) for start, end in names]
-
-
-def _is_kept(segment: Segment, kept: Sequence[tuple[datetime, datetime]]) -> bool:
-    """A chunk that began in the segment may end as long after it as it is long."""
-    return any(segment.start < end and segment.start + 2 * PERIOD > start for start, end in kept)
-
-
-def _remove_empty(folder: StreamFolder) -> None:
-    for day in folder.folder.glob("[0-9]*"):
-        if not any(day.iterdir()):
-            day.rmdir()
-
-
-MOST_WAITING = 20_000
-"""Judgement: chunks of a stream that are not sealed, a day of one every 4 s. Beyond, whoever seals
-has ended, or cannot: senders, which keep what is not acknowledged, are held up."""
-
-_TRIES = 5  # technical: a reader meets a sealing once in a while, and not again at once
 _RATE_OFF = DRIFT_PPM * 1e-6
 """Of the described rate, within which a chunk is taken as of that rate. Derived: no frequency is
 then further off than the setting frequency_allowance grants. Crystals keep to it: NI 9234, 50 ppm.
@@ -120,7 +68,24 @@ then further off than the setting frequency_allowance grants. Crystals keep to i
 _OVER_RANGE = 2.0
 """Of full_scale. Judgement: a sensor that clips at 5 V, before a converter that does at 10 V."""
 _SWEEP = "last_sweep.json"
-_UNFINISHED = timedelta(hours=1)  # technical: no file takes so long; a killed process left it
+_UNFINISHED_S = 3600.0  # technical: no file takes so long; a killed process left it
+_QUIET = timedelta(seconds=10)  # technical: a window is not read again for each late chunk
+_DAY = timedelta(days=1)
+_STEP_REACH_US = 96 * 3_600_000_000  # as late_hours: how long ago a clock may have stepped ahead
+
+_LATEST_END = """SELECT MAX(end_us) FROM chunks
+WHERE start_us >= (SELECT MAX(start_us) FROM chunks) - 2 * 600000000"""
+_PERIODS = """WITH RECURSIVE found (period) AS (
+SELECT (SELECT start_us / 600000000 FROM chunks
+    WHERE start_us >= ? AND is_sealed AND excluded = '' ORDER BY start_us LIMIT 1)
+UNION ALL
+SELECT (SELECT start_us / 600000000 FROM chunks
+    WHERE start_us >= (period + 1) * 600000000 AND is_sealed AND excluded = ''
+    ORDER BY start_us LIMIT 1) FROM found WHERE period IS NOT NULL
+) SELECT period FROM found WHERE period IS NOT NULL"""
+"""From one ten minutes to the next, which passes over the other chunks in them."""
+
+Note = Callable[[StreamEvent], object]
 
 
 @dataclass(frozen=True)
@@ -134,11 +99,39 @@ class StoredChunk:
     is_new: bool
 
 
+@dataclass(frozen=True)
+class ReceivedSamples:
+    """Seconds of samples that count in ten minutes, of those that do not as their time was there
+    already, and from when to when those that count last, None without any.
+    """
+
+    received_s: float
+    apart_s: float
+    start: datetime | None
+    end: datetime | None
+
+
+@dataclass(frozen=True)
+class Swept:
+    """Count the days of streams that were removed or thinned, and what is left in the ring.
+
+    `unread_bytes` are of days with samples that the watch has not read, `recent_bytes` of the day
+    before them, `kept_bytes` of what is kept for good: none of these is removed to meet a limit.
+    """
+
+    days: int
+    freed_bytes: int
+    left_bytes: int
+    unread_bytes: int = 0
+    recent_bytes: int = 0
+    kept_bytes: int = 0
+
+
 class Ring:
     """All streams of a workspace, below `folder`.
 
     With `streams` only these are taken, as they are described; with `clock` nothing older than
-    `late` and nothing further ahead than `ahead`. What is noticed goes to `note`.
+    `late` and nothing further ahead than `ahead`. Events are passed to `note`.
     """
 
     def __init__(
@@ -148,22 +141,22 @@ class Ring:
         clock: Callable[[], datetime] | None = None,
         *,
         late: timedelta = timedelta(hours=96),
-        ahead: timedelta = timedelta(days=1),
+        ahead: timedelta = _DAY,
         note: Note = lambda event: log.info("%s: %s: %s", event.stream, event.kind, event.detail),
     ):
         self.folder, self._streams, self._clock = folder, streams, clock
         self._late, self._ahead, self._note = late, ahead, note
 
     def append(self, content: bytes) -> StoredChunk:
-        """Keeps a chunk: on disk when this returns. One that came before is not kept twice.
+        """Store a chunk: on disk when this returns. One that came before is not stored twice.
 
         Raises BadInput where it cannot be used, StoreError with `retry_after_s` where the disk is
-        full, StoreBusy where too many wait.
+        full.
         """
         return self.append_all([content])[0]
 
     def append_all(self, contents: Sequence[bytes], stream: str = "") -> list[StoredChunk]:
-        """Several at once, which is quicker; where one cannot be used, none is kept.
+        """Store several at once, which is quicker; where one cannot be used, none is stored.
 
         Raises DoubledChunk for one of the number and time of another that has other samples.
 
@@ -172,45 +165,45 @@ class Ring:
         for content in contents:
             refuse_long_chunk(len(content))
         chunks = [self._fitting(parse_chunk(content), stream) for content in contents]
+        now = self._clock() if self._clock is not None else datetime.now(UTC)
+        return self.place([(chunk, microseconds(now)) for chunk in chunks])
+
+    def place(
+        self, arrived: Sequence[tuple[Chunk, int]], is_former: bool = False
+    ) -> list[StoredChunk]:
+        """Store chunks, each with when it came, in microseconds, and exclude what does not count.
+
+        Those of a former ring are sealed, and none of them is refused.
+        """
         try:
-            placed = [self._place(chunk) for chunk in chunks]
-            found = [self._kept(*each) for each in zip(chunks, placed, strict=True)]
-            for name in {chunk.stream for chunk in chunks}:
-                if (incoming := self._folder(name).incoming).is_dir():
-                    sync(incoming)
+            for name in {chunk.stream for chunk, _ in arrived}:
+                self._days(name).make()
+            paths = {self._days(c.stream).path(microseconds(c.start)) for c, _ in arrived}
+            with writing(paths) if paths else nullcontext():
+                return [self._place(chunk, at_us, is_former) for chunk, at_us in arrived]
         except OSError as error:
             raise disk_error(error, self.folder) from error
-        return found
 
     def read(self, stream: str, start: datetime, end: datetime) -> tuple[Piece, ...]:
-        """The samples from `start` on and before `end`, sealed and unsealed alike, by time."""
-        folder = self._folder(stream)
-        for left in reversed(range(_TRIES)):
-            try:
-                found = folder.between(start, end, folder.waiting())
-            except FileNotFoundError:
-                if not left:
-                    raise
-                continue
-            break
-        return joined({k: self._ordered(chunk) for k, chunk in found.items()}, start, end)
+        """Return the samples from `start` on and before `end`, sealed or not, by time."""
+        days = self._days(stream)
+        rows = days.between(microseconds(start), microseconds(end))
+        chunks = [chunk for row in rows if not row.excluded and (chunk := days.load(row))]
+        return join(map(self._ordered, chunks), start, end)
 
     def seal(self, now: datetime) -> list[tuple[str, datetime]]:
-        """Chunks of finished ten minutes become segments; each stream and beginning of ten minutes
+        """Note what came of finished ten minutes; return each stream and beginning of ten minutes
         that has new samples by it, also where some came late.
         """
-        sealed: list[tuple[str, datetime]] = []
-        try:
-            for folder in self._folders():
-                starts = seal_stream(folder, now, self._note)
-                sealed.extend((folder.folder.name, start) for start in starts)
-        except OSError as error:
-            raise disk_error(error, self.folder) from error
-        return sealed
+        return [
+            (days.folder.name, time_of(start_us))
+            for days in self._all_days()
+            for start_us in self._seal(days, now)
+        ]
 
     def keep(self, stream: str, start: datetime, end: datetime, why: str) -> None:
-        """Keeps the samples of a time for good, for a reason."""
-        kept = self._folder(stream).folder / "kept"
+        """Keep the samples of a time for good, for a reason."""
+        kept = self._days(stream).folder / "kept"
         kept.mkdir(parents=True, exist_ok=True)
         document = {"stream": stream, "start": start, "end": end, "why": why}
         path = kept / f"{microseconds(start):017d}-{microseconds(end):017d}.json"
@@ -224,16 +217,39 @@ class Ring:
         ring_days: float = 30,
         ring_bytes: int = 200 * 10**9,
         unread: Mapping[str, Collection[datetime]] = MappingProxyType({}),
+        recent: timedelta = _DAY,
     ) -> Swept:
-        """Remove what is older than so many days, and the oldest beyond so many bytes.
+        """Remove days older than so many days, and the oldest beyond so many bytes.
 
-        What is kept for good stays, and so do the `unread` ten minutes of each stream and the day
-        before them. What was left is noted for `last_sweep`.
+        `unread` are the beginnings of the ten minutes that nobody has read, by stream. Their days
+        stay, and so does what is `recent` before them or before now: an alert keeps it for good.
+        What is kept for good stays. What was left is noted for `last_sweep`.
         """
-        for folder in self._folders():
-            folder.remove_unfinished(now - _UNFINISHED)
-        longest = timedelta(days=ring_days)
-        swept = sweep(list(self._folders()), now, longest, ring_bytes, unread)
+        found = [(path, days) for days in self._all_days() for path in days.paths()]
+        sizes = {path: size_of(path) for path, _ in found}
+        total, removed = sum(sizes.values()), 0
+        held = dict.fromkeys(("unread_bytes", "recent_bytes", "kept_bytes"), 0)
+        for path, days in sorted(found, key=lambda each: each[0].name):
+            start = _day_of(path)
+            waiting = unread.get(days.folder.name, ())
+            is_old = start + _DAY <= now - timedelta(days=ring_days)
+            if any(start <= each < start + _DAY for each in waiting):
+                held["unread_bytes"] += sizes[path]
+            elif not is_old and start + _DAY > min(waiting, default=now) - recent:
+                held["recent_bytes"] += sizes[path]
+            elif is_old or sum(sizes.values()) > ring_bytes:
+                before = sizes[path]
+                days.thin(path, _kept(days), may_go=start + _DAY < now - self._late)
+                sizes[path] = size_of(path)
+                held["kept_bytes"] += sizes[path]
+                removed += sizes[path] < before
+        for days in self._all_days():
+            for left in days.folder.glob(".*.part*"):
+                with suppress(FileNotFoundError):
+                    if left.stat().st_mtime < time.time() - _UNFINISHED_S:
+                        left.unlink()
+        left_bytes = sum(sizes.values())
+        swept = Swept(removed, total - left_bytes, left_bytes, **held)
         if self.folder.is_dir():
             replace_text(self.folder / _SWEEP, dump(asdict(swept)) + "\n")
         return swept
@@ -250,41 +266,189 @@ class Ring:
 
     def latest(self) -> dict[str, datetime]:
         """Return when the last sample of each stream ended."""
-        ends = {folder.folder.name: self._recent(folder) for folder in self._folders()}
-        return {name: time_of(max(e for _, e in spans)) for name, spans in ends.items() if spans}
+        ends = {}
+        for days in self._all_days():
+            found = (query(path, _LATEST_END) for path in reversed(days.paths()))
+            end_us = next((rows[0][0] for rows in found if rows and rows[0][0]), None)
+            if end_us is not None:
+                ends[days.folder.name] = time_of(int(end_us))
+        return ends
 
     def last_arrivals(self) -> dict[str, datetime]:
         """Return when something of each stream last came, whatever the time of its samples."""
         found = {}
-        for folder in self._folders():
-            name = folder.folder.name
-            times = [self.state(name).arrived]
-            for each in folder.waiting():
-                with suppress(FileNotFoundError):  # it has been sealed
-                    times.append(each.arrived)
-            if known := [each for each in times if each is not None]:
-                found[name] = max(known)
+        for days in self._all_days():
+            if paths := days.paths():
+                since_us = microseconds(_day_of(paths[-1]) - self._late)
+                sql = "SELECT MAX(arrived_us) FROM chunks"
+                times = [row[0] for path in days.paths(since_us) for row in query(path, sql)]
+                if known := [each for each in times if each is not None]:
+                    found[days.folder.name] = time_of(max(known))
         return found
 
     def periods(self, stream: str, since: datetime) -> tuple[datetime, ...]:
-        """The beginnings of the ten minutes from `since` on that have sealed samples."""
-        return tuple(self._folder(stream).periods(since))
+        """Return the beginnings of the ten minutes from `since` on that have sealed samples."""
+        since_us = -(-microseconds(since) // PERIOD_US) * PERIOD_US
+        paths = self._days(stream).paths(since_us)
+        return tuple(
+            time_of(int(row[0]) * PERIOD_US) for p in paths for row in query(p, _PERIODS, since_us)
+        )
 
     def unsealed_periods(self, stream: str) -> frozenset[datetime]:
         """Return the beginnings of the ten minutes of which chunks wait to be sealed."""
-        waiting = self._folder(stream).waiting()
-        return frozenset(period_of(each.key.start_us) for each in waiting)
+        return frozenset(time_of(row.period_us) for row in self._days(stream).unsealed())
 
-    def state(self, stream: str) -> StreamState:
-        """Return what is known of a stream from what is sealed."""
-        return load_state(self._folder(stream).folder / "state.json")
+    def received(self, stream: str, since: datetime) -> dict[datetime, ReceivedSamples]:
+        """Return what is sealed of each ten minutes from a time on."""
+        sql = (
+            "SELECT start_us / 600000000 AS period, "
+            "SUM((excluded = '') * MAX(valid - covered, 0) / sampling_rate_hz), "
+            "SUM(covered / sampling_rate_hz), "
+            "MIN(CASE WHEN excluded = '' THEN start_us END), "
+            "MAX(CASE WHEN excluded = '' THEN end_us END) "
+            "FROM chunks WHERE start_us >= ? AND is_sealed GROUP BY period"
+        )
+        since_us = microseconds(since)
+        found = {}
+        for path in self._days(stream).paths(since_us):
+            for period, received_s, apart_s, *edges in query(path, sql, since_us):
+                begin, end = (None if each is None else time_of(int(each)) for each in edges)
+                at = time_of(int(period) * PERIOD_US)
+                found[at] = ReceivedSamples(float(received_s), float(apart_s), begin, end)
+        return found
 
     def size_bytes(self, stream: str) -> int:
-        """Of all segments of a stream and of what waits."""
-        folder = self._folder(stream)
-        paths = [each.path for each in folder.segments()]
-        paths += [each.path for each in folder.waiting()]
-        return sum(path.stat().st_size for path in paths if path.exists())
+        """Return the size of all days of a stream."""
+        return sum(size_of(path) for path in self._days(stream).paths())
+
+    def _seal(self, days: StreamDays, now: datetime) -> list[int]:
+        stream = days.folder.name
+        convert_former_files(self, days.folder)
+        waiting = days.unsealed()
+        of_clock = [row for row in waiting if is_of_clock(row)]
+        for event in list_clock_events(stream, of_clock):
+            self._note(event)
+        days.seal(of_clock)
+        others = sorted((r for r in waiting if not is_of_clock(r)), key=lambda row: row.start_us)
+        sealed = {r.period_us for r in of_clock if time_of(r.period_us) + PERIOD + GRACE <= now}
+        last = self._last_sealed(days) if others else None
+        for start_us, group in groupby(others, key=lambda row: row.period_us):
+            rows = list(group)
+            is_quiet = all(abs(now - time_of(row.arrived_us)) >= _QUIET for row in rows)
+            if time_of(start_us) + PERIOD + GRACE > now or not is_quiet:
+                continue
+            if last is not None and start_us // DRIFT_US > last.start_us // DRIFT_US:
+                for event in find_drift(stream, self._hours(days, last)):
+                    self._note(event)
+            events, last = list_events(stream, last, rows)
+            for event in events:
+                self._note(event)
+            days.seal(rows)
+            sealed.add(start_us)
+        return sorted(sealed)
+
+    def _last_sealed(self, days: StreamDays) -> Row | None:
+        where = (
+            "is_sealed AND excluded IN ('', ?) AND start_us = "
+            "(SELECT MAX(start_us) FROM chunks WHERE is_sealed AND excluded IN ('', ?))"
+        )
+        found = (days.rows([path], where, OVERLAP, OVERLAP) for path in reversed(days.paths()))
+        return next((rows[-1] for rows in found if rows), None)
+
+    def _hours(self, days: StreamDays, row: Row) -> list[Row]:
+        """Return what counts of the six hours that a chunk is in."""
+        start_us = row.start_us // DRIFT_US * DRIFT_US
+        where = "excluded = '' AND start_us >= ? AND start_us < ?"
+        return days.rows([row.day], where, start_us, start_us + DRIFT_US)
+
+    def _place(self, chunk: Chunk, arrived_us: int, is_former: bool) -> StoredChunk:
+        days, row = self._days(chunk.stream), row_of(chunk, arrived_us)
+        made = StoredChunk(chunk.stream, chunk.sequence, chunk.start, chunk.end, is_new=False)
+        around = days.between(row.start_us, row.end_us)
+        for same in around:
+            if (same.start_us, same.sequence) == (row.start_us, row.sequence):
+                known = self._load(days, same)
+                if known and same.samples >= row.samples and agree(known, chunk):
+                    return made
+        covered, conflicts = self._compare(days, chunk, around)
+        if conflicts and self._exclude_ahead(days, chunk, row, conflicts):
+            around = days.between(row.start_us, row.end_us)
+            covered, conflicts = self._compare(days, chunk, around)
+        name = row.start_us, row.sequence
+        is_doubled = any((each.start_us, each.sequence) == name for each, _ in conflicts)
+        if is_doubled and not is_former:
+            raise _doubled(chunk)
+        if is_doubled or any(not runs_on(before, chunk) for _, before in conflicts):
+            row = row._replace(covered=row.samples, excluded=OVERLAP)
+        elif covered.all() and not conflicts:
+            return made
+        else:
+            grown = any((each.start_us, each.sequence) == name for each in around)
+            number = 0 if grown else int(covered.sum())
+            row = row._replace(covered=number)
+            row = row._replace(misplaced=self._misplaced(days, row))
+        days.add(row._replace(is_sealed=int(is_former)), chunk)
+        return replace(made, is_new=True)
+
+    def _compare(
+        self, days: StreamDays, chunk: Chunk, around: Sequence[Row]
+    ) -> tuple[NDArray[np.bool_], list[tuple[Row, Chunk]]]:
+        """Return a mask of the samples whose time is there, and the chunks that differ there."""
+        covered = np.zeros(chunk.values.shape[1], bool)
+        start_us, end_us = microseconds(chunk.start), microseconds(chunk.end)
+        conflicts = []
+        for row in around:
+            common_us = min(row.end_us, end_us) - max(row.start_us, start_us)
+            if row.excluded or common_us * chunk.sampling_rate_hz < 0.5e6:  # half a sample
+                continue
+            before = self._load(days, row)
+            taken = find_taken(before, chunk) if before else slice(0, 0)
+            covered[taken] = True
+            if before and taken.stop and not repeats(before, chunk, taken):
+                conflicts.append((row, before))
+        return covered, conflicts
+
+    def _exclude_ahead(
+        self, days: StreamDays, chunk: Chunk, row: Row, conflicts: Sequence[tuple[Row, Chunk]]
+    ) -> bool:
+        """Exclude what a chunk contradicts if its clock was ahead; return True if so."""
+        telling = {
+            each for each, old in conflicts if is_half(old, chunk) or not runs_on(old, chunk)
+        }
+        if not telling:
+            return False
+        since_us = row.start_us - _STEP_REACH_US
+        rows = days.rows(days.paths(since_us), "start_us >= ?", since_us)
+        former_us = [each.start_us for each in rows if each.excluded.endswith(HOURS_AHEAD)]
+        counted = [each for each in rows if not each.excluded]
+        hours, wrong = find_hour_step(counted, row, former_us)
+        if hours and telling <= set(wrong):
+            days.exclude(wrong, hours_ahead(hours))
+            return True
+        if came_early(row) or not all(came_early(each) for each, _ in conflicts):
+            return False
+        days.exclude((each for each, _ in conflicts), EARLY)
+        return True
+
+    def _misplaced(self, days: StreamDays, row: Row) -> str:
+        """Return the numbers of the neighbours in time that a chunk's number does not belong to.
+
+        It belongs after both: the clock stepped back into a gap. A number below both may be of a
+        logger that counts from the beginning again.
+        """
+        if row.covered or row.sequence >= BY_TIME:
+            return ""
+        place = row.start_us, row.sequence
+        sql = "SELECT sequence FROM chunks WHERE excluded = '' AND misplaced = '' "
+        sql += "AND (start_us, sequence) "
+        after = sql + "> (?, ?) ORDER BY start_us, sequence LIMIT 1"
+        until = sql + "< (?, ?) ORDER BY start_us DESC, sequence DESC LIMIT 1"
+        behind = _first(days.paths(row.start_us), after, place)
+        if behind is None or behind > row.sequence:
+            return ""
+        before = _first(reversed(days.paths(None, row.start_us)), until, place)
+        is_between = before is not None and before < behind
+        return f"{before} and {behind}" if is_between else ""
 
     def _fitting(self, chunk: Chunk, stream: str) -> Chunk:
         if stream not in ("", chunk.stream):
@@ -300,75 +464,6 @@ class Ring:
             _refuse_far(chunk, self._clock(), self._late, self._ahead)
         return chunk
 
-    def _place(self, chunk: Chunk) -> tuple[Path, bytes] | None:
-        """The file for a chunk, in the one form in which all are kept; None where its samples are
-        there. Raises DoubledChunk, unless those that differ are of a clock that was ahead.
-        """
-        folder, content = self._folder(chunk.stream), chunk_document(chunk)
-        key = ChunkKey(microseconds(chunk.start), chunk.sequence, checksum_of_chunk(content))
-        path = folder.chunk_path(key, microseconds(chunk.end))
-        if path.exists():
-            return None
-        others = [(other, self._ordered(each)) for other, each in folder.alike(key)]
-        known = [each for _, each in others if agree(each, chunk)]
-        if any(each.values.shape[1] >= chunk.values.shape[1] for each in known):
-            return None
-        differing = [other for other in others if not agree(other[1], chunk)]
-        if differing and not self._is_of_clock_ahead(key, chunk, differing):
-            raise _doubled(chunk)
-        return path, content
-
-    def _is_of_clock_ahead(
-        self, key: ChunkKey, chunk: Chunk, differing: Sequence[tuple[ChunkKey, Chunk]]
-    ) -> bool:
-        """Return True if a clock that was ahead dated all of the chunks that differ from one."""
-        folder = self._folder(chunk.stream)
-        if self._clock is not None:
-            arrived_us = microseconds(self._clock())
-            if came_early(replace(key, arrived_us=arrived_us), chunk):
-                return False
-        known = self.state(chunk.stream).step_times
-        return all(was_ahead(folder, known, each, chunk) for each in differing)
-
-    def _kept(self, chunk: Chunk, placed: tuple[Path, bytes] | None) -> StoredChunk:
-        if placed is not None:
-            folder = self._folder(chunk.stream)
-            folder.make()
-            self._refuse_crowd(folder)
-            self._write(*placed)
-        is_new = placed is not None
-        return StoredChunk(chunk.stream, chunk.sequence, chunk.start, chunk.end, is_new)
-
-    def _write(self, path: Path, content: bytes) -> None:
-        temporary = path.with_name(f".{path.name}.{os.getpid()}.{id(content)}.part")
-        try:
-            with temporary.open("wb") as file:
-                file.write(content)
-                file.flush()
-                if self._clock is not None:
-                    at = self._clock().timestamp()
-                    os.utime(file.fileno(), (at, at))
-                os.fsync(file.fileno())
-            temporary.rename(path)
-        finally:
-            temporary.unlink(missing_ok=True)
-
-    def _refuse_crowd(self, folder: StreamFolder) -> None:
-        if sum(1 for _ in folder.incoming.iterdir()) >= MOST_WAITING:
-            raise StoreBusy(
-                f"{MOST_WAITING} chunks of stream {folder.folder.name} wait to be sealed.",
-                remedy="Look whether the daemon runs: `shm doctor`. Then send them again.",
-                retry_after_s=30.0,
-            )
-
-    def _recent(self, folder: StreamFolder) -> set[tuple[int, int]]:
-        """Start and end of the chunks of the last segments and of those that wait."""
-        spans = {(each.key.start_us, each.end_us) for each in folder.waiting()}
-        for segment in folder.last_segments():
-            ends = folder.spans(segment.path)
-            spans |= {(key.start_us, end_us) for key, end_us in ends.items()}
-        return spans
-
     def _ordered(self, chunk: Chunk) -> Chunk:
         """With the channels in the order in which they are described."""
         described = next((s for s in self._streams or () if s.name == chunk.stream), None)
@@ -378,13 +473,32 @@ class Ring:
         places = [chunk.channels.index(name) for name in names]
         return replace(chunk, channels=names, values=chunk.values[places])
 
-    def _folder(self, stream: str) -> StreamFolder:
-        return StreamFolder(self.folder / stream)
+    def _load(self, days: StreamDays, row: Row) -> Chunk | None:
+        chunk = days.load(row)
+        return None if chunk is None else self._ordered(chunk)
 
-    def _folders(self) -> Iterator[StreamFolder]:
+    def _days(self, stream: str) -> StreamDays:
+        return StreamDays(self.folder / stream)
+
+    def _all_days(self) -> Iterator[StreamDays]:
         for path in sorted(self.folder.glob("*")):
             if path.is_dir():
-                yield StreamFolder(path)
+                yield StreamDays(path)
+
+
+def _first(paths: Iterable[Path], sql: str, values: Sequence[object]) -> int | None:
+    found = (query(path, sql, *values) for path in paths)
+    return next((int(rows[0][0]) for rows in found if rows), None)
+
+
+def _day_of(path: Path) -> datetime:
+    return datetime.strptime(path.stem, "%Y%m%d").replace(tzinfo=UTC)
+
+
+def _kept(days: StreamDays) -> list[tuple[int, int]]:
+    """Return from when to when samples are kept for good, in microseconds."""
+    names = (path.stem.split("-") for path in (days.folder / "kept").glob("[0-9]*.json"))
+    return [(int(start), int(end)) for start, end in names]
 
 
 def ring_of(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 
 import sqlalchemy as sa
@@ -25,7 +27,7 @@ def upgrade(engine: Engine) -> None:
     from alembic.util import CommandError
 
     location = shown(engine.url)
-    with writing(engine) as connection:
+    with _changes_alone_logged(engine), writing(engine) as connection:
         found = _version(connection)
         _refuse_newer(found, location)
         if found in _RELEASED:
@@ -45,6 +47,29 @@ def upgrade(engine: Engine) -> None:
                 f"the store {location} cannot be upgraded: {error}.",
                 remedy="Restore it from a backup.",
             ) from error
+
+
+@contextmanager
+def _changes_alone_logged(engine: Engine) -> Iterator[None]:
+    """Have SQLite log what it changes and not what it adds: all rows are added once.
+
+    Where another process has the file open it goes on as ever, and takes twice the room.
+    """
+    if engine.dialect.name != "sqlite":
+        yield
+        return
+    _set_journal_mode(engine, "DELETE")
+    try:
+        yield
+    finally:
+        _set_journal_mode(engine, "WAL")
+
+
+def _set_journal_mode(engine: Engine, mode: str) -> None:
+    with suppress(sa.exc.DatabaseError), engine.connect() as connection:
+        connection.exec_driver_sql("ROLLBACK")  # a mode is set outside of transactions
+        connection.exec_driver_sql(f"PRAGMA journal_mode = {mode}")
+        connection.exec_driver_sql("BEGIN")
 
 
 def check(engine: Engine) -> None:

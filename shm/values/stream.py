@@ -29,6 +29,21 @@ PERIODS: Mapping[Period, timedelta] = {  # as their names say
     "day": timedelta(days=1),
 }
 
+PERIOD = timedelta(minutes=10)
+"""What is sealed as one, and read and identified as one window."""
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def microseconds(time: datetime) -> int:
+    """Return the microseconds since 1970."""
+    return (time - _EPOCH) // timedelta(microseconds=1)
+
+
+def time_of(microseconds: int) -> datetime:
+    """Return the time so many microseconds after 1970."""
+    return _EPOCH + timedelta(microseconds=microseconds)
+
 
 def period_start(at: datetime, length: timedelta) -> datetime:
     """Return the beginning of the stretch, of that length from midnight on, that holds a moment."""

@@ -29,7 +29,7 @@ from shm.read.chunk_document import chunk_document
 from shm.simulate.ambient import MonitoringPlan, streamed
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
-from shm.store.ring_files import PERIOD
+from shm.values.stream import PERIOD
 from tests.helpers.daemons import real_daemon
 from tests.helpers.footprint import descendants, resident_mb
 from tests.helpers.live_streams import with_live_streams

@@ -19,7 +19,6 @@ from shm.errors import StoreError
 from shm.pipeline import utc_now
 from shm.read.chunk_document import chunk_document
 from shm.store import Workspace
-from shm.store import ring as ring_module
 from shm.store.queries.streams import list_stream_events
 from shm.store.ring import Ring
 from shm.values import Channel, Recording
@@ -121,17 +120,13 @@ def test_a_doubled_chunk_that_differs_is_refused_with_what_to_do(
     assert [kind for kind, _ in events_of(bridge)] == ["doubled", "doubled"]
 
 
-@pytest.mark.parametrize("what", ["full disk", "backlog"])
 def test_a_sender_is_told_when_to_come_again(
-    client: httpx.Client, bridge: Workspace, monkeypatch: pytest.MonkeyPatch, what: str
+    client: httpx.Client, bridge: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> None:
         raise StoreError("the disk is full.", retry_after_s=60.0)
 
-    if what == "backlog":
-        monkeypatch.setattr(ring_module, "MOST_WAITING", 0)
-    else:
-        monkeypatch.setattr(Ring, "_write", full)
+    monkeypatch.setattr(Ring, "place", full)
     answer = client.post(URL, content=chunk_document(recent()))
     assert answer.status_code == 503
     assert int(answer.headers["Retry-After"]) >= 30
@@ -183,7 +178,7 @@ def test_a_disk_that_is_full_holds_chunks_up_and_loses_none(
 
         with messages(workspace):
             with monkeypatch.context() as patch:
-                patch.setattr(Ring, "_write", full)
+                patch.setattr(Ring, "place", full)
                 time.sleep(0.5)
                 for number in range(3):
                     broker.publish("shm/test-bridge/stream/h3", chunk_document(recent(number)))
@@ -256,7 +251,7 @@ def test_a_file_that_is_read_again_after_a_crash_counts_once(
     shutil.copytree(tmp_path / "copy", folder, dirs_exist_ok=True)
     keeper.turn()
     assert samples_of(bridge) == 9000
-    assert not list(bridge.folder.glob("ring/h3/incoming/*"))
+    assert not Ring(bridge.folder / "ring").unsealed_periods("h3")
 
 
 def test_what_files_do_not_say_is_said_once(bridge: Workspace, keeper: StreamKeeper) -> None:
@@ -328,5 +323,5 @@ def test_the_daemon_keeps_the_ring(bridge: Workspace) -> None:
     Ring(bridge.folder / "ring", clock=lambda: now() - HOUR).append(chunk_document(old))
     shm_daemon.run(bridge, once=True, make_executor=threads)
     assert samples_of(bridge) == 9500
-    assert list(bridge.folder.glob("ring/h3/*/*.h5"))
+    assert Ring(bridge.folder / "ring").periods("h3", now() - 24 * HOUR)
     assert list((bridge.spool / "streams" / "h3").iterdir()) == []

@@ -14,8 +14,7 @@ from shm.pipeline.stream_health import stream_leads
 from shm.read.chunk_document import chunk_document
 from shm.store import Workspace
 from shm.store.ring import ring_of
-from shm.store.ring_files import PERIOD
-from shm.values.stream import Window, WindowReading, period_start
+from shm.values.stream import PERIOD, Window, WindowReading, period_start
 from shm_cli.main import run
 from shm_daemon.doctor import examine
 from shm_daemon.heartbeat import beat

@@ -18,7 +18,7 @@ import numpy as np
 from shm.read.chunk_document import chunk_document
 from shm.store.ring import Ring
 from tests.helpers.nouns import NOW
-from tests.helpers.streams import STREAM, a_chunk
+from tests.helpers.streams import STREAM, a_chunk, list_excluded
 
 SAMPLES = 6000
 """A minute a chunk, so that ten minutes are sealed at every tenth."""
@@ -69,7 +69,8 @@ def assert_none_lost_none_doubled(folder: Path, acknowledged: int) -> None:
         # The chunk that was under way may be there too, unacknowledged.
         assert samples in (acknowledged * SAMPLES, (acknowledged + 1) * SAMPLES)
         ring.seal(datetime.now(end.tzinfo) + timedelta(days=3650))
-    assert not list((folder / "h3" / "incoming").glob("[0-9]*"))
+    assert not ring.unsealed_periods("h3")
+    assert list_excluded(ring) == []
     assert not (folder / "h3" / "aside").exists()
 
 

@@ -7,6 +7,8 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from shm.store import Store, Workspace
+from shm.store.ring import Ring
+from shm.store.ring_days import StreamDays
 from shm.values import ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import (
@@ -18,6 +20,7 @@ from shm.values.stream import (
     StreamEvent,
     Window,
     WindowReading,
+    time_of,
 )
 from tests.helpers.nouns import NOW
 
@@ -55,6 +58,13 @@ def fill_streams(store: Store) -> None:
     store.streams.save_window(a_window())
     store.streams.save_pooled(a_reading(), b"state")
     store.streams.save_event(an_event())
+
+
+def list_excluded(ring: Ring) -> list[tuple[datetime, str]]:
+    """Return when each chunk of `h3` begins that does not count, with the reason."""
+    days = StreamDays(ring.folder / "h3")
+    rows = days.rows(days.paths(), "excluded <> ''")
+    return [(time_of(row.start_us), row.excluded) for row in rows]
 
 
 def a_chunk(

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import csiio
-import h5py
 import numpy as np
 import openpyxl
 import pandas as pd
@@ -36,7 +35,7 @@ from shm.values import FrequencyResponse, Recording
 
 
 def write(described: Recording | FrequencyResponse, path: Path) -> None:
-    """Writes as `shm.read.write` does, and HDF5, MATLAB and TDMS in the same layout.
+    """Writes as `shm.read.write` does, and MATLAB and TDMS in the same layout.
 
     A format that `shm` only reads needs a line of `_WRITERS`.
     """
@@ -72,13 +71,6 @@ class Layout:
         for name, about in facts.items():
             facts[name] = {k: v for k, v in about.items() if f"{name}_{k}" not in arrays}
         return cls(arrays, facts, {k: v for k, v in flat.items() if k not in taken})
-
-
-def _hdf5(layout: Layout, path: Path) -> None:
-    with h5py.File(path, "w", track_order=True) as file:
-        file.attrs.update(layout.attributes)
-        for name, values in layout.arrays.items():
-            file.create_dataset(name, data=values).attrs.update(layout.facts[name])
 
 
 def _matlab(described: Recording | FrequencyResponse, path: Path) -> None:
@@ -223,8 +215,6 @@ def _of_layout(
 
 
 _WRITERS: dict[str, Callable[[Recording | FrequencyResponse, Path], None]] = {
-    ".h5": _of_layout(_hdf5),
-    ".hdf5": _of_layout(_hdf5),
     ".mat": _matlab,
     ".tdms": _of_layout(_tdms),
     ".xlsx": _excel,

@@ -351,8 +351,8 @@ def test_a_write_that_fails_leaves_the_old_file(
 
 
 def test_what_is_only_read_is_refused_on_writing(recording: Recording, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"no format is written as \.h5.*\.npz, \.uff, \.csv"):
-        write_ours(recording, tmp_path / "test.h5")
+    with pytest.raises(UsageError, match=r"no format is written as \.mat.*\.npz, \.uff, \.csv"):
+        write_ours(recording, tmp_path / "test.mat")
     assert list(tmp_path.iterdir()) == []
 
 

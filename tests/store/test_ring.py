@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import errno
-import os
 import random
-import resource
+import sqlite3
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -16,19 +14,18 @@ import h5py
 import numpy as np
 import pytest
 
-from shm.documents import format_time
-from shm.errors import BadInput, DoubledChunk, ShmError, StoreBusy, StoreError
-from shm.read import read, ring_segment
+from shm.errors import BadInput, DoubledChunk, StoreError
+from shm.read import read
 from shm.read.chunk_document import chunk_document
-from shm.store import ring as ring_module
 from shm.store.ring import Ring
+from shm.store.ring_days import close_days, writing
 from shm.values import Recording
-from shm.values.stream import Chunk, Stream, StreamChannel, StreamEvent
+from shm.values.stream import Chunk, Stream, StreamChannel, StreamEvent, microseconds
 from tests.helpers.nouns import NOW
 from tests.helpers.stream_killing import assert_none_lost_none_doubled, killed_again_and_again
-from tests.helpers.streams import STREAM, a_chunk
+from tests.helpers.streams import STREAM, a_chunk, list_excluded
 
-HOUR = timedelta(hours=1)
+HOUR, MINUTE = timedelta(hours=1), timedelta(minutes=1)
 FOR_EVER = timedelta(days=3650)
 
 
@@ -50,6 +47,12 @@ class Logger:
 
     def seal(self) -> list[tuple[str, datetime]]:
         return self.ring.seal(self.now + timedelta(minutes=11))
+
+    @property
+    def received(self) -> tuple[float, float]:
+        """Return how many seconds of samples count and do not."""
+        found = self.ring.received("h3", NOW - HOUR).values()
+        return sum(each.received_s for each in found), sum(each.apart_s for each in found)
 
     @property
     def kinds(self) -> list[str]:
@@ -77,7 +80,7 @@ def test_chunks_are_joined_whether_they_are_sealed_or_not(logger: Logger) -> Non
     assert logger.ring.seal(NOW + timedelta(minutes=25)) == [
         ("h3", NOW), ("h3", NOW + timedelta(minutes=10))
     ]  # fmt: skip
-    assert len(list(logger.ring.folder.glob("h3/incoming/*"))) == 5
+    assert logger.ring.unsealed_periods("h3") == {NOW + timedelta(minutes=20)}
     for (piece,) in (before, logger.ring.read("h3", NOW, NOW + HOUR)):
         assert np.array_equal(piece.values, samples(chunks))
         assert (piece.start, piece.channels) == (NOW, ("acc_1", "acc_2"))
@@ -86,20 +89,6 @@ def test_chunks_are_joined_whether_they_are_sealed_or_not(logger: Logger) -> Non
     assert logger.ring.latest() == {"h3": NOW + timedelta(minutes=25)}
     assert logger.ring.periods("h3", NOW + timedelta(minutes=5)) == (NOW + timedelta(minutes=10),)
     assert logger.events == []
-
-
-def test_a_segment_is_read_by_others_and_by_us(logger: Logger) -> None:
-    chunks = minutes(*range(10))
-    logger.send(*chunks)
-    (path,) = logger.ring.folder.glob("h3/*/*.h5")
-    with h5py.File(path) as file:
-        assert file["acc_1"].attrs["unit"] == "m/s2"
-        assert file.attrs["sampling_rate_hz"] == 100.0
-        assert list(file["_chunks"]["sequence"]) == list(range(10))
-        assert np.array_equal(file["acc_2"][()], samples(chunks)[1])
-    found = read(path)
-    assert isinstance(found, Recording)
-    assert (found.time, found.samples) == (NOW, 60_000)
 
 
 def test_a_chunk_that_comes_again_is_kept_once(logger: Logger) -> None:
@@ -128,26 +117,12 @@ def test_another_chunk_of_the_same_number_and_time_is_refused(
     assert np.array_equal(piece.values, first.values)
 
 
-def test_two_chunks_of_one_number_that_came_at_the_same_moment(
-    logger: Logger, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    first, second = a_chunk(0), replace(a_chunk(0), values=a_chunk(1).values)
-    logger.send(first, seals=False)
-    monkeypatch.setattr("shm.store.ring_files.StreamFolder.alike", lambda *_: ())
-    logger.now += timedelta(seconds=1)
-    logger.send(second)
-    assert logger.kinds == ["doubled"]
-    assert len(list(logger.ring.folder.glob("h3/aside/*.chunk"))) == 1
-    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
-    assert np.array_equal(piece.values, first.values)
-
-
 def test_a_file_that_has_grown_adds_what_is_new(logger: Logger) -> None:
     whole = a_chunk(0)
     logger.send(replace(whole, values=whole.values[:, :200]), whole)
     (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
     assert np.array_equal(piece.values, whole.values)
-    assert logger.ring.state("h3").received_s == {format_time(NOW): 5.0}
+    assert logger.received == (5.0, 0.0)
 
 
 @pytest.mark.parametrize("is_sealed", [False, True])
@@ -172,10 +147,8 @@ def test_a_clock_that_is_set_back_replaces_no_sample_and_fills_no_gap(
             assert np.array_equal(piece.values, samples(chunks))
         logger.seal()
     assert "overlap" in logger.kinds
-    state = logger.ring.state("h3")
-    assert (sum(state.received_s.values()), sum(state.apart_s.values())) == (20 * 60, 14 * 60)
-    with_all = sum(h5py.File(path)["acc_1"].size for path in logger.ring.folder.glob("h3/*/*.h5"))
-    assert with_all == 34 * 6000  # those that do not count lie there too
+    assert logger.received == (20 * 60, 14 * 60)
+    assert len(list_excluded(logger.ring)) == 14  # those that do not count lie there too
     logger.send(*minutes(10))
     (piece, _) = logger.ring.read("h3", NOW, NOW + HOUR)
     assert np.array_equal(piece.values, samples(minutes(*range(20))))
@@ -218,7 +191,7 @@ def test_a_late_chunk_that_overlaps_fills_the_gap_where_it_contradicts_nothing(
     found = np.concatenate([p.values for p in logger.ring.read("h3", NOW, NOW + HOUR)], axis=1)
     count = [before, within, after] if is_same else [before, after]
     assert np.array_equal(found, samples(count))
-    assert sum(logger.ring.state("h3").received_s.values()) == 60.0 * len(count)
+    assert logger.received[0] == 60.0 * len(count)
 
 
 def test_values_that_are_missing_are_noted_and_do_not_count(logger: Logger) -> None:
@@ -230,7 +203,7 @@ def test_values_that_are_missing_are_noted_and_do_not_count(logger: Logger) -> N
         ("gap", "acc_1"), ("gap", "acc_2")
     ]  # fmt: skip
     assert logger.events[0].detail == "100 samples have no value (null or NaN)"
-    assert sum(logger.ring.state("h3").received_s.values()) == pytest.approx(4.8)
+    assert logger.received[0] == pytest.approx(4.8)
 
 
 def test_values_beyond_what_the_sensor_measures_are_refused(logger: Logger) -> None:
@@ -242,19 +215,6 @@ def test_values_beyond_what_the_sensor_measures_are_refused(logger: Logger) -> N
     with pytest.raises(BadInput, match="sample 3 is 41 m/s2 where full_scale is 20") as caught:
         logger.send(chunk)
     assert caught.value.channel == "acc_2"
-
-
-def test_segments_of_before_the_time_of_arrival_was_kept_are_read(
-    logger: Logger, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    old = [(name, kind) for name, kind in ring_segment._ROW.descr if name != "arrived_us"]
-    rows = ring_segment._rows
-    with monkeypatch.context() as patch:
-        patch.setattr(ring_segment, "_rows", lambda chunks: rows(chunks)[[n for n, _ in old]])
-        logger.send(*minutes(*range(9)))
-    logger.send(*minutes(9))
-    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
-    assert np.array_equal(piece.values, samples(minutes(*range(10))))
 
 
 def test_a_gap_is_noted_and_filled_by_what_comes_late(logger: Logger) -> None:
@@ -381,43 +341,25 @@ def test_a_clock_that_drifts_is_noted(logger: Logger) -> None:
     assert len(logger.ring.read("h3", NOW, NOW + 8 * HOUR)) == 1
 
 
-def test_torn_files_are_set_aside_and_others_go_on(logger: Logger) -> None:
-    logger.send(*minutes(*range(20)))
-    logger.send(*minutes(20, 21, 22), seals=False)
-    folder = logger.ring.folder / "h3"
-    torn = sorted(folder.glob("incoming/*.chunk"))[1]
-    torn.write_bytes(torn.read_bytes()[:-1000])
-    first = min(folder.glob("*/*.h5"))
+def test_damaged_days_and_samples_are_set_aside_and_others_go_on(logger: Logger) -> None:
+    days = [NOW + timedelta(days=n) for n in range(3)]
+    logger.send(*(a_chunk(n, day, samples=6000) for n, day in enumerate(days)))
+    first, second, _ = sorted(logger.ring.folder.glob("h3/*.db"))
+    with sqlite3.connect(second) as connection:
+        connection.execute("UPDATE contents SET samples = substr(samples, 1, 9000)")
+    connection.close()
+    close_days()
     content = bytearray(first.read_bytes())
-    content[len(content) // 2] ^= 0xFF
+    content[:100] = bytes(100)
     first.write_bytes(content)
-    lengths = [piece.values.shape[1] for piece in logger.ring.read("h3", NOW, NOW + HOUR)]
-    assert lengths == [11 * 6000, 6000]
-    reasons = sorted(path.name for path in folder.glob("aside/*.reason.json"))
-    assert reasons == [f"{torn.name}.reason.json", f"{first.name}.reason.json"]
-    logger.seal()
-    assert not list(folder.glob("incoming/*"))
-
-
-def test_what_a_crash_left_after_sealing_goes(
-    logger: Logger, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    chunks = minutes(*range(10))
-    logger.send(*chunks, seals=False)
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "unlink", _crash)
-        with pytest.raises(KeyboardInterrupt):
-            logger.seal()
-    assert len(list(logger.ring.folder.glob("h3/incoming/*.chunk"))) == 10
-    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
-    assert piece.values.shape == (2, 60_000)
-    assert logger.seal() == []
-    assert not list(logger.ring.folder.glob("h3/incoming/*.chunk"))
-
-
-def _crash(path: Path, missing_ok: bool = False) -> None:
-    if path.suffix == ".chunk":
-        raise KeyboardInterrupt
+    pieces = logger.ring.read("h3", NOW, NOW + timedelta(days=4))
+    assert [piece.start for piece in pieces] == days[2:]
+    assert "is not a database" in (first.parent / "aside" / f"{first.name}.reason.json").read_text()
+    ((at, reason),) = list_excluded(logger.ring)
+    assert at == days[1]
+    assert "damaged" in reason
+    logger.ring.append(chunk_document(a_chunk(1, days[1], samples=6000)))
+    assert len(logger.ring.read("h3", NOW, NOW + timedelta(days=4))) == 2
 
 
 def test_kills_lose_and_double_nothing(tmp_path: Path) -> None:
@@ -426,66 +368,21 @@ def test_kills_lose_and_double_nothing(tmp_path: Path) -> None:
     assert_none_lost_none_doubled(tmp_path / "ring", acknowledged)
 
 
-@pytest.mark.parametrize("call", ["fsync", "rename"])
-def test_a_full_disk_acknowledges_nothing(
-    logger: Logger, monkeypatch: pytest.MonkeyPatch, call: str
-) -> None:
+def test_a_full_disk_acknowledges_nothing(logger: Logger) -> None:
     (first, second) = minutes(0, 1)
     logger.send(first, seals=False)
-
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os if call == "fsync" else Path, call, full)
-        with pytest.raises(StoreError, match="disk is full") as caught:
-            logger.ring.append(chunk_document(second))
+    (day,) = logger.ring.folder.glob("h3/*.db")
+    with writing([day]) as (connection,):
+        connection.execute("PRAGMA max_page_count = 1")  # it stays as large as it is
+    with pytest.raises(StoreError, match="disk is full") as caught:
+        logger.ring.append_all([chunk_document(each) for each in minutes(*range(1, 9))])
     assert caught.value.retry_after_s == 60.0
-    assert len(list(logger.ring.folder.glob("h3/incoming/*"))) == 1
+    close_days()
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert piece.values.shape == (2, 6000)
     logger.send(second)
     (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
     assert piece.values.shape == (2, 12_000)
-
-
-def test_a_full_disk_while_sealing_leaves_the_chunks(
-    logger: Logger, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    logger.send(*minutes(0, 1), seals=False)
-
-    def full(*_: object, **__: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    with monkeypatch.context() as patch:
-        patch.setattr("shm.store.ring_sealing.write_segment", full)
-        with pytest.raises(StoreError, match="disk is full"):
-            logger.seal()
-    assert logger.seal() == [("h3", NOW)]
-    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
-    assert piece.values.shape == (2, 12_000)
-
-
-def test_a_segment_that_the_disk_has_no_room_for_does_not_end_the_process(logger: Logger) -> None:
-    logger.send(*minutes(0, 1), seals=False)
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))  # a write beyond it fails
-    try:
-        with pytest.raises(ShmError, match="too large"):
-            logger.seal()
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert list(logger.ring.folder.rglob("*.part")) == []
-    assert logger.seal() == [("h3", NOW)]
-
-
-def test_senders_are_held_up_where_too_many_wait(
-    logger: Logger, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(ring_module, "MOST_WAITING", 2)
-    logger.send(*minutes(0, 1), seals=False)
-    with pytest.raises(StoreBusy, match="wait to be sealed"):
-        logger.send(*minutes(2))
-    logger.seal()
-    logger.send(*minutes(2))
 
 
 @pytest.mark.parametrize(
@@ -506,33 +403,60 @@ def test_what_does_not_fit_is_refused(
     assert not logger.ring.folder.exists()
 
 
-def test_old_samples_go_but_for_those_that_are_kept(logger: Logger) -> None:
-    logger.send(*minutes(*range(60)))
-    logger.ring.keep("h3", NOW + timedelta(minutes=32), NOW + timedelta(minutes=33), "a train")
-    swept = logger.ring.sweep(NOW + timedelta(days=30, minutes=51), 30)
-    assert (swept.segments, swept.left_bytes) == (3, logger.ring.size_bytes("h3"))
-    starts = logger.ring.periods("h3", NOW)
-    assert starts == tuple(NOW + timedelta(minutes=m) for m in (20, 30, 50))
+@pytest.fixture
+def days(logger: Logger) -> Logger:
+    """Ten minutes of each of four days."""
+    for day in range(4):
+        start = NOW + timedelta(days=day)
+        logger.send(*(a_chunk(n, start + n * MINUTE, samples=6000) for n in range(10)))
+    return logger
 
 
-def test_sweep_removes_oldest_beyond_limit(logger: Logger) -> None:
-    logger.send(*minutes(*range(60)))
-    most = logger.ring.size_bytes("h3") // 2
-    swept = logger.ring.sweep(logger.now + timedelta(days=2), 30, most)
-    assert 3 <= swept.segments <= 4
-    assert logger.ring.size_bytes("h3") <= most
-    assert logger.ring.periods("h3", NOW)[-1] == NOW + timedelta(minutes=50)
-    logger.ring.sweep(logger.now + FOR_EVER, 30)
-    assert not list(logger.ring.folder.glob("h3/2*"))
+def left_days(logger: Logger) -> list[int]:
+    return sorted({(start - NOW).days for start in logger.ring.periods("h3", NOW)})
 
 
-@pytest.mark.parametrize("later", [timedelta(0), timedelta(days=2)])
-def test_sweep_keeps_last_day(logger: Logger, later: timedelta) -> None:
-    logger.send(*minutes(*range(60)))
-    swept = logger.ring.sweep(logger.now + later, 30, 1)
-    assert swept.segments == (6 if later else 0)
-    assert (swept.left_bytes, swept.recent_bytes) == (logger.ring.size_bytes("h3"),) * 2
-    assert logger.ring.last_sweep() == swept
+def test_old_samples_go_but_for_those_that_are_kept(days: Logger) -> None:
+    days.ring.keep("h3", NOW + 2 * MINUTE, NOW + 3 * MINUTE, "a train")
+    before = days.ring.size_bytes("h3")
+    swept = days.ring.sweep(NOW + timedelta(days=32), 30)
+    assert (swept.days, swept.left_bytes) == (2, days.ring.size_bytes("h3"))
+    assert swept.freed_bytes == before - swept.left_bytes
+    assert 0 < swept.kept_bytes < before / 8
+    assert left_days(days) == [0, 2, 3]
+    (piece,) = days.ring.read("h3", NOW, NOW + HOUR)
+    assert (piece.start, piece.values.shape[1]) == (NOW + 2 * MINUTE, 6000)
+    assert days.ring.sweep(NOW + timedelta(days=32), 30).freed_bytes == 0
+    days.ring.sweep(NOW + FOR_EVER, 30)
+    assert left_days(days) == [0]
+
+
+def test_sweep_removes_oldest_beyond_limit(days: Logger) -> None:
+    most = days.ring.size_bytes("h3") // 2
+    unread = {"h3": [NOW + timedelta(days=1)]}
+    swept = days.ring.sweep(NOW + timedelta(days=9), 30, most, unread)
+    assert (swept.days, swept.left_bytes) == (0, days.ring.size_bytes("h3"))
+    swept = days.ring.sweep(NOW + timedelta(days=9), 30, most)
+    assert (swept.days, left_days(days)) == (2, [2, 3])
+    assert days.ring.size_bytes("h3") <= most
+    days.ring.sweep(NOW + FOR_EVER, 30)
+    assert not list(days.ring.folder.glob("h3/2*"))
+
+
+@pytest.mark.parametrize(("later", "left"), [(0, [2, 3]), (2, [])])
+def test_sweep_keeps_last_day(days: Logger, later: int, left: list[int]) -> None:
+    swept = days.ring.sweep(NOW + timedelta(days=3 + later), 30, 1)
+    assert left_days(days) == left
+    assert swept.left_bytes == days.ring.size_bytes("h3")
+    assert (swept.recent_bytes > 0) == bool(left)
+    assert days.ring.last_sweep() == swept
+
+
+def test_a_chunk_that_comes_after_its_day_was_emptied_is_stored(days: Logger) -> None:
+    """Another process may still have the file open: it is not removed while chunks may come."""
+    days.ring.sweep(NOW + timedelta(days=5), 30, 1)
+    days.send(a_chunk(50, NOW + timedelta(days=3, hours=1)))
+    assert left_days(days) == [3]
 
 
 def test_a_real_recording_in_chunks_is_the_same_recording(
@@ -556,3 +480,44 @@ def test_a_real_recording_in_chunks_is_the_same_recording(
     ring.seal(whole.time + FOR_EVER)
     (piece,) = ring.read("real", whole.time, whole.time + HOUR)
     assert np.array_equal(piece.values, values.astype(np.float32))
+
+
+def write_former_segment(
+    folder: Path, chunks: Sequence[Chunk], arrived: Sequence[datetime]
+) -> None:
+    """Write ten minutes as 1.0.0 did."""
+    numbers = ("start_us", "end_us", "sequence", "first", "samples", "arrived_us")
+    kinds = [(name, "<i8") for name in numbers]
+    kinds += [("checksum", "S16"), ("temperature_c", "<f8"), ("wind_m_s", "<f8")]
+    first, rows = 0, []
+    for chunk, at in zip(chunks, arrived, strict=True):
+        edges, count = (microseconds(chunk.start), microseconds(chunk.end)), chunk.values.shape[1]
+        rows.append((*edges, chunk.sequence, first, count, microseconds(at), b"", 11.5, np.nan))
+        first += count
+    path = folder / f"{NOW:%Y%m%d}" / f"{NOW:%Y%m%dT%H%MZ}-512c8786.h5"
+    path.parent.mkdir(parents=True)
+    with h5py.File(path, "w") as file:
+        file.attrs.update({"stream": "h3", "sampling_rate_hz": 100.0})
+        file.attrs["channels"] = list(chunks[0].channels)
+        for name, values in zip(chunks[0].channels, samples(chunks), strict=True):
+            file[name] = values
+        file["_chunks"] = np.array(rows, kinds)
+
+
+def test_the_ring_of_1_0_0_is_converted(logger: Logger) -> None:
+    chunks, other = minutes(*range(9)), replace(a_chunk(99, samples=6000), start=NOW + HOUR / 40)
+    folder = logger.ring.folder / "h3"
+    write_former_segment(folder, [*chunks, other], [NOW, *[NOW + MINUTE] * 8, NOW + HOUR])
+    (folder / "incoming").mkdir()
+    for chunk, name in zip(minutes(9, 10), ("1-2-9-a.chunk", "1-2-10-b.chunk"), strict=True):
+        (folder / "incoming" / name).write_bytes(chunk_document(chunk))
+    (folder / "incoming" / "1-2-11-c.chunk").write_bytes(b"torn")
+    (folder / "state.json").write_text("{}")
+    assert [start for _, start in logger.seal()] == [NOW]
+    close_days()
+    assert sorted(path.name for path in folder.glob("*")) == ["20260501.db", "aside"]
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert np.array_equal(piece.values, samples(minutes(*range(11))))
+    assert logger.received == (60.0 * 10, 60.0)
+    assert logger.ring.unsealed_periods("h3") == {NOW + 10 * MINUTE}
+    assert (folder / "aside" / "1-2-11-c.chunk.reason.json").exists()

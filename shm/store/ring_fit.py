@@ -1,0 +1,216 @@
+"""How a chunk fits those that came before it, and how chunks are joined to pieces without a gap.
+
+Whatever stamps say to the millisecond. Where two chunks are of one time, the samples of the one
+that came first count, unless its clock was ahead.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta
+from itertools import pairwise
+from statistics import median
+
+import numpy as np
+
+from shm.read.chunk_document import BY_TIME
+from shm.store.ring_days import Row
+from shm.values import NAN
+from shm.values.stream import PERIODS, Chunk, Piece
+
+_JITTER_S = 0.05  # judgement: of a logger's stamps; a radio clock or NTP is within 10 ms
+_DRIFT = 1e-3  # judgement: no crystal is further off; a long chunk differs by that from its stamps
+_AHEAD_US = 60_000_000  # judgement: of the server's clock, which may be off as well
+_OF_A_SAMPLE = 0.501  # derived: up to half a sample, and a stamp's microsecond, is the same sample
+_HOUR_US = PERIODS["hour"] // timedelta(microseconds=1)
+
+
+def slack_s(before: int, sequence: int, sampling_rate_hz: float, length_s: float) -> float:
+    """Return the largest offset between stamps of two chunks that follow without a gap, in s.
+
+    Where their numbers follow, no sample is missing between them: then it is a matter of stamps.
+    Numbers that were made of the time cannot tell; there as much as jitter may be missing unseen.
+    """
+    sample_s = 1 / sampling_rate_hz
+    if sequence == before + 1 or min(before, sequence) >= BY_TIME:
+        return max(_JITTER_S, 1.5 * sample_s) + _DRIFT * length_s
+    return _OF_A_SAMPLE * sample_s
+
+
+def agree(one: Chunk, other: Chunk) -> bool:
+    """Return True if two chunks have the same samples, as far as both have any."""
+    samples = min(one.values.shape[1], other.values.shape[1])
+    first, second = one.values[:, :samples], other.values[:, :samples]
+    return _is_alike(one, other) and np.array_equal(first, second, equal_nan=True)
+
+
+def find_taken(before: Chunk, chunk: Chunk) -> slice:
+    """Return which samples of a chunk are of the time of another one, beyond jitter."""
+    rate = chunk.sampling_rate_hz
+    begin, end = max(before.start, chunk.start), min(before.end, chunk.end)
+    common_s = (end - begin).total_seconds()
+    first, second = (before, chunk) if before.start <= chunk.start else (chunk, before)
+    slack = slack_s(first.sequence, second.sequence, rate, _seconds(first))
+    is_jitter = common_s <= slack and not _ends_as_begins(first, second, round(common_s * rate))
+    if common_s <= 0 or is_jitter:
+        return slice(0, 0)
+    return slice(*(round((time - chunk.start).total_seconds() * rate) for time in (begin, end)))
+
+
+def repeats(before: Chunk, chunk: Chunk, taken: slice) -> bool:
+    """Return True if the samples of the common time are the same, as of a logger that resends."""
+    first = round((chunk.start - before.start).total_seconds() * chunk.sampling_rate_hz)
+    there = before.values[:, first + taken.start : first + taken.stop]
+    return _is_alike(before, chunk) and np.array_equal(
+        there, chunk.values[:, taken], equal_nan=True
+    )
+
+
+def runs_on(before: Chunk, chunk: Chunk) -> bool:
+    """Return True if a chunk is the next one, of a clock that was set back a little.
+
+    Files are not counted.
+    """
+    numbers = before.sequence, chunk.sequence
+    is_next = numbers[1] == numbers[0] + 1 or min(numbers) >= BY_TIME
+    return is_next and before.start <= chunk.start
+
+
+def is_half(before: Chunk, chunk: Chunk) -> bool:
+    """Return True if two chunks have half of the shorter one's time in common.
+
+    Less is a correction of the clock by seconds.
+    """
+    common = min(before.end, chunk.end) - max(before.start, chunk.start)
+    return 2 * common >= min(before.end - before.start, chunk.end - chunk.start)
+
+
+def came_early(row: Row) -> bool:
+    """Return True if a chunk came before it ends by its stamps: its clock was ahead."""
+    return row.end_us - row.arrived_us > _AHEAD_US
+
+
+def find_hour_step(
+    rows: Iterable[Row],
+    chunk: Row,
+    known_us: Collection[int],
+    tolerance_us: int = 2_000_000,
+) -> tuple[int, list[Row]]:
+    """Find what a clock dated ahead by whole hours; return the hours, 0 of none, and the chunks.
+
+    In the order in which they came, samples must begin whole hours later than usual after those
+    before them, and end that much, give or take half of it, after those that came next begin; these
+    may be `chunk`, which contradicts them. Their true time must be free. `known_us` are when the
+    samples of former steps begin.
+    """
+    by_arrival = sorted(rows, key=lambda row: (row.arrived_us, row.sequence, row.start_us))
+    jumps = [after.start_us - before.end_us for before, after in pairwise(by_arrival)]
+    pauses = [each for each in jumps if tolerance_us < each < _HOUR_US - tolerance_us]
+    usual_us = median(pauses or [0])
+    for first, jump_us in reversed(list(enumerate(jumps, start=1))):
+        lengths_us = jump_us, jump_us - usual_us
+        hours = max(_whole_hours(length_us, tolerance_us) for length_us in lengths_us)
+        start_us, step_us = by_arrival[first].start_us, hours * _HOUR_US
+        if not hours or any(abs(start_us - each) < _HOUR_US for each in known_us):
+            continue
+        wrong, end_us = [by_arrival[first]], by_arrival[first].end_us
+        for following in (*by_arrival[first + 1 :], chunk):
+            if following.start_us < end_us - step_us / 2:
+                break
+            wrong.append(following)
+            end_us = max(end_us, following.end_us)
+        if following is wrong[-1] or abs(end_us - following.start_us - step_us) > step_us / 2:
+            continue
+        true_span = start_us - step_us, end_us - step_us
+        if not any(_is_within(row, true_span) for row in set(by_arrival) - set(wrong)):
+            return hours, wrong
+    return 0, []
+
+
+def _whole_hours(time_us: float, tolerance_us: int) -> int:
+    hours = round(time_us / _HOUR_US)
+    return hours if hours > 0 and abs(time_us - hours * _HOUR_US) <= tolerance_us else 0
+
+
+def _is_within(row: Row, span: tuple[int, int]) -> bool:
+    """Return True if half of a chunk's time is within a span."""
+    common_us = min(span[1], row.end_us) - max(span[0], row.start_us)
+    return 2 * common_us > row.end_us - row.start_us
+
+
+def join(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Piece, ...]:
+    """Return the samples from `start` on and before `end` of chunks that count, without overlaps.
+
+    Where two of them are of one time they agree, or the next of a clock that was set back runs on.
+    """
+    runs: list[list[Chunk]] = []
+    for chunk in sorted(chunks, key=lambda each: (each.start, each.sequence)):
+        last = runs[-1][-1] if runs else None
+        if last is not None and (taken := find_taken(last, chunk)).stop:
+            later = chunk.start + timedelta(seconds=taken.stop / chunk.sampling_rate_hz)
+            chunk = replace(chunk, start=later, values=chunk.values[:, taken.stop :])
+            if not chunk.values.shape[1]:
+                continue
+        if last is not None and _is_alike(last, chunk):
+            numbers = last.sequence, chunk.sequence
+            slack = slack_s(*numbers, chunk.sampling_rate_hz, _seconds(last))
+            if (chunk.start - last.end).total_seconds() <= slack:
+                runs[-1].append(chunk)
+                continue
+        runs.append([chunk])
+    pieces = (_cut(_piece(run), start, end) for run in runs)
+    return tuple(piece for piece in pieces if piece.values.shape[1])
+
+
+def _ends_as_begins(first: Chunk, second: Chunk, samples: int) -> bool:
+    """Return True if so many samples at a seam are there twice, to the bit."""
+    if samples < 1 or not _is_alike(first, second):
+        return False
+    tail, head = first.values[:, -samples:], second.values[:, :samples]
+    is_telling = len(np.unique(tail)) > tail.size / 2
+    return is_telling and np.array_equal(tail, head, equal_nan=True)
+
+
+def _seconds(chunk: Chunk) -> float:
+    return (chunk.end - chunk.start).total_seconds()
+
+
+def _is_alike(one: Chunk, other: Chunk) -> bool:
+    rates = one.sampling_rate_hz, other.sampling_rate_hz
+    return one.channels == other.channels and rates[0] == rates[1]
+
+
+def _piece(run: Sequence[Chunk]) -> Piece:
+    first = run[0]
+    values = np.concatenate([chunk.values for chunk in run], axis=1, dtype=float)
+    weather = (_middle_c(run), _mean_wind_m_s(run))
+    rate, start = first.sampling_rate_hz, first.start
+    return Piece(first.stream, start, rate, first.channels, values, *weather)
+
+
+def _middle_c(run: Sequence[Chunk]) -> float:
+    """Return the median: a mean would make a likely temperature of 10 °C and a broken -127."""
+    known = sorted(c.temperature_c for c in run if not math.isnan(c.temperature_c))
+    return known[len(known) // 2] if known else NAN
+
+
+def _mean_wind_m_s(run: Sequence[Chunk]) -> float:
+    """Return the mean over the chunks that state it, each by its length."""
+    known = [(c.wind_m_s, c.values.shape[1]) for c in run if not math.isnan(c.wind_m_s)]
+    weights = sum(weight for _, weight in known)
+    return sum(value * weight for value, weight in known) / weights if weights else NAN
+
+
+def _cut(piece: Piece, start: datetime, end: datetime) -> Piece:
+    rate, samples = piece.sampling_rate_hz, piece.values.shape[1]
+    first, last = (_place((time - piece.start).total_seconds() * rate) for time in (start, end))
+    first, last = max(first, 0), max(min(last, samples), 0)
+    later = piece.start + timedelta(seconds=first / rate)
+    return replace(piece, start=later, values=piece.values[:, first:last])
+
+
+def _place(samples: float) -> int:
+    """Return the first sample from a time on; a microsecond of rounding is no sample."""
+    return math.ceil(samples - 1e-3)
