@@ -74,15 +74,18 @@ def agreement(
     """Return the alert of a test that is the second to show a shift beyond its threshold.
 
     None where it shows none, no test next to it agrees, the clocks say that it was a later visit,
-    or the shift is `told` already.
+    a test of a visit before shows the same, or the shift is `told` already.
     """
     its = _shown(reader, newest[0], hanger, options)
     if not any(its):
         return None
     near = {tests[0].id: tests[0] for tests in (*beside.came, *beside.dated) if tests}
     others = [(test, _shown(reader, test, hanger, options)) for test in near.values()]
+    known = _read_earlier_visits(reader, newest[0], beside, options)
     for j, (quantity, mine) in enumerate(zip(reader.quantities, its, strict=True)):
         if mine is None or (quantity.name, way_of(mine.mean)) in told:
+            continue
+        if any(_agree(mine, each[j]) for each in known):
             continue
         for other, shown in others:
             same = shown[j]
@@ -96,6 +99,19 @@ def agreement(
                 of_test = (newest[0].id, newest[1])
                 return alert_of(hanger, of_test, what, words, ("beyond threshold",), (drift,))
     return None
+
+
+def _read_earlier_visits(
+    reader: Reader, newest: ModalTest, beside: Beside, options: WatchOptions
+) -> list[list[Shown]]:
+    """Return the readings of the last visits before the newest: these shifts are not new."""
+    earlier = {
+        test.id: test
+        for tests in (beside.came[0], beside.dated[0])
+        for test in tests
+        if _is_later(newest, test) and test.id not in {*beside.held, *beside.of_works}
+    }
+    return [read_alone(reader, test, options) for test in earlier.values()]
 
 
 def _is_unwatched(

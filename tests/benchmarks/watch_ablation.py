@@ -2,6 +2,7 @@
 
 make ablation ROOM=watch
 make ablation ROOM=watch ARGS="--only 'everything,persistence' --bridges 4 --seed 82000"
+make ablation ROOM=watch ARGS="--histories"                 # a look, in minutes, before any season
 python tests/benchmarks/watch_ablation.py --answers a.jsonl --of b.jsonl    # without what b has
 
 Seasons of the worlds of `watch_worlds.py`: quiet ones, and events on day 540. For each mechanism
@@ -48,6 +49,10 @@ from shm.watch.state_sums import StateSums, WatchState  # noqa: E402
 from shm.watch.watcher import Watcher  # noqa: E402
 from tests.benchmarks import watch_worlds  # noqa: E402
 from tests.benchmarks.watch_trial import outcomes  # noqa: E402
+from tests.contracts import watch_calls  # noqa: E402
+from tests.contracts.test_watch_contract import differ  # noqa: E402
+from tests.contracts.watch_scenarios import SCENARIOS  # noqa: E402
+from tests.helpers.synthetic_readings import watch_of  # noqa: E402
 
 Row = dict[str, Any]
 Change = tuple[Any, str, Any]
@@ -97,6 +102,7 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
     ],
     "bound on one visit": [(Watcher, "_limit_last_visit", weigh_all)],
     "tests that stand alone": [(watcher, "select_consistent_tests", count_all)],
+    "modes that stray": [(persistence, "_has_outlying_mode", give(False))],
     "a baseline that stands alone": [(watcher, "ENOUGH_AGAINST", 10**9)],
     "two tests that agree": [(watch_worlds, "agreement", give(None))],
     "learnt scatter": [(StateSums, "scatter", lambda self, _: self.structure.scatter_variance)],
@@ -129,6 +135,23 @@ def without(name: str) -> Iterator[None]:
         for change in MECHANISMS[name]:
             stack.enter_context(patch.object(*change))
         yield
+
+
+def list_differences() -> tuple[list[str], list[str]]:
+    """Return the golden histories that change, and the scenarios that are not met."""
+    changed = [
+        name
+        for name in (*watch_calls.STATES, "deck")
+        if list(differ(watch_calls.CASES[name](), watch_calls.golden(name)))
+    ]
+    unmet = []
+    for each in SCENARIOS.values():
+        found = watch_of(each.make(), each.quantities)
+        first = found.calls[0].index if found.calls else None
+        is_met = first is None if each.first is None else each.first <= (first or -1) <= each.last
+        if not is_met or found.tests[-1].change.is_baseline_alone != each.is_baseline_doubted:
+            unmet.append(each.name)
+    return changed, unmet
 
 
 HEADS = (
@@ -169,6 +192,7 @@ def main() -> None:
     parser.add_argument("--baselines", default="1")
     parser.add_argument("--begins", type=float, default=outcomes.BEGINS, help="day of the events")
     parser.add_argument("--only", help="these mechanisms, parted by commas")
+    parser.add_argument("--histories", action="store_true", help="golden histories and scenarios")
     parser.add_argument("--answers", type=Path, help="keep every hanger's outcome, a line each")
     parser.add_argument("--of", type=Path, nargs="*", default=[], help="outcomes that are there")
     given = parser.parse_args()
@@ -176,6 +200,12 @@ def main() -> None:
     names = given.only.split(",") if given.only else list(MECHANISMS)
     if unknown := set(names) - MECHANISMS.keys():
         parser.error(f"no mechanism {sorted(unknown)}; there are {', '.join(MECHANISMS)}")
+    if given.histories:
+        for name in names:
+            with without(name):
+                changed, unmet = list_differences()
+            print(f"{name}: changed {changed}, not met {unmet}", flush=True)
+        return
     rows = [json.loads(line) for path in given.of for line in path.read_text().splitlines()]
     key = ("without", "world", "scenario", "seed", "baseline")
     done = {tuple(row[each] for each in key) for row in rows}
