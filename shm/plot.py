@@ -32,9 +32,9 @@ from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
 from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
 from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
+from shm.report.figures.modal_test_axes import ResponseCurves
 from shm.report.figures.modal_test_modes import SHAPES, STABILISATION
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
-from shm.report.figures.modal_test_response import ResponseCurves
 from shm.report.figures.recording_channels import FIGURE as CHANNELS
 from shm.report.figures.specification import FigureSpec, Specification
 from shm.values import Diagnosis, GapCheck, Hanger, ModalTest, Posterior, Recording

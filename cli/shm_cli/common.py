@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import getpass
-import os
 import shutil
-import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -14,9 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import rich_click as click
-from rich.console import Console, Group, RenderableType
-from rich.measure import Measurement
-from rich.padding import Padding
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -27,8 +22,6 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
-from rich.table import Column, Table
-from rich.text import Text
 
 from shm.bridge import load_hanger
 from shm.documents import dump
@@ -37,15 +30,15 @@ from shm.modes_document import load_modes
 from shm.values import Hanger, ModalTest
 from shm_cli import errors
 from shm_cli.flags import wants_json
-from shm_cli.terminal import Terminal, escape_controls
+from shm_cli.terminal import Terminal
 
 if TYPE_CHECKING:
     from shm.report.figures.specification import Illustration
     from shm.report.paper import Table as Texts
     from shm.store import Store, Workspace
 
-# Technical: columns of a file, of no terminal at all, and of lines that are read with ease.
-_WIDTH_OF_A_FILE, _BEYOND_ANY = 120, 100_000
+# Technical: columns of a file, and of lines that are read with ease.
+_WIDTH_OF_A_FILE = 120
 _READABLE = 100
 
 
@@ -72,68 +65,15 @@ def answer(document: Mapping[str, object], words: str, kind: str = "") -> None:
 
 
 def show_rows(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print rows of texts as a table, as they are: none is markup of rich.
+    """Print rows of texts as a table that fits the terminal; in a file no column is narrow."""
+    from shm.report.as_text import laid_out
+    from shm.report.paper import Table
 
-    Columns after the first are aligned to the right.
-    """
-    made = table(title, *headings)
-    for row in rows:
-        made.add_row(*(Text(escape_controls(cell)) for cell in row))
-    show_table(made)
-
-
-def show_table(table: Table) -> None:
-    """Print a table on stdout; one that the terminal is too narrow for as a list a row."""
-    console = Terminal(highlight=False)
-    if not sys.stdout.isatty() and "COLUMNS" not in os.environ:
-        console.width = max(console.width, _WIDTH_OF_A_FILE)
-    console.print(table.title, style="bold", soft_wrap=True, markup=False)
-    table.title = None
-    console.print(table if _folded(table, console) else _as_lists(table))
-
-
-def _folded(table: Table, console: Console) -> bool:
-    """Fit columns to the terminal without cutting a word; return False if they do not fit."""
-    unbounded = console.options.update(max_width=_BEYOND_ANY)
-    least, widths = [], []
-    for column in table.columns:
-        spans = [Measurement.get(console, unbounded, e) for e in (column.header, *column.cells)]
-        widths.append(max(span.maximum for span in spans))
-        is_whole = column.no_wrap = _is_one_word(column)
-        least.append(widths[-1] if is_whole else max(span.minimum for span in spans))
-    borders = Measurement.get(console, unbounded, table).maximum - sum(widths)
-    room = console.width - borders
-    if sum(least) > room:
-        return False
-    while sum(widths) > room:
-        loose = [index for index, width in enumerate(widths) if width > least[index]]
-        widths[max(loose, key=widths.__getitem__)] -= 1
-    for column, width in zip(table.columns, widths, strict=True):
-        column.width = width
-    return True
-
-
-def _is_one_word(column: Column) -> bool:
-    """Return True if nothing in a column can be broken, such as a drawn bar."""
-    cells = [str(cell) for cell in column.cells]
-    return len(str(column.header)) <= max(map(len, cells), default=0) and " " not in "".join(cells)
-
-
-def _as_lists(table: Table) -> Group:
-    """Return each row as lines `heading value` without empty values, blank lines between."""
-    headings = [str(column.header) for column in table.columns]
-    rows = zip(*(column.cells for column in table.columns), strict=True)
-    return Group(*(Padding(_listed(headings, row), (0, 0, 1, 0)) for row in rows))
-
-
-def _listed(headings: Sequence[str], cells: Sequence[RenderableType]) -> Table:
-    listed = Table.grid(padding=(0, 2, 0, 0), pad_edge=False)
-    listed.add_column(style="bold", no_wrap=True)
-    listed.add_column(overflow="fold")
-    named = [(heading, cell) for heading, cell in zip(headings, cells, strict=True) if cell]
-    for heading, cell in named:
-        listed.add_row(Text(heading), cell)
-    return listed
+    width = shutil.get_terminal_size((_WIDTH_OF_A_FILE, 24)).columns
+    made = Table("", tuple(headings), tuple(tuple(row) for row in rows))
+    if title:
+        click.echo(title)
+    click.echo(laid_out(made, width).strip("\n") + "\n")
 
 
 def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -160,14 +100,6 @@ def readable_width() -> int:
 def paragraph(text: str) -> str:
     """Return a text in lines that fit the terminal, and are not too long to read."""
     return textwrap.fill(text, readable_width())
-
-
-def table(title: str, *columns: str) -> Table:
-    """Return an empty table; columns after the first are aligned to the right."""
-    made = Table(title=title, header_style="bold")
-    for index, column in enumerate(columns):
-        made.add_column(Text(column), justify="left" if index == 0 else "right")
-    return made
 
 
 def open_workspace(ctx: click.Context, **flags: object) -> Workspace:

@@ -20,10 +20,10 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import latest_drifts, stored_pattern
 from shm.pipeline.rebaselining import Order, set_baseline
 from shm.pipeline.reporting import hanger_states
-from shm.report.bridge_report import pattern_json
 from shm.report.figures.along_the_bridge import bridge_illustration
-from shm.report.shifts import pattern_tables, shift_cells
-from shm.report.states import NOTHING_WATCHED, temperature_documents, temperature_table
+from shm.report.hanger_tables import temperature_documents, temperature_table
+from shm.report.shifts import pattern_json, pattern_tables, shift_cells
+from shm.report.states import NOTHING_WATCHED
 from shm.store import Baseline
 from shm.values import Drift
 from shm.watch.repair_check import EVENT_KINDS

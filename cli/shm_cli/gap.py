@@ -25,8 +25,8 @@ from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_json, bridge_diagnosis_paper
 from shm.report.contents import BridgeDiagnosisSheet, DiagnosisSheet
+from shm.report.diagnosis_report import FIGURES as OF_DIAGNOSIS
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
-from shm.report.figures.every_figure import OF_DIAGNOSIS
 from shm.report.figures.gap_causes import SHARED
 from shm.report.figures.specification import Illustration, drawn
 from shm.report.paper import Paper

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import rich_click as click
-from rich.text import Text
 
 from shm.diagnosis_document import gap_check_document
 from shm.errors import BadInput, NothingThere, UsageError
@@ -27,8 +26,7 @@ from shm_cli.common import (
     opened_store,
     paragraph,
     show,
-    show_table,
-    table,
+    show_rows,
     tests_and_hanger,
 )
 
@@ -189,11 +187,6 @@ def _answer(found: GapCheck) -> None:
         return
     click.echo(paragraph(introduction(found)))
     if found.effects:
-        made = table("What a diagnosis would find", *HEADINGS)
-        for column in made.columns:
-            column.justify = "left"
-        for row in rows(found):
-            made.add_row(*map(Text, row))
-        show_table(made)
+        show_rows("What a diagnosis would find", HEADINGS, rows(found))
     for line in check_text(found):
         click.echo(paragraph(line))

@@ -242,7 +242,7 @@ def _write(
         html.write_text(as_html(modal_test_paper(sheets[0])), encoding="utf-8")
     if figures is None:
         return
-    from shm.report.figures.every_figure import modal_test_figures
+    from shm.report.modal_test_report import modal_test_figures
 
     for sheet in sheets:
         write_pictures(modal_test_figures(sheet), figures, f"{sheet.identification.test.id}-")

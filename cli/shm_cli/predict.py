@@ -10,15 +10,10 @@ import rich_click as click
 
 from shm.errors import UsageError
 from shm.models import THESIS, Model, build
-from shm.models.solid.classes import SolidModel
-from shm.report.figures import prediction_figures
-from shm.report.figures.prediction_figures import Curves, specify
-from shm.report.figures.prediction_figures import write_curves_png as write_png
 from shm.values import PLANES, FloatArray
 from shm_cli import completion, flags
 from shm_cli.common import one_hanger, progress_bar, show, show_rows
 
-_MOST_DRAWN = 20  # technical: a mesh of a second
 _MOST_POINTS = 10_000  # technical: a table that a person can still open, in seconds
 
 
@@ -26,17 +21,6 @@ _MOST_POINTS = 10_000  # technical: a table that a person can still open, in sec
 @click.argument("model", shell_complete=completion.models)
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A parameter.")
 @click.option("--sweep", metavar="NAME=FROM:TO:N", help="A parameter over a range.")
-@click.option(
-    "--figure",
-    type=flags.NewFile(".png"),
-    metavar="FILE.png",
-    help="Draw the frequencies of the --sweep here, or the --shape.",
-)
-@click.option(
-    "--shape",
-    metavar="PLANE:ORDER",
-    help="A mode of a solid class, drawn in space: transverse:2, say.",
-)
 @click.option("--modes", type=click.IntRange(1, 100), default=6)
 @flags.hanger()
 @flags.hanger_file
@@ -47,8 +31,6 @@ def command(
     model: str,
     settings: tuple[str, ...],
     sweep: str | None,
-    figure: Path | None,
-    shape: str | None,
     modes: int,
     hanger_id: int | None,
     hanger_file: Path | None,
@@ -63,50 +45,17 @@ def command(
 
     \b
     Example: shm predict beam1 --hanger-file H.toml --set theta_F=1 --set theta_L=0.97
-    Example: shm predict beam1 --hanger-file H.toml --sweep theta_F=0.5:2:50 --figure sweep.png
-    Example: shm predict solid0 --hanger-file H.toml --shape transverse:2 --figure mode.png
+    Example: shm predict beam1 --hanger-file H.toml --sweep theta_F=0.5:2:50
     """
-    if figure is not None and sweep is None and shape is None:
-        raise UsageError("--figure draws a sweep.", remedy="Add --sweep theta_F=0.5:2:50, say.")
-    if shape is not None and (figure is None or sweep is not None):
-        raise UsageError("--shape is drawn.", remedy="Add --figure FILE.png, without --sweep.")
     # The thesis's for its parameters alone: nobody asked for its reading of the description.
     chosen = build(model, one_hanger(ctx, hanger_file, hanger_id), THESIS).as_it_hangs()
     nominal = {name: 1.0 for name in chosen.parameter_names if name.startswith("theta_")}
     values = nominal | dict(_pair(setting) for setting in settings)
-    if shape is not None and figure is not None:
-        _draw_shape(chosen, values, shape, figure)
-    elif sweep is None:
+    if sweep is None:
         _show_one(chosen, values, modes)
     else:
         name, points = _range(sweep)
-        frequencies_hz = _swept(chosen, values, name, points, modes)
-        if figure is not None:
-            parts = [
-                Curves(plane, points, frequencies_hz[:, place])
-                for place, plane in enumerate(PLANES)
-            ]
-            write_png(specify(parts, name, "frequency (Hz)"), figure)
-        _show_sweep(chosen, values, name, points, frequencies_hz)
-
-
-def _draw_shape(model: Model, values: dict[str, float], shape: str, path: Path) -> None:
-    plane, _, order = shape.partition(":")
-    if plane not in PLANES or not order.isdecimal() or not 1 <= int(order) <= _MOST_DRAWN:
-        raise UsageError(
-            f"--shape {shape!r} is not PLANE:ORDER, with an order from 1 to {_MOST_DRAWN}.",
-            remedy="Write --shape transverse:2, say.",
-        )
-    if not isinstance(model, SolidModel):
-        raise UsageError(
-            f"model class {model.name} is no solid: it has no surface.",
-            remedy="Take s1, s2, solid0, solid1 or solid2.",
-        )
-    corners, moved = model.surface(model.pack(values), PLANES[PLANES.index(plane)], int(order))
-    prediction_figures.write_deformed_png(
-        corners, moved, path, f"{model.title}: mode {order}, {plane}."
-    )
-    click.echo(f"Mode {order}, {plane}, of {model.title} is drawn in {path}.")
+        _show_sweep(chosen, values, name, points, _swept(chosen, values, name, points, modes))
 
 
 def _show_one(model: Model, values: dict[str, float], modes: int) -> None:

@@ -305,7 +305,7 @@ def check_clock(examined: DoctorContext) -> Iterator[Finding]:
         )
     said = _synchronised()
     if said is None:
-        yield unknown("clock", "whether anything sets it cannot be told here")
+        yield unknown("clock", "cannot check whether the clock is synchronised (NTP)")
     elif said:
         yield ok("clock", "synchronised")
     else:

@@ -64,20 +64,13 @@ def _folded(text: str, width: int, start: str = "") -> str:
 
 
 def in_terminal(table: Table) -> Table:
-    """Return the rows that a terminal shows, with the column that stands for a figure there."""
-    rows, headings, note = table.rows, table.headings, table.note
-    if table.terminal_column:
-        heading, *strokes = table.terminal_column
-        headings = (headings[0], heading, *headings[1:])
-        rows = tuple((row[0], s, *row[1:]) for row, s in zip(rows, strokes, strict=True))
+    """Return the table with the rows that a terminal shows."""
+    rows, note = table.rows, table.note
     if table.terminal_rows is not None:
         more = table.hidden_note.format(len(rows) - len(table.terminal_rows))
         rows = tuple(rows[index] for index in table.terminal_rows)
         note = f"{note} {more}".strip() if rows else more
-    return replace(
-        table, headings=headings, rows=rows, note=note, marks=(), terminal_rows=None,
-        terminal_column=(),
-    )  # fmt: skip
+    return replace(table, rows=rows, note=note, marks=(), terminal_rows=None)
 
 
 def laid_out(table: Table, width: int = WIDTH) -> str:

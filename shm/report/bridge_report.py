@@ -10,23 +10,22 @@ from shm.documents import drift_document
 from shm.report import formatting
 from shm.report.bar_table import bar_document, bars_table
 from shm.report.contents import BridgeReport, hangers_unit
-from shm.report.control_report import chart_document, control_lead
+from shm.report.control_report import chart_document
+from shm.report.figures.along_the_bridge import SHIFTS, TENSIONS
 from shm.report.figures.control_chart import FIGURE as CONTROL
-from shm.report.figures.every_figure import bridge_figures
-from shm.report.figures.specification import drawn
+from shm.report.figures.specification import Illustration, drawn
 from shm.report.formatting import Interval
-from shm.report.hanger_status import Status
+from shm.report.hanger_status import Status, control_lead
 from shm.report.hanger_summary import HangerSummary, PeriodSummary
 from shm.report.paper import CREDIBLE, Fact, Paper, Section, Table, appendices, filled
 from shm.report.shared_tables import lineage, settings
-from shm.report.shifts import _day, pattern_tables, shift_cells
+from shm.report.shifts import _day, pattern_json, pattern_tables, shift_cells
 from shm.report.states import period_json
 from shm.values import Drift
 from shm.values.messages import NEXT_TEST
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm.values.stated_tension import stated
 from shm.watch.control_chart import ControlChart
-from shm.watch.neighbours import BridgePattern
 
 
 def bridge_paper(data: BridgeReport) -> Paper:
@@ -45,7 +44,7 @@ def bridge_paper(data: BridgeReport) -> Paper:
                 tables=filled(bars_table([line.bar for line in data.hangers])),
                 brief=[_glance(data)],
             ),
-            Section("Along the bridge", figures=lambda: bridge_figures(data)),
+            Section("Along the bridge", figures=lambda: _figures(data)),
             *(_control_part(each) for each in data.controls),
             Section("Numbers", tables=tables(data)),
             *appendices(Section("Settings", tables=filled(settings(data.settings)))),
@@ -55,6 +54,12 @@ def bridge_paper(data: BridgeReport) -> Paper:
         closing=f"{CREDIBLE}; times are UTC.",
         more="All of it: `shm report --bridge --full`, or `--out bridge.pdf`.",
     )
+
+
+def _figures(data: BridgeReport) -> tuple[Illustration, ...]:
+    """Draw what moved, where it was compared, and what each hanger carries."""
+    shifts = drawn((SHIFTS,), data.pattern) if data.pattern else ()
+    return (*shifts, *drawn((TENSIONS,), data))
 
 
 def _control_part(chart: ControlChart) -> Section:
@@ -272,8 +277,8 @@ def _since_baseline(data: BridgeReport) -> Table:
             for line in data.hangers
             if line.drift
         ),
-        note="Shift of the tension at the latest test, if there is any, the swing with the "
-        "temperature taken out; how probable it is that it lies beyond the hanger's threshold; "
+        note="Shift of the tension at the latest test, if there is any, without the effect of the "
+        "temperature; how probable it is that it lies beyond the hanger's threshold; "
         "what was called since. Hangers that have nothing but their baseline are left out.",
     )
 
@@ -294,7 +299,7 @@ def _courses(data: BridgeReport) -> Table:
             if line.course and (line.course.tests or line.course.alerts)
         ),
         note="Change from the first test of the period to the last, by these two alone, taken as "
-        "independent; the swing with the temperature is in it. Hangers without a test in the "
+        "independent; the effect of the temperature is in it. Hangers without a test in the "
         "period are left out.",
     )
 
@@ -336,12 +341,6 @@ def _origin(data: BridgeReport) -> Table:
 
 
 REPORT_SCHEMA = "shm.bridge_report/1"
-PATTERN_SCHEMA = "shm.bridge_pattern/1"
-
-
-def pattern_json(pattern: BridgePattern) -> dict[str, Any]:
-    """Return the document that `shm drift bridge --json` prints."""
-    return {"schema": PATTERN_SCHEMA, **asdict(pattern)}
 
 
 def bridge_json(data: BridgeReport) -> dict[str, Any]:

@@ -80,6 +80,14 @@ def trend_row(
 
 
 @dataclass(frozen=True)
+class Dated:
+    """A row of the trend whose time is known."""
+
+    time: datetime
+    row: TrendRow
+
+
+@dataclass(frozen=True)
 class Deed:
     """What a person did with the hanger, such as `baseline set`, and by whom and why."""
 
@@ -184,6 +192,26 @@ class HangerReport:
             or math.isclose(row.measured_hz, measured.get((row.plane, row.order), NAN))
         )
 
+    @property
+    def misfits_percent(self) -> list[tuple[PredictedFrequency, Interval]]:
+        """Return predicted over measured frequency less one of each measured mode, in percent.
+
+        The interval is that of prediction and measurement together; of the prediction alone where
+        the measurement came without a standard deviation.
+        """
+        sds_hz = {(mode.plane, mode.order): mode.frequency_sd_hz for mode in self.latest.modes}
+        return [
+            (each, _misfit(each, sds_hz.get((each.plane, each.order), math.nan)))
+            for each in self.predicted
+            if math.isfinite(each.measured_hz)
+        ]
+
+    @property
+    def dated_trend(self) -> list[Dated]:
+        """Return the rows of the trend with a time, oldest first."""
+        rows = [Dated(row.time, row) for row in self.trend if row.time is not None]
+        return sorted(rows, key=lambda row: row.time)
+
     @cached_property
     def compared(self) -> Selection:
         """Return the model classes as they are by the latest test."""
@@ -214,6 +242,12 @@ class HangerReport:
         """Return the one unit of all tensions, so that they compare at a glance."""
         known = (self.tension_n, self.baseline_tension_n, Interval.of_averaged(self.by_latest_test))
         return force_unit(*(each.mean for each in known if each))
+
+
+def _misfit(each: PredictedFrequency, measured_sd_hz: float) -> Interval:
+    sd_hz = math.hypot(each.sd_hz, measured_sd_hz if math.isfinite(measured_sd_hz) else 0.0)
+    off = Interval.normal(each.mean_hz - each.measured_hz, sd_hz)
+    return off.scaled(100 / each.measured_hz)
 
 
 def summary_of(
@@ -331,6 +365,12 @@ class ModalTestReport:
     @property
     def hits(self) -> tuple[Hit, ...]:
         return self.identification.hits
+
+    @property
+    def located_hits(self) -> list[tuple[int, Hit]]:
+        """Return the hits whose records are at hand, each with its number from 1."""
+        numbered = enumerate(self.hits, 1)
+        return [(number, hit) for number, hit in numbered if hit.record < len(self.recordings)]
 
     @property
     def used_hits(self) -> tuple[Hit, ...]:

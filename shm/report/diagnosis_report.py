@@ -28,7 +28,8 @@ from shm.report.diagnosis_wording import (
     tension_of,
     tension_unit,
 )
-from shm.report.figures.every_figure import OF_DIAGNOSIS
+from shm.report.figures.gap_causes import FIGURE as CAUSES
+from shm.report.figures.gap_map import FIGURE as GAP_MAP
 from shm.report.figures.specification import drawn
 from shm.report.formatting import Interval
 from shm.report.paper import (
@@ -50,6 +51,8 @@ from shm.values import (
     is_excluded,
 )
 from shm.values.rounding import ForceUnit
+
+FIGURES = (CAUSES, GAP_MAP)
 
 _STYLES = {
     Outcome.EXPLAINED: "first",
@@ -94,7 +97,7 @@ def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] 
         details=write_details(sheet.diagnosis),
         facts=facts(sheet),
         remarks=sheet.diagnosis.remarks,
-        figures=lambda: drawn(OF_DIAGNOSIS, sheet),
+        figures=lambda: drawn(FIGURES, sheet),
         tables=(*answers(sheet), *evidence(sheet)),
         status=outcome.value,
         style="watch" if verdict.is_uncertain or verdict.is_doubted else _STYLES[outcome],

@@ -322,3 +322,8 @@ def counted(count: int, what: str) -> str:
 def listed(items: Sequence[str]) -> str:
     """Return `a, b and c`."""
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def counted_tests(tests: tuple[str, ...]) -> str:
+    """Return `test t001`, `5 tests`."""
+    return f"test {tests[0]}" if len(tests) == 1 else f"{len(tests)} tests"

@@ -12,9 +12,8 @@ from shm.report import formatting
 from shm.report import hanger_tables as tables
 from shm.report.assumed import assumptions_line, assumptions_table, with_assumptions
 from shm.report.bar_table import bar_document, bar_table
-from shm.report.bridge_report import pattern_json
 from shm.report.contents import DiagnosisSheet, HangerReport
-from shm.report.control_report import chart_document, control_table
+from shm.report.control_report import chart_document
 from shm.report.diagnosis_report import causes, diagnosis_json, diagnosis_part
 from shm.report.figures.bar_sketch import FIGURE as SKETCH
 from shm.report.figures.control_chart import FIGURE as CONTROL
@@ -26,10 +25,12 @@ from shm.report.figures.specification import drawn
 from shm.report.formatting import Interval
 from shm.report.hanger_sentences import advice, further, summary, why
 from shm.report.hanger_summary import BASELINE_ALONE, BASELINE_AND_CHANGE
+from shm.report.hanger_tables import control_table, temperature_documents
 from shm.report.open_warnings import dated_by_receipt
 from shm.report.paper import CREDIBLE, Fact, Paper, Section, Table, appendices, filled
 from shm.report.shared_tables import settings
-from shm.report.states import period_json, temperature_documents
+from shm.report.shifts import pattern_json
+from shm.report.states import period_json
 from shm.values import Alert, ControlHanger, Drift, FrequencyResponse, Hanger
 from shm.values.rounding import NINETY_PERCENT, force_unit, rounded_percent
 from shm.values.stated_tension import StatedTension, stated

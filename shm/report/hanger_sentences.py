@@ -9,8 +9,7 @@ import numpy as np
 
 from shm.report import formatting, open_warnings
 from shm.report.contents import HangerReport
-from shm.report.diagnosis_summary import next_step, write_summary
-from shm.report.formatting import Interval
+from shm.report.diagnosis_summary import next_step
 from shm.report.hanger_status import UNDETERMINED
 from shm.report.hanger_summary import (
     BASELINE_ALONE,
@@ -18,10 +17,9 @@ from shm.report.hanger_summary import (
     BASELINE_TESTS,
     LATEST_TEST,
 )
-from shm.values import Diagnosis, PredictedFrequency
+from shm.values import PredictedFrequency
 from shm.values.posterior import MOST_R_HAT
 from shm.values.rounding import rounded_percent
-from shm.values.stated_tension import stated
 
 # Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
 # three names are what a sentence bears.
@@ -74,14 +72,9 @@ def further(data: HangerReport) -> str:
 
 
 def _sentences(data: HangerReport) -> tuple[str, ...]:
-    known = data.now.is_determined
     found = (
         *_doubts(data),
         _tension(data),
-        _latest_test(data),
-        # How well a test repeats it, and the probabilities that the owner's limits ask for.
-        *(stated(data.averaged, data.tension_unit).sentences[1:] if known else ()),
-        _against_nominal(data),
         _against_baseline(data),
         _unseen(data),
         "Once the change is explained, set a new baseline (`shm drift rebaseline`)."
@@ -91,7 +84,7 @@ def _sentences(data: HangerReport) -> tuple[str, ...]:
         in_period(data),
         data.neighbours.sentence if data.neighbours else "",
         _model(data),
-        _gap(data),
+        _outside(data),
         *_further_advice(data),
         open_warnings.dated_by_receipt(data.now.undated),
     )
@@ -109,26 +102,6 @@ def _further_advice(data: HangerReport) -> tuple[str, ...]:
     return tuple(each for make in made if (each := make(data)))
 
 
-def misfits_percent(data: HangerReport) -> list[tuple[PredictedFrequency, Interval]]:
-    """Return predicted over measured frequency less one of each measured mode, in percent.
-
-    The interval is that of prediction and measurement together; of the prediction alone where
-    the measurement came without a standard deviation.
-    """
-    sds_hz = {(mode.plane, mode.order): mode.frequency_sd_hz for mode in data.latest.modes}
-    return [
-        (each, _misfit(each, sds_hz.get((each.plane, each.order), math.nan)))
-        for each in data.predicted
-        if math.isfinite(each.measured_hz)
-    ]
-
-
-def _misfit(each: PredictedFrequency, measured_sd_hz: float) -> Interval:
-    sd_hz = math.hypot(each.sd_hz, measured_sd_hz if math.isfinite(measured_sd_hz) else 0.0)
-    off = Interval.normal(each.mean_hz - each.measured_hz, sd_hz)
-    return off.scaled(100 / each.measured_hz)
-
-
 def _tension(data: HangerReport) -> str:
     now = data.now
     if not now.is_determined:
@@ -137,28 +110,6 @@ def _tension(data: HangerReport) -> str:
     tension = formatting.with_half(data.tension_n, data.tension_unit)
     day = f" of {data.latest.time:%Y-%m-%d}" if data.latest.time else ""
     return _BASIS[now.basis].format(tension=tension, test=data.latest.id, day=day)
-
-
-def _latest_test(data: HangerReport) -> str:
-    """Return the tension by the latest test alone, where the headline is another estimate."""
-    if data.now.basis not in (BASELINE_AND_CHANGE, BASELINE_ALONE):
-        return ""
-    alone = formatting.with_half(Interval.of_averaged(data.by_latest_test), data.tension_unit)
-    return f"Test {data.latest.id} alone gives {alone}."
-
-
-def _against_nominal(data: HangerReport) -> str:
-    nominal = data.hanger.nominal_tension_n
-    if not nominal > 0:
-        return "It has no nominal tension to compare with."
-    if not data.now.is_determined:
-        return ""
-    share = data.tension_n.scaled(1 / nominal)
-    half, off = share.width / 2, share.mean - 1
-    if abs(off) <= half:
-        return f"The tension agrees with the nominal one ({rounded_percent(off, half, '+')})."
-    size, side = rounded_percent(abs(off), half), "above" if off > 0 else "below"
-    return f"The tension is {size} {side} nominal."
 
 
 def _against_baseline(data: HangerReport) -> str:
@@ -170,7 +121,8 @@ def _against_baseline(data: HangerReport) -> str:
     if change is None:
         return "The change since the baseline is not known: its latest test does not show it."
     size = rounded_percent(change.mean, change.width / 2, "+")
-    statement = f"Since the baseline of {counted_tests(data.baseline.tests)} it changed by {size}"
+    tests = formatting.counted_tests(data.baseline.tests)
+    statement = f"Since the baseline of {tests} it changed by {size}"
     if not data.now.is_found:
         statement = f"No significant change since the baseline ({size})"
     later = [
@@ -179,11 +131,6 @@ def _against_baseline(data: HangerReport) -> str:
     if not later:
         return f"{statement}."
     return f"{statement}, by a test made before the alert of {max(later):%Y-%m-%d}."
-
-
-def counted_tests(tests: tuple[str, ...]) -> str:
-    """Return `test t001`, `5 tests`."""
-    return f"test {tests[0]}" if len(tests) == 1 else f"{len(tests)} tests"
 
 
 def _unseen(data: HangerReport) -> str:
@@ -218,7 +165,7 @@ def _course(data: HangerReport) -> str:
 
 
 def _model(data: HangerReport) -> str:
-    misfits = misfits_percent(data)
+    misfits = data.misfits_percent
     if not misfits:
         return f"{_chosen(data)}."
     count = (
@@ -233,7 +180,7 @@ def _model(data: HangerReport) -> str:
 
 def _rms_percent(data: HangerReport) -> float:
     """Return the root mean square of the misfits; NaN where no mode was measured."""
-    residuals = [off.mean for _, off in misfits_percent(data)]
+    residuals = [off.mean for _, off in data.misfits_percent]
     return float(np.sqrt(np.mean(np.square(residuals)))) if residuals else math.nan
 
 
@@ -245,17 +192,9 @@ def _misses(data: HangerReport) -> bool:
     return not data.posterior.fits
 
 
-def _gap(data: HangerReport) -> str:
-    """Return what the model does not explain, and why as far as that was diagnosed."""
-    if data.diagnosis is None:
-        return _outside(data)
-    wording = [_diagnosed_on(data.diagnosis), write_summary(data.diagnosis)]
-    return " ".join(part for part in (*wording, data.gap_watch) if part)
-
-
 def _outside(data: HangerReport) -> str:
     """Name the modes that the model class misses by more than both uncertainties."""
-    misfits = [] if _misses(data) else misfits_percent(data)
+    misfits = [] if _misses(data) or data.diagnosis else data.misfits_percent
     outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
     if not misfits:
         return ""
@@ -276,13 +215,6 @@ def _outliers(modes: Sequence[PredictedFrequency]) -> str:
     named = f"{wording[0].upper()}{wording[1:]}"
     who = named if len(modes) <= _MOST_NAMED else formatting.counted(len(modes), "mode")
     return f"{who} {'lies' if len(modes) == 1 else 'lie'} outside the 90 % interval"
-
-
-def _diagnosed_on(diagnosis: Diagnosis) -> str:
-    return (
-        f"What the plain class {diagnosis.baseline} would leave unexplained was diagnosed on "
-        f"{counted_tests(diagnosis.tests)}."
-    )
 
 
 def _chosen(data: HangerReport) -> str:

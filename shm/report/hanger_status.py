@@ -14,8 +14,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from shm.report import formatting
-from shm.report.control_report import control_lead
-from shm.report.formatting import Interval
+from shm.report.formatting import NORMAL_90, Interval
 from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedTest
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
@@ -23,6 +22,7 @@ from shm.watch.alert_text import lead_of, look_again, quantity_words, size_words
 
 if TYPE_CHECKING:
     from shm.report.hanger_summary import HangerSummary
+    from shm.watch.control_chart import ControlChart
 
 WATCH_PROBABILITY = 0.5  # likelier than not
 # Judgement: dead load and erection leave the hangers of sound bridges some 10 % off nominal. With
@@ -282,6 +282,20 @@ def _decide(known: HangerSummary) -> tuple[Status | None, Lead]:
             status = Status.UNCLEAR
         return status, _first(doubts)
     return _quiet(known, status)
+
+
+CONTROL_REMEDY = f"Check clock and sampling rate of the logger, and repeat the control test {WEEK}."
+
+
+def control_lead(chart: ControlChart) -> Lead:
+    """Return state and action of a control hanger."""
+    name, latest = f"Control hanger {chart.hanger.id}", chart.latest
+    if latest is None:
+        return Lead(f"{name}: no test yet.", f"Test it {NEXT_TEST}.")
+    size = rounded_percent(latest.deviation, NORMAL_90 * latest.sd, "+")
+    if latest.is_out:
+        return Lead(f"{name}: {size} from its known tension, out of its limits.", CONTROL_REMEDY)
+    return Lead(f"{name}: {size} from its known tension, within its limits.", "No action needed.")
 
 
 def _in_doubt(known: HangerSummary) -> Lead:

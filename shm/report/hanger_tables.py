@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,19 +14,30 @@ from shm.models.practice_formulas import FORMULAS
 from shm.report import formatting, shared_tables
 from shm.report.bar_table import NOT_STATED
 from shm.report.contents import HangerReport, TrendRow
+from shm.report.control_report import limits, percent
 from shm.report.formatting import Interval
-from shm.report.hanger_sentences import counted_tests, misfits_percent
 from shm.report.hanger_summary import BASELINE_ALONE, BASELINE_AND_CHANGE
 from shm.report.paper import Table, fold_improbable
 from shm.report.shared_tables import lineage, quality_table
 from shm.report.shifts import shift_cells, shift_table
 from shm.report.sizes import size_of
-from shm.report.states import temperature_table
-from shm.values import PLANES, WITHOUT_MODEL, Alert, Mode, Posterior, PredictedFrequency
+from shm.report.states import StatesOverTime
+from shm.values import (
+    PLANES,
+    WITHOUT_MODEL,
+    Alert,
+    FloatArray,
+    Mode,
+    Posterior,
+    PredictedFrequency,
+    TemperatureCoefficient,
+    kind_of,
+)
 from shm.values.messages import Lead
 from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import stated
 from shm.watch.alert_text import factor
+from shm.watch.control_chart import ControlChart
 
 
 def results(data: HangerReport) -> Table:
@@ -61,7 +73,7 @@ def results(data: HangerReport) -> Table:
 
 
 def _baseline_tests(data: HangerReport) -> str:
-    return counted_tests(data.baseline.tests) if data.baseline else ""
+    return formatting.counted_tests(data.baseline.tests) if data.baseline else ""
 
 
 def temperatures(data: HangerReport) -> Table:
@@ -89,12 +101,12 @@ def neighbours(data: HangerReport) -> Table:
     made = shift_table(replace(pattern, rows=near, not_compared=()))
     wording = " ".join((pattern.sentence, *pattern.remarks))
     note = f"{wording} The whole bridge: shm report --bridge."
-    return replace(made, title=title, note=note, terminal_column=())
+    return replace(made, title=title, note=note)
 
 
 def frequencies(data: HangerReport) -> Table:
     measured = {(mode.plane, mode.order): mode for mode in data.latest.modes}
-    misfits = {(mode.plane, mode.order): off for mode, off in misfits_percent(data)}
+    misfits = {(mode.plane, mode.order): off for mode, off in data.misfits_percent}
     return Table(
         "Frequencies",
         (
@@ -187,9 +199,9 @@ def models(data: HangerReport) -> Table:
         "Model classes",
         ("model", "probability", "log evidence", "its sd", *formatting.tension_headings(unit)),
         fold_improbable(rows, [share for _, share in pairs], "classes"),
-        note=f"Compared on {counted_tests(pairs[0][0].tests)}. Before them all classes were "
-        "equally probable, clamped ones less so but with the thesis's priors. Evidence in natural "
-        "logarithms, with the standard deviation of its sampling."
+        note=f"Compared on {formatting.counted_tests(pairs[0][0].tests)}. Before them all classes "
+        "were equally probable, clamped ones less so but with the thesis's priors. Evidence in "
+        "natural logarithms, with the standard deviation of its sampling."
         if pairs
         else "",
     )
@@ -281,7 +293,7 @@ def period(data: HangerReport) -> Table:
                 if name in first.stiffness
             ),
         ),
-        note="By these two tests alone, taken as independent of one another; the swing with the "
+        note="By these two tests alone, taken as independent of one another; the effect of the "
         "temperature is in the change. The intervals of stiffness are of log10.",
     )  # fmt: skip
 
@@ -417,3 +429,100 @@ def sampling(data: HangerReport) -> Table:
 
 def _seconds(seconds: float) -> str:
     return f"{seconds:.1f} s" if math.isfinite(seconds) else "not known"
+
+
+_WIDE_K = 10.0
+
+
+_FEWEST = 3
+"""Of two tests at two temperatures nobody can tell an effect of the temperature from a change."""
+
+
+def temperature_table(states: StatesOverTime) -> Table:
+    """Return each quantity's change per kelvin in percent of itself, or why it is not known."""
+    why = _why_not_known(states)
+    titles = {quantity.name: quantity.title for quantity in states.quantities}
+    known = [_is_known(each, states) for each in states.temperature_coefficients]
+    rows = tuple(
+        _coefficient_row(
+            each, titles.get(each.quantity, formatting.quantity(each.quantity)), "" if sure else why
+        )
+        for each, sure in zip(states.temperature_coefficients, known, strict=True)
+    )
+    if len(rows) > 1 and not any(known):
+        rows = (("tension and end stiffness", f"not known: {why}", ""),)
+    return Table(
+        "Change with the temperature",
+        ("quantity", "change per K", "90 % interval"),
+        rows,
+        note="In percent of the quantity, mean and standard deviation, beside what the softening "
+        "of steel explains (0.03 % of its modulus per K). States over time are free of it; "
+        "for the shifts the watch learns a coefficient of its own.",
+    )
+
+
+def temperature_documents(states: StatesOverTime) -> list[dict[str, Any]]:
+    """Return the change of each quantity per kelvin; `known` is false without any test."""
+    return [
+        {
+            "quantity": each.quantity,
+            "unit": f"{kind_of(each.quantity).shift_unit} per K",
+            "mean": each.mean,
+            "sd": each.sd,
+            "prior_sd": each.prior_sd,
+            "known": _is_known(each, states),
+            "why_not_known": "" if _is_known(each, states) else _why_not_known(states),
+        }
+        for each in states.temperature_coefficients
+    ]
+
+
+def _coefficient_row(
+    each: TemperatureCoefficient, title: str, why_not_known: str
+) -> tuple[str, ...]:
+    if why_not_known:
+        return (title, f"not known: {why_not_known}", "")
+    scale = kind_of(each.quantity).percent_a_unit
+    change = Interval.normal(each.mean, each.sd).scaled(scale)
+    sd = f"{scale * each.sd:.{formatting.decimals(change.width)}f}"
+    return (
+        title,
+        f"{formatting.mean(change, True)} ± {sd} % per K",
+        f"{formatting.span(change, True)} % per K",
+    )
+
+
+def _is_known(each: TemperatureCoefficient, states: StatesOverTime) -> bool:
+    """Return True if the tests show it, and are enough to distinguish it from a change."""
+    return each.is_known and len(_known_c(states)) >= _FEWEST
+
+
+def _known_c(states: StatesOverTime) -> FloatArray:
+    """Return the temperatures (n,) of the tests that count."""
+    return states.temperatures_c[np.isfinite(states.temperatures_c) & ~states.outlier]
+
+
+def _why_not_known(states: StatesOverTime) -> str:
+    known = _known_c(states)
+    if len(known) < 2:
+        return f"{formatting.counted(len(known), 'test')} with a temperature"
+    span_k = float(np.ptp(known))
+    if span_k >= _WIDE_K:
+        return f"{len(known)} tests over {span_k:.0f} K are too few to tell it from other changes"
+    return f"the temperatures of the tests differ by {span_k:.1f} K only"
+
+
+def control_table(chart: ControlChart) -> Table:
+    """Return each test with its limits, the latest first."""
+    unit = force_unit(chart.hanger.known_tension_n)
+    rows = tuple(
+        (
+            each.test, formatting.moment(each.time),
+            formatting.rounded_tension(each.tension_n, unit),
+            formatting.rounded_tension(each.known_n, unit), percent(each.deviation), limits(each),
+            "out of limits" if each.is_out else "within limits",
+        )
+        for each in reversed(chart.points)
+    )  # fmt: skip
+    names = ("test", "time", "tension", "known", "deviation", "limits", "")
+    return Table("Control chart", names, rows, note="Limits: three standard deviations.")

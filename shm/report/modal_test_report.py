@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -14,13 +13,26 @@ from shm.report import formatting, shared_tables
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.contents import ModalTestReport
 from shm.report.figures.bar_sketch import FIGURE as SKETCH
-from shm.report.figures.every_figure import modal_test_figures
-from shm.report.figures.specification import drawn
+from shm.report.figures.modal_test_axes import ResponseCurves
+from shm.report.figures.modal_test_hits import FIGURE as HITS
+from shm.report.figures.modal_test_modes import SHAPES, STABILISATION
+from shm.report.figures.modal_test_response import FIGURE as RESPONSE
+from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
+from shm.report.figures.specification import FigureSpec, Illustration, drawn
 from shm.report.figures.style import VERDICT_STYLES
 from shm.report.paper import Fact, Paper, Section, Table, filled
 from shm.report.shared_tables import headline, lineage, overall, quality_table, settings
-from shm.values import PLANES, FrequencyResponse, Mode, Plane, QualityCheck, Recording, Verdict
+from shm.values import FrequencyResponse, Mode, QualityCheck, Recording, Verdict
 from shm.values.rounding import force_unit
+
+FIGURES: tuple[FigureSpec[ResponseCurves], ...] = (
+    TIME_HISTORY, HITS, RESPONSE, STABILISATION, SHAPES
+)  # fmt: skip
+
+
+def modal_test_figures(sheet: ModalTestReport) -> tuple[Illustration, ...]:
+    """Draw all of one hammer test."""
+    return drawn(FIGURES, ResponseCurves.of(sheet))
 
 
 def modal_test_paper(sheet: ModalTestReport) -> Paper:
@@ -60,7 +72,7 @@ def facts(sheet: ModalTestReport) -> tuple[Fact, ...]:
         ("Modes", str(len(sheet.modes)), f"in {formatting.counted(len(planes), 'plane')}"),
         ("Hits used", f"{len(sheet.used_hits)} of {len(hits)}" if hits else "none", _force(sheet)),
         ("Tested", formatting.moment(test.time), formatting.temperature(test.temperature_c)),
-        ("Set aside", str(len(sheet.identification.set_aside)), "resonances without an order"),
+        ("Excluded", str(len(sheet.identification.set_aside)), "resonances without an order"),
     )
 
 
@@ -83,60 +95,9 @@ def name(sheet: ModalTestReport) -> str:
 
 
 def summary(sheet: ModalTestReport) -> str:
-    """Return one paragraph in plain words."""
-    sentences = (
-        measured(sheet),
-        _what_was_found(sheet),
-        _without_order(sheet),
-        _what_is_no_mode(sheet),
-        trust(sheet),
-        advice(sheet),
-    )
+    """Return how far the modes can be used, what has no order, and what to do next."""
+    sentences = (_trust(sheet), _without_order(sheet), _what_is_no_mode(sheet), _advice(sheet))
     return " ".join(sentence for sentence in sentences if sentence)
-
-
-def measured(sheet: ModalTestReport) -> str:
-    test = sheet.identification.test
-    when = f"{formatting.moment(test.time)}, {formatting.temperature(test.temperature_c)}"
-    return f"This test ({when}) has {_sensors(sheet)}{_excitation(sheet)}."
-
-
-def _sensors(sheet: ModalTestReport) -> str:
-    response = sheet.identification.frequency_response
-    points: Sequence[tuple[str | None, float]] = []
-    if response is not None:
-        points = [(point.plane, point.x_m) for point in response.points]
-    elif sheet.recordings:
-        points = [(c.plane, c.x_m) for c in sheet.recordings[0].accelerations]
-    if not points:
-        return "no records at hand"
-    places = {x_m for _, x_m in points if math.isfinite(x_m)}
-    at = f" at {formatting.counted(len(places), 'place')}" if places else ""
-    planes = {plane for plane, _ in points if plane}
-    where = {0: "", 1: f" in the {next(iter(planes), '')} plane", 2: " in both planes"}
-    return f"{formatting.counted(len(points), 'acceleration channel')}{at}{where[len(planes)]}"
-
-
-def _excitation(sheet: ModalTestReport) -> str:
-    if len(sheet.used_hits) == len(sheet.hits) == 1:
-        return " and one hit"
-    if not sheet.hits:
-        given = sheet.identification.frequency_response is not None
-        return ", given as frequency responses" if given else " of ambient motion: nobody hit"
-    reasons = Counter(hit.reason for hit in sheet.hits if not hit.used)
-    left = formatting.listed([f"{count} {reason}" for reason, count in reasons.items()] or [""])
-    dropped = f", {sum(reasons.values())} dropped ({left})" if reasons else ""
-    hits = formatting.counted(len(sheet.hits), "hit")
-    return f" and {hits}: {len(sheet.used_hits) if reasons else 'all'} used{dropped}"
-
-
-def _what_was_found(sheet: ModalTestReport) -> str:
-    if not sheet.modes:
-        return "" if _without_order(sheet) else "No mode was identified."
-    groups = [_group(sheet, plane) for plane in PLANES]
-    listed = formatting.listed([group for group in groups if group])
-    verb = "was" if len(sheet.modes) == 1 else "were"
-    return f"{formatting.counted(len(sheet.modes), 'mode')} {verb} identified: {listed}."
 
 
 def _without_order(sheet: ModalTestReport) -> str:
@@ -148,26 +109,6 @@ def _without_order(sheet: ModalTestReport) -> str:
     return f"The order of {count} is not known ({min(found_hz):.4g} to {max(found_hz):.4g} Hz)."
 
 
-def _group(sheet: ModalTestReport, plane: Plane) -> str:
-    modes = sorted((m for m in sheet.modes if m.plane == plane), key=lambda m: m.frequency_hz)
-    if not modes:
-        return ""
-    low, high = modes[0].frequency_hz, modes[-1].frequency_hz
-    span = f"{low:.4g} Hz" if len(modes) == 1 else f"{low:.4g} to {high:.4g} Hz"
-    return f"{plane} {_orders(modes)} ({span})"
-
-
-def _orders(modes: Sequence[Mode]) -> str:
-    """Return `1 to 3, 5, 7 to 9`."""
-    runs: list[list[int]] = []
-    for order in sorted(mode.order for mode in modes):
-        if runs and order == runs[-1][-1] + 1:
-            runs[-1].append(order)
-        else:
-            runs.append([order])
-    return ", ".join(str(r[0]) if len(r) == 1 else f"{r[0]} to {r[-1]}" for r in runs)
-
-
 def _what_is_no_mode(sheet: ModalTestReport) -> str:
     found = [each for each in sheet.identification.set_aside if each.kind != "unnumbered"]
     if not found:
@@ -176,7 +117,7 @@ def _what_is_no_mode(sheet: ModalTestReport) -> str:
     return f"Excluded, as they are no modes of the hanger: {listed}."
 
 
-def trust(sheet: ModalTestReport) -> str:
+def _trust(sheet: ModalTestReport) -> str:
     """Return a sentence on how far the modes can be used."""
     checks = sheet.identification.quality
     made = [check for check in checks if check.verdict != "unknown"]
@@ -201,7 +142,7 @@ def _names(checks: Sequence[QualityCheck], verdict: Verdict) -> str:
     return formatting.listed([check.name for check in checks if check.verdict == verdict])
 
 
-def advice(sheet: ModalTestReport) -> str:
+def _advice(sheet: ModalTestReport) -> str:
     """Return what to do next, gravest first."""
     checks = sheet.identification.quality
     graves = sorted(

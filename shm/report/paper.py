@@ -72,10 +72,9 @@ class Table:
 
     `marks` names a style for each row; empty: none has one. A terminal shows the rows whose
     indices are in `terminal_rows`, all where it is None; `hidden_note` says in place of `{}` how
-    many more there are, and a table without either is left out there. `terminal_column`, a
-    heading and a cell for each row, stands after the first column in a terminal, which has no
-    figures. One that `may_break` goes on over a page's end, where others begin a new page; paper
-    shows the two halves of one that `is_folded` next to each other.
+    many more there are, and a table without either is left out there. One that `may_break` goes on
+    over a page's end, where others begin a new page; paper shows the two halves of one that
+    `is_folded` next to each other.
     """
 
     title: str
@@ -85,7 +84,6 @@ class Table:
     marks: tuple[str, ...] = ()
     terminal_rows: tuple[int, ...] | None = None
     hidden_note: str = "... and {} more rows (in HTML and JSON)."
-    terminal_column: tuple[str, ...] = ()
     may_break: bool = False
     is_folded: bool = False
 

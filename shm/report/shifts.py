@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
+from typing import Any
 
 from shm.report import formatting
 from shm.report.formatting import Interval
@@ -60,9 +62,6 @@ def _stiffness(interval: Interval) -> tuple[str, str]:
     return f"{mean} times", f"{low} to {high} times"
 
 
-_BAR = 6  # layout: signs of a bar in a terminal
-
-
 _PERCENT_DECIMALS = 1
 
 
@@ -92,20 +91,9 @@ def shift_table(pattern: BridgePattern) -> Table:
         ("hanger", f"shift, {unit.name} (90 %)", "shift, % (90 %)", "it has", "test of"),
         tuple(rows),
         note="Shift of the tension since the baseline at each hanger's latest test, if there is "
-        "any, the swing with the temperature taken out, with 90 % intervals; whether it has lost "
+        "any, without the effect of the temperature, with 90 % intervals; whether it has lost "
         "or gained, with the probability of that.",
-        terminal_column=(
-            "lost | gained",
-            *(bar(share) for share in _shares(pattern)),
-            *("" for _ in pattern.not_compared),
-        ),
     )
-
-
-def _shares(pattern: BridgePattern) -> list[float]:
-    """Return shifts as fractions of the largest."""
-    widest = max(abs(row.shift_fraction) for row in pattern.rows) or 1.0
-    return [row.shift_fraction / widest for row in pattern.rows]
 
 
 def _shift(row: HangerRow, unit: ForceUnit, places: int) -> tuple[str, ...]:
@@ -120,15 +108,6 @@ def _shift(row: HangerRow, unit: ForceUnit, places: int) -> tuple[str, ...]:
     )
 
 
-def bar(share: float) -> str:
-    """Return a share of the largest shift, -1 to 1, as `...<==|......`."""
-    length = round(abs(share) * _BAR)
-    stroke = "=" * (length - 1)
-    left = f"<{stroke}" if share < 0 and length else ""
-    right = f"{stroke}>" if share > 0 and length else ""
-    return f"{left.rjust(_BAR, '.')}|{right.ljust(_BAR, '.')}"
-
-
 def _signed(interval: Interval, places: int) -> str:
     nothing = 0.5 * 10**-places
     if max(abs(interval.low), abs(interval.high)) < nothing:
@@ -141,3 +120,11 @@ def _signed(interval: Interval, places: int) -> str:
 
 def _day(time: object) -> str:
     return f"{time:%Y-%m-%d}" if time else "none"
+
+
+PATTERN_SCHEMA = "shm.bridge_pattern/1"
+
+
+def pattern_json(pattern: BridgePattern) -> dict[str, Any]:
+    """Return the document that `shm drift bridge --json` prints."""
+    return {"schema": PATTERN_SCHEMA, **asdict(pattern)}

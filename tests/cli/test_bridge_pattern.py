@@ -84,12 +84,6 @@ def test_a_common_shift_is_told_with_the_change_of_temperature(tmp_path: Path) -
     assert "+20 K from their baselines" in told
 
 
-def test_the_table_draws_who_lost_and_who_gained(arch: Workspace) -> None:
-    told = call(arch).stdout
-    assert "<=====|......" in told
-    assert "......|==>..." in told
-
-
 @pytest.mark.parametrize(
     "arguments", [[], ["--bridge", "--hanger", "6"], ["--bridge", "--test", "t"]]
 )

@@ -9,7 +9,6 @@ import pytest
 
 from shm.bridge import load_hanger
 from shm.models import THESIS, build
-from shm_cli.example import HANGER_FILE
 from tests.cli.conftest import Shm
 
 STIFF = [part for k in range(1, 5) for part in ("--set", f"log10_k{k}=12")]
@@ -71,24 +70,3 @@ def test_a_wrong_parameter_is_a_usage_error_that_says_how(
     ended = shm("predict", *arguments, "--hanger-file", hanger_file)
     assert ended.code == 2
     assert said in ended.err
-
-
-def test_a_sweep_is_drawn(shm: Shm, hanger_file: Path, tmp_path: Path) -> None:
-    drawn = ("--sweep", "theta_F=0.5:2:4", "--figure", tmp_path / "sweep.png")
-    assert shm("predict", "beam1", "--hanger-file", hanger_file, *drawn).code == 0
-    assert (tmp_path / "sweep.png").read_bytes().startswith(b"\x89PNG")
-    nowhere = ("--figure", tmp_path / "no" / "sweep.png")
-    assert "is no folder" in shm("predict", "beam1", *drawn[:2], *nowhere).err
-    alone = shm("predict", "beam1", "--hanger-file", hanger_file, *drawn[2:])
-    assert alone.code == 2
-    assert "--sweep" in alone.err
-
-
-def test_predict_draws_a_mode_of_a_solid_and_refuses_a_beam_s(shm: Shm, tmp_path: Path) -> None:
-    path = tmp_path / "mode.png"
-    given = ("--hanger-file", HANGER_FILE, "--shape", "longitudinal:1", "--figure", path)
-    ended = shm("predict", "s1", *given)
-    assert (ended.code, ended.err) == (0, "")
-    assert f"is drawn in {path}" in ended.out.replace("\n", " ")
-    assert path.read_bytes().startswith(b"\x89PNG")
-    assert "is no solid" in shm("predict", "beam1", *given).err

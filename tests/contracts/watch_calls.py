@@ -16,7 +16,7 @@ import numpy as np
 
 from shm.documents import alert_document, drift_document, dump
 from shm.modes_document import load_modes
-from shm.report.bridge_report import pattern_json
+from shm.report.shifts import pattern_json
 from shm.store.blobs import watch_document
 from shm.values import (
     Alert,

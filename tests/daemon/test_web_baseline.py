@@ -64,7 +64,7 @@ def test_an_engineer_sets_it_and_is_told_what_holds_from_now_on(
     assert PAGE not in browser.get("/hangers/3").text
     sign_in(browser, "engineer")
     assert PAGE in browser.get("/hangers/3").text
-    assert "It is compared with its test" in browser.get(PAGE).text
+    assert "Compared with one test" in browser.get(PAGE).text
     assert "has no baseline yet" in browser.get("/hangers/4/baseline").text
     for wrong, status in (({"since": ""}, 422), ({"why": " "}, 409), ({"kind": "prayed"}, 422)):
         assert browser.post(PAGE, data={**asked, **wrong}).status_code == status

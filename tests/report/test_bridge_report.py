@@ -16,7 +16,6 @@ from shm.report.formatting import Interval
 from shm.report.hanger_sentences import summary
 from shm.report.hanger_status import Status
 from shm.report.hanger_tables import neighbours
-from shm.report.shifts import bar
 from shm.values import Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
 from tests.helpers.nouns import a_change, a_summary, with_now
@@ -80,14 +79,6 @@ def test_without_a_pattern_the_hangers_are_told_and_why(report: BridgeReport) ->
     assert document["pattern"] is None
     assert document["hangers"][2]["status"] == "alert"
     assert document["hangers"][8]["tension_n"] is None
-
-
-@pytest.mark.parametrize(
-    ("share", "drawn"),
-    [(0, "......|......"), (-1, "<=====|......"), (0.5, "......|==>..."), (0.01, "......|......")],
-)
-def test_a_bar_shows_a_share_of_the_largest_shift(share: float, drawn: str) -> None:
-    assert bar(share) == drawn
 
 
 def test_a_hanger_whose_change_is_called_tells_of_those_beside_it(

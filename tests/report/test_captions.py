@@ -11,12 +11,18 @@ from pathlib import Path
 from typing import Any
 
 from shm.report.contents import HangerReport
-from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST
-from shm.report.figures.modal_test_response import ResponseCurves
+from shm.report.diagnosis_report import FIGURES as OF_DIAGNOSIS
+from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
+from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
+from shm.report.figures.hanger_temperature import FIGURE as TEMPERATURE
+from shm.report.figures.hanger_trend import FIGURE as TREND
+from shm.report.figures.modal_test_axes import ResponseCurves
+from shm.report.modal_test_report import FIGURES as OF_MODAL_TEST
 from tests.report.conftest import bare, hanger, season
 from tests.report.diagnoses import sheet
 from tests.report.test_modal_test_figures import CASES as SHEETS
 
+OF_HANGER = (TREND, FREQUENCIES, STIFFNESS, TEMPERATURE)
 KEPT = Path(__file__).parent / "data" / "captions.txt"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
@@ -11,21 +10,22 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pytest
-from PIL import Image
 
 from shm.report.contents import DiagnosisSheet, HangerReport
-from shm.report.figures.every_figure import (
-    OF_DIAGNOSIS,
-    OF_HANGER,
-    OF_MODAL_TEST,
-    modal_test_figures,
-)
-from shm.report.figures.modal_test_response import ResponseCurves
-from shm.report.figures.specification import Illustration, Specification, drawn, png
+from shm.report.diagnosis_report import FIGURES as OF_DIAGNOSIS
+from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
+from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
+from shm.report.figures.hanger_temperature import FIGURE as TEMPERATURE
+from shm.report.figures.hanger_trend import FIGURE as TREND
+from shm.report.figures.modal_test_axes import ResponseCurves
+from shm.report.figures.specification import Illustration, Specification, drawn
 from shm.report.figures.style import PALETTE
+from shm.report.modal_test_report import FIGURES as OF_MODAL_TEST
+from shm.report.modal_test_report import modal_test_figures
 from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, sheet
 from tests.report.sheets import make_sheet, warned
 
+OF_HANGER = (TREND, FREQUENCIES, STIFFNESS, TEMPERATURE)
 SVG = "{http://www.w3.org/2000/svg}"
 Figures = dict[str, dict[str, Illustration]]
 
@@ -113,16 +113,6 @@ def test_drawing_is_repeatable_and_changes_no_setting(season: HangerReport) -> N
     first, second = (drawn(OF_HANGER[:1], season)[0].svg() for _ in range(2))
     assert first == second
     assert dict(mpl.rcParams) == before
-
-
-def test_a_png_has_room_below_for_words(figures: Figures) -> None:
-    figure = figures["season"]["trend"].figure
-    bare, told = (
-        Image.open(io.BytesIO(png(figure, 50, words))) for words in ("", "circles: seen. " * 40)
-    )
-    assert bare.format == "PNG"
-    assert told.height > bare.height + 20
-    assert told.width < 1.1 * bare.width
 
 
 def test_the_trend_has_levels_and_alerts(figures: Figures, season: HangerReport) -> None:

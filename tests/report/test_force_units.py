@@ -181,8 +181,7 @@ def test_a_notebook_shows_that_unit(season: HangerReport, tension_n: float, unit
     assert f"tension in {unit}" in row
     assert not NOTHING.search(row)
     assert f">tension, {unit}</th>" in notebook.sheet(data.selection).html
-    (nominal,) = re.findall(
-        r"nominal tension</th><td[^>]*>([^<]*)", notebook.sheet(data.hanger).html
-    )
+    described = notebook.sheet(data.hanger).html
+    (nominal,) = re.findall(r"nominal tension</th><td[^>]*>([^<]*)", described)
     assert nominal.endswith(f" {unit}")
     assert not NOTHING.search(nominal)

@@ -14,11 +14,11 @@ from matplotlib.lines import Line2D
 
 from shm.report.contents import ModalTestReport
 from shm.report.figures import style
-from shm.report.figures.every_figure import OF_MODAL_TEST
-from shm.report.figures.every_figure import modal_test_figures as report_test_figures
-from shm.report.figures.modal_test_response import ResponseCurves
+from shm.report.figures.modal_test_axes import ResponseCurves
 from shm.report.figures.specification import Illustration
 from shm.report.figures.specification import drawn as members_drawn
+from shm.report.modal_test_report import FIGURES as OF_MODAL_TEST
+from shm.report.modal_test_report import modal_test_figures as report_test_figures
 from shm.values import PLANES, Channel
 from tests.report.sheets import (
     ambient,

@@ -53,15 +53,12 @@ def told(outline: Outline) -> str:
     return " ".join(" ".join(outline.words).split())
 
 
-def test_the_page_begins_with_what_was_measured_what_came_of_it_and_what_to_do(
+def test_the_page_begins_with_how_far_it_can_be_used(
     outlines: dict[str, Outline],
 ) -> None:
     page = told(outlines["dropped"])
     paragraph = page[page.index("In short") : page.index("Modes and quality")]
     for words in (
-        "4 acceleration channels at 2 places in both planes and 6 hits: 5 used",
-        "1 dropped (1 double hit)",
-        "12 modes were identified: transverse 1 to 6 (5.8 to 34.8 Hz) and longitudinal 1 to 6",
         "Excluded, as they are no modes of the hanger: harmonic at 11.6 Hz, tone at 50 Hz and",
         "The modes can be used with care: 2 of 4 checks warn (double hits and tones)",
         "Next: Hit freely. Move the cables",
@@ -91,9 +88,6 @@ def test_the_page_holds_every_number_that_a_person_checks(outlines: dict[str, Ou
     ("name", "words"),
     [
         ("refused", "Do not use it: refused by noise. Next: Hit harder."),
-        ("given responses", "9 acceleration channels at 9 places, given as frequency responses."),
-        ("one sensor", "1 acceleration channel and 5 hits: all used."),
-        ("ambient", "of ambient motion: nobody hit."),
         ("ambient", "Its quality was not checked: judge by the figures before using the modes."),
     ],
 )
@@ -109,7 +103,6 @@ def test_a_test_of_good_checks_is_trusted() -> None:
     )
     sheet = replace(sheet, identification=replace(sheet.identification, quality=checks))
     text = " ".join(as_text(modal_test_paper(sheet)).split())
-    assert "and one hit." in text
     assert "the one check that could be made is good" in text
     assert "Nothing needs doing before using them." in text
     assert "1 further check good." in text

@@ -11,7 +11,8 @@ import pytest
 from shm.report.as_text import as_text
 from shm.report.contents import HangerReport
 from shm.report.hanger_report import hanger_json, hanger_paper
-from shm.report.states import StatesOverTime, temperature_documents, temperature_table
+from shm.report.hanger_tables import temperature_documents, temperature_table
+from shm.report.states import StatesOverTime
 from shm.values import FloatArray, TemperatureCoefficient
 
 TENSION = TemperatureCoefficient("tension", -0.0012, 0.0003, 0.004)

@@ -84,7 +84,7 @@ class CalledChange(BaseModel):
 class StateOverTime(BaseModel):
     """Estimate of one quantity from all tests so far: tension in N, stiffness log10 of its unit.
 
-    It holds at the reference temperature: the swing with the temperature is taken out.
+    It holds at the reference temperature: the effect of the temperature is taken out.
     """
 
     quantity: str

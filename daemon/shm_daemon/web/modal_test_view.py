@@ -22,13 +22,13 @@ from shm.identify import Identification, Poles
 from shm.pipeline.lineage import identify_lineage
 from shm.pipeline.reporting import modal_test_report
 from shm.report.contents import ModalTestReport
+from shm.report.figures.modal_test_axes import ResponseCurves, Spectrum
 from shm.report.figures.modal_test_hits import FIGURE as HITS
 from shm.report.figures.modal_test_modes import SHAPES, STABILISATION, rows_of
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
-from shm.report.figures.modal_test_response import ResponseCurves, Spectrum
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
 from shm.report.figures.specification import FigureSpec, Specification
-from shm.report.modal_test_report import advice, conditions, dropped, hits, summary, trust
+from shm.report.modal_test_report import conditions, dropped, hits, summary
 from shm.report.paper import Table
 from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
 from shm.store.archive import MODES_SUFFIX
@@ -175,10 +175,8 @@ class ModalTestView:
 
     @property
     def summary(self) -> str:
-        """One paragraph in plain words."""
-        if self.worked:
-            return self.worked.summary
-        return " ".join(part for part in (trust(self.as_stored), advice(self.as_stored)) if part)
+        """Return one paragraph in plain words."""
+        return summary(self.sheet)
 
     def whole(self) -> WorkedOut | None:
         """Return the whole sheet; None while it is worked out, which this begins.
@@ -222,14 +220,13 @@ _NO_POLES = Poles(np.empty(0), np.empty(0), np.empty(0), np.empty(0, bool))
 
 @dataclass(frozen=True, eq=False)
 class WorkedOut:
-    """A whole sheet but for its records, and what was made of those: words, tables, figures.
+    """A whole sheet but for its records, and what was made of those: tables, figures.
 
     `figures` are documents as JSON bytes, by name; those that came to nothing are not among them.
     """
 
     sheet: ModalTestReport
     spectrum: Spectrum | None
-    summary: str
     hits: Table
     dropped: Table
     conditions: Table
@@ -259,7 +256,6 @@ class ModalTestOrder:
         return WorkedOut(
             sheet=replace(sheet, records=()),
             spectrum=whole.spectrum,
-            summary=summary(sheet),
             hits=hits(sheet),
             dropped=dropped(sheet),
             # Where it comes from, the page says itself, with the steps.

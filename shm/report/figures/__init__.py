@@ -1,1 +1,1 @@
-"""The figures of all reports: `every_figure` lists them, each is drawn from one specification."""
+"""The figures of all reports: each is drawn from one specification."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -45,7 +44,6 @@ def specify_shifts(pattern: BridgePattern) -> Specification:
     """Return bars of the shifts with their intervals; hangers not compared as crosses at 0."""
     unit, _ = shift_unit(pattern)
     places = _places(pattern)
-    step = (max(places.values()) - min(places.values())) / max(len(places) - 1, 1) or 1.0
     marks: list[Mark] = []
     for way, colour in _WAYS.items():
         rows = [row for row in pattern.rows if row.way == way]
@@ -54,7 +52,7 @@ def specify_shifts(pattern: BridgePattern) -> Specification:
                 Bars(
                     x=[places[row.hanger] for row in rows],
                     y=unit.of(np.array([row.shift_n for row in rows])),
-                    width=_BAR_WIDTH * step,
+                    width=_BAR_WIDTH,
                     colour=colour,
                     name=way,
                 )
@@ -84,7 +82,7 @@ def specify_shifts(pattern: BridgePattern) -> Specification:
             Panel(
                 y=Axis(label=f"lost or gained ({unit.name})"),
                 marks=marks,
-                x=_along(pattern, places, step),
+                x=_along(places),
             )
         ],
         _INCHES,
@@ -92,30 +90,17 @@ def specify_shifts(pattern: BridgePattern) -> Specification:
     )
 
 
-def _places(pattern: BridgePattern) -> dict[int, float]:
-    """Return where each hanger is along the bridge: in m where all are known, else its place."""
-    if not _in_metres(pattern):
-        compared = {row.hanger: float(row.place) for row in pattern.rows}
-        return compared | {each.hanger: float(each.place) for each in pattern.not_compared}
-    known = {row.hanger: row.position_m for row in pattern.rows}
-    at = np.array([[row.place, row.position_m] for row in pattern.rows])
-    slope, start = np.polyfit(at[:, 0], at[:, 1], 1)
-    return {**known, **{each.hanger: start + slope * each.place for each in pattern.not_compared}}
+def _places(pattern: BridgePattern) -> dict[int, int]:
+    """Return the place of each hanger in the order of the bridge."""
+    return {each.hanger: each.place for each in (*pattern.rows, *pattern.not_compared)}
 
 
-def _in_metres(pattern: BridgePattern) -> bool:
-    return all(math.isfinite(row.position_m) for row in pattern.rows)
-
-
-def _along(pattern: BridgePattern, places: dict[int, float], step: float) -> Axis:
-    ends = min(places.values()) - step, max(places.values()) + step
-    if _in_metres(pattern):
-        return Axis(label="along the bridge (m)", range=ends, grid=False)
+def _along(places: dict[int, int]) -> Axis:
     ordered = sorted(places, key=lambda hanger: places[hanger])
     shown = ordered[:: 1 + (len(ordered) - 1) // _MOST_NUMBERS]
     return Axis(
         label="hanger, in the order of the bridge",
-        range=ends,
+        range=(min(places.values()) - 1, max(places.values()) + 1),
         ticks=[places[hanger] for hanger in shown],
         tick_labels=[str(hanger) for hanger in shown],
         grid=False,

@@ -11,7 +11,6 @@ from shm.report import formatting
 from shm.report.contents import HangerReport
 from shm.report.figures import specification as spec
 from shm.report.formatting import NORMAL_90, Interval
-from shm.report.hanger_sentences import misfits_percent
 from shm.values import (
     PLANES,
     Mode,
@@ -101,7 +100,7 @@ def _caption(data: HangerReport) -> str:
 
 
 def _alt(data: HangerReport) -> str:
-    offs = [off.mean / 100 for _, off in misfits_percent(data)]
+    offs = [off.mean / 100 for _, off in data.misfits_percent]
     return (
         f"Ratio of predicted to measured frequency of {len(offs)} modes, between "
         f"{1 + min(offs):.4f} and {1 + max(offs):.4f}."

@@ -152,7 +152,7 @@ def _courses(data: HangerReport) -> list[StiffnessHistory]:
             )
             for each in watched
         ]
-    rows = time_axes.dated(data)
+    rows = data.dated_trend
     base = end_stiffness(data.baseline, data.hanger) if data.baseline else {}
     return [
         StiffnessHistory(

@@ -299,7 +299,7 @@ def _alt(course: TensionHistory) -> str:
 
 
 def _course(data: HangerReport) -> TensionHistory:
-    rows = time_axes.dated(data)
+    rows = data.dated_trend
     alerted = {alert.test: alert.message for alert in data.alerts}
     undated = len(data.trend) - len(rows)
     baseline_n = data.now.baseline_n

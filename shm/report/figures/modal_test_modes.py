@@ -10,7 +10,7 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
 from shm.report.figures import specification as spec
-from shm.report.figures.modal_test_response import (
+from shm.report.figures.modal_test_axes import (
     ResponseCurves,
     Spectrum,
     mode_marks,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,18 +11,8 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
 from shm.report.figures import specification as spec
-from shm.report.figures.modal_test_hits import (
-    borders_s,
-    channel_of,
-    hit_time_s,
-    located_hits,
-    offsets_s,
-    shown_rows,
-    thinned,
-    unknown_times_s,
-)
-from shm.report.figures.modal_test_response import ResponseCurves
-from shm.values import FloatArray
+from shm.report.figures.modal_test_axes import ResponseCurves
+from shm.values import Channel, FloatArray, Recording
 
 if TYPE_CHECKING:
     from shm.identify import Hit
@@ -32,6 +23,94 @@ _LEAD = 0.012
 _MARKS_AT, _ROOM = 0.84, 0.35
 """Where the marks of the hits stand in the uppermost panel, as a share of its height, and the room
 above the curve that is left to them, as a share of the curve's."""
+
+
+# Layout: channels drawn, and of these at most that are not sound.
+_MOST_CHANNELS, _MOST_FAULTY = 4, 2
+_BINS = 700
+_GAP_SHARE = 0.015
+"""Between two records, as a share of their whole length."""
+
+
+def shown_rows(sheet: ModalTestReport) -> list[int]:
+    """Return rows of accelerations to draw: some left out, then some of each plane in turn.
+
+    Of a plane the first, the last, and those between.
+    """
+    channels = sheet.recordings[0].accelerations
+    faults = sheet.channel_faults
+    faulty = [row for row, channel in enumerate(channels) if channel.name in faults]
+    sound = [row for row in range(len(channels)) if row not in faulty]
+    chosen = faulty[:_MOST_FAULTY]
+    chosen += _in_turn(channels, sound)[: max(1, _MOST_CHANNELS - len(chosen))]
+    return sorted(chosen)
+
+
+def _in_turn(channels: tuple[Channel, ...], rows: list[int]) -> list[int]:
+    planes = list(dict.fromkeys(channels[row].plane for row in rows))
+    queues = [_ends_first([r for r in rows if channels[r].plane == plane]) for plane in planes]
+    longest = max((len(queue) for queue in queues), default=0)
+    return [queue[turn] for turn in range(longest) for queue in queues if turn < len(queue)]
+
+
+def _ends_first(rows: list[int]) -> list[int]:
+    return [rows[0], *rows[:0:-1]] if rows else []
+
+
+def offsets_s(records: Sequence[Recording]) -> list[float]:
+    """Return where each record begins on the common axis, in s."""
+    whole = sum(record.duration_s for record in records)
+    gap = _GAP_SHARE * whole if len(records) > 1 else 0.0
+    ends = np.cumsum([record.duration_s + gap for record in records])
+    return [0.0, *ends[:-1].tolist()]
+
+
+def borders_s(records: Sequence[Recording]) -> list[float]:
+    """Return the middle of the gap between each two records on the common axis, in s."""
+    starts = offsets_s(records)
+    ends = [start + record.duration_s for start, record in zip(starts, records, strict=True)]
+    return [(end + start) / 2 for end, start in zip(ends[:-1], starts[1:], strict=True)]
+
+
+def hit_time_s(sheet: ModalTestReport, hit: Hit) -> float:
+    """Return the time of a hit on the common axis, in s."""
+    return offsets_s(sheet.recordings)[hit.record] + hit.start_s
+
+
+def channel_of(record: Recording, row: int | None) -> Channel | None:
+    """Return the force (`row` None) or the acceleration of that row; None where it has none."""
+    if row is None:
+        return record.force
+    return record.accelerations[row] if row < len(record.accelerations) else None
+
+
+def thinned(records: Sequence[Recording], row: int | None) -> tuple[FloatArray, FloatArray]:
+    """Return time in s and values of one channel, thinned by their envelope; both (m,).
+
+    NaN where samples are, and between the records, so that a line drawn through them breaks.
+    """
+    whole = sum(record.duration_s for record in records)
+    times, values = [], []
+    for offset, record in zip(offsets_s(records), records, strict=True):
+        channel = channel_of(record, row)
+        if channel is not None and len(channel.values):
+            bins = max(8, round(_BINS * record.duration_s / whole))
+            places = spec.envelope_places(channel.values, bins)
+            times += [offset + places / record.sampling_rate_hz, np.array([np.nan])]
+            values += [channel.values[places], np.array([np.nan])]
+    return np.concatenate(times), np.concatenate(values)
+
+
+def unknown_times_s(records: Sequence[Recording], row: int | None) -> FloatArray:
+    """Return the middle of each bin with samples that are NaN, on the common axis, in s."""
+    found: list[float] = []
+    for offset, record in zip(offsets_s(records), records, strict=True):
+        channel = channel_of(record, row)
+        if channel is not None:
+            bad = np.flatnonzero(np.isnan(channel.values))
+            width = max(1, record.samples * len(records) // _BINS)
+            found += (offset + np.unique(bad // width) * width / record.sampling_rate_hz).tolist()
+    return np.array(found)
 
 
 def _draw(shown: ResponseCurves) -> spec.Specification | None:
@@ -111,13 +190,13 @@ def _hit_lines(sheet: ModalTestReport) -> list[spec.Mark]:
             at=hit_time_s(sheet, hit), axis="x", colour="green" if hit.used else "red", width=0.7,
             opacity=0.7, dash="solid" if hit.used else "dash",
         )
-        for _, hit in located_hits(sheet)
+        for _, hit in sheet.located_hits
     ]  # fmt: skip
 
 
 def _hit_marks(sheet: ModalTestReport) -> list[spec.Mark]:
     """Return numbered symbols for used hits in one row, and a row for each reason to drop."""
-    located = located_hits(sheet)
+    located = sheet.located_hits
     groups: dict[str, list[tuple[int, Hit]]] = {}
     for number, hit in located:
         groups.setdefault("" if hit.used else hit.reason, []).append((number, hit))
@@ -167,7 +246,7 @@ def _alt(shown: ResponseCurves) -> str:
     used = formatting.counted(len(sheet.used_hits), "hit")
     dropped = [
         f"hit {number} at {hit.start_s:.1f} s: {hit.reason}"
-        for number, hit in located_hits(sheet)
+        for number, hit in sheet.located_hits
         if not hit.used
     ]
     left = f"; dropped: {', '.join(dropped)}" if dropped else ""

@@ -13,7 +13,6 @@ from __future__ import annotations
 import io
 import math
 import re
-import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -23,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar
 
 import numpy as np
 
-from shm.report.figures.style import INK, PALETTE, TINY
+from shm.report.figures.style import PALETTE
 from shm.values import FloatArray, IntArray, Plane
 
 if TYPE_CHECKING:
@@ -265,7 +264,6 @@ def peak_places(values: FloatArray, bins: int) -> IntArray:
 Data = TypeVar("Data")
 DOTS_PER_INCH = 150
 """Of a file, for a screen; a PDF has more (`as_pdf`)."""
-_COLUMNS_AN_INCH = 17  # layout: letters of the smallest size, about half as wide as high
 
 
 @dataclass(frozen=True)
@@ -330,16 +328,10 @@ _ID = re.compile(r'\bid="([^"]+)"')
 _REFERENCE = re.compile(r'(href="#|url\(#)([^")]+)')
 
 
-def png(figure: Figure, dots_per_inch: int = DOTS_PER_INCH, words: str = "") -> bytes:
-    """Return the figure on white; `words` below it, where it is shown without a page."""
-    box = None
-    if words:
-        columns = round(_COLUMNS_AN_INCH * figure.get_figwidth())
-        lines = "\n".join(textwrap.wrap(words, columns))
-        figure.text(0.01, -0.02, lines, va="top", fontsize=TINY, color=INK)
-        box = "tight"
+def png(figure: Figure, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
+    """Return the figure on white."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=dots_per_inch, facecolor="white", bbox_inches=box)
+    figure.savefig(buffer, format="png", dpi=dots_per_inch, facecolor="white")
     return buffer.getvalue()
 
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 import numpy as np
 
-from shm.report.contents import HangerReport, TrendRow
 from shm.report.figures import specification as spec
 from shm.report.formatting import Interval
 from shm.report.states import CalledChange
@@ -26,20 +24,6 @@ _THINNEST = 0.004
 """Width of the span of a change, as a share of the axis."""
 LABEL_ROOM = 0.08
 """Above a figure for each line of what is written over changes, as a share of its height."""
-
-
-@dataclass(frozen=True)
-class Dated:
-    """A row of the trend whose time is known."""
-
-    time: datetime
-    row: TrendRow
-
-
-def dated(data: HangerReport) -> list[Dated]:
-    """Return the rows with a time, oldest first."""
-    rows = [Dated(row.time, row) for row in data.trend if row.time is not None]
-    return sorted(rows, key=lambda row: row.time)
 
 
 def places(*curves: FloatArray, always: Collection[int] = ()) -> IntArray:

@@ -30,15 +30,15 @@ from shm.models.solid.classes import SolidModel
 from shm.models.tensioned_beam import wave_numbers
 from shm.report.contents import HangerReport, summary_of
 from shm.report.figures import hanger_frequencies
-from shm.report.figures.prediction_figures import (
+from shm.report.figures.specification import Specification
+from shm.values import PLANES, FloatArray, Hanger, Plane, Posterior, Summary
+from tests.benchmarks.thesis import frequencies, parameter_pairs, thesis_data
+from tests.benchmarks.thesis.prediction_figures import (
     Curves,
     specify,
     write_curves_png,
     write_deformed_png,
 )
-from shm.report.figures.specification import Specification
-from shm.values import PLANES, FloatArray, Hanger, Plane, Posterior, Summary
-from tests.benchmarks.thesis import frequencies, parameter_pairs, thesis_data
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,7 +306,7 @@ def solutions(figure: Drawn, points: int = _POINTS) -> Solutions:
     """What a figure shows."""
     xi = np.linspace(figure.low, figure.high, points)
     springs = np.full_like(xi, figure.spring)
-    q = wave_numbers(xi, springs, springs, MODES)
+    q = wave_numbers(xi**2, springs, springs, MODES)
     omega = q * np.hypot(xi[:, None], q)
     order = np.arange(1, MODES + 1)
     if figure.quantity == "eta":

@@ -15,7 +15,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.controls import control_charts
 from shm.report import formatting
 from shm.report.contents import hangers_unit
-from shm.report.control_report import control_lead
+from shm.report.hanger_status import control_lead
 from shm.values.messages import TODAY, WEEK, Lead, Urgency
 from shm.values.rounding import ForceUnit
 from shm_daemon.heartbeat import duration_words

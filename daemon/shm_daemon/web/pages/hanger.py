@@ -23,8 +23,9 @@ from shm.report.contents import DiagnosisSheet, HangerReport
 from shm.report.diagnosis_report import answers, evidence, next_measurements, tension
 from shm.report.hanger_report import facts, gap_part, hanger_paper
 from shm.report.hanger_sentences import details
+from shm.report.hanger_tables import temperature_table
 from shm.report.paper import Table, filled
-from shm.report.states import called_words, temperature_table
+from shm.report.states import called_words
 from shm.store import EventKind, Store, TrendPoint, Workspace
 from shm.store.queries.trends import find_latest_trends, list_trend
 from shm.values import Hanger

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shm.report.figures import specification, style
+from shm.report.figures import style
 from shm.report.figures.specification import Axis, Line, Mark, Panel, Specification, limits
 from shm.values import FloatArray
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 # In a fixed order; dashed where a higher mode begins the list anew.
 _HUES = ("blue", "orange", "green", "purple", "red", "quiet")
 _ADJACENT_INCHES = 3.2  # layout
+_COLUMNS_AN_INCH = 17  # layout: letters of the smallest size, about half as wide as high
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,7 @@ def write_curves_png(figure: Specification, path: Path, words: str = "") -> None
     # What draws is loaded where something is drawn.
     from shm.report.figures.with_matplotlib import draw
 
-    path.write_bytes(specification.png(draw(figure), words=words))
+    path.write_bytes(_png(draw(figure), words))
 
 
 def _lines(curves: Curves) -> list[Mark]:
@@ -116,4 +119,14 @@ def draw(corners: FloatArray, moved: FloatArray) -> Figure:
 
 def write_deformed_png(corners: FloatArray, moved: FloatArray, path: Path, words: str = "") -> None:
     """Return the figure of these on white, with `words` below."""
-    path.write_bytes(specification.png(draw(corners, moved), words=words))
+    path.write_bytes(_png(draw(corners, moved), words))
+
+
+def _png(figure: Figure, words: str) -> bytes:
+    """Return the figure on white, with words below it."""
+    columns = round(_COLUMNS_AN_INCH * figure.get_figwidth())
+    lines = "\n".join(textwrap.wrap(words, columns))
+    figure.text(0.01, -0.02, lines, va="top", fontsize=style.TINY, color=style.INK)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=150, facecolor="white", bbox_inches="tight")
+    return buffer.getvalue()
