@@ -68,10 +68,8 @@ class Format:
 
     `recognises` judges the first bytes of a file; `open_tables` gives what a file holds, a table
     for each record, as long as the context lasts. `write` is None of a format that is only read;
-    `may_be_gzipped` says whether NAME.csv.gz is read too; `holds_responses` is False of one that
-    holds time records alone, `names_channels` of one whose channels have numbers, or names of its
-    own. `library` is what it loads where a file is read; `shared_suffixes` are those of a text that
-    its content may have too.
+    `may_be_gzipped` says whether NAME.csv.gz is read too. `library` is what it loads where a file
+    is read; `shared_suffixes` are those of a text that its content may have too.
     """
 
     name: str
@@ -80,8 +78,6 @@ class Format:
     open_tables: Callable[[Path], AbstractContextManager[tuple[Table, ...]]]
     write: Callable[[Recording | FrequencyResponse, Path], None] | None = None
     may_be_gzipped: bool = False
-    holds_responses: bool = True
-    names_channels: bool = True
     library: str = ""
     shared_suffixes: tuple[str, ...] = ()
 

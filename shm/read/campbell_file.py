@@ -92,8 +92,6 @@ FORMAT = Format(
     (".tob3", ".tob1"),
     recognises,
     at_once(open_tables),
-    holds_responses=False,
-    names_channels=False,
     library="csiio",
     shared_suffixes=(".dat",),
 )

@@ -102,18 +102,20 @@ class Element:
     kind: int
     content: bytes
 
-    def matrix(self, most_bytes: int) -> _Matrix:
-        """Return the matrix of which at most so many bytes are unpacked; raises ValueError."""
-        content = self.content[:most_bytes]
-        if self.kind == _COMPRESSED:
-            unpacked = zlib.decompressobj().decompress(self.content, most_bytes)
-            kind, length = struct.unpack_from(f"{self.order}II", unpacked)
-            content = unpacked[8 : 8 + length]
-        else:
-            kind = self.kind
+    def matrix(self, *, head_alone: bool = False) -> _Matrix:
+        """Return the matrix, or as much of it as shows its head; raises ValueError."""
+        most_bytes = _HEAD_BYTES if head_alone else limits().bytes_at_once
+        kind, content = self.kind, memoryview(self.content)
+        if kind == _COMPRESSED:
+            tag = zlib.decompressobj().decompress(self.content, 8)
+            kind, length = struct.unpack(f"{self.order}II", tag)
+            if length > most_bytes and not head_alone:
+                raise ValueError("a variable unpacks to more than is read at once")
+            unpacked = zlib.decompressobj().decompress(self.content, 8 + min(length, most_bytes))
+            content = memoryview(unpacked)[8:]
         if kind != _MATRIX:
             raise ValueError("an element is no matrix")
-        return _matrix(content, self.order)
+        return _matrix(content[:most_bytes], self.order)
 
 
 def elements_of(content: bytes) -> Iterator[Element]:
@@ -137,7 +139,7 @@ class _Matrix:
     kind: str
     shape: tuple[int, ...]
     is_complex: bool
-    parts: Iterator[tuple[int, bytes]]
+    parts: Iterator[tuple[int, memoryview]]
 
     def values(self) -> NDArray[Any]:
         """Return numbers, or a text for each row; raises ValueError where they are damaged."""
@@ -147,13 +149,13 @@ class _Matrix:
         if self.kind == "char":
             (kind, part), rows = parts[0], max(1, self.shape[0])
             ending = {"<": "-le", ">": "-be"}[self.order] if kind in _IN_ORDER else ""
-            letters = part.decode(_ENCODINGS[kind] + ending)
+            letters = bytes(part).decode(_ENCODINGS[kind] + ending)
             return np.array([letters[row::rows].rstrip() for row in range(rows)], dtype=str)
         rows_of = [self._numbers(*part) for part in parts]
         found = rows_of[0] + 1j * rows_of[1] if self.is_complex else rows_of[0]
         return found.reshape(self.shape, order="F")
 
-    def _numbers(self, kind: int, part: bytes) -> NDArray[Any]:
+    def _numbers(self, kind: int, part: memoryview) -> NDArray[Any]:
         found = np.frombuffer(part, self.order + _TYPES[kind])
         if found.size != math.prod(self.shape):
             raise ValueError("a variable's values are not as many as its shape says")
@@ -163,7 +165,9 @@ class _Matrix:
         """Return the fields of a struct of one element that hold numbers or texts."""
         (_, length), (_, names), *values = self.parts
         (size,) = struct.unpack(f"{self.order}I", length)
-        keys = [names[at : at + size].split(b"\0")[0].decode() for at in range(0, len(names), size)]
+        keys = [
+            bytes(names[n : n + size]).split(b"\0")[0].decode() for n in range(0, len(names), size)
+        ]
         found = {}
         for key, (_, content) in zip(keys, values, strict=True):
             inner = _matrix(content, self.order) if content else None
@@ -176,7 +180,7 @@ class _Matrix:
         return found
 
 
-def _matrix(content: bytes, order: str) -> _Matrix:
+def _matrix(content: memoryview, order: str) -> _Matrix:
     """Return a matrix by its head; raises ValueError where that is damaged."""
     parts = _parts(content, order)
     (kind, flags), dimensions = next(parts), next(parts)
@@ -189,10 +193,12 @@ def _matrix(content: bytes, order: str) -> _Matrix:
         raise ValueError("the head of a variable is damaged")
     shape = () if named == "opaque" else tuple(np.frombuffer(dimensions[1], f"{order}i4").tolist())
     named = "logical" if flag & _LOGICAL else named
-    return _Matrix(order, name[1].decode("latin-1"), named, shape, bool(flag & _COMPLEX), parts)
+    return _Matrix(
+        order, bytes(name[1]).decode("latin-1"), named, shape, bool(flag & _COMPLEX), parts
+    )
 
 
-def _parts(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+def _parts(content: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
     """Yield type and bytes of each part of a matrix; a short part stands within its tag."""
     place = 0
     while place + 8 <= len(content):
@@ -210,7 +216,7 @@ def _arrays(path: Path) -> Arrays:
     content = bytes_of(path)
     with guarded(path):
         elements = list(elements_of(content))
-        heads = [element.matrix(_HEAD_BYTES) for element in elements]
+        heads = [element.matrix(head_alone=True) for element in elements]
         if len(heads) > _MOST_VARIABLES:
             raise ValueError("there are far too many variables")
     names = [head.name for head in heads]
@@ -244,11 +250,7 @@ def _variable(head: _Matrix, element: Element, path: Path) -> Variable:
     refuse_large(head.shape, item_bytes, head.name, path)
     shape = head.shape[:1] if head.kind == "char" else head.shape
     letter = "c" if head.is_complex else kind.kind
-    return Variable(head.name, shape, letter, item_bytes, lambda: _whole(element).values())
-
-
-def _whole(element: Element) -> _Matrix:
-    return element.matrix(limits().bytes_at_once)
+    return Variable(head.name, shape, letter, item_bytes, lambda: element.matrix().values())
 
 
 def _fields(name: str, element: Element, path: Path) -> list[Variable]:
@@ -258,7 +260,7 @@ def _fields(name: str, element: Element, path: Path) -> list[Variable]:
     of names those of a table's columns.
     """
     with guarded(path, f"the struct {name!r}"):
-        fields = _whole(element).fields()
+        fields = element.matrix().fields()
     rows = {
         name: row
         for key, value in fields.items()

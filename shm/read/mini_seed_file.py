@@ -140,7 +140,5 @@ FORMAT = Format(
     (".mseed", ".miniseed", ".msd"),
     recognises,
     at_once(open_tables),
-    holds_responses=False,
-    names_channels=False,
     library="pymseed",
 )

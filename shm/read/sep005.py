@@ -99,5 +99,4 @@ FORMAT = Format(
     (".json",),
     lambda head: _BEGINS.match(head) is not None,
     at_once(open_tables),
-    holds_responses=False,
 )

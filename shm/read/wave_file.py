@@ -88,6 +88,4 @@ FORMAT = Format(
     (".wav",),
     recognises,
     at_once(open_tables),
-    holds_responses=False,
-    names_channels=False,
 )

@@ -20,7 +20,7 @@ from shm.values import AddedMass, Channel, FrequencyResponse, Recording, Respons
 from shm_cli.main import run
 from tests.contracts.inference_calls import GOLDEN
 from tests.helpers.logger_texts import FORCE, PLAIN, RATE, SHAPES, german, rows
-from tests.helpers.written import write
+from tests.helpers.written import holds_responses, write
 
 FOLDER = GOLDEN / "read"
 
@@ -112,7 +112,7 @@ def sound_files(folder: Path) -> dict[str, Path]:
     found: dict[str, Path] = {}
     for known in FORMATS:
         kinds = {"recording": recording(), "response": response()}
-        for kind, made in kinds.items() if known.holds_responses else [("recording", recording())]:
+        for kind, made in kinds.items() if holds_responses(known) else [("recording", recording())]:
             path = folder / known.name / f"{kind}{known.suffixes[0]}"
             path.parent.mkdir(exist_ok=True)
             write(made, path)

@@ -15,7 +15,7 @@ from shm.read import FORMATS, Format, peek, read
 from shm.read.registry import survey
 from shm.values import FrequencyResponse, Recording
 from tests.helpers.logger_texts import SHAPES
-from tests.helpers.written import write
+from tests.helpers.written import holds_responses, write
 
 formats = pytest.mark.parametrize("file_format", FORMATS, ids=lambda f: f.name)
 examples = settings(
@@ -54,7 +54,7 @@ def test_damaged_files_raise_nothing_but_bad_input(
 ) -> None:
     """Cut off, overwritten, inserted, repeated: read well or refused, never a crash."""
     path = path_for(file_format, tmp_path)
-    both = file_format.holds_responses and data.draw(st.booleans(), label="response")
+    both = holds_responses(file_format) and data.draw(st.booleans(), label="response")
     write(response if both else recording, path)
     path.write_bytes(damaged(path.read_bytes(), data))
     assert is_read_well_or_refused(path)

@@ -129,6 +129,21 @@ def test_catmans_t0_is_the_time(tmp_path: Path) -> None:
     )
 
 
+def test_signals_one_below_the_other_are_one_record(tmp_path: Path) -> None:
+    def part(title: str, unit: str, values: np.ndarray) -> str:
+        head = f"Header Size:\t5\nX-axis delta:\t0.002\nY-axis unit:\t{unit}\n"
+        head += f"Title1:\t{title}\nDate:\t2026-05-14\nTime:\t10:00:00\n"
+        return head + rows(lambda i: f"{i + 1}\t{i / RATE:.8e}\t{values[i]:.6e}")
+
+    both = part("Hammer", "N", FORCE) + part("Acc", "m/s²", ACC)
+    found = recorded(written(tmp_path, both, "a.txt"))
+    assert [(c.name, c.quantity) for c in found.channels] == [
+        ("Hammer", "force"), ("Acc", "acceleration"),
+    ]  # fmt: skip
+    assert (found.time, found.sampling_rate_hz) == (datetime(2026, 5, 14, 10, tzinfo=UTC), RATE)
+    np.testing.assert_allclose(found.channels[1].values, ACC)
+
+
 def test_a_record_over_the_end_of_summer_time_runs_on(tmp_path: Path) -> None:
     begin = datetime(2026, 10, 25, 2, 59, 59, 700_000)
 

@@ -67,5 +67,5 @@ def test_a_misspelt_key_is_refused_and_those_of_others_are_left_alone(modes: Pat
     with pytest.raises(BadInput, match="unknown key temprature_c") as refused:
         shm.load_modes(modes)
     assert "Write temperature_c" in refused.value.remedy
-    modes.with_suffix(".toml").write_text('operator = "Ann"\n')
-    assert len(shm.load_modes(modes)) == 2
+    modes.with_suffix(".toml").write_text('operator = "Ann"\nshoes = "brown"\n')
+    assert [test.operator for test in shm.load_modes(modes)] == ["Ann", "Ann"]

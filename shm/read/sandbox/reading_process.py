@@ -19,12 +19,13 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import numpy as np
+from cattrs import Converter
 from numpy.typing import NDArray
 
 from shm.documents import finite, reader, value_of
@@ -48,6 +49,7 @@ _CODE = (
     "from shm.read.registry import VERBS, libraries_for; "
     "from shm.read.sandbox.serving import serve; serve(VERBS, libraries_for)"
 )
+_ARRAY: Any = np.ndarray
 _OURS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "HDF5_USE_FILE_LOCKING": "FALSE"}
 _PASSED_ON = {"LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH"}
 
@@ -57,23 +59,18 @@ def ask(verb: str, path: Path, limits: Limits, kinds: Mapping[str, type]) -> lis
 
     Raises BadInput, also where the child died of the file.
     """
-    if holds_test(path) or is_gzipped(path):
-        # It is unpacked in a folder of ours, which also goes where the child is killed.
-        with tempfile.TemporaryDirectory(prefix="shm-read-") as folder:
-            found, arrays = _answer(verb, path, folder, limits)
-    else:
-        found, arrays = _answer(verb, path, "", limits)
-    return _values(found, arrays, path, kinds)
+    request: dict[str, Any] = {"verb": verb, "path": str(path), "folder": ""}
+    request |= {"working_folder": str(Path.cwd()), "limits": asdict(limits)}
+    if not holds_test(path) and not is_gzipped(path):
+        return _answer(request, path, limits, kinds)
+    # It is unpacked in a folder of ours, which also goes where the child is killed.
+    with tempfile.TemporaryDirectory(prefix="shm-read-") as folder:
+        return _answer({**request, "folder": folder}, path, limits, kinds)
 
 
 def _answer(
-    verb: str, path: Path, folder: str, limits: Limits
-) -> tuple[list[tuple[str, Any]], dict[str, NDArray[Any]]]:
-    """Return pairs of a class and a node, and the arrays; raises the refusal of a child."""
-    request = {
-        "verb": verb, "path": str(path), "working_folder": str(Path.cwd()), "folder": folder,
-        "limits": asdict(limits),
-    }  # fmt: skip
+    request: dict[str, Any], path: Path, limits: Limits, kinds: Mapping[str, type]
+) -> list[Any]:
     with _one_at_a_time:
         try:
             raw, status = _reader().ask(request, limits)
@@ -88,19 +85,19 @@ def _answer(
         raise _death(status, path, limits, begun=raw.startswith(BEGUN)) from None
     if found and found[0][0] == "refusal":
         raise BadInput(**found[0][1])
-    return found, arrays
+    try:
+        by = _reader_with(arrays)
+        return [value_of(kinds[kind], node, by=by) for kind, node in found]
+    except (ValueError, TypeError) as error:
+        raise BadInput(
+            f"the file made the reader give an answer that cannot be: {error}.",
+            file=path,
+            remedy=_DAMAGED,
+        ) from error
 
 
-def _values(
-    found: Sequence[tuple[str, Any]],
-    arrays: Mapping[str, NDArray[Any]],
-    path: Path,
-    kinds: Mapping[str, type],
-) -> list[Any]:
-    """Return values of the classes named, each part of the type that it must be."""
-
-    def is_array(kind: Any) -> bool:
-        return get_origin(kind) is np.ndarray
+def _reader_with(arrays: Mapping[str, NDArray[Any]]) -> Converter:
+    """Return what takes a value from its node, where each part is of the type that it must be."""
 
     def array(node: Any, kind: Any) -> NDArray[Any]:
         found = arrays.get(str(node.get("array"))) if isinstance(node, dict) else None
@@ -109,15 +106,8 @@ def _values(
         return found
 
     by = reader(finite)
-    by.register_structure_hook_func(is_array, array)
-    try:
-        return [value_of(kinds[kind], node, by=by) for kind, node in found]
-    except (ValueError, TypeError) as error:
-        raise BadInput(
-            f"the file made the reader give an answer that cannot be: {error}.",
-            file=path,
-            remedy=_DAMAGED,
-        ) from error
+    by.register_structure_hook_func(lambda kind: get_origin(kind) is _ARRAY, array)
+    return by
 
 
 class _Reader:
