@@ -163,6 +163,7 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
     help="When the test was, if the file does not say; or 'unknown'.",
 )
 @click.option("--temperature", type=float, metavar="C", help="Degrees Celsius of the steel.")
+@click.option("--operator", default="", metavar="NAME", help="Who measured.")
 @click.option("--dry-run", is_flag=True, help="Only show what is understood; keep nothing.")
 @flags.json
 @click.pass_context
@@ -239,6 +240,7 @@ def _whole_file(options: dict[str, Any]) -> Answers:
         options["hanger"],
         math.nan if rate is None else rate,
         temperature_c=math.nan if temperature is None else temperature,
+        operator=options["operator"].strip(),
         each_time=options["each_time"],
     )
     return answers if options["time"] is None else answer_time(options["time"], answers)

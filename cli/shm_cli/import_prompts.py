@@ -11,7 +11,7 @@ from typing import TypeVar
 import rich_click as click
 
 from shm.errors import BadInput, UsageError
-from shm.pipeline.import_answers import answer_temperature, answer_time
+from shm.pipeline.import_answers import ANSWERS_OF_TEST
 from shm.pipeline.importing import Answers, Question
 from shm.store import Workspace
 
@@ -30,14 +30,16 @@ def asked(
             answers = replace(answers, hanger=_prompt(question, lambda t: _hanger(t, workspace)))
         elif question.about == "rate":
             answers = replace(answers, sampling_rate_hz=_prompt(question, _rate_hz))
-        elif question.about == "time":
-            answers = _prompt(question, partial(answer_time, answers=answers))
-        elif question.about == "temperature":
-            answers = _prompt(question, partial(answer_temperature, answers=answers))
+        elif question.about in ANSWERS_OF_TEST:
+            answers = _of_test(question, answers)
         else:
             given = _prompt(question, partial(of_channel, question))
             tables.setdefault(question.channel, {}).update(given)
     return replace(answers, channels=tables)
+
+
+def _of_test(question: Question, answers: Answers) -> Answers:
+    return _prompt(question, lambda text: ANSWERS_OF_TEST[question.about](text, answers))
 
 
 def asked_if_it_stays(answers: Answers, *, is_known: bool) -> Answers:

@@ -24,6 +24,7 @@ from joserfc.jws import JWSRegistry
 
 from shm.bridge.description import EMAIL, SingleSignOn, is_safe
 from shm.errors import ShmError
+from shm_daemon.hooks.contract import read_secret
 from shm_daemon.http_client import reason_of
 
 _ALGORITHMS = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512",
@@ -152,14 +153,8 @@ def _session(
     described: SingleSignOn, document: Mapping[str, Any] | None = None, back: str = ""
 ) -> OAuth2Session:
     """Raises ShmError where the secret cannot be read."""
-    try:
-        secret = described.client_secret_file.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or "it is no text"
-        raise ShmError(
-            f"the secret in {described.client_secret_file.name} cannot be read: {why}.",
-            remedy="Write it, readable for the user that runs the web interface.",
-        ) from None
+    file = described.client_secret_file
+    secret = read_secret(file.parent, file.name, ShmError)
     # Discovery 1.0, 3: `client_secret_basic` where it is not said.
     known = (document or {}).get("token_endpoint_auth_methods_supported", ["client_secret_basic"])
     session = OAuth2Session(

@@ -23,7 +23,7 @@ from shm.pipeline.publishing import Progress, queue_results
 from shm.store import Store, Workspace
 from shm.store.point_outbox import PointOutbox
 from shm_daemon.background import repeated
-from shm_daemon.hooks.contract import SHOWN_CHARACTERS, one_line
+from shm_daemon.hooks.contract import SHOWN_CHARACTERS, one_line, read_secret
 from shm_daemon.http_client import HttpClient, NoAnswer
 
 _POINTS_REFUSED = (HTTPStatus.BAD_REQUEST, HTTPStatus.UNPROCESSABLE_ENTITY)
@@ -51,15 +51,9 @@ class PointsRefused(ShmError):
 def token_of(publication: Publication, workspace: Workspace, environment: Mapping[str, str]) -> str:
     """Return the token, empty where none is named; raises NotTaken where it cannot be read."""
     where = publication.token_file or f"the variable {publication.token_env}"
-    try:
-        found = (
-            (workspace.folder / publication.token_file).read_text(encoding="utf-8")
-            if publication.token_file
-            else environment.get(publication.token_env, "")
-        ).strip()
-    except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or "not a text"
-        raise NotTaken(f"{where} cannot be read: {why}.", remedy="Write the token there.") from None
+    found = environment.get(publication.token_env, "").strip()
+    if publication.token_file:
+        found = read_secret(workspace.folder, publication.token_file, NotTaken)
     if publication.needs_token and (not found or not found.isprintable()):
         raise NotTaken(f"{where} holds no token.", remedy="Write the token there.")
     return found

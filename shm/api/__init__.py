@@ -37,7 +37,6 @@ from shm.models import DESCRIPTION, build, competing_names
 from shm.models.base import Conditions, Model
 from shm.read import read as read_file
 from shm.read import registry
-from shm.read import sep005 as sep005_channels
 from shm.settings import Settings, load_settings
 from shm.simulate import (
     HammerPlan,
@@ -100,7 +99,7 @@ def from_sep005(
         >>> shm.from_sep005([acceleration], hanger=3).samples
         100
     """
-    return sep005_channels.from_sep005(channels, hanger=hanger)
+    return registry.from_sep005(channels, hanger=hanger)
 
 
 def load_modes(path: str | Path) -> tuple[ModalTest, ...]:

@@ -117,7 +117,7 @@ class SimulatorDiagnosis:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """The likeliest cause, with its group; empty while no gap is shown or the unknown leads."""
+        """Return the likeliest cause and its group; empty where no gap or the unknown leads."""
         if self.no_gap_probability >= NO_GAP_BELOW or not self.causes:
             return ()
         first = self.causes[0].name
@@ -126,7 +126,7 @@ class SimulatorDiagnosis:
         return group if together > self.unexplained_probability else ()
 
     def summary(self) -> str:
-        """The answer in a few lines."""
+        """Return the answer in a few lines."""
         lines = [self._verdict(), *(f"! {each}" for each in self.remarks)]
         for each in self.causes:
             sizes = ", ".join(
@@ -145,7 +145,7 @@ class SimulatorDiagnosis:
         return "\n".join(lines)
 
     def to_records(self) -> list[dict[str, object]]:
-        """One row for each answer, as `pandas.DataFrame` takes them."""
+        """Return one row for each answer, as `pandas.DataFrame` takes them."""
         rows: list[tuple[object, ...]] = [(e.name, e.probability, e.gap_left) for e in self.causes]
         rows.append(("no gap", self.no_gap_probability, self.shrinkage.before))
         rows.append(("unexplained", self.unexplained_probability, float("nan")))
@@ -247,7 +247,7 @@ def _by_evidence(fits: Sequence[Fit]) -> list[Fit]:
 def _pairs(
     problem: SimulatorProblem, alone: Fit, singles: Sequence[Fit], rng: np.random.Generator
 ) -> list[Fit]:
-    """Of the leading singles, where these explain something and leave too much.
+    """Return pairs of the leading singles, where these explain something and leave too much.
 
     A pair that explains hardly more than one of its effects says nothing of a second one.
     """
@@ -296,7 +296,7 @@ def _groups(
 
 
 def _shrinkage(problem: SimulatorProblem, alone: Fit, best: Fit) -> Shrinkage:
-    """In the deviations that belong to the best answer, whichever fit is looked at."""
+    """Return root mean squares in the deviations that belong to the best answer."""
     errors = errors_of(problem, best)
     residuals = [problem.value - fit.predicted for fit in (alone, best)]
     held = [_held_out(problem, fit) for fit in (alone, best)]
@@ -304,7 +304,7 @@ def _shrinkage(problem: SimulatorProblem, alone: Fit, best: Fit) -> Shrinkage:
 
 
 def _held_out(problem: SimulatorProblem, fit: Fit) -> FloatArray:
-    """Residuals (data,) of fits that have not seen the condition."""
+    """Return residuals (data,) of fits that have not seen the condition."""
     conditions = [tuple(sorted(each.condition.items())) for each in problem.readings]
     number = {each: k for k, each in enumerate(dict.fromkeys(conditions))}
     several = len(number) > 1
@@ -318,7 +318,7 @@ def _held_out(problem: SimulatorProblem, fit: Fit) -> FloatArray:
 
 
 def _averaged(answers: _Answers) -> dict[str, tuple[float, float]]:
-    """Over all answers by their probabilities (Hoeting et al. 1999)."""
+    """Return the parameters over all answers by their probabilities (Hoeting et al. 1999)."""
     weight = dict(answers.chances)
     free = Hypothesis(flexible=True)
     weight[free] = weight.get(free, 0.0) + answers.unknown

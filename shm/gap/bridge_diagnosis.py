@@ -18,8 +18,9 @@ import scipy
 from shm.errors import UsageError
 from shm.gap.contract import GapOptions
 from shm.gap.coordinates import scale_free
-from shm.gap.diagnose import examined, tension_estimate
+from shm.gap.diagnose import examined, summarise, tension_estimate
 from shm.gap.groups import SAME_BELOW
+from shm.gap.places import AS_LIKELY
 from shm.gap.probabilities import CALIBRATION, SINGLE, UNKNOWN
 from shm.gap.shared_causes import (
     LEAST,
@@ -51,8 +52,6 @@ SHARED = 0.5
 _KNOWN = SINGLE / (SINGLE + UNKNOWN)
 
 _JOINTLY = 0.9  # numerical: the part of the time that single hangers take
-_AS_LIKELY = 1.5
-"""Places of one effect whose log evidences differ by less are not told apart."""
 _NEGLIGIBLE = 1e-4  # of a probability: what is less likely changes no number of the diagnosis
 _DRAWS = 4000  # numerical: a 95 % interval to 2 % of its width
 
@@ -190,7 +189,7 @@ def _cause(
     for each, share in zip(candidates, normalised(log), strict=True):
         probability[list(each.shared.group.members)] += share * each.shared.member
     log_weight = float(scipy.special.logsumexp(log))
-    near = [each.place[1] for each in candidates if each.log_weight > best.log_weight - _AS_LIKELY]
+    near = [each.place[1] for each in candidates if each.log_weight > best.log_weight - AS_LIKELY]
     sizes = next(e.effects[best.place].sizes for e in hangers if best.place in e.effects)
     of_group = best.shared.size.sum(axis=1)
     size = _estimate(sizes, best.grid.x, best.grid.sign, of_group)
@@ -229,9 +228,7 @@ def _member_size(hanger: HangerEvidence, best: _Candidate, index: int) -> Effect
 def _estimate(sizes: Sizes, x: FloatArray, sign: FloatArray, weight: FloatArray) -> EffectEstimate:
     rows = systematic(weight / weight.sum(), _DRAWS, np.random.default_rng(0))
     value = sizes.value(x[rows]) * sign[rows]
-    low, high = (float(each) for each in np.quantile(value, [0.05, 0.95]))
-    name, unit = sizes.parameter.name, sizes.parameter.unit
-    return EffectEstimate(name, unit, float(value.mean()), float(value.std()), low, high)
+    return EffectEstimate(sizes.parameter.name, sizes.parameter.unit, *summarise(value))
 
 
 def _grouped(

@@ -56,7 +56,7 @@ class Design:
 
     @property
     def mode(self) -> IntArray:
-        """A number (F,) for each plane and order."""
+        """Return a number (F,) for each plane and order."""
         orders = self.frequency_order.max() + 1
         return np.asarray(self.frequency_plane * orders + self.frequency_order)
 
@@ -112,7 +112,7 @@ class Observations:
         return self.known_damping
 
     def part(self, frequencies: IntArray, shapes: IntArray) -> Observations:
-        """Some frequencies and some components of their shapes, by index in their order."""
+        """Return some frequencies and some components of their shapes, by index in their order."""
         design = self.design
         part = replace(
             design,
@@ -144,12 +144,12 @@ class Hypothesis:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The effects' names; none for the baseline."""
+        """Return the effects' names; none for the baseline."""
         return tuple(name for name, _ in self.effects)
 
     @property
     def name(self) -> str:
-        """The effects' names as one; empty for the baseline."""
+        """Return the effects' names as one; empty for the baseline."""
         return joined(self.names)
 
     @property

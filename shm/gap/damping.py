@@ -39,7 +39,7 @@ def remark_on_damping(observations: Observations) -> tuple[str, ...]:
 
 
 def log_rising(observations: Observations) -> float:
-    """Log Bayes factor of a damping that rises with the level; 0 where the tests cannot tell."""
+    """Return the log Bayes factor of damping that rises with the level; 0 where unknown."""
     design, damping = observations.design, observations.damping
     known = np.flatnonzero(np.isfinite(damping).all(axis=1))
     test = design.frequency_test[known]
@@ -67,7 +67,7 @@ def log_rising(observations: Observations) -> float:
 
 
 def _log_density(value: FloatArray, covariance: FloatArray) -> float:
-    """Normal, about a common mean that nobody knows (its own width is part of `covariance`)."""
+    """Return that of a normal law about an unknown mean, whose width is part of `covariance`."""
     factor = np.linalg.cholesky(covariance)
     white = np.linalg.solve(factor, value - value.mean())
     return float(-(white @ white) / 2 - np.log(np.diag(factor)).sum())

@@ -89,7 +89,7 @@ def _unused_readings(tests: Sequence[ModalTest]) -> str:
 
 
 def _irregular(tests: Sequence[ModalTest]) -> str:
-    """The baseline's tension is then another one than that inferred elsewhere."""
+    """Return a remark on modes that `shm update` leaves out, which has another tension then."""
     found = [
         f"{mode_name(mode)} of test {test.id} ({mode.frequency_hz:g} Hz)"
         for test in tests

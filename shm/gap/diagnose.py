@@ -249,14 +249,14 @@ def _estimates(problem: GapProblem, fit: Fit) -> tuple[EffectEstimate, ...]:
         EffectEstimate(
             each.name,
             each.unit,
-            *_summary(split_place(column, length_m)[0] if is_place(each) else column),
+            *summarise(split_place(column, length_m)[0] if is_place(each) else column),
         )
         for each, column in zip(coordinates.effects, values.T, strict=True)
     )
 
 
 def _contenders(attribution: Attribution) -> list[Fit]:
-    """The fits that further measurements should tell apart, the likeliest first."""
+    """Return the fits that further measurements should tell apart, the likeliest first."""
     weighed = [(attribution.no_gap_probability, attribution.baseline)]
     weighed += [
         (each.probability, each.best.fit) for each in attribution.explanations if each.best.fit
@@ -298,10 +298,10 @@ def tension_estimate(samples: FloatArray) -> TensionEstimate:
     if not np.isfinite(samples).all():
         return TensionEstimate(NAN, NAN, NAN, NAN)
     low, high = (float(each) for each in np.quantile(samples, [0.025, 0.975]))
-    return TensionEstimate(*_summary(samples), low, high)
+    return TensionEstimate(*summarise(samples), low, high)
 
 
-def _summary(samples: FloatArray) -> tuple[float, float, float, float]:
-    """Mean, standard deviation, 5 and 95 % quantiles."""
+def summarise(samples: FloatArray) -> tuple[float, float, float, float]:
+    """Return mean, standard deviation, 5 and 95 % quantiles."""
     low, high = np.quantile(samples, [0.05, 0.95])
     return float(samples.mean()), float(samples.std(ddof=1)), float(low), float(high)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
@@ -26,22 +25,20 @@ from shm.values.rounding import force_unit
 FAR_BETTER = 10.0
 """What other numbers must gain in log evidence on all that was tried: slips are rare."""
 
-_SHIFTS = {0: "", 1: "one higher", -1: "one lower"}
-
-Shifts = tuple[int, ...]
+_SHIFTS = {1: "one higher", -1: "one lower"}
 
 
 def doubt_orders(problem: GapProblem, attribution: Attribution) -> tuple[str, ...]:
     """Return a remark where the hanger alone explains the modes far better under other orders.
 
     Tried are orders one higher or lower, all or from one mode on, and one mode that is none of the
-    hanger's, of either plane or both.
+    hanger's, of either plane or of both alike.
     """
     if attribution.leads == "no gap":
         return ()
     most = -np.inf
     best: tuple[_Numbering, Peak] | None = None
-    for each in (*_shifted(problem), *_from_one_on(problem)):
+    for each in _numberings(problem):
         if each.problem.near_misfit < problem.near_misfit:  # a fit costs forty times as much
             peak = _peak(each.problem)
             log_evidence = peak.log_evidence + each.log_dropped
@@ -72,25 +69,22 @@ class _Numbering:
         return -self.dropped * float(np.log(np.log(100.0)))
 
 
-def _shifted(problem: GapProblem) -> Iterator[_Numbering]:
-    """All modes of either plane, or of both, numbered one higher or lower."""
-    design = problem.design
-    planes = np.unique(design.frequency_plane)
-    for chosen in product(_SHIFTS, repeat=len(planes)):
-        shifts = np.zeros(len(PLANES), dtype=int)
-        shifts[planes] = chosen
-        order = design.frequency_order + shifts[design.frequency_plane]
-        if shifts.any() and order.min() > 0:
-            yield _Numbering(_words(tuple(shifts)), _numbered(problem, order))
+def _numberings(problem: GapProblem) -> Iterator[_Numbering]:
+    """Yield other orders of a plane, or of both at once.
 
-
-def _from_one_on(problem: GapProblem) -> Iterator[_Numbering]:
-    """One mode missed between the others, or one counted that is none; in one plane or both."""
+    All modes one higher or lower; one mode missed between the others; one counted that is none.
+    """
     design = problem.design
     planes = np.unique(design.frequency_plane).tolist()
     for these in [[plane] for plane in planes] + ([planes] if len(planes) > 1 else []):
         inside = np.isin(design.frequency_plane, these)
-        label = "both planes'" if len(these) > 1 else f"the {PLANES[these[0]]}"
+        both, plane = len(these) > 1, PLANES[these[0]]
+        every = "the modes of both planes" if both else f"the {plane} modes"
+        for shift, how in _SHIFTS.items():
+            order = design.frequency_order + shift * inside
+            if order.min() > 0:
+                yield _Numbering(f"{every} numbered {how}", _numbered(problem, order))
+        label = "both planes'" if both else f"the {plane}"
         for first in np.unique(design.frequency_order[inside]).tolist():
             above = inside & (design.frequency_order > first)
             if not above.any():
@@ -117,14 +111,6 @@ def _numbered(problem: GapProblem, order: IntArray) -> GapProblem:
 def _peak(problem: GapProblem) -> Peak:
     """Return the peak of the hanger alone."""
     return find_peaks(Target(problem, Hypothesis()), problem.near)[0]
-
-
-def _words(shifts: Shifts) -> str:
-    """Return the planes that are numbered otherwise, and how."""
-    by_plane = {plane: _SHIFTS[shift] for plane, shift in zip(PLANES, shifts, strict=True) if shift}
-    if len(by_plane) == len(PLANES) and len(set(by_plane.values())) == 1:
-        return f"the modes of both planes numbered {by_plane[PLANES[0]]}"
-    return " and ".join(f"the {plane} modes numbered {how}" for plane, how in by_plane.items())
 
 
 def _tension(problem: GapProblem, peak: Peak) -> str:

@@ -122,7 +122,8 @@ def _remains(found: Cleared, error: GrossError) -> bool:
     index = int(np.searchsorted(rows, error.row))
     answer = answered(found.attribution)[0][1]
     seen = _seen_from(found.whole.part(rows).without_shape(index), answer, index)
-    return bool(seen.gross_given_rest[0] > seen.ordinary_given_rest[0])
+    gross, ordinary = seen.gross_or_ordinary[:, 0]
+    return bool(gross > ordinary)
 
 
 def _find_gross_error(found: Cleared) -> GrossError | None:
@@ -135,8 +136,11 @@ def _find_gross_error(found: Cleared) -> GrossError | None:
     if not len(rows):
         return None
     seen = [_left_out_of(problem, tried[k].fit, rows) for k in plain]
-    gross = np.array([log[k] + s.gross for k, s in zip(plain, seen, strict=True)])
-    ordinary = np.array([log[k] + s.ordinary for k, s in zip(plain, seen, strict=True)])
+    gross, ordinary = np.swapaxes(
+        [log[k] + each.rest + each.gross_or_ordinary for k, each in zip(plain, seen, strict=True)],
+        0,
+        1,
+    )
     odds = scipy.special.logsumexp(gross, axis=0) - scipy.special.logsumexp(ordinary, axis=0)
     best = int(odds.argmax())
     if odds[best] < _WORTH_FITS:
@@ -183,9 +187,7 @@ def _judge(problem: GapProblem, tried: ScoredHypothesis, row: int) -> FloatArray
     peaks = find_peaks(Target(rest, hypothesis), np.vstack([fit.z, np.hstack([alone, effects])]))
     whole, z = problem.without_shape(row), peaks[0].z
     seen = left_out(whole, hypothesis, z, *_around(whole, hypothesis, z), np.array([row]))
-    gross, ordinary = laplace(peaks) + np.array(
-        [seen.gross_given_rest[0], seen.ordinary_given_rest[0]]
-    )
+    gross, ordinary = laplace(peaks) + seen.gross_or_ordinary[:, 0]
     return np.array([gross, max(ordinary, _log_evidence(whole, tried))])
 
 
@@ -217,50 +219,35 @@ class LeftOut:
 
     @property
     def log_rest(self) -> FloatArray:
-        """Log evidence (nodes, r) of all data but each frequency."""
+        """Return the log evidence (nodes, r) of all data but each frequency."""
         return np.asarray(
             self.log_all[:, None] - scipy.stats.norm.logpdf(self.deviation, scale=self.sd)
         )
 
     @property
-    def gross(self) -> FloatArray:
-        """Log evidence (r,) relative to that of all data, were each frequency a gross error."""
-        return self._relative(log_gross(self.deviation, self.gross_share))
+    def rest(self) -> FloatArray:
+        """Return the log evidence (r,) of all data but each, relative to that of all data."""
+        whole = scipy.special.logsumexp(self.log_all)
+        return np.asarray(scipy.special.logsumexp(self.log_rest, axis=0) - whole)
 
     @property
-    def ordinary(self) -> FloatArray:
-        """The same (r,) were it an ordinary datum, whose error has the tails of Student's t."""
-        return self._relative(log_ordinary(self.deviation, self.sd, self.gross_share))
+    def gross_or_ordinary(self) -> FloatArray:
+        """Return log densities (2, r) given all other data: of a gross error, of an ordinary one.
+
+        An ordinary error has the tails of Student's t.
+        """
+        rest, share = self.log_rest, self.gross_share
+        both = log_gross(self.deviation, share), log_ordinary(self.deviation, self.sd, share)
+        together = scipy.special.logsumexp(rest, axis=0)
+        return np.array([scipy.special.logsumexp(rest + each, axis=0) - together for each in both])
 
     @property
     def expected(self) -> tuple[FloatArray, FloatArray]:
-        """Mean and standard deviation (r,) of the deviations, over the possibilities."""
+        """Return mean and standard deviation (r,) of the deviations, over the possibilities."""
         weight = np.exp(self.log_rest - scipy.special.logsumexp(self.log_rest, axis=0))
         mean = (weight * self.deviation).sum(axis=0)
         square = (weight * (self.sd**2 + self.deviation**2)).sum(axis=0)
         return mean, np.sqrt(square - mean**2)
-
-    @property
-    def gross_given_rest(self) -> FloatArray:
-        """Return the log density (r,) given all other data, were each a gross error."""
-        return self._given_rest(log_gross(self.deviation, self.gross_share))
-
-    @property
-    def ordinary_given_rest(self) -> FloatArray:
-        """Return the log density (r,) given all other data, were each an ordinary datum."""
-        return self._given_rest(log_ordinary(self.deviation, self.sd, self.gross_share))
-
-    def _given_rest(self, log_density: FloatArray) -> FloatArray:
-        """Log of the mean density (r,), the possibilities weighed by all other data."""
-        rest = self.log_rest
-        return np.asarray(
-            scipy.special.logsumexp(rest + log_density, axis=0)
-            - scipy.special.logsumexp(rest, axis=0)
-        )
-
-    def _relative(self, log_density: FloatArray) -> FloatArray:
-        whole = scipy.special.logsumexp(self.log_all)
-        return np.asarray(scipy.special.logsumexp(self.log_rest + log_density, axis=0) - whole)
 
 
 def log_gross(deviation: FloatArray, share: float) -> FloatArray:
@@ -322,10 +309,10 @@ def _seen_from(problem: GapProblem, fit: Fit, row: int) -> LeftOut:
 def acts_alone(
     design: Design, remaining: Design, row: int, deviation: float, gross_share: float
 ) -> float:
-    """Return how probably the frequency `row` of `design`, off by `deviation` of its logarithm,
-    is no slip but moved by something unknown that acts on this mode alone.
+    """Return how probably an excluded frequency is no slip, but moved by what acts on it alone.
 
-    `remaining` are the frequencies that were not set aside.
+    It is `row` of `design`, off by `deviation` of its logarithm; `remaining` are the frequencies
+    that were kept.
     """
     if abs(deviation) > _LARGEST or _right_elsewhere(design, remaining, row):
         return 0.0

@@ -209,8 +209,9 @@ class GapProblem:
         return Repeated(self.section_of(design), tensions, masses, shapes, errors)
 
     def tensions_of(self, design: Design) -> FloatArray:
-        """Return what one standard deviation of each test's tension does to the frequencies of a
-        design: loads (F, tests), none of a lone test without a reading.
+        """Return loads (F, tests): what one standard deviation of each test's tension does.
+
+        None of a lone test without a reading.
 
         It differs a little from test to test, and one that was read errs by its reading. All modes
         of a test move together, those of other tests do not.
@@ -298,7 +299,7 @@ class GapProblem:
         return sensor_loads(as_if, self._predicted_near, self.hanger)[0]
 
     def _predicted_near(self, design: Design) -> FloatArray:
-        """The data (data,) that the baseline near the measured ones predicts of a design."""
+        """Return the data (data,) that the baseline near the measured ones predicts of a design."""
         return np.asarray(self.predict(Hypothesis(), self.near, design)[0])
 
     def left(self, fit: Fit) -> FloatArray:
@@ -324,12 +325,12 @@ class GapProblem:
 
     @property
     def near_misfit(self) -> float:
-        """By how much the baseline near the data misses the frequencies, root mean square."""
+        """Return by how much the baseline near the data misses the frequencies (rms)."""
         return self._nearest[1]
 
     @property
     def near(self) -> FloatArray:
-        """A point z (1, d) of the baseline at the tension that fits the frequencies best."""
+        """Return a point z (1, d) of the baseline at the tension that fits the frequencies best."""
         return self._nearest[0]
 
     @cached_property
@@ -344,7 +345,7 @@ class GapProblem:
         return z[[int(misfit.argmin())]], float(misfit.min())
 
     def part(self, rows: BoolArray | IntArray) -> GapProblem:
-        """The same problem on some of the frequencies; a mode's shape goes with its frequency.
+        """Return the same problem on some of the frequencies, each with the shape of its mode.
 
         `rows` are theirs, as indices or as a choice (F,). Priors are those of the whole.
         """
@@ -353,7 +354,7 @@ class GapProblem:
         return self._with(self.observations.part(frequencies, shapes))
 
     def without_shape(self, row: int) -> GapProblem:
-        """The same problem without the shape of the mode `row`; itself where it has none."""
+        """Return the problem without the shape of the mode `row`; itself where it has none."""
         components = np.flatnonzero(self.design.shape_mode != row)
         if len(components) == len(self.design.shape_mode):
             return self
@@ -406,7 +407,7 @@ class GapProblem:
     def _modes(
         self, effects: Effects, theta: FloatArray, design: Design
     ) -> Iterator[tuple[int, HangerModes]]:
-        """Each test that holds data with the modes of theta (n, d) in it."""
+        """Return each test that holds data, with the modes of theta (n, d) in it."""
         if design.places_m == self.design.places_m:
             composed = self._hanger_with(effects)
         else:

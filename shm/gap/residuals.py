@@ -39,7 +39,7 @@ DRAWS = 100  # technical: a mean p-value to a tenth of its spread over draws
 def residuals(
     problem: GapProblem, before: Fit, after: Fit | None, held_out: HeldOut
 ) -> tuple[Residual, ...]:
-    """The residual of each frequency from the baseline's fit `before`, in the data's order.
+    """Return the residual of each frequency from the baseline's fit `before`, in the data's order.
 
     `z` is the residual over its own standard deviation, of which the tension and the other free
     parameters absorb a part (standardised residual, Cook and Weisberg 1982, 2.1; here with known
@@ -78,7 +78,7 @@ def residuals(
 
 
 def identification_sd(problem: GapProblem, fit: Fit) -> FloatArray:
-    """Standard deviations (data,); those that nobody gave are what `fit` takes for the errors.
+    """Return standard deviations (data,); those that nobody gave are what `fit` takes for errors.
 
     Less what repeats in any case, which is no error of identification.
     """
@@ -90,7 +90,7 @@ def identification_sd(problem: GapProblem, fit: Fit) -> FloatArray:
 
 
 def left_over(fit: Fit, sd: FloatArray) -> FloatArray:
-    """Covariance (F, F) of what a fit leaves of independent errors `sd` (data,) in frequencies.
+    """Return the covariance (F, F) of what a fit leaves of independent errors `sd` (data,).
 
     A fit weighs the data by all errors that it allows for. Supports that give and a section that
     varies keep its parameters from following the data as far as `sd` alone would let them.
@@ -104,7 +104,7 @@ def left_over(fit: Fit, sd: FloatArray) -> FloatArray:
 
 
 def trends(problem: GapProblem, before: Fit) -> tuple[Trend, ...]:
-    """The trends of the frequency residuals, that with the largest share first.
+    """Return the trends of the frequency residuals, that with the largest share first.
 
     Conditions that the tests do not vary are absent. The regression is weighted by the
     identification's errors. Tests are compared mode by mode (each plane and order has its own
@@ -125,7 +125,7 @@ def trends(problem: GapProblem, before: Fit) -> tuple[Trend, ...]:
 
 
 def _conditions(design: Design) -> Iterator[tuple[str, FloatArray, IntArray]]:
-    """Each condition's name, its value at each frequency and the groups it is compared within."""
+    """Yield each condition's name, its value at each frequency and the groups to compare within."""
     test, plane, order = design.frequency_test, design.frequency_plane, design.frequency_order
     mode = 2 * order + plane
     masses = [c.added_mass.mass_kg if c.added_mass else 0.0 for c in design.conditions]
@@ -173,7 +173,7 @@ def _centred(values: FloatArray, groups: IntArray, weight: FloatArray) -> FloatA
 def predictive_p_value(
     observations: Observations, predicted: FloatArray, noise: Covariance
 ) -> float:
-    """Posterior predictive p-value of the misfit (Gelman, Meng and Stern, Stat. Sinica 6, 1996).
+    """Return the posterior predictive p-value (Gelman, Meng and Stern, Stat. Sinica 6, 1996).
 
     `predicted` (draws, data) are those of draws of the posterior, `noise` is the covariance that
     the data should have about a right prediction. Three misfits are looked at, each a chi-square:
@@ -199,19 +199,19 @@ def predictions(problem: GapProblem, fit: Fit) -> FloatArray:
 
 
 def _p_value(residual: FloatArray, covariance: FloatArray, means: FloatArray) -> float:
-    """The mean p-value of `means` (m, F) of residuals (draws, F) whose covariance is (F, F)."""
+    """Return the mean p-value of `means` (m, F) of residuals (draws, F) of a covariance (F, F)."""
     lower = np.linalg.cholesky(means @ covariance @ means.T)
     whitened = np.linalg.solve(lower, means @ residual.T)
     return float(np.mean(scipy.stats.chi2.sf(np.sum(whitened**2, axis=0), len(means))))
 
 
 def _freedom(design: Design) -> int:
-    """Of the components of shapes; scaling to unit length takes one from each shape."""
+    """Return that of the components of shapes; scaling to unit length takes one from each."""
     return len(design.shape_mode) - len(np.unique(design.shape_mode))
 
 
 def _means(design: Design) -> FloatArray:
-    """Rows (m, F) that average each mode over the tests in which it was measured."""
+    """Return rows (m, F) that average each mode over the tests in which it was measured."""
     rows = (design.mode == np.unique(design.mode)[:, None]).astype(float)
     return np.asarray(rows / rows.sum(axis=1, keepdims=True))
 
@@ -272,8 +272,7 @@ def shrinkage(problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut
 
 
 def _residuals(problem: GapProblem, fit: Fit, folds: BoolArray) -> FloatArray:
-    """Return what `fit`, refitted to the others of each fold, misses of the frequencies it holds
-    out."""
+    """Return what `fit`, refitted to the others of each fold, misses of what the fold holds out."""
     design, residual = problem.observations.design, problem.observations.value - fit.predicted
     left = np.full(folds.shape, NAN)
     for fold, out in enumerate(folds):

@@ -66,7 +66,7 @@ def drop_copies(readings: Sequence[Reading]) -> tuple[tuple[Reading, ...], tuple
 
 
 def errors_of(problem: SimulatorProblem, fit: Fit) -> FloatArray:
-    """Stated deviations, and for unstated ones those that the fit found."""
+    """Return stated deviations, and for unstated ones those that the fit found."""
     found = np.sqrt(np.diag(fit.noise.frequency))
     return np.where(np.isfinite(problem.sd), problem.sd, found)
 
@@ -77,12 +77,12 @@ def in_sds(problem: SimulatorProblem, fit: Fit) -> FloatArray:
 
 
 def rms(values: FloatArray) -> float:
-    """Root mean square."""
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(values**2)))
 
 
 def p_value(problem: SimulatorProblem, fit: Fit, residual: FloatArray | None = None) -> float:
-    """Of the misfit at the best point, averaged over the unknown size of the errors.
+    """Return that of the misfit at the best point, averaged over the unknown size of the errors.
 
     A `residual` (data,) may be another than the fit's, NaN for readings that do not count.
     """
@@ -97,7 +97,7 @@ def p_value(problem: SimulatorProblem, fit: Fit, residual: FloatArray | None = N
 def moments(
     problem: SimulatorProblem, fit: Fit, names: Mapping[str, object]
 ) -> dict[str, tuple[float, float]]:
-    """Mean and standard deviation of parameters; NaN for a deviation that draws do not show."""
+    """Return mean and standard deviation of parameters; NaN where draws do not show it."""
     found = {}
     for j, (name, prior) in enumerate(problem.priors(fit.hypothesis).items()):
         if name in names:
@@ -112,7 +112,7 @@ def _at_bound(prior: Prior, z: FloatArray) -> bool:
 
 
 def at_bounds(problem: SimulatorProblem, fit: Fit) -> tuple[str, ...]:
-    """A remark on each parameter that lies at the bound of its prior, or far out of it."""
+    """Return a remark on each parameter at the bound of its prior, or far out of it."""
     remarks = []
     for j, (name, prior) in enumerate(problem.priors(fit.hypothesis).items()):
         z = fit.draws[:, j]
@@ -127,12 +127,12 @@ def at_bounds(problem: SimulatorProblem, fit: Fit) -> tuple[str, ...]:
 
 
 def slips(problem: SimulatorProblem, *fits: Fit) -> tuple[str, ...]:
-    """A remark on the reading with which alone the last of these does not fit, if any does not."""
+    """Return a remark on the reading without which the last of these that misfits would fit."""
     return tuple(remark for fit in fits if (remark := _slip(problem, fit)))[-1:]
 
 
 def _slip(problem: SimulatorProblem, fit: Fit) -> str:
-    """On the reading without which a bad fit is a good one; empty where there is none."""
+    """Return a remark on the reading without which a bad fit is a good one; empty for none."""
     if len(problem.value) < len(fit.z) + 3 or p_value(problem, fit) > _BAD:
         return ""
     best, remark = _GOOD, ""

@@ -59,7 +59,7 @@ class Prior:
             )
 
     def value(self, z: FloatArray) -> FloatArray:
-        """The parameter at standard normal coordinates of any shape."""
+        """Return the parameter at standard normal coordinates of any shape."""
         match self.spread:
             case "uniform":
                 return np.asarray(self.a + (self.b - self.a) * scipy.special.ndtr(z))
@@ -161,20 +161,20 @@ class SimulatorProblem:
 
     @property
     def same_observable(self) -> FloatArray:
-        """(data, data): 1 where two readings are of one observable."""
+        """Return 1 where two readings are of one observable (data, data)."""
         names = np.array([each.observable for each in self.readings])
         return np.asarray(names[:, None] == names, dtype=float)
 
     def effects(self, hypothesis: Hypothesis) -> tuple[SimulatorEffect, ...]:
-        """The effects of a hypothesis; none of the simulator alone."""
+        """Return the effects of a hypothesis; none of the simulator alone."""
         return tuple(e for e in self.simulator.effects if e.name in hypothesis.names)
 
     def effect_priors(self, hypothesis: Hypothesis) -> dict[str, Prior]:
-        """Of its effects alone."""
+        """Return the priors of its effects alone."""
         return {n: p for each in self.effects(hypothesis) for n, p in each.parameters.items()}
 
     def priors(self, hypothesis: Hypothesis) -> dict[str, Prior]:
-        """Of the simulator, then of the effects: one coordinate z each, in this order."""
+        """Return those of the simulator, then of the effects: a coordinate z each, in order."""
         return {**self.simulator.parameters, **self.effect_priors(hypothesis)}
 
     def dimension(self, hypothesis: Hypothesis) -> int:
@@ -199,7 +199,7 @@ class SimulatorProblem:
     def predicted_of(
         self, hypothesis: Hypothesis, z: FloatArray, readings: Sequence[Reading]
     ) -> FloatArray:
-        """Predictions (n, readings) at z (n, d), be they measured or only planned.
+        """Return predictions (n, readings) at z (n, d), be they measured or only planned.
 
         Two effects that are one function act together in it; others add what each does alone.
         """
@@ -258,7 +258,7 @@ class SimulatorProblem:
         return {name: _together([one.get(name) for one in each]) for name in each[0]}
 
     def nodes(self) -> tuple[NoiseNode, ...]:
-        """The unknown errors: stated deviations times a common factor, unstated ones by a share."""
+        """Return unknown errors: stated ones times a common factor, unstated ones by a share."""
         known = np.isfinite(self.sd)
         bounds, spread = DEFAULTS.unstated_frequency_sd.bounds, DEFAULTS.stated_sd_log_sd.value
         shares = np.zeros(1) if known.all() else np.geomspace(*bounds, _UNKNOWN_SDS)
@@ -271,7 +271,7 @@ class SimulatorProblem:
         )
 
     def flexible_nodes(self) -> tuple[NoiseNode, ...]:
-        """The unknown errors and a remainder that is free in form and size, log-uniform in size."""
+        """Return the unknown errors and a remainder free in form and size, log-uniform in size."""
         plain = self.nodes()
         covariance = plain[len(plain) // 2].covariance.frequency
         sd = np.sqrt(np.diag(covariance))
@@ -286,7 +286,7 @@ class SimulatorProblem:
         )
 
     def _patterns(self) -> list[FloatArray]:
-        """Correlations (data, data) that a remainder may have: in all observables, and in each."""
+        """Return correlations (data, data) of a remainder: in all observables, and in each."""
         same = self.same_observable
         varied = self._varied_conditions()
         apart = sum(((each[:, None] - each) ** 2 for each in varied), np.zeros_like(same))
@@ -300,7 +300,7 @@ class SimulatorProblem:
         return forms
 
     def _varied_conditions(self) -> list[FloatArray]:
-        """Each quantity that all conditions state and that varies, from 0 to 1."""
+        """Return each quantity that all conditions state and that varies, from 0 to 1."""
         stated = set.intersection(*(set(each.condition) for each in self.readings))
         values = [np.array([each.condition[n] for each in self.readings]) for n in sorted(stated)]
         return [(each - each.min()) / np.ptp(each) for each in values if np.ptp(each) > 0]
@@ -337,7 +337,7 @@ def _mapping(
 
 
 def _together(values: list[Any]) -> Any:
-    """As one array; what has no common shape is no number."""
+    """Return one array; what has no common shape is no number."""
     same_shape = len({np.shape(each) for each in values}) == 1
     return np.array(values) if same_shape else np.full(len(values), None)
 

@@ -83,7 +83,7 @@ def bridge_report(
             f"{newest.time:%Y-%m-%d}: ask for a longer period.",
         )
     charts = control_charts(workspace, store)
-    pattern, why_not = _pattern_or_why(store, [hanger.id for hanger in hangers])
+    pattern, why_not = pattern_or_why(workspace, store)
     return BridgeReport(
         workspace.bridge.name,
         tuple(
@@ -261,9 +261,10 @@ def _course(points: Sequence[TrendPoint], alerts: int) -> PeriodSummary:
     return PeriodSummary(len(points), alerts, last.since(first))
 
 
-def _pattern_or_why(store: Store, order: Sequence[int]) -> tuple[BridgePattern | None, str]:
+def pattern_or_why(workspace: Workspace, store: Store) -> tuple[BridgePattern | None, str]:
+    """Return what moved over the bridge, or why nothing can be compared."""
     try:
-        return stored_pattern(store, order), ""
+        return stored_pattern(store, [hanger.id for hanger in workspace.bridge.hangers]), ""
     except NothingThere as reason:
         return None, f"Over the bridge nothing can be compared: {reason.message}"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -21,7 +21,8 @@ from shm.values import Alert
 _THREADS = 16  # technical: they mostly wait for an answer
 _THREADS_A_HOOK = 4  # technical: a quarter, so that a hook that hangs leaves room for three
 _LONGEST_S = 86400.0  # judgement: a hook mended within a day is told the day after at the latest
-_DOUBLINGS = 32  # of any wait that may be set, so many are more than a day
+_LONGEST_WAITS = (timedelta(0), timedelta(seconds=_LONGEST_S))
+"""Before the first attempt and after a failure: who is put off for longer, was by a wrong clock."""
 
 Notifier = Callable[[Hook, Alert], object]
 
@@ -103,8 +104,8 @@ class Courier:
         now, alerts = self._clock(), self._store.alerts
         excluded = [each.delivery.id for each in self._sending]
         excluded += self._list_quiet(workspace, now)
-        waits = _list_waits(workspace.settings)
-        due = alerts.list_due_deliveries(now, 2 * _THREADS, excluded, waits, begun=True)
+        room = 2 * _THREADS
+        due = alerts.list_due_deliveries(now, room, excluded, _LONGEST_WAITS, begun=True)
         parts: defaultdict[int | None, list[Delivery]] = defaultdict(list)
         for part in alerts.list_deliveries(messages=[each.id for each in due]) if due else ():
             parts[part.message_id].append(part)
@@ -155,16 +156,8 @@ def alert_fields(alert: Alert) -> dict[str, object]:
 
 def _wait_after(attempts: int, settings: Settings) -> timedelta:
     """Return the wait after so many failures: doubled each time, a day at most."""
-    seconds = settings.hook_backoff_seconds * 2.0 ** (attempts - 1) if attempts else 0.0
+    seconds = settings.hook_backoff_seconds * 2.0 ** (attempts - 1)
     return timedelta(seconds=min(seconds, _LONGEST_S))
-
-
-def _list_waits(settings: Settings) -> Sequence[timedelta]:
-    """Return the waits after so many failures, up to the first that is as long as any."""
-    waits = [_wait_after(0, settings)]
-    while waits[-1].total_seconds() < _LONGEST_S and len(waits) < _DOUBLINGS:
-        waits.append(_wait_after(len(waits), settings))
-    return waits
 
 
 def _send(notifier: Notifier, hook: Hook | None, name: str, message: Alert) -> None:

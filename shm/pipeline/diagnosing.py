@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
@@ -12,7 +11,12 @@ from shm.inference.options import Progress, silent
 from shm.pipeline.lineage import diagnosis_lineage
 from shm.report.hanger_status import still_detected
 from shm.store import Store, StoredTest
-from shm.store.queries.hangers import find_latest_watches, list_detected_changes
+from shm.store.queries.hangers import (
+    find_latest_diagnosis,
+    find_latest_watches,
+    list_detected_changes,
+)
+from shm.store.queries.tests import list_test_rows
 from shm.values import Diagnosis, Hanger, ModalTest
 
 if TYPE_CHECKING:
@@ -53,27 +57,26 @@ def choose_tests(
     it are among them. Raises NothingThere where there is no test.
     """
     stored = latest_tests(store, hanger, count)
-    began_by = None if every else find_last_change(store, hanger, stored)
+    began_by = None if every else find_last_change(store, hanger)
     if began_by is None:
         return ChosenTests(stored)
     since = tuple(each for each in stored if each.time >= began_by) or stored[-1:]
     if len(since) == len(stored):
         return ChosenTests(stored)
-    tests = "test" if len(since) == 1 else f"{len(since)} tests"
+    tests, are = ("test", "is") if len(since) == 1 else (f"{len(since)} tests", "are")
     remark = (
-        f"Only the {tests} since {began_by:%Y-%m-%d}, when the watch reports a change, "
-        f"{'is' if len(since) == 1 else 'are'} diagnosed; {len(stored) - len(since)} earlier left "
-        f"out. To diagnose them together: `shm gap diagnose --hanger {hanger.id} --all-tests`."
+        f"Only the {tests} since {began_by:%Y-%m-%d} {are} diagnosed: the watch reports a change "
+        f"before. Earlier ones left out: {len(stored) - len(since)}. To diagnose all together: "
+        f"`shm gap diagnose --hanger {hanger.id} --all-tests`."
     )
     return ChosenTests(since, remark)
 
 
-def find_last_change(store: Store, hanger: Hanger, stored: Sequence[StoredTest]) -> datetime | None:
+def find_last_change(store: Store, hanger: Hanger) -> datetime | None:
     """Return by when the last change that is in force began, or the baseline was set anew.
 
     None where neither is known. A change is in force while the watch detects it, or while an alert
-    of it has not ended; what two tests agree on began with the first of them. `stored` are the
-    tests by time.
+    of it has not ended; what two tests agree on began with the first of them.
     """
     baseline, latest = store.watch.baseline(hanger.id), find_latest_watches(store, [hanger])
     detected = list_detected_changes(store, [hanger]).get(hanger.id, ())
@@ -83,10 +86,32 @@ def find_last_change(store: Store, hanger: Hanger, stored: Sequence[StoredTest])
         if each.alert.change is not None:
             times.append(each.alert.change.began_by)
         elif "beyond threshold" in each.alert.kinds:
-            times += [test.time for test in stored if test.time < each.alert.time][-1:]
+            rows = list_test_rows(store, hanger.id)
+            times += [row.time for row in rows if row.time < each.alert.time][:1]
     if baseline is not None and baseline.since is not None:
         times.append(baseline.since)
     return max(times, default=None)
+
+
+def latest_diagnosis(store: Store, hanger: Hanger) -> Diagnosis | None:
+    """Return the latest diagnosis of a hanger; it says first if its tests are from before a change.
+
+    None where there is none.
+    """
+    stored = find_latest_diagnosis(store, hanger.id)
+    if stored is None:
+        return None
+    found, began_by = stored.diagnosis, find_last_change(store, hanger)
+    if began_by is None:
+        return found
+    times = [row.time for row in list_test_rows(store, hanger.id) if row.name in found.tests]
+    if not times or max(times) >= began_by:
+        return found
+    remark = (
+        f"These tests are from before {began_by:%Y-%m-%d}, when the watch reports a change. "
+        f"Diagnose again: `shm gap diagnose --hanger {hanger.id}`."
+    )
+    return replace(found, remarks=(remark, *found.remarks))
 
 
 def diagnose_stored(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -72,6 +73,19 @@ def answer_temperature(text: str, answers: Answers) -> Answers:
     return replace(answers, temperature_c=number)
 
 
+def answer_operator(text: str, answers: Answers) -> Answers:
+    """Return the answers with who measured, by a name or 'unknown'."""
+    if text.strip().lower() in (*_UNKNOWN, ""):
+        return replace(answers, is_operator_unknown=True)
+    return replace(answers, operator=text.strip())
+
+
+ANSWERS_OF_TEST: dict[str, Callable[[str, Answers], Answers]] = {
+    "time": answer_time, "temperature": answer_temperature, "operator": answer_operator,
+}  # fmt: skip
+"""What takes the answer to a question about one test, by what it is about."""
+
+
 def unit_recorded(name: str, found: Import) -> str:
     """The unit in which a file says that a column is recorded."""
     return next(column.unit for column in found.survey.columns if column.name == name)
@@ -121,6 +135,7 @@ def import_document(found: Import) -> dict[str, Any]:
         "hanger": found.hanger,
         "time": found.described.get("time", survey.time),
         "temperature_c": found.described.get("temperature_c", survey.temperature_c),
+        "operator": found.described.get("operator", survey.operator),
         "sampling_rate_hz": found.sampling_rate_hz,
         "samples": survey.samples,
         "columns": [_column(column) for column in found.columns],

@@ -27,12 +27,13 @@ from shm.pipeline.lineage import read_limits
 from shm.read import logger_words as words
 from shm.read.assemble import assemble
 from shm.read.base import Survey, SurveyedColumn
+from shm.read.describe import describe
 from shm.read.header import CHANNEL_KEYS, Entry
 from shm.read.profiles import Profile, completed, profile_for, save_profile, with_day_order
 from shm.read.sandbox import survey
 from shm.read.sidecar import Described, sidecar_document
 from shm.read.stamps import DayOrder, in_zone, order_of_choice
-from shm.read.table import Column, Table, describe
+from shm.read.table import Column, Table
 from shm.store import Workspace
 from shm.values import NAN, PLANES, Channel, Plane, Quantity, Recording
 
@@ -58,10 +59,12 @@ class Answers:
     sampling_rate_hz: float = NAN
     time: datetime | None = None
     temperature_c: float = NAN
+    operator: str = ""
     channels: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     each_time: bool = False
     is_time_unknown: bool = False
     is_temperature_unknown: bool = False
+    is_operator_unknown: bool = False
 
     @property
     def said(self) -> dict[str, Any]:
@@ -70,6 +73,7 @@ class Answers:
             "hanger": self.hanger,
             "time": self.time,
             "temperature_c": self.temperature_c,
+            "operator": self.operator or None,
             "sampling_rate_hz": self.sampling_rate_hz,
         }
         known = {k: v for k, v in document.items() if v is not None and v == v}
@@ -239,9 +243,12 @@ def _refuse_unknown(own: Described, found: Survey, path: Path) -> None:
             )
 
 
+_OF_TEST = ("time", "temperature_c", "operator")
+
+
 def _to_keep(known: Described, said: Described, found: Survey) -> dict[str, Any]:
     """Return what holds for every file of the logger: not the hanger that the file itself says."""
-    kept = _joined(known, {k: v for k, v in said.items() if k not in ("time", "temperature_c")})
+    kept = _joined(known, {k: v for k, v in said.items() if k not in _OF_TEST})
     if found.layout.hanger is not None:
         kept.pop("hanger", None)
     return kept
@@ -296,7 +303,7 @@ def _says(described: Described, key: str, is_unknown: bool) -> bool:
 
 
 def _of_test(found: Survey, described: Described, answers: Answers) -> list[Question]:
-    """Return the questions about time and temperature, without which a file can be taken in."""
+    """Return the questions about one test alone, without which a file can be taken in."""
     asked = []
     if found.time is None and not _says(described, "time", answers.is_time_unknown):
         asked.append(_of_time(found))
@@ -304,6 +311,9 @@ def _of_test(found: Survey, described: Described, answers: Answers) -> list[Ques
     if math.isnan(found.temperature_c) and not warmth:
         text = "How warm was the steel, in degrees Celsius (or 'unknown')?"
         asked.append(Question("temperature", "", text, "--temperature C", needed=False))
+    if not found.operator and not _says(described, "operator", answers.is_operator_unknown):
+        text = "Who measured (or 'unknown')?"
+        asked.append(Question("operator", "", text, "--operator NAME", needed=False))
     return asked
 
 
@@ -420,7 +430,7 @@ def _recording(
         ]  # fmt: skip
         rates = {} if math.isnan(rate) else {"sampling_rate_hz": Entry(rate, path)}
         table = Table(path, tuple(columns), rates)
-        made = assemble(table, describe(table, with_sidecars=False))
+        made = assemble(describe(table, with_sidecars=False))
         assert isinstance(made, Recording)
         return made, ""
     except BadInput as error:

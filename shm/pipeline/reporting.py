@@ -14,7 +14,8 @@ from shm.inference import UpdateOptions, refresh
 from shm.inference.reference_level import at_level
 from shm.models import build
 from shm.pipeline.adopting import gap_watch
-from shm.pipeline.bridge_reporting import hanger_summaries, stored_pattern
+from shm.pipeline.bridge_reporting import hanger_summaries, pattern_or_why
+from shm.pipeline.diagnosing import latest_diagnosis
 from shm.pipeline.lineage import (
     IDENTIFY_SETTINGS,
     discarded_of_baselines,
@@ -33,7 +34,7 @@ from shm.report.hanger_report import StructureReport
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
 from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
 from shm.store.queries.alerts import count_open_alerts
-from shm.store.queries.hangers import find_latest_diagnosis, list_detections
+from shm.store.queries.hangers import list_detections
 from shm.store.queries.tests import (
     count_tests,
     list_baseline_tests,
@@ -45,7 +46,6 @@ from shm.values import Hanger, ResponsePoint, WatchedTest
 from shm.values.stated_tension import averaged_now
 from shm.watch import WatchOptions, watch_hanger
 from shm.watch.alert_text import frequency_words, watch_words
-from shm.watch.neighbours import BridgePattern
 
 log = logging.getLogger(__name__)
 
@@ -74,7 +74,7 @@ def hanger_report(
         states=hanger_states(
             workspace, store, hanger, store.watch.baseline(hanger_id, report.posterior.model)
         ),
-        neighbours=_neighbours(workspace, store) if report.now.called else None,
+        neighbours=pattern_or_why(workspace, store)[0] if report.now.called else None,
         period=period,
         at_level=_at_level(workspace, report),
     )
@@ -156,7 +156,7 @@ def hanger_now(
         store.watch.baseline(hanger.id, posterior.model),
     )
     in_force = store.watch.baseline(hanger.id)
-    diagnosis, watch = find_latest_diagnosis(store, hanger.id), gap_watch(store, hanger.id)
+    watch = gap_watch(store, hanger.id)
     watched, alerts = _watched_against(store, baseline), store.alerts.list_all(hanger.id)
     (now,) = hanger_summaries(workspace, store, generated_at, [hanger])
     return HangerReport(
@@ -173,7 +173,7 @@ def hanger_now(
         alerts=tuple(stored.alert for stored in alerts),
         acknowledged=_acknowledged(alerts),
         quality=latest.quality,
-        diagnosis=diagnosis.diagnosis if diagnosis else None,
+        diagnosis=latest_diagnosis(store, hanger),
         gap_watch=str(watch) if watch else "",
         drift_watch=watch_words(watched),
         creep=watched[-1].creep_per_year if watched else None,
@@ -249,14 +249,6 @@ def _watched_against(store: Store, baseline: Baseline | None) -> tuple[WatchedTe
     """The watches that call a change, and the latest one."""
     found = list_detections(store, baseline.hanger, baseline.id) if baseline else ()
     return tuple(each.watched for each in found)
-
-
-def _neighbours(workspace: Workspace, store: Store) -> BridgePattern | None:
-    """Return what moved over the bridge; None where fewer than three hangers can be compared."""
-    try:
-        return stored_pattern(store, [hanger.id for hanger in workspace.bridge.hangers])
-    except NothingThere:
-        return None
 
 
 def hanger_states(

@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from shm.documents import parse_time
-from shm.pipeline.stream_health import LATELY, State, StreamHealth, heard
+from shm.pipeline.stream_health import LATELY, StreamHealth, heard
 from shm.report.figures.stream_course import StreamHistory
 from shm.store import Store, Workspace
 from shm.store.queries.streams import (
@@ -44,27 +44,26 @@ _TESTS_COMPARED = 12
 _ROWS_SEEN = 1000  # technical: three years of a stream's own days among them
 
 
-@dataclass(frozen=True, eq=False)
-class StreamCondition:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StreamCondition(StreamHealth):
     """`lost_share` is of the samples of the last 24 hours up to the last one, NaN without any.
 
     `apart_s` is how many seconds of samples came for a time that was there already, in 24 hours:
     they do not count, and are kept beside those that came first.
-    `behind` is how much has come and is not read yet; `events` are those of the last 24 hours.
     """
 
-    stream: Stream
-    state: State
-    last_sample: datetime | None
     lag: timedelta | None
-    behind: timedelta | None
     received_hz: float
     lost_share: float
     apart_s: float
     ring_bytes: int
     window: WindowReading | None
     hour: PooledReading | None
-    events: tuple[StreamEvent, ...]
+
+    @property
+    def behind(self) -> timedelta | None:
+        """Return how much has come and is not read yet."""
+        return None if self.last_sample is None else self.unread
 
 
 def stream_states(
@@ -79,18 +78,14 @@ def _state(health: StreamHealth, ring: Ring, store: Store, now: datetime) -> Str
     in_ring = ring.state(stream.name)
     received, lost = _received(in_ring, now)
     return StreamCondition(
-        stream=stream,
-        state=health.state,
-        last_sample=last,
+        **{**vars(health), "events": joined(health.events)},
         lag=None if last is None else max(timedelta(0), now - last),
-        behind=None if last is None else health.unread,
         received_hz=received * stream.sampling_rate_hz,
         lost_share=lost,
         apart_s=_lately_s(in_ring.apart_s, now),
         ring_bytes=ring.size_bytes(stream.name),
         window=find_last_window(store, stream.name),
         hour=_last_hour(store, stream),
-        events=joined(health.events),
     )
 
 

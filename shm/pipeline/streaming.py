@@ -158,6 +158,7 @@ class Streaming:
             try:
                 self._begin(stream)
             except (ShmError, BrokenExecutor):
+                self._recalled.discard(stream.name)  # what was to be read is looked for again
                 raise
             except Exception:  # what one stream holds must not stop the others
                 log.exception("stream %s cannot begin its next step", stream.name)
@@ -265,17 +266,18 @@ class Streaming:
         hanger = self.workspace.bridge.tested(stream.hanger)
         options = identify_options(self.workspace.settings, self.workspace.bridge)
         known = list_latest_with_modes(self.store, stream.name)
+        step = partial(
+            read_stream_window,
+            self.ring.read(stream.name, start, start + WINDOW),
+            stream,
+            last_modes(known),
+            hanger,
+            options,
+            tuple(self._offsets[stream.name]),
+            any(each.how == "tracked" for each in known),
+        )
         try:
-            found: WindowFound = yield partial(
-                read_stream_window,
-                self.ring.read(stream.name, start, start + WINDOW),
-                stream,
-                last_modes(known),
-                hanger,
-                options,
-                tuple(self._offsets[stream.name]),
-                any(each.how == "tracked" for each in known),
-            )
+            found: WindowFound = yield step
             for event in found.events:
                 self.store.streams.save_event(event)
             self._offsets[stream.name].append(found.offsets)
@@ -351,19 +353,20 @@ class Streaming:
         recent: tuple[StreamEvent, ...] = ()
         if period == "hour":
             recent = list_stream_events(store, stream.name, start - _LOOKED_BACK)
+        step = partial(
+            pool_stream,
+            self._windows(stream, start, length),
+            period,
+            start,
+            self.workspace.bridge.tested(stream.hanger),
+            baseline_of(store, stream),
+            None if watch is None else watch.content,
+            self.workspace.settings.false_call_years,
+            recent,
+            is_watched=period == "hour" and (watch is None or start >= watch.reading_time),
+        )
         try:
-            found: Pooled = yield partial(
-                pool_stream,
-                self._windows(stream, start, length),
-                period,
-                start,
-                self.workspace.bridge.tested(stream.hanger),
-                baseline_of(store, stream),
-                None if watch is None else watch.content,
-                self.workspace.settings.false_call_years,
-                recent,
-                is_watched=period == "hour" and (watch is None or start >= watch.reading_time),
-            )
+            found: Pooled = yield step
             self._store_pooled(stream, start + length, found)
             self._pooled[stream.name, period] = start + length
         except Exception as error:

@@ -151,11 +151,6 @@ def copied(candidate: Candidate) -> Doubt | None:
     )
 
 
-def is_copy(own: Fingerprint, other: Fingerprint) -> bool:
-    """Return True if one recording holds the other's impacts."""
-    return shared(own, other) is not None
-
-
 def shared(own: Fingerprint, other: Fingerprint) -> Common | None:
     """Return what two recordings have in common where one holds the other's impacts.
 

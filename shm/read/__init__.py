@@ -16,14 +16,16 @@ from shm.resources import when_asked
 
 if TYPE_CHECKING:
     from shm.read.base import Format, Peek, PeekChannel
-    from shm.read.bundles import bundle, holds_test
+    from shm.read.bundles import bundle
+    from shm.read.content import holds_test
     from shm.read.limits import Limits
     from shm.read.registry import FORMATS, peek, peek_test, read, read_test, write
     from shm.read.sidecar import sidecar_path
 
 _HOMES = {
     "base": ("Format", "Peek", "PeekChannel"),
-    "bundles": ("bundle", "holds_test"),
+    "bundles": ("bundle",),
+    "content": ("holds_test",),
     "limits": ("Limits",),
     "registry": ("FORMATS", "peek", "peek_test", "read", "read_test", "write"),
     "sidecar": ("sidecar_path",),

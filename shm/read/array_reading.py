@@ -6,21 +6,25 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shm.errors import BadInput
-from shm.read.arrays import Arrays, Variable, flatten_tables
+from shm.read.arrays import Arrays, Variable, plain
 from shm.read.base import Format
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, quantity_named
 from shm.read.limits import guarded, refuse_large
-from shm.read.logger_words import UNIT_MISSING, unit_of
+from shm.read.logger_words import UNIT_MISSING, is_accelerance, unit_of
 from shm.read.stamps import moment
-from shm.read.table import Column, Role, Table, is_accelerance
-from shm.values import ComplexArray, FloatArray
+from shm.read.table import Column, Role, Table
+from shm.values import ComplexArray, FloatArray, FrequencyResponse, Recording
 
+# judgement: twice the 16 accelerations of setting max_channels; a wider table is no recording
+_MOST_COLUMNS = 32
 _TIMES = {"t", "time", "times", "timedomain", "timevector", "timeaxis", "times_s"}
 _FREQUENCIES = {"f", "freq", "frequency", "frequencies", "frequencyhz", "freqdomain", "freqhz"}
 _SECONDS = {"s", "sec", "second", "seconds"}
@@ -45,6 +49,7 @@ def format_of_arrays(
     recognises: Callable[[bytes], bool],
     opened: Callable[[Path], AbstractContextManager[Arrays]],
     library: str = "",
+    write: Callable[[Recording | FrequencyResponse, Path], None] | None = None,
 ) -> Format:
     """Return the format whose files are opened so; a look loads no channel."""
 
@@ -55,7 +60,7 @@ def format_of_arrays(
                 whole = flatten_tables(arrays)
             yield (_table(whole, path, name),)
 
-    return Format(name, suffixes, recognises, open_tables, library=library)
+    return Format(name, suffixes, recognises, open_tables, write, library=library)
 
 
 def _table(arrays: Arrays, path: Path, name: str) -> Table:
@@ -172,3 +177,55 @@ def facts(attributes: Mapping[str, object]) -> dict[str, object]:
 
 def _bare(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def flatten_tables(arrays: Arrays) -> Arrays:
+    """Return arrays with single numbers and texts as attributes, and tables as single rows.
+
+    `acc_1_unit` becomes the attribute `unit` of `acc_1`; other facts become general attributes.
+    The rows or columns of a table DATA, whichever are longer, become DATA_1, DATA_2, ...
+    """
+    stated = {v.name: _fact(v) for v in arrays.variables if v.is_fact}
+    series = [part for v in arrays.variables if not v.is_fact for part in _parts(v)]
+    facts_of = {v.name: facts_about(v.name, stated) for v in series}
+    taken = {f"{name}_{key}" for name, about in facts_of.items() for key in about}
+    general = {name: value for name, value in stated.items() if name not in taken}
+    variables = (replace(v, attributes={**facts_of[v.name], **v.attributes}) for v in series)
+    return Arrays(tuple(variables), {**general, **arrays.attributes}, arrays.left_out)
+
+
+def facts_about(name: str, stated: Mapping[str, object]) -> dict[str, object]:
+    """Return the facts about `name` by channel key: `acc_1_unit` is the unit of acc_1."""
+    return {key: stated[f"{name}_{key}"] for key in CHANNEL_KEYS if f"{name}_{key}" in stated}
+
+
+def _fact(variable: Variable) -> object:
+    values = variable.load()
+    if variable.kind == "U":
+        return "".join(str(text) for text in np.ravel(values)).strip()
+    return plain(values)
+
+
+def _parts(variable: Variable) -> list[Variable]:
+    """Return the variable itself in one row, or the rows of a table."""
+    lengths = [length for length in variable.shape if length != 1]
+    if variable.kind not in "iufc" or len(lengths) < 2:
+        shape = tuple(lengths) or (1,)
+        return [replace(variable, shape=shape, load=lambda: variable.load().reshape(shape))]
+    if len(variable.shape) != 2 or min(lengths) > _MOST_COLUMNS:
+        return [variable]
+    loaded = cache(variable.load)
+    lies = variable.shape[0] <= variable.shape[1]
+    return [
+        replace(
+            variable,
+            name=f"{variable.name}_{row + 1}",
+            shape=(max(lengths),),
+            load=_row(loaded, row, lies),
+        )
+        for row in range(min(lengths))
+    ]
+
+
+def _row(load: Callable[[], NDArray[Any]], row: int, lies: bool) -> Callable[[], NDArray[Any]]:
+    return lambda: load()[row] if lies else load()[:, row]

@@ -21,7 +21,7 @@ from shm.read.header import Header
 from shm.read.limits import limits, refuse_large, refuse_many_samples
 from shm.read.logger_words import ACCELERANCE
 from shm.read.sidecar import sidecar_path
-from shm.read.table import Column, Description, Table, describe, is_raw
+from shm.read.table import Column, Description, Table, is_raw
 from shm.read.time_axis import on_even_grid, rate_of
 from shm.values import (
     NAN,
@@ -72,27 +72,17 @@ def collecting(problems: list[str]) -> Attempt:
 # ---------------------------------------------------------------- a table
 
 
-def assemble(table: Table, described: Description | None = None) -> Recording | FrequencyResponse:
+def assemble(found: Description) -> Recording | FrequencyResponse:
     """Return the values of a table in SI units, described by file and sidecar; raises BadInput."""
-    if table.refusal is not None:
-        raise table.refusal
-    found = described or describe(table)
     return _response(found) if found.is_response else _recording(found)
 
 
-def peek(table: Table, file_format: str) -> Peek:
-    """Return what is said of a table, without its values; faults become problems."""
-    problems = list(table.problems)
-    attempt = collecting(problems)
-    if table.refusal is not None:
-        return Peek(table.source, file_format, (), 0, problems=(*problems, str(table.refusal)))
-    found = attempt(lambda: describe(table), None)
-    if found is None:
-        found = describe(table, with_sidecars=False)
-    look_at = _look_at_response if found.is_response else _look_at_record
-    look = look_at(found, file_format, attempt)
-    possible = () if look.time else _possible_times(table)
-    return replace(look, left_out=found.left_out, problems=tuple(problems), possible_times=possible)
+def look_at(found: Description, file_format: str, attempt: Attempt) -> Peek:
+    """Return what is said of a table, without its values; faults are the attempt's."""
+    kind = _look_at_response if found.is_response else _look_at_record
+    look = kind(found, file_format, attempt)
+    possible = () if look.time else _possible_times(found.table)
+    return replace(look, left_out=found.left_out, possible_times=possible)
 
 
 def _possible_times(table: Table) -> tuple[datetime, ...]:
@@ -101,7 +91,7 @@ def _possible_times(table: Table) -> tuple[datetime, ...]:
 
 def read_of_test(header: Header, attempt: Attempt) -> dict[str, Any]:
     """Return what a header says of the complete test; None and NaN where that is faulty."""
-    unknown = dict.fromkeys(TEST_CONDITIONS) | {"temperature_c": NAN}
+    unknown = dict.fromkeys(TEST_CONDITIONS) | {"temperature_c": NAN, "operator": ""}
     return {key: attempt(partial(getattr, header, key), none) for key, none in unknown.items()}
 
 

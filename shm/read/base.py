@@ -59,6 +59,7 @@ class Peek:
     frequency_step_hz: float = NAN
     left_out: tuple[str, ...] = ()
     possible_times: tuple[datetime, ...] = ()
+    operator: str = ""
 
 
 @dataclass(frozen=True)
@@ -146,6 +147,7 @@ class Survey:
     lines: int = 0
     remarks: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
+    operator: str = ""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,15 @@ from typing import TypeVar
 from shm.errors import BadInput, UsageError
 from shm.read.arrays import natural_sort_key
 from shm.read.atomic import replace_file
-from shm.read.content import MOST_MEMBERS, checked_members, refusal, unpack, unpacking_folder
+from shm.read.content import (
+    FIRST_DAY,
+    MOST_MEMBERS,
+    checked_members,
+    holds_test,
+    refusal,
+    unpack,
+    unpacking_folder,
+)
 from shm.read.header import CHANNEL_KEYS, Entry, Header
 from shm.read.limits import guarded, limits
 from shm.read.sidecar import (
@@ -29,19 +37,12 @@ from shm.read.sidecar import (
 )
 from shm.read.stamps import moment
 
-SUFFIX = ".zip"
-FIRST_DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that ZIP knows, so that equal files pack alike
 _OF_EACH = ("channel", "sampling_rate_hz")
 _DEVICE, _CLOCK = "meta/device.csv", "meta/time.csv"
 _MOST_CLOCK = 10_000  # judgement: bytes; it holds a line for each start and pause
 _UNIX, _PLAIN_FILE = 3, 0o100644 << 16  # PKWARE APPNOTE 4.4.2 and 4.4.15: rw-r--r--
 
 T = TypeVar("T")
-
-
-def holds_test(path: Path) -> bool:
-    """Return whether a name is that of an archive with the files of one test."""
-    return path.suffix.lower() == SUFFIX
 
 
 @contextmanager

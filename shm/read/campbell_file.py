@@ -14,10 +14,9 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read.base import Format, at_once
-from shm.read.header import Entry
+from shm.read.header import Entry, is_measured, stated_entries
 from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples, too_large
 from shm.read.logger_heading import distinct_names
-from shm.read.logger_text import is_measured, stated_entries
 from shm.read.logger_words import hanger_numbered, name_and_unit
 from shm.read.table import Column, Role, Table
 from shm.values import FloatArray

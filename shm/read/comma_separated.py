@@ -28,18 +28,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from shm.errors import BadInput, UsageError
-from shm.read import labview_file, logger_text
 from shm.read.atomic import replace_text
-from shm.read.base import Format, at_once, names_in
-from shm.read.content import LINE_BREAK, cells_of, is_text, mark_between, text_of
+from shm.read.base import names_in
+from shm.read.content import LINE_BREAK, cells_of, mark_between
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, condition_entries, spread
 from shm.read.limits import refuse_long_header
 from shm.read.logger_words import ACCELERANCE, SI
@@ -58,32 +56,16 @@ _PARTS = {
 _PART = re.compile(rf"(?:(.*?)[ _.])?({'|'.join(_PARTS)})( part)?(\s*[\[(][^\])]*[\])]\s*)?", re.I)
 
 
-def text_format(
-    name: str,
-    suffixes: tuple[str, ...],
-    recognises: Callable[[bytes], bool],
-    text_in: Callable[[Path], tuple[str, Sequence[str]]],
-    **more: Any,
-) -> Format:
-    """Return the format of files that hold text, and lines said elsewhere, as on other sheets."""
-
-    def open_tables(path: Path) -> tuple[Table, ...]:
-        text, preamble = text_in(path)
-        return open_text(text, path, preamble)
-
-    return Format(name, suffixes, recognises, at_once(open_tables), **more)
-
-
-def open_text(text: str, path: Path, preamble: Sequence[str] = ()) -> tuple[Table, ...]:
-    """Return what a text holds, as any logger's where it is none of ours; raises BadInput."""
-    if labview_file.recognises(text):
-        return labview_file.tables_in(text, path)
+def response_in(text: str, path: Path) -> Table | None:
+    """Return the frequency responses in a text; None where no line names frequencies."""
     lines = LINE_BREAK.split(text)
     at = next((i for i, line in enumerate(lines[:_FREE_LINES]) if _names_frequency(line)), None)
-    if at is not None:
-        return (_Text(lines, path, at).responses(),)
-    logged = None if logger_text.is_shm_csv(text) else logger_text.table_in(text, path, preamble)
-    return (logged if logged is not None else _Text(lines, path).record(),)
+    return None if at is None else _Text(lines, path, at).responses()
+
+
+def record_in(text: str, path: Path) -> Table:
+    """Return the time record that a text of ours holds; raises BadInput."""
+    return _Text(LINE_BREAK.split(text), path).record()
 
 
 def _names_frequency(line: str) -> bool:
@@ -275,7 +257,7 @@ def _number(text: str) -> float | None:
 # ---------------------------------------------------------------- writing
 
 
-def _write(described: Recording | FrequencyResponse, path: Path) -> None:
+def write(described: Recording | FrequencyResponse, path: Path) -> None:
     for name in names_in(described):
         if not _PLAIN.fullmatch(name):
             raise UsageError(
@@ -344,13 +326,3 @@ def _as_text(value: object) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     return repr(float(value)) if isinstance(value, float) else str(value)
-
-
-FORMAT = text_format(
-    "CSV",
-    (".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".prn", ".xls"),
-    is_text,
-    lambda path: (text_of(path), ()),
-    write=_write,
-    may_be_gzipped=True,
-)

@@ -47,6 +47,7 @@ MOST_MEMBERS = 200
 _MOST_RATIO = 200
 _CHUNK = 1 << 20
 _ENCRYPTED = 0x1
+FIRST_DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that ZIP knows, so that equal files pack alike
 _ARCHIVES = (".zip", ".tar", ".tgz", ".7z", ".rar", ".bz2", ".xz", ".zst")
 _PACK_AGAIN = "Pack the plain files of one test anew."
 
@@ -152,6 +153,11 @@ def bytes_of(path: Path) -> bytes:
 def is_gzipped(path: Path) -> bool:
     """Return whether a name claims a gzipped file, as NAME.csv.gz does."""
     return path.suffix.lower() == ".gz"
+
+
+def holds_test(path: Path) -> bool:
+    """Return whether a name is that of an archive with the files of one test."""
+    return path.suffix.lower() == ".zip"
 
 
 @contextmanager

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from shm.errors import BadInput
-from shm.read.comma_separated import text_format
 from shm.read.content import checked_members
 from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples, too_large
 
@@ -87,8 +86,3 @@ def _cell(value: object) -> str:
     if _COMMA_NUMBER.fullmatch(text):  # a number that was exported as text, in German
         return text.replace(",", ".")
     return re.sub(r"[\t\r\n]+", " ", text).strip()
-
-
-FORMAT = text_format(
-    "Excel", (".xlsx", ".xlsm"), recognises, text_of_workbook, library="python_calamine"
-)

@@ -26,7 +26,6 @@ from h5py import h5d, h5g, h5l, h5o
 from numpy.typing import NDArray
 
 from shm.errors import BadInput
-from shm.read.array_reading import format_of_arrays
 from shm.read.arrays import Arrays, Variable, attributes_of, natural_sort_key, unique_names
 from shm.read.limits import guarded, refuse_large
 
@@ -43,8 +42,13 @@ _COMPLEX = ("real", "imag")
 _PLAIN = "Store plain datasets in the file itself."
 
 
+def recognises(head: bytes) -> bool:
+    """Return whether the first bytes of a file are those of HDF5."""
+    return head.startswith(_MAGIC)
+
+
 @contextmanager
-def _opened(path: Path) -> Iterator[Arrays]:
+def opened(path: Path) -> Iterator[Arrays]:
     with opened_nodes(path) as nodes:
         found = variables(nodes)
         readable = tuple(v for v in found if v.kind in "iufcU")
@@ -56,9 +60,6 @@ def _general(nodes: list[Node]) -> dict[str, object]:
     """Return the attributes of the groups; those closest to the root take precedence."""
     groups = sorted((n for n in nodes if n.dataset is None), key=lambda n: -len(n.path))
     return {key: value for group in groups for key, value in group.attributes.items()}
-
-
-FORMAT = format_of_arrays("HDF5", (".h5", ".hdf5"), lambda head: head.startswith(_MAGIC), _opened)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,8 @@ from shm.read.logger_words import (
     UNIT_MISSING,
     Unit,
     accelerance_si,
+    means_force_alone,
+    plane_meant,
     unit_of,
 )
 from shm.values import (
@@ -40,12 +42,11 @@ KEYS = (
     "added_mass_kg",
     "added_mass_at_m",
     "added_mass_radius_m",
+    "operator",
     "sampling_rate_hz",
 )
 CHANNEL_KEYS = ("unit", "x_m", "plane", "calibration", "full_scale", "leave_out", "coherence")
 _OF_ALL_CHANNELS = ("unit", "calibration", "full_scale")
-_FACTOR_REMEDY = "Give a number other than 0: units of `unit` per recorded volt or count."
-_SCALE_REMEDY = "Give the largest value that can be recorded, in the channel's unit."
 
 
 @dataclass(frozen=True)
@@ -87,10 +88,9 @@ class Header:
 
     @property
     def hanger(self) -> int | None:
-        entry = self._given("hanger")
+        number, entry = self._number("hanger", "Give the hanger's number, as in hanger: 3.")
         if entry is None:
             return None
-        number = _number(entry, "hanger", "Give the hanger's number, as in hanger: 3.")
         if not number.is_integer() or number < 0:
             raise entry.refusal(
                 f"hanger = {entry.text} is not a whole number.", "Give the hanger's number."
@@ -112,44 +112,45 @@ class Header:
 
     @property
     def temperature_c(self) -> float:
-        entry = self._given("temperature_c")
         remedy = "Give degrees Celsius, or leave it out."
-        if entry is None:
-            return NAN
-        number = _number(entry, "temperature_c", remedy)
-        if math.isnan(number) or not math.isnan(outdoor_c(number)):
-            return number
-        raise entry.refusal(f"temperature_c = {entry.text} is no temperature outdoors.", remedy)
+        number, entry = self._number("temperature_c", remedy)
+        if entry is not None and not math.isnan(number) and math.isnan(outdoor_c(number)):
+            raise entry.refusal(f"temperature_c = {entry.text} is no temperature outdoors.", remedy)
+        return number
 
     @property
     def added_mass(self) -> AddedMass | None:
         """The known mass that was clamped on; None where nothing says one."""
-        mass, place = self._given("added_mass_kg"), self._given("added_mass_at_m")
-        radius = self._given("added_mass_radius_m")
-        if mass is None and place is None and radius is None:
-            return None
         remedy = "Give both added_mass_kg and added_mass_at_m, from the deck end, or neither."
+        mass_kg, mass = self._number("added_mass_kg", remedy)
+        x_m, place = self._number("added_mass_at_m", remedy)
+        of_radius = "Give its radius of gyration in m, 0 of a point, or leave it out."
+        radius_m, radius = self._number("added_mass_radius_m", of_radius)
+        only = mass or place or radius
+        if only is None:
+            return None
         if mass is None or place is None:
-            only = mass or place or radius
-            assert only is not None
             raise only.refusal("a known mass needs its size and its place.", remedy)
-        mass_kg = _number(mass, "added_mass_kg", remedy)
-        x_m = _number(place, "added_mass_at_m", remedy)
         if not mass_kg > 0:
             raise mass.refusal(f"added_mass_kg = {mass.text} is not positive.", remedy)
         if not x_m >= 0:
             raise place.refusal(f"added_mass_at_m = {place.text} is below the deck end.", remedy)
-        return AddedMass(mass_kg, x_m, None if radius is None else _radius_m(radius))
+        if radius is not None and not radius_m >= 0:
+            raise radius.refusal(f"added_mass_radius_m = {radius.text} is negative.", of_radius)
+        return AddedMass(mass_kg, x_m, None if radius is None else radius_m)
+
+    @property
+    def operator(self) -> str:
+        """Who measured; empty where nothing says it."""
+        entry = self._given("operator")
+        return "" if entry is None else entry.text
 
     @property
     def sampling_rate_hz(self) -> float:
         """NaN where nothing says it."""
-        entry = self._given("sampling_rate_hz")
-        if entry is None:
-            return NAN
         remedy = "Give the samples a second, as in sampling_rate_hz: 512."
-        rate = _number(entry, "sampling_rate_hz", remedy)
-        if not rate > 0:
+        rate, entry = self._number("sampling_rate_hz", remedy)
+        if entry is not None and not rate > 0:
             raise entry.refusal(f"sampling_rate_hz = {entry.text} is not positive.", remedy)
         return rate
 
@@ -196,22 +197,18 @@ class Header:
 
     def calibration(self, name: str) -> float:
         """Return the units of `unit` per recorded unit, NaN where values are recorded in `unit`."""
-        if not self.has_entry(name, "calibration"):
-            return NAN
-        entry = self.channels[name]["calibration"]
-        factor = _number(entry, "calibration", _FACTOR_REMEDY, name)
-        if factor == 0 or math.isnan(factor):
-            raise entry.refusal(f"calibration = {entry.text} is no factor.", _FACTOR_REMEDY, name)
+        remedy = "Give a number other than 0: units of `unit` per recorded volt or count."
+        factor, entry = self._number("calibration", remedy, name)
+        if entry is not None and (factor == 0 or math.isnan(factor)):
+            raise entry.refusal(f"calibration = {entry.text} is no factor.", remedy, name)
         return factor
 
     def full_scale(self, name: str) -> float:
         """Return the largest value that can be recorded, in `unit`; NaN if unknown."""
-        if not self.has_entry(name, "full_scale"):
-            return NAN
-        entry = self.channels[name]["full_scale"]
-        largest = _number(entry, "full_scale", _SCALE_REMEDY, name)
-        if largest <= 0:
-            raise entry.refusal(f"full_scale = {entry.text} is not positive.", _SCALE_REMEDY, name)
+        remedy = "Give the largest value that can be recorded, in the channel's unit."
+        largest, entry = self._number("full_scale", remedy, name)
+        if entry is not None and largest <= 0:
+            raise entry.refusal(f"full_scale = {entry.text} is not positive.", remedy, name)
         return largest
 
     def leaves_out(self, name: str) -> bool:
@@ -220,18 +217,14 @@ class Header:
 
     def has_entry(self, name: str, key: str) -> bool:
         """Return whether anything is given for a key of a channel."""
-        entry = self.channels[name].get(key)
-        return entry is not None and bool(entry.text)
+        return self._given(key, name) is not None
 
     def x_m(self, name: str) -> float:
-        entry = self.channels[name].get("x_m")
-        if entry is None or not entry.text:
-            return NAN
-        return _number(entry, "x_m", "Give metres from the deck end, or leave it empty.", name)
+        return self._number("x_m", "Give metres from the deck end, or leave it empty.", name)[0]
 
     def plane(self, name: str) -> Plane | None:
-        entry = self.channels[name].get("plane")
-        if entry is None or not entry.text:
+        entry = self._given("plane", name)
+        if entry is None:
             return None
         for plane in PLANES:
             if entry.text.lower() == plane:
@@ -240,9 +233,25 @@ class Header:
             f"plane = {entry.text!r} is unknown.", f"Give {' or '.join(PLANES)}.", name
         )
 
-    def _given(self, key: str) -> Entry | None:
-        entry = self.entries.get(key)
+    def _given(self, key: str, channel: str = "") -> Entry | None:
+        entry = (self.channels[channel] if channel else self.entries).get(key)
         return entry if entry is not None and entry.text else None
+
+    def _number(self, key: str, remedy: str, channel: str = "") -> tuple[float, Entry | None]:
+        """Return a finite number and its entry; NaN where it is written as such, or none is."""
+        entry = self._given(key, channel)
+        if entry is None:
+            return NAN, None
+        text = entry.text
+        if "," in text and "." not in text:
+            text = text.replace(",", ".")
+        try:
+            number = float(text)
+        except ValueError:
+            number = math.inf
+        if math.isinf(number):
+            raise entry.refusal(f"{key} = {entry.text!r} is not a number.", remedy, channel)
+        return number, entry
 
 
 def quantity_named(name: str) -> Quantity | None:
@@ -251,6 +260,29 @@ def quantity_named(name: str) -> Quantity | None:
     if lowered.startswith(("force", "hammer")):
         return "force"
     return "acceleration" if lowered.startswith("acc") else None
+
+
+def is_measured(name: str, unit: str) -> bool:
+    """Return whether a file itself says that a column is a force or an acceleration, in a unit."""
+    return unit_of(unit) is not None and not _is_doubtful(name, unit)
+
+
+def _is_doubtful(name: str, unit: str) -> bool:
+    """Return whether a load cell, by its name, is in a unit of acceleration: g may be its grams."""
+    known = unit_of(unit)
+    in_g = known is not None and known.quantity == "acceleration"
+    return in_g and means_force_alone(name)
+
+
+def stated_entries(name: str, unit: str, path: Path, line: int | None = None) -> dict[str, Entry]:
+    """Return what a logger's name and unit say of a channel, by the keys of a sidecar."""
+    measured, plane = unit_of(unit), plane_meant(name)
+    if _is_doubtful(name, unit) or (quantity_named(name) and not unit):
+        unit = UNIT_MISSING  # a name such as force promises newtons in our own files alone
+    entries = {"unit": unit}
+    if plane is not None and measured is not None and measured.quantity == "acceleration":
+        entries["plane"] = plane
+    return {key: Entry(value, path, line) for key, value in entries.items() if value}
 
 
 def is_true(entry: Entry) -> bool:
@@ -283,28 +315,6 @@ def spread(
     )
 
 
-def _number(entry: Entry, key: str, remedy: str, channel: str = "") -> float:
-    """Return a finite number, or NaN where it is written as such."""
-    text = entry.text
-    if "," in text and "." not in text:
-        text = text.replace(",", ".")
-    try:
-        number = float(text)
-    except ValueError:
-        raise entry.refusal(f"{key} = {entry.text!r} is not a number.", remedy, channel) from None
-    if math.isinf(number):
-        raise entry.refusal(f"{key} = {entry.text!r} is not a number.", remedy, channel)
-    return number
-
-
-def _radius_m(entry: Entry) -> float:
-    remedy = "Give the radius of gyration of the known mass in m, 0 of a point, or leave it out."
-    radius_m = _number(entry, "added_mass_radius_m", remedy)
-    if not radius_m >= 0:
-        raise entry.refusal(f"added_mass_radius_m = {entry.text} is negative.", remedy)
-    return radius_m
-
-
 def known_values(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values that are neither None, nor NaN, nor an empty text."""
     return {
@@ -320,16 +330,11 @@ def entries_of(values: Mapping[str, Any], path: Path) -> dict[str, Entry]:
 def condition_entries(described: Recording | FrequencyResponse) -> dict[str, Any]:
     """Return the entries that state the conditions of a test; what is unknown is left out."""
     known = collect_conditions(described)
-    mass = known.pop("added_mass")
-    known["time"] = format_time(known["time"])
-    return known_values({**known, **mass_entries(mass)})
-
-
-def mass_entries(added_mass: AddedMass | None) -> dict[str, float]:
-    """Return the entries that describe a known mass; empty where there is none."""
-    if added_mass is None:
-        return {}
-    entries = {"added_mass_kg": added_mass.mass_kg, "added_mass_at_m": added_mass.x_m}
-    if added_mass.radius_of_gyration_m is not None:
-        entries["added_mass_radius_m"] = added_mass.radius_of_gyration_m
-    return entries
+    mass: AddedMass | None = known.pop("added_mass")
+    if mass is not None:
+        known |= {
+            "added_mass_kg": mass.mass_kg,
+            "added_mass_at_m": mass.x_m,
+            "added_mass_radius_m": mass.radius_of_gyration_m,
+        }
+    return known_values({**known, "time": format_time(known["time"])})

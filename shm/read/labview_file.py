@@ -7,7 +7,7 @@ channel with 0 samples is empty.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,7 @@ import numpy as np
 
 from shm.documents import format_time
 from shm.errors import BadInput
-from shm.read import logger_text
-from shm.read.header import entries_of
+from shm.read.header import entries_of, is_measured, stated_entries
 from shm.read.limits import guarded, refuse_large, refuse_long_header, refuse_many_samples
 from shm.read.logger_heading import distinct_names, unrounded
 from shm.read.stamps import moment
@@ -35,8 +34,12 @@ def recognises(text: str) -> bool:
     return text.startswith(_FIRST)
 
 
-def tables_in(text: str, path: Path) -> tuple[Table, ...]:
-    """Return a table for each record of a file; raises BadInput where none is found."""
+def tables_in(text: str, path: Path, as_plain: Callable[[], Table | None]) -> tuple[Table, ...]:
+    """Return a table for each record of a file; raises BadInput where none is found.
+
+    `as_plain` reads it as a plain text, as it was before this reader: the layout is still that of
+    the plain text where both say the same, so that the profiles of loggers stay in force.
+    """
     import lvm_read  # few files are of this kind
 
     refuse_long_header(len(text.partition(_X)[0]), path)
@@ -55,7 +58,7 @@ def tables_in(text: str, path: Path) -> tuple[Table, ...]:
         )
     names = [f"record_{place}" for place in range(1, len(records) + 1)]
     return tuple(
-        _table(record, found, name if len(records) > 1 else "", text, path)
+        _table(record, found, name if len(records) > 1 else "", as_plain, path)
         for record, name in zip(records, names, strict=True)
     )
 
@@ -90,7 +93,11 @@ def _goes_on(before: Mapping[str, Any], record: Mapping[str, Any]) -> bool:
 
 
 def _table(
-    record: Mapping[str, Any], whole: Mapping[Any, Any], name: str, text: str, path: Path
+    record: Mapping[str, Any],
+    whole: Mapping[Any, Any],
+    name: str,
+    as_plain: Callable[[], Table | None],
+    path: Path,
 ) -> Table:
     data: FloatArray = np.asarray(record["data"], float)
     refuse_many_samples(len(data), path)
@@ -108,7 +115,7 @@ def _table(
         rate = unrounded(rate, by_times, [("Delta_X", repr(step))], ".")
         columns = (*columns, times)
     entries = entries_of({"time": format_time(time), "sampling_rate_hz": rate}, path)
-    layout = _layout([column for column in columns if column is not times], text, path)
+    layout = _layout([column for column in columns if column is not times], as_plain)
     return Table(path, columns, entries, layout, remarks=remarks, record=name, local_time=time)
 
 
@@ -147,8 +154,8 @@ def _columns(
 
 
 def _column(name: str, unit: str, values: FloatArray, path: Path) -> Column:
-    measured = logger_text.is_measured(name, unit)
-    stated = logger_text.stated_entries(name, unit, path)
+    measured = is_measured(name, unit)
+    stated = stated_entries(name, unit, path)
     role: Role = "channel" if measured else "other"
     return Column(name, len(values), lambda: values, unit, role, stated)
 
@@ -167,13 +174,9 @@ def _number(value: Any) -> float:
     return float(value) if isinstance(value, int | float) else NAN
 
 
-def _layout(columns: Sequence[Column], text: str, path: Path) -> tuple[str, ...]:
-    """Return the words of the layout: those of a plain text where that is read alike.
-
-    So the profiles of loggers that were imported before this reader stay in force.
-    """
+def _layout(columns: Sequence[Column], as_plain: Callable[[], Table | None]) -> tuple[str, ...]:
     with suppress(BadInput):
-        plain = logger_text.table_in(text, path)
+        plain = as_plain()
         if plain is not None and [c.name for c in plain.choosable] == [c.name for c in columns]:
             return plain.layout
     return ("LabVIEW", *(f"{column.name} [{column.unit}]" for column in columns))

@@ -24,7 +24,14 @@ from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read import logger_words as words
 from shm.read.content import LINE_BREAK, cells_of, mark_between
-from shm.read.header import CHANNEL_KEYS, KEYS, Entry, entries_of, quantity_named
+from shm.read.header import (
+    CHANNEL_KEYS,
+    KEYS,
+    entries_of,
+    is_measured,
+    quantity_named,
+    stated_entries,
+)
 from shm.read.limits import refuse_long_header
 from shm.read.logger_heading import (
     Heading,
@@ -45,8 +52,7 @@ from shm.read.logger_rows import (
     values_of,
 )
 from shm.read.logger_times import Clock, clock_of, day_order_of
-from shm.read.logger_words import UNIT_MISSING
-from shm.read.stamps import DayOrder, PossibleTime, is_stamp, moment, names_zone, possible_times
+from shm.read.stamps import DayOrder, PossibleTime, is_stamp, possible_times, stamp_of
 from shm.read.table import Column, Table
 from shm.read.time_axis import rate_of
 from shm.values import NAN
@@ -256,37 +262,29 @@ def _hanger(heading: Heading) -> int | None:
     return numbers.pop() if len(numbers) == 1 else None
 
 
-def _dates(heading: Heading) -> list[str]:
-    return [v for k, v in heading.facts if words.means_date(k) and is_stamp(v)]
-
-
-def _moments(heading: Heading) -> list[str]:
-    """Return the times of a heading, catman's `T0 = ...` among them."""
-    named = ((k, v) for k, v in heading.facts if is_stamp(v))
-    return [v for k, v in named if words.means_moment(k) or k.strip().upper() == "T0"]
-
-
 def _days(heading: Heading) -> list[str]:
-    """Return all days and times of a heading, as they are written."""
-    return [*_dates(heading), *_moments(heading)]
+    """Return all days and times of a heading, as written: the clocks, with each day, and the days.
+
+    catman writes `T0 = ...`.
+    """
+    facts = [(key, value) for key, value in heading.facts if is_stamp(value)]
+    days = [value for key, value in facts if words.means_date(key)]
+    clocks = [v for key, v in facts if words.means_moment(key) or key.strip().upper() == "T0"]
+    return [*clocks, *(f"{day} {clock}" for day in days for clock in clocks), *days]
 
 
 def _time(heading: Heading, order: DayOrder | None) -> tuple[datetime | None, bool]:
     """Return the time that a heading says, and whether its clock names no zone."""
-    days, clocks = _dates(heading), _moments(heading)
-    whole = [v for v in clocks if moment("", v, order) is not None]
-    if whole:
-        return moment("", whole[0], order), not names_zone(whole[0])
-    clock = clocks[0] if clocks else ""
-    local = not names_zone(clock) and not any(map(names_zone, days[:1]))
-    return (moment(days[0], clock, order), local) if days else (None, False)
+    for text in _days(heading):
+        found = stamp_of(text)
+        if found is not None and found.is_certain(order):
+            return found.time(order), not found.has_zone
+    return None, False
 
 
 def _possible_times(heading: Heading) -> tuple[PossibleTime, ...]:
     """Return the times of a heading whose day can be read in several orders; empty for others."""
-    days, clocks = _dates(heading), _moments(heading)
-    texts = [*clocks, *(f"{day} {clock}" for day in days for clock in clocks), *days]
-    return next((each for text in texts if (each := possible_times(text))), ())
+    return next((each for text in _days(heading) if (each := possible_times(text))), ())
 
 
 def _temperature(heading: Heading, decimal: str, columns: Sequence[Column]) -> float:
@@ -313,29 +311,3 @@ def _layout(heading: Heading, block: DataRows) -> tuple[str, ...]:
     serials = [value for key, value in heading.facts if words.means_serial(key)]
     columns = [f"{n} [{u}]" for n, u in zip(heading.names, heading.units, strict=True)]
     return (f"{dialect.mark}{dialect.decimal}", *keys, *serials, *columns)
-
-
-# ---------------------------------------------------------------- channels
-
-
-def is_measured(name: str, unit: str) -> bool:
-    """Return whether a file itself says that a column is a force or an acceleration, in a unit."""
-    return words.unit_of(unit) is not None and not _is_doubtful(name, unit)
-
-
-def _is_doubtful(name: str, unit: str) -> bool:
-    """Return whether a load cell, by its name, is in a unit of acceleration: g may be its grams."""
-    known = words.unit_of(unit)
-    in_g = known is not None and known.quantity == "acceleration"
-    return in_g and words.means_force_alone(name)
-
-
-def stated_entries(name: str, unit: str, path: Path, line: int | None = None) -> dict[str, Entry]:
-    """Return what a logger's name and unit say of a channel, by the keys of a sidecar."""
-    measured, plane = words.unit_of(unit), words.plane_meant(name)
-    if _is_doubtful(name, unit) or (quantity_named(name) and not unit):
-        unit = UNIT_MISSING  # a name such as force promises newtons in our own files alone
-    entries = {"unit": unit}
-    if plane is not None and measured is not None and measured.quantity == "acceleration":
-        entries["plane"] = plane
-    return {key: Entry(value, path, line) for key, value in entries.items() if value}

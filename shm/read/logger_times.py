@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shm.errors import BadInput
 from shm.read import logger_words as words
-from shm.read.logger_heading import Heading
 from shm.read.logger_rows import DataRows, values_of
 from shm.read.stamps import (
     DayOrder,
@@ -27,6 +27,9 @@ from shm.read.stamps import (
 )
 from shm.read.time_axis import REMEDY
 from shm.values import FloatArray
+
+if TYPE_CHECKING:
+    from shm.read.logger_heading import Heading
 
 # Judgement: no logger records a hammer test slower than this, and none faster.
 _SLOWEST_HZ, _FASTEST_HZ = 20.0, 200_000.0

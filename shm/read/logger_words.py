@@ -97,6 +97,11 @@ def accelerance_si(numerator: str, denominator: str) -> float | None:
     return above.si / below.si if right else None
 
 
+def is_accelerance(unit: str) -> bool:
+    """Return whether a unit is one of acceleration over force."""
+    return "/" in unit.replace(")(", ")/(") and accelerance_si(unit, "") is not None
+
+
 # In s and in V; a day has 86,400 s.
 _SECONDS = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek", "sekunden"), 1.0),

@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shm.errors import BadInput
-from shm.read.array_reading import format_of_arrays
 from shm.read.arrays import Arrays, Variable, unique_names
 from shm.read.content import bytes_of
 from shm.read.hdf5_file import opened_nodes, variables
@@ -62,12 +61,12 @@ _UNIT_FIELDS = ("unit", "units")
 _OF = "\0"  # between a struct and its field, until names are told apart
 
 
-def _recognises(head: bytes) -> bool:
+def recognises(head: bytes) -> bool:
     return head.startswith((_VERSION_5, _VERSION_7_3))
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Arrays]:
+def opened(path: Path) -> Iterator[Arrays]:
     with path.open("rb") as stream:
         version_7_3 = stream.read(len(_VERSION_7_3)) == _VERSION_7_3
     if not version_7_3:
@@ -90,9 +89,6 @@ def _interpreted(variable: Variable) -> Variable:
 
 def _text(codes: NDArray[Any]) -> NDArray[Any]:
     return np.array([chr(int(code)) for code in codes.ravel()])
-
-
-FORMAT = format_of_arrays("MATLAB", (".mat",), _recognises, _opened)
 
 
 # ---------------------------------------------------------------- version 5

@@ -17,47 +17,91 @@ import numpy as np
 
 from shm import modes_document
 from shm.errors import BadInput, UsageError
+from shm.read import (
+    comma_separated,
+    excel_file,
+    hdf5_file,
+    labview_file,
+    logger_text,
+    matlab_file,
+    numpy_file,
+    sep005,
+    tdms_file,
+)
 from shm.read import logger_words as words
-from shm.read.assemble import assemble, collecting, read_of_test, sampling_rate
-from shm.read.assemble import peek as look
-from shm.read.base import Format, Layout, Peek, PeekChannel, Survey, SurveyedColumn
-from shm.read.bundles import each_member, entries_of_test, holds_test
+from shm.read.array_reading import format_of_arrays
+from shm.read.assemble import assemble, collecting, look_at, read_of_test, sampling_rate
+from shm.read.base import Format, Layout, Peek, PeekChannel, Survey, SurveyedColumn, at_once
+from shm.read.bundles import each_member, entries_of_test
 from shm.read.campbell_file import FORMAT as CAMPBELL
-from shm.read.comma_separated import FORMAT as CSV
 from shm.read.content import (
     head_of,
+    holds_test,
     is_gzipped,
+    is_text,
     refuse_unless_readable,
     refuse_unreadable_suffix,
+    text_of,
 )
-from shm.read.excel_file import FORMAT as EXCEL
-from shm.read.hdf5_file import FORMAT as HDF5
+from shm.read.describe import describe
 from shm.read.header import CHANNEL_KEYS, Header, known_values
-from shm.read.matlab_file import FORMAT as MATLAB
 from shm.read.mini_seed_file import FORMAT as MINI_SEED
-from shm.read.numpy_file import FORMAT as NUMPY
-from shm.read.sep005 import FORMAT as SEP005
+from shm.read.modal_sets import foreign_modes
 from shm.read.sidecar import sidecar_document, sidecar_path
-from shm.read.table import Column, Table, describe
-from shm.read.tdms_file import FORMAT as TDMS
+from shm.read.table import Column, Table
 from shm.read.universal_file import FORMAT as UFF
 from shm.read.wave_file import FORMAT as WAVE
 from shm.values import NAN, FrequencyResponse, ModalTest, Recording
 
+
+def open_text(text: str, path: Path, preamble: Sequence[str] = ()) -> tuple[Table, ...]:
+    """Return what a text holds, as any logger's where it is none of ours; raises BadInput.
+
+    `preamble` are lines that are said elsewhere, as on other sheets.
+    """
+    if labview_file.recognises(text):
+        return labview_file.tables_in(text, path, lambda: logger_text.table_in(text, path))
+    response = comma_separated.response_in(text, path)
+    if response is not None:
+        return (response,)
+    logged = None if logger_text.is_shm_csv(text) else logger_text.table_in(text, path, preamble)
+    return (logged or comma_separated.record_in(text, path),)
+
+
 # The most particular first: any text may be comma-separated.
 FORMATS: tuple[Format, ...] = (
-    HDF5,
-    MATLAB,
-    TDMS,
-    NUMPY,
-    EXCEL,
+    format_of_arrays("HDF5", (".h5", ".hdf5"), hdf5_file.recognises, hdf5_file.opened),
+    format_of_arrays("MATLAB", (".mat",), matlab_file.recognises, matlab_file.opened),
+    format_of_arrays("TDMS", (".tdms",), tdms_file.recognises, tdms_file.opened, "nptdms"),
+    format_of_arrays(
+        "NumPy", (".npz", ".npy"), numpy_file.recognises, numpy_file.opened, "", numpy_file.write
+    ),
+    Format(
+        "Excel",
+        (".xlsx", ".xlsm"),
+        excel_file.recognises,
+        at_once(lambda path: open_text(*_sheets(path))),
+        library="python_calamine",
+    ),
     WAVE,
     MINI_SEED,
     CAMPBELL,
-    SEP005,
+    sep005.FORMAT,
     UFF,
-    CSV,
+    Format(
+        "CSV",
+        (".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".prn", ".xls"),
+        is_text,
+        at_once(lambda path: open_text(text_of(path), path)),
+        comma_separated.write,
+        may_be_gzipped=True,
+    ),
 )
+
+
+def _sheets(path: Path) -> tuple[str, Path, tuple[str, ...]]:
+    text, preamble = excel_file.text_of_workbook(path)
+    return text, path, preamble
 
 
 def read(path: Path) -> Recording | FrequencyResponse:
@@ -74,7 +118,13 @@ def read(path: Path) -> Recording | FrequencyResponse:
 
 def _records(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
     with format_of(path).open_tables(path) as tables:
-        return tuple(map(assemble, tables))
+        return tuple(map(_assembled, tables))
+
+
+def _assembled(table: Table) -> Recording | FrequencyResponse:
+    if table.refusal is not None:
+        raise table.refusal
+    return assemble(describe(table))
 
 
 def peek(path: Path) -> Peek:
@@ -90,6 +140,18 @@ def _looks(path: Path) -> tuple[Peek, ...]:
     found = format_of(path)
     with found.open_tables(path) as tables:
         return tuple(look(table, found.name) for table in tables)
+
+
+def look(table: Table, file_format: str) -> Peek:
+    """Return what is said of a table, without its values; faults become problems."""
+    problems = list(table.problems)
+    attempt = collecting(problems)
+    if table.refusal is not None:
+        return Peek(table.source, file_format, (), 0, problems=(*problems, str(table.refusal)))
+    found = attempt(lambda: describe(table), None)
+    if found is None:
+        found = describe(table, with_sidecars=False)
+    return replace(look_at(found, file_format, attempt), problems=tuple(problems))
 
 
 def write(recording: Recording | FrequencyResponse, path: Path) -> None:
@@ -308,6 +370,7 @@ def _surveyed(tables: Sequence[Table], file_format: str, path: Path) -> Survey:
         hanger=seen.hanger,
         time=seen.time,
         temperature_c=seen.temperature_c,
+        operator=seen.operator,
         layout=_layout(table, file_format, columns),
         lines=seen.lines,
         remarks=(*table.remarks, *([several] if len(tables) > 1 else [])),
@@ -386,3 +449,29 @@ def _layout(table: Table, file_format: str, columns: Sequence[SurveyedColumn]) -
         table.possible_times,
         table.local_time,
     )
+
+
+def from_sep005(
+    channels: Sequence[Mapping[str, Any]] | Mapping[str, Any], *, hanger: int | None = None
+) -> Recording:
+    """Return the recording that SEP005 channels hold: those in units of force or acceleration.
+
+    Raises BadInput naming the channel where a key is missing or nothing can be read.
+    """
+    listed = [channels] if isinstance(channels, Mapping) else list(channels)
+    table = sep005.table_of(listed, Path(sep005.NAME), hanger)
+    found = assemble(describe(table, with_sidecars=False))
+    assert isinstance(found, Recording)
+    return replace(found, source=sep005.NAME)
+
+
+VERBS: dict[str, Callable[[Path], Sequence[object]]] = {
+    "read_test": read_test,
+    "peek_test": peek_test,
+    "load_modes": load_modes,
+    "survey": lambda path: [survey(path)],
+    "layout_of": lambda path: [layout_of(path)],
+    "foreign_modes": lambda path: [each for each in [foreign_modes(path)] if each],
+    "do_nothing": lambda _: [],
+}
+"""What the sandbox may be asked to do with a file."""

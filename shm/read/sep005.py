@@ -10,45 +10,27 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from shm.errors import BadInput
-from shm.read.assemble import assemble
 from shm.read.base import Format, at_once
-from shm.read.header import KEYS, Entry, entries_of
+from shm.read.header import KEYS, Entry, entries_of, is_measured, stated_entries
 from shm.read.limits import guarded, refuse_large, refuse_many_samples
-from shm.read.logger_text import is_measured, stated_entries
 from shm.read.logger_words import name_and_unit
-from shm.read.table import Column, Role, Table, describe
-from shm.values import NAN, FrequencyResponse, Recording
+from shm.read.table import Column, Role, Table
+from shm.values import NAN
 
-_NAME = "SEP005"
-_SOURCE = Path(_NAME)
+NAME = "SEP005"
 _BEGINS = re.compile(rb"\s*\[\s*\{\s*\"(data|name|unit_str|fs|time|start_timestamp|quantity)\"\s*:")
 _OF_ALL = tuple(key for key in KEYS if key not in ("time", "sampling_rate_hz"))
 _OF_CHANNEL = ("plane", "x_m", "full_scale")
 _REMEDY = "Give data, name, unit_str, and fs or time (SDyPy enhancement proposal 5)."
 
 
-def from_sep005(
-    channels: Sequence[Mapping[str, Any]] | Mapping[str, Any], *, hanger: int | None = None
-) -> Recording:
-    """Return the recording that SEP005 channels hold: those in units of force or acceleration.
-
-    Raises BadInput naming the channel where a key is missing or nothing can be read.
-    """
-    listed = [channels] if isinstance(channels, Mapping) else list(channels)
-    table = _table(listed, _SOURCE, hanger)
-    found = assemble(table, describe(table, with_sidecars=False))
-    assert not isinstance(found, FrequencyResponse)
-    return replace(found, source=_NAME)
-
-
-def _table(listed: Sequence[Any], path: Path, hanger: int | None = None) -> Table:
+def table_of(listed: Sequence[Any], path: Path, hanger: int | None = None) -> Table:
     """Return the channels as columns; raises BadInput naming the one at fault."""
     columns = [column for each in listed for column in _columns(each, path)]
     starts = {str(each["start_timestamp"]) for each in listed if each.get("start_timestamp")}
@@ -64,7 +46,7 @@ def _table(listed: Sequence[Any], path: Path, hanger: int | None = None) -> Tabl
     stated |= {"hanger": hanger} if hanger is not None else {}
     stated["time"] = next(iter(starts), None)
     entries = entries_of(stated, path)
-    return Table(path, tuple(columns), entries, (_NAME, *(column.name for column in columns)))
+    return Table(path, tuple(columns), entries, (NAME, *(column.name for column in columns)))
 
 
 def open_tables(path: Path) -> tuple[Table, ...]:
@@ -73,7 +55,7 @@ def open_tables(path: Path) -> tuple[Table, ...]:
         listed = json.loads(path.read_bytes())
     if not isinstance(listed, list):
         raise BadInput("it is no list of channels.", file=path, remedy=_REMEDY)
-    table = _table(listed, path)
+    table = table_of(listed, path)
     longest = max((column.size for column in table.columns), default=0)
     refuse_many_samples(longest, path)
     refuse_large((longest, len(table.columns)), 8, "", path)
@@ -113,7 +95,7 @@ def _columns(channel: Any, path: Path) -> list[Column]:
 
 
 FORMAT = Format(
-    _NAME,
+    NAME,
     (".json",),
     lambda head: _BEGINS.match(head) is not None,
     at_once(open_tables),

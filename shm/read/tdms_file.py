@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput
-from shm.read.array_reading import format_of_arrays
 from shm.read.arrays import Arrays, Variable, attributes_of, unique_names
 from shm.read.limits import guarded, refuse_large
 
@@ -24,7 +23,7 @@ _MOST_CHANNELS = 2000  # judgement: a hundred times what a recording has
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Arrays]:
+def opened(path: Path) -> Iterator[Arrays]:
     tdms_file = _library(path)
     # As a stream, so that no index file beside it is opened.
     with path.open("rb") as stream:
@@ -96,8 +95,5 @@ def _variable(name: str, channel: Any, path: Path) -> Variable:
     )
 
 
-def _recognises(head: bytes) -> bool:
+def recognises(head: bytes) -> bool:
     return head.startswith(_MAGIC)
-
-
-FORMAT = format_of_arrays("TDMS", (".tdms",), _recognises, _opened, "nptdms")

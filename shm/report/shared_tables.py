@@ -99,6 +99,7 @@ def conditions(test: ModalTest) -> dict[str, str]:
         "temperature": formatting.temperature(test.temperature_c),
         "hit level over reference level": formatting.plain(test.amplitude, absent="not recorded"),
         "added mass": added_mass(test),
+        "measured by": test.operator or "not recorded",
     }
 
 

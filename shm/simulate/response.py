@@ -4,12 +4,8 @@ A mode of damped angular frequency w_d and pole s obeys z' = s z + f for its com
 deflection is Im(z)/w_d and its acceleration Im(s^2 z)/w_d + f. From sample to sample z is exact;
 the force within a sample is summed by Simpson's rule on the fine steps. Once a band-limited pulse
 is over, that sum is exact but for the pulse's content beyond half the fine rate (L. N. Trefethen
-and J. A. C. Weideman, SIAM Review 56, 2014).
-
-When, where and how hard the hammer strikes, from when to when the record runs, and the pulses as
-an anti-aliased logger sees them, on a grid finer than its samples.
-
-What the logger makes of its lines: noise, clipping, steps of its converter.
+and J. A. C. Weideman, SIAM Review 56, 2014). Pulses are those that an anti-aliased logger sees, on
+a grid finer than its samples; it adds noise, clipping and the steps of its converter.
 """
 
 from __future__ import annotations

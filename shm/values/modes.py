@@ -147,6 +147,7 @@ class ModalTest(Displayable):
     tension_read_n: float = NAN
     tension_read_sd_n: float = NAN
     rattles_above: float = NAN
+    operator: str = ""
 
     def __post_init__(self) -> None:
         if not is_test_id(self.id):

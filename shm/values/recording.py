@@ -59,7 +59,7 @@ class Recording(Displayable):
 
     One file, one or many hits. The force channel's `x_m` and `plane` say where and in which
     direction the hammer hit. `possible_times` are several where `time` is None because its day can
-    be read in several orders; empty otherwise.
+    be read in several orders; empty otherwise. `operator` measured, "" where nobody says.
     """
 
     source: str
@@ -70,6 +70,7 @@ class Recording(Displayable):
     temperature_c: float = NAN
     added_mass: AddedMass | None = None
     possible_times: tuple[datetime, ...] = ()
+    operator: str = ""
 
     @property
     def force(self) -> Channel | None:
@@ -116,7 +117,7 @@ class Recording(Displayable):
         return figure
 
 
-TEST_CONDITIONS = ("hanger", "time", "temperature_c", "added_mass")
+TEST_CONDITIONS = ("hanger", "time", "temperature_c", "added_mass", "operator")
 """What recordings, frequency responses and modal tests alike hold of how a test was made."""
 
 
@@ -159,6 +160,7 @@ class FrequencyResponse:
     time: datetime | None = None
     temperature_c: float = NAN
     added_mass: AddedMass | None = None
+    operator: str = ""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -29,7 +28,7 @@ from shm.values.drift import threshold_of
 from shm.watch.alert_text import alert_of, message_of_agreeing
 from shm.watch.options import WatchOptions
 from shm.watch.persistence import LARGE
-from shm.watch.posterior_summary import beyond, drift_of, shift_of_mixture
+from shm.watch.posterior_summary import drift_of_normal
 from shm.watch.quantities import shift_of
 from shm.watch.readings import Reader
 
@@ -43,8 +42,8 @@ BY_A_LOAD = 0.1
 _PULL_STEPS = 10.0
 """Standard deviation, in steps, of what a test does not see: far beyond any threshold."""
 
-_SCATTER, _SCATTER_OF_STEP = 0.01, 0.2
-"""Of a test beyond its errors, of the tension and of a spring's step: the most that is usual."""
+_MOST_SCATTER = 2.0
+"""Of what a test scatters by beyond its errors: the most that is usual over what is assumed."""
 
 _APART = timedelta(days=3)
 """Tests that far apart by their clocks are two visits."""
@@ -74,97 +73,63 @@ def agreement(
 ) -> Alert | None:
     """Return the alert of a test that is the second to show a shift beyond its threshold.
 
-    None where it shows none, no test beside it agrees, two that agree were there before it, the
-    clocks say that it was a later visit, one of a visit before shows the same, or the shift is
-    `told` already.
+    None where it shows none, no test next to it agrees, the clocks say that it was a later visit,
+    or the shift is `told` already.
     """
     its = _shown(reader, newest[0], hanger, options)
-    unwatched = {*beside.held, *beside.of_works}
     if not any(its):
         return None
-    near = [
-        [(test, _shown(reader, test, hanger, options)) for test in tests]
-        for tests in (*beside.came, *beside.dated)
-    ]
-    are_later = (False, True, False, True)
-    known = _known_before(reader, newest[0], beside, options)
+    near = {tests[0].id: tests[0] for tests in (*beside.came, *beside.dated) if tests}
+    others = [(test, _shown(reader, test, hanger, options)) for test in near.values()]
     for j, (quantity, mine) in enumerate(zip(reader.quantities, its, strict=True)):
         if mine is None or (quantity.name, way_of(mine.mean)) in told:
             continue
-        runs = [_run(tests, mine, j) for tests in near]
-        others = [
-            run[0]
-            for run in runs
-            if run
-            and (
-                run[0][0].id in unwatched
-                or _is_later(run[0][0], newest[0])
-                or (is_no_load(quantity, mine) and not _is_later(newest[0], run[0][0]))
-            )
-        ]
-        is_old = any(_agree(mine, each[j]) for each in known)
-        if others and not is_old and not any(map(partial(_have_told, beside), runs, are_later)):
-            other, shown = others[0]
-            drift = _drift(quantity, newest, (mine, shown), hanger)
-            what = f"two-tests-agree:{drift.quantity}-{way_of(drift.shift_mean)}"
-            tests = (other.id, newest[0].id)
-            words = message_of_agreeing(drift, hanger, tests, is_held=other.id in beside.held)
-            of_test = (newest[0].id, newest[1])
-            return alert_of(hanger, of_test, what, words, ("beyond threshold",), (drift,))
+        for other, shown in others:
+            same = shown[j]
+            if same and _agree(mine, same) and _is_unwatched(quantity, mine, newest, other, beside):
+                drift = _drift(quantity, newest, (mine, same), hanger)
+                what = f"two-tests-agree:{drift.quantity}-{way_of(drift.shift_mean)}"
+                is_held = other.id in beside.held
+                words = message_of_agreeing(
+                    drift, hanger, (other.id, newest[0].id), is_held=is_held
+                )
+                of_test = (newest[0].id, newest[1])
+                return alert_of(hanger, of_test, what, words, ("beyond threshold",), (drift,))
     return None
 
 
-def is_no_load(quantity: WatchedQuantity, shown: Shown) -> bool:
+def _is_unwatched(
+    quantity: WatchedQuantity,
+    shown: Shown,
+    newest: tuple[ModalTest, datetime],
+    other: ModalTest,
+    beside: Beside,
+) -> bool:
+    """Return True if the watch cannot judge two tests as two visits.
+
+    It has not counted the other one, or that is dated later; of one visit they must be further off
+    than by any load.
+    """
+    if other.id in {*beside.held, *beside.of_works} or _is_later(other, newest[0]):
+        return True
+    return _is_no_load(quantity, shown) and not _is_later(newest[0], other)
+
+
+def _is_no_load(quantity: WatchedQuantity, shown: Shown) -> bool:
     """Return True if a quantity is further off than by any load that stands on the deck."""
     if quantity.name == TENSION:
         return bool(abs(shift_of(quantity, shown.mean)) > BY_A_LOAD)
     return shown.moves > LARGE
 
 
-def _known_before(
-    reader: Reader, newest: ModalTest, beside: Beside, options: WatchOptions
-) -> list[list[Shown]]:
-    """Return the readings of the last visits before the newest: these shifts are not new."""
-    earlier = {
-        test.id: test
-        for tests in (beside.came[0], beside.dated[0])
-        for test in tests
-        if _is_later(newest, test) and test.id not in {*beside.held, *beside.of_works}
-    }
-    return [read_alone(reader, test, options) for test in earlier.values()]
-
-
-def _is_later(newest: ModalTest, other: ModalTest) -> bool:
-    """Return True if the newest was a later visit than the other, by their own clocks."""
-    return newest.time is not None and other.time is not None and newest.time - other.time >= _APART
+def _is_later(one: ModalTest, other: ModalTest) -> bool:
+    """Return True if one test was a later visit than the other, by their clocks."""
+    return one.time is not None and other.time is not None and one.time - other.time >= _APART
 
 
 def way_of(shift: float) -> Way:
     """To which side a shift goes."""
     return "down" if shift < 0 else "up"
-
-
-def _run(
-    tests: Sequence[tuple[ModalTest, Sequence[Shown | None]]], own: Shown, j: int
-) -> list[tuple[ModalTest, Shown]]:
-    """Of tests, the nearest first, those up to the first that does not agree in quantity `j`."""
-    found: list[tuple[ModalTest, Shown]] = []
-    for test, all_shown in tests:
-        shown = all_shown[j]
-        if shown is None or not _agree(own, shown):
-            break
-        found.append((test, shown))
-    return found
-
-
-def _have_told(beside: Beside, run: Sequence[tuple[ModalTest, Shown]], are_later: bool) -> bool:
-    """Return True if two tests of a run were reported to agree: as the second came, but for works.
-
-    The run goes away from the newest test: which are second depends on the side.
-    """
-    names = [test.id for test, _ in run]
-    second = names[1:] if are_later else names[:-1]
-    return any(name not in beside.of_works for name in second)
 
 
 def _agree(one: Shown, other: Shown) -> bool:
@@ -198,7 +163,7 @@ def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[S
     if reading.modes is not None:
         slopes = reading.modes.slopes[np.isfinite(reading.modes.variances)].mean(axis=0)
     for j, quantity in enumerate(reader.quantities):
-        scatter = scatter_of(quantity)
+        scatter = _MOST_SCATTER * _scatter_of(quantity, options)
         per_kelvin = (
             options.tension_per_kelvin_sd
             if quantity.name == TENSION
@@ -211,9 +176,11 @@ def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[S
     return found
 
 
-def scatter_of(quantity: WatchedQuantity) -> float:
-    """Standard deviation of a test of an unchanged hanger beyond its errors, in the coordinate."""
-    return _SCATTER if quantity.name == TENSION else _SCATTER_OF_STEP * quantity.step_sd
+def _scatter_of(quantity: WatchedQuantity, options: WatchOptions) -> float:
+    """Return what a test of an unchanged hanger scatters by, in the coordinate."""
+    if quantity.name == TENSION:
+        return options.tension_scatter
+    return options.spring_scatter_of_step * quantity.step_sd
 
 
 def drifts_of(
@@ -236,8 +203,6 @@ def _drift(
 ) -> Drift:
     """Return what tests that agree show, as if their errors were all of each alone: the larger."""
     weights = [1 / each.variance for each in alike]
-    mean, alone = np.average([each.mean for each in alike], weights=weights), np.ones(1)
-    at = alone * mean, alone * math.sqrt(max(each.variance for each in alike))
-    chance = beyond(quantity, alone, *at, threshold_of(quantity.name, hanger))
-    of_test = newest[0].id, newest[1]
-    return drift_of(quantity, hanger, of_test, shift_of_mixture(quantity, alone, *at), chance)
+    mean = float(np.average([each.mean for each in alike], weights=weights))
+    sd = math.sqrt(max(each.variance for each in alike))
+    return drift_of_normal(quantity, hanger, (newest[0].id, newest[1]), mean, sd)

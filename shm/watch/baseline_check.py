@@ -64,12 +64,8 @@ _TENSION_STEP, _DECADES_STEP = 0.02, 0.1  # technical: of finite differences
 _FARTHEST_TENSION, _FARTHEST_DECADES = 0.4, 1.0  # technical: beyond it nothing is linearised
 _DRAWS = 4000  # of the description: technical, refined below
 _NARROWER = (0.3, 0.1, 0.03)  # technical: of the prior's range, about the best draw
-_HELD = 1e-9  # of a parameter that is not drawn
-# Where slopes are taken: a tension near the nominal one, the length as taped with its fittings, and
-# springs that bend with the bar. Judgement; what differs from test to test is the same anywhere.
-_PLAUSIBLE = {"theta_F": (1.0, 0.3), "theta_L": (1.0, 0.02)}
-_SPRING, _SAME_PLANE = "log10_k", ("13", "24")
-_FELT, _FELT_SD = 3.0, 0.7
+_SPRING, _FELT = "log10_k", 3.0  # of the stiffness of a wave: a spring that bends with the bar
+_TENSION_RANGE, _TENSIONS = (0.3, 2.5), 60  # of the nominal one; technical
 _MODEL_SD = 0.01  # judgement: of a frequency, a class beside a bar as made
 
 
@@ -340,15 +336,10 @@ class _Modes:
         found = self.model.frequencies_at(theta, int(self.orders.max()) + 1, conditions)
         return np.asarray(np.log(found[:, self.planes, self.orders]))
 
-    def _best(
-        self, theta: FloatArray, measured: FloatArray, held: FloatArray | float = 0.0
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the likeliest of parameter sets, a few modes being mistaken, and its misfit.
-
-        `held` (sets,) is the log density of what is known of the sets beforehand.
-        """
+    def _best(self, theta: FloatArray, measured: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the likeliest of parameter sets, a few modes being mistaken, and its misfit."""
         off = measured - self.log_frequencies(theta, self.conditions)
-        at = int(np.nanargmax(log_mixture(off, _MODEL_SD**2).sum(axis=1) + held))
+        at = int(np.nanargmax(log_mixture(off, _MODEL_SD**2).sum(axis=1)))
         return theta[at], off[at]
 
     def off_description(self, measured: FloatArray) -> FloatArray:
@@ -363,33 +354,24 @@ class _Modes:
         return off
 
     def typical_parameters(self, level: FloatArray) -> FloatArray:
-        """Return a parameter set near the description at which the median test lies.
+        """Return the described bar with ends that are felt, at the tension which suits `level`.
 
-        Slopes are taken there. Frequencies alone leave tension, length and ends to each other: what
-        fits best may be a loose bar with one end free, whose springs move nothing. Both ends are
-        taken as alike, and where a spring is felt.
+        Slopes are taken there: what differs from test to test is the same anywhere near.
         """
-        model, rng = self.model, np.random.default_rng(0)
-        prior, names = model.prior, model.parameter_names
-        best, width = (prior.lower + prior.upper) / 2, (prior.upper - prior.lower) / 2
+        model, names = self.model, self.model.parameter_names
+        theta = (model.prior.lower + model.prior.upper) / 2
         for column, name in enumerate(names):
-            if name in _PLAUSIBLE:
-                best[column], width[column] = _PLAUSIBLE[name]
             with contextlib.suppress(KeyError):
-                best[column], width[column] = model.usual(name), 0.0
-        springs = [n for n, name in enumerate(names) if name.startswith(_SPRING)]
-        best[springs] = math.log10(_FELT * model.wave_stiffness_n_m_rad(1))
-        width[springs] = _FELT_SD
-        centre = best.copy()
-        for share in (1.0, *_NARROWER):
-            draws = share * width * rng.standard_normal((_DRAWS // 4, len(names)))
-            for ends in _SAME_PLANE:
-                pair = [n for n in springs if names[n][-1] in ends]
-                draws[:, pair] = draws[:, pair[:1]]
-            theta = np.clip(np.vstack([best, best + draws]), prior.lower, prior.upper)
-            held = -(((theta - centre) / np.maximum(width, _HELD)) ** 2).sum(axis=1) / 2
-            best, _ = self._best(theta, level, held)
-        return best
+                theta[column] = model.usual(name)
+            if name == "theta_L":
+                theta[column] = 1.0
+            elif name.startswith(_SPRING):
+                theta[column] = math.log10(_FELT * model.wave_stiffness_n_m_rad(1))
+        every = np.tile(theta, (_TENSIONS, 1))
+        tension = names.index("theta_F")
+        every[:, tension] = np.geomspace(*_TENSION_RANGE, _TENSIONS)
+        every = np.clip(every, model.prior.lower, model.prior.upper)
+        return self._best(every, level)[0]
 
 
 class _Bar:

@@ -20,12 +20,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy
 
-from shm.values import FloatArray, IntArray
+from shm.values import BoolArray, FloatArray, IntArray
 from shm.watch.causes import DetectedChange, Direction, Layout
 from shm.watch.options import OF_ONE_VISIT_YEARS
 
@@ -36,6 +36,9 @@ SIZES = np.array([1.0, 6.0])
 # Judgement: nine of ten changes are just what may not be missed.
 LOG_SHARES = np.log([0.9, 0.1])
 _A_WEEK_YEARS = 7 / 365.25
+SAMPLES = 500
+"""Of a summary: a probability of a half is known to 0.02, a mean to a twentieth of its sd."""
+_LEADING = 24  # technical: changes that draws are of, the most probable
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +90,6 @@ class Evidence:
     null_covariance: FloatArray
     seen: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
     log_most: float = math.inf
-    _asked: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = field(
-        default_factory=dict, repr=False
-    )
 
     @property
     def log_statistic(self) -> float:
@@ -139,32 +139,67 @@ class Evidence:
         """Probability (D,) of each direction, given a change."""
         return np.asarray(self.shares.sum(axis=(0, 1, 2, 4)))
 
-    def changes_at(self, indices: Sequence[tuple[int, ...]]) -> list[tuple[FloatArray, FloatArray]]:
-        """Mean (n + q,) and factor (n + q, r) of the covariance of each change, by the last test.
+    def draw(
+        self, part: BoolArray, loadings: FloatArray, *, is_last_counted: bool = True
+    ) -> tuple[FloatArray, FloatArray]:
+        """Draw changes (SAMPLES, n + q) by the last test, and the null's parameters with each.
 
-        A ramp's is what has come of it by then; directions of fewer columns have zeros there.
+        The latter as `loadings` (rows, p) of them, (SAMPLES, rows). Of the most probable changes in
+        the directions of `part` (D,); where there is none, none is drawn. Unless `is_last_counted`,
+        changes that begin at the last test are left out. Draws come in pairs about the mean.
         """
-        at, _, kind, *_ = np.array(indices).T
-        done = np.where(kind == RAMP, self._progress(at), 1.0)[:, None]
-        means, factors = self._at_their_rate(indices)
-        return list(zip(done * means, done[..., None] * factors, strict=True))
+        log_mass = np.where(part[:, None], self.log_mass, -np.inf)
+        if not is_last_counted:
+            log_mass[-1:] = -np.inf
+        leading = np.argsort(log_mass.ravel())[-_LEADING:]
+        leading = leading[np.isfinite(log_mass.ravel()[leading])]
+        if not len(leading):
+            return np.zeros((0, self.layout.n + self.layout.q)), np.zeros((0, len(loadings)))
+        weight = np.exp(log_mass.ravel()[leading] - _total(log_mass.ravel()[leading]))
+        places = np.array(np.unravel_index(leading, log_mass.shape)).T
+        at, k, kind, *_ = places.T
+        mean, factor = self._sizes(places)
+        chosen = np.repeat(_allot(weight, SAMPLES // 2), 2)
+        rates = mean[chosen] + np.einsum("sir,sr->si", factor[chosen], _pairs(factor.shape[2]))
+        done = np.where(kind == RAMP, self._progress(at), 1.0)[chosen, None]
+        response = loadings @ self.null_covariance[k] @ self.seen[2][kind, at, k]
+        shared = np.einsum("src,sc->sr", response[chosen], rates)
+        return done * rates, self._draw_null(k[chosen], loadings) - shared
 
-    def _at_their_rate(self, indices: Sequence[tuple[int, ...]]) -> tuple[FloatArray, FloatArray]:
+    def draw_null(self, loadings: FloatArray) -> FloatArray:
+        """Draw `loadings` (rows, p) of the null's parameters if nothing (further) changed."""
+        of_scatters = _allot(np.exp(self.log_null), SAMPLES // 2)
+        return self._draw_null(np.repeat(of_scatters, 2), loadings)
+
+    def _draw_null(self, k: IntArray, loadings: FloatArray) -> FloatArray:
+        """Return such draws (SAMPLES, rows) at the scatters `k` (SAMPLES,)."""
+        covariance = loadings @ self.null_covariance @ loadings.T
+        strength, axes = np.linalg.eigh((covariance + np.swapaxes(covariance, 1, 2)) / 2)
+        root = axes * np.sqrt(np.maximum(strength, 0.0))[:, None]
+        normal = _pairs(len(loadings), seed=1)
+        moved = np.einsum("sri,si->sr", root[k], normal)
+        return np.asarray(self.null_mean[k] @ loadings.T + moved)
+
+    def mean_of(self, index: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+        """Return a change (n + q,) by the last test, and the null's parameters (p,) with it."""
+        places = np.array([index])
+        at, k, kind, *_ = places.T
+        (rate,), _ = self._sizes(places)
+        moved = self.null_covariance[k[0]] @ self.seen[2][kind[0], at[0], k[0]] @ rate
+        done = self.progress(index[0]) if index[2] == RAMP else 1.0
+        return done * rate, self.null_mean[k[0]] - moved
+
+    def _sizes(self, places: IntArray) -> tuple[FloatArray, FloatArray]:
         """Means (changes, n + q) and factors (changes, n + q, r); of a ramp, a year of it."""
-        new = [index for index in indices if index not in self._asked]
-        if new:
-            at, k, kind, d, size = np.array(new).T
-            information, pull, _ = self.seen
-            factor = SIZES[size][:, None, None] * self._factors[d]
-            crossed = factor.transpose(0, 2, 1)
-            inner = np.eye(factor.shape[2]) + crossed @ information[kind, at, k] @ factor
-            root = np.linalg.cholesky(np.linalg.inv((inner + inner.transpose(0, 2, 1)) / 2))
-            reach = factor @ root
-            pulled = reach.transpose(0, 2, 1) @ pull[kind, at, k][..., None]
-            means = (reach @ pulled)[..., 0]
-            self._asked.update(zip(new, zip(means, reach, strict=True), strict=True))
-        found = [self._asked[index] for index in indices]
-        return np.array([mean for mean, _ in found]), np.array([factor for _, factor in found])
+        at, k, kind, d, size = places.T
+        information, pull, _ = self.seen
+        factor = SIZES[size][:, None, None] * self._factors[d]
+        crossed = factor.transpose(0, 2, 1)
+        inner = np.eye(factor.shape[2]) + crossed @ information[kind, at, k] @ factor
+        root = np.linalg.cholesky(np.linalg.inv((inner + inner.transpose(0, 2, 1)) / 2))
+        reach = factor @ root
+        pulled = reach.transpose(0, 2, 1) @ pull[kind, at, k][..., None]
+        return (reach @ pulled)[..., 0], reach
 
     @cached_property
     def _factors(self) -> FloatArray:
@@ -183,21 +218,6 @@ class Evidence:
 
     def _progress(self, at: IntArray) -> FloatArray:
         return np.asarray(self.years[-1] - _ramp_from(self.years, self.beginnings)[at])
-
-    def of_null(
-        self, indices: Sequence[tuple[int, ...]], loadings: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return what `loadings` (rows, null) of the null's parameters are, given each of some
-        changes.
-
-        Means and variances, both (changes, rows).
-        """
-        at, k, kind, *_ = np.array(indices).T
-        means, factors = self._at_their_rate(indices)
-        reach, moved = loadings @ self.null_covariance[k], self.seen[2][kind, at, k]
-        variance = (reach * loadings).sum(axis=2) + np.square(reach @ moved @ factors).sum(axis=2)
-        shifts = (reach @ moved @ means[..., None])[..., 0]
-        return self.null_mean[k] @ loadings.T - shifts, variance
 
 
 def evidence_of(
@@ -370,3 +390,16 @@ def _chosen(beginnings: IntArray, most: int) -> IntArray:
 def _total(log_mass: FloatArray) -> float:
     """Log of the sum; -inf of nothing."""
     return float(np.logaddexp.reduce(log_mass.ravel())) if log_mass.size else -math.inf
+
+
+def _allot(weight: FloatArray, count: int) -> IntArray:
+    """Return which of some alternatives each of `count` draws is of, by their weights."""
+    reached = np.cumsum(weight) / weight.sum()
+    return np.minimum(np.searchsorted(reached, (np.arange(count) + 0.5) / count), len(weight) - 1)
+
+
+@lru_cache(maxsize=32)
+def _pairs(columns: int, seed: int = 0) -> FloatArray:
+    """Return standard normal draws (SAMPLES, columns), each followed by its opposite."""
+    half = np.random.default_rng(seed).standard_normal((SAMPLES // 2, columns))
+    return np.stack([half, -half], axis=1).reshape(SAMPLES, columns)

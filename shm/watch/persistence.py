@@ -1,9 +1,8 @@
 """Tests that count, and changes that stay.
 
-A test counts where it agrees with what was before it or with a test next to it, before or after,
-and none of its modes strays: two tests agree by the modes that they share, and these may be without
-the one that is mistaken. So a blunder counts in nothing as long as it is alone, and what lasts
-counts from its second test on, however large it is. Nothing here asks which cause it is.
+A test counts where it agrees with what was before it or with a test next to it, before or after. So
+a blunder counts in nothing as long as it is alone, and what lasts counts from its second test on,
+however large it is. Nothing here asks which cause it is.
 
 Does a change stay? Each test after it is asked whether tests before it did the same.
 
@@ -20,7 +19,6 @@ that were odd, where they are few: a baseline of one test proves no change by it
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,8 +32,6 @@ _SELDOM = 1e-3  # of tests that agree so many are taken for such that do not
 _NEAR = 2  # tests to each side: a blunder may lie between two that agree
 _BEFORE = 5  # counted tests that say where the hanger was
 _AGREEING = 0.4  # judgement: of those before; two of five
-# Of a log frequency (judgement): further off than by any load, and nearer than orders are.
-_STRAYS, _SAME = 0.04, 0.02
 _WIDER, _TAIL = 10.0, 2.0  # judgement: how a blunder lies, ten times as wide and with heavy tails
 
 
@@ -97,22 +93,9 @@ def select_consistent_tests(seen: Seen, known: BoolArray, baseline_tests: int) -
             test + step for step in range(-_NEAR, _NEAR + 1) if step and 0 <= test + step < tests
         ]
         near = [each for each in near if each >= first]
-        agrees = agreeing >= _AGREEING * len(before) or any(seen.agree(test, n) for n in near)
-        found[test] = agrees and not _has_outlying_mode(seen, found, test, near)
+        is_next_to_one = any(seen.agree(test, each) for each in near)
+        found[test] = agreeing >= _AGREEING * len(before) or is_next_to_one
     return found
-
-
-def _has_outlying_mode(seen: Seen, found: BoolArray, test: int, near: Sequence[int]) -> bool:
-    """Return True if a mode lies where no counted test before has it, and none next to it."""
-    for mode in np.flatnonzero(np.isfinite(seen.variances[test])):
-        measured = np.isfinite(seen.variances[:, mode])
-        before = np.flatnonzero(found[:test] & measured[:test])[-_BEFORE:]
-        its, others = seen.values[test, mode], seen.values[:, mode]
-        if not len(before) or abs(its - np.median(others[before])) <= _STRAYS:
-            continue
-        if not any(measured[each] and abs(its - others[each]) < _SAME for each in near):
-            return True
-    return False
 
 
 def _of_baseline(seen: Seen, first: int) -> BoolArray:
@@ -263,8 +246,7 @@ def _shown(
 
     The latter is that of any log frequency.
     """
-    ((change, _),) = evidence.changes_at([index])
-    ((null,), _) = evidence.of_null([index], np.eye(evidence.null_mean.shape[1]))
+    change, null = evidence.mean_of(index)
     measured = np.isfinite(course.variances)
     weight = np.where(measured, 1 / np.where(measured, course.variances, 1.0), 0.0)
     moves = course.changing @ change

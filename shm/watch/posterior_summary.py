@@ -1,6 +1,6 @@
 """Summary of the evidence after a test: the change, its onset, and the shift of each quantity.
 
-Shifts in the units that people read, of mixtures of normal distributions in the coordinate.
+Shifts are in the units that people read, by draws of the changes and of the null's parameters.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import scipy
 from shm.values import (
     NAN,
     TENSION,
+    BoolArray,
     Change,
     Drift,
     FloatArray,
@@ -26,19 +27,17 @@ from shm.values import (
     is_ratio,
 )
 from shm.values.drift import threshold_of
-from shm.watch.change_point import LOG_SHARES, SIZES, STEP, Evidence
+from shm.watch.change_point import LOG_SHARES, SAMPLES, SIZES, STEP, Evidence
 from shm.watch.options import DAYS_PER_YEAR, WatchOptions
-from shm.watch.quantities import coordinate_of, shift_of, value_at
+from shm.watch.quantities import shift_of, value_at
 
 _ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
 _TAIL = 0.05  # 90 % lie between
 _DIGITS = 3  # probabilities that read alike are ordered by tension first
 _TRADED = 0.25  # judgement: of what an end does, that looks like another tension
 _BEYOND_DOUBT = 1e4  # judgement: times what a detection takes
-# Technical: exact for polynomials of degree 13.
-_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
-_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
-_NEGLIGIBLE = 1e-7  # technical: less than the least probability that is told
+# Technical: draws of a standard normal law, evenly in probability.
+_NORMAL = scipy.special.ndtri((np.arange(SAMPLES) + 0.5) / SAMPLES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,19 +61,24 @@ class SummaryContext:
         """Return the time so many years from the start."""
         return self.start + timedelta(days=years * DAYS_PER_YEAR)
 
-    def model_uncertainty(self, means: FloatArray) -> FloatArray:
-        """Return standard deviations (B, q) of shifts `means` (B, q) that the model leaves open.
+    def model_uncertainty(self, shifts: FloatArray) -> FloatArray:
+        """Return standard deviations (draws, q) of `shifts` (draws, q) that the model leaves open.
 
         A share of each, as the baseline's own values are open; some of what ends do may be
         tension's."""
-        its = means * [each.scale_sd for each in self.quantities]
+        its = shifts * [each.scale_sd for each in self.quantities]
         is_tension = np.array([each.name == TENSION for each in self.quantities])
         if is_tension.any() and not is_tension.all():
-            of_ends = np.abs(means[:, ~is_tension]).sum(axis=1, keepdims=True)
+            of_ends = np.abs(shifts[:, ~is_tension]).sum(axis=1, keepdims=True)
             first = len(self.effects.T) - len(self.quantities)
             of_tension = self.effects[1::2, first:][:, is_tension].mean()
             its[:, is_tension] = np.hypot(its[:, is_tension], _TRADED * of_ends / of_tension)
         return np.asarray(its)
+
+    def with_model(self, shifts: FloatArray) -> FloatArray:
+        """Return draws of shifts (draws, q) with what the model leaves open."""
+        normal = np.random.default_rng(2).permutation(_NORMAL)[: len(shifts), None]
+        return np.asarray(shifts + self.model_uncertainty(shifts) * normal)
 
 
 def probability_of_change(evidence: Evidence, options: WatchOptions) -> float:
@@ -115,27 +119,25 @@ def summarize_change(
 def _material(subject: SummaryContext, evidence: Evidence) -> float:
     """The probability that a change, if there is one, moves one of the frequencies that owners look
     at by more than what is to be told."""
-    if not len(evidence.beginnings):
-        return 0.0
-    weights, changes = _leading(evidence, np.ones(len(evidence.directions), bool))
-    return float(weights @ _materials(subject, evidence, changes))
+    changes, _ = evidence.draw(_everything(evidence), _nothing(evidence))
+    return float(_are_material(subject, evidence, changes).mean()) if len(changes) else 0.0
 
 
-def _materials(
-    subject: SummaryContext, evidence: Evidence, changes: Sequence[tuple[int, ...]]
-) -> FloatArray:
-    """The same (changes,) of each; of any mode, where no doubt is left that something changed."""
+def _are_material(subject: SummaryContext, evidence: Evidence, changes: FloatArray) -> BoolArray:
+    """The same (draws,) of each; of any mode, where no doubt is left that something changed."""
     effects, least = subject.effects, subject.options.least_frequency_shift
     if evidence.log_evidence > math.log(_BEYOND_DOUBT * subject.options.limit_years):
         effects = np.vstack([effects, subject.by_mode])
-    if not changes:
-        return np.zeros(0)
-    found = evidence.changes_at(changes)
-    middle = np.array([mean for mean, _ in found]) @ effects.T
-    sd = np.sqrt(np.square(effects @ np.array([factor for _, factor in found])).sum(axis=2))
-    sd = np.maximum(sd, 1e-12)
-    tails = scipy.special.ndtr((-least - middle) / sd) + scipy.special.ndtr((middle - least) / sd)
-    return np.asarray(tails.max(axis=1))
+    return np.asarray((np.abs(changes @ effects.T) > least).any(axis=1))
+
+
+def _everything(evidence: Evidence) -> BoolArray:
+    return np.ones(len(evidence.directions), bool)
+
+
+def _nothing(evidence: Evidence) -> FloatArray:
+    """Return loadings that ask nothing of the null's parameters."""
+    return np.zeros((0, evidence.null_mean.shape[1]))
 
 
 def _sudden(evidence: Evidence) -> float:
@@ -190,35 +192,26 @@ def _as_changed(
     evidence: Evidence,
     names: Sequence[str],
     j: int,
-    part: FloatArray,
+    part: BoolArray,
     probability: float,
 ) -> Moved:
     """Return what is at `j` of the names, given that it changed: by the directions of its `part`.
 
     Of a cause that is no quantity the shift is that of the frequencies' mean, a fraction.
     """
-    weights, changes = _leading(evidence, part)
-    found = evidence.changes_at(changes)
+    changes, _ = evidence.draw(part, _nothing(evidence))
     n = evidence.layout.n
     together, similar = _find_company(evidence, part, names, names[j])
+    shift, end, plane = changes[:, :n].mean(axis=1), None, None
     if j < len(subject.quantities):
         quantity = subject.quantities[j]
-        means = np.array([each[0][n:] for each in found])
-        sd = np.array([math.sqrt(float((each[1][n + j] ** 2).sum())) for each in found])
-        sd = np.hypot(sd, subject.model_uncertainty(means)[:, j])
-        shift = shift_of_mixture(quantity, weights, means[:, j], sd)
+        shift = shift_of(quantity, subject.with_model(changes[:, n:])[:, j])
         end, plane = quantity.end, quantity.plane
-    else:
-        means = np.array([each[0][:n].mean() for each in found])
-        square = np.array([float((each[1][:n].mean(axis=0) ** 2).sum()) for each in found])
-        mean_all = float(weights @ means)
-        spread = float(weights @ (square + (means - mean_all) ** 2))
-        shift, end, plane = (mean_all, math.sqrt(max(spread, 0.0))), None, None
     return Moved(
         quantity=names[j],
         probability=probability,
-        shift_mean=shift[0],
-        shift_sd=shift[1],
+        shift_mean=float(shift.mean()) if len(shift) else 0.0,
+        shift_sd=float(shift.std()) if len(shift) else 0.0,
         end=end,
         plane=plane,
         alike=similar,
@@ -226,28 +219,8 @@ def _as_changed(
     )
 
 
-def _leading(
-    evidence: Evidence, part: FloatArray, *, is_last_counted: bool = True
-) -> tuple[FloatArray, list[tuple[int, ...]]]:
-    """Return the most probable changes in the directions of `part` (D,) and their weights, sum 1.
-
-    Unless `is_last_counted`, changes that begin at the last test are left out.
-    """
-    log_mass = np.where(part[:, None], evidence.log_mass, -np.inf)
-    if not is_last_counted:  # before the weights: those of the others may all underflow
-        log_mass[-1] = -np.inf
-    flat = log_mass.ravel()
-    # Technical: changes that a mixture is made of, the likeliest
-    most = min(24, len(flat))
-    best = np.argpartition(flat, len(flat) - most)[-most:]
-    best = best[np.isfinite(flat[best])]
-    weights = np.exp(flat[best] - np.logaddexp.reduce(flat[best])) if len(best) else flat[best]
-    places = np.array(np.unravel_index(best, log_mass.shape)).T
-    return np.asarray(weights), [tuple(each) for each in places.tolist()]
-
-
 def _find_company(
-    evidence: Evidence, part: FloatArray, names: Sequence[str], itself: str
+    evidence: Evidence, part: BoolArray, names: Sequence[str], itself: str
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return what moves with `itself` in the best direction of `part`, and what fits without it.
 
@@ -294,52 +267,46 @@ def summarize_drifts(
     probability = probability_of_change(evidence, subject.options)
     evidence = causes
     loadings = _of_null(evidence, subject)
-    nulls = [
-        (
-            float(weight),
-            loadings @ evidence.null_mean[k],
-            loadings @ evidence.null_covariance[k] @ loadings.T,
-        )
-        for k, weight in enumerate(np.exp(evidence.log_null))
-    ]
-    q = len(subject.quantities)
-    everything = np.ones(len(evidence.directions), bool)
-    weights, means, sds, changes = _shifts(evidence, everything, loadings)
-    none = np.array([each[0] for each in nulls]) * (1 - probability)
-    all_weights = np.concatenate([none, probability * weights]) if len(weights) else none
-    all_means = np.concatenate([np.array([each[1] for each in nulls]).reshape(-1, q), means])
-    sds_of_null = np.array([np.sqrt(np.maximum(np.diag(each[2]), 0)) for each in nulls])
-    all_sds = np.hypot(
-        np.concatenate([sds_of_null.reshape(-1, q), sds]), subject.model_uncertainty(all_means)
-    )
-    reported = np.ones(len(all_weights))
-    if len(changes) and not evidence.called:
-        reported[len(none) :] = _materials(subject, evidence, changes)
+    unmoved = subject.with_model(evidence.draw_null(loadings))
+    moved, changes = _draw_shifts(subject, evidence, _everything(evidence), loadings)
+    probability = probability if len(moved) else 0.0
+    is_material = np.ones(len(moved), bool)
+    if len(moved) and not evidence.called:
+        is_material = _are_material(subject, evidence, changes)
     found = []
     for j, quantity in enumerate(subject.quantities):
-        chosen = (all_weights, all_means, all_sds)
+        shifts = _mix(unmoved, moved, probability)[:, j]
         if not evidence.called and len(evidence.beginnings):
             part = np.array([j in each.members for each in evidence.directions])
-            its = _shifts(evidence, part, loadings, alone=len(evidence.beginnings) == 1)
-            if len(its[0]):
-                chosen = (*its[:2], np.hypot(its[2], subject.model_uncertainty(its[1])))
+            is_alone = len(evidence.beginnings) == 1
+            its, _ = _draw_shifts(subject, evidence, part, loadings, is_last_counted=is_alone)
+            shifts = its[:, j] if len(its) else shifts
         elif not evidence.called and not is_baseline:
-            sd = quantity.step_sd * math.sqrt(float(np.exp(LOG_SHARES) @ SIZES**2))
-            chosen = np.ones(1), np.zeros((1, q)), np.full((1, q), sd)
-        shift = shift_of_mixture(quantity, chosen[0], chosen[1][:, j], chosen[2][:, j])
-        moving = (all_sds[:, j] > 0) | (all_means[:, j] != 0)
+            shifts = quantity.step_sd * math.sqrt(float(np.exp(LOG_SHARES) @ SIZES**2)) * _NORMAL
         threshold = threshold_of(quantity.name, subject.hanger)
-        chance = beyond(
-            quantity,
-            (reported * all_weights)[moving],
-            all_means[moving, j],
-            all_sds[moving, j],
-            threshold,
-            subject.options.least_frequency_shift,
+        least = subject.options.least_frequency_shift
+        down, up = (
+            (1 - probability) * _share(_is_beyond(quantity, unmoved[:, j], threshold, way, least))
+            + probability
+            * _share(is_material & _is_beyond(quantity, moved[:, j], threshold, way, least))
+            for way in (-1, 1)
         )
         at = reading.test, reading.time
-        found.append(drift_of(quantity, subject.hanger, at, shift, chance))
+        found.append(drift_of(quantity, subject.hanger, at, shifts, max(down, up)))
     return tuple(found)
+
+
+def _share(chosen: BoolArray) -> float:
+    return float(chosen.mean()) if len(chosen) else 0.0
+
+
+def _mix(unmoved: FloatArray, moved: FloatArray, probability: float) -> FloatArray:
+    """Return draws, of which as many are `moved` as is probable."""
+    many = round(probability * len(moved))
+    # Technical: draws of either that lie anywhere among them
+    few = np.arange(many) * max(len(moved), 1) // max(many, 1)
+    rest = np.arange(SAMPLES - many) * SAMPLES // max(SAMPLES - many, 1)
+    return np.concatenate([unmoved[rest], moved[few]])
 
 
 def _of_null(evidence: Evidence, subject: SummaryContext) -> FloatArray:
@@ -357,35 +324,34 @@ def _of_null(evidence: Evidence, subject: SummaryContext) -> FloatArray:
     return np.hstack(blocks)
 
 
-def _shifts(
-    evidence: Evidence, part: FloatArray, loadings: FloatArray, *, alone: bool = True
-) -> tuple[FloatArray, FloatArray, FloatArray, list[tuple[int, ...]]]:
-    """Weights (B,), means and sds (B, q) of the quantities' shifts, given one change of `part`.
-
-    Unless `alone` may, a change that the last test by itself speaks for does not count.
-    """
-    layout = evidence.layout
+def _draw_shifts(
+    subject: SummaryContext,
+    evidence: Evidence,
+    part: BoolArray,
+    loadings: FloatArray,
+    *,
+    is_last_counted: bool = True,
+) -> tuple[FloatArray, FloatArray]:
+    """Draw the quantities' shifts (draws, q), given one change of `part`, and the changes."""
     if not len(evidence.beginnings):
-        return np.zeros(0), np.zeros((0, layout.q)), np.zeros((0, layout.q)), []
-    weights, changes = _leading(evidence, part, is_last_counted=alone)
-    if not changes:
-        return weights, np.zeros((0, layout.q)), np.zeros((0, layout.q)), []
-    found = evidence.changes_at(changes)
-    before, spread = evidence.of_null(changes, loadings)
-    means = np.array([mean[layout.n :] for mean, _ in found]) + before
-    variance = np.array([np.square(each[layout.n :]).sum(axis=1) for _, each in found]) + spread
-    return weights, means, np.sqrt(np.maximum(variance, 0)), changes
+        return np.zeros((0, evidence.layout.q)), np.zeros((0, 0))
+    changes, before = evidence.draw(part, loadings, is_last_counted=is_last_counted)
+    return subject.with_model(changes[:, evidence.layout.n :] + before), changes
 
 
 def drift_of(
     quantity: WatchedQuantity,
     hanger: Hanger,
     at: tuple[str, datetime],
-    shift: tuple[float, float],
+    shifts: FloatArray,
     probability: float,
 ) -> Drift:
-    """Return a shift (mean, sd) by a test, its name and time, with that of being beyond."""
-    still, mean = value_at(quantity, 0.0), shift[0]
+    """Return the shift by a test, its name and time: from draws (draws,) in the coordinate.
+
+    `probability` is that of being beyond.
+    """
+    still, shift = value_at(quantity, 0.0), shift_of(quantity, shifts)
+    mean = float(shift.mean())
     return Drift(
         hanger=hanger.id,
         test=at[0],
@@ -394,57 +360,30 @@ def drift_of(
         baseline=quantity.baseline,
         value=still * (1 + mean) if is_ratio(quantity.name) else still + mean,
         shift_mean=mean,
-        shift_sd=shift[1],
+        shift_sd=float(shift.std()),
         threshold=threshold_of(quantity.name, hanger),
         probability=probability,
     )
 
 
-def shift_of_mixture(
-    quantity: WatchedQuantity, weights: FloatArray, mean: FloatArray, sd: FloatArray
-) -> tuple[float, float]:
-    """Return mean and sd of a shift: of normal distributions (B,) in the coordinate.
-
-    There is none with what `weights` leave. By Gauss-Hermite quadrature of seven nodes in each.
-    """
-    chosen = weights > _NEGLIGIBLE
-    weights = weights[chosen]
-    mean, sd = mean[chosen], sd[chosen]
-    shifts = shift_of(quantity, mean[:, None] + sd[:, None] * _NODES)
-    first = float(weights @ shifts @ _WEIGHTS)
-    second = float(weights @ (shifts - first) ** 2 @ _WEIGHTS)
-    second += (1 - float(weights.sum())) * first**2
-    return first, math.sqrt(max(second, 0.0))
+def drift_of_normal(
+    quantity: WatchedQuantity, hanger: Hanger, at: tuple[str, datetime], mean: float, sd: float
+) -> Drift:
+    """Return the shift of which the coordinate has a normal law."""
+    shifts, threshold = mean + sd * _NORMAL, threshold_of(quantity.name, hanger)
+    ways = (_share(_is_beyond(quantity, shifts, threshold, way, 0.0)) for way in (-1, 1))
+    return drift_of(quantity, hanger, at, shifts, max(ways))
 
 
-def beyond(
-    quantity: WatchedQuantity,
-    weights: FloatArray,
-    mean: FloatArray,
-    sd: FloatArray,
-    threshold: float,
-    least: float = 0.0,
-) -> float:
-    """Return the probability of a shift beyond a threshold, the likelier way, by the mixture.
+def _is_beyond(
+    quantity: WatchedQuantity, x: FloatArray, threshold: float, way: int, least: float
+) -> BoolArray:
+    """Return which draws `x` (draws,) in the coordinate are beyond a threshold, in one way.
 
     Decades of an end that is as good as clamped move nothing: what moves the frequencies' mean by
     less than `least`, a spring's coordinate, is not beyond.
     """
-    chosen = weights > _NEGLIGIBLE
-    weights, mean = weights[chosen], mean[chosen]
-    sd = np.maximum(sd[chosen], 1e-12)
-    low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
+    beyond = way * shift_of(quantity, x) > threshold
     if not is_ratio(quantity.name):
-        low, high = min(low, -least), max(high, least)
-    down = float(weights @ scipy.special.ndtr((low - mean) / sd))
-    up = float(weights @ scipy.special.ndtr((mean - high) / sd))
-    return min(max(down, up), 1.0)
-
-
-def _coordinate(quantity: WatchedQuantity, shift: float) -> float:
-    """Return the coordinate of a shift; infinite where the quantity's table ends before it."""
-    is_fraction = is_ratio(quantity.name)
-    value = quantity.baseline * (1 + shift) if is_fraction else quantity.baseline + shift
-    if not min(quantity.values) < value < max(quantity.values):
-        return math.copysign(math.inf, shift)
-    return coordinate_of(quantity, value)
+        beyond &= way * x > least
+    return np.asarray(beyond)

@@ -156,13 +156,6 @@ def shift_of(quantity: WatchedQuantity, x: _X) -> _X:
     return _like(x, value - quantity.baseline)
 
 
-def coordinate_of(quantity: WatchedQuantity, value: float) -> float:
-    """The coordinate at which the quantity has `value`: tension in N, or log10 of the stiffness."""
-    if is_ratio(quantity.name):
-        return float(np.log(value / quantity.baseline))
-    return float(np.interp(value, quantity.values, quantity.coordinates))
-
-
 def _like(x: _X, found: float | FloatArray) -> _X:
     return np.asarray(found) if isinstance(x, np.ndarray) else float(found)
 

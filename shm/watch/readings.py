@@ -19,10 +19,6 @@ of the two that moves alone is read as a move of both, and a part of it as tensi
 30 % up to 0.5 % of it where the softer spring has 1e7 N m/rad and both planes are measured, more
 where it is softer still.
 
-Amplitude: identification gives the frequency of small amplitude where the slope is sure, and so
-tests at any amplitude compare. Where it is not sure in a test but was in the baseline, so much of
-the baseline's slope is taken off, at the test's own amplitude, as such a frequency holds.
-
 Loosening: the baseline tells what the ends give together and hardly which of them gives how much: a
 fork plate or a turnbuckle stiffens what a pin softens, and an end that gives looks clamped. As it
 loosens, the modes go by how soft it is: all alike where it is stiff, the lower ones more where it
@@ -134,17 +130,14 @@ class LinearReading:
         return float(step @ self.information @ step)
 
 
-def _credible_share(misfit: FloatArray, fitted: int) -> float:
-    """Return the share of its stated information that a test deserves, by its misfit over sd (n,).
+def _error_inflation(misfit: FloatArray, fitted: int) -> float:
+    """Return by what the stated variances of a test are too small, at least 1.
 
-    1 where the misfit is one that a thousandth of good tests exceed, or less. Where the modes fit
-    no state of the hanger, their errors are larger than stated by as much (Birge 1932).
+    By its `misfit` over sd (n,), as far as that can tell: a prior is worth `_PRIOR_FREEDOM` modes
+    (Birge 1932).
     """
-    free = len(misfit) - fitted
-    if free < 1:
-        return 1.0
-    most = float(scipy.special.chdtri(free, _SELDOM))
-    return most / max(most, float(misfit @ misfit))
+    free = max(len(misfit) - fitted, 0)
+    return max(1.0, (_PRIOR_FREEDOM + float(misfit @ misfit)) / (_PRIOR_FREEDOM + free))
 
 
 class Likelihood:
@@ -233,15 +226,12 @@ class Likelihood:
         """
         slopes = linear.slopes * self._scale
         shares, axes = np.linalg.eigh(slopes.T @ slopes)
+        shares = shares / _error_inflation(linear.residual, len(linear.x))
         seen = shares > _UNSEEN
-        steps = (off @ slopes @ axes)[:, seen] / shares[seen]
-        share = _credible_share(linear.residual, int(seen.sum()))
-        chosen = shares[seen] * share > _UNSEEN
-        shares, axes = shares[seen][chosen] * share, axes[:, seen][:, chosen]
-        information = (axes * shares) @ axes.T / np.outer(self._scale, self._scale)
-        return self._scale * (steps[:, chosen] @ axes.T), np.asarray(
-            information + information.T
-        ) / 2
+        steps = (off @ slopes @ axes)[:, seen] / np.linalg.norm(slopes @ axes[:, seen], axis=0) ** 2
+        information = (axes[:, seen] * shares[seen]) @ axes[:, seen].T
+        information = information / np.outer(self._scale, self._scale)
+        return self._scale * (steps @ axes[:, seen].T), (information + information.T) / 2
 
     def predicted(self, x: FloatArray, seen: SeenModes) -> FloatArray:
         """Log frequencies (n, modes) of the model at coordinates (n, q) within the tables."""
@@ -288,55 +278,6 @@ def softening(
     change = log_frequencies(stiff, base[None], modes)
     change = change - log_frequencies(model, base[None], modes)
     return np.asarray(hanger.assumptions.modulus_per_kelvin.value * change[0] / _STIFFER)
-
-
-# Of the slope, in a frequency that is not of small amplitude. The mean weighted with the energy of
-# a ring-down, while the amplitude falls as exp(-t), has 2/3 of it: the integral of exp(-3t) over
-# that of exp(-2t). Measured of softening and hardening hangers: median 0.5, quartiles 0.2 and 1.1
-# (tests/benchmarks/identify_ablation.py); the sd is half of their distance over 0.674.
-SHARE, SHARE_SD = 0.5, 0.65
-
-
-@dataclass(frozen=True, eq=False)
-class AmplitudeSlopes:
-    """Of the baseline, by mode (modes,): change of the log frequency by unit amplitude, its sd, and
-    the usual amplitude; 0 of a mode of which no test is sure."""
-
-    slope: FloatArray
-    sd: FloatArray
-    usual: FloatArray
-
-    @classmethod
-    def of(cls, tests: Sequence[ModalTest], modes: Sequence[MeasuredMode]) -> AmplitudeSlopes:
-        """From those tests that are sure, weighted by their errors."""
-        found = np.zeros((3, len(modes)))
-        for column, key in enumerate(modes):
-            seen = [
-                (mode.amplitude_slope, mode.amplitude_slope_sd, test.amplitude)
-                for test in tests
-                for mode in test.regular_modes
-                if (mode.plane, mode.order) == key and mode.depends_on_amplitude
-            ]
-            if seen:
-                slope, sd, level = np.array(seen).T
-                level = np.where(level > 0, level, 1.0)
-                # A slope that is known to 1 % is known well enough; none is known exactly.
-                weight = (level / np.maximum(sd, 0.01 * np.abs(slope))) ** 2
-                mean = weight @ (slope / level) / weight.sum()
-                found[:, column] = mean, weight.sum() ** -0.5, level.mean()
-        return cls(*found)
-
-    def at(
-        self, test: ModalTest, modes: Sequence[Mode], own: IntArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the shifts of log frequencies (n,) from those of small amplitude, and the sds.
-
-        `own` (n,) are the columns of the test's `modes`. An amplitude not known is the baseline's.
-        """
-        level = test.amplitude if test.amplitude > 0 else self.usual[own]
-        level = np.where([mode.depends_on_amplitude for mode in modes], 0.0, level)
-        slope, sd = level * self.slope[own], level * self.sd[own]
-        return SHARE * slope, np.hypot(SHARE * sd, SHARE_SD * np.hypot(slope, sd))
 
 
 # Judgement: how stiff an end may be that is found to be stiffer, in units of the bending stiffness
@@ -449,7 +390,6 @@ class Reader:
         self._likelihood = Likelihood(self._model, self._base, self.quantities, highest)
         self.reference_temperature_c = mean_temperature_c(usable)
         self._per_kelvin = softening(self._model, self._base, hanger, self.modes)
-        self._per_amplitude = AmplitudeSlopes.of(usable, self.modes)
         mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
         self._unstated_sd = hanger.assumptions.unstated_frequency_sd.value
         sensors_kg = mounted_kg(hanger)
@@ -504,9 +444,7 @@ class Reader:
         Stated errors are taken to be off by a factor that the misfit tells, as far as it can.
         """
         sd, n = np.sqrt(seen.variance), len(self.modes)
-        free = max(len(seen.own) - len(linear.x), 0)
-        misfit = float(linear.residual @ linear.residual)
-        larger = max(1.0, (_PRIOR_FREEDOM + misfit) / (_PRIOR_FREEDOM + free))
+        larger = _error_inflation(linear.residual, len(linear.x))
         values, variances = np.zeros(n), np.full(n, np.inf)
         slopes = np.zeros((n, len(linear.x)))
         values[seen.own] = sd * (linear.residual + linear.slopes @ linear.x)
@@ -595,14 +533,13 @@ class Reader:
             if self._is_warmth_known(test)
             else 0.0
         )
-        slip, slip_sd = self._per_amplitude.at(test, modes, its)
         return SeenModes(
             conditions=self._model.conditions(test),
             plane=np.array([PLANES.index(mode.plane) for mode in modes], dtype=int),
             order=np.array([mode.order - 1 for mode in modes], dtype=int),
             own=its,
-            log_frequency=np.log(frequency_hz) - self._residual[its] - variation - slip,
-            variance=sd**2 + slip_sd**2 + self._allowance**2,
+            log_frequency=np.log(frequency_hz) - self._residual[its] - variation,
+            variance=sd**2 + self._allowance**2,
         )
 
 

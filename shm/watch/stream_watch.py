@@ -450,7 +450,13 @@ class StreamWatch:
                 state, unlike = replace(state, bank=state.bank.changed(evidence)), 0.0
                 now = _shift(state)[0]
                 state = replace(state, called=state.called.after(now - evidence.shift, now))
-                moved = cause.moved
+                mean, sd = math.expm1(evidence.shift), evidence.shift_sd
+                moved = tuple(
+                    replace(each, shift_mean=mean, shift_sd=sd)
+                    if each.quantity == TENSION
+                    else each
+                    for each in cause.moved
+                )
         test = self._watched_test(state, evidence, moved, is_apart, unlike, reading, end)
         reported, alert = after(state.told, test, self.hanger)
         # Technical: of changes that were told, so that what is kept stays bounded

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from shm.errors import BadInput, UsageError
+from shm.errors import BadInput
 from shm.values import (
     Change,
     CreepRate,
@@ -40,7 +40,7 @@ from shm.watch.posterior_summary import (
 from shm.watch.state_sums import StateSums, WatchState, begun_of, size_of
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 13
+_VERSION = 14
 # Technical: what a test says goes nearly in proportion to its weight.
 _MOST_REPEATS, _NEARLY = 6, 0.5
 _CLEARLY_NATS = 3.0  # 20 to 1
@@ -102,15 +102,9 @@ class Watcher:
     def begin(self, readings: Sequence[Reading]) -> tuple[WatchState, Watch]:
         """The state after the readings of the baseline, by time, and a result for each of them.
 
-        Raises UsageError where these are more than the options' `baseline_tests`, or none. Where
-        they are fewer, the state cannot go on.
+        Where they are fewer than the options' `baseline_tests`, the state cannot go on.
         """
-        if not 0 < len(readings) <= self.options.baseline_tests:
-            raise UsageError(
-                f"The watch was to begin with {len(readings)} readings; its baseline has "
-                f"{self.options.baseline_tests}."
-            )
-        time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
+        n, q = self.structure.layout.n, self.structure.layout.q
         coefficients = q * self.structure.thermal_laws
         none: dict[str, Any] = {
             **dict.fromkeys(("values", "variances", "per_kelvin"), np.zeros((0, n))),
@@ -118,8 +112,8 @@ class Watcher:
         }
         state = WatchState(
             key=self.key,
-            start=time,
-            last_time=time,
+            start=readings[0].time,
+            last_time=readings[0].time,
             reference_c=reference_of([reading.temperature_c for reading in readings]),
             slopes=np.zeros((0, n, q)),
             **none,
@@ -130,26 +124,21 @@ class Watcher:
             called=np.zeros((0, 3)),
             called_precision=np.zeros((0, n + q, n + q)),
         )
+        return self.watch(state, readings)
+
+    def watch(self, state: WatchState, readings: Sequence[Reading]) -> tuple[WatchState, Watch]:
+        """Return the state after more readings, by time, and a result for each of them."""
         tests = []
         for reading in readings:
-            state, found = self._advance(state, reading)
+            state, found = self.after(state, reading)
             tests.append(found)
         return state, Watch(tuple(tests))
 
     def after(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
         """Return the state after one more reading, and the result.
 
-        Raises BadInput where the reading is older than the last, or of other quantities, UsageError
-        where the state is that of another watch, or its baseline is not complete.
+        Raises BadInput where the reading is older than the last, or of other quantities.
         """
-        if state.key != self.key or state.tests < self.options.baseline_tests:
-            raise UsageError(
-                "This state of a watch is not of this hanger, baseline and options.",
-                remedy="Begin the watch anew.",
-            )
-        return self._advance(state, reading)
-
-    def _advance(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
         if reading.time < state.last_time:
             raise BadInput(
                 f"The watch was given test {reading.test} after one that is later.",
@@ -157,24 +146,19 @@ class Watcher:
             )
         state = self._reclassify_last_change(self._with(state, reading))
         state, evidence = self._limit_last_visit(state)
-        rows = _counting(state)
         if not state.counted[-1]:
-            evidence = self._evidence(state, rows)
+            evidence = self._evidence(state, _counting(state))
         evidence, causes, against = self._apply_recurrence_bound(state, evidence)
         if against >= ENOUGH_AGAINST:
             # Else everything since would be one change, and hide the next.
-            state = self._without_baseline(state)
-            evidence = self._evidence(state, _counting(state))
-            evidence, causes, _ = self._apply_recurrence_bound(state, evidence)
+            state = self._with_baseline(state, counts=False)
+            evidence, causes, _ = self._bounded(state)
         its = slice(self.options.baseline_tests)
+        since, all_causes = evidence, causes
         if np.isfinite(state.variances[its]).any() and not state.counted[its].any():
             against = int(state.counted.sum())
             # How far it is since the baseline stays open all the same.
-            whole = self._with_baseline(state)
-            since = self._evidence(whole, _counting(whole))
-            since, all_causes, _ = self._apply_recurrence_bound(whole, since)
-        else:
-            since, all_causes = evidence, causes
+            since, all_causes, _ = self._bounded(self._with_baseline(state, counts=True))
         found = self._summarize(state, reading, (evidence, causes, against), (since, all_causes))
         coefficients, coefficient_sd = self._coefficients(evidence)
         if found.change.called and state.counted[-1]:
@@ -185,6 +169,10 @@ class Watcher:
             state = replace(state, called=begun, called_precision=sizes, still_same=still)
         state = replace(state, coefficients=coefficients, coefficient_sd=coefficient_sd)
         return state, found
+
+    def _bounded(self, state: WatchState) -> tuple[Evidence, Evidence, int]:
+        """Return the evidence of the tests that count, as `_apply_recurrence_bound` does."""
+        return self._apply_recurrence_bound(state, self._evidence(state, _counting(state)))
 
     def _apply_recurrence_bound(
         self, state: WatchState, evidence: Evidence
@@ -202,15 +190,12 @@ class Watcher:
         log_years, against = bound_by_recurrence(causes, course, self.options.limit_years)
         return replace(evidence, log_most=log_years), causes, 0 if causes.called else against
 
-    def _without_baseline(self, state: WatchState) -> WatchState:
-        """Return the state in which a baseline that stands alone does not count."""
+    def _with_baseline(self, state: WatchState, *, counts: bool) -> WatchState:
+        """Return the state in which the baseline counts, no change being called; or does not."""
         counted = state.counted.copy()
-        counted[: self.options.baseline_tests] = False
-        return replace(state, counted=counted)
-
-    def _with_baseline(self, state: WatchState) -> WatchState:
-        counted = state.counted.copy()
-        counted[: self.options.baseline_tests] = True
+        counted[: self.options.baseline_tests] = counts
+        if not counts:
+            return replace(state, counted=counted)
         none = state.called[:0], state.called_precision[:0]
         return replace(state, counted=counted, called=none[0], called_precision=none[1])
 
@@ -236,7 +221,12 @@ class Watcher:
             of_baseline,
             *self.sums.effects(state),
         )
-        outlier = self._outlier(state, state.tests - 1)
+        outlier = outlier_probability(
+            self.sums.seen(state),
+            state.counted,
+            state.tests - 1,
+            self.options.outlier_probability,
+        )
         return WatchedTest(
             test=reading.test,
             time=reading.time,
@@ -359,10 +349,6 @@ class Watcher:
         variance = float(weights @ (variances + (means - mean) ** 2))
         return CreepRate(mean, math.sqrt(variance), self.options.creep_per_year_sd)
 
-    def _outlier(self, state: WatchState, test: int) -> float:
-        prior = self.options.outlier_probability
-        return outlier_probability(self.sums.seen(state), state.counted, test, prior)
-
 
 def watched(
     readings: Sequence[Reading],
@@ -381,11 +367,7 @@ def watched(
         return Watch(())
     count = watcher.options.baseline_tests
     state, begun = watcher.begin(readings[:count])
-    tests = list(begun.tests)
-    for reading in readings[count:]:
-        state, found = watcher.after(state, reading)
-        tests.append(found)
-    return Watch(tuple(tests))
+    return Watch((*begun.tests, *watcher.watch(state, readings[count:])[1].tests))
 
 
 def _counting(state: WatchState) -> IntArray:

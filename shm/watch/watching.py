@@ -141,10 +141,6 @@ class Watched:
     def latest(self) -> WatchedTest:
         return self.watch.tests[-1]
 
-    def alert(self, hanger: Hanger) -> Alert | None:
-        """Return what the newest test calls for, beyond what was told before."""
-        return new_alert(self.watch.tests, hanger)
-
 
 def watch_hanger(
     baseline: Posterior,
@@ -255,18 +251,6 @@ def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> Wa
     return replace(options, baseline_tests=baseline_tests, limit_years=limit_years)
 
 
-def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
-    """The alert that the newest of the tests of a hanger calls for, beyond those told before.
-
-    `watched` are all its tests since the baseline, the oldest first. The alert's key names hanger,
-    rules, quantity, way and test: the same whenever it is asked for.
-    """
-    reported, alert = AlertState(), None
-    for test in watched:
-        reported, alert = after(reported, test, hanger)
-    return alert
-
-
 def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertState, Alert | None]:
     """Return what stands after one more test, and the alert that it calls for, if any."""
     level = hanger.thresholds.alert_probability
@@ -313,7 +297,10 @@ def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
 
 
 def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
-    """All alerts of a history, the oldest test first: what `new_alert` says after each test."""
+    """Return all alerts of a history, the oldest test first.
+
+    An alert's key names hanger, rules, quantity, way and test: the same whenever it is asked for.
+    """
     reported, alerts = AlertState(), []
     for test in watched:
         reported, alert = after(reported, test, hanger)

@@ -9,6 +9,7 @@ from shm.acquire import Acquired, AcquireOptions, SimulatedDevice, acquire
 from shm.errors import BadInput
 from shm.models import THESIS, build
 from shm.values import Channel, FloatArray, Hanger
+from tests.helpers.slow import few_of
 
 OPTIONS = AcquireOptions(seconds=8.0, most_hits=4)
 NOTHING = np.empty(0)
@@ -39,7 +40,7 @@ def run(hanger: Hanger, said: list[str], **faults: object) -> Acquired:
     return acquire(device, CHANNELS, said.append, OPTIONS, hanger=hanger)
 
 
-@pytest.mark.parametrize("rate_hz", [1000.0, 4000.0])
+@pytest.mark.parametrize("rate_hz", few_of([1000.0, 4000.0], 1))
 def test_acquire_stops_when_good(hanger: Hanger, rate_hz: float) -> None:
     said: list[str] = []
 

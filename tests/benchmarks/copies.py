@@ -17,7 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.plausibility import fingerprint_of
-from shm.plausibility.copies import is_copy
+from shm.plausibility.copies import shared
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.values import Channel, Fingerprint, Recording
 from tests.helpers.altered import ALTERED
@@ -55,14 +55,14 @@ def print_of(recording: Recording) -> Fingerprint:
 
 def tell_distinct(name: str, recordings: Sequence[Recording]) -> None:
     pairs = list(itertools.combinations(map(print_of, recordings), 2))
-    held = sum(is_copy(*pair) for pair in pairs)
+    held = sum(shared(*pair) is not None for pair in pairs)
     print(f"distinct, {name}: {held} of {len(pairs)} pairs pass for copies", flush=True)
 
 
 def tell_altered(
     name: str, alter: Callable[[Recording], Recording], recordings: Sequence[Recording]
 ) -> None:
-    known = sum(is_copy(print_of(alter(each)), print_of(each)) for each in recordings)
+    known = sum(shared(print_of(alter(each)), print_of(each)) is not None for each in recordings)
     print(f"copies, {name}: {known} of {len(recordings)} known", flush=True)
 
 

@@ -55,6 +55,7 @@ SHORT = {
     "identify_limits": "--sound 2 --faulty 1", "identify_seconds": "--runs 1",
     "identify_simulated": "--tests 4", "identify_sound": "--seeds 0:2",
     "kill_daemon": "--kills 4 --files 6",
+    "kill_stream": "--kills 4",
     "kill_two_daemons": "--files 12",
     "kill_workers": "--kills 4 --files 6",
     "load": "--queue 4 --hangers 2 --alerts 1 --models beam2 --kinds modes",

@@ -1,14 +1,15 @@
 """Random mutants of the product: would the tests notice if one line said something else?
 
     python tests/benchmarks/mutants.py --seed 3 --mutants 100
+    python tests/benchmarks/mutants.py --mutants 60 --rooms shm/gap shm/watch shm/store shm/report
 
 A line is drawn among all lines of the product that can be changed, then one change of it: a
 comparison turned, + and - swapped, * and / swapped, `not` dropped, `and` and `or` swapped, a number
 or a flag changed, None returned, a call left out whose value nobody takes. Each is written into a
 copy of the working tree and meets at most `--files` files of tests, nearest first: of its name,
-then those that import the module, then the rest of its package's folder. What none of them notices
-survived; whether it is equivalent, a person decides. Not changed: docstrings, texts, `__repr__`,
-logging, types, flags of a dataclass.
+then those that import the module, then the rest of its package's folder and its contract. What
+none of them notices survived; whether it is equivalent, a person decides. Not changed: docstrings,
+texts, `__repr__`, logging, types, flags of a dataclass.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -148,10 +150,12 @@ def changed(source: str, node: ast.AST, text: str) -> str:
     return (raw[:first] + text.encode() + raw[last:]).decode()
 
 
-def drawn(root: Path, seed: str, count: int) -> list[tuple[Path, int, str, str]]:
+def drawn(
+    root: Path, rooms: Sequence[str], seed: str, count: int
+) -> list[tuple[Path, int, str, str]]:
     """File, line, what stood there, the changed file. Each line has the same chance."""
     rng = random.Random(seed)
-    files = sorted(path for room in PRODUCT for path in (root / room).rglob("*.py"))
+    files = sorted(path for room in rooms for path in (root / room).rglob("*.py"))
     by_line: dict[tuple[Path, int], list[ast.AST]] = {}
     for path in files:
         for node in sites(ast.parse(path.read_text())):
@@ -170,10 +174,11 @@ def nearest(root: Path, path: Path) -> list[Path]:
     parts = path.relative_to(root).with_suffix("").parts
     room = parts[1] if len(parts) > 1 else parts[0]
     folders = _FOLDERS.get(room, (room,))
+    contracts = {f"test_{each}_contract" for each in folders}
     module = ".".join(parts[1:] if parts[0] in ("cli", "daemon") else parts)
     ranks = {}
     for test in (root / "tests").rglob("test_*.py"):
-        own = test.parent.name in folders
+        own = test.parent.name in folders or test.stem in contracts
         named = path.stem.strip("_") in test.stem
         imported = module in (text := test.read_text()) or (own and path.stem in text)
         if own or named or imported:
@@ -203,6 +208,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", default="0")
     parser.add_argument("--mutants", type=int, default=5)
+    parser.add_argument("--rooms", nargs="+", default=PRODUCT, help="folders of the product")
     parser.add_argument("--files", type=int, default=12, help="files of tests a mutant meets")
     parser.add_argument("--seconds", type=float, default=180.0, help="then it is undecided")
     asked = parser.parse_args()
@@ -211,7 +217,7 @@ def main() -> None:
         root = Path(folder) / "tree"
         left = shutil.ignore_patterns(".*", "__pycache__", "build")
         shutil.copytree(ROOT, root, ignore=left)
-        for path, line, old, source in drawn(root, asked.seed, asked.mutants):
+        for path, line, old, source in drawn(root, asked.rooms, asked.seed, asked.mutants):
             before = path.read_text()
             path.write_text(source)
             passed = survives(root, nearest(root, path)[: asked.files], asked.seconds)

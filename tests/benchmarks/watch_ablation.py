@@ -43,7 +43,7 @@ from shm.watch import (  # noqa: E402
     watching,
 )
 from shm.watch.change_point import Evidence  # noqa: E402
-from shm.watch.readings import AmplitudeSlopes, Likelihood  # noqa: E402
+from shm.watch.readings import Likelihood  # noqa: E402
 from shm.watch.state_sums import StateSums, WatchState  # noqa: E402
 from shm.watch.watcher import Watcher  # noqa: E402
 from tests.benchmarks import watch_worlds  # noqa: E402
@@ -97,7 +97,6 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
     ],
     "bound on one visit": [(Watcher, "_limit_last_visit", weigh_all)],
     "tests that stand alone": [(watcher, "select_consistent_tests", count_all)],
-    "modes that stray": [(persistence, "_has_outlying_mode", give(False))],
     "a baseline that stands alone": [(watcher, "ENOUGH_AGAINST", 10**9)],
     "two tests that agree": [(watch_worlds, "agreement", give(None))],
     "learnt scatter": [(StateSums, "scatter", lambda self, _: self.structure.scatter_variance)],
@@ -114,9 +113,6 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
     "mistaken modes: tests of another bar": [(mistaken_modes, "_MISFIT", 1e-300)],
     "stated errors by the misfit": [(readings, "_PRIOR_FREEDOM", 1e12)],
     "patterns of loosening": [(readings, "loosening_of", find_no_pattern)],
-    "slopes with amplitude": [
-        (AmplitudeSlopes, "at", lambda _, test, modes, own: np.zeros((2, len(modes))))
-    ],
     "creep": [with_options(creep_per_year_sd=1e-9)],
     "unknown temperatures of a season": [(options, "_SEASON_YEARS", 1e-9)],
     "tests of one day": [(state_sums, "OF_ONE_VISIT_YEARS", 1e-9)],

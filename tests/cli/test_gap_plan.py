@@ -50,7 +50,7 @@ def test_a_plan_goes_by_the_owners_hours_within_the_budget(
 
 
 def test_a_plan_is_shown_as_a_table(shm: Shm, modes: Path, hanger_file: Path) -> None:
-    ended = shm("gap", "plan", modes, "--hanger-file", hanger_file, *SHORT)
+    ended = shm("gap", "plan", modes, "--hanger-file", hanger_file, *SHORT, "--baseline", "beam1")
     assert ended.code == 0, ended.err
     assert "known mass of" in ended.out
     assert "promised log odds" in ended.out

@@ -33,7 +33,7 @@ PATIENCE_S = 120.0
 _STYLE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 
 
-OF_TEST = {"When was the test": "2026-05-01T10:00Z", "How warm": "12,5"}
+OF_TEST = {"When was the test": "2026-05-01T10:00Z", "How warm": "12,5", "Who measured": "Ann"}
 
 
 class Terminal:
@@ -159,6 +159,7 @@ def test_a_wrong_answer_is_asked_for_again_and_the_right_ones_are_kept(
     with terminal(workspace, export(tmp_path / "a.csv")) as person:
         person.answer("When was the test", "lately", "2026-05-01T10:00Z")
         person.answer("How warm", "very", "12,5")
+        person.answer("Who measured", "Ann")
         person.answer("Which hanger", "three", "9", "3")
         person.answer("hammer of Kraft", "1,9")
         person.answer("Where is A1", "high up", "2,52")
@@ -168,7 +169,7 @@ def test_a_wrong_answer_is_asked_for_again_and_the_right_ones_are_kept(
         person.answer("of hanger 3, too?", "y")
         assert person.end() == 0
     landed = tomllib.loads((workspace.spool / "a.toml").read_text())
-    assert (landed["temperature_c"], landed["time"].hour) == (12.5, 10)
+    assert (landed["temperature_c"], landed["time"].hour, landed["operator"]) == (12.5, 10, "Ann")
     assert "Which hanger was tested? [3, 4]" in person.shown
     for wrong in (
         "'lately' is no day",

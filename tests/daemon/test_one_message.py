@@ -32,7 +32,7 @@ from shm.store import IdentifiedTest, Lineage, Store, StoredTest, Workspace
 from shm.values import Alert, Change, Drift, RepeatedMistake, Selection, WatchedTest
 from shm.values.messages import Lead, Urgency
 from shm.watch.alert_text import message_of
-from shm.watch.watching import new_alert
+from shm.watch.watching import alerts_of
 from shm_cli.main import cli
 from shm_daemon.web.commands import without_commands
 from tests.helpers.hangers import HANGER_3
@@ -81,7 +81,8 @@ class Hangers:
         own = tuple(replace(d, hanger=hanger, test=name, time=time) for d in drifts)
         found = WatchedTest(name, time, 11.5, own, change, None, **more)  # type: ignore[arg-type]
         before = [each.watched for each in self.store.watch.list_all(hanger, baseline.id)]
-        alert = new_alert([*before, found], replace(HANGER_3, id=hanger))
+        every = alerts_of([*before, found], replace(HANGER_3, id=hanger))
+        alert = next((each for each in every if each.test == found.test), None)
         self.store.watch.save(test, baseline, found, alert, ["mail"], time)
 
     def raised(self, hanger: int) -> int:

@@ -158,6 +158,9 @@ def answered(form: Locator) -> None:
         else:
             said = str(PLACE_M)
         line.locator("input").fill(said)
+    stays = form.locator(".carried input[type=checkbox]")
+    if stays.count():
+        stays.uncheck()  # all its files are of this hanger
     form.get_by_role("button", name="Keep for this logger, and send").click()
 
 

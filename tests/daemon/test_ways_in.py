@@ -24,6 +24,7 @@ from shm_daemon.web.address import Address
 from shm_daemon.web.serving import web_with_daemon
 from tests.helpers.brokers import a_broker
 from tests.helpers.daemons import ROOT, quick_daemons, until_serving
+from tests.helpers.slow import few_of
 from tests.helpers.waiting import until
 from tests.helpers.workspaces import make_workspace, modelled_test
 
@@ -140,36 +141,36 @@ def test_messages_outlast_killed_daemons_and_each_is_stored_once(tmp_path: Path)
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+@pytest.mark.parametrize("page", few_of(["", "/static/shm.css"], 1))
 def test_it_answers_within_seconds_of_work_and_sigterm_ends_it_without_a_word_of_python(
-    workspace: Workspace,
+    workspace: Workspace, page: str
 ) -> None:
     """At the moment that `/health` answers, while pages are loaded, and once one was shown."""
     shm = "from shm_cli.main import main; main()"
     environment = {**os.environ, "PYTHONPATH": ".:daemon:cli"}
-    for page in ("", "/static/shm.css"):
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            port = free.getsockname()[1]
-        words = ["--workspace", str(workspace.folder), "daemon", "--web", "--port", str(port)]
-        daemon = subprocess.Popen(
-            [sys.executable, "-c", shm, *words],
-            cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        with daemon:
-            try:
-                until(lambda port=port: answers(port))  # type: ignore[misc]
-                (server,) = servers_of(workspace)
-                assert processor_s(server) < 5.0
-                if page:
-                    httpx.get(f"http://127.0.0.1:{port}{page}", timeout=90, trust_env=False)
-                lock = workspace.folder / "shm.lock"
-                until(lambda lock=lock: lock.exists() and lock.read_text())  # type: ignore[misc]
-            finally:
-                daemon.terminate()
-                said = daemon.communicate(timeout=60)[1]
-        assert daemon.returncode == 0, said
-        assert "Fatal" not in said
-        assert "Traceback" not in said
-        until(lambda: not servers_of(workspace))
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    words = ["--workspace", str(workspace.folder), "daemon", "--web", "--port", str(port)]
+    daemon = subprocess.Popen(
+        [sys.executable, "-c", shm, *words],
+        cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    with daemon:
+        try:
+            until(lambda: answers(port))
+            (server,) = servers_of(workspace)
+            assert processor_s(server) < 5.0
+            if page:
+                httpx.get(f"http://127.0.0.1:{port}{page}", timeout=90, trust_env=False)
+            lock = workspace.folder / "shm.lock"
+            until(lambda: lock.exists() and lock.read_text())
+        finally:
+            daemon.terminate()
+            said = daemon.communicate(timeout=60)[1]
+    assert daemon.returncode == 0, said
+    assert "Fatal" not in said
+    assert "Traceback" not in said
+    until(lambda: not servers_of(workspace))
 
 
 def processor_s(process: int) -> float:

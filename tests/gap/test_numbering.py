@@ -64,10 +64,7 @@ def _remark(shifts: Mapping[str, int], *effects: PlantedEffect) -> str:
                 "were the modes of both planes numbered one higher",
             ),
             ({"transverse": -1}, "were the transverse modes numbered one higher, the"),
-            (
-                {"transverse": 1, "longitudinal": -1},
-                "were the transverse modes numbered one lower and the longitudinal modes",
-            ),
+            ({"transverse": 1}, "were the transverse modes numbered one lower, "),
         ],
         1,
     ),

@@ -13,14 +13,15 @@ from shm.read import sandbox
 from shm.read.sandbox import reading_process
 
 _VERB = """
+from shm.read import registry
 from shm.read.sandbox import serving
-known = serving._VERBS['read_test']
+known = registry.VERBS['read_test']
 def verb(path):
     if '.py' not in path.suffixes: return known(path)
     space = {'path': path}
     exec(path.read_text(), space)
     return space['found']
-serving._VERBS['read_test'] = verb
+registry.VERBS['read_test'] = verb
 """
 
 

@@ -7,6 +7,7 @@ import json
 import math
 import zipfile
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -24,11 +25,12 @@ from pymseed import MS3TraceList, nslc2sourceid
 
 from shm.read import FORMATS, Format
 from shm.read import write as write_ours
-from shm.read.arrays import Layout, layout_of
+from shm.read.array_reading import facts_about
 from shm.read.base import PeekChannel
 from shm.read.comma_separated import recording_text, response_text
 from shm.read.header import condition_entries
 from shm.read.logger_words import SI
+from shm.read.numpy_file import arrays_of
 from shm.read.sidecar import sidecar_path, write_sidecar
 from shm.values import FrequencyResponse, Recording
 
@@ -53,15 +55,34 @@ def needs_responses(file_format: Format) -> None:
         pytest.skip(f"{file_format.name} holds time records alone")
 
 
+@dataclass
+class Layout:
+    """Named arrays, the facts about each by name, and those about the whole."""
+
+    arrays: dict[str, Any]
+    facts: dict[str, dict[str, Any]]
+    attributes: dict[str, Any]
+
+    @classmethod
+    def of(cls, described: Recording | FrequencyResponse) -> Layout:
+        flat = arrays_of(described)
+        arrays = {name: value for name, value in flat.items() if isinstance(value, np.ndarray)}
+        facts = {name: facts_about(name, flat) for name in arrays}
+        taken = {*arrays, *(f"{name}_{key}" for name, about in facts.items() for key in about)}
+        for name, about in facts.items():
+            facts[name] = {k: v for k, v in about.items() if f"{name}_{k}" not in arrays}
+        return cls(arrays, facts, {k: v for k, v in flat.items() if k not in taken})
+
+
 def _hdf5(layout: Layout, path: Path) -> None:
     with h5py.File(path, "w", track_order=True) as file:
         file.attrs.update(layout.attributes)
-        for array in layout.arrays:
-            file.create_dataset(array.name, data=array.values).attrs.update(array.attributes)
+        for name, values in layout.arrays.items():
+            file.create_dataset(name, data=values).attrs.update(layout.facts[name])
 
 
-def _matlab(layout: Layout, path: Path) -> None:
-    scipy.io.savemat(str(path), layout.flat, long_field_names=True, oned_as="column")
+def _matlab(described: Recording | FrequencyResponse, path: Path) -> None:
+    scipy.io.savemat(str(path), arrays_of(described), long_field_names=True, oned_as="column")
 
 
 def _tdms(layout: Layout, path: Path) -> None:
@@ -69,10 +90,11 @@ def _tdms(layout: Layout, path: Path) -> None:
     rate = layout.attributes.get("sampling_rate_hz")
     timed = {"wf_increment": 1 / rate, "sampling_rate_hz": rate} if isinstance(rate, float) else {}
     channels = [
-        ChannelObject("test", array.name, array.values, {
-            **{"unit_string" if k == "unit" else k: v for k, v in array.attributes.items()}, **timed
+        ChannelObject("test", name, values, {
+            **{"unit_string" if k == "unit" else k: v for k, v in layout.facts[name].items()},
+            **timed,
         })
-        for array in layout.arrays
+        for name, values in layout.arrays.items()
     ]  # fmt: skip
     with path.open("wb") as stream, TdmsWriter(stream) as writer:
         writer.write_segment([RootObject(layout.attributes), GroupObject("test"), *channels])
@@ -197,13 +219,13 @@ def _of_layout(
     write_layout: Callable[[Layout, Path], None],
 ) -> Callable[[Recording | FrequencyResponse, Path], None]:
     """Return a writer that is given the named arrays of what it writes."""
-    return lambda described, path: write_layout(layout_of(described), path)
+    return lambda described, path: write_layout(Layout.of(described), path)
 
 
 _WRITERS: dict[str, Callable[[Recording | FrequencyResponse, Path], None]] = {
     ".h5": _of_layout(_hdf5),
     ".hdf5": _of_layout(_hdf5),
-    ".mat": _of_layout(_matlab),
+    ".mat": _matlab,
     ".tdms": _of_layout(_tdms),
     ".xlsx": _excel,
     ".wav": _wave,

@@ -9,7 +9,7 @@ import pytest
 
 from shm.errors import NotIdentifiable
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.identify.measuring.ambient import LEAST_PARTS, MOST_PARTS, ambient_measurement
+from shm.identify.measuring.ambient import ambient_measurement
 from shm.values import Recording
 from tests.identify.signals import Planted, Sensor, as_recording, response
 
@@ -52,18 +52,6 @@ def identified() -> Identification:
     return identify([RECORD], OPTIONS, test_id="wind")
 
 
-def test_the_modes_are_found_without_a_hammer(identified: Identification) -> None:
-    found = sorted(identified.test.modes, key=lambda mode: mode.frequency_hz)
-    assert len(found) == 4
-    for mode, planted in zip(found, MODES, strict=True):
-        assert mode.frequency_hz == pytest.approx(planted.frequency_hz, rel=2e-3)
-        assert abs(mode.frequency_hz - planted.frequency_hz) < 4 * mode.frequency_sd_hz
-        assert abs(mode.damping_ratio - planted.damping_ratio) < 4 * mode.damping_sd
-    assert [mode.plane for mode in found] == [
-        "transverse", "longitudinal", "transverse", "longitudinal",
-    ]  # fmt: skip
-
-
 def test_what_needs_a_hit_is_unknown(identified: Identification) -> None:
     assert identified.frequency_response is None
     assert identified.fit is None
@@ -72,33 +60,12 @@ def test_what_needs_a_hit_is_unknown(identified: Identification) -> None:
     assert all(np.isnan(mode.acceleration_m_s2) for mode in identified.test.modes)
 
 
-def test_the_record_is_cut_into_equal_parts() -> None:
-    measurement = ambient_measurement([RECORD], OPTIONS)
-    lengths = {part.shape[1] for part in measurement.decays}
-    assert len(measurement.decays) == MOST_PARTS
-    assert max(lengths) - min(lengths) <= 1
-    assert measurement.frequency_response is None
-
-
-def test_gaps_are_cut_out() -> None:
-    gap = slice(20_000, 20_400)
-    measurement = ambient_measurement([_with(RECORD, 1, gap.start, gap.stop, np.nan)], OPTIONS)
-    assert LEAST_PARTS <= len(measurement.decays) <= MOST_PARTS
-    assert all(np.isfinite(part).all() for part in measurement.decays)
-
-
 def test_a_dead_or_mostly_unknown_channel_is_dropped() -> None:
     for value, reason in ((0.3, "never changes"), (np.nan, "not-a-number")):
         record = _with(RECORD, 2, 0, RECORD.samples, value)
         measurement = ambient_measurement([record], OPTIONS)
         assert [point.name for point in measurement.points] == ["acc_1", "acc_2"]
         assert reason in measurement.dropped[0].reason
-
-
-def test_no_channel_left_is_not_identifiable() -> None:
-    record = replace(RECORD, channels=RECORD.channels[:1])
-    with pytest.raises(NotIdentifiable, match="no acceleration channel"):
-        ambient_measurement([_with(record, 0, 0, record.samples, 0.0)], OPTIONS)
 
 
 def test_a_short_record_is_not_identifiable_and_says_how_long_it_must_be() -> None:

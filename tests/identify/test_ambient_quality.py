@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.identify.contract import Dropped, Finding, FoundMode, Poles
-from shm.identify.estimation.ssi import merge_findings
-from shm.identify.measuring.ambient import LEAST_PARTS, LOUDER, ambient_measurement, set_apart
+from shm.identify.contract import Finding, FoundMode, Poles
+from shm.identify.measuring.ambient import ambient_measurement
 from shm.identify.quality import Inspection
 from shm.identify.quality.of_ambient import ROWS
 from shm.values import Hanger, QualityCheck, Recording
@@ -66,20 +64,6 @@ def test_a_truck_is_set_apart_and_told() -> None:
     assert len(result.test.modes) == 4
 
 
-def test_loud_parts_stay_where_too_few_would_be_left() -> None:
-    rng = np.random.default_rng(0)
-    quiet = [rng.standard_normal((2, 500)) for _ in range(LEAST_PARTS)]
-    loud = [3 * LOUDER * rng.standard_normal((2, 500)) for _ in range(2)]
-    assert set_apart([*quiet, *loud])[1] == 2
-    assert set_apart([*quiet[1:], *loud])[1] == 0
-
-
-def test_no_part_outweighs_the_rest() -> None:
-    """Differences from sample to sample have the same mean square in all."""
-    for part in ambient_measurement([_with_truck(RECORD)], OPTIONS).decays:
-        assert np.mean(np.diff(part, axis=1) ** 2) == pytest.approx(1.0)
-
-
 def test_wide_modes_are_kept_with_their_deviations() -> None:
     """Of 2 % damping and six minutes: sqrt(z / (w T)) is 0.0013 at 5 Hz, and SSI has more."""
     options = IdentifyOptions(2.0, 40.0)
@@ -89,13 +73,6 @@ def test_wide_modes_are_kept_with_their_deviations() -> None:
         mode = modes[round(planted.frequency_hz)]
         assert abs(mode.frequency_hz - planted.frequency_hz) < 4 * mode.frequency_sd_hz
     assert modes[5].frequency_sd_hz / modes[5].frequency_hz > 0.001
-
-
-def test_what_a_record_gives_at_best_follows_its_length() -> None:
-    short, long = (replace(IdentifyOptions(), ambient_s=seconds) for seconds in (100.0, 400.0))
-    assert short.at_best(5.0, 0.02)[0] == pytest.approx(np.sqrt(0.02 / (2 * np.pi * 500)))
-    assert long.at_best(5.0, 0.02)[0] == pytest.approx(short.at_best(5.0, 0.02)[0] / 2)
-    assert IdentifyOptions().at_best(5.0, 0.02) == (0.0, 0.0)
 
 
 def _inspection(known_hz: tuple[float, ...]) -> Inspection:
@@ -119,19 +96,3 @@ def test_modes_where_the_spectrum_has_no_peak_are_warned_of() -> None:
     check = _HEIGHT.check(_inspection((17.0, 30.0)))
     assert check is not None
     assert check.verdict == "warning"
-
-
-def test_after_hits_these_checks_do_not_arise() -> None:
-    inspection = replace(_inspection((6.0,)), records=())
-    assert [row.check(inspection) for row in ROWS] == [None, None, None]
-
-
-def test_a_finding_is_completed_by_what_it_lacks() -> None:
-    one = _inspection((6.0, 13.5)).finding
-    other = _inspection((13.51, 23.0)).finding
-    assert one is not None
-    assert other is not None
-    lost = Dropped("mode at 23 Hz", 1, "its frequency changes from hit to hit", 23.01)
-    whole = merge_findings(replace(one, dropped=(lost,)), other)
-    assert [mode.frequency_hz for mode in whole.modes] == [6.0, 13.5, 23.0]
-    assert whole.dropped == ()

@@ -40,11 +40,6 @@ def test_a_bar_numbers_high_orders_that_the_grid_leaves_open() -> None:
     assert rough.least_margin < LEAST_MARGIN
 
 
-def test_it_does_so_in_one_plane() -> None:
-    orders = (tuple(range(6, 16)), ())
-    assert number_modes(_planes(orders), LONG).orders == orders
-
-
 def test_orders_that_no_frequency_tells_stay_open() -> None:
     planes = _planes((tuple(range(20, 27)), ()))
     assert number_modes(planes, LONG).least_margin < LEAST_MARGIN

@@ -11,7 +11,7 @@ import pytest
 from shm.documents import dump
 from shm.identify.contract import Measurement
 from shm.identify.identification import Identification
-from shm.identify.setup_merging.calm_part import late_part_level, late_parts, linear_below_level
+from shm.identify.setup_merging.calm_part import linear_below_level
 from shm.modes_document import modes_document, parse_modes
 from shm.values import Mode, ResponsePoint
 from tests.helpers.struck import identified
@@ -45,16 +45,6 @@ def test_its_test_says_above_which_level_it_knocks_and_why_a_part_was_left_out(
     assert (
         parse_modes(json.loads(dump(modes_document([test]))))[0].rattles_above == test.rattles_above
     )
-
-
-def test_later_parts_keep_what_rings_and_know_what_is_left() -> None:
-    time_s = np.arange(1000) / 100
-    decay = np.exp(-0.3 * time_s) * np.sin(20 * time_s)[None]
-    one = Measurement("a", (ResponsePoint("a"),), (decay, decay), 100.0, None, driven=(decay,))
-    (later,) = late_parts([one], 0.5)
-    assert np.array_equal(later.decays[0], decay[:, 500:])
-    assert later.driven == ()
-    assert late_part_level([one], 0.5) == pytest.approx(np.exp(-0.3 * 5), rel=0.1)
 
 
 def test_a_sound_test_says_nothing_of_it() -> None:

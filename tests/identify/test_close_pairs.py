@@ -84,25 +84,8 @@ def test_modes_mixed_by_noise_are_both_found_with_their_own_shapes() -> None:
         assert mode.damping_ratio == pytest.approx(0.001, rel=0.2)
 
 
-def test_modes_that_noise_does_not_mix_stay_as_they_are() -> None:
-    models = _models(mixing=1e-5)
-    candidates, repeats = _before(models)
-    after, _ = split_close_pairs(candidates, repeats, (models[0], models[1:]), SECONDS, _is_trusted)
-    assert after == candidates
-
-
 def test_poles_of_one_shape_are_not_made_into_two_modes() -> None:
     models = _models(mixing=0.05, alike=True)
     candidates, repeats = _before(models)
     after, _ = split_close_pairs(candidates, repeats, (models[0], models[1:]), SECONDS, _is_trusted)
-    assert after == candidates
-
-
-def test_two_hits_prove_no_pair() -> None:
-    models = _models(mixing=0.05)
-    candidates = _candidates(models[0])
-    repeats = find_again(candidates, models[1:3])
-    after, _ = split_close_pairs(
-        candidates, repeats, (models[0], models[1:3]), SECONDS, _is_trusted
-    )
     assert after == candidates

@@ -1,13 +1,11 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from shm.identify.measuring.frf import HitRecord
 from shm.identify.measuring.hits import find_pulses
-from shm.identify.measuring.setups import LEAD_SECONDS, Cut, cut
+from shm.identify.measuring.setups import LEAD_SECONDS, cut
 from tests.identify.signals import Planted, Sensor, recording
 
 RATE_HZ = 1024.0
@@ -35,12 +33,6 @@ def test_the_force_keeps_its_impulse_and_its_place(hit: HitRecord) -> None:
     assert np.argmax(found.driven[0]) / 128.0 == pytest.approx(lead, abs=1 / 128.0)
 
 
-def test_the_free_part_holds_nothing_of_the_pulse() -> None:
-    found = cut(_hits()[0], RATE_HZ, 50.0)
-    assert np.max(np.abs(found.driven[0, found.free :])) < 0.01 * found.driven[0].max()
-    np.testing.assert_array_equal(found.decay, found.driven[1:, found.free :])
-
-
 def test_free_motion_is_the_same_exponential_as_before_the_filter() -> None:
     """A step of k samples multiplies the analytic signal of one mode by exp(s k / rate)."""
     decay = cut(_hits()[0], RATE_HZ, 50.0).decay[0]
@@ -61,19 +53,3 @@ def test_all_hits_have_the_same_lead_even_where_the_record_begins_with_the_hit()
         peak_of(early[0]),
         peak_of(early[0]) + 1,
     }
-
-
-def test_unknown_samples_before_the_hit_do_not_reach_it() -> None:
-    hit = _hits()[0]
-    signals = hit.accelerations.copy()
-    signals[0, hit.pulse.start - 100 : hit.pulse.start - 60] = np.nan
-    found: Cut = cut(replace(hit, accelerations=signals), RATE_HZ, 50.0)
-    assert np.all(np.isfinite(found.driven))
-    np.testing.assert_allclose(found.decay, cut(hit, RATE_HZ, 50.0).decay)
-
-
-def test_a_slow_record_is_not_thinned() -> None:
-    hit = _hits()[0]
-    found = cut(hit, RATE_HZ, 400.0)
-    assert found.sampling_rate_hz == RATE_HZ
-    assert found.driven.shape[1] == hit.pulse.stop - hit.pulse.start + int(LEAD_SECONDS * RATE_HZ)

@@ -43,12 +43,6 @@ def test_delays_are_found_and_taken_off() -> None:
     assert turned == pytest.approx(np.array([each.poles[-1].shape for each in real]))
 
 
-def test_noise_few_modes_and_one_channel_have_no_delays() -> None:
-    assert delays_s(_candidates(LATE_S, noise=30.0), OPTIONS) is None
-    assert delays_s(_candidates(LATE_S, modes=4), OPTIONS) is None
-    assert delays_s(_candidates(LATE_S[:1]), OPTIONS) is None
-
-
 def test_modes_of_late_channels_are_not_dropped_and_keep_their_shapes() -> None:
     """Three of the eight would have shapes that are not real."""
     rate_hz, slot_s, hits = 256.0, 5.0, 3

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.identify.contract import Hit
-from shm.identify.estimation.drift import common_drift, hit_shares
+from shm.identify.estimation.drift import common_drift
 from shm.values import Channel, QualityCheck, Recording
 
 RATE_HZ, SLOT_S, HITS = 512.0, 6.0, 4
@@ -96,11 +95,3 @@ def test_modes_that_differ_leave_their_mean_unsure() -> None:
     assert not apart.sure
     assert apart.sd == pytest.approx(1e-3 / np.sqrt(3), rel=0.01)
     assert common_drift([1e-3, 1e-3], [1e-5, 1e-5]) is None
-
-
-def test_hits_are_placed_by_their_moments_or_over_several_records_by_their_number() -> None:
-    hits = [Hit(0, 0, at_s, 1.0) for at_s in (1.0, 2.0, 5.0)]
-    assert hit_shares(hits) == pytest.approx([-0.5, -0.25, 0.5])
-    apart = [Hit(record, 0, 1.0, 1.0) for record in range(3)]
-    assert hit_shares(apart) == pytest.approx([-0.5, 0.0, 0.5])
-    assert not np.any(hit_shares(hits[:1]))

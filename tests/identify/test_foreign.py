@@ -96,8 +96,7 @@ def test_of_a_string_mode_and_a_harmonic_beside_it_the_harmonic_goes() -> None:
     assert orders_of(placement) == COUNTED
 
 
-@pytest.mark.parametrize("frequency_hz", [3.1, 8.0, 13.9])
-@pytest.mark.parametrize("angle_deg", [0.0, 45.0, 80.0])
+@pytest.mark.parametrize(("frequency_hz", "angle_deg"), [(3.1, 0.0), (8.0, 45.0), (13.9, 80.0)])
 def test_a_swing_about_the_arch_end_is_the_deck(frequency_hz: float, angle_deg: float) -> None:
     swing = found_at(frequency_hz, 1 - PLACES / HANGER.length_m, angle_deg, damping=0.01)
     placement = with_foreign(swing)

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from shm.identify.measuring.frf import (
     HitRecord,
     Window,
     averaged_response,
-    common_window,
 )
 from shm.identify.measuring.hits import find_pulses
 from shm.values import FrequencyResponse, Recording, ResponsePoint
@@ -60,14 +58,6 @@ def test_h1_is_the_accelerance_of_the_planted_modes() -> None:
     assert np.max(error) < 0.02 * np.max(np.abs(expected))
 
 
-def test_lines_begin_at_zero_are_even_and_pass_the_band_a_little() -> None:
-    frequency = _average(_record()).frequency_hz
-    assert frequency[0] == 0
-    np.testing.assert_allclose(np.diff(frequency), frequency[1])
-    assert 70 < frequency[-1] <= 75
-    assert frequency[1] == pytest.approx(1 / 8, rel=0.05)
-
-
 def test_coherence_is_one_without_noise_and_falls_with_it() -> None:
     clean, noisy = _average(_record()), _average(_record(noise=150.0))
     assert clean.coherence is not None
@@ -76,33 +66,12 @@ def test_coherence_is_one_without_noise_and_falls_with_it() -> None:
     assert np.median(noisy.coherence[0, 40:300]) < 0.9
 
 
-def test_a_single_hit_has_no_coherence() -> None:
-    assert _average(_record(hits=1)).coherence is None
-
-
-def test_a_ring_down_that_has_died_away_gets_no_exponential_window() -> None:
-    assert _average(_record()).window_time_constant_s == math.inf
-
-
 def test_a_long_ring_down_is_brought_to_a_hundredth_by_its_window() -> None:
     slow = (Planted(12.0, 0.001, (1.0,)),)
     average = _average(_record(slow, hits=1))
     own = math.exp(-0.001 * 2 * math.pi * 12.0 * 7.0)
     window = math.exp(-7.7 / average.window_time_constant_s)
     assert own * window == pytest.approx(END_LEVEL, rel=0.15)
-
-
-def test_common_window_ignores_what_follows_the_ring_down() -> None:
-    """Neither lost samples nor a knock after the end of a ring-down changes its window."""
-    hits = _hits(_record((Planted(12.0, 0.001, (1.0,)),), hits=3, seconds=4.0))[:2]
-    expected = common_window(hits, RATE_HZ, 60.0)
-    assert math.isfinite(expected.time_constant_s)
-    for strange in (np.nan, 1e4):
-        signals = hits[0].accelerations.copy()
-        for hit in hits:
-            signals[:, hit.pulse.stop : hit.pulse.stop + 10] = strange
-        others = [replace(hit, accelerations=signals) for hit in hits]
-        assert common_window(others, RATE_HZ, 60.0) == expected
 
 
 def test_the_window_adds_just_the_damping_that_its_time_constant_says() -> None:
@@ -136,18 +105,3 @@ def test_the_window_shifts_the_accelerance_alike_in_every_estimator(estimator: s
     band = (average.frequency_hz > 5) & (average.frequency_hz < 30)
     error = np.abs(average.accelerance[0] - expected)[band]
     assert np.max(error) < 0.02 * np.max(np.abs(expected))
-
-
-def test_hits_of_different_length_are_cut_to_the_shortest() -> None:
-    record = _record()
-    force = record.force
-    assert force is not None
-    signals = np.array([channel.values for channel in record.accelerations])
-    pulses = find_pulses(force.values, RATE_HZ)
-    spacings = [
-        averaged_response(
-            [HitRecord(force.values, signals, p) for p in some], RATE_HZ, 60.0
-        ).frequency_hz[1]
-        for some in (pulses[:1], pulses[:2], pulses[-1:])
-    ]
-    assert spacings[0] == spacings[1] <= spacings[2]

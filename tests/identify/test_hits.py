@@ -5,7 +5,6 @@ import pytest
 from scipy.signal import firwin, lfilter
 
 from shm.identify.measuring.hits import find_pulses
-from shm.identify.measuring.screening import _carried_on
 from shm.values import FloatArray
 from tests.identify.signals import force_signal, half_sine
 
@@ -109,12 +108,6 @@ def test_a_second_strike_of_the_same_swing_is_seen(share: float, after_s: float)
     assert double_hits == [False, False, True, False]
 
 
-def test_a_second_strike_is_told_as_a_share_of_the_first() -> None:
-    force = force_signal([1000], 8000, 2048.0, [1000.0])
-    (pulse,) = find_pulses(_struck_again(force, 1000, 0.3, 0.05), 2048.0)
-    assert pulse.second_peak == pytest.approx(0.3, rel=0.03)
-
-
 @pytest.mark.parametrize("factor", [4, 8, 16, 32])
 def test_the_ringing_of_an_anti_aliasing_filter_is_not_a_second_strike(factor: int) -> None:
     """Hits sampled at 16384 Hz, filtered sharply and thinned to 4096 ... 512 Hz."""
@@ -125,24 +118,3 @@ def test_the_ringing_of_an_anti_aliasing_filter_is_not_a_second_strike(factor: i
         thin += 0.1 * np.random.default_rng(seed).standard_normal(len(thin))
         pulses = find_pulses(thin, 16_384.0 / factor)
         assert [pulse.second_peak for pulse in pulses] == [0.0, 0.0, 0.0]
-
-
-def test_a_ring_down_ends_before_the_next_hit() -> None:
-    force, starts = _force()
-    pulses = find_pulses(force, 2048.0)
-    assert all(p.stop < after for p, after in zip(pulses, starts[1:], strict=False))
-    assert pulses[-1].stop == len(force)
-
-
-def test_the_pulse_ends_where_the_force_is_quiet_again() -> None:
-    force, starts = _force()
-    for pulse, start in zip(find_pulses(force, 2048.0), starts, strict=True):
-        assert 5 <= pulse.end - start <= 9
-
-
-def test_lost_samples_before_a_hit_come_to_nothing_known_without_a_warning() -> None:
-    earlier = np.full((2, 5), 1 + 1j)
-    earlier[1] = complex(np.nan, np.nan)
-    ahead = _carried_on(earlier, 0.5 * earlier)
-    np.testing.assert_allclose(ahead[0], 0.25 * earlier[0])
-    assert np.isnan(ahead[1]).all()

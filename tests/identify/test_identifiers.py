@@ -15,7 +15,7 @@ from shm.identify.contract import FREQUENCY_FLOOR, Finding, Measurement
 from shm.identify.identification import identifier
 from shm.identify.measuring.setups import measure_recordings
 from shm.values import FloatArray, Recording
-from tests.identify.signals import Planted, Sensor, hanger_modes, recording
+from tests.identify.signals import Planted, hanger_modes, recording
 
 OPTIONS = IdentifyOptions(2.0, 50.0)
 identify = IDENTIFIERS["ssi"]
@@ -111,23 +111,6 @@ def test_silence_holds_no_mode() -> None:
     assert len(finding.poles.order) == 0
 
 
-def test_two_channels_that_say_the_same_do_no_harm() -> None:
-    planted = [Planted(f, 0.003, (1.0, 1.0)) for f in (6.0, 13.5, 23.0)]
-    for noise in (0.0, 0.02):
-        record = recording(planted, (Sensor(), Sensor()), noise=noise, hits=3, seconds=5.0)
-        same = _sensing(record, [record.accelerations[0].values] * 2)
-        finding = identify(measure_recordings([same], OPTIONS)[0], OPTIONS)
-        assert _frequencies(finding) == pytest.approx([6.0, 13.5, 23.0], rel=5e-4)
-
-
-def test_modes_out_of_the_band_are_left_out() -> None:
-    narrow = IdentifyOptions(10.0, 30.0)
-    record = recording(hanger_modes(), noise=0.01)
-    found = _frequencies(identify(measure_recordings([record], narrow)[0], narrow))
-    assert len(found) == 4
-    assert all(10 < frequency < 30 for frequency in found)
-
-
 def test_standard_deviations_follow_the_noise() -> None:
     quiet, loud = (
         identify(_measured(hanger_modes(), noise=noise, seed=3), OPTIONS).modes
@@ -176,45 +159,6 @@ def test_what_differs_between_tests_is_added_to_each_frequency() -> None:
     for one, other in zip(alone, allowed, strict=True):
         expected = np.hypot(one.frequency_sd_hz, 0.0003 * one.frequency_hz)
         assert other.frequency_sd_hz == pytest.approx(expected, rel=1e-9)
-
-
-def test_a_single_sensor_axis_is_enough_for_modes_apart() -> None:
-    planted = [Planted(f, 0.003, (1.0,)) for f in (6.0, 13.5, 23.0)]
-    finding = identify(_measured(planted, sensors=(Sensor(),), noise=0.02, hits=3), OPTIONS)
-    assert _frequencies(finding) == pytest.approx([6.0, 13.5, 23.0], rel=5e-4)
-
-
-def test_many_channels_are_no_harder_than_few() -> None:
-    places = np.linspace(0.5, 4.0, 12)
-    planted = [
-        Planted(f, 0.003, tuple(np.sin(n * np.pi * places / 9)))
-        for n, f in enumerate((5.0, 10.6, 17.0, 24.5, 33.0), 1)
-    ]
-    sensors = tuple(Sensor("transverse", float(x)) for x in places)
-    finding = identify(_measured(planted, sensors=sensors, noise=0.02, hits=3), OPTIONS)
-    assert _frequencies(finding) == pytest.approx([5.0, 10.6, 17.0, 24.5, 33.0], rel=5e-4)
-
-
-def test_the_diagram_marks_the_poles_of_the_modes_as_stable() -> None:
-    finding = _found()
-    poles = finding.poles
-    assert len(poles.order) == len(poles.frequency_hz) == len(poles.damping_ratio)
-    for frequency in _frequencies(finding):
-        near = np.abs(poles.frequency_hz / frequency - 1) < 1e-3
-        assert poles.stable[near].sum() > 5
-
-
-def test_the_same_measurement_gives_the_same_modes() -> None:
-    again = identify(_measured(hanger_modes(), noise=0.02, hits=3), OPTIONS)
-    assert _frequencies(again) == _frequencies(_found())
-
-
-def test_the_size_of_the_model_may_be_stated() -> None:
-    measurement = _measured(hanger_modes(), noise=0.02)
-    stated = replace(OPTIONS, block_rows=60, max_order=40)
-    finding = identify(measurement, stated)
-    assert len(finding.modes) == 8
-    assert finding.poles.order.max() <= 40
 
 
 def test_an_unknown_identifier_is_a_usage_error_that_names_the_known() -> None:

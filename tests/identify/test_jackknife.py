@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from shm.identify.contract import FREQUENCY_FLOOR
-from shm.identify.estimation.spread import frequency_sd, jackknife_sd, smooth_sds
+from shm.identify.estimation.spread import jackknife_sd, smooth_sds
 
 
 def _without_each(values: np.ndarray) -> np.ndarray:
@@ -29,23 +28,6 @@ def test_ninety_per_cent_intervals_cover_ninety_per_cent(hits: int) -> None:
         values = rng.normal(size=hits)
         inside += abs(values.mean()) < 1.645 * float(jackknife_sd(_without_each(values)))
     assert inside / 2000 == pytest.approx(0.9, abs=0.025)
-
-
-def test_below_three_hits_it_is_unknown_not_zero() -> None:
-    assert np.isnan(jackknife_sd(np.array([1.0, 1.1])))
-    assert np.isnan(jackknife_sd(np.empty((0, 3)))).all()
-
-
-def test_below_three_hits_a_frequency_gets_the_stated_floor() -> None:
-    assert frequency_sd(50.0, np.array([50.0, 50.1])) == pytest.approx(50.0 * FREQUENCY_FLOOR)
-    assert frequency_sd(50.0, np.array([50.0, 50.0, 50.0])) == 0.0
-
-
-def test_it_works_column_by_column() -> None:
-    estimates = np.random.default_rng(2).normal(size=(6, 4))
-    np.testing.assert_allclose(
-        jackknife_sd(estimates), [jackknife_sd(column) for column in estimates.T]
-    )
 
 
 def test_a_deviation_that_is_small_by_chance_is_held_up_by_its_neighbours() -> None:

@@ -42,7 +42,7 @@ def _truth(found: list[FoundMode]) -> dict[FoundMode, int]:
     return orders
 
 
-@pytest.mark.parametrize("factor", [0.4, 0.7, 1.3, 1.8])
+@pytest.mark.parametrize("factor", [0.4, 1.8])
 def test_a_nominal_tension_far_off_does_not_shift_the_orders(factor: float) -> None:
     hanger = replace(HANGER, nominal_tension_n=HANGER.nominal_tension_n / factor)
     kept = hanger_modes()[4:]
@@ -95,11 +95,6 @@ def test_what_is_no_hanger_is_counted_and_a_note_says_so() -> None:
     placement = place_modes(found, POINTS, None)
     assert [mode.order for mode in placement.modes] == [1, 2, 3, 4, 5]
     assert any("counted" in note for note in placement.notes)
-
-
-def test_nothing_found_is_nothing_placed() -> None:
-    placement = place_modes([], POINTS, HANGER)
-    assert (placement.modes, placement.foreign_modes) == ((), ())
 
 
 def _turned(mode: FoundMode, degrees: float) -> FoundMode:

@@ -21,37 +21,10 @@ def _mode(frequency_hz: float, *shape: float) -> FoundMode:
     return FoundMode(frequency_hz, 0.01, 0.002, 0.0001, values, 0.01 * np.abs(values))
 
 
-def test_a_mode_lies_in_the_plane_with_more_energy() -> None:
-    modes = [_mode(5.0, 1.0, 0.1), _mode(5.3, -0.2, 1.0), _mode(9.0, 0.9, -1.0)]
-    assert planes_of(modes, points(BIAXIAL)) == ["transverse", "longitudinal", "longitudinal"]
-
-
 def test_three_sensors_one_way_do_not_outvote_one_the_other_way() -> None:
     sensors = (*(Sensor("transverse", x) for x in (1.0, 2.0, 3.0)), Sensor("longitudinal", 2.0))
     mode = _mode(5.0, 0.65, 0.65, 0.65, 1.0)
     assert planes_of([mode], points(sensors)) == ["longitudinal"]
-
-
-def test_without_a_stated_plane_all_is_transverse() -> None:
-    modes = [_mode(5.0, 1.0, 0.1), _mode(5.3, -0.2, 1.0)]
-    assert planes_of(modes, points((Sensor(None), Sensor(None)))) == ["transverse", "transverse"]
-
-
-def test_sensors_of_one_plane_give_that_plane() -> None:
-    assert planes_of([_mode(5.0, 1.0)], points([Sensor("longitudinal")])) == ["longitudinal"]
-
-
-def test_two_close_modes_on_skewed_axes_are_put_in_the_two_planes() -> None:
-    """Axes at 45 degrees: both modes have as much energy in either plane but for noise."""
-    pair = [_mode(10.0, 1.0, 0.98), _mode(10.05, 1.0, -0.93)]
-    assert planes_of(pair, points(BIAXIAL)) == ["longitudinal", "transverse"] or planes_of(
-        pair, points(BIAXIAL)
-    ) == ["transverse", "longitudinal"]
-
-
-def test_of_two_close_modes_the_one_that_leans_over_is_moved() -> None:
-    pair = [_mode(10.0, 1.0, 0.1), _mode(10.05, 1.0, 0.9)]
-    assert planes_of(pair, points(BIAXIAL)) == ["transverse", "longitudinal"]
 
 
 def test_a_mode_is_not_moved_where_the_other_plane_is_taken_or_the_shape_says_no() -> None:
@@ -61,23 +34,12 @@ def test_a_mode_is_not_moved_where_the_other_plane_is_taken_or_the_shape_says_no
     assert planes_of(plain, points(BIAXIAL)) == ["transverse", "transverse"]
 
 
-def test_modes_far_apart_may_share_a_plane() -> None:
-    pair = [_mode(10.0, 1.0, 0.1), _mode(20.0, 1.0, 0.9)]
-    assert planes_of(pair, points(BIAXIAL)) == ["transverse", "transverse"]
-
-
 def test_a_shape_holds_its_plane_and_beside_it_the_other() -> None:
     shape = shape_points(_mode(5.0, 0.4, 0.02, -0.8, 0.04), "transverse", points(TWO_PLACES))
     assert [point.x_m for point in shape] == [1.0, 2.5]
     assert [point.value for point in shape] == pytest.approx([-0.5, 1.0])
     assert [point.cross for point in shape] == pytest.approx([-0.025, -0.05])
     assert [point.sd for point in shape] == pytest.approx([0.005, 0.01])
-
-
-def test_a_single_axis_sensor_leaves_the_other_plane_unknown() -> None:
-    (point,) = shape_points(_mode(5.0, 1.0), "transverse", points([Sensor("transverse", 3.0)]))
-    assert (point.x_m, point.value) == (3.0, 1.0)
-    assert np.isnan(point.cross)
 
 
 def test_a_sensor_without_position_has_no_place_in_the_shape() -> None:

@@ -75,10 +75,6 @@ def test_one_sensor_in_another_unit_is_named(factor: float) -> None:
         assert name in [doubt.channel for doubt in found]
 
 
-def test_g_for_m_s2_passes_as_no_tension_depends_on_it() -> None:
-    assert signal_doubts([times(1 / 9.81, *ACCELERATIONS)], ROD) == ()
-
-
 @pytest.mark.parametrize("name", ACCELERATIONS)
 def test_an_accelerometer_in_the_hammers_place_is_doubted_and_the_hammer_named(name: str) -> None:
     values = {channel.name: channel.values for channel in SOUND.channels}

@@ -22,10 +22,6 @@ def _pooled(values: list[float], sds: list[float]) -> FloatArray:
     return np.array(pool_estimates(np.array(values), np.array(sds)))
 
 
-def test_a_single_set_up_stays_as_it_is() -> None:
-    assert pool_estimates(np.array([6.1]), np.array([0.002])) == (6.1, 0.002)
-
-
 def test_set_ups_that_agree_are_averaged_by_their_precision() -> None:
     mean, sd = _pooled([1.0, 1.0, 1.0], [0.1, 0.1, 0.2])
     assert mean == pytest.approx(1.0)

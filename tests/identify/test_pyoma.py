@@ -69,11 +69,6 @@ def test_its_own_identification_finds_modes_apart() -> None:
     assert found.poles.stable.any()
 
 
-def test_silence_holds_no_mode() -> None:
-    silent = replace(_measurement(), decays=(np.zeros((3, 500)),))
-    assert IDENTIFIERS["pyoma2"](silent, OPTIONS).modes == ()
-
-
 def test_nothing_of_it_gets_through_the_door(capfd: pytest.CaptureFixture[str]) -> None:
     state, handlers = np.geterr(), list(logging.getLogger("pyoma2").handlers)
     level = logging.getLogger("matplotlib").level
@@ -98,13 +93,6 @@ def test_a_process_that_begins_with_identify_keeps_its_state_and_its_log() -> No
         [sys.executable, "-c", code], capture_output=True, text=True, check=False
     )
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
-
-
-@pytest.mark.parametrize("code", ALONE.values(), ids=ALONE.keys())
-def test_it_is_not_imported_before_it_is_needed(code: str) -> None:
-    asked = f"{code}\nimport sys; sys.exit('pyoma2' in sys.modules)"
-    ended = subprocess.run([sys.executable, "-c", asked], capture_output=True, check=False)
-    assert ended.returncode == 0
 
 
 @pytest.mark.parametrize(

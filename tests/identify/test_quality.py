@@ -10,7 +10,6 @@ import pytest
 
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, FoundMode, Measurement, Poles
-from shm.identify.measuring.prediction import prediction_rule, surprise
 from shm.identify.measuring.setups import measure_recordings
 from shm.identify.measuring.signal_faults import KNOCK
 from shm.identify.quality import CHECKS, Inspection, assess, refusal, tones
@@ -139,41 +138,12 @@ def test_two_hits_of_one_peak_force_to_the_last_bit_are_clipped() -> None:
     assert check_of("clipping").verdict == "good"
 
 
-def test_a_known_full_scale_tells_a_clipped_signal_by_one_sample() -> None:
-    top = float(np.abs(SOUND.channels[1].values).max())
-    channels = [replace(c, full_scale=top) if c.name == "acc_1" else c for c in SOUND.channels]
-    assert check_of("clipping", replace(SOUND, channels=tuple(channels))).verdict == "warning"
-
-
 def test_a_loose_cable_is_told() -> None:
     def crackle(values: FloatArray) -> None:
         values[SLOT + 3000 : SLOT + 3050] += 20 * np.random.default_rng(0).standard_normal(50)
 
     found = check_of("cable", changed("acc_2", crackle))
     assert (found.verdict, found.value) == ("warning", 1.0)
-
-
-def test_a_jump_that_comes_back_slowly_is_a_surprise() -> None:
-    """It disturbs most of the blocks around it: those before it tell what is usual."""
-    rng, step = np.random.default_rng(0), np.arange(4000)
-    rings = np.sum([np.sin(2 * np.pi * f * step + f) for f in (0.05, 0.13, 0.22)], axis=0)
-    parts = np.exp(-0.002 * step) * rings + 0.01 * rng.standard_normal((3, 4000))
-    assert max(surprise(parts)) < 3.0
-    parts[1, 1500:] += np.exp(-np.arange(2500) / 200)
-    assert [value > 10.0 for value in surprise(parts)] == [False, True, False]
-
-
-def test_surprise_without_motion() -> None:
-    """A channel that shows no motion at all, as a coarse recorder's may, has no rule to leave."""
-    np.testing.assert_array_equal(surprise([np.zeros(2000)] * 2), [0.0, 0.0])
-
-
-def test_prediction_rule_lost_samples() -> None:
-    """The rule is that of the samples that are there, whatever is lost between them."""
-    ring = np.sin(0.3 * np.arange(2000)) * np.exp(-0.001 * np.arange(2000))
-    holes = ring.copy()
-    holes[[300, 301, 900]] = np.nan
-    np.testing.assert_allclose(prediction_rule([holes]), prediction_rule([ring]), atol=1e-3)
 
 
 def test_repeatability_force_lost_before_hits() -> None:
@@ -294,11 +264,6 @@ def test_a_weak_tone_between_short_ring_downs_is_told() -> None:
     assert [t.frequency_hz for t in found] == pytest.approx([25.3], abs=0.02)
 
 
-def test_mains_in_the_force_alone_is_told() -> None:
-    record = changed("force", lambda v: np.add(v, tone(5 * SLOT, 40.0, 0.5), out=v))
-    assert check_of("tones", record).value == 1.0
-
-
 @pytest.mark.parametrize("hits", [3, 5])
 def test_without_time_before_the_first_hit_only_what_ignores_the_hits_is_a_tone(hits: int) -> None:
     modes = [Planted(12.0, 1e-4, (1.0, 0.5)), Planted(31.0, 1e-4, (0.5, 1.0))]
@@ -325,11 +290,6 @@ def test_one_hit_of_another_direction_is_told_and_left_out() -> None:
     assert found.verdict == "warning"
     assert "16.5 s" in found.found
     assert check_of("repeatability").value < 0.01
-
-
-def test_fewer_than_three_hits_are_a_warning() -> None:
-    found = check_of("hits", recording(hanger_modes(), hits=2, noise=0.02, lead_s=0.5))
-    assert (found.verdict, found.value, found.limit) == ("warning", 2, 3)
 
 
 def test_sensors_that_feel_nothing_of_the_hits_are_refused() -> None:
@@ -379,12 +339,6 @@ def test_measured_responses_are_judged_by_their_coherence(coherence: float, verd
     assert found.value == pytest.approx(coherence)
 
 
-def test_responses_without_coherence_say_so() -> None:
-    (found,) = assess(_responses(None))
-    assert found.verdict == "unknown"
-    assert np.isnan(found.value)
-
-
 def _finding(*frequencies_hz: float) -> Finding:
     nothing = np.empty(0)
     modes = tuple(FoundMode(f, 0.0, 0.001, 0.0, np.ones(2), np.zeros(2)) for f in frequencies_hz)
@@ -402,15 +356,3 @@ def test_two_identifiers_are_compared_mode_by_mode() -> None:
     (found,) = [figure for figure in assess(apart) if figure.name == "cross-check"]
     assert (found.verdict, found.value) == ("warning", pytest.approx(5e-3))
     assert "13.50 Hz" in found.found
-
-
-@pytest.mark.parametrize(("seen", "verdict"), [((6.0, 13.5), "good"), ((6.0,), "warning")])
-def test_a_second_identifier_may_miss_a_mode_but_not_most(
-    seen: tuple[float, ...], verdict: str
-) -> None:
-    both = replace(
-        inspection(SOUND), finding=_finding(6.0, 13.5, 24.0), cross_check=_finding(*seen)
-    )
-    (found,) = [figure for figure in assess(both) if figure.name == "cross-check"]
-    assert found.verdict == verdict
-    assert "24.00 Hz" in found.found

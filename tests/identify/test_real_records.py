@@ -85,7 +85,7 @@ def _free_free_shape(order: int, position: np.ndarray) -> np.ndarray:
     return np.asarray(np.cosh(b) + np.cos(b) - s * (np.sinh(b) + np.sin(b)))
 
 
-@pytest.mark.parametrize("band", [(500.0, 4500.0), (700.0, 4000.0), (200.0, 6000.0)])
+@pytest.mark.parametrize("band", [(500.0, 4500.0), (200.0, 6000.0)])
 def test_five_hits_on_a_structure_give_its_published_frequencies(
     band: tuple[float, float],
 ) -> None:
@@ -107,20 +107,6 @@ def test_the_coherence_of_the_five_hits_is_as_published() -> None:
     for published in (810, 851, 900, 2640, 3008, 3669):
         line = round(published / response.frequency_hz[1])
         assert response.coherence[0, line] > 0.998
-
-
-def test_close_modes_of_the_five_hits_repeat_within_their_standard_deviations() -> None:
-    """Any four of the hits give the frequencies of all five within 0.05 %."""
-    records = _pyfrf_hits()
-    options = IdentifyOptions(700.0, 1100.0)
-    whole = identify(records, options, test_id="p", hanger=STRUCTURE).test.modes
-    part = identify(records[1:], options, test_id="p", hanger=STRUCTURE).test.modes
-    for published in (810, 851, 900):
-        one, other = (
-            min((m.frequency_hz for m in modes), key=lambda f: abs(f - published))
-            for modes in (whole, part)
-        )
-        assert one == pytest.approx(other, rel=5e-4)
 
 
 def test_a_roving_hammer_gives_the_published_frequencies_and_shapes_of_its_beam() -> None:
@@ -158,14 +144,3 @@ def test_one_hit_that_begins_with_its_record_is_used_with_a_warning() -> None:
     assert {"hits", "pre-trigger"} <= {c.name for c in result.quality if c.verdict == "warning"}
     with pytest.raises(NotIdentifiable, match=r"the force explains 3\d% of the response"):
         identify([response], IdentifyOptions(5, 500), test_id="case1")
-
-
-def test_a_single_hit_claims_nothing_about_repeating() -> None:
-    options = IdentifyOptions(500.0, 4500.0)
-    result = identify(_pyfrf_hits()[:1], options, test_id="pyfrf", hanger=STRUCTURE)
-    found = np.array([mode.frequency_hz for mode in result.test.modes])
-    for published in (810, 851, 900, 2640, 3008, 3669):
-        assert np.min(np.abs(found / published - 1)) < 0.002, published
-    assert all(mode.frequency_sd_hz >= 0.001 * mode.frequency_hz for mode in result.test.modes)
-    assert all(np.isnan(mode.damping_sd) for mode in result.test.modes)
-    assert {"hits", "pre-trigger"} <= {c.name for c in result.quality if c.verdict == "warning"}

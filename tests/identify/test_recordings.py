@@ -34,29 +34,6 @@ def _channels(record: Recording, *channels: Channel) -> Recording:
     return replace(record, channels=channels)
 
 
-def test_each_hit_gives_a_ring_down_of_all_channels() -> None:
-    measurement = measure_recordings([RECORD], OPTIONS)[0]
-    assert [hit.used for hit in measurement.hits] == 5 * [True]
-    assert {decay.shape[0] for decay in measurement.decays} == {2}
-    assert len(measurement.decays) == 5
-    assert measurement.sampling_rate_hz == 128.0
-    assert [point.name for point in measurement.points] == ["acc_1", "acc_2"]
-
-
-def test_hits_know_their_record_and_second() -> None:
-    measurement = measure_recordings([RECORD, RECORD], OPTIONS)[0]
-    assert [hit.record for hit in measurement.hits] == 5 * [0] + 5 * [1]
-    assert measurement.hits[6].start_s == pytest.approx(8.3, abs=0.01)
-
-
-def test_no_ring_down_holds_its_hit() -> None:
-    """The free motion of a mode at 13.5 Hz has no step or bump where the pulse was."""
-    measurement = measure_recordings([recording(hanger_modes()[1:2])], OPTIONS)[0]
-    for decay in measurement.decays:
-        begin, later = np.abs(decay[0, :20]).max(), np.abs(decay[0, 20:60]).max()
-        assert begin == pytest.approx(later, rel=0.2)
-
-
 def test_a_not_a_number_sample_of_the_force_drops_its_hit_alone() -> None:
     record = _with(RECORD, "force", first=SLOT + 4000, last=SLOT + 4001, value=np.nan)
     measurement = measure_recordings([record], OPTIONS)[0]
@@ -97,20 +74,6 @@ def test_a_channel_without_plane_among_others_with_is_dropped() -> None:
     assert (dropped.what, "plane" in dropped.reason) == ("channel acc_2", True)
 
 
-def test_a_ring_down_cut_off_is_dropped() -> None:
-    channels = [replace(c, values=c.values[: 4 * SLOT + 1000]) for c in RECORD.channels]
-    measurement = measure_recordings([_channels(RECORD, *channels)], OPTIONS)[0]
-    assert [hit.reason for hit in measurement.hits][-1] == "ring-down cut off"
-
-
-def test_a_constant_offset_changes_nothing() -> None:
-    shifted = [replace(c, values=c.values + 9.81) for c in RECORD.accelerations]
-    one = identify([RECORD], OPTIONS, test_id="a").test.modes
-    other = identify([_channels(RECORD, RECORD.channels[0], *shifted)], OPTIONS, test_id="b")
-    for mode, same in zip(one, other.test.modes, strict=True):
-        assert mode.frequency_hz == pytest.approx(same.frequency_hz, rel=1e-6)
-
-
 def test_no_usable_hit_is_not_identifiable_and_says_why() -> None:
     record = _with(RECORD, "acc_1", first=0, last=5 * SLOT, value=np.nan)
     record = _with(record, "acc_2", first=0, last=5 * SLOT, value=np.nan)
@@ -121,12 +84,6 @@ def test_no_usable_hit_is_not_identifiable_and_says_why() -> None:
         measure_recordings([silent], OPTIONS)[0]
     assert (caught.value.file, caught.value.channel) == ("test.csv", "force")
     assert caught.value.remedy
-
-
-def test_a_record_of_two_samples_is_not_identifiable() -> None:
-    channels = [replace(channel, values=channel.values[:2]) for channel in RECORD.channels]
-    with pytest.raises(NotIdentifiable):
-        identify([_channels(RECORD, *channels)], OPTIONS, test_id="t")
 
 
 def test_a_record_without_force_among_others_or_without_acceleration_is_refused() -> None:

@@ -88,13 +88,6 @@ def test_the_damping_of_an_exponential_window_is_taken_off() -> None:
         )
 
 
-def test_unknown_lines_outside_of_the_band_do_no_harm() -> None:
-    broken = [_response(index) for index in range(3)]
-    for response in broken:
-        response.accelerance[:, 0] = np.nan
-    assert len(_identified(broken).test.modes) == 3
-
-
 def test_a_point_with_unknown_lines_in_the_band_is_dropped_and_said_so() -> None:
     responses = [_response(index) for index in range(3)]
     responses[1].accelerance[0, 2000] = np.nan
@@ -114,18 +107,3 @@ def test_responses_of_different_lines_are_refused() -> None:
     with pytest.raises(BadInput, match="lines differ") as caught:
         _identified([_response(0), other])
     assert caught.value.file == "point1.frf"
-
-
-def test_no_point_left_is_not_identifiable() -> None:
-    broken = _response(0)
-    broken.accelerance[:] = np.nan
-    with pytest.raises(NotIdentifiable, match="no frequency response"):
-        _identified([broken])
-
-
-def test_too_few_lines_are_not_identifiable() -> None:
-    short = replace(
-        _response(0), frequency_hz=np.arange(9) * 60.0, accelerance=np.ones((1, 9), complex)
-    )
-    with pytest.raises(NotIdentifiable):
-        _identified([short])

@@ -129,22 +129,6 @@ def test_all_points_have_a_measured_response_and_what_the_modes_make_of_it(
         assert np.linalg.norm(left) < 0.1 * np.linalg.norm(response.accelerance[:, band])
 
 
-def test_hits_of_all_records_are_told_in_their_order(roving_sensor: Identification) -> None:
-    assert [hit.record for hit in roving_sensor.hits] == [r for r in range(4) for _ in range(3)]
-
-
-def test_the_test_has_the_mean_temperature_and_the_earliest_time(
-    roving_sensor: Identification,
-) -> None:
-    assert roving_sensor.test.temperature_c == pytest.approx(11.5)
-    assert roving_sensor.test.time == datetime(2026, 5, 1, 9, tzinfo=UTC)
-
-
-def test_each_mode_knows_how_hard_it_rang(roving_sensor: Identification) -> None:
-    levels = [mode.acceleration_m_s2 for mode in roving_sensor.test.modes]
-    assert all(0.1 < level < 20 for level in levels)
-
-
 def _one_plane_at_a_time(hits: int) -> list[Recording]:
     """Return a biaxial sensor; the first record is hit transversely, the second longitudinally."""
     records: list[Recording] = []

@@ -57,15 +57,6 @@ def _joined(one: Finding, other: Finding, options: IdentifyOptions = OPTIONS) ->
     return join_set_ups([ONE, OTHER], [one, other], options)
 
 
-def test_modes_of_one_frequency_are_one_mode() -> None:
-    groups = _groups(
-        [ONE, OTHER],
-        [_mode(6.0, (1, 1)), _mode(9.0, (1, -1))],
-        [_mode(6.001, (1, 0.2)), _mode(9.002, (1, 0.5))],
-    )
-    assert groups == [[(0, 6.0), (1, 6.001)], [(0, 9.0), (1, 9.002)]]
-
-
 def test_modes_further_apart_than_set_ups_differ_are_two() -> None:
     far = 6.0 * (1 + 1.5 * LARGEST_SHIFT)
     assert _groups([ONE, OTHER], [_mode(6.0, (1, 1))], [_mode(far, (1, 1))]) == [
@@ -129,22 +120,3 @@ def test_without_a_force_a_mode_that_one_set_up_misses_is_dropped_and_said_so() 
     assert len(result.finding.modes) == 1
     assert result.finding.dropped[-1].what == "mode at 9 Hz"
     assert "not seen in all set-ups" in result.finding.dropped[-1].reason
-
-
-def test_counts_of_what_was_dropped_are_added_and_all_poles_shown() -> None:
-    result = _joined(_finding(_mode(6.0, (1, 1))), _finding(_mode(6.0, (1, 1)), poles=3))
-    assert result.finding.dropped == (Dropped("poles", 20, "outside of the band"),)
-    assert len(result.finding.poles.order) == len(result.finding.poles.stable) == 5
-
-
-def test_nothing_found_is_nothing_joined() -> None:
-    result = _joined(_finding(), _finding())
-    assert result.finding.modes == ()
-
-
-def test_a_single_set_up_stays_as_it_is() -> None:
-    finding = _finding(_mode(6.0, (1, 1)))
-    result = join_set_ups([ONE], [finding], OPTIONS)
-    assert result.finding.modes == finding.modes
-    assert result.points == ONE.points
-    assert result.notes == ()

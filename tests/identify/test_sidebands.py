@@ -50,7 +50,3 @@ def test_two_equal_lines_about_a_mode_are_its_sidebands() -> None:
 )
 def test_modes_that_lie_about_a_third_stay(neighbour: FoundMode) -> None:
     assert len(_kept(_mode(28.5, 0.1), _mode(30.0), neighbour)) == 3
-
-
-def test_one_line_beside_a_mode_stays() -> None:
-    assert len(_kept(_mode(30.0), _mode(31.5, 0.1))) == 2

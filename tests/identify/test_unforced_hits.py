@@ -46,20 +46,6 @@ def test_wind_and_a_truck_are_no_hits(seed: int) -> None:
     assert find_unforced(_ambient(seed), RATE_HZ, 50.0) == []
 
 
-def test_hits_of_unknown_force_give_the_modes_and_say_that_it_is_unknown() -> None:
-    found = identify([TAPS], OPTIONS, test_id="t")
-    forced = identify([FORCED], OPTIONS, test_id="t")
-    assert found.frequency_response is None
-    assert np.isnan(found.test.amplitude)
-    assert all(np.isnan(hit.peak_force_n) for hit in found.hits)
-    assert len(found.test.modes) == len(forced.test.modes)
-    for mode, other in zip(found.test.modes, forced.test.modes, strict=True):
-        assert mode.frequency_hz == pytest.approx(other.frequency_hz, rel=1e-4)
-        assert mode.damping_ratio == pytest.approx(other.damping_ratio, rel=0.05)
-    hits = next(check for check in found.quality if check.name == "hits")
-    assert "no force is known" in hits.found
-
-
 def test_where_the_force_shows_no_hits_those_of_the_motion_are_used_with_a_warning() -> None:
     """A slow logger without a filter misses pulses between two samples: here all of them."""
     silent = replace(FORCED.channels[0], values=0.01 * np.sin(np.arange(FORCED.samples)))

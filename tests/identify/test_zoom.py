@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-import pytest
 
 from shm.identify import IdentifyOptions
 from shm.identify.contract import Measurement
 from shm.identify.estimation.hankel import Window, windows
 from shm.identify.estimation.ssi import through_windows
 from shm.values import FloatArray, ResponsePoint
-from tests.benchmarks.recordings_limit import ring_down_covariance
-from tests.worlds.recordings import ModeTruth
 
 RATE_HZ = 256.0
 
@@ -49,12 +44,6 @@ def test_a_decaying_sine_passes_a_window_as_one_lowered_by_its_shift() -> None:
     assert np.max(np.abs(error)) < 3e-4 * np.max(np.abs(slow))
 
 
-def test_windows_cover_the_band_side_by_side() -> None:
-    every = list(windows(RATE_HZ, IdentifyOptions(2.0, 100.0)))
-    assert [w.high_hz for w in every[:-1]] == [w.low_hz for w in every[1:]]
-    assert (every[0].low_hz, every[-1].high_hz) == (2.0, 100.0)
-
-
 def test_windows_find_close_pairs_of_a_single_decay() -> None:
     """Twelve pairs 0.3 % apart, 60 dB above the noise: every one within 0.05 %."""
     measurement = _measurement((_decay(1, 12, 1e-3), _decay(2, 12, 1e-3)))
@@ -75,14 +64,3 @@ def test_a_short_ring_down_among_long_ones_does_not_shorten_the_lags() -> None:
     )
     assert [mode.frequency_hz for mode in found] == [mode.frequency_hz for mode in without]
     assert len(found) == 12
-
-
-def test_the_bound_of_one_decay_is_the_closed_one() -> None:
-    """A exp(-s t) cos(w t + p) in noise of density S for ever: var w = 8 s^3 S / A^2."""
-    hz, damping, density, amplitude = 10.0, 0.004, 1e-6, 0.5
-    mode = ModeTruth(
-        "x", 1, hz, hz, 0.0, hz, damping, 60.0, (1.0,), (density,), (complex(amplitude),)
-    )
-    (covariance,) = ring_down_covariance((mode,), np.array([200.0]))
-    decay = 2 * math.pi * hz * damping
-    assert covariance[0, 0] == pytest.approx(8 * decay**3 * density / amplitude**2, rel=1e-3)

@@ -23,6 +23,7 @@ from tests.helpers.ambient_stream import (
     stream,
     values,
 )
+from tests.helpers.slow import few_of
 
 OPTIONS = IdentifyOptions(band_high_hz=60.0)
 HANGER = Hanger(3, LENGTH_M, 2.1e11, 5.03e-3, 2.01e-6, 39.5, 400e3)
@@ -83,7 +84,7 @@ def test_two_modes_that_were_taken_for_one_are_told_apart_by_their_planes() -> N
         assert abs(mode.frequency_hz - true[key]) < 4 * mode.frequency_sd_hz
 
 
-@pytest.mark.parametrize("minute", [20, 30])
+@pytest.mark.parametrize("minute", few_of([20, 30], 1))
 def test_modes_that_were_missed_at_first_join_the_others_once(
     minute: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -140,7 +141,7 @@ def detached(seed: int, rows: list[int], n_windows: int) -> tuple[Motion, list[F
     return motion, windows
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", few_of([1, 2], 1))
 def test_read_window_detached_plane(seed: int) -> None:
     """Known modes keep their numbers though the transverse sensors see the deck instead.
 
@@ -155,7 +156,7 @@ def test_read_window_detached_plane(seed: int) -> None:
     assert sum(mode.plane == "longitudinal" for mode in reading.modes) >= 3
 
 
-@pytest.mark.parametrize("seed", [101, 103])
+@pytest.mark.parametrize("seed", few_of([101, 103], 1))
 def test_read_window_excludes_strays(seed: int) -> None:
     """A peak of the deck near a lost mode is not followed from window to window."""
     motion, windows = detached(seed, [0, 1, 2, 3], 3)
@@ -168,7 +169,7 @@ def test_read_window_excludes_strays(seed: int) -> None:
         assert mode.frequency_hz == pytest.approx(motion.frequency_hz[name], rel=5e-3)
 
 
-@pytest.mark.parametrize("seed", [302, 309])
+@pytest.mark.parametrize("seed", few_of([302, 309], 1))
 def test_read_window_detached_plane_gains_no_mode(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -199,7 +200,7 @@ def test_read_window_loosened_plane(plane: Plane, fall: float) -> None:
         assert mode.frequency_hz == pytest.approx(hz[mode.plane, mode.order], rel=2e-3)
 
 
-@pytest.mark.parametrize("share", [-0.3, 0.3])
+@pytest.mark.parametrize("share", few_of([-0.3, 0.3], 1))
 def test_read_window_large_change(share: float) -> None:
     """A change of tension beyond reach is found from scratch and keeps all numbers."""
     rng = np.random.default_rng(3)

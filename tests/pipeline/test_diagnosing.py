@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from shm.pipeline.diagnosing import choose_tests
+from shm.pipeline.diagnosing import choose_tests, latest_diagnosis
 from shm.store import Store
 from shm.values import WatchedTest
+from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.nouns import NOW, a_change, a_posterior, a_watched_test, an_alert
 from tests.helpers.outboxes import LINEAGE, entered, make_baseline
 from tests.helpers.workspaces import make_workspace
@@ -44,6 +45,13 @@ def test_choose_tests_since_the_change_in_force(
         assert names == [f"t{number}" for number in range(int(since[1]), 4)]
         assert bool(chosen.remark) == (since != "t0")
         assert [each.id for each in choose_tests(store, hanger, 1).tests] == ["t3"]
+        for names in (("t0", "t1"), ("t0", "t3")):
+            made = replace(a_diagnosis(), tests=names)
+            store.posteriors.save_diagnosis(3, made, LINEAGE, NOW)
+            found = latest_diagnosis(store, hanger)
+            assert found is not None
+            is_old = since == "t2" and names[-1] == "t1"
+            assert ("Diagnose again" in "".join(found.remarks)) == is_old
 
 
 def _watch(store: Store, watched: tuple[dict[str, object], ...], alerts: str) -> None:

@@ -1,7 +1,7 @@
 """Whose modes a test holds: planted swaps, rates and planes are doubted, real changes are not.
 
 Frequencies come from the classes' own bar, exact but for a scatter of 0.01 %: what is tested is the
-reasoning. `tests/benchmarks/right_hanger.py` measures it on truth that others wrote.
+reasoning.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shm.plausibility import Candidate, fingerprint_of
-from shm.plausibility.copies import copied, is_copy
+from shm.plausibility.copies import copied, shared
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.values import (
     Channel,
@@ -115,8 +115,8 @@ def test_a_copy_is_known(how: str, hits: int) -> None:
     original = a_recording(2, hits)  # it has hit before the 0.6 s
     own, copy = print_of(2, hits), fingerprint_of([COPIES[how](original)])
     assert copy is not None
-    assert is_copy(copy, own)
-    assert is_copy(own, copy)
+    assert shared(copy, own)
+    assert shared(own, copy)
 
 
 def candidate(own: Recording, *known: KnownSamples) -> Candidate:
@@ -169,7 +169,7 @@ def test_other_impacts_on_the_same_hanger_are_no_copies(hits: int, noise_m_s2: f
     prints = [print_of(seed, hits, noise_m_s2) for seed in range(4)]
     pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i]]
     assert len(pairs) == 6
-    assert not any(is_copy(*pair) for pair in pairs)
+    assert not any(shared(*pair) for pair in pairs)
 
 
 @pytest.mark.parametrize(("hits", "bits"), [(1, 12), (1, 16), (1, 24), (3, 16)])
@@ -183,7 +183,7 @@ def test_hits_of_a_machine_are_no_copies(hits: int, bits: int) -> None:
     prints = [fingerprint_of([each]) for each in machine]
     pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b]
     assert len(pairs) == 6
-    assert not any(is_copy(*pair) for pair in pairs)
+    assert not any(shared(*pair) for pair in pairs)
 
 
 def test_real_hits_of_one_structure_are_copies_of_their_own_halves_alone(shared_data: Path) -> None:
@@ -192,7 +192,7 @@ def test_real_hits_of_one_structure_are_copies_of_their_own_halves_alone(shared_
     wholes = [Recording("s", (Channel("a", "acceleration", row),), 25_600.0) for row in rows]
     halves = [part(whole, 0.3, 0.8) for whole in wholes]
     prints, cuts = ([fingerprint_of([each]) for each in some] for some in (wholes, halves))
-    alike = [[a and b and is_copy(a, b) for b in prints] for a in cuts]
+    alike = [[bool(a and b and shared(a, b)) for b in prints] for a in cuts]
     assert len(rows) == 5
     assert alike == np.eye(5, dtype=bool).tolist()
 
@@ -203,4 +203,4 @@ def test_one_file_of_a_test_of_several_is_a_copy() -> None:
     whole, part = fingerprint_of(parts), fingerprint_of([parts[1]])
     assert whole is not None
     assert part is not None
-    assert is_copy(part, whole)
+    assert shared(part, whole)

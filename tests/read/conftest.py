@@ -25,6 +25,7 @@ def recording() -> Recording:
         time=datetime(2026, 5, 1, 10, 0, 30, 250000, tzinfo=UTC),
         temperature_c=-2.5,
         added_mass=AddedMass(25.0, 3.6, 0.08),
+        operator="Ann",
     )
 
 

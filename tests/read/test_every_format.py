@@ -26,6 +26,12 @@ from tests.helpers.written import needs_responses, write
 formats = pytest.mark.parametrize(
     "file_format", [known for known in FORMATS if known.names_channels], ids=lambda f: f.name
 )
+one_of_a_kind = pytest.mark.parametrize(
+    "file_format",
+    [known for known in FORMATS if known.name in ("HDF5", "CSV")],
+    ids=lambda f: f.name,
+)
+"""What is checked where all formats are one: arrays, and text."""
 written_formats = pytest.mark.parametrize(
     "file_format", [known for known in FORMATS if known.write], ids=lambda f: f.name
 )
@@ -123,23 +129,6 @@ def test_a_frequency_response_comes_back_as_it_was_written(
 
 
 @formats
-def test_a_peek_tells_the_headers_of_a_good_file(
-    file_format: Format, recording: Recording, tmp_path: Path
-) -> None:
-    found = peek(written(file_format, recording, tmp_path))
-    assert found.format == file_format.name
-    assert found.problems == ()
-    assert (found.hanger, found.time, found.temperature_c) == (3, recording.time, -2.5)
-    assert (found.samples, found.sampling_rate_hz) == (200, 512.0)
-    told = [(c.name, c.quantity, c.unit, c.plane, c.x_m) for c in found.channels]
-    assert told[0] == ("force", "force", "N", None, 1.92)
-    assert told[1:] == [
-        ("acc_1", "acceleration", "m/s2", "transverse", 2.52),
-        ("acc_2", "acceleration", "m/s2", "longitudinal", 2.52),
-    ]
-
-
-@formats
 def test_a_sidecar_is_written_only_where_the_format_needs_one(
     file_format: Format, recording: Recording, tmp_path: Path
 ) -> None:
@@ -168,7 +157,7 @@ def test_a_sidecar_goes_before_the_file(
     np.testing.assert_allclose(whole.channels[0].values, 1000 * recording.channels[0].values)
 
 
-@formats
+@one_of_a_kind
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -206,41 +195,7 @@ def test_a_faulty_sidecar_is_refused_by_name(
     assert refusal.value.remedy
 
 
-@formats
-def test_two_samples_are_not_a_record(
-    file_format: Format, recording: Recording, tmp_path: Path
-) -> None:
-    short = tuple(replace(c, values=c.values[:2]) for c in recording.channels)
-    path = written(file_format, replace(recording, channels=short), tmp_path)
-    with pytest.raises(BadInput, match="2 samples; at least 16"):
-        read(path)
-    assert any("2 samples" in problem for problem in peek(path).problems)
-
-
-@formats
-def test_a_record_without_any_acceleration_is_refused(
-    file_format: Format, recording: Recording, tmp_path: Path
-) -> None:
-    path = written(file_format, replace(recording, channels=recording.channels[:1]), tmp_path)
-    with pytest.raises(BadInput, match="no channel holds an acceleration"):
-        read(path)
-    assert any("acceleration" in problem for problem in peek(path).problems)
-
-
-@formats
-def test_an_ambient_record_without_force_is_read(
-    file_format: Format, recording: Recording, tmp_path: Path
-) -> None:
-    ambient = replace(recording, channels=recording.channels[1:])
-    path = written(file_format, ambient, tmp_path)
-    found = read(path)
-    assert_same(found, ambient)
-    assert isinstance(found, Recording)
-    assert found.force is None
-    assert peek(path).problems == ()
-
-
-@formats
+@one_of_a_kind
 @pytest.mark.parametrize(("forces", "accelerations"), [(1, 1), (1, 16), (0, 16)])
 def test_one_force_and_up_to_sixteen_accelerations_are_read(
     file_format: Format, recording: Recording, tmp_path: Path, forces: int, accelerations: int
@@ -249,7 +204,7 @@ def test_one_force_and_up_to_sixteen_accelerations_are_read(
     assert_same(read(written(file_format, many, tmp_path)), many)
 
 
-@formats
+@one_of_a_kind
 @pytest.mark.parametrize(
     ("forces", "accelerations", "words"),
     [(1, 17, "17 accelerations; at most 16"), (2, 1, "2 channels hold a force")],
@@ -282,7 +237,7 @@ def channels_of(recording: Recording, forces: int, accelerations: int) -> tuple[
     )
 
 
-@formats
+@one_of_a_kind
 def test_calibration_is_applied_and_full_scale_becomes_si(
     file_format: Format, recording: Recording, tmp_path: Path
 ) -> None:
@@ -319,7 +274,7 @@ def test_a_full_scale_comes_back(file_format: Format, recording: Recording, tmp_
     assert [c.full_scale for c in found.channels] == pytest.approx(scales, nan_ok=True)
 
 
-@formats
+@one_of_a_kind
 def test_impossible_values_are_refused_with_their_channel(
     file_format: Format, recording: Recording, tmp_path: Path
 ) -> None:
@@ -332,7 +287,7 @@ def test_impossible_values_are_refused_with_their_channel(
     assert refusal.value.channel == "acc_1"
 
 
-@formats
+@one_of_a_kind
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -380,16 +335,6 @@ def test_an_unknown_suffix_is_refused_with_the_right_one(
         write(recording, path)
 
 
-@formats
-def test_a_missing_file_and_a_folder_are_refused(file_format: Format, tmp_path: Path) -> None:
-    path = path_for(file_format, tmp_path)
-    with pytest.raises(BadInput, match="No such file"):
-        read(path)
-    path.mkdir()
-    with pytest.raises(BadInput, match="cannot be read"):
-        peek(path)
-
-
 @written_formats
 def test_a_write_that_fails_leaves_the_old_file(
     file_format: Format, recording: Recording, tmp_path: Path
@@ -425,7 +370,7 @@ def test_what_is_only_read_is_refused_on_writing(recording: Recording, tmp_path:
         ),
     ],
 )
-@formats
+@one_of_a_kind
 def test_peek_lists_sidecar_faults(
     file_format: Format,
     fault: str,

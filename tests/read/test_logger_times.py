@@ -11,7 +11,9 @@ import pytest
 
 from shm.errors import BadInput
 from shm.read import logger_text
-from shm.read.assemble import assemble, peek
+from shm.read.assemble import assemble
+from shm.read.describe import describe
+from shm.read.registry import look
 from shm.read.table import Table
 from shm.values import NAN, FloatArray
 
@@ -29,14 +31,14 @@ def table(times: FloatArray, stated_hz: float = NAN, name: str = "Time [s]") -> 
 
 def rate(seconds: FloatArray, stated_hz: float = NAN, name: str = "Time [s]") -> float:
     """Return the sampling rate, NaN where nothing says it."""
-    found = peek(table(seconds, stated_hz, name), "CSV")
+    found = look(table(seconds, stated_hz, name), "CSV")
     assert not any("but the times" in problem for problem in found.problems)
     return found.sampling_rate_hz
 
 
 def contradiction(seconds: FloatArray, stated_hz: float) -> str:
     """Return the problem of times that say another rate than is stated."""
-    found = peek(table(seconds, stated_hz), "CSV")
+    found = look(table(seconds, stated_hz), "CSV")
     return next(each for each in found.problems if "but the times" in each)
 
 
@@ -76,11 +78,11 @@ def test_counts_that_differ_by_more_than_one_say_no_rate() -> None:
 def test_times_that_jump_or_go_back_are_refused_at_their_row() -> None:
     back = np.repeat([0.0, 1, 0, 2], 8)
     with pytest.raises(BadInput, match=r"line 18.*does not increase"):
-        assemble(table(back))
+        assemble(describe(table(back), with_sidecars=False))
     jumped = whole_seconds(50, 20)
     jumped[500:] += 5
     with pytest.raises(BadInput, match=r"line 501.*the times are uneven"):
-        assemble(table(jumped))
+        assemble(describe(table(jumped), with_sidecars=False))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import pytest
 
 from shm.errors import BadInput
 from shm.read import modal_sets
-from shm.read.modal_sets import ForeignModalMode, ForeignModes, axes_of
+from shm.read.modal_sets import ForeignModalMode, ForeignModes
 from shm.values import NAN, ShapePoint
 
 PATH = Path("modes.unv")
@@ -66,14 +66,6 @@ def test_a_mode_is_told_by_place_along_the_hanger_and_by_the_axis_that_moves_mos
     assert found.modes[0].half_waves == 3
 
 
-def test_the_other_axis_leads_where_it_moves_more() -> None:
-    mode = only(r2=[-8.0, 0.0, 4.0, 0.0])
-    assert mode.axis == "y"
-    assert [(point.value, point.cross) for point in mode.points] == [
-        (0.0, 0.125), (0.5, -0.5), (-1.0, 0.25),
-    ]  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("units", "first_m"),
     [(UNITS, 1.0), ({"type": 164}, 1000.0), ({"type": 164, "length": 0.0}, 1000.0),
@@ -118,39 +110,6 @@ def test_a_complex_shape_is_turned_so_that_its_largest_part_is_real() -> None:
                   r3=np.zeros(4))  # fmt: skip
     for point, expected in zip(turned.points, only(r3=np.zeros(4)).points, strict=True):
         assert (point.value, point.cross) == pytest.approx((expected.value, expected.cross))
-
-
-@pytest.mark.parametrize(
-    ("changes", "axis"),
-    [
-        ({"node_nums": []}, ""),
-        ({"r1": [1.0, 2.0]}, ""),
-        ({"r1": [math.nan] * 4}, ""),
-        ({"r1": [0.0] * 4, "r2": [0.0] * 4}, ""),  # along the hanger alone
-        ({"node_nums": [11, 12, 13, 14]}, "z"),
-        ({"node_nums": [11, 12, 13, 14], "r3": [0.0] * 4}, "x"),
-        ({"node_nums": [11, 12, 13, 14], "r1": [math.inf] * 4}, ""),
-        ({"node_nums": [11, 12, 13, 14], "r1": [0.0] * 4, "r2": [0.0] * 4, "r3": [0.0] * 4}, ""),
-    ],
-)
-def test_of_a_shape_without_places_the_axis_is_all_that_is_known(
-    changes: dict[str, Any], axis: str
-) -> None:
-    mode = only(**changes)
-    assert (mode.axis, mode.points, mode.half_waves) == (axis, (), 0)
-
-
-def test_a_sign_by_chance_makes_no_half_wave() -> None:
-    points = tuple(ShapePoint(float(x), value) for x, value in enumerate((1, 0.5, -0.019, 0.6)))
-    assert ForeignModalMode(1.0, NAN, "x", points).half_waves == 1
-    points = tuple(ShapePoint(float(x), value) for x, value in enumerate((1, 0.5, -0.021, 0.6)))
-    assert ForeignModalMode(1.0, NAN, "x", points).half_waves == 3
-
-
-def test_modes_come_by_frequency_and_name_their_axes() -> None:
-    found = read(a_set(freq=9.0, node_nums=[]), NODES, a_set(freq=4.0), a_set(analysis_type=1))
-    assert [mode.frequency_hz for mode in found.modes] == [4.0, 9.0]
-    assert axes_of([*found.modes, only(r2=[-8.0, 0.0, 4.0, 0.0])]) == ("x", "y")
 
 
 @pytest.mark.parametrize("frequency", [0.0, None, -1.0, 1e5, math.nan])

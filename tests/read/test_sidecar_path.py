@@ -22,9 +22,3 @@ from shm.read import sidecar_path
 )
 def test_it_has_the_name_of_the_file_cut_to_what_a_folder_takes(name: str, expected: str) -> None:
     assert sidecar_path(Path("spool", name)) == Path("spool", expected)
-
-
-def test_it_can_be_looked_for_beside_the_longest_names(tmp_path: Path) -> None:
-    for name in ("x" * 255, "x" * 251 + ".csv", "\u00e9" * 125 + ".data", "y" * 250 + ".toml"):
-        (tmp_path / name).touch()
-        assert not sidecar_path(tmp_path / name).is_symlink()

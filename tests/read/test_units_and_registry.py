@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import shm.read
-from shm.read import FORMATS, peek, sidecar_path
+from shm.read import FORMATS, peek
 from shm.read.logger_words import accelerance_si, unit_of
 
 
@@ -74,22 +74,11 @@ def test_no_two_formats_claim_one_name_or_suffix() -> None:
     assert ".toml" not in suffixes
 
 
-def test_all_formats_of_owners_are_registered() -> None:
-    suffixes = {suffix for known in FORMATS for suffix in known.suffixes}
-    assert suffixes >= {".csv", ".uff", ".h5", ".hdf5", ".mat", ".tdms", ".npz", ".npy", ".txt"}
-
-
 def test_the_public_names_are_these() -> None:
     assert sorted(shm.read.__all__) == [
         "FORMATS", "Format", "Limits", "Peek", "PeekChannel", "bundle", "holds_test", "peek",
         "peek_test", "read", "read_test", "sidecar_path", "write",
     ]  # fmt: skip
-
-
-def test_the_sidecar_stands_beside_the_file_whether_there_or_not() -> None:
-    assert sidecar_path(Path("spool/h3.2026.csv")) == Path("spool/h3.2026.toml")
-    assert sidecar_path(Path("h3.uff")) == Path("h3.toml")
-    assert sidecar_path(Path("h3.2026.txt.gz")) == Path("h3.2026.toml")
 
 
 def test_a_peek_says_si_where_the_name_alone_says_what_is_measured(tmp_path: Path) -> None:

@@ -74,12 +74,3 @@ def test_what_holds_no_sample_or_too_many_channels_is_refused(tmp_path: Path) ->
     path.write_bytes(streamed("<", 12)[:44])
     with pytest.raises(BadInput):
         wave_file.open_tables(path)
-
-
-@pytest.mark.parametrize(
-    ("head", "is_one"),
-    [(b"RIFF\0\0\0\0WAVE", True), (b"RIFX\0\0\0\0WAVE", True), (b"RF64\0\0\0\0WAVE", True),
-     (b"RIFF\0\0\0\0AVI ", False), (b"XXXX\0\0\0\0WAVE", False)],
-)  # fmt: skip
-def test_a_wav_file_is_known_by_its_first_bytes(head: bytes, is_one: bool) -> None:
-    assert wave_file.recognises(head) is is_one

@@ -60,7 +60,7 @@ def test_a_test_comes_back_as_it_was(store: Store) -> None:
 def test_frequency_response_every_field(store: Store) -> None:
     """A response and its test come back with every field, of which none has its default here."""
     mass = AddedMass(25.0, 3.6)
-    conditions = {"time": NOW, "temperature_c": 11.5, "added_mass": mass}
+    conditions = {"time": NOW, "temperature_c": 11.5, "added_mass": mass, "operator": "Ann"}
     response = replace(a_response(), **conditions)
     measured = {
         "amplitude": 1.2,

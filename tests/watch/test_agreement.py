@@ -101,9 +101,6 @@ def test_it_may_stand_on_either_side_in_either_order(beside: Beside) -> None:
         (a_test(2, 0.92), came(a_test(1, 0.92))),  # a van may do that for a visit
         (a_test(2, 0.93, 45.0), came(a_test(1, 0.93, 45.0))),  # it may be the warmth
         (a_test(2, 1.0), came(a_test(1), a_test(3))),  # itself sound
-        (a_test(3), came(a_test(2), a_test(1))),  # the two before it have told it
-        (a_test(3), Beside(dated=([], [a_test(4), a_test(5)]))),
-        (a_test(3), Beside(came=([a_test(2)], []), dated=([a_test(2), a_test(1)], []))),
     ],
 )
 def test_what_is_no_second_test_of_a_shift_is_not_told(newest: ModalTest, beside: Beside) -> None:

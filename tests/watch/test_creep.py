@@ -41,14 +41,6 @@ def test_no_rate_is_given_while_a_change_is_likelier_than_none() -> None:
     assert likely[0].creep_per_year is None
 
 
-@pytest.mark.slow
-def test_a_called_loss_is_not_taken_for_creep() -> None:
-    lost = replace(RELAXES, change_at=20, ramp=(0.0,), step=(-0.08,))
-    creep = watch_of(lost.readings(1), lost.quantities).tests[-1].creep_per_year
-    assert creep is not None
-    assert abs(creep.mean) < 0.002
-
-
 @pytest.mark.parametrize(
     ("creep", "words"),
     [

@@ -13,7 +13,7 @@ import pytest
 
 from shm.values import FloatArray, Reading
 from shm.watch.options import WatchOptions
-from tests.helpers.synthetic_readings import BOTH_ENDS, START, History, tension, watch_of
+from tests.helpers.synthetic_readings import START, History, tension, watch_of
 
 WEAK_STEP = 0.001
 """A change much below the scatter: then the statistic's mean is not that of a few large values."""
@@ -84,9 +84,3 @@ def test_false_calls_below_limit(scatter: float, hangers: int) -> None:
     called, allowed = count_calls(scatter, hangers)
     assert called <= 0.2 * allowed
     assert count_calls(scatter, 3, math.log(1 - 1 / 12))[0] >= 2
-
-
-def test_five_quantities_without_change_are_left_alone_at_the_usual_limit() -> None:
-    history = History(BOTH_ENDS, tests=12)
-
-    assert not any(watch_of(history.readings(seed), BOTH_ENDS).calls for seed in range(3))

@@ -75,12 +75,6 @@ def test_a_drop_of_all_frequencies_is_told_within_three_weeks_with_its_size() ->
     assert abs(first.shift_mean + 0.02) < 3 * first.shift_sd < 0.006
 
 
-def test_a_change_is_called_at_one_test_alone() -> None:
-    found = watch(daily(range(121), from_day(90, -0.02, -0.02, -0.02)))
-
-    assert sum(each.change.called for each in found.tests) == 1
-
-
 def test_the_one_frequency_that_dropped_is_named() -> None:
     found = watch(daily(range(121), from_day(90, 0.0, 0.0, -0.02)))
 

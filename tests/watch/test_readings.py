@@ -17,7 +17,6 @@ from shm.values import (
     ModalTest,
     Reading,
 )
-from shm.watch.quantities import coordinate_of
 from shm.watch.readings import Reader
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import (
@@ -52,7 +51,9 @@ def coordinates(reader: Reader, theta: Sequence[float]) -> FloatArray:
     """Where the state `theta` of beam2 lies in the reader's coordinates (q,)."""
     named = dict(zip(described("beam2", HANGER_3).parameter_names, theta, strict=True))
     springs = [
-        coordinate_of(each, common_of([named[name] for name in each.parameters]))
+        np.interp(
+            common_of([named[name] for name in each.parameters]), each.values, each.coordinates
+        )
         for each in reader.quantities[1:]
     ]
     return np.array([np.log(theta[0] / SPRUNG[0]), *springs])

@@ -11,7 +11,7 @@ import pytest
 
 from shm.errors import BadInput
 from shm.values import WatchedTest
-from shm.watch.causes import POINT_MASS, TIMEBASE
+from shm.watch.causes import TIMEBASE
 from shm.watch.options import WatchOptions
 from shm.watch.watcher import Watch
 from tests.helpers.hangers import HANGER_3
@@ -22,7 +22,6 @@ from tests.helpers.synthetic_readings import (
     SPRING_STEP,
     TENSION_ALONE,
     History,
-    columns,
     off_by,
     shifted,
     slopes,
@@ -43,12 +42,6 @@ def last(tests: tuple[WatchedTest, ...]) -> WatchedTest:
 
 def lost(fraction: float, q: int = 1) -> list[float]:
     return [math.log(1 - fraction), *[0.0] * (q - 1)]
-
-
-def test_a_hanger_none_of_whose_temperatures_is_known_can_be_watched() -> None:
-    history = History(tests=18, temperatures_missing=1.0, change_at=10, step=lost(0.10))
-
-    assert watch(history).calls[0].change.moved[0].shift_mean == pytest.approx(-0.1, abs=0.03)
 
 
 @pytest.mark.parametrize("size", [0.03, 0.1, 0.5, 2.0, -0.9])
@@ -95,18 +88,6 @@ def test_a_loss_that_goes_on_is_followed_after_its_call() -> None:
     assert len(found.calls) == 1
     assert drift.shift_mean == pytest.approx(math.expm1(-0.02 * years), abs=0.004)
     assert drift.shift_sd < 0.02
-
-
-def test_a_loss_of_tension_is_told_from_a_loosened_end() -> None:
-    history = History(PLANES_ALONE, tests=CHANGE_AT + 8, change_at=CHANGE_AT)
-    tension = watch(replace(history, step=lost(0.04, q=3))).calls[0].change.moved
-    end = watch(replace(history, step=[0.0, -3 * SPRING_STEP, 0.0])).calls[0].change.moved
-
-    assert (tension[0].quantity, end[0].quantity) == ("tension", "log10_kx")
-    assert min(tension[0].probability, end[0].probability) > 0.95
-    assert tension[0].alike == end[0].alike == ()
-    assert end[0].plane == "transverse"
-    assert tension[0].shift_mean == pytest.approx(-0.04, abs=0.01)
 
 
 def test_both_planes_of_an_end_that_loosen_together_are_called_and_named_together() -> None:
@@ -185,18 +166,6 @@ def test_tests_of_one_day_say_no_more_than_one() -> None:
     assert many.probability == pytest.approx(one.probability, abs=0.15)
     two = watch_of(lost_readings, TENSION_ALONE).tests[-1].change
     assert two.evidence_years > 3 * many.evidence_years
-
-
-def test_a_mass_put_on_is_named_and_not_taken_for_tension() -> None:
-    of_mass, _ = columns().by_cause[POINT_MASS][4]
-    history = History(tests=CHANGE_AT + 4, change_at=CHANGE_AT, outliers=0, mode_step=3 * of_mass)
-
-    moved = watch(history).calls[0].change.moved
-
-    assert moved[0].quantity == POINT_MASS
-    by_name = {each.quantity: each.probability for each in moved}
-    assert by_name["tension"] < 0.1 < 0.6 < by_name[POINT_MASS]
-    assert moved[0].shift_mean == pytest.approx(3 * of_mass.mean(), rel=0.3)
 
 
 def test_a_clock_that_is_off_is_named_and_a_trifle_is_not_called() -> None:

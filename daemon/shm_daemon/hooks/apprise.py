@@ -15,7 +15,7 @@ from shm.bridge import AppriseHook
 from shm.bridge.hooks import apprise_scheme
 from shm.values import Alert
 from shm_daemon.hooks.command import Processes
-from shm_daemon.hooks.contract import HookFailed, one_line
+from shm_daemon.hooks.contract import HookFailed, one_line, read_secret
 
 _SENDER = Path(__file__).with_name("apprise_sender.py")
 
@@ -47,14 +47,7 @@ class AppriseDeliverer(Processes):
         return addresses, schemes
 
     def _addresses(self, hook: AppriseHook) -> tuple[str, ...]:
-        try:
-            text = (self.folder / hook.address_file).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "not a text"
-            raise HookFailed(
-                f"{hook.address_file} cannot be read: {reason}.",
-                remedy="Make it a text that the user who runs the daemon can read.",
-            ) from None
+        text = read_secret(self.folder, hook.address_file, HookFailed)
         lines = (line.strip() for line in text.splitlines())
         found = tuple(line for line in lines if line and not line.startswith("#"))
         if not found:

@@ -64,6 +64,20 @@ class Deliverer(Protocol):
         """Ends, from another thread, deliveries that are under way; no more are begun."""
 
 
+def read_secret(folder: Path, name: str, kind: type[ShmError]) -> str:
+    """Return the text of a file with a secret, its ends stripped; raises an error of a kind.
+
+    Bytes that are no text become surrogates, which no check of ours takes for printable.
+    """
+    try:
+        return (folder / name).read_text(encoding="utf-8", errors="surrogateescape").strip()
+    except OSError as error:
+        raise kind(
+            f"{name} cannot be read: {error.strerror}.",
+            remedy="Write it, readable for the user that runs shm here.",
+        ) from None
+
+
 def one_line(text: str) -> str:
     """A stranger's words made fit for a log: printable, on one line, not endless."""
     return " ".join(printable(text, " ").split())[:SHOWN_CHARACTERS]

@@ -15,7 +15,13 @@ from shm.bridge import WebhookHook
 from shm.documents import dump
 from shm.pipeline import DeliveryRefused
 from shm.values import Alert
-from shm_daemon.hooks.contract import SHOWN_CHARACTERS, DeliveryContext, HookFailed, one_line
+from shm_daemon.hooks.contract import (
+    SHOWN_CHARACTERS,
+    DeliveryContext,
+    HookFailed,
+    one_line,
+    read_secret,
+)
 from shm_daemon.http_client import Answer, HttpClient, NoAnswer
 
 _WORTH_ANOTHER_TRY = (
@@ -54,25 +60,18 @@ class WebhookDeliverer:
         self._client.close()
 
     def _secret(self, hook: WebhookHook) -> bytes:
+        surroundings = self._surroundings
         if hook.secret_env:
-            secret = self._surroundings.environment.get(hook.secret_env, "").encode()
+            secret = surroundings.environment.get(hook.secret_env, "")
             where = f"the variable {hook.secret_env} of the environment"
         else:
-            secret, where = self._secret_of_file(hook), hook.secret_file
+            secret = read_secret(surroundings.folder, hook.secret_file, HookFailed)
+            where = hook.secret_file
         if not secret:
             raise HookFailed(
                 f"{where} holds no secret.", remedy="Put one there; see docs/alerts.md."
             )
-        return secret
-
-    def _secret_of_file(self, hook: WebhookHook) -> bytes:
-        try:
-            return (self._surroundings.folder / hook.secret_file).read_bytes().strip()
-        except OSError as error:
-            raise HookFailed(
-                f"the secret in {hook.secret_file} cannot be read: {error.strerror}.",
-                remedy="Write it, readable for the user that runs the daemon; see docs/alerts.md.",
-            ) from None
+        return secret.encode(errors="surrogateescape")
 
 
 def _failure(hook: WebhookHook, error: NoAnswer, *, is_closed: bool) -> HookFailed:

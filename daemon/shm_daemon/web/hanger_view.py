@@ -12,6 +12,7 @@ from fastapi import Depends, Request
 
 from shm.errors import ShmError
 from shm.pipeline import utc_now
+from shm.pipeline.diagnosing import latest_diagnosis
 from shm.pipeline.reporting import hanger_now, hanger_states
 from shm.report.contents import Deed, DiagnosisSheet, HangerReport
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
@@ -27,7 +28,6 @@ from shm.store import (
 )
 from shm.store.queries.alerts import list_hanger_events
 from shm.store.queries.hangers import (
-    find_latest_diagnosis,
     list_baselines_in_force,
     list_detections,
 )
@@ -132,10 +132,10 @@ class HangerView:
     @cached_property
     def sheet(self) -> DiagnosisSheet | None:
         """The latest diagnosis of the gap."""
-        stored = find_latest_diagnosis(self.store, self.hanger.id)
-        if stored is None:
+        found = latest_diagnosis(self.store, self.hanger)
+        if found is None:
             return None
-        return DiagnosisSheet(stored.diagnosis, self.hanger, self.workspace.bridge.name)
+        return DiagnosisSheet(found, self.hanger, self.workspace.bridge.name)
 
     @cached_property
     def states(self) -> StatesOverTime | None:

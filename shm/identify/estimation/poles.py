@@ -47,24 +47,22 @@ class PoleSet:
             self.dropped,
         )
 
+    def in_band(self, options: IdentifyOptions) -> PoleSet:
+        """Return the poles in the band."""
+        above = self.frequency_hz >= options.band_low_hz
+        return self.chosen(above & (self.frequency_hz <= options.band_high_hz))
 
-def in_band(poles: PoleSet, options: IdentifyOptions) -> BoolArray:
-    """Return the mask (poles,) of poles in the band."""
-    return np.asarray(
-        (poles.frequency_hz >= options.band_low_hz) & (poles.frequency_hz <= options.band_high_hz)
-    )
-
-
-def plausibly_damped(poles: PoleSet, options: IdentifyOptions) -> BoolArray:
-    """Return the mask (poles,) of poles that decay, and no faster than a hanger's mode."""
-    return np.asarray((poles.damping_ratio > 0) & (poles.damping_ratio < options.max_damping_ratio))
+    def plausibly_damped(self, options: IdentifyOptions) -> PoleSet:
+        """Return the poles that decay, and no faster than a hanger's mode."""
+        decays = self.damping_ratio > 0
+        return self.chosen(decays & (self.damping_ratio < options.max_damping_ratio))
 
 
 # judgement: noise moves a mode by less than max_frequency_sd, 0.1 %, from order to order, and poles
 # of noise by percents; 1 - MAC of a mode 20 dB above the noise is 0.01
 FREQUENCY_TOLERANCE = 0.005
 SHAPE_TOLERANCE = 0.1
-_ORDERS_MISSED_AT_MOST = 8  # judgement: one step of 4 or three of 2 missed
+_MOST_MISSED = 8  # judgement: one step of 4 or three of 2 missed
 _DOUBLE = "double of a mode too near to be told apart"
 FAR = 1e6  # of a pair that must not be: far above the cost of any allowed one, 2
 
@@ -125,39 +123,29 @@ def stable_candidates(
 
     Without `gaps` they must be there at all of `final_orders` but one; else at more than half.
     """
-    banded = [poles.chosen(in_band(poles, options)) for poles in sets]
-    damped = [poles.chosen(plausibly_damped(poles, options)) for poles in banded]
-    lasting = _lasting(link(damped), len(sets), final_orders, options)
+    banded = [poles.in_band(options) for poles in sets]
+    damped = [poles.plausibly_damped(options) for poles in banded]
     least = len(final_orders) // 2 + 1 if gaps else len(final_orders) - 1
-    candidates = [c for c in lasting if len(c.poles) >= least]
-    total, inside, light = (_count(group) for group in (sets, banded, damped))
+    lasting = [
+        Candidate(track, tuple(pole for pole in track if pole.order in final_orders))
+        for track in link(damped)
+        if len(track) >= options.min_presence * len(sets)
+    ]
+    candidates = [candidate for candidate in lasting if len(candidate.poles) >= least]
+    total, inside, light = (
+        sum(len(poles.frequency_hz) for poles in group) for group in (sets, banded, damped)
+    )
+    before: Counter[str] = Counter()
+    for poles in sets:
+        before.update({each.reason: each.count for each in poles.dropped})
     stable = sum(len(candidate.track) for candidate in candidates)
     limit = f"damping ratio not between 0 and {options.max_damping_ratio:g}"
     return candidates, (
-        *_left_out_before(sets),
+        *(Dropped("poles", count, reason) for reason, count in before.items()),
         Dropped("poles", total - inside, "outside of the band"),
         Dropped("poles", inside - light, limit),
         Dropped("poles", light - stable, "not stable over the model orders"),
     )
-
-
-def _left_out_before(sets: Sequence[PoleSet]) -> tuple[Dropped, ...]:
-    """Count the poles that the models of all orders left out, by reason."""
-    counts: Counter[str] = Counter()
-    for poles in sets:
-        counts.update({each.reason: each.count for each in poles.dropped})
-    return tuple(Dropped("poles", count, reason) for reason, count in counts.items())
-
-
-def _lasting(
-    tracks: list[Track], orders: int, final_orders: Sequence[int], options: IdentifyOptions
-) -> list[Candidate]:
-    """Return tracks seen at enough orders as candidates, with their poles at the final ones."""
-    return [
-        Candidate(track, tuple(pole for pole in track if pole.order in final_orders))
-        for track in tracks
-        if len(track) >= options.min_presence * orders
-    ]
 
 
 def resolved(
@@ -185,16 +173,11 @@ def _double(one: Candidate, other: Candidate, seconds: float) -> bool:
     return bool(near and likeness > 1 - SHAPE_TOLERANCE)
 
 
-def _count(sets: Sequence[PoleSet]) -> int:
-    return sum(len(poles.frequency_hz) for poles in sets)
-
-
 def diagram(
     sets: Sequence[PoleSet], candidates: Sequence[Candidate], options: IdentifyOptions
 ) -> Poles:
     """Return all plausibly damped poles in the band; stable are those of `candidates`."""
-    shown = [poles.chosen(in_band(poles, options)) for poles in sets]
-    shown = [poles.chosen(plausibly_damped(poles, options)) for poles in shown]
+    shown = [poles.in_band(options).plausibly_damped(options) for poles in sets]
     tracked = {(p.order, p.frequency_hz) for c in candidates for p in c.track}
     order = np.concatenate([np.full(len(p.frequency_hz), p.order) for p in shown])
     frequency = np.concatenate([p.frequency_hz for p in shown])
@@ -220,10 +203,16 @@ def link(sets: Sequence[PoleSet]) -> list[Track]:
     """Link poles that agree from order to order (0.5 % of frequency, MAC 0.9) to tracks."""
     closed: list[list[Pole]] = []
     open_tracks: list[list[Pole]] = []
-    for poles in sets:
-        recent = [t for t in open_tracks if poles.order - t[-1].order <= _ORDERS_MISSED_AT_MOST]
-        closed += [t for t in open_tracks if poles.order - t[-1].order > _ORDERS_MISSED_AT_MOST]
-        open_tracks = _extended(recent, _as_poles(poles))
+    for of_order in sets:
+        missed = [of_order.order - track[-1].order for track in open_tracks]
+        closed += [t for t, by in zip(open_tracks, missed, strict=True) if by > _MOST_MISSED]
+        recent = [t for t, by in zip(open_tracks, missed, strict=True) if by <= _MOST_MISSED]
+        poles = _as_poles(of_order)
+        matches = _matched([track[-1] for track in recent], poles)
+        for track, pole in matches.items():
+            recent[track].append(poles[pole])
+        started = [[pole] for n, pole in enumerate(poles) if n not in matches.values()]
+        open_tracks = recent + started
     return [tuple(track) for track in closed + open_tracks]
 
 
@@ -237,47 +226,24 @@ def _as_poles(poles: PoleSet) -> list[Pole]:
     ]
 
 
-def _extended(tracks: list[list[Pole]], poles: list[Pole]) -> list[list[Pole]]:
-    """Return `tracks` with their best poles appended; a pole without a track starts one."""
-    if not tracks or not poles:
-        return tracks + [[pole] for pole in poles]
-    cost = mismatch([track[-1] for track in tracks], poles)
-    taken = set()
-    for row, column in zip(*scipy.optimize.linear_sum_assignment(cost), strict=True):
-        if cost[row, column] < FAR:
-            tracks[row].append(poles[column])
-            taken.add(column)
-    return tracks + [[pole] for index, pole in enumerate(poles) if index not in taken]
+def _matched(known: Sequence[Pole], poles: Sequence[Pole], times: float = 1.0) -> dict[int, int]:
+    """Return by number of `known` the number of the pole that continues it.
 
-
-def mismatch(
-    known: Sequence[Pole],
-    poles: Sequence[Pole],
-    frequency_tolerance: float = FREQUENCY_TOLERANCE,
-    shape_tolerance: float = SHAPE_TOLERANCE,
-) -> FloatArray:
-    """Return the cost at which `poles` continue `known`, (known, poles); 1e6 where they cannot."""
+    It differs by at most `times` the tolerances; all together by as little as possible.
+    """
+    if not known or not poles:
+        return {}
     known_hz = np.array([pole.frequency_hz for pole in known])
     ratio = np.array([pole.frequency_hz for pole in poles]) / known_hz[:, np.newaxis]
     known_shapes = np.array([pole.shape for pole in known])
     likeness = np.abs(known_shapes.conj() @ np.array([pole.shape for pole in poles]).T) ** 2
-    frequency_cost = np.abs(ratio - 1) / frequency_tolerance
-    shape_cost = (1 - likeness) / shape_tolerance
+    frequency_cost = np.abs(ratio - 1) / (times * FREQUENCY_TOLERANCE)
+    shape_cost = (1 - likeness) / (times * SHAPE_TOLERANCE)
     near = (frequency_cost < 1) & (shape_cost < 1)
-    return np.where(near, frequency_cost + shape_cost, FAR)
-
-
-def continued(known: Sequence[Pole], poles: PoleSet) -> list[Pole | None]:
-    """Return for each of `known` the pole of `poles` that repeats it (1 %, MAC 0.8), or None."""
-    candidates = _as_poles(poles)
-    if not known or not candidates:
-        return [None] * len(known)
-    cost = mismatch(known, candidates, 2 * FREQUENCY_TOLERANCE, 2 * SHAPE_TOLERANCE)
-    best: list[Pole | None] = [None] * len(known)
-    for row, column in zip(*scipy.optimize.linear_sum_assignment(cost), strict=True):
-        if cost[row, column] < FAR:
-            best[row] = candidates[column]
-    return best
+    cost = np.where(near, frequency_cost + shape_cost, FAR)
+    rows, columns = scipy.optimize.linear_sum_assignment(cost)
+    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
+    return {row: column for row, column in pairs if cost[row, column] < FAR}
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,18 +282,19 @@ def repeats_of(candidate: Candidate, matches: Sequence[Sequence[tuple[Pole, Pole
 def _in_one_model(
     candidates: Sequence[Candidate], sets: Sequence[PoleSet]
 ) -> list[list[tuple[Pole, Pole]]]:
+    """Return each candidate's poles with the same again (within 1 %, MAC 0.8) in one model."""
     matches: list[list[tuple[Pole, Pole]]] = [[] for _ in candidates]
-    for poles in sets:
+    for of_order in sets:
         known = [
             (index, pole)
             for index, candidate in enumerate(candidates)
             for pole in candidate.poles
-            if pole.order == poles.order
+            if pole.order == of_order.order
         ]
-        again = continued([pole for _, pole in known], poles)
-        for (index, pole), match in zip(known, again, strict=True):
-            if match is not None:
-                matches[index].append((pole, match))
+        poles = _as_poles(of_order)
+        for row, column in _matched([pole for _, pole in known], poles, 2.0).items():
+            index, pole = known[row]
+            matches[index].append((pole, poles[column]))
     return matches
 
 

@@ -1,8 +1,8 @@
-"""From measured frequency responses to a measurement, by way of their impulse responses.
+"""Make a measurement of measured frequency responses, by way of their impulse responses.
 
 Points hit one after the other (roving hammer) are, by reciprocity, channels of one response.
 
-Whether an analyser laid an exponential window on the records before it wrote them: it makes all
+An analyser may have laid an exponential window on time records before it wrote them: it makes all
 modes seem more damped by one rate of decay, and with it falls what in a recording never falls by
 itself: the noise of the hammer between its hits, and that of each accelerometer, which is what no
 rule foretells of a ring-down. A force window leaves the latter alone.

@@ -1,7 +1,4 @@
-"""The fault of each acceleration after each hit, and the names that faults go by.
-
-Faults of one signal that a logger or its connectors make: clipped, or standing still.
-"""
+"""Find the faults of each acceleration after each hit: of loggers, cables and what else struck."""
 
 from __future__ import annotations
 
@@ -337,17 +334,7 @@ def same_peaks(parts: Sequence[FloatArray]) -> BoolArray:
 
 def frozen(signals: FloatArray) -> BoolArray:
     """Return which signals, (channels, samples), are constant for 16 samples while others move."""
-    stride = FROZEN_SAMPLES // 2
-    # Sixteen equal samples hold two equal ones that are eight apart: only those are looked into.
-    thin = signals[:, ::stride]
-    suspects = np.flatnonzero(np.any(thin[:, 1:] == thin[:, :-1], axis=1))
-    found = np.zeros(len(signals), dtype=bool)
-    found[suspects] = [_is_constant(signals[row]) for row in suspects]
-    return found
-
-
-def _is_constant(signal: FloatArray) -> bool:
-    return bool(_still_runs(signal))
+    return np.array([bool(_still_runs(signal)) for signal in signals], dtype=bool)
 
 
 def _still_runs(signal: FloatArray) -> list[tuple[int, int]]:

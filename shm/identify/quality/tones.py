@@ -1,6 +1,6 @@
-"""Check `tones`: steady vibration of mains or machines, there whether the hammer hits or not.
+"""Find tones: steady vibration of mains or machines, there whether the hammer hits or not.
 
-The stretches of a record in which no hammer strikes: there a steady tone stays as it is.
+They are looked for in the stretches of a record in which no hammer strikes.
 """
 
 from __future__ import annotations

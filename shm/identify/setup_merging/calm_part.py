@@ -1,4 +1,4 @@
-"""The later part of ring-downs, of a hanger that at first does not ring as a bar does.
+"""Take the later part of ring-downs, of a hanger that at first does not ring as a bar does.
 
 A guide with play knocks, a joint slips through, a crack opens: in the first seconds energy wanders
 between the modes and no frequency is one. Once the swing has died away below what that takes, the
@@ -37,11 +37,12 @@ _UNSURE = 0.3  # judgement: of a damping without standard deviation
 def late_parts(measurements: Sequence[Measurement], left_out: float) -> tuple[Measurement, ...]:
     """Return the measurements without the beginnings of their ring-downs.
 
-    Those of the same sensors count together, since what the force says of them went with the
-    beginning.
+    Those of the same sensors with hits enough count together, since what the force says of them
+    went with the beginning.
     """
     whole = list(measurements)
-    if len({tuple(place_of(point) for point in each.points) for each in measurements}) == 1:
+    layouts = {tuple(place_of(point) for point in each.points) for each in measurements}
+    if len(layouts) == 1 and all(len(each.decays) >= LEAST_HITS for each in measurements):
         decays = tuple(decay for each in measurements for decay in each.decays)
         hits = tuple(hit for each in measurements for hit in each.hits)
         whole = [replace(measurements[0], decays=decays, hits=hits)]

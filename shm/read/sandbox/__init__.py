@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 from shm.read.base import Layout, Peek, Survey
 from shm.read.limits import Limits
@@ -25,38 +26,48 @@ __all__ = [
 ]  # fmt: skip
 
 
+_KINDS: dict[str, type] = {
+    kind.__name__: kind
+    for kind in (ForeignModes, FrequencyResponse, Layout, ModalTest, Peek, Recording, Survey)
+}
+
+
+def _ask(verb: str, path: Path, limits: Limits | None) -> list[Any]:
+    return ask(verb, path, limits or Limits(), _KINDS)
+
+
 def read_test(
     path: Path, limits: Limits | None = None
 ) -> tuple[Recording | FrequencyResponse, ...]:
     """Return the files of one test, as `shm.read.read_test` gives them; raises BadInput."""
-    return tuple(ask("read_test", path, limits))
+    return tuple(_ask("read_test", path, limits))
 
 
 def peek_test(path: Path, limits: Limits | None = None) -> tuple[Peek, ...]:
     """Return the headers of a test, as `shm.read.peek_test` gives them; raises BadInput."""
-    return tuple(ask("peek_test", path, limits))
+    return tuple(_ask("peek_test", path, limits))
 
 
 def survey(path: Path, limits: Limits | None = None) -> Survey:
     """Return what a file holds, as `shm.read.registry.survey` finds it; raises BadInput."""
-    found: Survey = ask("survey", path, limits)[0]
+    found: Survey = _ask("survey", path, limits)[0]
     return found
 
 
 def layout_of(path: Path, limits: Limits | None = None) -> Layout:
     """Return the layout of a file, by which its logger is known; raises BadInput."""
-    found: Layout = ask("layout_of", path, limits)[0]
+    found: Layout = _ask("layout_of", path, limits)[0]
     return found
 
 
 def foreign_modes(path: Path, limits: Limits | None = None) -> ForeignModes | None:
     """Return modes of another program in a UFF file, None where it holds none; raises BadInput."""
-    return next(iter(ask("foreign_modes", path, limits)), None)
+    return next(iter(_ask("foreign_modes", path, limits)), None)
 
 
 def load_modes(path: Path, limits: Limits | None = None) -> tuple[ModalTest, ...]:
     """Return the tests of a `*.modes.json`, as `shm.documents.load_modes` gives them."""
-    return tuple(ask("load_modes", path, limits))
+    return tuple(_ask("load_modes", path, limits))
 
 
 def missing_bounds() -> dict[str, str]:
@@ -64,5 +75,5 @@ def missing_bounds() -> dict[str, str]:
 
     Raises ShmError where one that it has could not be put in force.
     """
-    ask("do_nothing", Path(os.devnull), None)
+    _ask("do_nothing", Path(os.devnull), None)
     return {} if sys.platform == "linux" else {"a limit of memory": "only Linux enforces one"}

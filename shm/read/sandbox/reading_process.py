@@ -29,18 +29,9 @@ from numpy.typing import NDArray
 
 from shm.documents import finite, reader, value_of
 from shm.errors import BadInput, ShmError, WorkerDied
-from shm.read.base import Layout, Peek, Survey
-from shm.read.bundles import holds_test
-from shm.read.content import is_gzipped
+from shm.read.content import holds_test, is_gzipped
 from shm.read.limits import Limits
-from shm.read.modal_sets import ForeignModes
 from shm.resources import KILLING
-from shm.values import FrequencyResponse, ModalTest, Recording
-
-_KINDS: dict[str, type] = {
-    kind.__name__: kind
-    for kind in (ForeignModes, FrequencyResponse, Layout, ModalTest, Peek, Recording, Survey)
-}
 
 BEGUN = b"+"
 """A child writes it once its limits are in force."""
@@ -54,23 +45,31 @@ _DAMAGED = "The file is damaged or made to harm: export it anew from its source.
 _GRACE_S, _START_S, _RETRY_S = 5.0, 120.0, 60.0
 _CODE = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    "from shm.read.sandbox.serving import serve; serve()"
+    "from shm.read.registry import VERBS, libraries_for; "
+    "from shm.read.sandbox.serving import serve; serve(VERBS, libraries_for)"
 )
 _OURS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "HDF5_USE_FILE_LOCKING": "FALSE"}
 _PASSED_ON = {"LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH"}
 
 
-def ask(verb: str, path: Path, limits: Limits | None = None) -> list[Any]:
-    """Return the values that a child found in a file; raises BadInput, and where it died of it."""
-    limits = limits or Limits()
-    if not holds_test(path) and not is_gzipped(path):
-        return _answer(verb, path, "", limits)
-    # It is unpacked in a folder of ours, which also goes where the child is killed.
-    with tempfile.TemporaryDirectory(prefix="shm-read-") as folder:
-        return _answer(verb, path, folder, limits)
+def ask(verb: str, path: Path, limits: Limits, kinds: Mapping[str, type]) -> list[Any]:
+    """Return the values that a child found in a file, each of a class among `kinds`.
+
+    Raises BadInput, also where the child died of the file.
+    """
+    if holds_test(path) or is_gzipped(path):
+        # It is unpacked in a folder of ours, which also goes where the child is killed.
+        with tempfile.TemporaryDirectory(prefix="shm-read-") as folder:
+            found, arrays = _answer(verb, path, folder, limits)
+    else:
+        found, arrays = _answer(verb, path, "", limits)
+    return _values(found, arrays, path, kinds)
 
 
-def _answer(verb: str, path: Path, folder: str, limits: Limits) -> list[Any]:
+def _answer(
+    verb: str, path: Path, folder: str, limits: Limits
+) -> tuple[list[tuple[str, Any]], dict[str, NDArray[Any]]]:
+    """Return pairs of a class and a node, and the arrays; raises the refusal of a child."""
     request = {
         "verb": verb, "path": str(path), "working_folder": str(Path.cwd()), "folder": folder,
         "limits": asdict(limits),
@@ -89,11 +88,14 @@ def _answer(verb: str, path: Path, folder: str, limits: Limits) -> list[Any]:
         raise _death(status, path, limits, begun=raw.startswith(BEGUN)) from None
     if found and found[0][0] == "refusal":
         raise BadInput(**found[0][1])
-    return _values(found, arrays, path)
+    return found, arrays
 
 
 def _values(
-    found: Sequence[tuple[str, Any]], arrays: Mapping[str, NDArray[Any]], path: Path
+    found: Sequence[tuple[str, Any]],
+    arrays: Mapping[str, NDArray[Any]],
+    path: Path,
+    kinds: Mapping[str, type],
 ) -> list[Any]:
     """Return values of the classes named, each part of the type that it must be."""
 
@@ -109,7 +111,7 @@ def _values(
     by = reader(finite)
     by.register_structure_hook_func(is_array, array)
     try:
-        return [value_of(_KINDS[kind], node, by=by) for kind, node in found]
+        return [value_of(kinds[kind], node, by=by) for kind, node in found]
     except (ValueError, TypeError) as error:
         raise BadInput(
             f"the file made the reader give an answer that cannot be: {error}.",

@@ -18,7 +18,7 @@ import signal
 import socket
 import struct
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from importlib import import_module
@@ -32,25 +32,17 @@ from shm.documents import compact
 from shm.errors import BadInput, ShmError
 from shm.read.content import unpacking_in
 from shm.read.limits import Limits, limited, limits, too_large, too_much_memory
-from shm.read.modal_sets import foreign_modes
-from shm.read.registry import layout_of, libraries_for, load_modes, peek_test, read_test, survey
 from shm.read.sandbox.reading_process import BEGUN, HEADER, LARGEST_ANSWER
 
 _LARGEST_REQUEST = 1 << 16  # three paths of PATH_MAX, 4096 bytes, thrice as long in JSON
 _OPEN_FILES = 64  # judgement: a reader opens a file, its sidecar and modules, one after the other
 _WALL_SECONDS = 3.0  # judgement: times its processor time; beyond, it waits for something
-_VERBS: dict[str, Callable[[Path], Sequence[object]]] = {
-    "read_test": read_test,
-    "peek_test": peek_test,
-    "load_modes": load_modes,
-    "survey": lambda path: [survey(path)],
-    "layout_of": lambda path: [layout_of(path)],
-    "foreign_modes": lambda path: [each for each in [foreign_modes(path)] if each],
-    "do_nothing": lambda _: [],
-}
 
 
-def serve() -> None:
+Verb = Callable[[Path], Sequence[object]]
+
+
+def serve(verbs: Mapping[str, Verb], libraries_for: Callable[[Path], Sequence[str]]) -> None:
     """Answer requests until the asking process is gone."""
     requests = socket.socket(fileno=0)
     gc.freeze()
@@ -67,13 +59,13 @@ def serve() -> None:
                     import_module(library)
             child = os.fork()
             if child == 0:
-                _read_and_end(request, descriptors[0])
+                _read_and_end(verbs[request["verb"]], request, descriptors[0])
             os.close(descriptors[0])
             _, status = os.waitpid(child, 0)
             requests.sendall(struct.pack("i", os.waitstatus_to_exitcode(status)))
 
 
-def _read_and_end(request: dict[str, Any], out: int) -> None:
+def _read_and_end(verb: Verb, request: dict[str, Any], out: int) -> None:
     """Run the whole life of a child; nothing of the parent's runs after it."""
     code = 1
     try:
@@ -84,7 +76,7 @@ def _read_and_end(request: dict[str, Any], out: int) -> None:
         _confine(allowed, unpacks=folder is not None, keep=out)
         os.write(out, BEGUN)
         with limited(allowed), unpacking_in(folder):
-            _answer(_VERBS[request["verb"]], Path(request["path"]), out)
+            _answer(verb, Path(request["path"]), out)
         code = 0
     finally:
         os._exit(code)
@@ -119,7 +111,7 @@ def _confine(allowed: Limits, *, unpacks: bool, keep: int) -> None:
         resource.setrlimit(what, most)
 
 
-def _answer(verb: Callable[[Path], Sequence[object]], path: Path, out: int) -> None:
+def _answer(verb: Verb, path: Path, out: int) -> None:
     arrays: dict[str, NDArray[Any]] = {}
     try:
         found = [(type(each).__name__, _node(each, arrays)) for each in verb(path)]

@@ -22,8 +22,7 @@ from starlette.concurrency import run_in_threadpool
 from shm.errors import BadInput, UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.import_answers import (
-    answer_temperature,
-    answer_time,
+    ANSWERS_OF_TEST,
     answer_to,
     import_document,
 )
@@ -103,6 +102,7 @@ class ImportLook(BaseModel):
     hanger: int | None
     time: datetime | None
     temperature_c: float | None
+    operator: str
     sampling_rate_hz: float | None
     samples: int
     columns: list[ImportedColumn]
@@ -131,7 +131,8 @@ async def import_file(
             max_length=_MOST_ANSWERS,
             description='Answers, as JSON: {"hanger": 3, "columns": {"A1": {"plane": "transverse",'
             ' "place": "2.5"}}}; with "each_time": true the hanger is not kept; "time" is an ISO'
-            " 8601 time or day. Without answers the file is only looked into.",
+            ' 8601 time or day, "operator" who measured. Without answers the file is only looked'
+            " into.",
         ),
     ] = None,
 ) -> Any:
@@ -199,10 +200,10 @@ def _answers(body: str, found: Import) -> Answers:
         _number(document, "sampling_rate_hz", least=0.0),
         None,
         _number(document, "temperature_c", least=-300.0),
-        tables,
+        channels=tables,
         each_time=document.get("each_time") is True,
     )
-    for key, answer in (("time", answer_time), ("temperature", answer_temperature)):
+    for key, answer in ANSWERS_OF_TEST.items():
         if key in document:
             answers = _with(answer, answers, document[key])
     return answers

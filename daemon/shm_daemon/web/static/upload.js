@@ -133,7 +133,7 @@
         box.append(line);
         return [question, input];
       });
-      const carried = made("input", { id: `carried-${row.number}`, type: "checkbox" });
+      const carried = made("input", { id: `carried-${row.number}`, type: "checkbox", checked: true });
       if (found.questions.some(({ about }) => about === "hanger")) {
         const label = made("label", { htmlFor: carried.id, className: "carried" });
         label.append(carried, " This logger goes from hanger to hanger: ask each time");
@@ -149,12 +149,12 @@
       plain.addEventListener("click", () => ended(null));
       box.addEventListener("submit", (event) => {
         event.preventDefault();
-        const answers = { columns: {}, ...(carried.checked && { each_time: true }) };
+        const answers = { columns: {}, ...(carried.isConnected && carried.checked && { each_time: true }) };
         for (const [{ about, channel }, { value }] of fields) {
           if (value === "") continue;
           if (about === "hanger") answers.hanger = Number(value);
           else if (about === "rate") answers.sampling_rate_hz = Number(value);
-          else if (about === "time" || about === "temperature") answers[about] = value;
+          else if (["time", "temperature", "operator"].includes(about)) answers[about] = value;
           else (answers.columns[channel] ??= {})[about] = value;
         }
         ended(answers);
