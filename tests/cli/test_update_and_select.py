@@ -54,6 +54,7 @@ def test_the_document_of_update_has_the_keys_of_the_contract_and_repeats(
     assert {**again, "seconds": 0} == {**document, "seconds": 0}
 
 
+@pytest.mark.slow
 def test_sampler_emcee_says_so_and_agrees(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
     usual, other = (
         shm(*call(modes_file, hanger_file, *words)).document
