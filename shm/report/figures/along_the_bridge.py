@@ -92,7 +92,8 @@ def specify_shifts(pattern: BridgePattern) -> Specification:
 
 def _places(pattern: BridgePattern) -> dict[int, int]:
     """Return the place of each hanger in the order of the bridge."""
-    return {each.hanger: each.place for each in (*pattern.rows, *pattern.not_compared)}
+    places = {each.hanger: each.place for each in pattern.rows}
+    return places | {each.hanger: each.place for each in pattern.not_compared}
 
 
 def _along(places: dict[int, int]) -> Axis:
