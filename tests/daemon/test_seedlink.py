@@ -22,7 +22,6 @@ from shm.store import Workspace
 from shm.store.queries.streams import list_stream_events
 from shm.store.ring import Ring
 from shm.values import FloatArray
-from shm_daemon.doctor import examine
 from shm_daemon.heartbeat import HEARTBEAT
 from shm_daemon.seedlink import Pace, streams_asked
 from shm_daemon.wakeup import Wakeup
@@ -328,10 +327,3 @@ def test_missing_extra_is_said(bridge: Workspace, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setitem(sys.modules, "seedlink_client", None)
     with pytest.raises(UsageError, match="seedlink"), asked(workspace):
         pass
-
-
-def test_doctor_names_extra(bridge: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    workspace = asking(bridge, 18000)
-    monkeypatch.setattr("shm_daemon.doctor._MODULES", {"web": ("fastapi",)})
-    (finding,) = (each for each in examine(workspace.folder, NOW) if each.check == "extras")
-    assert finding.remedy == "pip install 'shm[seedlink]'"
