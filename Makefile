@@ -31,10 +31,9 @@ demo: .venv/runtime
 demo-live: .venv/runtime
 	$(BIN)/shm demo --live --folder shm-demo-live
 
-# Three parts at once, because many tests wait for a daemon, a server or a browser. The quick tests of
-# the numerics run as on another processor: see tests/benchmarks/Makefile.
+# Three parts at once, because many tests wait for a daemon, a server or a browser.
 test: .venv/development
-	$(MAKE) --jobs 3 --directory tests/benchmarks lint without-avx2 test-others
+	$(MAKE) --jobs 3 --directory tests/benchmarks lint tests sample-without-avx2
 
 lint: .venv/development
 	$(BIN)/ruff check .

@@ -35,7 +35,7 @@ from shm import api
 from shm.models.registry import MODELS
 from shm_cli.common import markdown
 from shm_cli.effects import effects_page
-from shm_cli.installation import settings_page
+from shm_cli.installation import licences_page, settings_page
 from shm_cli.main import VERBS, cli
 from tests.benchmarks.thesis import frequencies, selection, thesis_data
 from tests.benchmarks.validate import compared
@@ -198,6 +198,7 @@ def main() -> None:
         draw_examples()
     (DOCS / "commands.md").write_text(commands_page(), encoding="utf-8")
     (DOCS / "settings.md").write_text(settings_page(), encoding="utf-8")
+    (DOCS / "licences.md").write_text(licences_page(), encoding="utf-8")
     (DOCS / "effects.md").write_text(effects_page(), encoding="utf-8")
     (DOCS / "thesis.md").write_text(thesis_page(), encoding="utf-8")
     fill_in(DOCS / "physics.md", "classes", classes_table())

@@ -23,7 +23,7 @@ from grafana_foundation_sdk.models import common as texts
 from grafana_foundation_sdk.models import dashboard as models
 
 FOLDER = Path(__file__).resolve().parents[1] / "config" / "grafana"
-STATES = ("First test", "No change", "Cannot judge", "Check", "Watch", "Alert")
+STATES = ("Baseline only", "No change", "Cannot judge", "Check", "Watch", "Alert")
 URGENCIES = ("none", "next test", "week", "today")
 _COLOURS = ("blue", "green", "yellow", "yellow", "orange", "red")
 _DAYS = {"shm_hanger": 2}

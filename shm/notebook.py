@@ -10,7 +10,7 @@ import io
 import math
 import textwrap
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,11 +19,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from shm.report.formatting import Interval
+    from shm.report.paper import Table
     from shm.values import (
         Diagnosis,
         FloatArray,
         GapCheck,
         Hanger,
+        Limits,
         ModalTest,
         Posterior,
         Recording,
@@ -57,32 +59,34 @@ class Sheet:
 
     @property
     def text(self) -> str:
-        """In columns, without blanks at the ends of lines."""
-        table = [self.head, *self.rows] if any(self.head) else list(self.rows)
-        widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-        lines = [
-            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-            for row in table
-        ]
+        """In columns of a notebook's cell."""
+        return self.text_of(_WIDTH)
+
+    def text_of(self, width: int) -> str:
+        """Return the sheet in lines of at most `width` columns, as a report's text."""
+        from shm.report.as_text import laid_out
+
         lead, notes = (
-            [textwrap.fill(each, _WIDTH) for each in wording] for wording in (self.lead, self.notes)
+            [textwrap.fill(each, width) for each in wording] for wording in (self.lead, self.notes)
         )
-        return "\n".join([self.title, *lead, *lines, *notes])
+        table = laid_out(replace(self._table, title=""), width).strip("\n")
+        return "\n".join([self.title, *lead, table, *notes])
 
     @property
     def html(self) -> str:
-        headings = "".join(f"<th>{escape(each)}</th>" for each in self.head)
-        shown = f"<thead><tr>{headings}</tr></thead>" if any(self.head) else ""
-        body = "".join(
-            "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
-            for row in self.rows
-        )
-        table = f"<caption>{escape(self.title)}</caption>{shown}<tbody>{body}</tbody>"
+        from shm.report.as_html import table_html
+
         lead, notes = (
             "".join(f"<p>{escape(each)}</p>" for each in wording)
             for wording in (self.lead, self.notes)
         )
-        return f"{lead}<table>{table}</table>{notes}"
+        return f"{lead}{table_html(self._table)}{notes}"
+
+    @property
+    def _table(self) -> Table:
+        from shm.report.paper import Table
+
+        return Table(self.title, self.head, tuple(self.rows))
 
 
 def sheet(value: Any) -> Sheet:
@@ -154,7 +158,7 @@ def _largest(values: FloatArray) -> float:
     return float(known.max()) if len(known) else math.nan
 
 
-def _posterior(posterior: Posterior) -> Sheet:
+def posterior_sheet(posterior: Posterior, limits: Limits | None = None) -> Sheet:
     """Show tension and parameters: mean, 90 % interval, most probable value, meaning."""
     from shm.values.posterior import WITHOUT_MODEL
 
@@ -177,13 +181,15 @@ def _posterior(posterior: Posterior) -> Sheet:
         rows.append(_interval_row(name, interval, best[name], formatting.meaning(posterior, name)))
     head = ("", "mean", "90 % interval", "most probable", "what it is")
     sampled = (
-        f"{len(posterior.samples)} draws, log evidence {posterior.log_evidence:.2f} "
-        f"± {formatting.number(posterior.log_evidence_sd, '.2f')}, "
-        f"R-hat {formatting.number(posterior.r_hat, '.3f')}."
+        f"{len(posterior.samples)} draws "
+        f"({formatting.number(posterior.effective_sample_size, '.0f')} effective), log evidence "
+        f"{posterior.log_evidence:.2f} ± {formatting.number(posterior.log_evidence_sd, '.2f')}, "
+        f"R-hat {formatting.number(posterior.r_hat, '.3f')}, seed {posterior.seed}."
     )
     title = f"{_whose(posterior)}, {formatting.model_class(posterior.model)}"
-    statement = " ".join(stated(averaged_now(posterior), unit).sentences)
-    return Sheet(title, head, rows, (statement, *posterior.caveats, sampled))
+    averaged = averaged_now(posterior, limits=limits)
+    lead = (*averaged.caveats, " ".join(stated(averaged, unit).sentences))
+    return Sheet(title, head, rows, (sampled,), lead)
 
 
 def _frequencies(posterior: Posterior) -> Sheet:
@@ -194,7 +200,7 @@ def _frequencies(posterior: Posterior) -> Sheet:
     return Sheet(title, ("mode", "frequency in Hz"), rows)
 
 
-def _selection(selection: Selection) -> Sheet:
+def selection_sheet(selection: Selection, limits: Limits | None = None) -> Sheet:
     """Show the tension over all classes with its caveats, then what each class gives."""
     from shm.report import formatting
     from shm.report.formatting import Interval
@@ -212,13 +218,14 @@ def _selection(selection: Selection) -> Sheet:
             (
                 formatting.model_class(posterior.model),
                 formatting.probability(probability),
-                f"{posterior.log_evidence:.2f}",
+                f"{posterior.log_evidence:.2f} "
+                f"± {formatting.number(posterior.log_evidence_sd, '.2f')}",
                 formatting.mean(tension),
                 formatting.span(tension),
             )
         )
     head = ("class", "probability", "log evidence", *formatting.tension_headings(unit))
-    averaged = selection.averaged
+    averaged = selection.averaged_with(limits)
     lead = (*averaged.caveats, " ".join(stated(averaged, unit).sentences))
     return Sheet(f"{_whose(selection.selected)}, model classes", head, rows, lead=lead)
 
@@ -285,7 +292,7 @@ _SHEETS: dict[str, Callable[[Any], Sheet]] = {
     "GapCheck": _gap_check,
     "Hanger": _hanger,
     "ModalTest": _modal_test,
-    "Posterior": _posterior,
+    "Posterior": posterior_sheet,
     "Recording": _recording,
-    "Selection": _selection,
+    "Selection": selection_sheet,
 }

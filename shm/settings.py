@@ -181,7 +181,7 @@ class Settings:
     alert_grouping_seconds: float = _row(
         60.0,
         "s",
-        "alike alerts of several hangers within this time are one message; 0: never",
+        "similar alerts of several hangers within this time are one message; 0: never",
         0,
         3600,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from itertools import accumulate
 from pathlib import Path
@@ -20,17 +20,17 @@ from shm.gap.diagnose import examined
 from shm.gap.measurement_plan import PlannedMeasurement, Race, nothing_planned, planned
 from shm.gap.shared_causes import LEAST
 from shm.pipeline import utc_now
-from shm.pipeline.diagnosing import LATEST_TESTS, diagnose_stored, latest_tests
-from shm.pipeline.lineage import diagnosis_lineage
+from shm.pipeline.diagnosing import ChosenTests, choose_tests, diagnose_stored, keep_diagnosis
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_json, bridge_diagnosis_paper
 from shm.report.contents import BridgeDiagnosisSheet, DiagnosisSheet
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
-from shm.report.figures.every_figure import bridge_diagnosis_figures, diagnosis_figures
-from shm.report.figures.specification import Illustration
+from shm.report.figures.every_figure import OF_DIAGNOSIS
+from shm.report.figures.gap_causes import SHARED
+from shm.report.figures.specification import Illustration, drawn
 from shm.report.paper import Paper
-from shm.store import Store, StoredTest
+from shm.store import Store
 from shm.store.queries.tests import load_frequency_response
 from shm.values import Diagnosis, Hanger, ModalTest, ResponsePoint
 from shm.values.bar_description import describe_bar, list_sensors
@@ -60,6 +60,12 @@ _without = click.option(
     help="Take an effect out of the catalogue; may be given again.",
 )
 
+_all_tests = click.option(
+    "--all-tests",
+    is_flag=True,
+    help="Take tests from before the last change that the watch reports, too.",
+)
+
 _HEADS = ("measurement", "hours", "in all", "promised log odds", "then", "probability")
 
 
@@ -85,6 +91,7 @@ def command() -> None:
 )
 @flags.baseline
 @_without
+@_all_tests
 @flags.seed
 @flags.json
 @click.pass_context
@@ -96,21 +103,25 @@ def plan(
     budget_hours: float | None,
     baseline: str,
     without: tuple[str, ...],
+    all_tests: bool,
     seed: int,
 ) -> None:
     """Rank the next measurements, each with its cost and expected benefit.
 
-    Uses MODES.json, or the latest 20 tests of a hanger of the workspace. State the hours of each
-    kind of measurement in the table [measurement_hours] of bridge.toml.
+    Uses MODES.json, or the latest tests of a hanger of the workspace since its last change, 20 at
+    most. State the hours of each kind of measurement in the table [measurement_hours] of
+    bridge.toml.
 
     \b
     Example: shm gap plan hanger3.modes.json --hanger-file H.toml --budget 8
     """
-    tests, hanger = _measured(ctx, file, hanger_file, hanger_id)
+    tests, hanger, remark = _measured(ctx, file, hanger_file, hanger_id, every=all_tests)
     bridge = load_bridge(hanger_file) if hanger_file is not None else open_workspace(ctx).bridge
     options = GapOptions(baseline, without, seed=seed)
     with advancing_bar() as progress:
         diagnosis, attribution = examined(tests, hanger, options, progress)
+    if remark:
+        click.echo(remark, err=True)
     race = Race.of(attribution, np.random.default_rng(seed))
     most_hours = budget_hours or np.inf
     steps = planned(race, bridge.measurement_hours, most_hours)
@@ -142,14 +153,20 @@ def plan(
 
 
 def _measured(
-    ctx: click.Context, file: Path | None, hanger_file: Path | None, hanger_id: int | None
-) -> tuple[Sequence[ModalTest], Hanger]:
-    """Return the tests and their hanger, as `shm gap diagnose` takes them."""
+    ctx: click.Context,
+    file: Path | None,
+    hanger_file: Path | None,
+    hanger_id: int | None,
+    *,
+    every: bool,
+) -> tuple[Sequence[ModalTest], Hanger, str]:
+    """Return the tests, their hanger and a remark on those left out, as `shm gap diagnose` does."""
     if file is not None:
-        return tests_and_hanger(ctx, file, hanger_file, hanger_id)
+        return *tests_and_hanger(ctx, file, hanger_file, hanger_id), ""
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     with opened_store(ctx) as (_, store):
-        return [each.test for each in latest_tests(store, hanger, LATEST_TESTS)], hanger
+        chosen = choose_tests(store, hanger, every=every)
+        return chosen.tests, hanger, chosen.remark
 
 
 def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
@@ -176,6 +193,7 @@ def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
     help="Leave a test or an order of modes out of the fit and predict it; may be given again.",
 )
 @flags.latest
+@_all_tests
 @flags.seed
 @click.option(
     "--html", type=flags.NewFile(), metavar="FILE", help="Write a page with all figures here."
@@ -193,15 +211,17 @@ def diagnose(
     without: tuple[str, ...],
     hold_out: tuple[str, ...],
     count: int,
+    all_tests: bool,
     seed: int,
     html: Path | None,
     figures: Path | None,
 ) -> None:
     """Diagnose the gap: where it is, its causes, how far they shrink it, what to measure next.
 
-    Give MODES.json with --hanger-file, or a hanger of the workspace: its latest tests are used, and
-    the diagnosis is stored for its report and for `shm gap adopt`. The answer gives a probability
-    to every effect of the catalogue, to no gap, and to something that the catalogue lacks.
+    Give MODES.json with --hanger-file, or a hanger of the workspace: its latest tests since the
+    last change that the watch reports are used, and the diagnosis is stored for its report and for
+    `shm gap adopt`. The answer gives a probability to every effect of the catalogue, to no gap, and
+    to something that the catalogue lacks.
 
     With --bridge, or with several MODES.json, each followed by its H.toml: the cause that hangers
     share, which of them have it, and what it means for their tensions.
@@ -213,17 +233,19 @@ def diagnose(
     """
     options = GapOptions(baseline, without, hold_out, seed=seed)
     if bridge or len(files) > 1:
-        joint = _jointly(ctx, files, bridge, (hanger_id, hanger_file), count, options)
-        draw = partial(bridge_diagnosis_figures, joint.diagnosis)
+        joint = _jointly(ctx, files, bridge, (hanger_id, hanger_file), (count, all_tests), options)
+        draw = partial(drawn, (SHARED,), joint.diagnosis)
         _show(bridge_diagnosis_paper(joint), bridge_diagnosis_json(joint), draw, html, figures)
         return
     if not files:
-        sheet = _of_workspace(ctx, one_hanger(ctx, hanger_file, hanger_id), count, options)
+        sheet = _of_workspace(
+            ctx, one_hanger(ctx, hanger_file, hanger_id), (count, all_tests), options
+        )
     else:
         tests, hanger = tests_and_hanger(ctx, files[0], hanger_file, hanger_id)
         found = _diagnosis(tests, hanger, options)
         sheet = DiagnosisSheet(found, hanger, sensors=_sensors(tests))
-    draw = partial(diagnosis_figures, sheet)
+    draw = partial(drawn, OF_DIAGNOSIS, sheet)
     _show(diagnosis_paper(sheet), diagnosis_json(sheet), draw, html, figures)
 
 
@@ -232,14 +254,17 @@ for _verb in (adopt, adopted, check, drop, effects):
 
 
 def _of_workspace(
-    ctx: click.Context, hanger: Hanger, count: int, options: GapOptions
+    ctx: click.Context, hanger: Hanger, latest: tuple[int, bool], options: GapOptions
 ) -> DiagnosisSheet:
-    """Return the diagnosis of the latest tests, which the store keeps."""
+    """Return the diagnosis of the latest tests, which the store keeps.
+
+    `latest` says how many at most, and if from before the last change, too.
+    """
     with opened_store(ctx) as (workspace, store):
-        stored = latest_tests(store, hanger, count)
+        chosen = choose_tests(store, hanger, latest[0], every=latest[1])
         with advancing_bar() as progress:
-            found = diagnose_stored(store, stored, hanger, options, utc_now(), progress)
-        sensors = _stored_sensors(store, stored)
+            found = diagnose_stored(store, chosen, hanger, options, utc_now(), progress)
+        sensors = _stored_sensors(store, chosen)
     return DiagnosisSheet(found, hanger, workspace.bridge.name, sensors)
 
 
@@ -248,9 +273,9 @@ def _sensors(tests: Sequence[ModalTest]) -> tuple[ResponsePoint, ...]:
     return tuple(dict.fromkeys(point for test in tests for point in list_sensors(test)))
 
 
-def _stored_sensors(store: Store, tests: Sequence[StoredTest]) -> tuple[ResponsePoint, ...]:
+def _stored_sensors(store: Store, chosen: ChosenTests) -> tuple[ResponsePoint, ...]:
     """Return the sensors of all tests as their recordings had them, each once."""
-    responses = ((each.test, load_frequency_response(store, each)) for each in tests)
+    responses = ((each.test, load_frequency_response(store, each)) for each in chosen.stored)
     return tuple(dict.fromkeys(p for test, found in responses for p in list_sensors(test, found)))
 
 
@@ -264,7 +289,7 @@ def _jointly(
     files: tuple[Path, ...],
     bridge: bool,
     one: tuple[int | None, Path | None],
-    count: int,
+    latest: tuple[int, bool],
     options: GapOptions,
 ) -> BridgeDiagnosisSheet:
     """Diagnose several hangers together: of files, or all of the workspace, which stores each."""
@@ -274,7 +299,7 @@ def _jointly(
             remedy="Give MODES.json H.toml pairs alone, or --bridge alone.",
         )
     if bridge:
-        return _of_bridge(ctx, count, options)
+        return _of_bridge(ctx, latest, options)
     found = [tests_and_hanger(ctx, modes, of, None) for modes, of in _pairs(files)]
     for tests, hanger in found:
         show_doubts(tests, hanger)
@@ -294,13 +319,15 @@ def _pairs(files: tuple[Path, ...]) -> list[tuple[Path, Path]]:
     return pairs
 
 
-def _of_bridge(ctx: click.Context, count: int, options: GapOptions) -> BridgeDiagnosisSheet:
+def _of_bridge(
+    ctx: click.Context, latest: tuple[int, bool], options: GapOptions
+) -> BridgeDiagnosisSheet:
     """Return all hangers of the workspace that have tests and that the baseline can describe."""
     with opened_store(ctx) as (workspace, store):
         stored = {
-            hanger: tests
+            hanger: choose_tests(store, hanger, latest[0], every=latest[1])
             for hanger in workspace.bridge.hangers
-            if hanger.is_modelled and (tests := store.tests.list_all(hanger.id)[-count:])
+            if hanger.is_modelled and store.tests.list_all(hanger.id)
         }
         if len(stored) < LEAST:
             raise NothingThere(
@@ -309,13 +336,16 @@ def _of_bridge(ctx: click.Context, count: int, options: GapOptions) -> BridgeDia
                 remedy="Take tests in with `shm ingest`.",
             )
         with advancing_bar() as progress:
-            named = [(hanger, [e.test for e in tests]) for hanger, tests in stored.items()]
+            named = [(hanger, chosen.tests) for hanger, chosen in stored.items()]
             found = diagnose_bridge(named, options, progress)
-        for (hanger, tests), diagnosis in zip(stored.items(), found.diagnoses, strict=True):
-            lineage = diagnosis_lineage(tests, hanger, asdict(options))
-            store.posteriors.save_diagnosis(hanger.id, diagnosis, lineage, utc_now())
+        each_alone = tuple(
+            keep_diagnosis(store, chosen, hanger, diagnosis, options, utc_now())
+            for (hanger, chosen), diagnosis in zip(stored.items(), found.diagnoses, strict=True)
+        )
+        found = replace(found, diagnoses=each_alone)
         bars = tuple(
-            describe_bar(hanger, _stored_sensors(store, tests)) for hanger, tests in stored.items()
+            describe_bar(hanger, _stored_sensors(store, chosen))
+            for hanger, chosen in stored.items()
         )
     return BridgeDiagnosisSheet(found, workspace.bridge.name, bars)
 

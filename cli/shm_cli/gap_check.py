@@ -15,7 +15,8 @@ from rich.text import Text
 from shm.diagnosis_document import gap_check_document
 from shm.errors import BadInput, NothingThere, UsageError
 from shm.gap.check import Check, CheckOptions
-from shm.report.figures.every_figure import gap_check_figures
+from shm.report.figures.gap_check import FIGURE
+from shm.report.figures.specification import drawn
 from shm.report.gap_check_report import HEADINGS, check_text, introduction, rows
 from shm.values import GapCheck, Hanger, ModalTest
 from shm_cli import completion, flags
@@ -119,7 +120,7 @@ def check(
         if not found.effects:
             raise NothingThere(f"no effect was checked: {figure} is not drawn.")
         with drawing():
-            for each in gap_check_figures(found):
+            for each in drawn((FIGURE,), found):
                 each.figure.savefig(figure, facecolor="white")
     if not found.is_complete:
         ctx.exit(130)  # as a shell reports Ctrl-C

@@ -147,6 +147,18 @@ def notices_command() -> None:
         show_rows("", heads, [(e.package, e.version, e.licence, e.extra) for e in found])
 
 
+def licences_page() -> str:
+    """Return the manual's page of licences in Markdown, of the packages that are installed."""
+    head = (
+        "# Licences\n\n"
+        "`shm` itself is under the MIT licence. These are the packages that it requires, with the "
+        "licence that each declares; those of an extra are needed for that extra alone. `shm "
+        "notices` says so of your installation, where the texts of the licences lie, too.\n\n"
+    )
+    rows = [(each.package, each.version, each.licence, each.extra) for each in notices()]
+    return head + markdown(("package", "version", "licence", "extra"), rows) + "\n"
+
+
 def notices() -> Sequence[Notice]:
     """Return every installed package that shm requires, directly or not, with its extras."""
     found: dict[str, Notice] = {}

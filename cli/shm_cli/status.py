@@ -48,7 +48,7 @@ from shm.store.queries.recordings import (
 from shm.store.queries.tests import count_tests, list_baseline_tests, list_undated_names
 from shm.store.stored_alerts import describe_silence
 from shm.values import Summary
-from shm.values.rounding import ForceUnit, force_unit, rounded_percent
+from shm.values.rounding import ForceUnit, force_unit, listed, rounded_percent
 from shm.watch.alert_text import frequency_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
@@ -84,12 +84,10 @@ def command(ctx: click.Context, which: str | None) -> None:
     _show(document)
     for text in document["changed_settings"]:
         click.echo(paragraph(f"changed on the page Settings: {text}"))
-    for row in document["hangers"]:
-        if row["urgency"] != "none" and row["tests"]:
-            text = " ".join((row["state"], row["action"], *row["notes"]))
-            click.echo(paragraph(text))
-    for text, hangers in _competitions(document["hangers"]).items():
-        click.echo(f"hanger{'s' if ',' in hangers else ''} {hangers}: {text}")
+    for text in _actions(document["hangers"]):
+        click.echo(paragraph(text))
+    for text, hangers in _not_applicable(document["hangers"]).items():
+        click.echo(paragraph(f"hanger{'s' if ',' in hangers else ''} {hangers}: {text}"))
     for row in document["hangers"]:
         if row["creep_per_year"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['creep_per_year']['words']}")
@@ -232,23 +230,32 @@ def _gap(store: Store, hanger: int) -> dict[str, Any] | None:
     }
 
 
-def _competitions(rows: list[dict[str, Any]]) -> dict[str, str]:
-    """Return the competing classes, and the reasons against others, with their hangers."""
+def _actions(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what each hanger needs; of those with a baseline alone in one sentence."""
+    of_baseline: dict[str, dict[str, str]] = {}
+    found = []
+    for row in rows:
+        if row["urgency"] == "none" or not row["tests"]:
+            continue
+        words = " ".join((row["state"], row["action"], *row["notes"]))
+        if row["status"] == "first" and not row["notes"]:
+            of_baseline.setdefault(row["action"], {})[str(row["hanger"])] = words
+        else:
+            found.append(words)
+    for action, hangers in of_baseline.items():
+        many = f"Baseline only, hangers {listed(list(hangers))}: {action}"
+        found.append(many if len(hangers) > 1 else next(iter(hangers.values())))
+    return found
+
+
+def _not_applicable(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Return why model classes do not apply, with the hangers of each reason."""
     found: dict[str, list[str]] = {}
     for row in rows:
-        competing = ", ".join(map(model_class, row["competing"]))
-        sentence = f"{competing or 'no model class'} may compete"
-        for reason, names in _by_reason(row["not_applicable"]).items():
-            sentence += f"; {', '.join(names)} {'do' if names[1:] else 'does'} not apply: {reason}"
-        found.setdefault(f"{sentence}.", []).append(str(row["hanger"]))
-    return {sentence: ", ".join(hangers) for sentence, hangers in found.items()}
-
-
-def _by_reason(not_applicable: Mapping[str, str]) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
-    for name, reason in not_applicable.items():
-        found.setdefault(reason.removesuffix("."), []).append(name)
-    return found
+        for name, reason in row["not_applicable"].items():
+            text = f"{model_class(name)} does not apply: {reason}"
+            found.setdefault(text, []).append(str(row["hanger"]))
+    return {text: ", ".join(hangers) for text, hangers in found.items()}
 
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:

@@ -5,26 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import rich_click as click
 
-from shm.documents import posterior_document, selection_document, summary
+from shm.documents import posterior_document, selection_document
 from shm.errors import UsageError
 from shm.inference import Progress, UpdateOptions, select, update
 from shm.inference.options import IMPORTANCE, SAMPLERS
 from shm.models import Model, applicable, build, competing_names
 from shm.modes_document import load_modes
+from shm.notebook import posterior_sheet, selection_sheet
 from shm.report.assumed import assumptions_line, with_assumptions
 from shm.settings import load_settings
 from shm.store.queries.hangers import list_adoptions
-from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior, Selection
-from shm.values.rounding import force_unit
-from shm.values.stated_tension import averaged_now, stated
+from shm.values import Hanger, Limits, ModalTest, Posterior
 from shm_cli import completion, flags
 from shm_cli.common import (
     opened_store,
     paragraph,
     progress_bar,
+    readable_width,
     show,
     show_doubts,
     show_rows,
@@ -167,50 +166,20 @@ def tell_irregular(tests: Sequence[ModalTest]) -> None:
                 )
 
 
-def show_stated(averaged: Averaged) -> None:
-    """Return the caveats of a tension, then the tension with both intervals."""
-    for caveat in averaged.caveats:
-        click.echo(paragraph(caveat))
-    for sentence in stated(averaged).sentences:
-        click.echo(paragraph(sentence))
-
-
 def show_posterior(posterior: Posterior, limits: Limits | None = None) -> None:
-    """Return the tension in words, parameters and predicted frequencies as tables."""
-    show_stated(averaged_now(posterior, limits=limits))
-    tension_n = summary(
-        posterior.tension_n, posterior.most_probable[0] * posterior.nominal_tension_n
-    )
-    unit = force_unit(tension_n["mean"])
-    places = unit.decimals(tension_n["mean"])
-    title = (
-        f"{posterior.model}: posterior of hanger {posterior.hanger}, "
-        f"log evidence {posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}"
-    )
-    rows = [
-        (f"tension ({unit.name})", *(f"{unit.of(e):.{places}f}" for e in tension_n.values())),
-    ]
-    for name, best in zip(posterior.names, posterior.most_probable, strict=True):
-        figures = summary(posterior.parameter(name), best)
-        rows.append((name, *(f"{value:.4g}" for value in figures.values())))
-    show_rows(title, ("parameter", "mean", "sd", "5 %", "median", "95 %", "most probable"), rows)
+    """Print the tension in words, then parameters and predicted frequencies as tables."""
+    click.echo(posterior_sheet(posterior, limits).text_of(readable_width()))
     predicted = [
         (
             f"{row.plane} {row.order}",
             f"{row.measured_hz:.3f}",
-            f"{row.mean_hz:.3f}",
-            f"{row.sd_hz:.3f}",
+            f"{row.mean_hz:.3f} ± {row.sd_hz:.3f}",
             f"{row.mean_hz / row.measured_hz:.4f}",
         )
         for row in posterior.predicted
     ]
-    headings = ("mode", "measured (Hz)", "mean (Hz)", "sd (Hz)", "ratio")
+    headings = ("mode", "measured (Hz)", "predicted (Hz, ± sd)", "ratio")
     show_rows("predicted frequencies", headings, predicted)
-    click.echo(
-        f"{len(posterior.samples)} samples ({posterior.effective_sample_size:.0f} effective), "
-        f"R-hat {posterior.r_hat:.3f}, {posterior.evaluations} model evaluations, "
-        f"{posterior.seconds:.1f} s, seed {posterior.seed}"
-    )
 
 
 @click.command("select")
@@ -275,7 +244,7 @@ def select_command(
         complete = {**document, **_at(level), "not_applicable": not_applicable, "doubts": doubts}
         show(with_assumptions(complete, hanger))
         return
-    show_selection(selection, hanger.limits)
+    click.echo(selection_sheet(selection, hanger.limits).text_of(readable_width()))
     tell_assumptions(hanger)
     for name, reason in not_applicable.items():
         click.echo(f"{name} does not apply: {reason}")
@@ -302,31 +271,3 @@ def _stated_priors(text: str) -> dict[str, float]:
             f"--prior {text}: not one number a class.",
             remedy="Write beam1=0.25,beam2=0.75, say.",
         ) from error
-
-
-def show_selection(selection: Selection, limits: Limits | None = None) -> None:
-    """Print the tension over all classes, and the classes as a table, most probable first."""
-    show_stated(selection.averaged_with(limits))
-    unit = force_unit(*(float(each.tension_n.mean()) for each in selection.posteriors))
-    headings = (
-        "class", "probability", "log evidence", f"tension ({unit.name})",
-        f"90 % interval ({unit.name})", "to nominal", "most probable values",
-    )  # fmt: skip
-    rows = []
-    for posterior, probability in zip(selection.posteriors, selection.probabilities, strict=True):
-        low, high = unit.of(np.quantile(posterior.tension_n, [0.05, 0.95]))
-        mean = float(posterior.tension_n.mean())
-        places = unit.decimals(mean)
-        best = zip(posterior.names, posterior.most_probable, strict=True)
-        cells = (
-            posterior.model,
-            f"{probability:.3f}",
-            f"{posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}",
-            f"{unit.of(mean):.{places}f}",
-            f"{low:.{places}f} to {high:.{places}f}",
-            f"{mean / posterior.nominal_tension_n - 1:+.1%}",
-            ", ".join(f"{name} {value:.3g}" for name, value in best),
-        )
-        rows.append(cells)
-    title = f"model classes of hanger {selection.selected.hanger}, most probable first"
-    show_rows(title, headings, rows)

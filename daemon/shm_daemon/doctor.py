@@ -74,9 +74,7 @@ def check_single_sign_on(workspace: Workspace) -> Iterator[Finding]:
 
     Provider(described).discover()
     yield ok("single sign-on", f"{described.host} answers")
-    if described.client_secret_file.stat().st_mode & 0o044:
-        name = described.client_secret_file.name
-        yield warning("single sign-on", f"others can read {name}", f"chmod 600 {name}")
+    yield from _secrecy(workspace, "single sign-on", str(described.client_secret_file))
     with suppress(NothingThere), workspace.store() as store:
         people = [each for each in store.people.list_all() if each.removed_at is None]
         if people and not any(each.single_sign_on for each in people):
@@ -179,7 +177,8 @@ def _ready(notifier: HookNotifier, hook: Hook) -> Finding:
 def _secrecy(workspace: Workspace, check: str, name: str) -> Iterator[Finding]:
     path = workspace.folder / name
     if name and path.exists() and path.stat().st_mode & (stat.S_IRGRP | stat.S_IROTH):
-        yield warning(check, f"others can read {name}", f"chmod 600 {path}")
+        shown = os.path.relpath(path, workspace.folder)
+        yield warning(check, f"others can read {shown}", f"chmod 600 {path}")
 
 
 _CHECKS: Sequence[tuple[str, of_store.Check]] = (
@@ -214,14 +213,18 @@ def examine(folder: Path, now: datetime) -> tuple[Finding, ...]:
         return (*findings, _broken("bridge.toml", error))
     described = f"{workspace.bridge.name}, {counted(len(workspace.bridge.hangers), 'hanger')}"
     findings.append(ok("bridge.toml", described))
-    findings += _found("disk", partial(check_disks, folder, workspace.settings))
-    findings += _found("models", partial(check_models, workspace))
-    findings += _found("extras", partial(check_extras, workspace))
-    findings += _found("confinement", check_confinement)
-    findings += _found("logo", partial(check_logo, workspace))
-    findings += _found("hooks", partial(check_hooks, workspace))
-    findings += _found("single sign-on", partial(check_single_sign_on, workspace))
-    findings += _found("bridges", partial(check_other_bridges, workspace))
+    checks: dict[str, Callable[[], Iterable[Finding]]] = {
+        "disk": partial(check_disks, folder, workspace.settings),
+        "models": partial(check_models, workspace),
+        "extras": partial(check_extras, workspace),
+        "confinement": check_confinement,
+        "logo": partial(check_logo, workspace),
+        "hooks": partial(check_hooks, workspace),
+        "single sign-on": partial(check_single_sign_on, workspace),
+        "bridges": partial(check_other_bridges, workspace),
+    }
+    for name, check in checks.items():
+        findings += _found(name, check)
     return (*findings, *_of_store(workspace, now))
 
 

@@ -15,7 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from shm.pipeline.lineage import discarded_of_baselines, redescribed
-from shm.pipeline.stream_health import REMEDIES, backlog_leads, heard, ring_leads
+from shm.pipeline.stream_health import stream_leads
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
@@ -367,19 +367,11 @@ def _outdated_baselines(examined: DoctorContext) -> Iterator[Finding]:
 
 
 def check_streams(examined: DoctorContext) -> Iterator[Finding]:
-    """Nothing where `bridge.toml` describes no stream."""
-    found = heard(examined.workspace, examined.store, examined.now)
-    for state, remedy in REMEDIES.items():
-        names = [each.named for each in found if each.state == state]
-        if names:
-            yield warning("streams", f"{state}: {some(names)}", remedy)
-    behind = backlog_leads(found)
-    for lead in behind:
-        yield warning("streams", lead.state, lead.action)
-    for lead in ring_leads(examined.workspace):
-        yield warning("ring", lead.state, lead.action)
-    if found and not behind and not any(each.state in REMEDIES for each in found):
-        yield ok("streams", f"{counted(len(found), 'stream')}, heard within the hour")
+    """Find streams that say nothing or are not read; nothing where none is described."""
+    leads = stream_leads(examined.workspace, examined.store, examined.now)
+    yield from (warning("streams", lead.state.rstrip("."), lead.action) for lead in leads)
+    if (streams := examined.workspace.bridge.streams) and not leads:
+        yield ok("streams", f"{counted(len(streams), 'stream')}, heard within the hour")
 
 
 def check_changed_settings(examined: DoctorContext) -> Iterator[Finding]:

@@ -7,25 +7,24 @@ import os
 import resource
 import signal
 import threading
-import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from functools import partial
-from multiprocessing.connection import Connection, wait
-from typing import Any, ParamSpec, TypeVar
+from multiprocessing.connection import wait
+from multiprocessing.process import BaseProcess
+from typing import ParamSpec, TypeVar
 
 from shm.errors import ShmError, WorkerDied
 from shm.resources import memory_of_machine, one_thread_a_process
 from shm.settings import Settings
 
-_ENDING_S = 0.1  # technical: a process at rest ends within it, once its pipe is closed
-_STILLBORN = 3  # technical: once is chance; each takes a second of imports
+_ENDING_S = 5.0  # technical: a process that has died is buried within it
 AGAIN_S = 5.0
 """Technical: after so long a place to work in is looked for again; files wait meanwhile."""
 _MOST_OF_MEMORY = 0.8
 """One step may have so much of the machine's memory; beyond, it is told that there is none."""
-_NOTHING: tuple[Any, BaseException | None] = (None, None)
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -52,13 +51,12 @@ def executor_of(settings: Settings) -> Executor:
 class Workers(Executor):
     """Run each step in one of some processes; one that dies takes no other along.
 
-    A step whose process died raises WorkerDied; the others go on, and a new process takes the
-    place. Raises ShmError with `retry_after_s` where no process can be begun. `prepare` is called
-    in each new process.
+    Each process is a pool of its own. A step whose process died raises WorkerDied; the others go
+    on, and a new process takes the place. Raises ShmError with `retry_after_s` where no process can
+    be begun. `prepare` is called in each new process.
     """
 
     def __init__(self, count: int, prepare: Callable[[], object] | None = None):
-        self._count = count
         self._threads = ThreadPoolExecutor(count, thread_name_prefix="worker")
         self._prepare, self._idle, self._ended = prepare, list[_Worker](), False
         self._changing = threading.Lock()  # of what is at rest, and whether any more may begin
@@ -91,21 +89,21 @@ class Workers(Executor):
         with self._changing:
             if self._ended:  # whoever ended us has looked for our processes: none would find it
                 raise WorkerDied("its process was not begun, because all end.")
-            return self._idle.pop() if self._idle else _Worker(self._prepare)
+            self._idle = [each for each in self._idle if each.lives]
+            if self._idle:
+                return self._idle.pop()
+            worker = _Worker(self._prepare)
+        worker.wait_until_begun()
+        return worker
 
     def _run(self, step: Callable[[], T]) -> T:
-        for _ in range(self._count + _STILLBORN):  # all at rest may have been killed there
-            worker = self._worker()
-            try:
-                found: T = worker.do(step)
-            except WorkerDied:
-                if worker.begun or self._ended:
-                    raise
-            else:
-                return found
-            finally:
-                self._rest(worker)
-        raise _none_begins("each ended before it took on a step")
+        worker = self._worker()
+        try:
+            return worker.pool.submit(step).result()
+        except BrokenProcessPool:
+            raise worker.death() from None
+        finally:
+            self._rest(worker)
 
     def _rest(self, worker: _Worker) -> None:
         with self._changing:
@@ -117,53 +115,49 @@ class Workers(Executor):
 
 
 class _Worker:
-    """One process, asked through a pipe; `begun` where it has taken on what it was asked last."""
+    """A pool of one process."""
 
-    begun = False
+    process: BaseProcess | None = None
 
     def __init__(self, prepare: Callable[[], object] | None):
         from shm.pipeline import steps  # in a thread: nobody waits for it
 
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload([steps.__name__, "scipy.optimize"])
-        self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_work, args=(theirs, prepare), daemon=True)
+        self.pool = ProcessPoolExecutor(
+            1, mp_context=context, initializer=_begin_step_worker, initargs=(prepare,)
+        )
         try:
-            self._process.start()
-        except (OSError, EOFError) as error:
+            self._pid = self.pool.submit(os.getpid)
+        except (OSError, EOFError, BrokenProcessPool) as error:
             raise _none_begins(repr(error)) from error
-        finally:
-            theirs.close()
+
+    def wait_until_begun(self) -> None:
+        """Raise ShmError where the process ends before it takes on a step."""
+        with suppress(BrokenProcessPool):
+            pid = self._pid.result()
+            self.process = next(
+                (p for p in multiprocessing.active_children() if p.pid == pid), None
+            )
+        if self.process is None:
+            self.end()
+            raise _none_begins("it ended before it took on a step")
 
     @property
     def lives(self) -> bool:
-        return self._process.is_alive()
+        return self.process is not None and self.process.is_alive()
 
-    def do(self, step: Callable[[], Any]) -> Any:
-        """Return what the step returns, or raise what it raises; raises WorkerDied."""
-        self.begun = False
-        try:
-            self._pipe.send(step)
-            self.begun = bool(self._pipe.recv())
-            found, error = self._pipe.recv()
-        except (EOFError, ConnectionError):
-            raise self._death() from None
-        if error is not None:
-            raise error
-        return found
-
-    def _death(self) -> WorkerDied:
-        self.end()
-        code = self._process.exitcode or 0
+    def death(self) -> WorkerDied:
+        """Return how the process died."""
+        assert self.process is not None
+        self.process.join(_ENDING_S)
+        code = self.process.exitcode or 0
         how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
         return WorkerDied(f"the process that worked on it died ({how}).", how=how)
 
     def end(self) -> None:
-        """Closes the pipe, which ends a process at rest, and kills one that is not."""
-        self._pipe.close()
-        self._process.join(_ENDING_S)
-        self._process.kill()
-        self._process.join()
+        """End the process once it is at rest."""
+        self.pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _none_begins(why: str) -> ShmError:
@@ -174,29 +168,11 @@ def _none_begins(why: str) -> ShmError:
     )
 
 
-def _work(pipe: Connection, prepare: Callable[[], object] | None) -> None:
-    """The whole life of a worker: it ends when the pipe is closed."""
+def _begin_step_worker(prepare: Callable[[], object] | None) -> None:
     _begin_worker()
     _bound_memory()
     if prepare is not None:
         prepare()
-    with suppress(EOFError, ConnectionError):
-        while True:
-            step, answer = pipe.recv(), _NOTHING
-            pipe.send(True)  # from here on a death may be the step's doing
-            try:
-                answer = step(), None
-            except BaseException as error:  # noqa: BLE001 - whatever it is, it is the answer
-                error.add_note(traceback.format_exc())
-                answer = None, error
-            try:
-                pipe.send(answer)
-            except ConnectionError:
-                raise
-            except Exception as error:  # noqa: BLE001 - what cannot be pickled raises anything
-                unsent = f"an answer cannot be sent: {error!r}; {answer[1]!r}"
-                pipe.send((None, RuntimeError(unsent)))
-            del step, answer
 
 
 def _bound_memory() -> None:

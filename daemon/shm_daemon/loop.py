@@ -10,6 +10,7 @@ from concurrent.futures import BrokenExecutor, Executor
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from typing import Protocol
 
 from shm.errors import (
     SchemaOutdated,
@@ -20,7 +21,7 @@ from shm.errors import (
     TooLarge,
     retry_pause_s,
 )
-from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
+from shm.pipeline import Clock, Flow, Notifier, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
 from shm.store import Workspace
@@ -30,10 +31,10 @@ from shm_daemon.heartbeat import Pulse, longest_wait_s, tell_systemd, turn_faile
 from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
-from shm_daemon.publishing import Publisher, results_published
-from shm_daemon.seedlink import StreamAskers, streams_asked
+from shm_daemon.publishing import results_published
+from shm_daemon.seedlink import streams_asked
 from shm_daemon.spool import FileStabilityTracker, scan
-from shm_daemon.streams import StreamKeeper, streams_kept
+from shm_daemon.streams import streams_kept
 from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
 from shm_daemon.web.site import modified_ns
 
@@ -64,23 +65,29 @@ def run(
     waiting cannot mend.
     """
     wakeup = wakeup or Wakeup()
-    patience = Patience(wakeup, standby)
+    settings_of = make_executor, notifier, clock, once
     with stopped_by_signals(wakeup), ExitStack() as ending:
         ending.callback(tell_systemd, "STOPPING=1", "STATUS=ending")
+        wait_for = Patience(wakeup, standby)
         while not wakeup.stopped:
             try:
-                with workspace.lock(patience) as lock, ExitStack() as stack:
-                    begin = partial(_begin, stack, workspace, lock, wakeup, clock, make_executor)
-                    if begin(notifier, once).serve(once):
+                with workspace.lock(wait_for) as lock, ExitStack() as stack:
+                    if Daemon(stack, workspace, lock, wakeup, *settings_of).serve():
                         return
             except StoreError as error:
                 waiting_helps = error.retry_after_s is not None
                 if once and isinstance(error, StoreDamaged):
                     raise
-                if not wakeup.stopped and not (waiting_helps and patience(error)):
+                if not wakeup.stopped and not (waiting_helps and wait_for(error)):
                     if waiting_helps and wakeup.stopped:  # meanwhile: that is no failure
                         return
                     raise
+
+
+class Described(Protocol):
+    """Follow a description of the bridge that may change."""
+
+    def use(self, workspace: Workspace) -> object: ...
 
 
 class Patience:
@@ -101,101 +108,82 @@ class Patience:
         return not self._wakeup.stopped
 
 
-def _begin(
-    stack: ExitStack,
-    workspace: Workspace,
-    lock: ActiveLock,
-    wakeup: Wakeup,
-    clock: Clock,
-    make_executor: Callable[[Settings], Executor],
-    notifier: Notifier | None,
-    once: bool,
-) -> Daemon:
-    """A daemon at work, all of which ends with the stack."""
-    settings = workspace.settings
-    store = stack.enter_context(workspace.store())
-    stack.enter_context(children_ended())
-    if notifier is None:
-        notifier = HookNotifier(
-            workspace.folder,
-            settings.hook_timeout_seconds,
-            os.environ,
-            settings.pages_address,
-        )
-        stack.callback(notifier.close)
-    executor = make_executor(settings)
-    flow = Flow(
-        workspace,
-        store,
-        executor,
-        notifier=notifier,
-        clock=clock,
-        lanes=settings.workers + 1,
-        wake=wakeup.ring,
-        on_progress=(pulse := Pulse(workspace)),
-    )
-    stack.callback(flow.close)
-    streaming = Streaming(
-        workspace, store, executor, clock=clock, lanes=settings.workers, wake=wakeup.ring
-    )
-    stack.callback(streaming.close)
-    stack.enter_context(rung_by_changes(wakeup, workspace.spool))
-    stack.enter_context(messages(workspace))
-    keeper = stack.enter_context(
-        streams_kept(workspace, clock, until_done=once, sealed=streaming.note_sealed)
-    )
-    publisher = stack.enter_context(results_published(workspace, clock, when_done=once))
-    askers = stack.enter_context(streams_asked(workspace, clock, begun=not once))
-    parts = flow, streaming, keeper, publisher, askers
-    daemon = Daemon(*parts, wakeup, lock, pulse, lambda: make_executor(settings))
-    stack.callback(daemon.close)
-    log.info("watching %s", workspace.spool)
-    return daemon
-
-
 class Daemon:
-    """One turn after the other: take whole files in, advance the flow, wait for a ring."""
+    """One turn after the other: take whole files in, advance the flow, wait for a ring.
+
+    All that it begins ends with the `stack`.
+    """
 
     def __init__(
         self,
-        flow: Flow,
-        streaming: Streaming,
-        keeper: StreamKeeper,
-        publisher: Publisher,
-        askers: StreamAskers,
-        wakeup: Wakeup,
+        stack: ExitStack,
+        workspace: Workspace,
         lock: ActiveLock,
-        pulse: Pulse,
-        make_executor: Callable[[], Executor],
+        wakeup: Wakeup,
+        make_executor: Callable[[Settings], Executor],
+        notifier: Notifier | None,
+        clock: Clock,
+        once: bool,
     ):
-        self._flow, self._streaming = flow, streaming
-        self._keeper, self._publisher, self._askers = keeper, publisher, askers
-        self._wakeup, self._lock, self._pulse = wakeup, lock, pulse
-        self._make_executor = make_executor
-        settings = flow.workspace.settings
+        settings = workspace.settings
+        self._wakeup, self._lock, self._once = wakeup, lock, once
+        self._make_executor = partial(make_executor, settings)
+        self._pulse = Pulse(workspace)
+        store = stack.enter_context(workspace.store())
+        stack.enter_context(children_ended())
+        if notifier is None:
+            timeout_s, pages = settings.hook_timeout_seconds, settings.pages_address
+            notifier = HookNotifier(workspace.folder, timeout_s, os.environ, pages)
+            stack.callback(notifier.close)
+        executor = self._make_executor()
+        self._flow = Flow(
+            workspace,
+            store,
+            executor,
+            notifier=notifier,
+            clock=clock,
+            lanes=settings.workers + 1,
+            wake=wakeup.ring,
+            on_progress=self._pulse,
+        )
+        stack.callback(self._flow.close)
+        self._streaming = Streaming(
+            workspace, store, executor, clock=clock, lanes=settings.workers, wake=wakeup.ring
+        )
+        stack.callback(self._streaming.close)
+        stack.enter_context(rung_by_changes(wakeup, workspace.spool))
+        stack.enter_context(messages(workspace))
+        sealed = self._streaming.note_sealed
+        self._described: tuple[Described, ...] = (
+            self._flow,
+            self._streaming,
+            stack.enter_context(streams_kept(workspace, clock, until_done=once, sealed=sealed)),
+            stack.enter_context(results_published(workspace, clock, when_done=once)),
+            stack.enter_context(streams_asked(workspace, clock, begun=not once)),
+        )
+        stack.callback(self._end_executor)
         self._tracker = FileStabilityTracker(settings.spool_stable_seconds, time.monotonic)
         self._longest_wait_s = longest_wait_s()
-        self._scan_at = 0.0
-        self._described_at = modified_ns(flow.workspace), flow.workspace.newest_change
-        self._once, self._failure = False, ""
+        self._scan_at, self._failure = 0.0, ""
+        self._described_at = modified_ns(workspace), workspace.newest_change
         self._not_taken: dict[Path, str] = {}
-        folders = flow.workspace.spool, flow.workspace.archive.folder
+        folders = workspace.spool, workspace.archive.folder
         self._devices = {folder: _device(folder) for folder in folders}
-        turn_failed(flow.workspace, "")
+        turn_failed(workspace, "")
+        log.info("watching %s", workspace.spool)
 
-    def serve(self, once: bool) -> bool:
+    def serve(self) -> bool:
         """Takes turns until the wakeup is stopped or, with `once`, until nothing is left to do.
 
         False where the store is no longer ours: another may have begun what we had under way.
         """
-        self._once = once
         while not self._wakeup.stopped:
             if not self._lock.held():
                 log.warning("the right to the store was lost; it is asked for again")
                 return False
             self._pulse.beat()
             busy = self._turn()
-            if once and not busy and not self._tracker.watching:
+            if self._once and not busy and not self._tracker.watching:
                 break
             if SPOOL in self._rest():
                 self._scan_at = min(self._scan_at, time.monotonic() + _HINT_DELAY_S)
@@ -213,7 +201,7 @@ class Daemon:
             self._pulse.beat()
         return self._wakeup.wait(max(0.0, pause_s))
 
-    def close(self) -> None:
+    def _end_executor(self) -> None:
         self._flow.executor.shutdown(wait=False, cancel_futures=True)
 
     def _turn(self) -> bool:
@@ -283,11 +271,11 @@ class Daemon:
         self._take_over_description()
         self._refuse_other_disks()
         whole = self._tracker.whole(scan(self._flow.workspace.spool, self._pulse))
-        until, sharing = time.monotonic() + _RECEIVING_S, Sharing(self._pulse)
+        until = time.monotonic() + _RECEIVING_S
         for path in whole:
             if self._wakeup.stopped:
                 break
-            self._receive(path, sharing)
+            self._receive(path)
             if time.monotonic() > until:  # after one at least, however slow the disk is
                 break
         pause = min(
@@ -295,10 +283,10 @@ class Daemon:
         )
         self._scan_at = time.monotonic() + pause
 
-    def _receive(self, path: Path, sharing: Sharing) -> None:
+    def _receive(self, path: Path) -> None:
         """One file that cannot be taken must not hold up the others; a store that cannot, must."""
         try:
-            self._flow.receive(path, sharing)
+            self._flow.receive(path)
         except StoreError:
             raise
         except TooLarge as error:
@@ -345,11 +333,9 @@ class Daemon:
             return
         self._described_at = described
         try:
-            self._flow.use(self._flow.workspace.reopened())
-            self._streaming.use(self._flow.workspace)
-            self._keeper.use(self._flow.workspace)
-            self._publisher.use(self._flow.workspace)
-            self._askers.use(self._flow.workspace)
+            changed = workspace.reopened()
+            for each in self._described:  # the flow first, which refuses what is wrong
+                each.use(changed)
         except ShmError as error:
             log.error("bridge.toml is not taken over: %s", error)
         else:

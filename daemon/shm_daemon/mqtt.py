@@ -6,22 +6,19 @@ A message lands in the spool as an upload does, and is acknowledged only once th
 its file was received: a daemon or a broker killed before that has it sent again. Protocol 3.1.1,
 which every broker speaks, with a session that the broker keeps while the daemon is down.
 
-Of what has not landed yet no more than `mqtt_max_bytes` wait in memory. What comes beyond is not
-acknowledged; brokers send such messages again on a new connection, so one is made once all that was
-taken has left the spool.
+One message at a time is in memory. While it cannot land no other is read from the connection, so
+that the broker keeps them; one that gives the connection up sends them again on the next.
 """
 
 from __future__ import annotations
 
 import logging
 import os
-import queue
 import re
-import socket
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
 
@@ -103,34 +100,25 @@ def messages(workspace: Workspace) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class _Message:
-    """A message; its number `mid` means something on the connection that it came by only."""
+class _Landed:
+    """A message in the spool; its number `mid` has a meaning on its connection only."""
 
     connection: int
     mid: int
-    topic: str
-    payload: bytes
-    again: bool
-
-    @property
-    def size_bytes(self) -> int:
-        """The memory that it takes, roughly: many empty ones take some, too."""
-        return len(self.payload) + len(self.topic) + 1024
+    file: Landed
 
 
 class Listener:
-    """One connection and one worker: messages are queued by the first, landed by the second."""
+    """One connection, whose thread lands messages, and a thread that acknowledges them."""
 
     def __init__(self, workspace: Workspace, broker: Broker):
         self._workspace, self._broker = workspace, broker
         self._description = Description(workspace)  # streams may be added while we run
         self._topic = topic_of(workspace.bridge.name)
-        self._queue: queue.SimpleQueue[_Message | None] = queue.SimpleQueue()
-        self._queued_bytes, self._room = 0, threading.Lock()
-        self._refusing = False
-        self._pending: list[tuple[_Message, Landed]] = []
+        self._pending: list[_Landed] = []
         self._connection, self._ended = 0, threading.Event()
         self._store: Store | None = None
+        self._opening = threading.Lock()
         self._subscribed = False
         self._worker = threading.Thread(target=self._work, name="mqtt", daemon=True)
         self._client = self._make_client()
@@ -144,10 +132,11 @@ class Listener:
     def end(self) -> None:
         """End; the broker sends again what is not acknowledged by now."""
         self._ended.set()
-        self._queue.put(None)
         self._client.disconnect()
         self._client.loop_stop()
         self._worker.join(_RETRY_S)
+        if self._store is not None:
+            self._store.close()
 
     @property
     def connected(self) -> bool:
@@ -157,7 +146,7 @@ class Listener:
     @property
     def waiting(self) -> list[str]:
         """The checksums of what has landed and is not acknowledged yet."""
-        return [landed.sha256 for _, landed in list(self._pending)]
+        return [each.file.sha256 for each in list(self._pending)]
 
     def _make_client(self) -> Client:
         with needing("mqtt"):
@@ -184,7 +173,6 @@ class Listener:
             log.warning("the broker %s refuses us: %s", self._broker.host, reason)
             return
         self._connection += 1
-        self._refusing = False
         client.subscribe([(f"{self._topic}/+", 1), (f"{self._topic}/+/+", 1)])
 
     def _granted(self, client: Client, _: Any, mid: int, reasons: Any, properties: Any) -> None:
@@ -197,109 +185,39 @@ class Listener:
     def _disconnected(self, client: Client, _: Any, flags: Any, reason: Any, __: Any) -> None:
         self._connection += 1
         self._subscribed = False
-        if not self._ended.is_set() and not self._refusing:
+        if not self._ended.is_set():
             log.warning("no connection to the broker %s: %s", self._broker.host, reason)
 
     def _heard(self, client: Client, _: Any, message: MQTTMessage) -> None:
-        again = message.dup or message.retain
-        payload = bytes(message.payload)
-        heard = _Message(self._connection, message.mid, message.topic, payload, again)
-        if self._refusing or not self._has_room(heard):
-            self._refuse(message.qos)
-            return
-        self._put(heard)
-
-    def _has_room(self, message: _Message) -> bool:
-        """Return True if a message may wait in memory; one alone always may."""
-        most = self._workspace.settings.mqtt_max_bytes
-        return not self._queued_bytes or self._queued_bytes + message.size_bytes <= most
-
-    def _refuse(self, qos: int) -> None:
-        """Leave a message without acknowledgement, so that the broker keeps it."""
-        if not self._refusing:
-            self._refusing = True
-            self._queue.put(None)  # a worker that waits for a message looks up
-            log.warning(
-                "more messages come than can be taken: the broker keeps them and sends them again."
-            )
-        if qos == 0:
-            log.warning("a message is lost: the broker does not keep one sent with QoS 0. Use 1.")
-
-    # ------------------------------------------------------------ on the worker's thread
-
-    def _work(self) -> None:
+        """Land a message, however long that takes."""
         while not self._ended.is_set():
-            message = None
-            with suppress(queue.Empty):
-                idle = not self._pending and not self._refusing
-                message = self._queue.get(timeout=None if idle else _LOOK_S)
             try:
-                if message is not None:
-                    self._take(message)
-                    self._free(message)
-                    message = None
-                self._acknowledge_received()
-                self._ask_again()
-            except ShmError as error:
-                self._try_later(message, error)
-            except Exception as error:  # the daemon goes on without messages rather than not at all
-                log.exception("a message could not be taken")
-                self._try_later(message, error)
-        if self._store is not None:
-            self._store.close()
+                self._take(message)
+            except Exception as error:  # noqa: BLE001 - the daemon goes on whatever a message holds
+                self._wait(error)
+            else:
+                return
 
-    def _try_later(self, message: _Message | None, error: Exception) -> None:
-        log.warning("a message waits: %s", error)
-        if message is not None:
-            self._free(message)
-            self._put(message)
-        self._ended.wait(retry_pause_s(error, _RETRY_S))
-
-    def _put(self, message: _Message) -> None:
-        with self._room:
-            self._queued_bytes += message.size_bytes
-        self._queue.put(message)
-
-    def _free(self, message: _Message) -> None:
-        with self._room:
-            self._queued_bytes -= message.size_bytes
-
-    def _ask_again(self) -> None:
-        """Have the broker send again what was refused, by a new connection (MQTT-4.4.0-1).
-
-        Not before all that was taken has left the spool: the broker sends that again, too.
-        """
-        if not self._refusing or self._queued_bytes:
-            return
-        if any(landed.path.exists() for _, landed in self._pending):
-            return
-        connection = self._client.socket()
-        if isinstance(connection, socket.socket):
-            with suppress(OSError):  # it broke by itself
-                connection.shutdown(socket.SHUT_RDWR)
-
-    def _take(self, message: _Message) -> None:
-        """Lands a message; one of an earlier connection comes again by itself."""
-        if message.connection != self._connection:
-            return
+    def _take(self, message: MQTTMessage) -> None:
         level, _, given = message.topic.removeprefix(f"{self._topic}/").partition("/")
+        payload = bytes(message.payload)
         if level == _STREAM and given:
             # One that cannot be used is noted and logged, and acknowledged too: the broker would
             # send it again for ever.
             with suppress(BadInput):
                 workspace, _ = self._description.now()
-                take_chunks(workspace, self._opened(), given, [message.payload], utc_now())
-            self._acknowledge(message)
+                take_chunks(workspace, self._opened(), given, [payload], utc_now())
+            self._client.ack(message.mid, qos=1)
             return
-        with incoming(self._workspace.spool, len(message.payload)) as file:
-            file.write(message.payload)
+        with incoming(self._workspace.spool, len(payload)) as file:
+            file.write(payload)
             try:
                 name = landing_name(given)
             except BadInput:
-                suffix = _suffix(message.payload[:_HEAD_BYTES])
+                suffix = _suffix(payload[:_HEAD_BYTES])
                 name = landing_name(f"hanger-{level}-{file.sha256[:8]}{suffix}")
-            if message.again and self._is_received(file.sha256):
-                self._acknowledge(message)
+            if (message.dup or message.retain) and self._is_received(file.sha256):
+                self._client.ack(message.mid, qos=1)
                 return
             try:
                 for setting in ("max_file_bytes", "mqtt_max_bytes"):
@@ -310,33 +228,44 @@ class Listener:
                     self._workspace, file.whole(), name, error, utc_now(), file.sha256
                 )
                 log.warning("%s is refused: %s %s", name, error.message, error.remedy)
-                self._acknowledge(message)
+                self._client.ack(message.mid, qos=1)
                 return
             hanger = int(level) if re.fullmatch(r"\d{1,9}", level) else level
             landed = file.land(name, {"hanger": hanger})
-            self._pending.append((replace(message, payload=b""), landed))
+            self._pending.append(_Landed(self._connection, message.mid, landed))
+
+    # ------------------------------------------------------------ on the worker's thread
+
+    def _work(self) -> None:
+        while not self._ended.wait(_LOOK_S):
+            try:
+                self._acknowledge_received()
+            except Exception as error:  # noqa: BLE001 - the daemon goes on without messages
+                self._wait(error)
 
     def _acknowledge_received(self) -> None:
-        """Acknowledges what has left the spool for the store."""
-        for entry in list(self._pending):
-            message, landed = entry
-            if message.connection != self._connection:
-                self._pending.remove(entry)
-            elif not landed.path.exists() and self._is_received(landed.sha256):
-                self._pending.remove(entry)
-                self._acknowledge(message)
+        """Acknowledge what has left the spool for the store; forget former connections'."""
+        for each in list(self._pending):
+            if each.connection != self._connection:
+                self._pending.remove(each)
+            elif not each.file.path.exists() and self._is_received(each.file.sha256):
+                self._pending.remove(each)
+                self._client.ack(each.mid, qos=1)
 
-    def _acknowledge(self, message: _Message) -> None:
-        if message.connection == self._connection:
-            self._client.ack(message.mid, qos=1)
+    # ------------------------------------------------------------ on both
+
+    def _wait(self, error: Exception) -> None:
+        log.warning("messages wait: %s", error, exc_info=not isinstance(error, ShmError | OSError))
+        self._ended.wait(retry_pause_s(error, _RETRY_S))
 
     def _is_received(self, sha256: str) -> bool:
         return find_by_checksum(self._opened(), sha256) is not None
 
     def _opened(self) -> Store:
-        if self._store is None:
-            self._store = self._workspace.store()
-        return self._store
+        with self._opening:
+            if self._store is None:
+                self._store = self._workspace.store()
+            return self._store
 
 
 def _suffix(head: bytes) -> str:

@@ -24,7 +24,7 @@ from joserfc.jws import JWSRegistry
 
 from shm.bridge.description import EMAIL, SingleSignOn, is_safe
 from shm.errors import ShmError
-from shm_daemon.hooks.webhook import reason_of
+from shm_daemon.http_client import reason_of
 
 _ALGORITHMS = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512",
                "EdDSA")  # fmt: skip

@@ -10,14 +10,11 @@ import base64
 import json
 import logging
 import os
-import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from http import HTTPStatus
-
-import requests
 
 from shm.bridge.publish import Publication
 from shm.errors import ShmError
@@ -25,8 +22,9 @@ from shm.pipeline import Clock
 from shm.pipeline.publishing import Progress, queue_results
 from shm.store import Store, Workspace
 from shm.store.point_outbox import PointOutbox
+from shm_daemon.background import repeated
 from shm_daemon.hooks.contract import SHOWN_CHARACTERS, one_line
-from shm_daemon.hooks.webhook import Lines, reason_of, unchanged
+from shm_daemon.http_client import HttpClient, NoAnswer
 
 _POINTS_REFUSED = (HTTPStatus.BAD_REQUEST, HTTPStatus.UNPROCESSABLE_ENTITY)
 
@@ -68,7 +66,7 @@ def token_of(publication: Publication, workspace: Workspace, environment: Mappin
 
 
 def post(
-    publication: Publication, token: str, lines: Sequence[str], web: Lines, timeout_s: float
+    publication: Publication, token: str, lines: Sequence[str], client: HttpClient, timeout_s: float
 ) -> None:
     """Post lines of the line protocol; raises NotTaken or PointsRefused."""
     headers = {"Content-Type": "text/plain; charset=utf-8", "User-Agent": "shm"}
@@ -76,26 +74,14 @@ def post(
         headers["Authorization"] = f"Token {token}"
     elif token:
         headers["Authorization"] = f"Basic {base64.b64encode(token.encode()).decode()}"
-    with web.session(timeout_s) as (session, line):
-        try:
-            with session.post(
-                publication.write_url,
-                data="\n".join(lines).encode(),
-                headers=headers,
-                timeout=timeout_s,
-                allow_redirects=False,
-                stream=True,
-                auth=unchanged,
-            ) as response:
-                status = response.status_code
-                words = next(response.iter_content(SHOWN_CHARACTERS), b"")
-        except (requests.RequestException, OSError) as error:
-            late = line.cut_off or isinstance(error, requests.Timeout)
-            why = f"no answer within {timeout_s:g} s" if late else reason_of(error)
-            remedy = "See that it runs, and that url is right."
-            raise NotTaken(f"{publication.url}: {why}.", remedy=remedy) from None
-    if not 200 <= status < 300:
-        raise _refusal(publication, status, words)
+    url, data = publication.write_url, "\n".join(lines).encode()
+    try:
+        answer = client.send("POST", url, timeout_s, SHOWN_CHARACTERS, data=data, headers=headers)
+    except NoAnswer as error:
+        remedy = "See that it runs, and that url is right."
+        raise NotTaken(f"{publication.url}: {error.reason}.", remedy=remedy) from None
+    if not 200 <= answer.status < 300:
+        raise _refusal(publication, answer.status, answer.body)
 
 
 def _refusal(publication: Publication, status: int, words: bytes) -> ShmError:
@@ -121,7 +107,7 @@ class Publisher:
     """One turn after the other: what is new into the outbox, what waits to the databases."""
 
     def __init__(self, workspace: Workspace, clock: Clock, pace: Pace | None = None):
-        self._workspace, self._clock, self._web = workspace, clock, Lines()
+        self._workspace, self._clock, self._client = workspace, clock, HttpClient()
         self.pace = pace or Pace()
         self._outbox = PointOutbox(workspace.folder)
         self._store: Store | None = None
@@ -157,7 +143,7 @@ class Publisher:
             while waiting := self._outbox.list_waiting(name, self.pace.at_once):
                 lines = [each.line for each in waiting]
                 try:
-                    post(publication, token, lines, self._web, timeout_s)
+                    post(publication, token, lines, self._client, timeout_s)
                 except PointsRefused as error:  # it has taken the others
                     log.warning("publish %s: %s", name, error)
                     self._outbox.mark(waiting, "refused")
@@ -168,7 +154,7 @@ class Publisher:
             self._retry_at[name] = time.monotonic() + self.pace.retry_s
         else:
             why = ""
-        if why != before and not self._web.closed:
+        if why != before and not self._client.closed:
             self._outbox.note_failure(name, why, self._clock())
             log.warning("publish %s: %s", name, why) if why else log.info("publish %s: works", name)
 
@@ -178,7 +164,7 @@ class Publisher:
 
     def break_off(self) -> None:
         """End, from another thread, what is being sent; it is sent again."""
-        self._web.close()
+        self._client.close()
 
 
 @contextmanager
@@ -189,28 +175,17 @@ def results_published(
 
     For the holder of the workspace's lock.
     """
-    publisher, ended = Publisher(workspace, clock, pace), threading.Event()
-    thread = threading.Thread(target=_work, args=(publisher, ended), name="publish")
+    publisher = Publisher(workspace, clock, pace)
+    pauses = {"pause_s": publisher.pace.look_s, "retry_s": publisher.pace.retry_s}
     try:
-        if not when_done:
-            thread.start()
-        yield publisher
         if when_done:
+            yield publisher
             publisher.turn()
+            return
+        with repeated("publish", publisher.turn, **pauses):
+            try:
+                yield publisher
+            finally:
+                publisher.break_off()
     finally:
-        ended.set()
-        if thread.ident is not None:
-            publisher.break_off()
-            thread.join()
         publisher.close()
-
-
-def _work(publisher: Publisher, ended: threading.Event) -> None:
-    while not ended.is_set():
-        pause_s = publisher.pace.look_s
-        try:
-            publisher.turn()
-        except Exception as error:  # the daemon goes on without publishing rather than not at all
-            log.warning("results wait: %s", error, exc_info=not isinstance(error, ShmError))
-            pause_s = getattr(error, "retry_after_s", None) or publisher.pace.retry_s
-        ended.wait(pause_s)

@@ -19,7 +19,6 @@ import logging
 import math
 import re
 import shutil
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -41,6 +40,7 @@ from shm.store.queries.streams import list_stream_events
 from shm.store.ring import StoredChunk, ring_of
 from shm.values import Channel, FloatArray, Recording
 from shm.values.stream import Chunk, Stream, StreamEvent
+from shm_daemon.background import repeated
 from shm_daemon.spool import STREAMS, FileStabilityTracker, scan
 
 log = logging.getLogger(__name__)
@@ -244,29 +244,14 @@ def streams_kept(
     For the holder of the workspace's lock. With `until_done` all is kept before the context begins,
     and nothing after.
     """
-    keeper, ended = StreamKeeper(workspace, clock, sealed), threading.Event()
-    thread = threading.Thread(target=_work, args=(keeper, ended), name="streams")
+    keeper = StreamKeeper(workspace, clock, sealed)
     try:
-        if until_done:
-            while keeper.turn():
-                time.sleep(_LOOK_S / 10)
-        else:
-            thread.start()
+        if not until_done:
+            with repeated("streams", keeper.turn, pause_s=_LOOK_S, retry_s=_RETRY_S):
+                yield keeper
+            return
+        while keeper.turn():
+            time.sleep(_LOOK_S / 10)
         yield keeper
     finally:
-        ended.set()
-        if thread.ident is not None:
-            thread.join()
         keeper.close()
-
-
-def _work(keeper: StreamKeeper, ended: threading.Event) -> None:
-    while not ended.is_set():
-        pause_s = _LOOK_S
-        try:
-            keeper.turn()
-        except Exception as error:  # the daemon goes on without streams rather than not at all
-            known = isinstance(error, ShmError)
-            log.warning("streams wait: %s", error, exc_info=not known)
-            pause_s = retry_pause_s(error, _RETRY_S)
-        ended.wait(pause_s)

@@ -24,9 +24,9 @@ from shm.gap.outliers import (
     exclude_gross_errors,
     residuals_with_outliers,
 )
-from shm.gap.places import places
+from shm.gap.places import AS_LIKELY, list_other_places, places, split_place
 from shm.gap.problem import GapProblem
-from shm.gap.residuals import check_hold_out, held_out, residuals, sensor_remarks, shrinkage, trends
+from shm.gap.residuals import check_hold_out, held_out, residuals, shrinkage, trends
 from shm.gap.search import Attribution, Explanation, answered, check_effects, possible
 from shm.inference.data_checks import CheckedData
 from shm.inference.mixture import systematic
@@ -43,7 +43,6 @@ from shm.values import (
     Hanger,
     ModalTest,
     NextMeasurement,
-    Outlier,
     TensionEstimate,
 )
 from shm.values.verdict import DOUBTFUL
@@ -53,8 +52,6 @@ _ATTRIBUTION = 0.85
 
 _OF_NOTE = 0.2  # of the leading probability: what is less moves the answer little
 _TENSION_DRAWS = 4000  # numerical: a 95 % interval to 2 % of its width
-_AS_LIKELY = 1.5
-"""Places of one effect whose log evidences differ by less are not told apart."""
 
 
 def diagnose(
@@ -90,7 +87,7 @@ def examined(
     after = attribution.leading.best.fit if attribution.leading else None
     best = answer[0][1]
     excluded, doubted = (describe_outliers(clear, e, best) for e in (clear.excluded, clear.doubted))
-    held = held_out(problem, before, after, options.hold_out, rng)
+    held = held_out(problem, before, after, options.hold_out)
     after_n = _tension(problem, possible(attribution), rng)
     before_n = _tension(problem, [(1.0, before)], rng)
     where = residuals(problem, before, after, held)
@@ -100,7 +97,7 @@ def examined(
         tests=tuple(test.id for test in found.tests),
         where=residuals_with_outliers(clear, where, before, after),
         trends=trends(problem, before),
-        places=places(problem, before),
+        places=places(problem, attribution),
         no_gap_probability=attribution.no_gap_probability,
         unexplained_probability=attribution.unexplained_probability,
         causes=tuple(_cause(problem, each) for each in attribution.explanations),
@@ -117,7 +114,9 @@ def examined(
             *doubts,
             *_states(problem, before, after, (before_n, after_n)),
             *remark_on_damping(clear.whole.observations),
-            *_on_the_way(found, clear, excluded, doubted, after or before),
+            *found.remarks,
+            *describe_excluded(clear, excluded),
+            *describe_doubtful(doubted),
         ),
         seed=options.seed,
         seconds=time.perf_counter() - started,
@@ -186,19 +185,6 @@ def _following(
     return found
 
 
-def _on_the_way(
-    found: CheckedData,
-    clear: Cleared,
-    excluded: Sequence[Outlier],
-    doubted: Sequence[Outlier],
-    best: Fit,
-) -> tuple[str, ...]:
-    """Return remarks on the data's checks, on gross errors and on errors of the measurement."""
-    gross = (*describe_excluded(clear, excluded), *describe_doubtful(doubted))
-    measured = sensor_remarks(clear.problem, best)
-    return (*found.remarks, *gross, *measured)
-
-
 def _of_another(tests: Sequence[ModalTest], hanger: Hanger) -> tuple[str, ...]:
     """Return remarks on tests that are not of the hanger as described."""
     doubts = {test.id: doubt_of(test, Known(hanger), []) for test in tests}
@@ -245,11 +231,11 @@ def _cause(problem: GapProblem, explanation: Explanation) -> Cause:
         method=best.method,
         group=explanation.group,
         also_at=(
-            *(_list_other_places(problem, best.posterior) if best.posterior else ()),
+            *(list_other_places(problem, best.posterior) if best.posterior else ()),
             *(
                 each.hypothesis.at
                 for each in explanation.variants
-                if each is not best and each.log_evidence > best.log_evidence - _AS_LIKELY
+                if each is not best and each.log_evidence > best.log_evidence - AS_LIKELY
             ),
         ),
     )
@@ -263,37 +249,10 @@ def _estimates(problem: GapProblem, fit: Fit) -> tuple[EffectEstimate, ...]:
         EffectEstimate(
             each.name,
             each.unit,
-            *_summary(_split_place(column, length_m)[0] if is_place(each) else column),
+            *_summary(split_place(column, length_m)[0] if is_place(each) else column),
         )
         for each, column in zip(coordinates.effects, values.T, strict=True)
     )
-
-
-def _list_other_places(problem: GapProblem, fit: Fit) -> tuple[str, ...]:
-    """Return where else along the hanger a local effect is about as likely."""
-    coordinates = problem.coordinates(fit.hypothesis)
-    values = coordinates.effect_values(fit.draws)
-    found = []
-    for each, column in zip(coordinates.effects, values.T, strict=True):
-        if is_place(each):
-            main, other = _split_place(column, problem.hanger.length_m)
-            if len(other) > math.exp(-_AS_LIKELY) * len(main):
-                found.append(f"at {other.mean():.2f} m")
-    return tuple(found)
-
-
-def _split_place(x_m: FloatArray, length_m: float) -> tuple[FloatArray, FloatArray]:
-    """Return the draws (n,) of a place on the likelier side of mid-length, and the others.
-
-    There are no others where the two sides run into each other: that is one place.
-    """
-    sides = x_m[x_m < length_m / 2], x_m[x_m >= length_m / 2]
-    main, other = sorted(sides, key=len, reverse=True)
-    if not len(other):
-        return main, other
-    (low, high), (first, last) = (np.quantile(each, [0.05, 0.95]) for each in sides)
-    apart = first - high > (high - low) + (last - first)
-    return (main, other) if apart else (x_m, other[:0])
 
 
 def _contenders(attribution: Attribution) -> list[Fit]:

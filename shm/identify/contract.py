@@ -7,14 +7,45 @@ hits, files, planes or orders; a new one is one file and one line in `IDENTIFIER
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shm.identify.options import IdentifyOptions
-from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, ResponsePoint
+from shm.values import (
+    NAN,
+    Channel,
+    ComplexArray,
+    FloatArray,
+    FrequencyResponse,
+    Mode,
+    Plane,
+    ResponsePoint,
+)
+
+LEAST_HITS = 3
+"""Student's 95 % quantile is 1.8 times the normal one with two degrees of freedom, 3.8 with one."""
+FREQUENCY_FLOOR = 0.001
+"""With fewer than three hits nothing says how well hits repeat. The frequency then gets this
+standard deviation, as a fraction: what hangers' frequencies differ by from one day to the next.
+Damping and shape stay without."""
+
+Place: TypeAlias = tuple[Plane | None, float | None, str]
+"""Plane, position in m where stated, else the name: equal for one point in several set-ups."""
+
+
+def point_of(channel: Channel) -> ResponsePoint:
+    """Return the point where a channel's sensor is mounted, or its hammer hits."""
+    return ResponsePoint(channel.name, channel.plane, channel.x_m)
+
+
+def place_of(point: ResponsePoint) -> Place:
+    """Return what identifies a point in several set-ups."""
+    if math.isnan(point.x_m):
+        return point.plane, None, point.name
+    return point.plane, point.x_m, ""
 
 
 @dataclass(frozen=True)
@@ -141,7 +172,8 @@ class Finding:
     drift: Drift | None = None
 
 
-class Identifier(Protocol):
-    """Finds the modes of a measurement; an empty finding is a valid answer."""
-
-    def __call__(self, measurement: Measurement, options: IdentifyOptions) -> Finding: ...
+def poles_of_modes(modes: Sequence[FoundMode] | Sequence[Mode]) -> ComplexArray:
+    """Return the poles in rad/s above the real axis, (modes,)."""
+    omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])
+    damping = np.array([mode.damping_ratio for mode in modes])
+    return np.asarray(omega * (-damping + 1j * np.sqrt(1 - damping**2)))

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import compress
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import (
+    FREQUENCY_FLOOR,
+    LEAST_HITS,
     Dropped,
     Finding,
     FoundMode,
     Hit,
-    Identifier,
     Measurement,
     Poles,
     Tone,
@@ -25,30 +26,22 @@ from shm.identify.contract import (
 from shm.identify.each_hit import HitModes, modes_of_each_hit
 from shm.identify.estimation.postprocess import postprocess, without_sidebands
 from shm.identify.estimation.pyoma import identify_with_pyoma2
-from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.estimation.ssi import search_windows, summed_hankel_ssi
-from shm.identify.estimation.stabilise import merge_findings
 from shm.identify.measuring.setups import (
     measure_set_ups,
     refuse_off_the_hanger,
     without_unused_force,
 )
 from shm.identify.mode_ordering.placement import STATE_PLANES, Placement, place_modes
-from shm.identify.mode_ordering.planes import directions
 from shm.identify.options import AUTO_CROSS_CHECK, NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
 from shm.identify.quality.of_modes import first_orders
-from shm.identify.quality.of_sensors import sensor_gain, sensor_places
+from shm.identify.quality.of_sensors import directions, sensor_gain, sensor_places
 from shm.identify.setup_merging.calm_part import (
     LEFT_OUT,
     late_part_level,
     late_parts,
     linear_below_level,
-)
-from shm.identify.setup_merging.hit_directions import (
-    have_same_sensors,
-    pool_hits,
-    refine_by_direction,
 )
 from shm.identify.setup_merging.join_set_ups import JoinedFinding, join_set_ups
 from shm.identify.setup_merging.modal_participation import fitted
@@ -60,7 +53,6 @@ from shm.values import (
     FrequencyResponse,
     Hanger,
     ModalTest,
-    Mode,
     QualityCheck,
     Recording,
     ResponsePoint,
@@ -108,6 +100,10 @@ class Identification:
 
 _DEFAULTS = IdentifyOptions()
 _FEWEST_CALM = 3  # judgement: two frequencies fit a bar's tension and stiffness by chance
+_KNOCKS = (
+    "the hanger does not ring as a bar: something knocks (a guide with play), slips or opens while "
+    "it swings far"
+)
 
 
 def identify(
@@ -129,71 +125,48 @@ def identify(
     recordings = without_unused_force(recordings, measurements)
     steady = tones(measurements, recordings, options)
     found = _found(measurements, options.identifier, options)
-    placement = _placed(found, measurements, hanger, steady, options)
-    if not placement.modes and (closer := _windowed_pass(found, measurements, options)):
-        found, placement = closer, _placed(closer, measurements, hanger, steady, options)
+    look = partial(_looked_at, measurements, found.finding, options)
+    placement = place_modes(found.finding.modes, found.points, hanger, steady, look)
     second = _cross_check(measurements, options, hanger)
     quality = assess(Inspection(recordings, measurements, options, steady, found.finding, second))
     if turned := directions(found.finding.modes, found.points):
         quality = (*quality, turned)
     if refused := refusal(quality, records[0].source):
         raise refused
-    level_left, noted = 1.0, found.notes
-    if not placement.modes:
-        calm = _once_calm(measurements, options, hanger, steady)
-        if calm is None and placement.check is None:
-            raise _nothing_found(records[0].source, found.finding, placement, found.points)
-        placement, level_left, noted = calm or (placement, 1.0, noted)
-        free = level_left
+    calm = None if placement.modes else _once_calm(measurements, options, hanger, steady)
+    if calm is not None:
+        placement, level_left, note = calm
+        free, noted = level_left, [note]
+    elif not placement.modes and placement.check is None:
+        raise _nothing_found(records[0].source, found.finding, placement, found.points)
     else:
-        free = linear_below_level(measurements, placement.modes)
-        noted = (*noted, *_strange(free))
+        level_left = 1.0
+        free = linear_below_level(measurements, placement.modes) if placement.modes else 1.0
+        strange = [f"until {free:.0%} of their level is left, {_KNOCKS}"] if free < 1 else []
+        noted = [*found.notes, *strange]
     hits = sorted(
         (hit for measurement in measurements for hit in measurement.hits),
         key=lambda hit: (hit.record, hit.start),
     )
     amplitude = _amplitude(hits, options)
     return Identification(
-        test=replace(
-            _test(test_id, records, placement.modes, level_left * amplitude),
+        test=ModalTest(
+            as_test_id(test_id),
+            placement.modes,
+            amplitude=level_left * amplitude,
             rattles_above=free * amplitude if free < 1 else NAN,
+            **_conditions(records),
         ),
         frequency_response=joined_response(measurements),
         hits=tuple(hits),
         dropped=_all_dropped(measurements, found.finding),
         poles=found.finding.poles,
-        notes=(*placement.notes, *noted, *_few_hits(measurements), *_no_force(measurements)),
+        notes=(*placement.notes, *noted, *_notes_of_hits(measurements)),
         window_time_constant_s=measurements[0].window_time_constant_s,
         quality=(*quality, *_of_placed(measurements, found, placement, hanger, options)),
         set_aside=placement.foreign_modes,
         fit=fitted(measurements, found.apart, options) if level_left == 1 else None,
         each_hit=modes_of_each_hit(measurements, found.apart, placement.modes),
-    )
-
-
-def _placed(
-    found: JoinedFinding,
-    measurements: Sequence[Measurement],
-    hanger: Hanger | None,
-    steady: Sequence[Tone],
-    options: IdentifyOptions,
-) -> Placement:
-    look = partial(_looked_at, measurements, found.finding, options)
-    return place_modes(found.finding.modes, found.points, hanger, steady, look)
-
-
-def _windowed_pass(
-    found: JoinedFinding, measurements: Sequence[Measurement], options: IdentifyOptions
-) -> JoinedFinding | None:
-    """Return the finding completed by windows over the band; None where they show no more."""
-    if len(measurements) > 1 or options.identifier != "ssi":
-        return None
-    again = search_windows(measurements[0], options)
-    if again is None or not again.modes:
-        return None
-    more = _allowed_for(postprocess(again, measurements[0], options), options.shape_allowance)
-    return _of_modes_alone(
-        join_set_ups(measurements, [merge_findings(found.finding, more)], options)
     )
 
 
@@ -204,9 +177,9 @@ def _looked_at(
     at_hz: Sequence[float],
 ) -> tuple[tuple[FoundMode, ...], tuple[FoundMode, ...]]:
     """Return the modes that windows show around `at_hz` of one set-up, and weak candidates."""
-    again = None
-    if len(measurements) == 1 and options.identifier == "ssi":
-        again = search_windows(measurements[0], options, at_hz)
+    if len(measurements) > 1 or options.identifier != "ssi":
+        return (), found.doubtful
+    again = search_windows(measurements[0], options, at_hz)
     if again is None:
         return (), found.doubtful
     again = postprocess(again, measurements[0], options)
@@ -235,7 +208,7 @@ def _once_calm(
     options: IdentifyOptions,
     hanger: Hanger | None,
     steady: Sequence[Tone],
-) -> tuple[Placement, float, tuple[str, ...]] | None:
+) -> tuple[Placement, float, str] | None:
     """Return the result of the late parts of ring-downs, once they are a bar's; None if never.
 
     With it come the fraction of their level that is left by then, and a note. The parts that
@@ -250,20 +223,8 @@ def _once_calm(
     placement, left_out = max(found, key=lambda each: (len(each[0].modes), each[1]))
     if len(placement.modes) < _FEWEST_CALM:
         return None
-    note = (
-        f"the first {left_out:.0%} of each ring-down are left out: there the hanger does not ring "
-        "as a bar; something knocks (a guide with play), slips or opens while it swings far"
-    )
-    return placement, late_part_level(measurements, left_out), (note,)
-
-
-def _strange(free: float) -> tuple[str, ...]:
-    if free >= 1:
-        return ()
-    return (
-        f"until {free:.0%} of their level is left, ring-downs are no sum of the modes: something "
-        "knocks (a guide with play), slips or opens while the hanger swings far",
-    )
+    note = f"the first {left_out:.0%} of each ring-down are left out: there {_KNOCKS}"
+    return placement, late_part_level(measurements, left_out), note
 
 
 def _cross_check(
@@ -291,39 +252,18 @@ def _found(
     # What tests differ by is allowed for once, not set-up by set-up.
     alone = options if len(measurements) == 1 else replace(options, frequency_allowance=0.0)
     findings = [postprocess(function(m, alone), m, options) for m in measurements]
-    found = join_set_ups(measurements, findings, options)
-    if name == "ssi" and have_same_sensors(measurements):
-        every = pool_hits(measurements)
-        whole = postprocess(function(every, options), every, options)
-        found = refine_by_direction(measurements, found, whole)
-    found = _of_modes_alone(found)
-    return replace(found, finding=_allowed_for(found.finding, options.shape_allowance))
+    return _of_modes_alone(join_set_ups(measurements, findings, options), options.shape_allowance)
 
 
-def _of_modes_alone(found: JoinedFinding) -> JoinedFinding:
-    """Return the finding without the sidebands of modes."""
+def _of_modes_alone(found: JoinedFinding, shape_allowance: float) -> JoinedFinding:
+    """Return the finding without the sidebands of modes, shapes as sure as tests repeat them."""
     finding = without_sidebands(found.finding)
     remains = [any(mode is other for other in finding.modes) for mode in found.finding.modes]
     apart = tuple(tuple(compress(modes, remains)) for modes in found.apart)
-    return replace(found, finding=finding, apart=apart)
-
-
-def _allowed_for(found: Finding, shape_allowance: float) -> Finding:
-    """Add the scatter of shapes from test to test to their standard deviations."""
     modes = tuple(
-        replace(mode, shape_sd=np.hypot(mode.shape_sd, shape_allowance)) for mode in found.modes
+        replace(mode, shape_sd=np.hypot(mode.shape_sd, shape_allowance)) for mode in finding.modes
     )
-    return replace(found, modes=modes)
-
-
-def _test(
-    test_id: str,
-    records: Sequence[Recording | FrequencyResponse],
-    modes: tuple[Mode, ...],
-    amplitude: float,
-) -> ModalTest:
-    """Return the test, with the conditions of its records."""
-    return ModalTest(as_test_id(test_id), modes, amplitude=amplitude, **_conditions(records))
+    return replace(found, finding=replace(finding, modes=modes), apart=apart)
 
 
 def _conditions(records: Sequence[Recording | FrequencyResponse]) -> dict[str, Any]:
@@ -362,22 +302,18 @@ def _all_dropped(measurements: Sequence[Measurement], found: Finding) -> tuple[D
     return tuple(entry for entry in (*early, *found.dropped) if entry.count)
 
 
-def _few_hits(measurements: Sequence[Measurement]) -> tuple[str, ...]:
-    if len(measurements) >= LEAST_HITS or any(len(m.decays) >= LEAST_HITS for m in measurements):
-        return ()
-    return (
-        "fewer than three hits: a frequency's standard deviation is the stated "
-        f"{FREQUENCY_FLOOR:.1%}, those of damping and shape are not known",
-    )
-
-
-def _no_force(measurements: Sequence[Measurement]) -> tuple[str, ...]:
-    if not any(m.hits and m.frequency_response is None for m in measurements):
-        return ()
-    return (
-        "no force is known: hits are known by the motion after them, amplitudes and frequency "
-        "responses are not",
-    )
+def _notes_of_hits(measurements: Sequence[Measurement]) -> Iterator[str]:
+    """Yield what hits that are few, or of unknown force, do not tell."""
+    if len(measurements) < LEAST_HITS and all(len(m.decays) < LEAST_HITS for m in measurements):
+        yield (
+            "fewer than three hits: a frequency's standard deviation is the stated "
+            f"{FREQUENCY_FLOOR:.1%}, those of damping and shape are not known"
+        )
+    if any(m.hits and m.frequency_response is None for m in measurements):
+        yield (
+            "no force is known: hits are known by the motion after them, amplitudes and frequency "
+            "responses are not"
+        )
 
 
 def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
@@ -386,6 +322,8 @@ def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
     return float(np.median(forces)) / options.reference_force_n if forces else NAN
 
 
+Identifier: TypeAlias = Callable[[Measurement, IdentifyOptions], Finding]
+"""Finds the modes of a measurement; an empty finding is a valid answer."""
 IDENTIFIERS: dict[str, Identifier] = {
     "ssi": summed_hankel_ssi,
     "pyoma2": identify_with_pyoma2,

@@ -10,7 +10,7 @@ on.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -76,12 +76,11 @@ def apparent_mass_kg(record: Recording) -> float:
 
 
 def _units(record: Recording, hanger: Hanger | None) -> list[SignalDoubt]:
-    odd = _unlike_its_neighbours(record)
-    if odd:
-        return odd
-    outside = [d for c in record.channels for d in _outside_bounds(c)]
-    if outside or record.force is None or hanger is None:
-        return outside
+    doubts = list(_unlike_its_neighbours(record)) or [
+        doubt for channel in record.channels if (doubt := _outside_bounds(channel))
+    ]
+    if doubts or record.force is None or hanger is None:
+        return doubts
     mass_kg = apparent_mass_kg(record)
     usual = hanger.mass_per_length_kg_m * hanger.length_m
     low, high = (usual * each for each in MASS_OVER_DESCRIBED)
@@ -89,39 +88,31 @@ def _units(record: Recording, hanger: Hanger | None) -> list[SignalDoubt]:
         return []
     times = max(mass_kg / usual, usual / mass_kg)
     side = "less" if mass_kg > usual else "more"
-    return [
-        SignalDoubt(
-            "unit",
-            record.force.name,
-            f"The hanger moves {times:.2g} times {side} for the force than by its description: "
-            f"right units and sensitivities of {record.force.name} and the accelerometers?",
-        )
-    ]
+    text = (
+        f"The hanger moves {times:.2g} times {side} for the force than by its description: "
+        f"right units and sensitivities of {record.force.name} and the accelerometers?"
+    )
+    return [SignalDoubt("unit", record.force.name, text)]
 
 
-def _outside_bounds(channel: Channel) -> list[SignalDoubt]:
+def _outside_bounds(channel: Channel) -> SignalDoubt | None:
     force = channel.quantity == "force"
     low, high = PEAK_FORCE_N if force else PEAK_ACCELERATION_M_S2
     values = channel.values[np.isfinite(channel.values)]
     peak = float(np.abs(values - np.median(values)).max(initial=0.0)) if len(values) else 0.0
     if low <= peak <= high or peak == 0:  # a dead channel is another check's
-        return []
+        return None
     what, unit = ("hammer hits", "N") if force else ("a hit hanger", "m/s^2")
-    side = "below" if peak < low else "above"
-    return [
-        SignalDoubt(
-            "unit",
-            channel.name,
-            f"{channel.name} peaks at {peak:.3g} {unit}, {side} what {what} give "
-            f"({low:g} to {high:g} {unit}): right unit and sensitivity?",
-        )
-    ]
+    text = (
+        f"{channel.name} peaks at {peak:.3g} {unit}, {'below' if peak < low else 'above'} what "
+        f"{what} give ({low:g} to {high:g} {unit}): right unit and sensitivity?"
+    )
+    return SignalDoubt("unit", channel.name, text)
 
 
-def _unlike_its_neighbours(record: Recording) -> list[SignalDoubt]:
-    """Return sensors that move 100 times as much, or as little, as all others of their plane."""
+def _unlike_its_neighbours(record: Recording) -> Iterator[SignalDoubt]:
+    """Yield sensors that move 100 times as much, or as little, as all others of their plane."""
     velocities, channels = _velocities(record), record.accelerations
-    found = []
     for row, channel in enumerate(channels if len(velocities) else ()):
         rest = [
             velocities[n]
@@ -132,16 +123,12 @@ def _unlike_its_neighbours(record: Recording) -> list[SignalDoubt]:
             continue
         above, below = velocities[row] / max(rest), min(rest) / velocities[row]
         if max(above, below) > SENSORS_APART:
-            side = "more" if above > below else "less"
-            found.append(
-                SignalDoubt(
-                    "unit",
-                    channel.name,
-                    f"{channel.name} moves {max(above, below):.2g} times {side} than the other "
-                    "sensors of its plane: right unit and sensitivity?",
-                )
+            text = (
+                f"{channel.name} moves {max(above, below):.2g} times "
+                f"{'more' if above > below else 'less'} than the other sensors of its plane: right "
+                "unit and sensitivity?"
             )
-    return found
+            yield SignalDoubt("unit", channel.name, text)
 
 
 def _velocities(record: Recording) -> FloatArray:

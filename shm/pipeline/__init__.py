@@ -13,9 +13,8 @@ from shm.resources import when_asked
 if TYPE_CHECKING:
     from shm.pipeline.courier import DeliveryRefused, Notifier
     from shm.pipeline.flow import Flow
-    from shm.pipeline.intake import Sharing
 
-__all__ = ["Clock", "DeliveryRefused", "Flow", "Notifier", "Sharing", "utc_now"]
+__all__ = ["Clock", "DeliveryRefused", "Flow", "Notifier", "utc_now"]
 
 Clock = Callable[[], datetime]
 """The time as the flow takes it."""
@@ -29,5 +28,4 @@ def utc_now() -> datetime:
 if not TYPE_CHECKING:
     # The flow brings all readers with it: who only asks the time does without.
     of_courier = dict.fromkeys(("DeliveryRefused", "Notifier"), "shm.pipeline.courier")
-    others = {"Flow": "shm.pipeline.flow", "Sharing": "shm.pipeline.intake"}
-    __getattr__ = when_asked(__name__, {**of_courier, **others})
+    __getattr__ = when_asked(__name__, {**of_courier, "Flow": "shm.pipeline.flow"})

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
@@ -50,66 +50,13 @@ from shm.store.queries.hangers import (
 from shm.store.queries.tests import list_undated_names, load_frequency_response
 from shm.store.queries.trends import find_latest_trends, list_trend
 from shm.store.stored_alerts import describe_silence, silenced_until
-from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint
+from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
 from shm.watch.alert_text import look_again
-from shm.watch.control_chart import ControlChart
 
 if TYPE_CHECKING:
     from shm.watch.neighbours import BridgePattern, HangerShift
-
-
-def warnings_from(
-    every: Sequence[Hanger],
-    hangers: Sequence[Hanger],
-    baselines: Mapping[int, BaselineGlance],
-    latest: Mapping[int, StoredWatch],
-    now: Mapping[int, TrendPoint],
-    works: Sequence[Silence],
-    gone: Mapping[int, Sequence[str]],
-) -> dict[int, tuple[str, ...]]:
-    """Return the open warnings of each of `hangers` that has a baseline, by hanger.
-
-    `baselines` are those of `every` hanger of the bridge, `works` maintenance windows, `gone` the
-    tests of baselines that were discarded since.
-    """
-    tensions = {id_: each.averaged.tension_n for id_, each in baselines.items()}
-
-    def slack(hanger: Hanger) -> str:
-        watched = latest[hanger.id].watched if hanger.id in latest else None
-        if hanger.id not in now or watched is None:
-            return ""
-        level = hanger.thresholds.alert_probability
-        is_reported = any(d.quantity == TENSION and d.probability >= level for d in watched.drifts)
-        of_test = now[hanger.id].averaged.tension_n
-        return nearly_slack(hanger, tensions[hanger.id], of_test, is_reported=is_reported)
-
-    def of_works(hanger: Hanger) -> str:
-        point, watched = now.get(hanger.id), latest.get(hanger.id)
-        if point is None or point.test in baselines[hanger.id].tests:
-            return ""
-        if watched is not None and watched.watched.time >= point.time:
-            return ""
-        windows = [each for each in works if each.covers(hanger.id, point.time)]
-        return passed_over(hanger, describe_silence(windows[-1])) if windows else ""
-
-    return {
-        hanger.id: open_warnings(
-            hanger,
-            baselines[hanger.id].check,
-            standing_out(hanger, every, tensions),
-            latest[hanger.id].watched if hanger.id in latest else None,
-            (
-                redescription_words(hanger, redescribed(hanger, baselines[hanger.id])),
-                discarded(hanger, gone.get(hanger.id, ())),
-                slack(hanger),
-                of_works(hanger),
-            ),
-        )
-        for hanger in hangers
-        if hanger.id in baselines
-    }
 
 
 def bridge_report(
@@ -172,8 +119,8 @@ def hanger_summaries(
 ) -> tuple[HangerSummary, ...]:
     """Return the state of each of `hangers`, or of all along the bridge; it reads no samples."""
     hangers = hangers or workspace.bridge.hangers
-    kept = HangersNow.of(workspace, store, hangers, now)
-    return tuple(kept.summary(hanger) for hanger in hangers)
+    state = HangersNow(workspace, store, hangers, now)
+    return tuple(state.summary(hanger) for hanger in hangers)
 
 
 def unwatched(
@@ -203,54 +150,29 @@ def notes_of(
     )
 
 
-@dataclass(frozen=True)
 class HangersNow:
     """State of all hangers by the store, asked in a few queries without any samples."""
 
-    workspace: Workspace
-    now: datetime
-    latest: Mapping[int, TrendPoint]
-    baselines: Mapping[int, BaselineGlance]
-    watches: Mapping[int, StoredWatch]
-    called: Mapping[int, Sequence[Change]]
-    open_alerts: Mapping[int, int]
-    standing: Mapping[int, Sequence[StoredAlert]]
-    silences: tuple[Silence, ...]
-    warnings: Mapping[int, tuple[str, ...]]
-    blind: Mapping[int, Lead]
-    undated: Mapping[int, tuple[str, ...]]
-    charts: tuple[ControlChart, ...]
-
-    @classmethod
-    def of(
-        cls, workspace: Workspace, store: Store, hangers: Sequence[Hanger], now: datetime
-    ) -> HangersNow:
-        every = workspace.bridge.hangers
-        now_at = find_latest_trends(store, hangers)
-        baselines = list_baselines_in_force(store, every)  # of neighbours too: one may stand out
-        watches = find_latest_watches(store, hangers)
-        standing = defaultdict[int, list[StoredAlert]](list)
-        silences = store.silences.list_all()
-        works = [each for each in silences if each.is_maintenance]
+    def __init__(
+        self, workspace: Workspace, store: Store, hangers: Sequence[Hanger], now: datetime
+    ):
+        self.workspace, self.now = workspace, now
+        self.latest = find_latest_trends(store, hangers)
+        # Those of neighbours too: one may stand out.
+        self.baselines = list_baselines_in_force(store, workspace.bridge.hangers)
+        self.watches = find_latest_watches(store, hangers)
+        self.called = list_detected_changes(store, hangers)
+        self.open_alerts = count_open_alerts(store)
+        self.standing = defaultdict[int, list[StoredAlert]](list)
         for each in store.alerts.list_all(_only(hangers), standing=True):
-            standing[each.alert.hanger].append(each)
-        return cls(
-            workspace,
-            now,
-            now_at,
-            baselines,
-            watches,
-            list_detected_changes(store, hangers),
-            count_open_alerts(store),
-            standing,
-            tuple(each for each in silences if not each.is_over(now)),
-            warnings_from(
-                every, hangers, baselines, watches, now_at, works, discarded_of_baselines(store)
-            ),
-            blind_hangers(heard(workspace, store, now)),
-            list_undated_names(store),
-            control_charts(workspace, store),
-        )
+            self.standing[each.alert.hanger].append(each)
+        silences = store.silences.list_all()
+        self.works = [each for each in silences if each.is_maintenance]
+        self.silences = tuple(each for each in silences if not each.is_over(now))
+        self.blind = blind_hangers(heard(workspace, store, now))
+        self.undated = list_undated_names(store)
+        self.charts = control_charts(workspace, store)
+        self._discarded = discarded_of_baselines(store)
 
     def summary(self, hanger: Hanger) -> HangerSummary:
         """Return the state of a hanger, as every face shows it."""
@@ -271,7 +193,7 @@ class HangersNow:
             detected="; ".join(called_words(change) for change in called),
             standing=findings(each.alert for each in standing),
             open_alerts=self.open_alerts.get(hanger.id, 0),
-            warnings=(*doubts, *self.warnings.get(hanger.id, ())),
+            warnings=(*doubts, *self._warnings(hanger, baseline, watched)),
             notes=notes_of(standing, self.silences, hanger.id, self.now),
             unwatched=unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
             if point
@@ -279,6 +201,41 @@ class HangersNow:
             undated=self.undated.get(hanger.id, ()),
             control=control,
         )
+
+    def _warnings(
+        self, hanger: Hanger, baseline: BaselineGlance | None, watched: WatchedTest | None
+    ) -> tuple[str, ...]:
+        """Return the open warnings of a hanger that has a baseline."""
+        if baseline is None:
+            return ()
+        tensions = {id_: each.averaged.tension_n for id_, each in self.baselines.items()}
+        others = (
+            redescription_words(hanger, redescribed(hanger, baseline)),
+            discarded(hanger, self._discarded.get(hanger.id, ())),
+            self._slackness(hanger, tensions[hanger.id], watched),
+            self._passed_over(hanger, baseline, watched),
+        )
+        neighbours = standing_out(hanger, self.workspace.bridge.hangers, tensions)
+        return open_warnings(hanger, baseline.check, neighbours, watched, others)
+
+    def _slackness(self, hanger: Hanger, then: Summary, watched: WatchedTest | None) -> str:
+        point, level = self.latest.get(hanger.id), hanger.thresholds.alert_probability
+        if point is None or watched is None:
+            return ""
+        is_reported = any(d.quantity == TENSION and d.probability >= level for d in watched.drifts)
+        return nearly_slack(hanger, then, point.averaged.tension_n, is_reported=is_reported)
+
+    def _passed_over(
+        self, hanger: Hanger, baseline: BaselineGlance, watched: WatchedTest | None
+    ) -> str:
+        """Return that the latest test was passed over for planned works."""
+        point = self.latest.get(hanger.id)
+        if point is None or point.test in baseline.tests:
+            return ""
+        if watched is not None and watched.time >= point.time:
+            return ""
+        windows = [each for each in self.works if each.covers(hanger.id, point.time)]
+        return passed_over(hanger, describe_silence(windows[-1])) if windows else ""
 
 
 def _only(hangers: Sequence[Hanger]) -> int | None:

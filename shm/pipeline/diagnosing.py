@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
 from shm.errors import NothingThere
 from shm.inference.options import Progress, silent
 from shm.pipeline.lineage import diagnosis_lineage
+from shm.report.hanger_status import still_detected
 from shm.store import Store, StoredTest
-from shm.values import Diagnosis, Hanger
+from shm.store.queries.hangers import find_latest_watches, list_detected_changes
+from shm.values import Diagnosis, Hanger, ModalTest
 
 if TYPE_CHECKING:
     from shm.gap import GapOptions
@@ -20,7 +22,20 @@ LATEST_TESTS = 20
 """So many of the latest tests are diagnosed together."""
 
 
-def latest_tests(store: Store, hanger: Hanger, count: int) -> Sequence[StoredTest]:
+@dataclass(frozen=True, eq=False)
+class ChosenTests:
+    """Stored tests to diagnose together; `remark` says which were left out, empty for none."""
+
+    stored: tuple[StoredTest, ...]
+    remark: str = ""
+
+    @property
+    def tests(self) -> list[ModalTest]:
+        """Return the tests themselves."""
+        return [each.test for each in self.stored]
+
+
+def latest_tests(store: Store, hanger: Hanger, count: int) -> tuple[StoredTest, ...]:
     """Return so many at most, the latest last; raise NothingThere where there is none."""
     if not (stored := store.tests.list_all(hanger.id)[-count:]):
         raise NothingThere(
@@ -29,9 +44,54 @@ def latest_tests(store: Store, hanger: Hanger, count: int) -> Sequence[StoredTes
     return stored
 
 
+def choose_tests(
+    store: Store, hanger: Hanger, count: int = LATEST_TESTS, *, every: bool = False
+) -> ChosenTests:
+    """Return so many of the latest tests since the last change that the watch reports.
+
+    No steady cause explains tests from before and after a change. With `every` those from before
+    it are among them. Raises NothingThere where there is no test.
+    """
+    stored = latest_tests(store, hanger, count)
+    began_by = None if every else find_last_change(store, hanger, stored)
+    if began_by is None:
+        return ChosenTests(stored)
+    since = tuple(each for each in stored if each.time >= began_by) or stored[-1:]
+    if len(since) == len(stored):
+        return ChosenTests(stored)
+    tests = "test" if len(since) == 1 else f"{len(since)} tests"
+    remark = (
+        f"Only the {tests} since {began_by:%Y-%m-%d}, when the watch reports a change, "
+        f"{'is' if len(since) == 1 else 'are'} diagnosed; {len(stored) - len(since)} earlier left "
+        f"out. To diagnose them together: `shm gap diagnose --hanger {hanger.id} --all-tests`."
+    )
+    return ChosenTests(since, remark)
+
+
+def find_last_change(store: Store, hanger: Hanger, stored: Sequence[StoredTest]) -> datetime | None:
+    """Return by when the last change that is in force began, or the baseline was set anew.
+
+    None where neither is known. A change is in force while the watch detects it, or while an alert
+    of it has not ended; what two tests agree on began with the first of them. `stored` are the
+    tests by time.
+    """
+    baseline, latest = store.watch.baseline(hanger.id), find_latest_watches(store, [hanger])
+    detected = list_detected_changes(store, [hanger]).get(hanger.id, ())
+    watched = latest[hanger.id].watched if hanger.id in latest else None
+    times = [change.began_by for change in still_detected(detected, watched, hanger)]
+    for each in store.alerts.list_all(hanger.id, standing=True):
+        if each.alert.change is not None:
+            times.append(each.alert.change.began_by)
+        elif "beyond threshold" in each.alert.kinds:
+            times += [test.time for test in stored if test.time < each.alert.time][-1:]
+    if baseline is not None and baseline.since is not None:
+        times.append(baseline.since)
+    return max(times, default=None)
+
+
 def diagnose_stored(
     store: Store,
-    stored: Sequence[StoredTest],
+    chosen: ChosenTests,
     hanger: Hanger,
     options: GapOptions,
     now: datetime,
@@ -43,7 +103,21 @@ def diagnose_stored(
     """
     from shm.gap import diagnose  # only who diagnoses needs it
 
-    found = diagnose([each.test for each in stored], hanger, options, progress)
-    lineage = diagnosis_lineage(stored, hanger, asdict(options))
+    found = diagnose(chosen.tests, hanger, options, progress)
+    return keep_diagnosis(store, chosen, hanger, found, options, now)
+
+
+def keep_diagnosis(
+    store: Store,
+    chosen: ChosenTests,
+    hanger: Hanger,
+    found: Diagnosis,
+    options: GapOptions,
+    now: datetime,
+) -> Diagnosis:
+    """Keep a diagnosis of these tests, and return it with the remark on those left out."""
+    if chosen.remark:
+        found = replace(found, remarks=(chosen.remark, *found.remarks))
+    lineage = diagnosis_lineage(chosen.stored, hanger, asdict(options))
     store.posteriors.save_diagnosis(hanger.id, found, lineage, now)
     return found

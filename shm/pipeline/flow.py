@@ -20,10 +20,10 @@ from shm.errors import DISK_FULL, ShmError, StoreDamaged, StoreError, WorkerDied
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.courier import Courier, Notifier, alert_fields
 from shm.pipeline.faults import contained, explain_refusal
-from shm.pipeline.intake import Sharing, receive
+from shm.pipeline.intake import receive
 from shm.pipeline.limits import evaluate_limit_alerts
 from shm.pipeline.lineage import competing
-from shm.pipeline.watching import ReevaluationQueue
+from shm.pipeline.watching import judge_again
 from shm.pipeline.work import Queue, Task, Work
 from shm.read import sidecar_path
 from shm.store import Outcome, Receipt, Store, StoredAlert, Workspace
@@ -98,8 +98,7 @@ class Flow:
             if hanger.id in selected:
                 competing(hanger, workspace.settings, selected)
         self.workspace = workspace
-        self._judged_again = ReevaluationQueue(workspace, self.store)
-        self._limits_to_apply = list(workspace.bridge.hangers)
+        self._to_judge_again = list(workspace.bridge.watched)
         self._queue = Queue(workspace, self.store, self.clock)
 
     def close(self) -> None:
@@ -108,10 +107,9 @@ class Flow:
             running.future.cancel()
         self._courier.close()
 
-    def receive(self, path: Path, sharing: Sharing | None = None) -> Receipt:
+    def receive(self, path: Path) -> Receipt:
         """Takes a whole file in; see `shm.pipeline.intake`."""
-        now = self.clock()
-        receipt = receive(path, self.workspace, self.store, now, sharing, self.on_progress)
+        receipt = receive(path, self.workspace, self.store, self.clock(), self.on_progress)
         recording = receipt.recording
         name = recording.file.file_name
         fields = {"recording": recording.id, "file": name, "stage": "received"}
@@ -159,12 +157,13 @@ class Flow:
         now = self.clock()
         postponed = {id_ for id_, until in self._postponed.items() if _still_waits(until, now)}
         stopped = {id_ for id_, until in self._stopped.items() if _still_waits(until, now)}
-        while self._limits_to_apply:
-            hanger = self._limits_to_apply[0]
-            with contained(log, "limits of hanger %d cannot be applied", hanger.id):
-                evaluate_limit_alerts(self.workspace, self.store, [hanger], now)
-            self._limits_to_apply.pop(0)
-        self._judged_again.go_on(now, postponed, stopped)
+        while self._to_judge_again:
+            hanger = self._to_judge_again[0]
+            with contained(log, "hanger %d cannot be judged again", hanger.id):
+                judge_again(self.workspace, self.store, hanger, now)
+                if not hanger.is_control:
+                    evaluate_limit_alerts(self.workspace, self.store, [hanger], now)
+            self._to_judge_again.pop(0)
         for task in self._queue.list_waiting(2 * self.lanes, postponed):
             if task.hanger in stopped or task.key in self._running:
                 continue

@@ -13,6 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from datetime import datetime, tzinfo
 from datetime import time as clock_time
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -24,13 +25,14 @@ from shm.identify.measuring.setups import fault_of_place
 from shm.pipeline.import_times import outline, rate_told, with_times
 from shm.pipeline.lineage import read_limits
 from shm.read import logger_words as words
-from shm.read.assemble import recording
+from shm.read.assemble import assemble
 from shm.read.base import Survey, SurveyedColumn
-from shm.read.header import CHANNEL_KEYS, Entry, Header
+from shm.read.header import CHANNEL_KEYS, Entry
 from shm.read.profiles import Profile, completed, profile_for, save_profile, with_day_order
 from shm.read.sandbox import survey
 from shm.read.sidecar import Described, sidecar_document
 from shm.read.stamps import DayOrder, in_zone, order_of_choice
+from shm.read.table import Column, Table, describe
 from shm.store import Workspace
 from shm.values import NAN, PLANES, Channel, Plane, Quantity, Recording
 
@@ -410,11 +412,17 @@ def _recording(
 ) -> tuple[Recording | None, str]:
     """The recording as it will be read, or why it will be refused."""
     try:
-        columns = [_told(column, described) for column in found.columns]
-        used = [c for c in columns if c.quantity is not None and c.values is not None]
-        header = Header(path, {c.name: _entries(c, path) for c in used})
-        values = np.array([c.values for c in used]).reshape(len(used), -1 if used else 0)
-        return recording(header, values, path, rate), ""
+        columns = [
+            Column(c.name, len(c.values), partial(np.asarray, c.values), role="channel",
+                   stated=_entries(c, path))
+            for c in (_told(column, described) for column in found.columns)
+            if c.quantity is not None and c.values is not None
+        ]  # fmt: skip
+        rates = {} if math.isnan(rate) else {"sampling_rate_hz": Entry(rate, path)}
+        table = Table(path, tuple(columns), rates)
+        made = assemble(table, describe(table, with_sidecars=False))
+        assert isinstance(made, Recording)
+        return made, ""
     except BadInput as error:
         return None, str(error)
 

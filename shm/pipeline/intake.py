@@ -9,7 +9,6 @@ import os
 import shutil
 import tempfile
 import uuid
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -38,42 +37,11 @@ from shm.store.archive import (
 from shm.store.queries.history import list_events
 
 
-class Sharing:
-    """Count of files that wait for the same sidecar; each folder is listed once.
-
-    One for each look into the spool: with one for each file, ten thousand files would be listed
-    ten thousand times.
-    """
-
-    def __init__(self, on_progress: ProgressCallback = do_nothing) -> None:
-        self._meanwhile = on_progress
-        self._waiting: dict[Path, Counter[Path]] = {}
-
-    def others_need(self, sidecar: Path) -> bool:
-        """Return True if more than one file of the folder waits for a sidecar."""
-        return self._of(sidecar.parent)[sidecar] > 1
-
-    def taken(self, sidecar: Path) -> None:
-        """One of the files that waited for it is there no more."""
-        self._of(sidecar.parent)[sidecar] -= 1
-
-    def _of(self, folder: Path) -> Counter[Path]:
-        if folder not in self._waiting:
-            waiting: Counter[Path] = Counter()
-            for entry in folder.iterdir():
-                self._meanwhile()
-                sidecar = sidecar_path(entry)
-                waiting[sidecar] += entry != sidecar
-            self._waiting[folder] = waiting
-        return self._waiting[folder]
-
-
 def receive(
     path: Path,
     workspace: Workspace,
     store: Store,
     at: datetime,
-    sharing: Sharing | None = None,
     on_progress: ProgressCallback = do_nothing,
 ) -> Receipt:
     """Archives a whole file with its sidecar, enters it, and removes it where it was spooled.
@@ -103,7 +71,7 @@ def receive(
     )
     receipt = store.recordings.receive(file, at)
     if spooled:
-        _remove(path, kept, kept_sidecar, sharing or Sharing())
+        _remove(path, kept, kept_sidecar)
     return receipt
 
 
@@ -232,18 +200,19 @@ def _place(path: Path, spool: Path) -> tuple[Path, bool]:
     return Path(path.name), False
 
 
-def _remove(
-    path: Path, kept: ArchivedFile, kept_sidecar: ArchivedFile | None, sharing: Sharing
-) -> None:
+def _remove(path: Path, kept: ArchivedFile, kept_sidecar: ArchivedFile | None) -> None:
     """Empties the spool of a received file; its sidecar first, lest that be left alone.
+
+    A sidecar that another file waits for, as NAME.uff beside NAME.csv, stays.
 
     What has come under either name since it was read stays, to be taken in its turn.
     """
     sidecar = sidecar_path(path)
-    if kept_sidecar is not None and not sharing.others_need(sidecar):
-        _remove_if_still(sidecar, kept_sidecar)
+    if kept_sidecar is not None:
+        others = {each for each in path.parent.iterdir() if sidecar_path(each) == sidecar}
+        if not others - {path, sidecar}:
+            _remove_if_still(sidecar, kept_sidecar)
     _remove_if_still(path, kept)
-    sharing.taken(sidecar)
 
 
 def _remove_if_still(path: Path, kept: ArchivedFile) -> None:

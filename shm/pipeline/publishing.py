@@ -81,7 +81,7 @@ def summary_fields(summary: HangerSummary) -> dict[str, Value]:
     """Return the headline of a hanger, as every face shows it; empty before anything is known.
 
     A tension that the modes do not determine is left out, as it is from figures. Levels count
-    from 0: of `state` in the order First test, No change, Cannot judge, Check, Watch, Alert.
+    from 0: of `state` in the order Baseline only, No change, Cannot judge, Check, Watch, Alert.
     """
     message = summary.message
     if message.status is None:

@@ -17,7 +17,7 @@ from shm.inference.calibrating import learn
 from shm.inference.priors import Calibration
 from shm.models import build, described
 from shm.pipeline.lineage import Taught, Terms, competing, identify_settings, read_limits
-from shm.pipeline.registry import Opens, WatchResult
+from shm.pipeline.remote_file import Opens, WatchResult
 from shm.plausibility import fingerprint_of
 from shm.read.sandbox import Limits, load_modes, read_test
 from shm.settings import Settings

@@ -6,15 +6,16 @@ nothing, an alert of what lasts for a day, over once it ends; thermometers again
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Literal
 
 from shm.pipeline.reconcile import Condition, reconcile
-from shm.store import Store, StoredAlert, Workspace
+from shm.store import Store, Workspace
 from shm.store.queries.streams import (
     find_progress,
+    list_latest_with_modes,
     list_pooled,
     list_stream_events,
     list_window_starts,
@@ -49,23 +50,33 @@ _AT_FAULT = ("dead", "drifting", "swapped", "saturated", "lost modes", "thermome
 _FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends it
 _STANDS = {"thermometer": timedelta(hours=2)}  # derived: an hour is judged once it is over
 _NAMED = 5  # of many: the page of sensors lists them all
-_BLIND: dict[State, tuple[str, str]] = {
+
+
+_UNSEEN: dict[State, tuple[str, str]] = {
     "silent": ("silent", f"Look at its logger, power and connection {WEEK}."),
     "sees nothing": (
         "without any motion of it",
         f"See {WEEK} whether the sensors are fixed to it and connected.",
     ),
 }
+"""States in which nobody sees a hanger: what is said of it, and what to do."""
 
 
 @dataclass(frozen=True)
 class StreamHealth:
-    """A stream and how it is, by its last sample; `unread` is how much the watch has not read."""
+    """State of a stream.
+
+    `last_sample` is when its last sample was taken, `heard_at` when it was last heard of, by that
+    sample or by whatever came later: a backlog is old, and no silence. `unread` is how much the
+    watch has not read, `events` are those of the last day.
+    """
 
     stream: Stream
     state: State
     last_sample: datetime | None
+    heard_at: datetime | None = None
     unread: timedelta = timedelta(0)
+    events: tuple[StreamEvent, ...] = ()
 
     @property
     def named(self) -> str:
@@ -75,44 +86,39 @@ class StreamHealth:
 
 
 def heard(workspace: Workspace, store: Store, now: datetime) -> tuple[StreamHealth, ...]:
-    """Each stream that `bridge.toml` describes, in its order."""
+    """Return the state of each stream that `bridge.toml` describes, in its order.
+
+    Where the ring is empty, after a restore or a long silence, the end of the last window counts.
+    """
     if not workspace.bridge.streams:
         return ()
     # It brings h5py, and most bridges have no streams.
     from shm.store.ring import ring_of
 
     ring = ring_of(workspace)
-    last = last_samples(workspace, ring, store)
-    return tuple(
-        StreamHealth(
-            each,
-            classify_stream(
-                last[each.name], list_stream_events(store, each.name, now - LATELY), now
-            ),
-            last[each.name],
-            measure_unread(workspace, ring, store, each.name, now),
-        )
-        for each in workspace.bridge.streams
-    )
+    latest, arrivals = ring.latest(), ring.last_arrivals()
+    found = []
+    for stream in workspace.bridge.streams:
+        last = latest.get(stream.name) or find_progress(store, stream.name)
+        # An arrival that is yet to come was noted by a clock that was ahead.
+        times = [at for at in (last, arrivals.get(stream.name)) if at and at - now <= _AHEAD]
+        heard_at = max(times, default=last)
+        events = list_stream_events(store, stream.name, now - LATELY)
+        state = classify_stream(last, heard_at, events, now)
+        unread = measure_unread(workspace, ring, store, stream.name, now)
+        found.append(StreamHealth(stream, state, last, heard_at, unread, events))
+    return tuple(found)
 
 
-def last_samples(workspace: Workspace, ring: Ring, store: Store) -> dict[str, datetime | None]:
-    """Return when the last sample of each described stream ended, None where it never sent.
-
-    Where the ring is empty, after a restore or a long silence, it is when the last window ended.
-    """
-    latest = ring.latest()
-    names = [stream.name for stream in workspace.bridge.streams]
-    return {name: latest.get(name) or find_progress(store, name) for name in names}
-
-
-def classify_stream(last: datetime | None, events: Sequence[StreamEvent], now: datetime) -> State:
-    """Return how a stream is by its last sample and the `events` of a day."""
-    if last is None:
+def classify_stream(
+    last: datetime | None, heard_at: datetime | None, events: Sequence[StreamEvent], now: datetime
+) -> State:
+    """Return how a stream is by its last sample, when it was heard of, and a day's `events`."""
+    if last is None or heard_at is None:
         return "never sent"
     if last - now > _AHEAD:  # whether it still sends cannot be told by its stamps
         return "clock ahead"
-    if now - last > _SILENT:
+    if now - heard_at > _SILENT:
         return "silent"
     if now - last > _LATE:
         return "late"
@@ -133,33 +139,30 @@ def backlog_leads(
 ) -> tuple[Lead, ...]:
     """Return what to say of streams of which more than `longest` is not read yet."""
     behind = [each for each in found if each.unread > longest]
-    if not behind:
-        return ()
     names = [
         f"{each.stream.name} ({each.unread / timedelta(hours=1):.3g} hours)" for each in behind
     ]
-    more = ["others"] if names[_NAMED:] else []
-    what = "Streams" if names[1:] else "Stream"
-    return (
-        Lead(
-            f"{what} {listed([*names[:_NAMED], *more])}: samples are not read yet, so the watch is "
-            "behind.",
-            "Start `shm daemon` if none is active; if one is, give it more processors and raise "
-            "the setting workers.",
-        ),
+    state = f"{_listed(names)}: samples are not read yet, so the watch is behind."
+    action = (
+        "Start `shm daemon` if none is active; if one is, give it more processors and raise the "
+        "setting workers."
     )
+    return (Lead(state, action),) if names else ()
 
 
 def leads_of(found: Sequence[StreamHealth]) -> tuple[Lead, ...]:
-    """Of each state that somebody should know of, the streams that are in it, and the remedy."""
-    leads = []
-    for state, remedy in REMEDIES.items():
-        own = [each.named for each in found if each.state == state]
-        if own:
-            more = ["others"] if own[_NAMED:] else []
-            what = "Streams" if own[1:] else "Stream"
-            leads.append(Lead(f"{what} {listed([*own[:_NAMED], *more])}: {state}.", remedy))
-    return tuple(leads)
+    """Return for each state that somebody should know of the streams in it, and the remedy."""
+    named = {state: [e.named for e in found if e.state == state] for state in REMEDIES}
+    return tuple(
+        Lead(f"{_listed(names)}: {state}.", REMEDIES[state])
+        for state, names in named.items()
+        if names
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = ["others"] if names[_NAMED:] else []
+    return f"{'Streams' if names[1:] else 'Stream'} {listed([*names[:_NAMED], *more])}"
 
 
 def lateness_limit(workspace: Workspace, now: datetime) -> datetime:
@@ -228,58 +231,68 @@ def _gigabytes(size: int) -> str:
 
 def blind_hangers(found: Sequence[StreamHealth]) -> dict[int, Lead]:
     """Return what is said first of each hanger whose stream says nothing."""
-    leads = {}
-    for each in found:
-        if each.state in _BLIND:
-            what, action = _BLIND[each.state]
-            hanger = each.stream.hanger
-            leads[hanger] = Lead(f"Hanger {hanger}: its stream {each.named} is {what}.", action)
-    return leads
+    return {each.stream.hanger: _lead(each) for each in found if each.state in _UNSEEN}
+
+
+def _lead(health: StreamHealth) -> Lead:
+    what, action = _UNSEEN[health.state]
+    return Lead(f"Hanger {health.stream.hanger}: its stream {health.named} is {what}.", action)
 
 
 _KIND: AlertKind = "silent"
-_WORD = {"silent": "silent", "sees nothing": "blind"}
-"""What the key of an alert calls each state that is one."""
-_HELD = {"silent": ("silent",), "blind": ("sees nothing", "silent", "late", "clock ahead")}
-"""In which states an alert goes on: what sends nothing new does not see its hanger again."""
-_DETAILS = {
-    "silent": "nothing watches what the stream measured; what its logger stored is read once it is "
-    "back.",
-    "blind": "nothing watches what the stream measured until its sensors see the hanger again.",
-}
-_BROKEN_OFF = timedelta(hours=1)  # as `unheard` takes it to be over
 _LONG = timedelta(hours=26)
 """judgement: what a logger begins anew by itself, or sends as one file a day, needs nobody."""
 
 
 def evaluate_silent_streams(workspace: Workspace, store: Store, at: datetime) -> None:
-    """Open and close what streams call for that say nothing."""
-    found = {each.stream.name: each for each in heard(workspace, store, at)}
-    standing = [each for each in store.alerts.list_all(standing=True) if _KIND in each.alert.kinds]
-    conditions = [
-        Condition(each.alert, "over", why) for each in standing if (why := _why_ended(each, found))
-    ]
-    told = {_told(each) for each in standing}
-    for name, each in found.items():
-        word, last = _WORD.get(each.state, ""), each.last_sample
-        if not word or last is None or (word, name) in told:
-            continue
-        since = last if word == "silent" else _blind_since(store, name, at)
-        if at - since > _LONG:
-            conditions.append(Condition(_alert(each, word, since), "holds"))
+    """Open an alert of each stream that has not seen its hanger for a day; close what is over."""
+    is_open = [each for each in store.alerts.list_all(standing=True) if _KIND in each.alert.kinds]
+    found = heard(workspace, store, at)
+    seen_at = {each.stream.name: _last_seen(store, each) for each in found}
+    conditions: list[Condition] = []
+    for alert in (each.alert for each in is_open):
+        name = _stream_of(alert)
+        seen = seen_at.get(name)
+        if name not in seen_at:
+            why = "bridge.toml does not describe the stream any more"
+            conditions.append(Condition(alert, "over", why))
+        elif seen is not None and seen > alert.time:
+            conditions.append(Condition(alert, "over", f"stream {name} sees its hanger again"))
+    known = {_stream_of(each.alert) for each in is_open}
+    for each in found:
+        since = seen_at[each.stream.name]
+        is_unseen = each.state in _UNSEEN and since is not None and at - since > _LONG
+        if since is not None and is_unseen and each.stream.name not in known:
+            conditions.append(Condition(_alert(each, since), "holds"))
     hooks = [hook.name for hook in workspace.bridge.hooks]
-    store.alerts.settle(reconcile(standing, conditions), hooks, at)
+    store.alerts.settle(reconcile(is_open, conditions), hooks, at)
 
 
-def _blind_since(store: Store, name: str, at: datetime) -> datetime:
-    """Since when a stream has seen nothing; no longer ago than twice what an alert takes."""
-    since = None
-    for each in reversed(list_stream_events(store, name, at - 2 * _LONG)):
-        if each.kind == "lost modes" and not each.channel:
-            if since and since - each.end > _BROKEN_OFF:
-                break
-            since = min(since or at, each.start)
-    return since or at
+def _last_seen(store: Store, health: StreamHealth) -> datetime | None:
+    """Return when the last window with modes ended; without any, when the stream was heard of."""
+    last = next(iter(list_latest_with_modes(store, health.stream.name)), None)
+    if last is None:
+        return health.heard_at
+    return last.window.start + timedelta(seconds=last.window.duration_s)
+
+
+def _stream_of(alert: Alert) -> str:
+    return alert.key.split(":")[2]
+
+
+def _alert(health: StreamHealth, since: datetime) -> Alert:
+    stream, lead = health.stream, _lead(health)
+    state = f"{lead.state.rstrip('.')} for longer than a day."
+    return Alert(
+        key=f"hanger-{stream.hanger}:{_KIND}:{stream.name}:{since:%Y%m%dT%H%M%SZ}",
+        hanger=stream.hanger,
+        test="",
+        time=since,
+        message=f"{state} {lead.action} Details: nothing watches what the stream measured until "
+        "its sensors see the hanger again; what its logger stored is read once it is back.",
+        drifts=(),
+        kinds=(_KIND,),
+    )
 
 
 def note_blindness(store: Store, stream: Stream, start: datetime) -> None:
@@ -295,36 +308,6 @@ def note_blindness(store: Store, stream: Stream, start: datetime) -> None:
     event = sees_nothing(windows, reported)
     for each in [event] if event else find_lost_planes(windows, stream, reported):
         store.streams.save_event(each)
-
-
-def _told(stored: StoredAlert) -> tuple[str, str]:
-    """Of which state of which stream an alert is."""
-    _, word, stream, *_ = stored.alert.key.split(":")
-    return word, stream
-
-
-def _why_ended(stored: StoredAlert, found: Mapping[str, StreamHealth]) -> str:
-    word, name = _told(stored)
-    if name not in found:
-        return "bridge.toml does not describe the stream any more"
-    if found[name].state in _HELD[word]:
-        return ""
-    return f"stream {name} {'sends' if word == 'silent' else 'sees its hanger'} again"
-
-
-def _alert(told: StreamHealth, word: str, since: datetime) -> Alert:
-    stream = told.stream
-    said = blind_hangers([told])[stream.hanger]
-    state = f"{said.state.rstrip('.')} for longer than a day."
-    return Alert(
-        key=f"hanger-{stream.hanger}:{word}:{stream.name}:{since:%Y%m%dT%H%M%SZ}",
-        hanger=stream.hanger,
-        test="",
-        time=since,
-        message=f"{state} {said.action} Details: {_DETAILS[word]}",
-        drifts=(),
-        kinds=(_KIND,),
-    )
 
 
 _COMPARED = timedelta(days=1)  # the sun's round: it warms one side first

@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from shm.documents import parse_time
-from shm.pipeline.stream_health import LATELY, State, classify_stream, last_samples, measure_unread
+from shm.pipeline.stream_health import LATELY, State, StreamHealth, heard
 from shm.report.figures.stream_course import StreamHistory
 from shm.store import Store, Workspace
 from shm.store.queries.streams import (
@@ -70,46 +70,27 @@ class StreamCondition:
 def stream_states(
     workspace: Workspace, ring: Ring, store: Store, now: datetime
 ) -> tuple[StreamCondition, ...]:
-    """One for each stream that `bridge.toml` describes, in its order."""
-    last = last_samples(workspace, ring, store)
-    return tuple(
-        _state(
-            stream,
-            last[stream.name],
-            measure_unread(workspace, ring, store, stream.name, now),
-            ring,
-            store,
-            now,
-        )
-        for stream in workspace.bridge.streams
-    )
+    """Return the state of each stream that `bridge.toml` describes, in its order."""
+    return tuple(_state(each, ring, store, now) for each in heard(workspace, store, now))
 
 
-def _state(
-    stream: Stream,
-    last: datetime | None,
-    unread: timedelta,
-    ring: Ring,
-    store: Store,
-    now: datetime,
-) -> StreamCondition:
-    events = list_stream_events(store, stream.name, now - LATELY)
-    window = find_last_window(store, stream.name)
-    state = ring.state(stream.name)
-    received, lost = _received(state, now)
+def _state(health: StreamHealth, ring: Ring, store: Store, now: datetime) -> StreamCondition:
+    stream, last = health.stream, health.last_sample
+    in_ring = ring.state(stream.name)
+    received, lost = _received(in_ring, now)
     return StreamCondition(
         stream=stream,
-        state=classify_stream(last, events, now),
+        state=health.state,
         last_sample=last,
         lag=None if last is None else max(timedelta(0), now - last),
-        behind=None if last is None else unread,
+        behind=None if last is None else health.unread,
         received_hz=received * stream.sampling_rate_hz,
         lost_share=lost,
-        apart_s=_lately_s(state.apart_s, now),
+        apart_s=_lately_s(in_ring.apart_s, now),
         ring_bytes=ring.size_bytes(stream.name),
-        window=window,
+        window=find_last_window(store, stream.name),
         hour=_last_hour(store, stream),
-        events=joined(events),
+        events=joined(health.events),
     )
 
 

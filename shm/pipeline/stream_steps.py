@@ -15,7 +15,7 @@ from shm.identify.options import PASSED
 from shm.monitor import as_modal_test, offsets, pooled, read_window, sensor_faults
 from shm.values import PLANES, Alert, Hanger, ModalTest, Mode, Plane, Posterior
 from shm.values.stream import Period, Piece, PooledReading, Stream, StreamEvent, WindowReading
-from shm.watch.stream_reading import led_by
+from shm.watch.notices import led_by
 from shm.watch.stream_watch import StreamOptions, watch_reading, windows_as_mounted, with_believed
 
 _LINES = 200  # technical: of a spectrogram, as many as a panel has pixels

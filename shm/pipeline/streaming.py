@@ -12,10 +12,9 @@ from __future__ import annotations
 import bisect
 import logging
 from collections import defaultdict, deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from queue import SimpleQueue
@@ -81,11 +80,8 @@ _EVER = datetime.min.replace(tzinfo=UTC)
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class _Running:
-    future: Future[Any]
-    keep: Callable[[Any], object]
-    fail: Callable[[BaseException], object]
+Work = Generator[Callable[[], Any], Any, None]
+"""Work on a stream: yields what is to be computed elsewhere, is sent the result and stores it."""
 
 
 class Streaming:
@@ -106,8 +102,10 @@ class Streaming:
     ):
         self.store, self.executor, self.clock = store, executor, clock
         self.lanes, self.wake = lanes, wake
-        self._running: dict[str, _Running] = {}
+        self._running: dict[str, tuple[Work, Future[Any]]] = {}
         self._done: dict[str, datetime] = {}
+        self._waiting: defaultdict[str, list[datetime]] = defaultdict(list)  # ten minutes, by time
+        self._recalled: set[str] = set()
         self._pooled: dict[tuple[str, Period], datetime] = {}
         self._changed: dict[str, datetime] = {}
         self._settled: dict[str, datetime] = {}
@@ -115,11 +113,8 @@ class Streaming:
         self._offsets: defaultdict[str, deque[Mapping[str, float]]] = defaultdict(
             lambda: deque(maxlen=_OFFSETS)
         )
-        self._known: set[str] = set()
-        self._sealed: defaultdict[str, list[datetime]] = defaultdict(list)
-        self._late: defaultdict[str, list[datetime]] = defaultdict(list)
         self._news: SimpleQueue[tuple[str, datetime]] = SimpleQueue()
-        self._first, self._heed_at, self._rest = 0, _EVER, RestOfDays(clock)
+        self._first, self._look_at, self._rest = 0, _EVER, RestOfDays(clock)
         self.use(workspace)
 
     def use(self, workspace: Workspace) -> None:
@@ -135,22 +130,22 @@ class Streaming:
 
     def close(self) -> None:
         """Abandons what is under way: the store still says that it waits."""
-        for running in self._running.values():
-            running.future.cancel()
+        for _, future in self._running.values():
+            future.cancel()
 
     @property
     def under_way(self) -> tuple[Future[Any], ...]:
         """Return what is being computed now."""
-        return tuple(running.future for running in self._running.values())
+        return tuple(future for _, future in self._running.values())
 
     def advance(self, *, hurry: bool = False) -> bool:
         """Keeps what is finished, begins what has come; whether anything is under way. With `hurry`
         no rest of a day is waited for. Raises StoreError where the store cannot be used now."""
         self._rest.hurry = hurry
-        for name, running in list(self._running.items()):
-            if running.future.done():
-                self._finish(name, running)
+        for name, (work, future) in list(self._running.items()):
+            if future.done():
                 del self._running[name]
+                self._finish(name, work, future)
         while not self._news.empty():
             self._note(*self._news.get())
         streams = self.workspace.bridge.streams
@@ -168,59 +163,57 @@ class Streaming:
                 log.exception("stream %s cannot begin its next step", stream.name)
                 self._retry_later(stream.name)
         self._first = (self._first + 1) % max(1, len(streams))
-        if (now := self.clock()) >= self._heed_at:
-            self._heed_at = now + _HEED
+        if (now := self.clock()) >= self._look_at:
+            self._look_at = now + _HEED
             evaluate_silent_streams(self.workspace, self.store, now)
             compare_thermometers(self.workspace, self.store, now)
         return bool(self._running)
 
     def _note(self, name: str, start: datetime) -> None:
-        """Of ten minutes that were read before, there is more now: they are read anew."""
-        done = self._done.get(name)
-        waiting = self._late if done is not None and start < done else self._sealed
-        if start not in waiting[name]:
-            bisect.insort(waiting[name], start)
+        if start not in self._waiting[name]:
+            bisect.insort(self._waiting[name], start)
 
     def _may_begin(self, name: str) -> bool:
         return self.clock() >= self._not_before.get(name, _EVER)
 
-    # ------------------------------------------------------------ begin
-
     def _begin(self, stream: Stream) -> None:
-        """The next step of a stream, if there is one: pools come before further windows."""
-        if stream.name not in self._known:
+        """Begin the next step of a stream, if there is one: pools come before further windows."""
+        work = self._next_work(stream)
+        if work is not None:
+            future = self.executor.submit(next(work))
+            self._running[stream.name] = work, future
+            future.add_done_callback(lambda _: self.wake())
+
+    def _next_work(self, stream: Stream) -> Work | None:
+        name = stream.name
+        if name not in self._recalled:
             self._recall(stream)
-        if stream.name in self._changed and not self._late[stream.name]:
-            self._go_back(stream, self._changed.pop(stream.name))
-        done = self._done.get(stream.name)
-        if done is not None:
-            for period, length in PERIODS.items():
-                start = self._next_pool(stream, period, length, done)
-                if start is not None:
-                    self._begin_pool(stream, period, start)
-                    return
-        start = self._next_window(stream.name)
-        if start is not None:
-            self._begin_window(stream, start)
+        done, waiting = self._done.get(name), self._waiting[name]
+        is_late = done is not None and bool(waiting) and waiting[0] < done
+        if name in self._changed and not is_late:
+            self._go_back(stream, self._changed.pop(name))
+        for period, length in PERIODS.items() if done is not None else ():
+            start = self._next_pool(stream, period, length, done or _EVER)
+            if start is not None:
+                return self._pool(stream, period, start)
+        start = self._next_window(name)
+        return None if start is None else self._read(stream, start)
 
     def _recall(self, stream: Stream) -> None:
-        """Return how far the stream had come, what was sealed since, and what came late."""
-        name = stream.name
-        self._known.add(name)
-        done = find_progress(self.store, name)
-        since = lateness_limit(self.workspace, self.clock())
-        changed = find_first_unpooled(self.store, name, since)
+        """Recall how far the stream had come, what came since, and what came late."""
+        name, store, now = stream.name, self.store, self.clock()
+        changed = find_first_unpooled(store, name, lateness_limit(self.workspace, now))
         if changed is not None:
             self._changed[name] = changed
-        hours = find_pooled_range(self.store, name, "hour")
-        watched = self._watched_until(stream)
+        hours, watched = find_pooled_range(store, name, "hour"), self._watched_until(stream)
         if hours is not None and watched is not None and watched <= hours[1]:
             self._pooled[name, "hour"] = watched
             self._settled[name] = hours[1] + PERIODS["hour"]
-        if done is not None:
+        if (done := find_progress(store, name)) is not None:
             self._done[name] = done
-        for start in list_unread(self.workspace, self.ring, self.store, name, self.clock()):
+        for start in list_unread(self.workspace, self.ring, store, name, now):
             self._note(name, start)
+        self._recalled.add(name)
 
     def _go_back(self, stream: Stream, changed: datetime) -> None:
         """Pool again from the earliest window on that came late.
@@ -237,23 +230,27 @@ class Streaming:
                 content = gone_back(before.content, newest.content)
                 streams.go_back(stream.hanger, before.reading_time, content)
                 starts["hour"] = before.reading_time
-                self._settled[name] = max(
-                    newest.reading_time, self._settled.get(name, newest.reading_time)
-                )
+                self._settled[name] = max(newest.reading_time, self._settled.get(name, _EVER))
         for period, start in starts.items():
-            former = self._pooled.get((name, period), start)
-            self._pooled[name, period] = min(former, start)
+            self._pooled[name, period] = min(self._pooled.get((name, period), start), start)
 
     def _watched_until(self, stream: Stream) -> datetime | None:
         watch = load_stream_watch(self.store, stream.hanger)
         return None if watch is None else watch.reading_time
 
+    # ------------------------------------------------------------ windows
+
     def _next_window(self, name: str) -> datetime | None:
-        """The next ten minutes that are whole, or not waited for any more; late ones last."""
-        sealed, late = self._sealed[name], self._late[name]
-        if sealed and (len(sealed) > 1 or self._is_whole(name, sealed[0])):
-            return sealed.pop(0)
-        return late.pop(0) if late else None
+        """Return the next ten minutes that are whole, or not waited for any more; late ones last.
+
+        Those that were read before, of which there is more now, are late ones, too.
+        """
+        waiting = self._waiting[name]
+        first_new = bisect.bisect_left(waiting, self._done.get(name, _EVER))
+        new = waiting[first_new:]
+        if len(new) > 1 or (new and self._is_whole(name, new[0])):
+            return waiting.pop(first_new)
+        return waiting.pop(0) if first_new else None
 
     def _is_whole(self, name: str, start: datetime) -> bool:
         if self.clock() >= start + WINDOW + _PATIENCE:
@@ -261,16 +258,15 @@ class Streaming:
         received_s = self.ring.state(name).received_s.get(format_time(start) or "", 0.0)
         return received_s >= _WHOLE * WINDOW.total_seconds()
 
-    def _begin_window(self, stream: Stream, start: datetime) -> None:
+    def _read(self, stream: Stream, start: datetime) -> Work:
         from shm.pipeline.steps import identify_options
         from shm.pipeline.stream_steps import read_stream_window
 
         hanger = self.workspace.bridge.tested(stream.hanger)
         options = identify_options(self.workspace.settings, self.workspace.bridge)
         known = list_latest_with_modes(self.store, stream.name)
-        self._submit(
-            stream.name,
-            partial(
+        try:
+            found: WindowFound = yield partial(
                 read_stream_window,
                 self.ring.read(stream.name, start, start + WINDOW),
                 stream,
@@ -279,26 +275,55 @@ class Streaming:
                 options,
                 tuple(self._offsets[stream.name]),
                 any(each.how == "tracked" for each in known),
-            ),
-            partial(self._keep_window, stream),
-            partial(self._give_up_window, stream, start),
-        )
+            )
+            for event in found.events:
+                self.store.streams.save_event(event)
+            self._offsets[stream.name].append(found.offsets)
+            self._save(found.reading)
+            if found.lacks_modes or not found.reading.modes:
+                note_blindness(self.store, stream, start)
+        except Exception as error:
+            if _is_passing(error):
+                raise
+            _log_failure(stream, error)
+            # In the window's own row: what one window holds must not stop its stream.
+            seconds, nan = WINDOW.total_seconds(), float("nan")
+            window = Window(stream.name, stream.hanger, start, seconds, "unusable", nan)
+            self._save(WindowReading(window, (), "none", f"it could not be read: {error}"))
+
+    def _save(self, reading: WindowReading) -> None:
+        window = reading.window
+        self.store.streams.save_window(reading)
+        name, done = window.stream, self._done.get(window.stream, _EVER)
+        self._rest.note(name, window.start, done)
+        if window.start < done:
+            self._changed[name] = min(window.start, self._changed.get(name, window.start))
+        self._done[name] = max(done, window.start + WINDOW)
+
+    def _windows(
+        self, stream: Stream, start: datetime, length: timedelta
+    ) -> tuple[WindowReading, ...]:
+        found = list_windows(self.store, stream.hanger, start, start + length)
+        return tuple(each for each in found if each.window.stream == stream.name)
+
+    # ------------------------------------------------------------ pools
 
     def _next_pool(
         self, stream: Stream, period: Period, length: timedelta, done: datetime
     ) -> datetime | None:
-        """The next period that is over and has windows; those without are passed over."""
+        """Return the next period that is over and has windows; those without are passed over."""
         key = stream.name, period
         start = self._pooled.get(key) or self._pooled_until(stream, period, length)
-        while start is not None and start + length <= done:
+        if start is None:
+            return None
+        while start + length <= done:
             if period == "day" and self._rest.is_awaited(self.store, stream.name, start):
                 return None
             if self._is_due(stream, period, start):
                 break
             start += length
-        if start is not None:
-            self._pooled[key] = start
-        return start if start is not None and start + length <= done else None
+        self._pooled[key] = start
+        return start if start + length <= done else None
 
     def _is_due(self, stream: Stream, period: Period, start: datetime) -> bool:
         """Return True if it has windows and is not pooled, or is an hour yet to be watched."""
@@ -311,112 +336,43 @@ class Streaming:
         return bool(self._windows(stream, start, PERIODS[period]))
 
     def _pooled_until(self, stream: Stream, period: Period, length: timedelta) -> datetime | None:
-        """The end of the last reading of a period; the first window's period where none is."""
+        """Return the end of the last reading of a period; else the first window's period."""
         pooled = find_pooled_range(self.store, stream.name, period)
         if pooled is not None:
             return pooled[1] + length
         first = find_first_window(self.store, stream.name)
         return None if first is None else period_start(first, length)
 
-    def _windows(
-        self, stream: Stream, start: datetime, length: timedelta
-    ) -> tuple[WindowReading, ...]:
-        found = list_windows(self.store, stream.hanger, start, start + length)
-        return tuple(each for each in found if each.window.stream == stream.name)
-
-    def _begin_pool(self, stream: Stream, period: Period, start: datetime) -> None:
+    def _pool(self, stream: Stream, period: Period, start: datetime) -> Work:
         from shm.pipeline.stream_steps import pool_stream
 
-        hanger = self.workspace.bridge.tested(stream.hanger)
-        watch = load_stream_watch(self.store, stream.hanger)
-        self._submit(
-            stream.name,
-            partial(
+        store, length = self.store, PERIODS[period]
+        watch = load_stream_watch(store, stream.hanger)
+        recent: tuple[StreamEvent, ...] = ()
+        if period == "hour":
+            recent = list_stream_events(store, stream.name, start - _LOOKED_BACK)
+        try:
+            found: Pooled = yield partial(
                 pool_stream,
-                self._windows(stream, start, PERIODS[period]),
+                self._windows(stream, start, length),
                 period,
                 start,
-                hanger,
-                baseline_of(self.store, stream),
+                self.workspace.bridge.tested(stream.hanger),
+                baseline_of(store, stream),
                 None if watch is None else watch.content,
                 self.workspace.settings.false_call_years,
-                self._recent_events(stream, start) if period == "hour" else (),
+                recent,
                 is_watched=period == "hour" and (watch is None or start >= watch.reading_time),
-            ),
-            partial(self._keep_pooled, stream, period, start),
-            partial(self._give_up_pool, stream, period, start),
-        )
+            )
+            self._store_pooled(stream, start + length, found)
+            self._pooled[stream.name, period] = start + length
+        except Exception as error:
+            if _is_passing(error):
+                raise
+            _log_failure(stream, error)
+            self._pooled[stream.name, period] = start + length
 
-    def _recent_events(self, stream: Stream, start: datetime) -> tuple[StreamEvent, ...]:
-        return list_stream_events(self.store, stream.name, start - _LOOKED_BACK)
-
-    def _submit(
-        self,
-        name: str,
-        step: Callable[[], Any],
-        keep: Callable[[Any], object],
-        fail: Callable[[BaseException], object],
-    ) -> None:
-        future = self.executor.submit(step)
-        self._running[name] = _Running(future, keep, fail)
-        future.add_done_callback(lambda _: self.wake())
-
-    # ------------------------------------------------------------ finish
-
-    def _finish(self, name: str, running: _Running) -> None:
-        """Store the result of a step that has ended, or handle the error that it ended with.
-
-        Raises StoreError where the store cannot be used now: the result is stored at a later turn.
-        """
-        error = running.future.exception()
-        try:
-            if error is None:
-                running.keep(running.future.result())
-                return
-        except StoreError:
-            raise
-        except Exception as fault:  # noqa: BLE001 - it must stop neither stream nor files
-            error = fault
-        if isinstance(error, BrokenExecutor | MemoryError) or getattr(error, "retry_after_s", None):
-            self._retry_later(name)
-            log.warning("stream %s is tried again in a minute: %s", name, error)
-        else:
-            unexpected = None if isinstance(error, ShmError) else error
-            log.error("stream %s: a step failed: %s", name, error, exc_info=unexpected)
-            running.fail(error)
-
-    def _retry_later(self, name: str) -> None:
-        """Leave a stream alone for a minute, then look for its unread windows again."""
-        self._not_before[name] = self.clock() + _AGAIN
-        self._known.discard(name)
-
-    def _keep_window(self, stream: Stream, found: WindowFound) -> None:
-        for event in found.events:
-            self.store.streams.save_event(event)
-        self._offsets[stream.name].append(found.offsets)
-        self._save(found.reading)
-        if found.lacks_modes or not found.reading.modes:
-            note_blindness(self.store, stream, found.reading.window.start)
-
-    def _save(self, reading: WindowReading) -> None:
-        window = reading.window
-        self.store.streams.save_window(reading)
-        name, done = window.stream, self._done.get(window.stream, _EVER)
-        self._rest.note(name, window.start, done)
-        if window.start < done:
-            self._changed[name] = min(window.start, self._changed.get(name, window.start))
-        self._done[name] = max(done, window.start + WINDOW)
-
-    def _give_up_window(self, stream: Stream, start: datetime, error: BaseException) -> None:
-        """Said in the window's own row: what one window holds must not stop its stream."""
-        seconds = WINDOW.total_seconds()
-        window = Window(stream.name, stream.hanger, start, seconds, "unusable", float("nan"))
-        why = f"it could not be read: {error}"
-        self._save(WindowReading(window, (), "none", why))
-
-    def _keep_pooled(self, stream: Stream, period: Period, start: datetime, found: Pooled) -> None:
-        self._pooled[stream.name, period] = end = start + PERIODS[period]
-        settled = self._settled.get(stream.name, _EVER)
+    def _store_pooled(self, stream: Stream, end: datetime, found: Pooled) -> None:
         for event in found.events:
             self.store.streams.save_event(event)
         if found.reading is None:
@@ -427,7 +383,8 @@ class Streaming:
             why = f"alert {found.alert.key}"
             self.ring.keep(stream.name, end - _KEPT_BEFORE_ALERT, end, why)
         hooks = [hook.name for hook in self.workspace.bridge.hooks]
-        changes = self._reconciled(stream.hanger, found, is_again=end <= settled)
+        is_again = end <= self._settled.get(stream.name, _EVER)
+        changes = self._reconciled(stream.hanger, found, is_again=is_again)
         kept = found.kept or None
         for raised in self.store.streams.save_pooled(
             found.reading, kept, changes, hooks, self.clock()
@@ -441,23 +398,51 @@ class Streaming:
             return Reconciled()
         alerts = self.store.alerts.list_all(hanger)
         is_open = [each for each in alerts if each.resolution is None]
-        known = [each for each in alerts if each.baseline_id is None] if is_again else []
         over = [each.alert for each in is_open if each.alert.key in found.ended]
         conditions = [Condition(each, "over", _OVER) for each in over]
-        conditions += [Condition(found.alert, "holds")] if found.alert else []
-        changes = reconcile(is_open, conditions)
-        if found.alert and any(
-            set(found.alert.kinds) <= set(each.alert.kinds)
-            and is_same_event(each.alert, found.alert)
+        known = [each.alert for each in alerts if is_again and each.baseline_id is None]
+        if found.alert and not any(
+            set(found.alert.kinds) <= set(each.kinds) and is_same_event(each, found.alert)
             for each in known
         ):
-            changes = replace(changes, to_open=())
-        return changes
+            conditions.append(Condition(found.alert, "holds"))
+        return reconcile(is_open, conditions)
 
-    def _give_up_pool(
-        self, stream: Stream, period: Period, start: datetime, error: BaseException
-    ) -> None:
-        self._pooled[stream.name, period] = start + PERIODS[period]
+    # ------------------------------------------------------------ finish
+
+    def _finish(self, name: str, work: Work, future: Future[Any]) -> None:
+        """Send work its result, or the error that its computation ended with.
+
+        Raises StoreError where the store cannot be used now: the store still says that it waits.
+        """
+        try:
+            with suppress(StopIteration):
+                if (error := future.exception()) is None:
+                    work.send(future.result())
+                else:
+                    work.throw(error)
+        except StoreError:
+            self._recalled.discard(name)
+            raise
+        except Exception as error:  # noqa: BLE001 - it must stop neither stream nor files
+            self._retry_later(name)
+            log.warning("stream %s is tried again in a minute: %s", name, error)
+
+    def _retry_later(self, name: str) -> None:
+        """Leave a stream alone for a minute, then look for its unread windows again."""
+        self._not_before[name] = self.clock() + _AGAIN
+        self._recalled.discard(name)
+
+
+def _is_passing(error: Exception) -> bool:
+    """Return True if the same step may do later what it could not do now."""
+    of_machine = isinstance(error, BrokenExecutor | MemoryError | StoreError)
+    return of_machine or bool(getattr(error, "retry_after_s", None))
+
+
+def _log_failure(stream: Stream, error: Exception) -> None:
+    unexpected = None if isinstance(error, ShmError) else error
+    log.error("stream %s: a step failed: %s", stream.name, error, exc_info=unexpected)
 
 
 def last_modes(readings: Sequence[WindowReading]) -> tuple[Mode, ...]:

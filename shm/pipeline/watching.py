@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from math import isnan
@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING
 import shm
 from shm.errors import NothingThere
 from shm.pipeline.conditions import Evidence, conditions_of, is_gap_larger
-from shm.pipeline.faults import contained
 from shm.pipeline.reconcile import reconcile
 from shm.settings import Settings
 from shm.store import (
@@ -35,7 +34,7 @@ from shm.store import (
 )
 from shm.store.queries.hangers import find_latest_watches
 from shm.store.queries.recordings import list_holds
-from shm.store.queries.tests import list_baseline_tests, list_waiting_tests
+from shm.store.queries.tests import list_baseline_tests
 from shm.store.queries.watching import (
     find_watch_state,
     is_caught_up,
@@ -139,52 +138,16 @@ _RECENT_TESTS = 64  # technical: two visits of so many tests each are none of ha
 log = logging.getLogger(__name__)
 
 
-class ReevaluationQueue:
-    """Sends back the tests of each hanger whose latest was judged with other thresholds.
+def judge_again(workspace: Workspace, store: Store, hanger: Hanger, at: datetime) -> None:
+    """Send the tests of a hanger back to the watch whose latest was judged with other thresholds.
 
-    One hanger at a time, so that what comes in meanwhile waits for no other hanger's; those of a
-    new test go first, since it is judged after them. Who is left is told by the store: nothing is
-    lost where the process is killed.
+    What is left to be judged is told by the store: a kill loses nothing.
     """
-
-    def __init__(self, workspace: Workspace, store: Store):
-        self._workspace, self._store, self._judging = workspace, store, -1
-        self._unread = list(workspace.bridge.watched)
-        self._left: dict[int, tuple[int, str]] = {}
-
-    def go_on(
-        self, at: datetime, held: Collection[int] = (), damaged: Collection[int | None] = ()
-    ) -> None:
-        """Sends the next back where it is time; recordings that are held and hangers that stand
-        still are not waited for.
-        """
-        while self._unread:
-            with contained(log, "hanger %d cannot be judged again", self._unread[0].id):
-                self._note_differences(self._unread[0])
-            self._unread.pop(0)
-        if not self._left:
-            return
-        waiting = {test.hanger for test in list_waiting_tests(self._store, 1, excluding=held)}
-        for hanger in waiting & self._left.keys():
-            self._send_back(hanger, at)
-        while self._left and self._judging not in waiting - set(damaged):
-            hanger = next(iter(self._left))
-            if self._send_back(hanger, at):
-                return
-
-    def _note_differences(self, hanger: Hanger) -> None:
-        watch = find_latest_watches(self._store, [hanger]).get(hanger.id)
-        why = "; ".join(differences(watch, hanger, self._workspace.settings)) if watch else ""
-        if watch and why:
-            self._left[hanger.id] = watch.baseline_id, why
-
-    def _send_back(self, hanger: int, at: datetime) -> int:
-        baseline_id, why = self._left.pop(hanger)
-        self._judging = hanger
-        count = self._store.watch.rerun(hanger, baseline_id, why, at)
-        text = "hanger %d: %d tests are judged again, %d hangers are left: %s"
-        log.info(text, hanger, count, len(self._left), why)
-        return count
+    watch = find_latest_watches(store, [hanger]).get(hanger.id)
+    why = "; ".join(differences(watch, hanger, workspace.settings)) if watch else ""
+    if watch and why:
+        count = store.watch.rerun(hanger.id, watch.baseline_id, why, at)
+        log.info("hanger %d: %d tests are judged again: %s", hanger.id, count, why)
 
 
 def differences(judged: StoredWatch, hanger: Hanger, settings: Settings) -> Iterator[str]:

@@ -1,7 +1,8 @@
 """The work that waits: what is computed for a recording or a test, and where its result is stored.
 
 Each kind of work is one generator: it reads the store, yields what is to be computed elsewhere, is
-sent the result and stores it. Only the thread that runs the flow uses the store.
+sent the result and stores it. Only the thread that runs the flow uses the store. What computes is
+imported by the first work that needs it, so that the daemon itself begins quickly.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from shm.pipeline.limits import evaluate_limit_alerts
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.notification_plan import after_works, with_tension, works_before
 from shm.pipeline.plausibility_check import judge
-from shm.pipeline.registry import Opens, RemoteFile, WatchResult, registered, run_step
+from shm.pipeline.remote_file import Opens, RemoteFile, WatchResult, run_step
 from shm.pipeline.watching import find_neighbouring_tests, reconciled, to_watch
 from shm.report.hanger_summary import HangerSummary, LatestTest
 from shm.store import (
@@ -98,8 +99,12 @@ class Queue:
             waiting[test.hanger].append(test)
         selected = list_selected_models(self.store)
         oldest = min((each.id for each in received), default=None)
-        # Control hangers first: what they say of a campaign goes into its alerts.
-        for hanger in sorted(self.workspace.bridge.watched, key=lambda each: not each.is_control):
+        # Control hangers first: what they say of a campaign goes into its alerts. Then those with
+        # few tests, which years of others that are judged again must not hold up.
+        for hanger in sorted(
+            self.workspace.bridge.watched,
+            key=lambda each: (not each.is_control, len(waiting[each.id])),
+        ):
             tests = waiting[hanger.id]
             if hanger.id in selected:
                 yield from self._list_later(hanger, selected[hanger.id], tests, oldest)
@@ -123,21 +128,23 @@ class Queue:
                 yield _make_task("watch", test.id, partial(self._watch, hanger, test), [test])
 
     def _identify(self, recording: StoredRecording) -> Work:
+        from shm.pipeline import steps
+
         workspace, store = self.workspace, self.store
         settings = replace(workspace.settings, store="", mqtt_url="")  # both may hold a password
         archive: Opens = workspace.archive
         if settings.scheduler:  # workers elsewhere need not see our folders
             archive = RemoteFile.of(workspace.archive, recording.file, settings.max_file_bytes)
-        selected, step = list_selected_models(store), registered().identify
-        found = yield partial(
-            run_step, step, recording, archive, workspace.bridge, settings, selected
-        )
+        of_file = recording, archive, workspace.bridge, settings, list_selected_models(store)
+        found = yield partial(run_step, steps.identify_file, *of_file)
         lineage = identify_lineage(recording, found[0].test.hanger, workspace)
         found, judged = judge(workspace, store, recording, found)
         notice = store.tests.save(recording.id, found, lineage, self.clock(), judged)
         return None if notice is None else (notice,)
 
     def _select(self, hanger: Hanger, first: Sequence[TestRow]) -> Work:
+        from shm.pipeline import steps
+
         tests, settings = [self.store.tests.get(test.id) for test in first], self.workspace.settings
         names: tuple[str, ...] = (WITHOUT_MODEL,)
         if hanger.is_modelled:
@@ -145,12 +152,14 @@ class Queue:
         taught = self._find_taught(hanger, min(test.time for test in tests))
         terms, lineage = update_terms(hanger, names, tests, settings, taught=taught)
         plain = [_to_infer(test.test, hanger) for test in tests]
-        found = yield partial(run_step, registered().select, plain, hanger, names, terms)
+        found = yield partial(run_step, steps.select_model, plain, hanger, names, terms)
         self.store.posteriors.save_selection(hanger.id, tests, found, lineage, self.clock())
         self._summarise(hanger)
         return None
 
     def _update(self, hanger: Hanger, model: str, row: TestRow) -> Work:
+        from shm.pipeline import steps
+
         store, settings = self.store, self.workspace.settings
         test, baseline = store.tests.get(row.id), store.watch.baseline(hanger.id, model)
         # Not the latest posterior: a result must not depend on which tests were computed before.
@@ -161,13 +170,15 @@ class Queue:
         own = store.watch.baseline(hanger.id, model, test.time)
         of_baseline = own is not None and test.test.id in own.posterior.tests
         to_watch = not (of_baseline or hanger.is_control)
-        step, plain = registered().update, _to_infer(test.test, hanger)
-        found = yield partial(run_step, step, plain, hanger, model, known, terms)
+        plain = _to_infer(test.test, hanger)
+        found = yield partial(run_step, steps.update_test, plain, hanger, model, known, terms)
         store.posteriors.save(test, found, lineage, self.clock(), to_watch=to_watch)
         self._summarise(hanger)
         return None
 
     def _watch(self, hanger: Hanger, row: TestRow) -> Work:
+        from shm.pipeline import steps
+
         store, settings = self.store, self.workspace.settings
         test, silences = store.tests.get(row.id), store.silences.list_all()
         if any(each.is_maintenance and each.covers(hanger.id, test.time) for each in silences):
@@ -188,7 +199,7 @@ class Queue:
         beside = find_neighbouring_tests(store, baseline, test)
         years = settings.false_call_years
         of_test = (baseline, tests, current, hanger, years, needed.kept, beside)
-        found: WatchResult | None = yield partial(run_step, registered().watch, *of_test)
+        found: WatchResult | None = yield partial(run_step, steps.watch_test, *of_test)
         if found is None:  # the test still waits, to be watched from the baseline on
             store.watch.forget_state(baseline)
             return None

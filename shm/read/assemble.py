@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,6 @@ from shm.values import (
     NAN,
     TEST_CONDITIONS,
     Channel,
-    ComplexArray,
     FloatArray,
     FrequencyResponse,
     Recording,
@@ -34,8 +34,8 @@ from shm.values import (
 )
 
 # judgement: no ring-down can be seen in fewer; identification asks for far more
-LEAST_SAMPLES = 16
-LARGEST = 1e9  # N or m/s^2: beyond, the bytes are not what the headers say
+_LEAST_SAMPLES = 16
+_LARGEST = 1e9  # N or m/s^2: beyond, the bytes are not what the headers say
 _SAME_RATE = 1e-4
 _ROUNDED = 1e-3  # judgement: of the rate that the file says; so small a difference moves no tension
 _OFF_GRID = 0.05  # steps: analysers round the frequencies that they list
@@ -43,6 +43,7 @@ _NAME_THEM = (
     "Name accelerometers acc_1, acc_2, ..., or give in NAME.toml a table [channel.NAME] with"
     ' unit = "m/s2" for each; `shm import FILE` asks and keeps it for all files of this logger.'
 )
+_ONE_GRID = "Export all channels of one recording with one length and rate."
 _LEAVE_OUT = "Leave the others out: [channel.NAME] with leave_out = true in NAME.toml."
 
 Attempt = Callable[[Callable[[], Any], Any], Any]
@@ -76,27 +77,7 @@ def assemble(table: Table, described: Description | None = None) -> Recording | 
     if table.refusal is not None:
         raise table.refusal
     found = described or describe(table)
-    header, path = found.header, table.path
-    if found.is_response:
-        responses = np.array([column.load() for column in found.used], dtype=np.complex128)
-        listed = _listed_hz(found).load()
-        coherence = _coherence(found)
-        response = frequency_response(header, listed, responses, coherence, path)
-        return replace(response, source=table.source)
-    for column in found.used or table.columns:
-        _refuse_raw(column, header, path)
-    if not found.used:
-        raise _no_channel(found)
-    _samples(found)
-    rate = _measured_rate(found, with_times=False)
-    values = _rows(found.used, path)
-    if found.times is not None:
-        seconds = found.seconds * np.asarray(found.times.load(), float)
-        values, by_times = on_even_grid(seconds, values, table.uneven(found.times))
-        rate = _unless_same(by_times, header, path)
-    made = replace(recording(header, values, path, rate), source=table.source)
-    possible = tuple(dict.fromkeys(each.time for each in table.possible_times))
-    return made if made.time else replace(made, possible_times=possible)
+    return _response(found) if found.is_response else _recording(found)
 
 
 def peek(table: Table, file_format: str) -> Peek:
@@ -108,24 +89,58 @@ def peek(table: Table, file_format: str) -> Peek:
     found = attempt(lambda: describe(table), None)
     if found is None:
         found = describe(table, with_sidecars=False)
-    header, path = found.header, table.path
-    if found.is_response:
-        listed = _listed_hz(found)
-        look = _peeked_response(header, file_format, lambda: listed.load(), path, attempt)
-    else:
-        samples = attempt(lambda: _samples(found), 0)
-        rate = partial(_measured_rate, found, with_times=True)
-        look = _peeked(header, file_format, samples, rate, path, attempt)
-        for column in found.used or table.columns:
-            attempt(partial(_refuse_raw, column, header, path), None)
-    possible = tuple(dict.fromkeys(each.time for each in table.possible_times))
-    return replace(
-        look,
-        source=table.source,
-        left_out=found.left_out,
-        problems=tuple(problems),
-        possible_times=() if look.time else possible,
+    look_at = _look_at_response if found.is_response else _look_at_record
+    look = look_at(found, file_format, attempt)
+    possible = () if look.time else _possible_times(table)
+    return replace(look, left_out=found.left_out, problems=tuple(problems), possible_times=possible)
+
+
+def _possible_times(table: Table) -> tuple[datetime, ...]:
+    return tuple(dict.fromkeys(each.time for each in table.possible_times))
+
+
+def read_of_test(header: Header, attempt: Attempt) -> dict[str, Any]:
+    """Return what a header says of the complete test; None and NaN where that is faulty."""
+    unknown = dict.fromkeys(TEST_CONDITIONS) | {"temperature_c": NAN}
+    return {key: attempt(partial(getattr, header, key), none) for key, none in unknown.items()}
+
+
+# ---------------------------------------------------------------- time records
+
+
+def _look_at_record(found: Description, file_format: str, attempt: Attempt) -> Peek:
+    header, path = found.header, found.table.path
+    for column in found.used or found.table.columns:
+        attempt(partial(_refuse_raw, column, header, path), None)
+    samples = attempt(partial(_samples, found), 0)
+    channels = tuple(_peek_channel(header, name, attempt) for name in header.channels)
+    rate = attempt(partial(sampling_rate, found), NAN)
+    if channels:
+        attempt(partial(_refuse_few, samples, "the record has {} samples", path), None)
+    attempt(partial(_refuse_quantities, found, [each.quantity for each in channels]), None)
+    return Peek(
+        found.table.source, file_format, channels, samples, rate, **read_of_test(header, attempt)
     )
+
+
+def _recording(found: Description) -> Recording:
+    table, path = found.table, found.table.path
+    for column in found.used or table.columns:
+        _refuse_raw(column, found.header, path)
+    if not found.used:
+        _refuse_quantities(found, ())
+    _samples(found)
+    values = _rows(found.used, path)
+    if found.times is not None:
+        values, _ = on_even_grid(_seconds(found), values, table.uneven(found.times))
+        refuse_many_samples(values.shape[1], path)
+    look = _look_at_record(found, "", strictly)
+    channels = tuple(
+        _channel(found.header, each, row, path)
+        for each, row in zip(look.channels, values, strict=True)
+    )
+    made = Recording(table.source, channels, look.sampling_rate_hz, **found.header.of_test)
+    return made if made.time else replace(made, possible_times=_possible_times(table))
 
 
 def _samples(found: Description) -> int:
@@ -140,7 +155,7 @@ def _samples(found: Description) -> int:
                 f"has {column.size} values, {first.name} {first.size}.",
                 file=path,
                 channel=column.name,
-                remedy="Export all channels of one recording with one length and rate.",
+                remedy=_ONE_GRID,
             )
     return first.size
 
@@ -151,31 +166,39 @@ def _rows(used: Sequence[Column], path: Path) -> FloatArray:
     return np.array([column.load() for column in used], dtype=np.float64)
 
 
-def _measured_rate(found: Description, *, with_times: bool) -> float:
-    """Return the rate that the data tell, NaN where nothing does or it agrees with what is said.
+def sampling_rate(found: Description) -> float:
+    """Return the sampling rate; raises BadInput where nothing tells it, or two do and differ.
 
-    The times are loaded only where they are asked for and nothing else says the rate.
+    A column of times is rounded to its last digit, and the rate that the same file states is the
+    one that was set: there the statement counts.
     """
-    table, header = found.table, found.header
     _refuse_different_rates(found)
-    rate = table.clock_rate_hz
-    if math.isnan(rate):
-        shown = found.used or table.choosable
-        rate = next((c.rate_hz for c in shown if not math.isnan(c.rate_hz)), NAN)
-    if found.times is not None and with_times and math.isnan(header.sampling_rate_hz):
-        seconds = found.seconds * np.asarray(found.times.load(), float)
-        rate = rate_of(seconds, table.uneven(found.times))
-    return _unless_same(rate, header, table.path)
+    path, stated_hz = found.table.path, found.header.sampling_rate_hz
+    shown = found.used or found.table.choosable
+    rate = next((c.rate_hz for c in shown if not math.isnan(c.rate_hz)), NAN)
+    if found.times is not None:
+        rate = rate_of(_seconds(found), found.table.uneven(found.times), stated_hz)
+    if math.isnan(stated_hz) and math.isnan(rate):
+        raise BadInput(
+            "the sampling rate is missing.",
+            file=path,
+            remedy="Add a header line `# sampling_rate_hz: 512`, or to the sidecar"
+            " sampling_rate_hz = 512, or say it once for this logger: `shm import FILE`.",
+        )
+    if math.isnan(stated_hz):
+        return rate
+    entry = found.header.entries["sampling_rate_hz"]
+    if abs(rate - stated_hz) > (_ROUNDED if entry.file == path else _SAME_RATE) * stated_hz:
+        raise entry.refusal(
+            f"sampling_rate_hz = {stated_hz:g}, but the times in the data give {rate:.6g} Hz.",
+            "Correct the one that is wrong.",
+        )
+    return stated_hz
 
 
-def _unless_same(rate_hz: float, header: Header, path: Path) -> float:
-    """Return a rate of times, NaN where it agrees with the one that the same file says.
-
-    A column of times is rounded to its last digit, and a preamble's rate is the one that was set.
-    """
-    entry, stated_hz = header.entries.get("sampling_rate_hz"), header.sampling_rate_hz
-    agree = abs(rate_hz - stated_hz) <= _ROUNDED * stated_hz
-    return NAN if agree and entry is not None and entry.file == path else rate_hz
+def _seconds(found: Description) -> FloatArray:
+    assert found.times is not None
+    return found.seconds * np.asarray(found.times.load(), float)
 
 
 def _refuse_different_rates(found: Description) -> None:
@@ -187,7 +210,7 @@ def _refuse_different_rates(found: Description) -> None:
                 f"{column.label} has {column.size} samples every {_step_s(column):g} s,"
                 f" {first.label} {first.size} every {_step_s(first):g} s.",
                 file=path,
-                remedy="Export all channels of one recording with one length and rate.",
+                remedy=_ONE_GRID,
             )
     silent = [column for column in found.used if math.isnan(column.rate_hz)]
     stated = [column.facts.get("sampling_rate_hz") for column in silent]
@@ -196,7 +219,7 @@ def _refuse_different_rates(found: Description) -> None:
         raise BadInput(
             f"the channels have different sampling rates ({', '.join(sorted(rates))}).",
             file=path,
-            remedy="Export all channels of one recording with one length and rate.",
+            remedy=_ONE_GRID,
         )
 
 
@@ -217,113 +240,30 @@ def _refuse_raw(column: Column, header: Header, path: Path) -> None:
         )
 
 
-def _no_channel(found: Description) -> BadInput:
-    """Return the refusal of a file without a channel, with what it holds instead."""
-    held = ", ".join(found.left_out[:20]) or "nothing that is read"
-    example = found.left_out[0] if found.left_out else "acc_1"
-    return BadInput(
-        f"no channel holds an acceleration. The file holds {held}.",
-        file=found.table.path,
-        remedy=f'Say in NAME.toml what each is: [channel."{example}"] with unit = "m/s2";'
-        " `shm import FILE` asks and keeps it for all files of this logger.",
-    )
-
-
-def _listed_hz(found: Description) -> Column:
-    if found.frequencies is None:
-        lines = found.used[0].size if found.used else 0
-        raise BadInput(
-            f"no array holds the frequencies of its {lines} lines.",
-            file=found.table.path,
-            remedy='Name the array frequency_hz, or give it unit = "Hz" in NAME.toml.',
-        )
-    return found.frequencies
-
-
-def _coherence(found: Description) -> FloatArray | None:
-    """Return coherences (points, lines) where there is one for each response, else None."""
-    known = {c.name: c for c in found.table.columns if not c.is_complex}
-    wanted = []
-    for name, stated in found.header.channels.items():
-        wanted.append(
-            known.get(stated["coherence"].text if "coherence" in stated else f"{name}_coherence")
-        )
-    rows = [c for c in wanted if c is not None and c.size == found.used[0].size]
-    whole = rows and len(rows) == len(wanted)
-    return _rows(rows, found.table.path) if whole else None
-
-
-# ---------------------------------------------------------------- time records
-
-
-def recording(header: Header, values: FloatArray, path: Path, file_rate_hz: float) -> Recording:
-    """Return a recording of raw `values` (channels, samples), checked; raises BadInput.
-
-    `file_rate_hz` is the rate that the data themselves tell (a time column, an abscissa), or NaN.
-    """
-    look = _peeked(header, "", values.shape[1], lambda: file_rate_hz, path, strictly)
-    rows = dict(zip(header.channels, values, strict=True))
-    channels = tuple(
-        _channel(header, described, rows[described.name], path) for described in look.channels
-    )
-    return Recording(str(path), channels, look.sampling_rate_hz, **header.of_test)
-
-
-def _peeked(
-    header: Header,
-    file_format: str,
-    samples: int,
-    file_rate_hz: Callable[[], float],
-    path: Path,
-    attempt: Attempt,
-) -> Peek:
-    names = [name for name in header.channels if not attempt(partial(header.leaves_out, name), 0)]
-    channels = tuple(_peek_channel(header, name, attempt) for name in names)
-    rate = attempt(lambda: checked_rate(header, file_rate_hz(), path), NAN)
-    quantities = [channel.quantity for channel in channels if channel.quantity]
-    if channels:
-        attempt(lambda: _refuse_few(samples, "the record has {} samples", path), None)
-        attempt(lambda: refuse_many_samples(samples, path), None)
-    attempt(lambda: refuse_quantities(quantities, path), None)
-    return Peek(str(path), file_format, channels, samples, rate, **read_of_test(header, attempt))
-
-
-def checked_rate(header: Header, file_rate_hz: float, path: Path) -> float:
-    """Return the sampling rate; raises BadInput where neither header nor data say it, or differ."""
-    stated_hz = header.sampling_rate_hz
-    if math.isnan(stated_hz) and math.isnan(file_rate_hz):
-        raise BadInput(
-            "the sampling rate is missing.",
-            file=path,
-            remedy="Add a header line `# sampling_rate_hz: 512`, or to the sidecar"
-            " sampling_rate_hz = 512, or say it once for this logger: `shm import FILE`.",
-        )
-    if math.isnan(stated_hz):
-        return file_rate_hz
-    if abs(file_rate_hz - stated_hz) > _SAME_RATE * stated_hz:
-        raise header.entries["sampling_rate_hz"].refusal(
-            f"sampling_rate_hz = {stated_hz:g}, but the times in the data give"
-            f" {file_rate_hz:.6g} Hz.",
-            "Correct the one that is wrong.",
-        )
-    return stated_hz
-
-
-def refuse_quantities(quantities: Sequence[str], path: Path) -> None:
+def _refuse_quantities(found: Description, quantities: Sequence[str | None]) -> None:
     """Raise BadInput for too many or no accelerations, and for more than one force."""
     forces, accelerations = quantities.count("force"), quantities.count("acceleration")
-    most = limits().max_channels
-    if accelerations == 0:
-        raise BadInput("no channel holds an acceleration.", file=path, remedy=_NAME_THEM)
-    if accelerations > most:
+    path, most, remedy = found.table.path, limits().max_channels, _LEAVE_OUT
+    if accelerations == 0 and not found.used:
+        held = ", ".join(found.left_out[:20]) or "nothing that is read"
+        example = found.left_out[0] if found.left_out else "acc_1"
+        what = f"no channel holds an acceleration. The file holds {held}."
+        remedy = (
+            f'Say in NAME.toml what each is: [channel."{example}"] with unit = "m/s2";'
+            " `shm import FILE` asks and keeps it for all files of this logger."
+        )
+    elif accelerations == 0:
+        what, remedy = "no channel holds an acceleration.", _NAME_THEM
+    elif accelerations > most:
         what = f"{accelerations} accelerations; at most {most} are read."
-        raise BadInput(what, file=path, remedy=_LEAVE_OUT)
-    if forces > 1:
+    elif forces > 1:
         what = f"{forces} channels hold a force, where one hammer hits."
-        raise BadInput(what, file=path, remedy=_LEAVE_OUT)
+    else:
+        return
+    raise BadInput(what, file=path, remedy=remedy)
 
 
-def refuse_implausible(values: FloatArray, channel: str, path: Path) -> None:
+def _refuse_implausible(values: FloatArray, channel: str, path: Path) -> None:
     """Raise BadInput for a channel without any number, with infinite or impossible ones."""
     if np.isnan(values).all():
         raise BadInput(
@@ -332,7 +272,7 @@ def refuse_implausible(values: FloatArray, channel: str, path: Path) -> None:
             channel=channel,
             remedy="Check sensor and cable, or leave the channel out.",
         )
-    wild = np.flatnonzero(np.abs(values) > LARGEST)
+    wild = np.flatnonzero(np.abs(values) > _LARGEST)
     if len(wild):
         raise BadInput(
             f"sample {wild[0] + 1} is {values[wild[0]]:g}, which no sensor gives.",
@@ -343,9 +283,9 @@ def refuse_implausible(values: FloatArray, channel: str, path: Path) -> None:
 
 
 def _refuse_few(count: int, what: str, path: Path) -> None:
-    if count < LEAST_SAMPLES:
+    if count < _LEAST_SAMPLES:
         raise BadInput(
-            f"{what.format(count)}; at least {LEAST_SAMPLES} are needed.",
+            f"{what.format(count)}; at least {_LEAST_SAMPLES} are needed.",
             file=path,
             remedy="Export the frequency response over its whole band."
             if "lines" in what
@@ -358,7 +298,7 @@ def _channel(header: Header, described: PeekChannel, raw: FloatArray, path: Path
     calibration = 1.0 if math.isnan(described.calibration) else described.calibration
     with np.errstate(invalid="ignore"):
         values = raw * (unit.si * calibration)
-    refuse_implausible(values, described.name, path)
+    _refuse_implausible(values, described.name, path)
     scale, states_unit = described.full_scale * unit.si, header.has_entry(described.name, "unit")
     return Channel(
         described.name, quantity, values, described.plane, described.x_m, scale, states_unit
@@ -377,30 +317,34 @@ def _peek_channel(header: Header, name: str, attempt: Attempt) -> PeekChannel:
     )
 
 
-def read_of_test(header: Header, attempt: Attempt) -> dict[str, Any]:
-    """Return what a header says of the complete test; None and NaN where that is faulty."""
-    unknown = dict.fromkeys(TEST_CONDITIONS) | {"temperature_c": NAN}
-    return {key: attempt(partial(getattr, header, key), none) for key, none in unknown.items()}
-
-
 # ---------------------------------------------------------------- frequency responses
 
 
-def frequency_response(
-    header: Header,
-    listed_hz: FloatArray,
-    values: ComplexArray,
-    coherence: FloatArray | None,
-    path: Path,
-) -> FrequencyResponse:
-    """Return accelerances (points, lines) at `listed_hz` (lines,), lines from 0 added as NaN.
+def _look_at_response(found: Description, file_format: str, attempt: Attempt) -> Peek:
+    header, path = found.header, found.table.path
+    channels = []
+    for name in header.channels:
+        attempt(partial(header.accelerance_si, name), NAN)
+        plane = attempt(partial(header.plane, name), None)
+        x_m = attempt(partial(header.x_m, name), NAN)
+        unit = header.unit_text(name) or ACCELERANCE
+        channels.append(PeekChannel(name, "acceleration", unit, plane, x_m))
+    frequency = attempt(lambda: _grid(_listed_hz(found), path)[1], np.zeros(0))
+    return Peek(
+        found.table.source, file_format, tuple(channels), 0, **read_of_test(header, attempt),
+        lines=len(frequency), frequency_step_hz=float(frequency[1]) if len(frequency) else NAN,
+    )  # fmt: skip
 
-    The points are the header's channels. Raises BadInput for an uneven grid and faulty values.
-    """
-    skipped, frequency = grid(listed_hz, path)
+
+def _response(found: Description) -> FrequencyResponse:
+    """Return accelerances over all lines, those from 0 that the file leaves out as NaN."""
+    header, path = found.header, found.table.path
+    values = np.array([column.load() for column in found.used], dtype=np.complex128)
+    skipped, frequency = _grid(_listed_hz(found), path)
+    coherence, look = _coherence(found), _look_at_response(found, "", strictly)
     for row, name in zip(values, header.channels, strict=True):
         row *= header.accelerance_si(name)
-        refuse_implausible(np.abs(row), name, path)
+        _refuse_implausible(np.abs(row), name, path)
     # estimates of few averages may stand a little off 0 to 1
     if coherence is not None and (np.abs(coherence - 0.5) > 1.5).any():
         raise BadInput(
@@ -409,8 +353,8 @@ def frequency_response(
             remedy="Export the coherence anew, or leave it out.",
         )
     return FrequencyResponse(
-        str(path),
-        tuple(ResponsePoint(n, header.plane(n), header.x_m(n)) for n in header.channels),
+        found.table.source,
+        tuple(ResponsePoint(each.name, each.plane, each.x_m) for each in look.channels),
         frequency,
         _from_zero(values, skipped),
         None if coherence is None else _from_zero(coherence, skipped),
@@ -418,7 +362,31 @@ def frequency_response(
     )
 
 
-def grid(listed_hz: FloatArray, path: Path) -> tuple[int, FloatArray]:
+def _listed_hz(found: Description) -> FloatArray:
+    if found.frequencies is None:
+        lines = found.used[0].size if found.used else 0
+        raise BadInput(
+            f"no array holds the frequencies of its {lines} lines.",
+            file=found.table.path,
+            remedy='Name the array frequency_hz, or give it unit = "Hz" in NAME.toml.',
+        )
+    return np.asarray(found.frequencies.load(), float)
+
+
+def _coherence(found: Description) -> FloatArray | None:
+    """Return coherences (points, lines) where there is one for each response, else None."""
+    known = {c.name: c for c in found.table.columns if not c.is_complex}
+    wanted = []
+    for name, stated in found.header.channels.items():
+        wanted.append(
+            known.get(stated["coherence"].text if "coherence" in stated else f"{name}_coherence")
+        )
+    rows = [c for c in wanted if c is not None and c.size == found.used[0].size]
+    whole = rows and len(rows) == len(wanted)
+    return _rows(rows, found.table.path) if whole else None
+
+
+def _grid(listed_hz: FloatArray, path: Path) -> tuple[int, FloatArray]:
     """Return how many lines a file leaves out below its first, and all frequencies from 0 in Hz."""
     _refuse_few(len(listed_hz), "{} lines", path)
     step = float(listed_hz[-1] - listed_hz[0]) / (len(listed_hz) - 1)
@@ -435,27 +403,6 @@ def grid(listed_hz: FloatArray, path: Path) -> tuple[int, FloatArray]:
         file=path,
         remedy="Export lines at whole multiples of one step.",
     )
-
-
-def _peeked_response(
-    header: Header,
-    file_format: str,
-    listed_hz: Callable[[], FloatArray],
-    path: Path,
-    attempt: Attempt,
-) -> Peek:
-    channels = []
-    for name in header.channels:
-        attempt(partial(header.accelerance_si, name), NAN)
-        plane = attempt(partial(header.plane, name), None)
-        x_m = attempt(partial(header.x_m, name), NAN)
-        unit = header.unit_text(name) or ACCELERANCE
-        channels.append(PeekChannel(name, "acceleration", unit, plane, x_m))
-    frequency = attempt(lambda: grid(listed_hz(), path)[1], np.zeros(0))
-    return Peek(
-        str(path), file_format, tuple(channels), 0, **read_of_test(header, attempt),
-        lines=len(frequency), frequency_step_hz=float(frequency[1]) if len(frequency) else NAN,
-    )  # fmt: skip
 
 
 def _from_zero(rows: np.ndarray, skipped: int) -> np.ndarray:

@@ -63,8 +63,8 @@ def open_tables(path: Path) -> tuple[Table, ...]:
 
 
 def _column(name: str, unit: str, values: FloatArray, path: Path) -> Column:
-    role: Role = "channel" if is_measured(name, unit, None) else "other"
-    stated = stated_entries(name, unit, None, None, path)
+    role: Role = "channel" if is_measured(name, unit) else "other"
+    stated = stated_entries(name, unit, path)
     return Column(name, len(values), values.copy, unit, role, stated)
 
 

@@ -147,8 +147,8 @@ def _columns(
 
 
 def _column(name: str, unit: str, values: FloatArray, path: Path) -> Column:
-    measured = logger_text.is_measured(name, unit, None)
-    stated = logger_text.stated_entries(name, unit, None, None, path)
+    measured = logger_text.is_measured(name, unit)
+    stated = logger_text.stated_entries(name, unit, path)
     role: Role = "channel" if measured else "other"
     return Column(name, len(values), lambda: values, unit, role, stated)
 
@@ -174,6 +174,6 @@ def _layout(columns: Sequence[Column], text: str, path: Path) -> tuple[str, ...]
     """
     with suppress(BadInput):
         plain = logger_text.table_in(text, path)
-        if plain is not None and [c.name for c in plain.columns] == [c.name for c in columns]:
+        if plain is not None and [c.name for c in plain.choosable] == [c.name for c in columns]:
             return plain.layout
     return ("LabVIEW", *(f"{column.name} [{column.unit}]" for column in columns))

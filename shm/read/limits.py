@@ -108,6 +108,15 @@ def too_large(path: Path) -> BadInput:
     )
 
 
+def too_much_memory(path: Path, what: str) -> BadInput:
+    """Return the refusal of a file that makes its reader ask for more memory than it has."""
+    return BadInput(
+        f"{what} needs more memory than is given to one file.",
+        file=path,
+        remedy="Export a small file again; split a long one, or raise parse_memory_bytes.",
+    )
+
+
 @contextmanager
 def guarded(path: Path, what: str = "the file") -> Iterator[None]:
     """Turn errors and warnings of a parser within the context into a BadInput."""
@@ -118,11 +127,7 @@ def guarded(path: Path, what: str = "the file") -> Iterator[None]:
     except ShmError:
         raise
     except MemoryError as error:
-        raise BadInput(
-            f"{what} needs more memory than is given to one file.",
-            file=path,
-            remedy="Export a small file again; split a long one, or raise parse_memory_bytes.",
-        ) from error
+        raise too_much_memory(path, what) from error
     except Exception as error:
         raise BadInput(
             f"{what} cannot be read: its structure is damaged or of an unknown kind.",

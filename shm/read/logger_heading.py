@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from shm.read import logger_words as words
 from shm.read.logger_rows import Dialect, is_number, number_of
-from shm.read.stamps import parsed
+from shm.read.stamps import is_stamp
 from shm.values import NAN
 
 _NAME_LABELS = {
@@ -35,14 +35,13 @@ _PLAIN_COUNTER = "column"
 
 @dataclass(frozen=True)
 class Heading:
-    """`names` and `units` by column, "" where nothing says one; `sensitivities` likewise.
+    """`names` and `units` by column, "" where nothing says one.
 
     `facts` are keys and values of the preamble, `names_line` counts from 1, 0 without names.
     """
 
     names: tuple[str, ...]
     units: tuple[str, ...]
-    sensitivities: tuple[words.Sensitivity | None, ...]
     facts: tuple[tuple[str, str], ...]
     names_line: int
 
@@ -74,7 +73,7 @@ def heading_of(above: Sequence[str], dialect: Dialect) -> Heading:
         if place not in taken and (fact := _fact_at(place, above, dialect)) is not None
     ]
     names = distinct_names(tuple(name for name, _ in split))
-    return Heading(names, tuple(units), _sensitivities(others, dialect), tuple(facts), at + 1)
+    return Heading(names, tuple(units), tuple(facts), at + 1)
 
 
 def _axes_named(cells: list[str]) -> list[str]:
@@ -132,7 +131,7 @@ def _score(cells: Sequence[str], dialect: Dialect) -> float:
     if any(not cell or is_number(cell, dialect.decimal) for cell in needed[1:]):
         return 0.0
     labelled = words.key_of(cells[0]) in _NAME_LABELS
-    if not labelled and (words.key_of(cells[0]) in _UNIT_LABELS or any(map(parsed, named))):
+    if not labelled and (words.key_of(cells[0]) in _UNIT_LABELS or any(map(is_stamp, named))):
         return 0.0
     understood = sum(_is_understood(cell) for cell in cells if cell)
     return 1.0 + understood + 0.5 * labelled
@@ -160,16 +159,6 @@ def _are_units(cells: Sequence[str], dialect: Dialect) -> bool:
     return (
         bool(measured) and len(texts) > 1 and (known == len(texts) or _MOSTLY * len(texts) <= known)
     )
-
-
-def _sensitivities(
-    rows: dict[int, list[str]], dialect: Dialect
-) -> tuple[words.Sensitivity | None, ...]:
-    for cells in rows.values():
-        found = tuple(words.sensitivity_of(cell) for cell in cells)
-        if any(found):
-            return found
-    return (None,) * len(dialect.kinds)
 
 
 _CHANNEL_UNIT = re.compile(

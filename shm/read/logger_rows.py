@@ -49,7 +49,7 @@ _NUMBERS = {
         rf"(?=[+-]?[.,]?\d)[+-]?(?:\d{{1,3}}(?:\.\d{{3}})+|\d{{1,3}}(?:{_GROUPS}\d{{3}})+|\d+)?(?:,\d*)?(?:[eEdD][+-]?\d+)?"
     ),
 }
-_MARKS = ("\t", ";", "|", ", ", ",", " ")
+_MARKS = ("\t", ";", "|", ",", " ")
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Dialect:
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line, without surrounding blanks and quotes."""
         if self.quoted and '"' in line:
-            quoted = next(csv.reader([line], delimiter=self.mark[0], skipinitialspace=True), [])
+            quoted = next(csv.reader([line], delimiter=self.mark, skipinitialspace=True), [])
             return [cell.strip() for cell in quoted]
         if self.mark == " ":
             return _BLANKS.sub(" ", line.strip()).split(" ")
@@ -101,8 +101,7 @@ class Dialect:
 class DataRows:
     """The rows of numbers: `above` are the lines before them, `first_line` counts from 1.
 
-    `rows` are cells by row, `lines` the number of the line of each; `seam` is the line at which a
-    heading stands in their midst, 0 without: then times must run on over it.
+    `rows` are cells by row, `lines` the number of the line of each.
     """
 
     dialect: Dialect
@@ -110,7 +109,6 @@ class DataRows:
     rows: list[list[str]]
     lines: list[int]
     remarks: tuple[str, ...] = ()
-    seam: int = 0
 
 
 def is_number(text: str, decimal: str) -> bool:
@@ -165,8 +163,6 @@ def _dialect(sample: Sequence[str], mark: str, quoted: bool) -> Dialect | None:
     even = [row for row in rows if len(row) == count]
     columns = list(zip(*even, strict=True))
     decimal = "." if mark == "," and '"' not in "".join(sample) else _decimal(columns)
-    if mark == ", " and decimal != ",":
-        return None
     kinds = tuple(_kind(column, decimal) for column in columns)
     if "number" not in kinds or kinds.count("text") > kinds.count("number") + 1:
         return None
@@ -209,24 +205,26 @@ def block_of(lines: Sequence[str], dialect: Dialect, path: Path) -> DataRows | N
     rows: list[list[str]] = []
     numbers: list[int] = []
     keys = {cells[0] for line in lines[:start] if (cells := dialect.cells(line))[0]}
-    seam = 0
     for place in range(start, stop):
         line = lines[place]
         if not line.strip() or line.lstrip().startswith(_REMARK):
             continue
         row = dialect.cells(line)
+        if row[0] in keys:
+            raise BadInput(
+                "a second record begins here, with a heading of its own.",
+                file=path,
+                line=place + 1,
+                remedy="Export each recording to a file of its own; `ingest --together` joins"
+                " them.",
+            )
         if len(row) != len(dialect.kinds):
             row = dialect.row(line) or []
-        if row and row[0] in keys:
-            row = []
-        if not row and dialect.cells(line)[0] in keys:
-            seam = seam or place + 1
-            continue
         if not row:
             raise _no_row(dialect.cells(line), place + 1, dialect, path)
         rows.append(row)
         numbers.append(place + 1)
-    return DataRows(dialect, tuple(lines[:start]), rows, numbers, remarks, seam) if rows else None
+    return DataRows(dialect, tuple(lines[:start]), rows, numbers, remarks) if rows else None
 
 
 def _first(lines: Sequence[str], dialect: Dialect) -> int | None:
@@ -253,16 +251,6 @@ def _last(lines: Sequence[str], dialect: Dialect, start: int) -> tuple[int, tupl
     if not left:
         return stop, ()
     return stop, (f"{len(left)} lines after the last row are no numbers; left out.",)
-
-
-def second_record(line: int, path: Path) -> BadInput:
-    """Return the refusal of a file in which a second record starts at `line`."""
-    return BadInput(
-        "a second record begins here, with a heading of its own.",
-        file=path,
-        line=line,
-        remedy="Export each recording to a file of its own; `ingest --together` joins them.",
-    )
 
 
 def _no_row(cells: Sequence[str], line: int, dialect: Dialect, path: Path) -> BadInput:

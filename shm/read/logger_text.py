@@ -11,7 +11,7 @@ sidecar to describe (see `shm import`), times without a unit need a rate that ag
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -45,13 +45,13 @@ from shm.read.logger_rows import (
     values_of,
 )
 from shm.read.logger_times import Clock, clock_of, day_order_of
-from shm.read.logger_words import UNIT_MISSING, Sensitivity
-from shm.read.stamps import DayOrder, PossibleTime, moment, names_zone, parsed, possible_times
+from shm.read.logger_words import UNIT_MISSING
+from shm.read.stamps import DayOrder, PossibleTime, is_stamp, moment, names_zone, possible_times
 from shm.read.table import Column, Table
+from shm.read.time_axis import rate_of
 from shm.values import NAN
 
 _PLAIN_NAME = set("abcdefghijklmnopqrstuvwxyz0123456789_")
-_LISTED = re.compile(r"TIMESERIES .*?, *(\d+) samples,")  # SLIST and TSPAIR, of seismology
 _MOST_STACKED = 64  # judgement: four times the accelerations that are read
 _HEAD = 20_000  # characters in which a heading of our own says so
 
@@ -122,32 +122,45 @@ def _table(heading: Heading, block: DataRows, path: Path, before: int = 0) -> Ta
     time, is_local = clock.start, clock.is_local
     if time is None:
         time, is_local = _time(heading, order)
-    _refuse_wrapped(block, path)
     layout = _layout(heading, block)  # without what is found in its lines: profiles know it so
     heading = with_channel_units(heading, block.above)
     line = max(0, heading.names_line - before) or None
-    columns = tuple(
-        _column(heading, block, clock, place, line, path)
+    columns = [
+        _column(heading, block, place, line, path)
         for place, kind in enumerate(block.dialect.kinds)
         if kind == "number" and place not in clock.used
-    )
+    ]
     facts = {
         "hanger": _hanger(heading),
         "time": format_time(time),
         "temperature_c": _temperature(heading, decimal, columns),
-        "sampling_rate_hz": unrounded(rate, clock.rate_hz, heading.facts, decimal),
+        "sampling_rate_hz": rate,
     }
-    return Table(
+    found = Table(
         path,
-        columns,
+        tuple(columns),
         entries_of(facts, path),
         layout,
-        clock.rate_hz,
         remarks=(*clock.remarks, *block.remarks),
         possible_times=() if time else clock.possible_starts or _possible_times(heading),
         day_order=order,
+        line_of=lambda row: block.lines[row],
         local_time=time if is_local else None,
     )
+    return found if clock.seconds is None else _timed(found, heading, clock, rate, decimal)
+
+
+def _timed(table: Table, heading: Heading, clock: Clock, rate_hz: float, decimal: str) -> Table:
+    """Return a table with its times, and a rate by them where that of the heading is rounded."""
+    assert clock.seconds is not None
+    times = Column(clock.name, len(clock.seconds), clock.seconds.copy, "s", "times")
+    entries = dict(table.entries)
+    if not math.isnan(rate_hz):
+        by_times = rate_of(clock.seconds, table.uneven(times), rate_hz)
+        entries |= entries_of(
+            {"sampling_rate_hz": unrounded(rate_hz, by_times, heading.facts, decimal)}, table.path
+        )
+    return replace(table, columns=(*table.columns, times), entries=entries)
 
 
 def _stacked(lines: Sequence[str], path: Path) -> Table | None:
@@ -164,39 +177,39 @@ def _stacked(lines: Sequence[str], path: Path) -> Table | None:
     for a, b in pairwise([*starts, len(lines)]):
         part = _parsed(["", *lines[a + 1 : b]], path)
         table = None if part is None else _table(*part, path)
-        if part is None or table is None or len(table.columns) != 1:
+        if part is None or table is None or len(table.choosable) != 1:
             return None
         tables.append(table)
         titles.append(_of_one_signal(part[0], words.means_title))
-    if len({(t.columns[0].size, str(t.clock_rate_hz), _rate_text(t)) for t in tables}) > 1:
+    if len({_grid(table) for table in tables}) > 1:
         return None
     columns = tuple(
         replace(table.columns[0], name=name)
         for table, name in zip(tables, distinct_names(titles), strict=True)
     )
     units = [f"{column.name} [{column.unit}]" for column in columns]
+    columns = (*columns, *tables[0].columns[1:])
     return replace(tables[0], columns=columns, layout=("stacked", *units))
 
 
-def _rate_text(table: Table) -> str:
-    entry = table.entries.get("sampling_rate_hz")
-    return entry.text if entry is not None else ""
+def _grid(table: Table) -> tuple[object, ...]:
+    """Return what equal times have in common."""
+    times = [column.load()[-1] for column in table.columns if column.role == "times"]
+    stated = table.entries.get("sampling_rate_hz")
+    return table.columns[0].size, *times, stated.text if stated is not None else ""
 
 
-def _column(
-    heading: Heading, block: DataRows, clock: Clock, place: int, line: int | None, path: Path
-) -> Column:
+def _column(heading: Heading, block: DataRows, place: int, line: int | None, path: Path) -> Column:
     values, overloads = values_of(block, place, path)
-    values = clock.resampled(values)
-    name, sensitivity = heading.names[place], heading.sensitivities[place]
+    name = heading.names[place]
     unit = heading.units[place] or ("" if heading.names_line else _unit_of_one(heading))
     return Column(
         name,
         len(values),
         lambda: values,
         unit,
-        "channel" if is_measured(name, unit, sensitivity) else "other",
-        stated_entries(name, unit, sensitivity, line, path),
+        "channel" if is_measured(name, unit) else "other",
+        stated_entries(name, unit, path, line),
         overloads=overloads,
     )
 
@@ -216,19 +229,6 @@ def _refuse_split_decimals(heading: Heading, block: DataRows, path: Path) -> Non
             file=path,
             line=block.lines[0],
             remedy="Export with semicolons or tabs between the columns, or with decimal points.",
-        )
-
-
-def _refuse_wrapped(block: DataRows, path: Path) -> None:
-    """Raise BadInput where a seismic list gives another number of samples than follows."""
-    n_stated = next((int(found[1]) for line in block.above if (found := _LISTED.match(line))), None)
-    if n_stated is not None and n_stated != len(block.rows):
-        raise BadInput(
-            f"its heading says {n_stated} samples of one channel, where {len(block.rows)} rows of"
-            f" {len(block.dialect.kinds)} values follow.",
-            file=path,
-            line=block.lines[0],
-            remedy="Export one column for each channel, or as miniSEED.",
         )
 
 
@@ -257,12 +257,12 @@ def _hanger(heading: Heading) -> int | None:
 
 
 def _dates(heading: Heading) -> list[str]:
-    return [v for k, v in heading.facts if words.means_date(k) and parsed(v)]
+    return [v for k, v in heading.facts if words.means_date(k) and is_stamp(v)]
 
 
 def _moments(heading: Heading) -> list[str]:
     """Return the times of a heading, catman's `T0 = ...` among them."""
-    named = ((k, v) for k, v in heading.facts if parsed(v))
+    named = ((k, v) for k, v in heading.facts if is_stamp(v))
     return [v for k, v in named if words.means_moment(k) or k.strip().upper() == "T0"]
 
 
@@ -318,10 +318,9 @@ def _layout(heading: Heading, block: DataRows) -> tuple[str, ...]:
 # ---------------------------------------------------------------- channels
 
 
-def is_measured(name: str, unit: str, sensitivity: Sensitivity | None) -> bool:
+def is_measured(name: str, unit: str) -> bool:
     """Return whether a file itself says that a column is a force or an acceleration, in a unit."""
-    measured = words.unit_of(unit) is not None and not _is_doubtful(name, unit)
-    return measured or (words.volts_of(unit) is not None and sensitivity is not None)
+    return words.unit_of(unit) is not None and not _is_doubtful(name, unit)
 
 
 def _is_doubtful(name: str, unit: str) -> bool:
@@ -331,19 +330,12 @@ def _is_doubtful(name: str, unit: str) -> bool:
     return in_g and words.means_force_alone(name)
 
 
-def stated_entries(
-    name: str, unit: str, sensitivity: Sensitivity | None, line: int | None, path: Path
-) -> dict[str, Entry]:
+def stated_entries(name: str, unit: str, path: Path, line: int | None = None) -> dict[str, Entry]:
     """Return what a logger's name and unit say of a channel, by the keys of a sidecar."""
-    entries: dict[str, object] = {"unit": unit}
-    volts = words.volts_of(unit)
-    if volts is not None and sensitivity is not None:
-        entries = {"unit": sensitivity.unit, "calibration": sensitivity.unit_per_volt * volts}
-    elif _is_doubtful(name, unit) or (quantity_named(name) and not unit):
-        entries["unit"] = (
-            UNIT_MISSING  # a name such as force promises newtons in our own files alone
-        )
-    plane = words.plane_meant(name)
-    if plane is not None and (known := words.unit_of(str(entries["unit"]))) is not None:
-        entries |= {"plane": plane} if known.quantity == "acceleration" else {}
+    measured, plane = words.unit_of(unit), words.plane_meant(name)
+    if _is_doubtful(name, unit) or (quantity_named(name) and not unit):
+        unit = UNIT_MISSING  # a name such as force promises newtons in our own files alone
+    entries = {"unit": unit}
+    if plane is not None and measured is not None and measured.quantity == "acceleration":
+        entries["plane"] = plane
     return {key: Entry(value, path, line) for key, value in entries.items() if value}

@@ -265,7 +265,7 @@ means_date = _meaning(
 )
 means_moment = _meaning(
     r"(mess|test|start|aufnahme|record(ing|ed)?|acquisition|trigger|begin(n)?|created?)*"
-    r"(zeit|time|uhrzeit|zeitpunkt|beginn|begin|start|datetime|datumzeit|datumuhrzeit|dateandtime"
+    r"(zeit|times?|uhrzeit|zeitpunkt|beginn|begin|start|datetime|datumzeit|datumuhrzeit|dateandtime"
     r"|datetimestamp|dateutc|timeutc|recorded|acquired|on|am|ed)(utc)?"
 )
 means_temperature = _meaning(

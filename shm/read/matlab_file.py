@@ -1,22 +1,15 @@
-"""MATLAB .mat files: version 5 (save -v7) by scipy, version 7.3 by h5py.
+"""MATLAB .mat files: version 5 (save -v6, -v7) by our own reader, version 7.3 by h5py.
 
 Variables are those of `arrays`: force, acc_1, sampling_rate_hz, acc_1_unit, acc_1_x_m, ...
 A struct of one element counts as its fields. Objects, functions and cells are left out unread.
 
-The door to scipy.io: the variables of a MATLAB file of version 5 (save -v6, -v7).
-
-The elements of a MATLAB file of version 5, measured before scipy.io takes them.
-
-An element is a tag of type and length. scipy.io looks types up unchecked, so that a damaged one
-ends the process: 19 of 800 files with 1 to 3 bytes changed in a variable did (scipy 1.17.1), and
-`shm.read` reads in the caller's process. A compressed element may unpack to any size, whatever its
-variable's shape says. So parts are checked, and what comes out is counted (MAT-File Format,
-MathWorks, chapter 1).
+A file of version 5 is a row of elements: a tag of type and length, then a matrix that may be packed
+(MAT-File Format, MathWorks, chapter 1). scipy.io ends the process on damaged ones
+(docs/decisions/0023).
 """
 
 from __future__ import annotations
 
-import io
 import math
 import struct
 import zlib
@@ -28,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from shm.errors import BadInput
@@ -39,9 +31,35 @@ from shm.read.hdf5_file import opened_nodes, variables
 from shm.read.limits import guarded, limits, refuse_large
 
 _VERSION_5, _VERSION_7_3 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
-_NUMBERS = {
-    "double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64",
-}  # fmt: skip
+_HEADER_BYTES = 128
+_MATRIX, _COMPRESSED = 14, 15
+_INT8, _INT32, _UINT32 = 1, 5, 6
+_TYPES = {
+    1: "i1",
+    2: "u1",
+    3: "i2",
+    4: "u2",
+    5: "i4",
+    6: "u4",
+    7: "f4",
+    9: "f8",
+    12: "i8",
+    13: "u8",
+}
+_ENCODINGS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
+_IN_ORDER = (4, 17, 18)
+_KINDS = (
+    "", "cell", "struct", "object", "char", "sparse", "double", "single", "int8", "uint8", "int16",
+    "uint16", "int32", "uint32", "int64", "uint64", "function", "opaque",
+)  # fmt: skip
+_NUMBERS = _KINDS[6:16]
+_COMPLEX, _LOGICAL = 0x800, 0x200
+_HEAD_BYTES = 1 << 12  # technical: flags, dimensions and name
+_MOST_VARIABLES = 1000
+_MAX_FIELDS = 20  # judgement: a struct among more is settings of a program, no recording
+_NAME_FIELDS = ("channel_names", "names", "channels", "labels")
+_UNIT_FIELDS = ("unit", "units")
+_OF = "\0"  # between a struct and its field, until names are told apart
 
 
 def _recognises(head: bytes) -> bool:
@@ -53,7 +71,7 @@ def _opened(path: Path) -> Iterator[Arrays]:
     with path.open("rb") as stream:
         version_7_3 = stream.read(len(_VERSION_7_3)) == _VERSION_7_3
     if not version_7_3:
-        yield arrays_in(path)
+        yield _arrays(path)
         return
     with opened_nodes(path) as nodes:
         named = zip(variables(nodes), (n for n in nodes if n.dataset is not None), strict=True)
@@ -74,62 +92,177 @@ def _text(codes: NDArray[Any]) -> NDArray[Any]:
     return np.array([chr(int(code)) for code in codes.ravel()])
 
 
-FORMAT = format_of_arrays("MATLAB", (".mat",), _recognises, _opened, "scipy.io")
+FORMAT = format_of_arrays("MATLAB", (".mat",), _recognises, _opened)
 
 
-_scipy: Any = scipy  # the stubs of its `io` know no streams
-_MOST_VARIABLES = 1000
-_OF = "\0"  # between a struct and its field, until names are told apart
-_NAME_FIELDS = ("channel_names", "names", "channels", "labels")
-_UNIT_FIELDS = ("unit", "units")
-_MAX_FIELDS = 20  # judgement: a struct among more is settings of a program, no recording
-_KINDS = {
-    "double": ("f", 8), "single": ("f", 4), "char": ("U", 4), "int8": ("i", 1), "uint8": ("u", 1),
-    "int16": ("i", 2), "uint16": ("u", 2), "int32": ("i", 4), "uint32": ("u", 4),
-    "int64": ("i", 8), "uint64": ("u", 8),
-}  # fmt: skip
+# ---------------------------------------------------------------- version 5
 
 
-def arrays_in(path: Path) -> Arrays:
+@dataclass(frozen=True)
+class Element:
+    """One variable of a file, still packed where it is."""
+
+    order: str
+    kind: int
+    content: bytes
+
+    def matrix(self, most_bytes: int) -> _Matrix:
+        """Return the matrix of which at most so many bytes are unpacked; raises ValueError."""
+        content = self.content[:most_bytes]
+        if self.kind == _COMPRESSED:
+            unpacked = zlib.decompressobj().decompress(self.content, most_bytes)
+            kind, length = struct.unpack_from(f"{self.order}II", unpacked)
+            content = unpacked[8 : 8 + length]
+        else:
+            kind = self.kind
+        if kind != _MATRIX:
+            raise ValueError("an element is no matrix")
+        return _matrix(content, self.order)
+
+
+def elements_of(content: bytes) -> Iterator[Element]:
+    """Yield the elements of a file; raises ValueError or struct.error where it is cut off."""
+    order = "<" if content[126:128] == b"IM" else ">"
+    place = _HEADER_BYTES
+    while place < len(content):
+        kind, length = struct.unpack_from(f"{order}II", content, place)
+        if length == 0 or place + 8 + length > len(content):
+            raise ValueError("an element reaches beyond the file")
+        yield Element(order, kind, content[place + 8 : place + 8 + length])
+        place += 8 + length
+
+
+@dataclass(frozen=True)
+class _Matrix:
+    """A matrix by its head; `parts` are type and bytes of what follows."""
+
+    order: str
+    name: str
+    kind: str
+    shape: tuple[int, ...]
+    is_complex: bool
+    parts: Iterator[tuple[int, bytes]]
+
+    def values(self) -> NDArray[Any]:
+        """Return numbers, or a text for each row; raises ValueError where they are damaged."""
+        parts = list(self.parts)
+        if len(parts) != 1 + self.is_complex:
+            raise ValueError("a variable has too many or too few parts")
+        if self.kind == "char":
+            (kind, part), rows = parts[0], max(1, self.shape[0])
+            ending = {"<": "-le", ">": "-be"}[self.order] if kind in _IN_ORDER else ""
+            letters = part.decode(_ENCODINGS[kind] + ending)
+            return np.array([letters[row::rows].rstrip() for row in range(rows)], dtype=str)
+        rows_of = [self._numbers(*part) for part in parts]
+        found = rows_of[0] + 1j * rows_of[1] if self.is_complex else rows_of[0]
+        return found.reshape(self.shape, order="F")
+
+    def _numbers(self, kind: int, part: bytes) -> NDArray[Any]:
+        found = np.frombuffer(part, self.order + _TYPES[kind])
+        if found.size != math.prod(self.shape):
+            raise ValueError("a variable's values are not as many as its shape says")
+        return found.astype(self.kind)
+
+    def fields(self) -> dict[str, NDArray[Any]]:
+        """Return the fields of a struct of one element that hold numbers or texts."""
+        (_, length), (_, names), *values = self.parts
+        (size,) = struct.unpack(f"{self.order}I", length)
+        keys = [names[at : at + size].split(b"\0")[0].decode() for at in range(0, len(names), size)]
+        found = {}
+        for key, (_, content) in zip(keys, values, strict=True):
+            inner = _matrix(content, self.order) if content else None
+            if inner is not None and inner.kind == "cell":
+                cells = [_matrix(cell, self.order) for _, cell in inner.parts if cell]
+                if all(cell.kind == "char" for cell in cells):
+                    found[key] = np.array([" ".join(cell.values()) for cell in cells], dtype=str)
+            elif inner is not None and inner.kind in (*_NUMBERS, "char"):
+                found[key] = np.squeeze(inner.values())
+        return found
+
+
+def _matrix(content: bytes, order: str) -> _Matrix:
+    """Return a matrix by its head; raises ValueError where that is damaged."""
+    parts = _parts(content, order)
+    (kind, flags), dimensions = next(parts), next(parts)
+    if kind != _UINT32 or len(flags) != 8:
+        raise ValueError("the head of a variable is damaged")
+    (flag,) = struct.unpack_from(f"{order}I", flags)
+    named = _KINDS[flag & 0xFF]
+    name = dimensions if named == "opaque" else next(parts)
+    if name[0] != _INT8 or (named != "opaque" and dimensions[0] != _INT32):
+        raise ValueError("the head of a variable is damaged")
+    shape = () if named == "opaque" else tuple(np.frombuffer(dimensions[1], f"{order}i4").tolist())
+    named = "logical" if flag & _LOGICAL else named
+    return _Matrix(order, name[1].decode("latin-1"), named, shape, bool(flag & _COMPLEX), parts)
+
+
+def _parts(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+    """Yield type and bytes of each part of a matrix; a short part stands within its tag."""
+    place = 0
+    while place + 8 <= len(content):
+        kind, length = struct.unpack_from(f"{order}II", content, place)
+        if kind >> 16:
+            kind, length, begin, place = kind & 0xFFFF, kind >> 16, place + 4, place + 8
+        else:
+            begin = place + 8
+            place = begin + -(-length // 8) * 8
+        yield kind, content[begin : begin + length]
+
+
+def _arrays(path: Path) -> Arrays:
     """Return the variables that are numbers or texts; raises BadInput beyond the limits."""
     content = bytes_of(path)
     with guarded(path):
-        elements = tuple(elements_of(content))
-        complexities = [element.is_complex for element in elements]
-        listed = _scipy.io.whosmat(io.BytesIO(content))
-        if len(listed) != len(elements) or len(listed) > _MOST_VARIABLES:
-            raise ValueError("there are not as many variables as elements")
-    _refuse_doubles([name for name, _, _ in listed], path)
+        elements = list(elements_of(content))
+        heads = [element.matrix(_HEAD_BYTES) for element in elements]
+        if len(heads) > _MOST_VARIABLES:
+            raise ValueError("there are far too many variables")
+    names = [head.name for head in heads]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise BadInput(
+            "stands twice in the file.",
+            file=path,
+            channel=twice,
+            remedy="Save each variable once.",
+        )
     found: list[Variable] = []
     left_out: list[str] = []
-    for (name, shape, kind), element, is_complex in zip(
-        listed, elements, complexities, strict=True
-    ):
-        if kind in _KINDS:
-            found.append(_variable(name, shape, kind, is_complex, element, content, path))
-        elif kind == "struct" and math.prod(shape) == 1 and len(listed) < _MAX_FIELDS:
-            fields = _fields(name, element, content, path)
-            found += fields
-            left_out += [] if fields else [f"{name} ({kind})"]
-        else:
-            left_out.append(f"{name} ({kind})")
+    for head, element in zip(heads, elements, strict=True):
+        if head.kind in (*_NUMBERS, "char"):
+            found.append(_variable(head, element, path))
+            continue
+        fields = []
+        if head.kind == "struct" and math.prod(head.shape) == 1 and len(heads) < _MAX_FIELDS:
+            fields = _fields(head.name, element, path)
+        found += fields
+        left_out += [] if fields else [f"{head.name} ({head.kind})"]
     names = unique_names([tuple(variable.name.split(_OF)) for variable in found])
     apart = [replace(v, name=name) for v, name in zip(found, names, strict=True)]
     return Arrays(tuple(apart), {}, tuple(left_out))
 
 
-def _fields(name: str, element: Element, content: bytes, path: Path) -> list[Variable]:
+def _variable(head: _Matrix, element: Element, path: Path) -> Variable:
+    kind = np.dtype(np.str_ if head.kind == "char" else head.kind)
+    item_bytes = 4 if head.kind == "char" else kind.itemsize * (1 + head.is_complex)
+    refuse_large(head.shape, item_bytes, head.name, path)
+    shape = head.shape[:1] if head.kind == "char" else head.shape
+    letter = "c" if head.is_complex else kind.kind
+    return Variable(head.name, shape, letter, item_bytes, lambda: _whole(element).values())
+
+
+def _whole(element: Element) -> _Matrix:
+    return element.matrix(limits().bytes_at_once)
+
+
+def _fields(name: str, element: Element, path: Path) -> list[Variable]:
     """Return the fields of a struct that hold numbers or a text; none where no record is in it.
 
     A field `unit` of as many texts as there are records gives the unit of each, in their order; one
     of names those of a table's columns.
     """
     with guarded(path, f"the struct {name!r}"):
-        element.refuse_damaged_struct()
-        found = _scipy.io.loadmat(io.BytesIO(content), variable_names=[name], simplify_cells=True)[
-            name
-        ]
-        fields = {str(key): np.asarray(value) for key, value in found.items()}
+        fields = _whole(element).fields()
     rows = {
         name: row
         for key, value in fields.items()
@@ -140,7 +273,7 @@ def _fields(name: str, element: Element, content: bytes, path: Path) -> list[Var
         return []
     units = _listed(fields, _UNIT_FIELDS, len(rows))
     by_name = dict(zip(rows, units, strict=True)) if units else {}
-    facts = {k: v for k, v in fields.items() if v.dtype.kind in "iufU" and v.size == 1}
+    facts = {k: v for k, v in fields.items() if v.size == 1}
     return [
         Variable(
             f"{name}{_OF}{key}",
@@ -172,162 +305,6 @@ def _listed(fields: Mapping[str, NDArray[Any]], keys: Sequence[str], count: int)
     """Return as many texts as `count` of the first such field; empty where there is none."""
     for key in keys:
         texts = fields.get(key, np.zeros(0)).ravel()
-        if texts.size == count and all(isinstance(text, str) for text in texts):
-            return tuple(str(text) for text in texts)
+        if texts.size == count and texts.dtype.kind == "U":
+            return tuple(map(str, texts))
     return ()
-
-
-def _variable(
-    name: str,
-    shape: tuple[int, ...],
-    kind: str,
-    is_complex: bool,
-    element: Element,
-    content: bytes,
-    path: Path,
-) -> Variable:
-    letter, item_bytes = _KINDS[kind]
-    refuse_large(shape, 2 * item_bytes if is_complex else item_bytes, name, path)
-    is_text = letter == "U"
-
-    def load() -> NDArray[Any]:
-        element.refuse_damaged(shape, is_text)
-        found = _scipy.io.loadmat(io.BytesIO(content), variable_names=[name])
-        return np.asarray(found[name])
-
-    letter = "c" if is_complex and not is_text else letter
-    # A text comes as one string a row.
-    return Variable(name, shape[:1] if is_text else shape, letter, item_bytes, load)
-
-
-def _refuse_doubles(names: Sequence[str], path: Path) -> None:
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise BadInput(
-            "stands twice in the file.",
-            file=path,
-            channel=twice,
-            remedy="Save each variable once.",
-        )
-
-
-# MAT-File Format, MathWorks, chapter 1
-_HEADER_BYTES = 128
-_MATRIX, _COMPRESSED = 14, 15
-_INT8, _INT32, _UINT32 = 1, 5, 6
-_NUMBER_BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
-_TEXTS = (1, 2, 4, 16, 17, 18)
-_COMPLEX_FLAG = 0x800
-_CELL, _STRUCT, _CHAR, _SPARSE, _LAST_NUMBER = 1, 2, 4, 5, 15  # classes of arrays
-_DEEPEST = 3
-_CHUNK = 1 << 20  # technical: unpacked at once
-
-
-@dataclass(frozen=True)
-class Element:
-    """One variable of a file, still packed."""
-
-    byte_order: str
-    kind: int
-    packed: bytes
-
-    @property
-    def is_complex(self) -> bool:
-        """Return whether its values are complex; ValueError where the head is damaged."""
-        (kind, flags), dimensions, name = self._head(next(self.pieces()))
-        if (kind, len(flags), dimensions[0], name[0]) != (_UINT32, 8, _INT32, _INT8):
-            raise ValueError("the head of a variable is damaged")
-        return bool(self._number(flags, 0) & _COMPLEX_FLAG)
-
-    def pieces(self) -> Iterator[bytes]:
-        """Yield a matrix with its tag, unpacked piece by piece, until it outgrows the limit."""
-        if self.kind != _COMPRESSED:
-            yield struct.pack(f"{self.byte_order}II", self.kind, len(self.packed)) + self.packed
-            return
-        stream, size, packed = zlib.decompressobj(), 0, self.packed
-        while packed and size <= limits().bytes_at_once:
-            piece = stream.decompress(packed, _CHUNK)
-            packed = stream.unconsumed_tail
-            size += len(piece)
-            yield piece
-
-    def refuse_damaged(self, shape: tuple[int, ...], is_text: bool) -> None:
-        """Raise ValueError where the values do not match the shape, or are far too many."""
-        content = b"".join(self.pieces())
-        if len(content) > limits().bytes_at_once:
-            raise ValueError("a variable unpacks to more than is read at once")
-        values = list(self._parts(content))[3:]
-        if len(values) != 1 + self.is_complex:
-            raise ValueError("a variable has too many or too few parts")
-        for kind, part in values:
-            if is_text and kind in _TEXTS:
-                continue
-            if is_text or len(part) != math.prod(shape) * _NUMBER_BYTES[kind]:
-                raise ValueError("a variable's values are not as many as its shape says")
-
-    def refuse_damaged_struct(self) -> None:
-        """Raise ValueError where a part of a struct is not what its tag says, or far too large."""
-        content = b"".join(self.pieces())
-        if len(content) > limits().bytes_at_once:
-            raise ValueError("a variable unpacks to more than is read at once")
-        self._refuse_damaged_part(content, 0)
-
-    def _refuse_damaged_part(self, content: bytes, depth: int) -> None:
-        parts = list(self._parts(content))
-        (_, flags), (_, sizes), _, *values = parts
-        kind, dims = (
-            self._number(flags, 0) & 0xFF,
-            [self._number(sizes, place) for place in range(0, len(sizes), 4)],
-        )
-        if kind in (_STRUCT, _CELL):
-            inner = values[2:] if kind == _STRUCT else values
-            counted = kind == _STRUCT or len(inner) == math.prod(dims)
-            if depth > _DEEPEST or not counted or any(each[0] != _MATRIX for each in inner):
-                raise ValueError("a struct is damaged, or nested too deeply")
-            for _, part in inner:
-                if part:
-                    head = struct.pack(f"{self.byte_order}II", _MATRIX, len(part))
-                    self._refuse_damaged_part(head + part, depth + 1)
-            return
-        is_text, is_complex = kind == _CHAR, bool(self._number(flags, 0) & _COMPLEX_FLAG)
-        if not _CHAR <= kind <= _LAST_NUMBER or kind == _SPARSE or len(values) != 1 + is_complex:
-            raise ValueError("a field of a struct is of a kind that is not read")
-        for found, part in values:
-            fits = found in _TEXTS if is_text else found in _NUMBER_BYTES
-            if not fits or (not is_text and len(part) != math.prod(dims) * _NUMBER_BYTES[found]):
-                raise ValueError("a field's values are not as many as its shape says")
-
-    def _head(self, piece: bytes) -> list[tuple[int, bytes]]:
-        """Return flags, dimensions and name of a matrix, each with its type."""
-        parts = self._parts(piece)
-        return [next(parts, (0, b"")) for _ in range(3)]
-
-    def _parts(self, content: bytes) -> Iterator[tuple[int, bytes]]:
-        """Yield type and content of each part of a matrix."""
-        if self._number(content, 0) != _MATRIX or len(content) < 8:
-            raise ValueError("an element is no matrix")
-        place, end = 8, min(len(content), 8 + self._number(content, 4))
-        while place + 8 <= end:
-            kind, length, begin = self._number(content, place), 0, place + 4
-            if kind >> 16:
-                kind, length, following = kind & 0xFFFF, kind >> 16, place + 8
-            else:
-                length, begin = self._number(content, place + 4), place + 8
-                following = begin + -(-length // 8) * 8
-            yield kind, content[begin : begin + length]
-            place = following
-
-    def _number(self, content: bytes, place: int) -> int:
-        return int(struct.unpack_from(f"{self.byte_order}I", content, place)[0])
-
-
-def elements_of(content: bytes) -> Iterator[Element]:
-    """Yield the elements of a file in memory; raises ValueError or struct.error if cut off."""
-    order = "<" if content[126:128] == b"IM" else ">"
-    place = _HEADER_BYTES
-    while place < len(content):
-        kind, length = struct.unpack_from(f"{order}II", content, place)
-        if length == 0 or place + 8 + length > len(content):
-            raise ValueError("an element reaches beyond the file")
-        yield Element(order, kind, content[place + 8 : place + 8 + length])
-        place += 8 + length

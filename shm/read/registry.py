@@ -18,7 +18,7 @@ import numpy as np
 from shm import modes_document
 from shm.errors import BadInput, UsageError
 from shm.read import logger_words as words
-from shm.read.assemble import assemble, collecting, read_of_test
+from shm.read.assemble import assemble, collecting, read_of_test, sampling_rate
 from shm.read.assemble import peek as look
 from shm.read.base import Format, Layout, Peek, PeekChannel, Survey, SurveyedColumn
 from shm.read.bundles import each_member, entries_of_test, holds_test
@@ -42,7 +42,7 @@ from shm.read.table import Column, Table, describe
 from shm.read.tdms_file import FORMAT as TDMS
 from shm.read.universal_file import FORMAT as UFF
 from shm.read.wave_file import FORMAT as WAVE
-from shm.values import FrequencyResponse, ModalTest, Recording
+from shm.values import NAN, FrequencyResponse, ModalTest, Recording
 
 # The most particular first: any text may be comma-separated.
 FORMATS: tuple[Format, ...] = (
@@ -369,8 +369,11 @@ def _layout(table: Table, file_format: str, columns: Sequence[SurveyedColumn]) -
     stated = names if is_response else table.layout
     digest = hashlib.sha256("\n".join((file_format, *stated)).encode()).hexdigest()
     attempt, in_file = collecting([]), table.file_header
-    timed = any(column.role == "times" or column.rate_hz > 0 for column in table.columns)
-    has_rate = timed or table.clock_rate_hz > 0 or attempt(lambda: in_file.sampling_rate_hz, 0) > 0
+    plain = describe(table, with_sidecars=False)
+    rates = (
+        attempt(lambda: in_file.sampling_rate_hz, NAN),
+        attempt(lambda: sampling_rate(plain), NAN),
+    )
     return Layout(
         digest[:_FINGERPRINT_DIGITS],
         file_format,
@@ -378,7 +381,7 @@ def _layout(table: Table, file_format: str, columns: Sequence[SurveyedColumn]) -
         if is_response
         else tuple(f"{c.name} [{c.unit}]" if c.unit else c.name for c in columns),
         attempt(lambda: in_file.hanger, None),
-        has_rate,
+        any(rate > 0 for rate in rates),
         table.day_order,
         table.possible_times,
         table.local_time,

@@ -101,8 +101,8 @@ def _columns(channel: Any, path: Path) -> list[Column]:
         raise BadInput(
             "its data are no single row.", file=path, channel=name, remedy="Split its columns."
         )
-    role: Role = "channel" if is_measured(name, unit[1], None) else "other"
-    stated = dict(stated_entries(name, unit[1], None, None, path))
+    role: Role = "channel" if is_measured(name, unit[1]) else "other"
+    stated = dict(stated_entries(name, unit[1], path))
     stated |= {key: Entry(channel[key], path) for key in _OF_CHANNEL if key in channel}
     found = [
         Column(name, len(values), values.copy, unit[1], role, stated, rate_hz=rate, label=name)

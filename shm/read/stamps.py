@@ -8,10 +8,11 @@ unknown and all possible times are given.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, tzinfo
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -22,19 +23,17 @@ from shm.values import FloatArray
 _DAY = r"(?P<a>\d{1,4})(?P<mark>[-./])(?P<b>\d{1,2})[-./](?P<c>\d{1,4})"
 _CLOCK = r"(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2}(?:[.,:]\d+)?))?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
 _ZONE = r"\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2})?"
-_STAMP = re.compile(
-    rf"(?:{_DAY})?(?:\s*[T ,;]\s*|^)(?:{_CLOCK}{_ZONE})|{_DAY.replace('?P<', '?P<d')}"
-)
+_STAMP = re.compile(rf"(?:{_DAY})?(?:(?:\s*[T ,;]\s*|^){_CLOCK}{_ZONE})?")
 _NAMED_DAYS = (
-    "%d-%b-%Y %H:%M:%S", "%d %b %Y %H:%M:%S", "%d. %B %Y %H:%M:%S", "%B %d, %Y %H:%M:%S",
-    "%b %d, %Y %H:%M:%S", "%d-%b-%Y", "%d %B %Y", "%B %d, %Y", "%a %b %d %H:%M:%S %Y",
+    "%d-%b-%Y", "%d-%b-%y", "%d %b %Y", "%d. %B %Y", "%d %B %Y", "%B %d, %Y", "%b %d, %Y",
+    "%a %b %d %Y",
 )  # fmt: skip
+_NAMED = re.compile(r"(jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)", re.IGNORECASE)
 _DAY_IN_BYTES = re.compile(rb"(?<!\d)\d{1,2}([-/])\d{1,2}\1\d{2}")
 _PACKED = (".xlsx", ".xlsm", ".gz")  # whose first bytes tell nothing
-_MONTH = re.compile("jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec", re.IGNORECASE)
 _DAY_S = 86400.0
 _HOUR_S, _WHOLE_S = 3600.0, 1.0
-_CLOCK_ONLY = datetime(1, 1, 1, tzinfo=UTC)
+_NO_DAY = datetime(1, 1, 1, tzinfo=UTC)
 
 DayOrder = Literal["day first", "month first", "year first"]
 """What comes first in a day written as figures, such as 05/01/2026; the month follows a year."""
@@ -50,80 +49,45 @@ class PossibleTime:
     time: datetime
 
 
-def is_stamp(text: str) -> bool:
-    """Return whether a text is a clock time, a day, or both."""
-    return parsed(text) is not None
+@dataclass(frozen=True)
+class Stamp:
+    """A time as written, in UTC where it names no zone: `days` are those that it may be of.
 
-
-def parsed(text: str, order: DayOrder | None = None) -> tuple[datetime, bool] | None:
-    """Return a time in UTC (taken as such where no zone is said) and whether its day is certain.
-
-    A day that can be read in several orders is read in `order` where that is one of them, else in
-    the first of them. A clock time without a day is one of the first of January of the year 1, its
-    day not certain.
+    A clock time without a day has none. `is_ordered` says that the days are read by their order.
     """
-    found = _STAMP.fullmatch(text.strip())
-    if found is None:
-        return _named(text.strip())
-    try:
-        alone = found["da"] is not None
-        day, certain = _day(found, "d" if alone else "", order)
-        return (day, certain) if alone else (_clocked(day, found), certain)
-    except (ValueError, OverflowError):
+
+    days: Mapping[DayOrder, datetime]
+    is_ordered: bool
+    clock: timedelta
+    has_zone: bool
+
+    def time(self, order: DayOrder | None = None) -> datetime:
+        """Return the time, of a day in `order` where that is one of it, else in the first.
+
+        Without a day it is one of the first of January of the year 1.
+        """
+        day = self.days.get(order) if order else None
+        return (day or next(iter(self.days.values()), _NO_DAY)) + self.clock
+
+    def is_certain(self, order: DayOrder | None = None) -> bool:
+        """Return whether the day is known, with the order of the file's days."""
+        return order in self.days or len(set(self.days.values())) == 1
+
+
+@lru_cache(maxsize=1000)
+def stamp_of(text: str) -> Stamp | None:
+    """Return the clock time, the day, or both, that a text is; None for any other text."""
+    text = text.strip()
+    found = _STAMP.fullmatch(text)
+    if found is None or not text:
+        return _of_named_month(text) if _NAMED.search(text) else None
+    a, mark, b, c = (found[part] for part in ("a", "mark", "b", "c"))
+    days = {} if a is None else _days(a, mark, b, c)
+    clock = _clock(found) if found["h"] else timedelta()
+    if clock is None or (a is not None and not days):
         return None
-
-
-def names_zone(text: str) -> bool:
-    """Return whether a time says of which zone it is."""
-    found = _STAMP.fullmatch(text.strip())
-    return found is not None and found["zone"] is not None
-
-
-def in_zone(time: datetime, zone: tzinfo) -> datetime:
-    """Return the time in UTC of a clock in a zone, whose reading was taken for UTC.
-
-    Of the hour that comes twice at the end of summer time, the first.
-    """
-    return time.replace(tzinfo=zone).astimezone(UTC)
-
-
-def possible_times(text: str) -> tuple[PossibleTime, ...]:
-    """Return the times of a text whose day can be read in several orders.
-
-    Empty where its day is certain, or where it has none.
-    """
-    found = parsed(text)
-    if found is None or found[1] or found[0].year == 1:
-        return ()
-    each_way = [(order, parsed(text, order)) for order in _orders_of(text)]
-    return tuple(PossibleTime(order, each[0]) for order, each in each_way if each is not None)
-
-
-def order_of_choice(time: datetime, possible: Iterable[PossibleTime]) -> DayOrder | None:
-    """Return the only order in which a possible time has the day of `time`, else None."""
-    chosen = [each.order for each in possible if each.time.date() == time.date()]
-    return chosen[0] if len(chosen) == 1 else None
-
-
-def find_day_order(texts: Iterable[str]) -> DayOrder | None:
-    """Return the order that the days in these texts prove; None where none does, or they differ."""
-    proven = {_proven_order(text) for text in texts} - {None}
-    return proven.pop() if len(proven) == 1 else None
-
-
-def _proven_order(text: str) -> DayOrder | None:
-    """Return the only order in which a day in figures is one; None of all other texts."""
-    orders = _orders_of(text)
-    return orders[0] if len(orders) == 1 else None
-
-
-def _orders_of(text: str) -> tuple[DayOrder, ...]:
-    """Return the orders in which a text's day is one; empty where it is always written in one."""
-    found = _STAMP.fullmatch(text.strip())
-    if found is None or parsed(text) is None:
-        return ()
-    a, mark, b, c = _parts(found, "" if found["da"] is None else "d")
-    return () if a is None or mark == "." or len(a) == 4 else tuple(_days(a, mark, b, c))
+    is_ordered = a is not None and mark != "." and len(a) != 4
+    return Stamp(days, is_ordered, clock, found["zone"] is not None)
 
 
 def _days(a: str, mark: str, b: str, c: str) -> dict[DayOrder, datetime]:
@@ -145,59 +109,85 @@ def _days(a: str, mark: str, b: str, c: str) -> dict[DayOrder, datetime]:
     return days
 
 
-def _parts(found: re.Match[str], prefix: str) -> tuple[str, str, str, str]:
-    a, mark, b, c = (found[f"{prefix}{part}"] for part in ("a", "mark", "b", "c"))
-    return a, mark, b, c
-
-
-def _day(found: re.Match[str], prefix: str, order: DayOrder | None) -> tuple[datetime, bool]:
-    a, mark, b, c = _parts(found, prefix)
-    if a is None:
-        return _CLOCK_ONLY, False
-    days = _days(a, mark, b, c)  # AM and PM tell nothing: they do not stay in America
-    if not days:
-        raise ValueError("no such day")
-    if order in days:
-        return days[order], True
-    return next(iter(days.values())), len(set(days.values())) == 1
-
-
-def _clocked(day: datetime, found: re.Match[str]) -> datetime:
+def _clock(found: re.Match[str]) -> timedelta | None:
+    """Return the time since midnight in UTC; None where there is no such time."""
     hours, minutes = int(found["h"]), int(found["m"])
     seconds = float(re.sub("[,:]", ".", found["s"] or "0"))
-    if found["half"]:
+    if found["half"]:  # it tells nothing of the day: AM and PM do not stay in America
         hours = hours % 12 + 12 * found["half"].lower().startswith("p")
     if hours > 23 or minutes > 59 or seconds >= 61:
-        raise ValueError("no such time")
-    zone = found["zone"] or "Z"
-    offset = timedelta()
+        return None
+    zone, offset = found.groupdict().get("zone") or "Z", timedelta()
     if zone[0] in "+-":
-        size = timedelta(hours=int(zone[1:3]), minutes=int(zone[-2:]))
-        offset = size if zone[0] == "+" else -size
-    return day + timedelta(hours=hours, minutes=minutes, seconds=seconds) - offset
+        offset = timedelta(hours=int(zone[1:3]), minutes=int(zone[-2:])) * int(f"{zone[0]}1")
+    return timedelta(hours=hours, minutes=minutes, seconds=seconds) - offset
 
 
-def _named(text: str) -> tuple[datetime, bool] | None:
+def _of_named_month(text: str) -> Stamp | None:
     """Return a time whose month is a word, in English."""
-    if _MONTH.search(text) is None:
-        return None  # each form below is compiled anew for each text: strptime keeps five
-    half = text.upper().endswith(("AM", "PM"))
-    plain = re.sub(r"(\d)[.,]\d+( [AP]M)?$", r"\1\2", " ".join(text.split()))
+    found = re.search(_CLOCK, text)
+    clock = timedelta() if found is None else _clock(found)
+    if clock is None:
+        return None
+    day = text if found is None else text[: found.start()] + text[found.end() :]
     for form in _NAMED_DAYS:
-        form = f"{form} %p".replace("%H", "%I") if half else form
-        try:
-            return datetime.strptime(plain, form).replace(tzinfo=UTC), True
-        except ValueError:
-            continue
+        with suppress(ValueError):
+            of_day = datetime.strptime(" ".join(day.split()), form).replace(tzinfo=UTC)
+            return Stamp({"day first": of_day}, False, clock, False)
     return None
 
 
-def follow_days(texts: Sequence[str]) -> DayOrder | None:
-    """Return the order in which stamps that pass midnight follow each other; None where none do."""
-    first, last = (
-        {each.order: each.time for each in possible_times(text)} for text in (texts[0], texts[-1])
-    )
-    spans = {order: abs(last[order] - first[order]) for order in first.keys() & last.keys()}
+def is_stamp(text: str) -> bool:
+    """Return whether a text is a clock time, a day, or both."""
+    return stamp_of(text) is not None
+
+
+def names_zone(text: str) -> bool:
+    """Return whether a time says of which zone it is."""
+    found = stamp_of(text)
+    return found is not None and found.has_zone
+
+
+def in_zone(time: datetime, zone: tzinfo) -> datetime:
+    """Return the time in UTC of a clock in a zone, whose reading was taken for UTC.
+
+    Of the hour that comes twice at the end of summer time, the first.
+    """
+    return time.replace(tzinfo=zone).astimezone(UTC)
+
+
+def possible_times(text: str) -> tuple[PossibleTime, ...]:
+    """Return the times of a text whose day can be read in several orders.
+
+    Empty where its day is certain, or where it has none.
+    """
+    found = stamp_of(text)
+    if found is None or found.is_certain():
+        return ()
+    return tuple(PossibleTime(order, found.time(order)) for order in found.days)
+
+
+def order_of_choice(time: datetime, possible: Iterable[PossibleTime]) -> DayOrder | None:
+    """Return the only order in which a possible time has the day of `time`, else None."""
+    chosen = [each.order for each in possible if each.time.date() == time.date()]
+    return chosen[0] if len(chosen) == 1 else None
+
+
+def find_day_order(texts: Iterable[str]) -> DayOrder | None:
+    """Return the order that the days in these texts prove; None where none does, or they differ."""
+    ordered = [found for text in texts if (found := stamp_of(text)) and found.is_ordered]
+    proven = {next(iter(found.days)) for found in ordered if len(found.days) == 1}
+    return proven.pop() if len(proven) == 1 else None
+
+
+def follow_days(first: str, last: str) -> DayOrder | None:
+    """Return the order in which two stamps follow each other soonest; None where none does alone.
+
+    Rows that pass midnight lie a month apart in all other orders.
+    """
+    ends = stamp_of(first), stamp_of(last)
+    days = [end.days if end is not None and end.is_ordered else {} for end in ends]
+    spans = {order: abs(days[1][order] - days[0][order]) for order in days[0].keys() & days[1]}
     least = [order for order in spans if spans[order] == min(spans.values())]
     return least[0] if len(least) == 1 < len(spans) else None
 
@@ -214,23 +204,23 @@ def may_hold_days(path: Path, head_bytes: int = 20_000) -> bool:
     return bool(_DAY_IN_BYTES.search(head.replace(b"\0", b"")))
 
 
-def seconds_of_stamps(texts: Sequence[str], order: DayOrder | None = None) -> FloatArray | None:
-    """Return seconds since the first of the stamps, midnights passed; None where one is no stamp.
+def seconds_of_stamps(texts: Sequence[str], order: DayOrder | None = None) -> FloatArray:
+    """Return seconds since the first of the stamps, midnights passed; NaN where one is no stamp.
 
     Days that can be read in several orders are read in `order`.
     """
-    first = parsed(texts[0], order) if texts else None
-    if first is None:
-        return None
-    seconds, days = np.empty(len(texts)), 0.0
+    seconds, days = np.full(len(texts), np.nan), 0.0
+    first, before = None, -np.inf
     for place, text in enumerate(texts):
-        found = parsed(text, order)
+        found = stamp_of(text)
         if found is None:
-            return None
-        seconds[place] = (found[0] - first[0]).total_seconds() + days
-        if place and found[0].year == 1 and seconds[place] < seconds[place - 1] - _DAY_S / 2:
+            continue
+        first = first or found.time(order)
+        seconds[place] = (found.time(order) - first).total_seconds() + days
+        if not found.days and seconds[place] < before - _DAY_S / 2:
             days += _DAY_S
             seconds[place] += _DAY_S
+        before = seconds[place]
     return seconds
 
 
@@ -240,9 +230,9 @@ def moment(day: str, clock: str, order: DayOrder | None = None) -> datetime | No
     A day that can be read in several orders is read in `order`.
     """
     for text in (f"{day} {clock}".strip(), day, clock):
-        found = parsed(text, order) if text else None
-        if found is not None and found[1]:
-            return found[0] if found[0].year > 1 else None
+        found = stamp_of(text) if text else None
+        if found is not None and found.is_certain(order):
+            return found.time(order)
     return None
 
 

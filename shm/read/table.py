@@ -54,8 +54,7 @@ class Column:
 class Table:
     """A file as its format opens it: columns, and what it says of the whole in `entries`.
 
-    `layout` are the words by which files of one logger are known. `clock_rate_hz` is the rate by
-    times on whose even grid the columns are already, NaN without. `left_out` names what is no
+    `layout` are the words by which files of one logger are known. `left_out` names what is no
     column; `problems` are what should be mended, `remarks` what should be known. `record` names one
     of several records of a file, `day_order` is what its days prove of their order.
     """
@@ -64,7 +63,6 @@ class Table:
     columns: tuple[Column, ...]
     entries: Mapping[str, Entry] = field(default_factory=dict)
     layout: tuple[str, ...] = ()
-    clock_rate_hz: float = NAN
     left_out: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -147,8 +145,8 @@ def describe(table: Table, *, with_sidecars: bool = True) -> Description:
         header = with_sidecar(header, table.path, known)
     out = [column for column in found if header.leaves_out(column.name)]
     used = tuple(column for column in found if column not in out)
-    size = used[0].size if used else 0
-    fitting = [column for column in others if used and column.size == size]
+    size = next((column.size for column in used or table.choosable), 0)
+    fitting = [column for column in others if column.size == size]
     times = next((c for c in fitting if roles[c.name] == "times"), None)
     frequencies = next((c for c in fitting if roles[c.name] == "frequencies"), None)
     unit = _text(in_sidecar.get(times.name, {}), "unit") or times.unit if times else ""

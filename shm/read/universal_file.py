@@ -1,14 +1,16 @@
 """UFF: force and accelerations over time, or frequency responses, as data sets of type 58.
 
-Read in ASCII and binary (58b), written in ASCII. Places, planes and hanger stand in the sidecar;
-our own files also say them in id lines and nodes.
-
-Time histories of a UFF file and recordings, each made from the other.
+Read in ASCII and binary (58b), written in ASCII. Places and hanger stand in the sidecar. A file of
+ours, which its last id lines mark, has the names of its channels in the first ones, directions that
+are planes, and its frequency step with all digits.
 """
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable, Sequence
+from datetime import UTC
 from functools import cache, partial
 from itertools import count
 from pathlib import Path
@@ -17,15 +19,47 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput, UsageError
-from shm.read import universal_frf
 from shm.read.atomic import replace_file
 from shm.read.base import Format, PeekChannel, at_once
+from shm.read.header import Entry
 from shm.read.logger_heading import distinct_names
-from shm.read.logger_words import SI, unit_of
+from shm.read.logger_words import SI, accelerance_si, unit_of
 from shm.read.sidecar import write_sidecar
+from shm.read.stamps import moment
 from shm.read.table import Column, Table
-from shm.read.universal_sets import TIME_RESPONSE, Content, FunctionSet, load, recognises, save
-from shm.values import NAN, FloatArray, FrequencyResponse, Quantity, Recording
+from shm.read.universal_sets import (
+    COHERENCE,
+    FREQUENCY_RESPONSE,
+    TIME_RESPONSE,
+    Content,
+    FunctionSet,
+    load,
+    recognises,
+    save,
+)
+from shm.values import (
+    NAN,
+    Channel,
+    ComplexArray,
+    FloatArray,
+    FrequencyResponse,
+    Plane,
+    Quantity,
+    Recording,
+    ResponsePoint,
+)
+
+# UC-SDRL, Universal File Formats, data set 58, records 6 to 10, and 2411
+_QUANTITIES: dict[int, Quantity] = {9: "force", 12: "acceleration", 13: "force"}
+_CODES: dict[Quantity, int] = {"force": 13, "acceleration": 12}
+_TIME, _FREQUENCY, _EVEN, _DOUBLE = 17, 18, 1, 4
+_NODES = 2411
+# x runs along the hanger, so that y and z, 2 and 3, are the planes
+_DIRECTIONS: dict[Plane | None, int] = {"transverse": 2, "longitudinal": 3, None: 0}
+_MARK = "shm "
+_STEP = "frequency_step_hz"
+_SAME_STEP = 1e-4  # judgement: a step printed with six digits errs by 5e-6 at most
+Values = Callable[[FunctionSet], Any]
 
 
 def open_tables(path: Path) -> tuple[Table, ...]:
@@ -39,167 +73,100 @@ def open_tables(path: Path) -> tuple[Table, ...]:
     def values(found: FunctionSet) -> Any:
         return loaded()[content.functions.index(found)].data
 
-    if universal_frf.response_sets(content) and not _holds_histories(content):
-        return (universal_frf.table_in(content, values, path),)
-    return (_table(content, values, path),)
+    histories = [found for found in content.functions if found.function == TIME_RESPONSE]
+    # Time histories are what a file with responses is for, where they are force and response.
+    is_record = len({_quantity(found) for found in histories} - {None}) > 1
+    if not is_record and any(f.function == FREQUENCY_RESPONSE for f in content.functions):
+        return (_response_table(content, values, path),)
+    return (_record_table(histories, content, values, path),)
 
 
-def _holds_histories(content: Content) -> bool:
-    """Return whether time histories are what a file with responses is for: force and response."""
-    return len({quantity(found) for found in histories(content)} - {None}) > 1
+def _quantity(found: FunctionSet) -> Quantity | None:
+    """Return the quantity of a set by its unit, else by its type; None for any other."""
+    unit = unit_of(found.unit)
+    return unit.quantity if unit is not None else _QUANTITIES.get(found.quantity)
 
 
-def _table(content: Content, values: Callable[[FunctionSet], Any], path: Path) -> Table:
+def _sign(*directions: int) -> float:
+    """Return -1 where an odd number of directions is opposite to its axis, else 1."""
+    return float(np.prod([-1.0 if direction < 0 else 1.0 for direction in directions]))
+
+
+def _is_ours(found: FunctionSet) -> bool:
+    return any(line.startswith(_MARK) for line in found.lines)
+
+
+def _plane(found: FunctionSet, direction: int, path: Path) -> dict[str, Entry]:
+    planes = {number: plane for plane, number in _DIRECTIONS.items()} if _is_ours(found) else {}
+    return {"plane": Entry(planes.get(abs(direction)) or "", path)}
+
+
+def _facts(found: FunctionSet, path: Path) -> dict[str, Entry]:
+    """Return the time of the run, which the third id line gives."""
+    time = moment("", found.lines[2])
+    return {} if time is None else {"time": Entry(time.isoformat(), path)}
+
+
+# ---------------------------------------------------------------- time histories
+
+
+def _record_table(
+    histories: Sequence[FunctionSet], content: Content, values: Values, path: Path
+) -> Table:
     """Return all time histories; none, and why, of a file of modes alone."""
-    every = histories(content)
-    if not every and content.mode_count:
+    if not histories and content.mode_count:
         refusal = BadInput(
-            f"it holds {content.mode_count} modes at {len(content.nodes)} places that another"
+            f"it holds {content.mode_count} modes at {content.node_count} places that another"
             " program identified, no recording.",
             file=path,
             remedy="Give `shm import FILE`: it asks for the hanger and for the planes.",
         )
         return Table(path, (), layout=("UFF",), refusal=refusal)
     columns = tuple(
-        _column(name, found, content, partial(_signed, found, values), path)
-        for name, found in zip(_names(every, path), every, strict=True)
+        Column(
+            name,
+            found.points,
+            partial(_signed, found, values),
+            found.unit,
+            "other" if _quantity(found) is None else "channel",
+            {"unit": Entry(found.unit, path), **_plane(found, found.response[2], path)},
+            _facts(found, path),
+            1 / found.step if found.step > 0 else NAN,
+            label=_label(found),
+        )
+        for name, found in zip(_names(histories, path), histories, strict=True)
     )
-    sets = [c for c in columns if c.role == "channel"] or columns
-    named = (
-        f"{c.name} [{c.unit}]"
-        for c in columns
-        if (c.size, c.rate_hz) == (sets[0].size, sets[0].rate_hz)
-    )
-    left_out = tuple(_label(found) for found in content.functions if found not in every)
-    return Table(path, columns, layout=("UFF", *named), left_out=left_out)
-
-
-def _column(
-    name: str, found: FunctionSet, content: Content, load: Callable[[], FloatArray], path: Path
-) -> Column:
-    return Column(
-        name,
-        found.points,
-        load,
-        found.unit,
-        "other" if quantity(found) is None else "channel",
-        universal_frf.channel_entries(found, *found.response[1:], content, path),
-        universal_frf.entries(found, path),
-        1 / found.step if found.step > 0 else NAN,
-        label=_label(found),
-    )
+    usual = next((c for c in columns if c.role == "channel"), columns[0] if columns else None)
+    same = [c for c in columns if usual and (c.size, c.rate_hz) == (usual.size, usual.rate_hz)]
+    left_out = tuple(_label(found) for found in content.functions if found not in histories)
+    layout = ("UFF", *(f"{c.name} [{c.unit}]" for c in same))
+    return Table(path, columns, layout=layout, left_out=left_out)
 
 
 def _label(found: FunctionSet) -> str:
     return f"{found.title} ({found.label or 'of another kind'})"
 
 
-def _signed(found: FunctionSet, values: Callable[[FunctionSet], Any]) -> FloatArray:
-    signed = universal_frf.sign(found.response[2]) * np.real(np.asarray(values(found)))
+def _signed(found: FunctionSet, values: Values) -> FloatArray:
+    signed = _sign(found.response[2]) * np.real(np.asarray(values(found)))
     return np.asarray(signed, float)
 
 
-def _write(described: Recording | FrequencyResponse, path: Path) -> None:
-    if isinstance(described, Recording):
-        sets = sets_of(described)
-        channels = [
-            PeekChannel(c.name, c.quantity, SI[c.quantity], c.plane, c.x_m, NAN, c.full_scale)
-            for c in described.channels
-        ]
-        rate = described.sampling_rate_hz
-    else:
-        sets = universal_frf.sets_of(described)
-        channels = [PeekChannel(p.name, None, "", p.plane, p.x_m) for p in described.points]
-        rate = NAN
-    for found in sets:
-        if "data" in found and np.isnan(found["data"]).any():
-            raise UsageError(
-                f"UFF files cannot hold the gaps (NaN) of {found['id1']}.",
-                remedy="Write a .csv file.",
-            )
-    write_sidecar(described, channels, rate, path)
-    replace_file(path, lambda temporary: save(temporary, sets))
-
-
-FORMAT = Format(
-    "UFF",
-    (".uff", ".unv", ".uf"),
-    recognises,
-    at_once(open_tables),
-    write=_write,
-    may_be_gzipped=True,
-    library="pyuff",
-)
-
-
-# UC-SDRL, Universal File Formats, data set 58, records 7 to 10
-_QUANTITIES: dict[int, Quantity] = {9: "force", 12: "acceleration", 13: "force"}
-_CODES: dict[Quantity, int] = {"force": 13, "acceleration": 12}
-_TIME, _EVEN, _DOUBLE = 17, 1, 4
-
-
-def histories(content: Content) -> list[FunctionSet]:
-    """Return the sets over time, of any quantity."""
-    return [found for found in content.functions if found.function == TIME_RESPONSE]
-
-
-def quantity(found: FunctionSet) -> Quantity | None:
-    """Return the quantity of a set by its unit, else by its type; None for any other."""
-    unit = unit_of(found.unit)
-    return unit.quantity if unit is not None else _QUANTITIES.get(found.quantity)
-
-
-def sets_of(recording: Recording) -> list[dict[str, Any]]:
-    """Return the data sets of a recording for pyuff."""
-    places = [channel.x_m for channel in recording.channels]
-    nodes = universal_frf.number_nodes(places)
-    rate = recording.sampling_rate_hz
-    sets = universal_frf.node_set(places, nodes)
-    for channel, node in zip(recording.channels, nodes, strict=True):
-        lines = universal_frf.id_lines(recording, channel.name, {"sampling_rate_hz": rate})
-        sets.append(
-            {
-                **lines,
-                "type": 58,
-                "func_type": TIME_RESPONSE,
-                "rsp_ent_name": channel.name[:10],
-                "rsp_node": node,
-                "rsp_dir": universal_frf.direction(channel.plane),
-                "ref_node": 0,
-                "ref_dir": 0,
-                "ord_data_type": _DOUBLE,
-                "abscissa_spacing": _EVEN,
-                "abscissa_spec_data_type": _TIME,
-                "abscissa_axis_lab": "Time",
-                "abscissa_axis_units_lab": "s",
-                "ordinate_spec_data_type": _CODES[channel.quantity],
-                "ordinate_axis_lab": channel.quantity.title(),
-                "ordinate_axis_units_lab": SI[channel.quantity],
-                "orddenom_spec_data_type": 0,
-                "x": np.arange(len(channel.values)) / rate,
-                "data": channel.values.copy(),
-            }
-        )
-    return sets
-
-
-def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
+def _names(sets: Sequence[FunctionSet], path: Path) -> tuple[str, ...]:
     """Return the names of forces and accelerations, and the titles of all else."""
-    measured = [found for found in sets if quantity(found) is not None]
+    measured = [found for found in sets if _quantity(found) is not None]
     known = iter(_names_of_measured(measured, path))
-    return list(
-        distinct_names(
-            [
-                next(known) if quantity(found) is not None else found.lines[0] or found.label
-                for found in sets
-            ]
-        )
+    return distinct_names(
+        [
+            next(known) if _quantity(found) is not None else found.lines[0] or found.label
+            for found in sets
+        ]
     )
 
 
 def _names_of_measured(sets: Sequence[FunctionSet], path: Path) -> list[str]:
     """Return the names that we wrote; else force, acc_1, acc_2, ... in the order of the file."""
-    names = [found.lines[0] for found in sets if universal_frf.facts(found)]
+    names = [found.lines[0] for found in sets if _is_ours(found)]
     if len(names) == len(sets):
         _refuse_doubles(names, sets, path)
         return names
@@ -207,7 +174,7 @@ def _names_of_measured(sets: Sequence[FunctionSet], path: Path) -> list[str]:
     forces, accelerations = count(2), count(1)
     names = []
     for found in sets:
-        if quantity(found) == "acceleration":
+        if _quantity(found) == "acceleration":
             names.append(f"acc_{next(accelerations)}")
         else:
             names.append(f"force_{next(forces)}" if "force" in names else "force")
@@ -216,8 +183,8 @@ def _names_of_measured(sets: Sequence[FunctionSet], path: Path) -> list[str]:
 
 def _sensor(found: FunctionSet) -> tuple[object, ...]:
     """Return what identifies a sensor; loggers give one node to several accelerometers."""
-    title = "" if quantity(found) == "force" else found.lines[0]
-    return quantity(found), *found.response[1:], title
+    title = "" if _quantity(found) == "force" else found.lines[0]
+    return _quantity(found), *found.response[1:], title
 
 
 def _refuse_doubles(keys: Sequence[object], sets: Sequence[FunctionSet], path: Path) -> None:
@@ -230,3 +197,222 @@ def _refuse_doubles(keys: Sequence[object], sets: Sequence[FunctionSet], path: P
             file=path,
             remedy="Put each recording, with one or many hits, into a file of its own.",
         )
+
+
+# ---------------------------------------------------------------- frequency responses
+
+
+def _response_table(content: Content, values: Values, path: Path) -> Table:
+    """Return the accelerances of a file, roving sensor or roving hammer; raises BadInput."""
+    sets = [found for found in content.functions if found.function == FREQUENCY_RESPONSE]
+    n_responses, n_references = (
+        len({place[1:] for place in places})
+        for places in ([f.response for f in sets], [f.reference for f in sets])
+    )
+    if n_responses > 1 and n_references > 1:
+        raise BadInput(
+            f"{n_references} hammer points and {n_responses} sensors in one file.",
+            file=path,
+            remedy="Export the responses to one hammer point, or of one sensor, to one file.",
+        )
+    names = [f.lines[0] if _is_ours(f) else f"point_{n}" for n, f in enumerate(sets, start=1)]
+    if len(set(names)) < len(names):
+        raise BadInput(
+            "several frequency responses have one name.",
+            file=path,
+            remedy="Give each its own first id line.",
+        )
+    coherences = {
+        (found.response, found.reference): found
+        for found in content.functions
+        if found.function == COHERENCE and found.points == sets[0].points
+    }
+    columns = []
+    for name, found in zip(names, sets, strict=True):
+        load = partial(_accelerance, found, name, values, path)
+        direction = (found.reference if n_references > 1 else found.response)[2]
+        columns.append(
+            Column(name, found.points, load, "", "response", _plane(found, direction, path),
+                   _facts(found, path), label=found.title, is_complex=True)
+        )  # fmt: skip
+        share = coherences.get((found.response, found.reference))
+        if share is not None:
+            both, shares = f"{name}_coherence", partial(_real, share, values)
+            columns.append(Column(both, share.points, shares, role="coherence"))
+    listed = partial(_frequencies, sets, path)
+    columns.append(Column("frequency_hz", sets[0].points, listed, "Hz", "frequencies"))
+    return Table(path, tuple(columns), layout=tuple(names))
+
+
+def _real(found: FunctionSet, values: Values) -> FloatArray:
+    return np.real(np.asarray(values(found))).astype(float)
+
+
+def _frequencies(sets: Sequence[FunctionSet], path: Path) -> FloatArray:
+    """Return the frequencies of all lines, in Hz; raises BadInput where the sets differ."""
+    first = sets[0]
+    for found in sets:
+        if (found.points, found.first, found.step) != (first.points, first.first, first.step):
+            raise BadInput(
+                f"{found.title} has other frequencies than {first.title}.",
+                file=path,
+                remedy="Export all responses over the same lines.",
+            )
+    return first.first + _step(first) * np.arange(first.points, dtype=float)
+
+
+def _step(found: FunctionSet) -> float:
+    """Return the step in Hz, with all its digits where the file is ours."""
+    stated = re.search(rf"{_STEP}=(\S+)", found.lines[4])
+    try:
+        step = float(stated[1]) if stated is not None else NAN
+    except ValueError:
+        return found.step
+    return step if abs(step - found.step) < _SAME_STEP * found.step else found.step
+
+
+def _accelerance(found: FunctionSet, name: str, values: Values, path: Path) -> ComplexArray:
+    factor = accelerance_si(found.unit, found.denominator_unit)
+    if factor is None or (not found.unit and found.quantity != _CODES["acceleration"]):
+        raise BadInput(
+            f"{found.title} is {found.label or 'a response'} in {found.unit or 'no unit'} over"
+            f" {found.denominator_unit or 'no unit'}, not an acceleration over a force.",
+            file=path,
+            channel=name,
+            remedy="Export accelerances, in m/s2 or g over N, kN or lbf.",
+        )
+    direction = _sign(found.response[2], found.reference[2])
+    signed: ComplexArray = np.asarray(values(found), complex) * complex(factor * direction)
+    return signed
+
+
+# ---------------------------------------------------------------- writing
+
+
+def _write(described: Recording | FrequencyResponse, path: Path) -> None:
+    if isinstance(described, Recording):
+        sets = _sets_of_record(described)
+        channels = [
+            PeekChannel(c.name, c.quantity, SI[c.quantity], c.plane, c.x_m, NAN, c.full_scale)
+            for c in described.channels
+        ]
+        rate = described.sampling_rate_hz
+    else:
+        sets = _sets_of_response(described)
+        channels = [PeekChannel(p.name, None, "", p.plane, p.x_m) for p in described.points]
+        rate = NAN
+    for found in sets:
+        if "data" in found and np.isnan(found["data"]).any():
+            raise UsageError(
+                f"UFF files cannot hold the gaps (NaN) of {found['id1']}.",
+                remedy="Write a .csv file.",
+            )
+    write_sidecar(described, channels, rate, path)
+    replace_file(path, lambda temporary: save(temporary, sets))
+
+
+def _sets_of_record(recording: Recording) -> list[dict[str, Any]]:
+    times = np.arange(recording.samples) / recording.sampling_rate_hz
+    sets = _node_set(recording.channels)
+    for channel, common in zip(
+        recording.channels, _common(recording, recording.channels), strict=True
+    ):
+        measured = {
+            "func_type": TIME_RESPONSE,
+            "ord_data_type": _DOUBLE,
+            "abscissa_spec_data_type": _TIME,
+            "abscissa_axis_lab": "Time",
+            "abscissa_axis_units_lab": "s",
+            "ordinate_spec_data_type": _CODES[channel.quantity],
+            "ordinate_axis_lab": channel.quantity.title(),
+            "ordinate_axis_units_lab": SI[channel.quantity],
+            "orddenom_spec_data_type": 0,
+            "x": times,
+            "data": channel.values.copy(),
+        }
+        sets.append({**common, **measured})
+    return sets
+
+
+def _sets_of_response(response: FrequencyResponse) -> list[dict[str, Any]]:
+    sets = _node_set(response.points)
+    step = f" {_STEP}={float(response.frequency_hz[1] - response.frequency_hz[0])}"
+    for row, common in enumerate(_common(response, response.points, step)):
+        measured = {
+            **common,
+            "func_type": FREQUENCY_RESPONSE,
+            "abscissa_spec_data_type": _FREQUENCY,
+            "abscissa_axis_lab": "Frequency",
+            "abscissa_axis_units_lab": "Hz",
+            "ordinate_spec_data_type": _CODES["acceleration"],
+            "ordinate_axis_lab": "Acceleration",
+            "ordinate_axis_units_lab": SI["acceleration"],
+            "orddenom_spec_data_type": _CODES["force"],
+            "orddenom_axis_lab": "Force",
+            "orddenom_axis_units_lab": SI["force"],
+            "x": response.frequency_hz,
+        }
+        sets.append({**measured, "data": response.accelerance[row]})
+        if response.coherence is not None:
+            share = {"func_type": COHERENCE, "ordinate_axis_units_lab": "NONE"}
+            data = response.coherence[row].copy()
+            sets.append({**measured, **share, "ordinate_spec_data_type": 0, "data": data})
+    return sets
+
+
+def _common(
+    described: Recording | FrequencyResponse,
+    points: Sequence[Channel | ResponsePoint],
+    more: str = "",
+) -> list[dict[str, Any]]:
+    """Return what the sets of channels or points begin with."""
+    time = described.time
+    date = f"{time.astimezone(UTC):%d-%b-%y %H:%M:%S}" if time else "NONE"
+    return [
+        {
+            "type": 58,
+            "id1": point.name,
+            "id2": "hammer test of a hanger",
+            "id3": date,
+            "id4": "NONE",
+            "id5": f"{_MARK}format=1{more}",
+            "rsp_ent_name": point.name[:10],
+            "rsp_node": node,
+            "rsp_dir": _DIRECTIONS[point.plane],
+            "ref_node": 0,
+            "ref_dir": 0,
+            "abscissa_spacing": _EVEN,
+        }
+        for point, node in zip(points, _nodes(points), strict=True)
+    ]
+
+
+def _nodes(points: Sequence[Channel | ResponsePoint]) -> list[int]:
+    """Return a node number for each place, the same for equal places, from 1."""
+    numbers: dict[object, int] = {}
+    keys = [("unknown", i) if math.isnan(p.x_m) else p.x_m for i, p in enumerate(points)]
+    return [numbers.setdefault(key, len(numbers) + 1) for key in keys]
+
+
+def _node_set(points: Sequence[Channel | ResponsePoint]) -> list[dict[str, Any]]:
+    """Return the data set of nodes whose place is known; none where no place is."""
+    known = {
+        node: point.x_m
+        for point, node in zip(points, _nodes(points), strict=True)
+        if not math.isnan(point.x_m)
+    }
+    zeros = [0] * len(known)
+    nodes = {"type": _NODES, "node_nums": list(known), "x": list(known.values())}
+    others = ("def_cs", "disp_cs", "color", "y", "z")
+    return [{**nodes, **dict.fromkeys(others, zeros)}] if known else []
+
+
+FORMAT = Format(
+    "UFF",
+    (".uff", ".unv", ".uf"),
+    recognises,
+    at_once(open_tables),
+    write=_write,
+    may_be_gzipped=True,
+    library="pyuff",
+)

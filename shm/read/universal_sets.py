@@ -30,7 +30,6 @@ _EXPORT_AGAIN = "Export or send it again."
 _IEEE_754 = 2  # data set 58b, record 1
 _INCREMENT_DIGITS = 6  # of E13.5, data set 58, record 7
 _MOST_UNEVEN = 0.01  # judgement: of a step; a clock is far better, a lost sample far worse
-_LARGEST_NODE = 1e10  # ten digits, I10
 _LEAST_STEP, _LARGEST_STEP = 1e-9, 1e6  # judgement: s or Hz, beyond which no step is one
 
 
@@ -63,13 +62,10 @@ class FunctionSet:
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """The functions of a file and the places (x, y, z) of its nodes, in m.
-
-    `mode_count` counts modes that another program identified (`modal_sets`).
-    """
+    """The functions of a file; `mode_count` counts modes that another program identified."""
 
     functions: tuple[FunctionSet, ...]
-    nodes: dict[int, tuple[float, float, float]]
+    node_count: int = 0
     mode_count: int = 0
 
 
@@ -108,15 +104,15 @@ def save(path: Path, sets: Sequence[dict[str, Any]]) -> None:
 
 def _content(file: Any, path: Path, raw: bytes, headers_only: bool) -> Content:
     functions: list[FunctionSet] = []
-    nodes: dict[int, tuple[float, float, float]] = {}
+    nodes: set[float] = set()
     kinds = [int(kind) for kind in file.get_set_types()]
     for index, kind in enumerate(kinds):
         if kind == _FUNCTION:
             found = read_set(file, index, path, raw, headers_only)
             functions.append(_function(found, index + 1, path, raw))
         elif kind in NODES:
-            nodes.update(_nodes(read_set(file, index, path, raw, headers_only)))
-    return Content(tuple(functions), nodes, kinds.count(_MODES))
+            nodes.update(np.ravel(read_set(file, index, path, raw, headers_only)["node_nums"]))
+    return Content(tuple(functions), len(nodes), kinds.count(_MODES))
 
 
 def opened(plain: Path, path: Path) -> Any:
@@ -160,17 +156,6 @@ def _line_of_set(number: int, raw: bytes) -> int | None:
     if b"\x00" in raw or len(marks) < 2 * number - 1:
         return None
     return raw.count(b"\n", 0, marks[2 * (number - 1)]) + 1
-
-
-def _nodes(found: dict[str, Any]) -> dict[int, tuple[float, float, float]]:
-    keys = ("node_nums", "x", "y", "z")
-    columns = [np.asarray(found[key], dtype=float).ravel() for key in keys]
-    rows = zip(*columns, strict=False)
-    return {
-        int(node): (float(x), float(y), float(z))
-        for node, x, y, z in rows
-        if abs(node) < _LARGEST_NODE
-    }
 
 
 def _function(found: dict[str, Any], number: int, path: Path, raw: bytes) -> FunctionSet:

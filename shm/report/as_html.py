@@ -6,11 +6,12 @@ Readable on screen (light or dark), on paper, by ear.
 from __future__ import annotations
 
 import re
+from typing import Any
 
 from jinja2 import BaseLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from shm.report.paper import Paper
+from shm.report.paper import Paper, Table
 
 _COMMAND = re.compile(r"`([^`]+)`")
 _CODE = Markup("<code>{}</code>")
@@ -19,6 +20,12 @@ _CODE = Markup("<code>{}</code>")
 def as_html(paper: Paper) -> str:
     """Return the document; its figures are SVG elements whose colours follow the page's."""
     return ENVIRONMENT.get_template("paper.html.j2").render(paper=paper)
+
+
+def table_html(table: Table) -> str:
+    """Return one table by itself, as a notebook shows it."""
+    parts: Any = ENVIRONMENT.get_template("paper_parts.html.j2").module
+    return str(parts.render(table))
 
 
 def with_code(text: str) -> Markup:

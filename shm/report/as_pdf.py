@@ -115,7 +115,7 @@ def as_pdf(paper: Paper) -> bytes:
         _around(canvas, paper)
 
     document.addPageTemplates(PageTemplate("page", [frame], onPage=around))
-    document.build([*_flowables(paper), _counted()])
+    document.build(_flowables(paper))
     return buffer.getvalue()
 
 
@@ -142,7 +142,7 @@ def _around(canvas: Canvas, paper: Paper) -> None:
 
 
 def _counted() -> Flowable:
-    """Return the last flowable, which fills in the number of pages."""
+    """Return a flowable of the last page, which fills in the number of pages."""
 
     def fill_in(macro: Any) -> None:
         canvas: Canvas = macro.canv
@@ -189,7 +189,7 @@ def _flowables(paper: Paper) -> list[Flowable]:
         Paragraph(escape(paper.title) + (state if paper.status else ""), _TITLE),
         *body,
         *signature,
-        Paragraph(escape(paper.foot), _NOTE),
+        KeepTogether([_counted(), Paragraph(escape(paper.foot), _NOTE)]),
     ]
 
 

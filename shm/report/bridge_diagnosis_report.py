@@ -13,7 +13,8 @@ from shm.report.bar_table import bar_document, bars_table
 from shm.report.contents import BridgeDiagnosisSheet
 from shm.report.diagnosis_summary import write_lead
 from shm.report.diagnosis_wording import effect_phrase, tension_of
-from shm.report.figures.every_figure import bridge_diagnosis_figures
+from shm.report.figures.gap_causes import SHARED
+from shm.report.figures.specification import drawn
 from shm.report.paper import CREDIBLE, Paper, Section, Table, filled
 from shm.report.sizes import quantity, size
 from shm.values import BridgeDiagnosis, SharedCause, TensionEstimate, effect_label
@@ -45,7 +46,7 @@ def bridge_diagnosis_paper(sheet: BridgeDiagnosisSheet) -> Paper:
                 summary=_consequences(diagnosis),
                 tables=filled(bars_table(sheet.bars)),
             ),
-            Section("Who has it", figures=lambda: bridge_diagnosis_figures(diagnosis)),
+            Section("Who has it", figures=lambda: drawn((SHARED,), diagnosis)),
             Section(
                 "The answer in numbers",
                 tables=filled(_causes(diagnosis), _members(diagnosis), _tensions(diagnosis)),
@@ -155,7 +156,7 @@ def _causes(diagnosis: BridgeDiagnosis) -> Table:
     )
     return Table(
         "Causes in common, likeliest first",
-        ("cause", "probability", "alike", "log Bayes factor", "family (members)"),
+        ("cause", "probability", "group", "log Bayes factor", "family (members)"),
         (*rows, *((what, formatting.probability(share), "", "", "") for what, share in rest)),
         note=(
             "Against each hanger having causes of its own, in natural logarithms. Causes with the "

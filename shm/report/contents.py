@@ -80,6 +80,15 @@ def trend_row(
 
 
 @dataclass(frozen=True)
+class Deed:
+    """What a person did with the hanger, such as `baseline set`, and by whom and why."""
+
+    kind: str
+    at: datetime
+    why: str
+
+
+@dataclass(frozen=True)
 class TensionAtLevel:
     """The tension by the latest test at a level of its hits, in N, or why it is not known."""
 
@@ -106,7 +115,8 @@ class HangerReport:
     in it. `settings` are those that decide the numbers, each with its unit. `redescribed` says what
     of the hanger's description has changed since the baseline, where that moves results;
     `discarded` names the tests of the baseline that count no more. `inspections` are what people
-    wrote, the latest first. `at_level` is None where no reference level is set.
+    wrote, the latest first, `deeds` what they set and adopted. `at_level` is None where no
+    reference level is set.
     """
 
     bridge: str
@@ -135,6 +145,7 @@ class HangerReport:
     redescribed: tuple[str, ...] = ()
     discarded: tuple[str, ...] = ()
     inspections: tuple[Note, ...] = ()
+    deeds: tuple[Deed, ...] = ()
     at_level: TensionAtLevel | None = None
     letterhead: Letterhead = NO_LETTERHEAD
 

@@ -28,7 +28,8 @@ from shm.report.diagnosis_wording import (
     tension_of,
     tension_unit,
 )
-from shm.report.figures.every_figure import diagnosis_figures
+from shm.report.figures.every_figure import OF_DIAGNOSIS
+from shm.report.figures.specification import drawn
 from shm.report.formatting import Interval
 from shm.report.paper import (
     CREDIBLE,
@@ -93,7 +94,7 @@ def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] 
         details=write_details(sheet.diagnosis),
         facts=facts(sheet),
         remarks=sheet.diagnosis.remarks,
-        figures=lambda: diagnosis_figures(sheet),
+        figures=lambda: drawn(OF_DIAGNOSIS, sheet),
         tables=(*answers(sheet), *evidence(sheet)),
         status=outcome.value,
         style="watch" if verdict.is_uncertain or verdict.is_doubted else _STYLES[outcome],
@@ -156,7 +157,7 @@ def causes(sheet: DiagnosisSheet) -> Table:
         (
             "cause",
             "probability",
-            "alike",
+            "group",
             "log Bayes factor",
             "gain of fit",
             "Occam's factor",
@@ -305,7 +306,7 @@ def where(sheet: DiagnosisSheet) -> Table:
                 formatting.number(each.predicted_hz, ".3f"),
                 formatting.number(each.residual_percent, "+z.2f"),
                 formatting.number(each.z, "+z.1f"),
-                "set aside" if is_excluded(diagnosis, each) else _share(each.share),
+                "excluded" if is_excluded(diagnosis, each) else _share(each.share),
                 formatting.number(each.after_percent, "+z.2f", ""),
                 formatting.number(each.after_z, "+z.1f", ""),
             )
@@ -327,7 +328,7 @@ def trends(sheet: DiagnosisSheet) -> Table:
         for each in sheet.diagnosis.trends
     ]
     return Table(
-        "What the gap goes with",
+        "What the gap correlates with",
         ("condition", "change over its range, %", "90 % interval, %", "share of the misfit"),
         tuple(
             (

@@ -18,7 +18,10 @@ from shm.report.control_report import chart_document, control_table
 from shm.report.diagnosis_report import causes, diagnosis_json, diagnosis_part
 from shm.report.figures.bar_sketch import FIGURE as SKETCH
 from shm.report.figures.control_chart import FIGURE as CONTROL
-from shm.report.figures.every_figure import OF_HANGER_NAMES, hanger_figures
+from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
+from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
+from shm.report.figures.hanger_temperature import FIGURE as TEMPERATURE
+from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.specification import drawn
 from shm.report.formatting import Interval
 from shm.report.hanger_sentences import advice, further, summary, why
@@ -58,7 +61,7 @@ def hanger_paper(data: HangerReport) -> Paper:
             Section(
                 "Fit of the model",
                 paragraphs=[further(data)],
-                figures=lambda: hanger_figures(data, FIT),
+                figures=lambda: drawn((FREQUENCIES,), data),
                 tables=[tables.frequencies(data)],
             ),
             short_gap_part(data),
@@ -80,12 +83,11 @@ def _trend_part(data: HangerReport) -> Section:
     chart = data.now.control
     return Section(
         "Tension over time",
-        figures=lambda: (*drawn((CONTROL,), chart), *hanger_figures(data, TREND)),
+        figures=lambda: (*drawn((CONTROL,), chart), *drawn((TREND,), data)),
         tables=filled(
             *([control_table(chart)] if chart else []),
             tables.results(data),
             tables.period(data),
-            tables.temperatures(data),
             tables.neighbours(data),
         ),
     )
@@ -108,12 +110,13 @@ def _events_part(data: HangerReport) -> Section:
 def _appendices(data: HangerReport) -> tuple[Section, ...]:
     """Return what only the page and `--full` show: figures, numbers, the gap, settings."""
     return appendices(
-        Section("Figures", figures=lambda: hanger_figures(data, _further_figures(data))),
+        Section("Figures", figures=lambda: drawn((STIFFNESS, TEMPERATURE), data)),
         Section(
             "Numbers",
             tables=filled(
                 tables.parameters(data),
                 tables.models(data),
+                tables.temperatures(data),
                 tables.quality(data),
                 tables.history(data),
                 tables.alerts(data),
@@ -145,16 +148,6 @@ def short_gap_part(data: HangerReport) -> Section:
     if (sheet := diagnosed(data)) is None:
         return part
     return replace(part, details="", remarks=(), figures=tuple, tables=(causes(sheet),))
-
-
-def _further_figures(data: HangerReport) -> frozenset[str]:
-    """Return those without a histogram of a tension that the modes do not determine."""
-    return FURTHER if data.now.is_determined else FURTHER - {"tension"}
-
-
-TREND, FIT = frozenset({"trend"}), frozenset({"frequencies"})
-FURTHER = OF_HANGER_NAMES - TREND - FIT
-"""All that do not lead: a new figure is among them by itself."""
 
 
 def diagnosed(data: HangerReport) -> DiagnosisSheet | None:
@@ -262,7 +255,7 @@ def _since_baseline(data: HangerReport) -> Fact:
     if change is None and data.baseline_tension_n is not None:
         return ("Since the baseline", "not known", "the latest test does not show it")
     if change is None:
-        return ("Since the baseline", "first test", "nothing earlier to compare with")
+        return ("Since the baseline", "baseline only", "no later test to compare with")
     size = rounded_percent(change.mean, change.width / 2, "+")
     doubt = "" if data.now.is_found else "; no significant change"
     return ("Since the baseline", size, f"90 % interval{doubt}")

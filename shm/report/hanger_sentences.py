@@ -166,7 +166,7 @@ def _against_baseline(data: HangerReport) -> str:
     if data.now.control is not None:
         return ""
     if data.baseline is None or data.baseline_tension_n is None:
-        return "There is no earlier test to compare with: this one is the baseline."
+        return "No test was made since its baseline."
     if change is None:
         return "The change since the baseline is not known: its latest test does not show it."
     size = rounded_percent(change.mean, change.width / 2, "+")

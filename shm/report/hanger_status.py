@@ -63,11 +63,11 @@ _LEADS: dict[str, tuple[str, str]] = {
         f"{{again}} {WEEK}.",
     ),
     "first": (
-        "{name}: tension {tension} by its first test.",
+        "{name}: tension {tension}, and no test after its baseline.",
         f"Choose a warmer or colder day {NEXT_TEST}, so that the baseline covers temperature.",
     ),
     "first of sensors": (
-        "{name}: tension {tension} by its first test.",
+        "{name}: tension {tension}, and no test after its baseline.",
         "No action is needed: the next days will be warmer or colder.",
     ),
     "undetermined": (
@@ -119,7 +119,7 @@ class Status(Enum):
     CHECK = "Check"
     UNCLEAR = "Cannot judge"
     STEADY = "No change"
-    FIRST = "First test"
+    FIRST = "Baseline only"
 
 
 QUIET = (Status.STEADY, Status.FIRST)

@@ -390,7 +390,7 @@ def conditions(data: HangerReport) -> Table:
         "report made": f"{formatting.moment(data.generated_at)} by shm version {data.version}",
     }
     return Table(
-        "Where these numbers come from", ("what", "value"), tuple(facts.items()), may_break=True
+        "Where these numbers come from", ("what", "value"), tuple(facts.items()), is_folded=True
     )
 
 

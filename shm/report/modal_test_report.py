@@ -173,7 +173,7 @@ def _what_is_no_mode(sheet: ModalTestReport) -> str:
     if not found:
         return ""
     listed = formatting.listed([f"{each.kind} at {each.frequency_hz:.4g} Hz" for each in found])
-    return f"Set aside as no modes of the hanger: {listed}."
+    return f"Excluded, as they are no modes of the hanger: {listed}."
 
 
 def trust(sheet: ModalTestReport) -> str:
@@ -271,7 +271,7 @@ def quality(sheet: ModalTestReport) -> Table:
 
 def foreign_modes(sheet: ModalTestReport) -> Table:
     return Table(
-        "Set aside: not known as modes of the hanger",
+        "Excluded: not known as modes of the hanger",
         ("what", "frequency, Hz", "sd, Hz", "damping, %", "why"),
         tuple(
             (

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -251,6 +252,19 @@ class Ring:
         """Return when the last sample of each stream ended."""
         ends = {folder.folder.name: self._recent(folder) for folder in self._folders()}
         return {name: time_of(max(e for _, e in spans)) for name, spans in ends.items() if spans}
+
+    def last_arrivals(self) -> dict[str, datetime]:
+        """Return when something of each stream last came, whatever the time of its samples."""
+        found = {}
+        for folder in self._folders():
+            name = folder.folder.name
+            times = [self.state(name).arrived]
+            for each in folder.waiting():
+                with suppress(FileNotFoundError):  # it has been sealed
+                    times.append(each.arrived)
+            if known := [each for each in times if each is not None]:
+                found[name] = max(known)
+        return found
 
     def periods(self, stream: str, since: datetime) -> tuple[datetime, ...]:
         """The beginnings of the ten minutes from `since` on that have sealed samples."""

@@ -50,6 +50,7 @@ class StreamState:
     count, how many are kept apart, being of a time that was there before, which are the numbers of
     the first and the last chunk that belongs there, and when these begin and end. `steps` are
     when samples begin that were set aside because the clock was ahead, with by how many hours.
+    `arrived` is when the last of all came, in whatever order of their times they came.
     """
 
     last: PassedChunk | None = None
@@ -60,6 +61,7 @@ class StreamState:
     numbers: dict[str, tuple[int, int]] = field(default_factory=dict)
     spans: dict[str, tuple[datetime, datetime]] = field(default_factory=dict)
     steps: dict[str, int] = field(default_factory=dict)
+    arrived: datetime | None = None
 
     @property
     def step_times(self) -> tuple[datetime, ...]:
@@ -89,6 +91,8 @@ def notice(
     events: list[StreamEvent] = []
     late: list[PassedChunk] = []
     for chunk in chunks:
+        if state.arrived is None or chunk.arrived > state.arrived:
+            state = replace(state, arrived=chunk.arrived)
         due = _FILE_LATE if chunk.sequence >= BY_TIME else PERIOD + GRACE
         if chunk.arrived > chunk.end + due:
             late.append(chunk)

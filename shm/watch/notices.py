@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from datetime import timedelta
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from shm.values import (
     Alert,
     AlertKind,
     BoolArray,
+    Change,
     Drift,
     Hanger,
     Plane,
@@ -33,6 +35,7 @@ from shm.values import (
 from shm.values.drift import ENOUGH_FITS
 from shm.values.messages import WEEK
 from shm.values.rounding import force_unit, listed
+from shm.values.stream import StreamEvent
 from shm.watch.agreement import BY_A_LOAD
 from shm.watch.alert_text import (
     against_baseline_words,
@@ -249,3 +252,51 @@ def _words(mistaken: Sequence[RepeatedMistake]) -> tuple[str, str, str]:
         f"The watch leaves {them} out: another order or a machine's tone may be taken for {them}, "
         "or one end alone has loosened.",
     )
+
+
+# ---------------------------------------------------------------- events of a stream
+
+_HINTS = ("logger", "swapped", "saturated", "drifting", "dead", "lost modes", "clock step")
+"""Kinds of events that may be behind frequencies that move, the likeliest first."""
+_NEAR_A_CHANGE = timedelta(hours=3)
+"""Judgement: before a change and behind it: who exchanges a sensor works for an hour or two, and
+when a change began is known to about as much."""
+_LATELY = timedelta(hours=1)  # the hour of the alert itself
+
+
+def led_by(alert: Alert, events: Sequence[StreamEvent]) -> Alert:
+    """The alert, led by what was noticed at the time of its change, and by that its temperature is
+    not known; as it is where nothing was.
+    """
+    if alert.change is None:
+        return alert
+    words = " ".join(filter(None, (_near(alert.change, events), _unknown(alert, events))))
+    if not words:
+        return alert
+    hanger, _, rest = alert.message.partition(": ")
+    return replace(alert, message=f"{hanger}: {words} {rest[:1].upper()}{rest[1:]}")
+
+
+def _near(change: Change, events: Sequence[StreamEvent]) -> str:
+    first, last = change.began_after - _NEAR_A_CHANGE, change.began_by + _NEAR_A_CHANGE
+    near = [
+        event
+        for event in events
+        if event.kind in _HINTS and event.start <= last and event.end >= first
+    ]
+    if not near:
+        return ""
+    event = min(near, key=lambda each: _HINTS.index(each.kind))
+    reported = f"{event.channel}: {event.detail}" if event.channel else event.detail
+    whose = "the logger said" if event.kind == "logger" else f"event '{event.kind}':"
+    return (
+        f"check the sensors first, at {event.start:%Y-%m-%d %H:%M} {whose} {reported.rstrip('.')}."
+    )
+
+
+def _unknown(alert: Alert, events: Sequence[StreamEvent]) -> str:
+    reported = [e for e in events if e.kind == "thermometer" and e.end > alert.time - _LATELY]
+    if not reported:
+        return ""
+    why = reported[-1].detail.partition(": ")[0]
+    return f"the temperature is not known ({why}): part of this may be the weather's."

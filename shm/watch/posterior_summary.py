@@ -105,7 +105,7 @@ def summarize_change(
         sudden=_sudden(causes),
         began_after=began_after,
         began_by=began_by,
-        moved=_rank_causes(subject, causes),
+        moved=rank_causes(subject, causes),
         outlier_probability=outlier,
         material_probability=_material(subject, causes),
         against_baseline=against_baseline,
@@ -160,7 +160,7 @@ def _began(
     )
 
 
-def _rank_causes(subject: SummaryContext, evidence: Evidence) -> tuple[Moved, ...]:
+def rank_causes(subject: SummaryContext, evidence: Evidence) -> tuple[Moved, ...]:
     """Each quantity as one that changed, and each other cause, the likeliest first.
 
     A spring precedes the tension that is as likely: a part of its loss may be read as tension.

@@ -240,18 +240,23 @@ class StateSums:
         )
 
     def effects(self, state: WatchState) -> tuple[FloatArray, FloatArray]:
-        """Return what a change does to each plane's first frequency and mean, and to every mode.
-
-        Arrays (r, n + q) and (n, n + q).
-        """
+        """Return what a change does to what owners look at, and to every mode (`effects_of`)."""
         measured = np.isfinite(state.variances)
         count = np.maximum(measured.sum(axis=0), 1)[:, None]
         slopes = np.where(measured[:, :, None], state.slopes, 0.0).sum(axis=0) / count
-        of_modes = np.hstack([np.eye(self.structure.layout.n), slopes])
-        planes = np.array([plane for plane, _ in self.modes])
-        of_planes = [of_modes[planes == plane] for plane in dict.fromkeys(planes.tolist())]
-        rows = np.vstack([row for its in of_planes for row in (its[0], its.mean(axis=0))])
-        return rows, of_modes
+        return effects_of(self.modes, slopes)
+
+
+def effects_of(modes: Sequence[MeasuredMode], slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return what a change does to each plane's first frequency and mean, and to every mode.
+
+    Arrays (r, n + q) and (n, n + q), by `slopes` (n, q) of the modes.
+    """
+    of_modes = np.hstack([np.eye(len(modes)), slopes])
+    planes = np.array([plane for plane, _ in modes])
+    of_planes = [of_modes[planes == plane] for plane in dict.fromkeys(planes.tolist())]
+    rows = np.vstack([row for its in of_planes for row in (its[0], its.mean(axis=0))])
+    return rows, of_modes
 
 
 def _levels(log_amplitude: FloatArray) -> FloatArray:

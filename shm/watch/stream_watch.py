@@ -2,11 +2,10 @@
 
 Each reading becomes a shift of the tension and a contrast of the planes (`stream_reading`), which
 the filters explain by what the conditions do and by wander, or by a change (`stream_filter`). A
-change of one plane alone is of its ends or its sensors: its modes' levels take it up, the tension
-goes on by the other plane. A detected change is told apart by its pattern
-over the modes: a tension moves each by its sensitivity, springs the lower ones of a stiff bar more,
-a time base all alike, a sensor those of one plane. What is the measurement's is an event of the
-stream and rings nobody. All that the next reading needs is kept as bytes of a bounded size.
+change of one plane alone is of its ends: its modes' levels take it up, the tension goes on by the
+other plane. The cause of a detected change is found among those of hammer tests (`stream_causes`).
+What is the measurement's is an event of the stream and rings nobody. All that the next reading
+needs is kept as bytes of a bounded size.
 
 The first days are the baseline: nothing is told in them. Later, what is not learnt yet, such as
 the winter's temperatures in the first summer, is unknown to the filters, and makes them careful.
@@ -41,22 +40,12 @@ from shm.values import (
     WatchedTest,
 )
 from shm.values.rounding import NINETY_PERCENT
-from shm.values.stream import PERIODS, PooledReading, StreamEvent, StreamEventKind, WindowReading
+from shm.values.stream import PERIODS, PooledReading, StreamEvent, WindowReading
+from shm.watch.causes import TIMEBASE
 from shm.watch.kept_state import from_bytes, to_bytes
+from shm.watch.stream_causes import StreamCause, find_cause
 from shm.watch.stream_filter import CLIP, FAST, FEATURES, LEVEL, NOTHING, SLOW, Bank, Evidence
-from shm.watch.stream_reading import (
-    EXCHANGED,
-    MODEL_OFF,
-    SWAPPED,
-    TIME_BASE,
-    Cause,
-    ModeTable,
-    SeenReading,
-    cause_of,
-    exchanged,
-    planes_of,
-    usable,
-)
+from shm.watch.stream_reading import ModeTable, SeenReading, exchanged, planes_of, usable
 from shm.watch.stream_thermometer import Believed, Thermometer, believed
 from shm.watch.watching import AlertState, after
 
@@ -276,7 +265,19 @@ def with_ring(
 
 
 _VERSION = "stream-watch-1"
-_EVENTS: dict[str, StreamEventKind] = {TIME_BASE: "clock drift", SWAPPED: "swapped"}
+_MODEL_OFF = 0.2  # judgement: by what the part of bending in a sensitivity is known
+_EXCHANGED = (
+    "The modes of each plane lie where those of the other did: the planes are exchanged, "
+    "not the tension. Check the cables of the sensors."
+)
+_CLOCK = (
+    "All frequencies moved by one same fraction, {size}: the time base, not the tension. Check the "
+    "logger's clock and sampling rate."
+)
+_SENSORS = (
+    "Each mode moved by its own fraction: the sensors, not the tension. Check which sensors are "
+    "mounted, and where."
+)
 _HOURS_OF_A_FAULT = 8  # judgement: of which a mistaken mode spoils one or two
 
 
@@ -426,20 +427,16 @@ class StreamWatch:
         events: tuple[StreamEvent, ...] = ()
         if state.exchanged_hours == HOURS_EXCHANGED:
             began = end - timedelta(hours=HOURS_EXCHANGED)
-            events = (StreamEvent(reading.stream, "swapped", began, end, EXCHANGED),)
+            events = (StreamEvent(reading.stream, "swapped", began, end, _EXCHANGED),)
         moved: tuple[Moved, ...] = ()
-        if self._is_called(evidence):
-            cause = _cause_of(state, evidence)
-            since = int((state.ring_day >= evidence.by_day).sum())
+        if evidence.years > self._limit_years and evidence.material > 0.5:
+            by_mode, since = _move_of_modes(state, evidence)
+            cause = find_cause(by_mode, state.table, self.baseline, self.hanger)
             if cause.takes_hours and since < _HOURS_OF_A_FAULT:
                 evidence = NOTHING
             elif cause.is_measurement:
                 events += (_event(cause, state, evidence, reading, end),)
-                if cause.plane:
-                    state = _absorb_plane(state, cause, apart, None if is_apart else evidence)
-                else:
-                    state = _absorbed(state, cause)
-                evidence, unlike = NOTHING, 0.0
+                state, evidence, unlike = _absorb_fault(state, cause), NOTHING, 0.0
             elif cause.plane or is_apart:
                 before = _contrast(state)[0]
                 if cause.plane:
@@ -449,16 +446,11 @@ class StreamWatch:
                 state = replace(state, apart=state.apart.after(before, _contrast(state)[0]))
                 moved, unlike, is_apart = cause.moved, 0.0, True
             else:
-                evidence = _sized(evidence, cause, state)
-                moved = tuple(
-                    replace(each, shift_mean=evidence.shift, shift_sd=evidence.shift_sd)
-                    if each.quantity == TENSION
-                    else each
-                    for each in cause.moved
-                )
+                evidence = _sized(evidence, cause, state, since)
                 state, unlike = replace(state, bank=state.bank.changed(evidence)), 0.0
                 now = _shift(state)[0]
                 state = replace(state, called=state.called.after(now - evidence.shift, now))
+                moved = cause.moved
         test = self._watched_test(state, evidence, moved, is_apart, unlike, reading, end)
         reported, alert = after(state.told, test, self.hanger)
         # Technical: of changes that were told, so that what is kept stays bounded
@@ -481,9 +473,6 @@ class StreamWatch:
         shares = (1 - share) * of_tension.years, share * apart.years
         is_apart = shares[1] > shares[0]
         return replace(apart if is_apart else of_tension, years=sum(shares)), apart, is_apart
-
-    def _is_called(self, evidence: Evidence) -> bool:
-        return evidence.years > self._limit_years and evidence.material > 0.5
 
     @property
     def _limit_years(self) -> float:
@@ -591,49 +580,50 @@ def shift_of_reading(state: StreamState, seen: SeenReading) -> tuple[float, floa
 
 def fraction_of(log_shift: float, sd: float, table: ModeTable) -> tuple[float, float]:
     """A shift is off by what the sensitivities are: the share of bending is known to a fifth."""
-    off = MODEL_OFF * float(np.mean(0.5 - table.tension) / np.mean(table.tension))
+    off = _MODEL_OFF * float(np.mean(0.5 - table.tension) / np.mean(table.tension))
     return math.expm1(log_shift), math.hypot(sd, off * log_shift)
 
 
 # ---------------------------------------------------------------- what changed
 
 
-def _cause_of(state: StreamState, evidence: Evidence) -> Cause:
-    """By how the modes moved between before and after its beginning."""
+def _move_of_modes(state: StreamState, evidence: Evidence) -> tuple[FloatArray, int]:
+    """Return how the modes (n,) moved when a change began, NaN where that is not known.
+
+    And the number of readings since.
+    """
     later = state.ring_day >= evidence.by_day
     later[-1] = True
     earlier = state.ring_day <= evidence.after_day
     before = np.vstack([state.old, state.ring[earlier]])
     weight = np.append(OLD_READINGS, np.ones(earlier.sum()))[:, None] * np.isfinite(before)
-    count = np.isfinite(state.ring[later]).sum(axis=0)
-    known = (weight.sum(axis=0) > 0) & (count > 0)  # a mode that none of them has is unknown
+    moved = np.full(before.shape[1], np.nan)
+    known = (weight.sum(axis=0) > 0) & np.isfinite(state.ring[later]).any(axis=0)
     weight, before = weight[:, known], np.nan_to_num(before[:, known])
     first = np.sum(weight * before, axis=0) / weight.sum(axis=0)
-    last = np.nanmedian(state.ring[later][:, known], axis=0)  # one may be mistaken for a neighbour
-    moved = np.full(len(count), np.nan)
-    moved[known] = last - first
-    return cause_of(moved, state.table, count)
+    # One of them may be mistaken for a neighbour.
+    moved[known] = np.nanmedian(state.ring[later][:, known], axis=0) - first
+    return moved, int((state.ring_day >= evidence.by_day).sum())
 
 
-def _sized(evidence: Evidence, cause: Cause, state: StreamState) -> Evidence:
+def _sized(evidence: Evidence, cause: StreamCause, state: StreamState, since: int) -> Evidence:
     """A step of the tension by the readings' means before and after it: that no reading adds more
     to the evidence than it may makes the evidence's own size too small."""
     if cause.name != TENSION or evidence.kind:
         return evidence
-    later = max(int((state.ring_day >= evidence.by_day).sum()) / TOGETHER, 1.0)
-    its = cause.moved[0]
+    its, later = cause.moved[0], max(since / TOGETHER, 1.0)
     sd = math.hypot(its.shift_sd, state.bank.wander_sd / math.sqrt(later), state.unknown_sd)
-    return replace(evidence, shift=its.shift_mean, shift_sd=sd)
+    return replace(evidence, shift=math.log1p(its.shift_mean), shift_sd=sd)
 
 
 def _absorb_plane(
-    state: StreamState, cause: Cause, apart: Evidence, of_tension: Evidence | None
+    state: StreamState, cause: StreamCause, apart: Evidence, of_tension: Evidence | None
 ) -> StreamState:
     """With a change of one plane in its modes' levels: the tension goes on by the other plane.
 
     `of_tension` is what the filters of the tension took it for, if they did.
     """
-    table, its = state.table, planes_of(state.table.modes)[cause.plane]
+    table, its = state.table, planes_of(state.table.modes)[cause.plane or PLANES[0]]
     other = np.nan_to_num(np.nanmedian((cause.by_mode / table.tension)[~its]))
     moved = np.where(its, np.nan_to_num(cause.by_mode - other * table.tension), 0.0)
     size = float(np.median((moved / table.tension)[its & np.isfinite(cause.by_mode)]))
@@ -655,28 +645,32 @@ def _absorb_plane(
     )
 
 
-def _absorbed(state: StreamState, cause: Cause) -> StreamState:
+def _absorb_fault(state: StreamState, cause: StreamCause) -> StreamState:
     """With a fault of the measurement in the modes' levels: the tension goes on as it was."""
-    moved = np.nan_to_num(cause.by_mode)
-    table = replace(state.table, level=state.table.level + moved)
-    n = state.ring.shape[1]
+    level = state.table.level + np.nan_to_num(cause.by_mode)
     return replace(
         state,
-        table=table,
+        table=replace(state.table, level=level),
         bank=state.bank.without_beginnings(),
         contrast=state.contrast.without_beginnings(),
-        ring=np.zeros((0, n)),
+        ring=np.zeros((0, len(level))),
         ring_day=np.zeros(0),
     )
 
 
 def _event(
-    cause: Cause, state: StreamState, evidence: Evidence, reading: PooledReading, end: datetime
+    cause: StreamCause,
+    state: StreamState,
+    evidence: Evidence,
+    reading: PooledReading,
+    end: datetime,
 ) -> StreamEvent:
+    is_clock = cause.name == TIMEBASE
+    size = f"{100 * cause.by_mode[0]:+.2f} %"
     return StreamEvent(
         stream=reading.stream,
-        kind=_EVENTS.get(cause.name, "drifting"),
+        kind="clock drift" if is_clock else "drifting",
         start=_at(state, evidence.after_day),
         end=end,
-        detail=cause.words,
+        detail=_CLOCK.format(size=size) if is_clock else _SENSORS,
     )

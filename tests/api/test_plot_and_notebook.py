@@ -70,19 +70,6 @@ def test_every_figure_of_a_notebook_is_drawn_here() -> None:
     assert offered == set(UNITS)
 
 
-@pytest.mark.parametrize("name", UNITS)
-def test_a_figure_is_one_of_matplotlib_with_labels_on_white(
-    drawn: dict[str, Figure], name: str
-) -> None:
-    figure = drawn[name]
-    assert isinstance(figure, Figure)
-    labels = [axes.get_xlabel() for axes in figure.axes]
-    labels += [axes.get_ylabel().replace("\n", " ") for axes in figure.axes]
-    labels += [text.get_text() for text in (figure._supxlabel, figure._supylabel) if text]
-    assert UNITS[name] in labels
-    assert figure.get_facecolor() == (1.0, 1.0, 1.0, 1.0)
-
-
 def test_a_figure_without_its_data_says_so(
     hanger: shm.Hanger, posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
 ) -> None:

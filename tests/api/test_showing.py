@@ -54,7 +54,7 @@ def test_a_summary_is_in_the_words_of_the_report(
         assert not re.search(r"\bnan\b|None|\binf\b|<|[ ]$", text, re.MULTILINE)
     assert doubted.faults[0] in " ".join(doubted.summary().split())
     assert write_lead(diagnosis) in " ".join(diagnosis.summary().split())
-    assert len(test_of_711_kn.summary().splitlines()) == 2 + len(test_of_711_kn.modes)
+    assert len(test_of_711_kn.summary().splitlines()) == 3 + len(test_of_711_kn.modes)
 
 
 def test_tables_have_a_row_a_draw_a_mode_a_cause(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import shutil
 from collections.abc import Sequence
 from itertools import pairwise
@@ -15,6 +16,7 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
 from docs.filling import fill_in, write_csv
+from shm.documents import dump
 from shm.values import Outcome
 from tests.benchmarks.blind_scores import (
     CLAIMS,
@@ -27,6 +29,8 @@ from tests.benchmarks.blind_scores import (
 
 TRIALS = Path(__file__).resolve().parents[2] / "docs" / "trials"
 BESIDE, SEALED = "blind_trial/hangers.csv", "blind_trial/truth.json"
+ANSWERS = TRIALS / "blind_trial" / "answers.json.gz"
+"""The answers as documents, which `tests/report/test_verdict_agrees.py` reads."""
 RIGHT, WRONG, GREY = "#1b6ca8", "#c0392b", "#8a8a8a"
 PERCENT = -30, -10, -3, -1, 0, 1, 3, 10, 30, 100
 PROBABILITIES = 0.0, 0.5, 0.7, 0.8, 0.9, 1.0
@@ -187,11 +191,23 @@ def save_figures(rows: Sequence[Row], folder: Path) -> list[str]:
     return names
 
 
+def keep_answers(rows: Sequence[Row]) -> None:
+    """Keep the diagnoses, without the profiles of places, which nobody compares."""
+    answers = {}
+    for row in rows:
+        if (found := row.answer.get("diagnosis")) is not None:
+            name = f"{row.truth['hanger']}{', true cause left out' if row.is_without else ''}"
+            places = [{**each, "profile": []} for each in found["places"]]
+            answers[name] = {**found, "places": places}
+    ANSWERS.write_bytes(gzip.compress(dump(answers).encode(), mtime=0))
+
+
 def write_page(rows: Sequence[Row], trial: dict[str, object], truth: Path) -> None:
-    """Fill in the page of the trial, its figures, its table of hangers and the sealed file."""
+    """Fill in the page of the trial, its figures and its table; keep sealed file and answers."""
     reliability, confusion, intervals = save_figures(rows, TRIALS / "figures")
     write_csv(TRIALS / BESIDE, [HEAD, *(list_hanger(row) for row in rows)])
     shutil.copyfile(truth, TRIALS / SEALED)
+    keep_answers(rows)
     full = sum(not row.is_without for row in rows)
     sound = sum(row.is_sound for row in rows if not row.is_without)
     text = (

@@ -4,10 +4,10 @@ python tests/benchmarks/blind_trial.py build/blind_trial --hangers 36 --left-out
 python tests/benchmarks/blind_trial.py build/blind_trial --score                # what is there
 python tests/benchmarks/blind_trial.py build/blind_trial --score --write-docs   # the page, too
 
-A quarter of the hangers is sound: a third each of `tests/worlds/gapped_hangers.py`,
-`finite_elements.py` and `spectral.py`. The others are of the first world and have one of its twenty
-causes in turn, four of which the catalogue lacks; every eighth has two. None of these worlds shares
-equations, draws or nuisances with the product.
+A quarter of the hangers is sound: half each of `tests/worlds/gapped_hangers.py` and
+`finite_elements.py`. The others are of the first world and have one of its twenty causes in turn,
+four of which the catalogue lacks; every eighth has two. Neither world shares equations, draws or
+nuisances with the product.
 
 The truth is written with a salt before the first diagnosis, and its SHA-256 into `trial.json`. A
 process that diagnoses may not open it. When all answers are there, their SHA-256 is written, and
@@ -26,7 +26,7 @@ import secrets
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,11 +46,11 @@ from shm.diagnosis_document import diagnosis_document  # noqa: E402
 from shm.documents import dump  # noqa: E402
 from tests.benchmarks.blind_page import list_hanger, write_page  # noqa: E402
 from tests.benchmarks.blind_scores import Row, effects_of_class, score, table  # noqa: E402
-from tests.worlds import finite_elements, gapped_hangers, spectral  # noqa: E402
+from tests.worlds import finite_elements, gapped_hangers  # noqa: E402
 
 Truth = dict[str, Any]
 SCHEMA = "shm.blind_trial/2"
-GAPPED, ELEMENTS, SPECTRAL = "gapped hangers", "finite elements", "spectral"
+GAPPED, ELEMENTS = "gapped hangers", "finite elements"
 SOUND_FRACTION = 1 / 4
 PAIR_EVERY = 8
 COMPLETE, LEFT_OUT = "complete", "left_out"
@@ -70,7 +70,7 @@ def plan_hangers(count: int, seed: int) -> list[Plan]:
     """Return the plans, in an order that says nothing about the causes."""
     rng = np.random.default_rng([seed, 58])
     n_sound = round(count * SOUND_FRACTION)
-    worlds = (GAPPED, ELEMENTS, SPECTRAL)
+    worlds = (GAPPED, ELEMENTS)
     wanted: list[tuple[str, tuple[str, ...]]] = [
         (worlds[number % len(worlds)], ()) for number in range(n_sound)
     ]
@@ -94,26 +94,12 @@ def make_hanger(plan: Plan, seed: int, folder: Path) -> Truth:
         kept = ("tension_n", "kind", "causes", "inherent")
         truth = {key: case.truth[key] for key in kept}
     else:
-        world = finite_elements if plan.world == ELEMENTS else spectral
-        other = world.sound_hangers(seed, plan.index + 1)[plan.index]
+        other = finite_elements.sound_hangers(seed, plan.index + 1)[plan.index]
         other.write(folder)
         truth = {key: other.truth[key] for key in ("tension_n", "kind")}
-        truth |= {"causes": [], "inherent": find_warm_tension(other.truth)}
+        truth |= {"causes": [], "inherent": {}}
     accepted = sorted({name for each in truth["causes"] for name in each["accepted"]})
     return {"hanger": plan.name, "world": plan.world, "accepted": accepted, **truth}
-
-
-def find_warm_tension(truth: Mapping[str, Any]) -> Truth:
-    """Return by how many standard errors a sound hanger's tension is seen to follow temperature.
-
-    The tension of a spectral hanger does. As of a string: half of its change in each frequency.
-    """
-    tension_n = np.array(truth.get("test_tension_n", ()))
-    if len(tension_n) < 2:
-        return {}
-    change = (tension_n / tension_n.mean() - 1) / 2 / truth["frequency_sd"]
-    size = float(np.sqrt(sum(truth["modes"].values()) * np.sum(change**2)))
-    return {"temperature_tension": size} if size >= gapped_hangers.INHERENT else {}
 
 
 # ---------------------------------------------------------------- the seal

@@ -2,7 +2,7 @@
 
     python tests/benchmarks/every.py                     # what `make bench` runs: a day or two
     python tests/benchmarks/every.py --short             # small cases and no other tests: an hour
-    python tests/benchmarks/every.py --only evidence,golden --anew
+    python tests/benchmarks/every.py --only evidence,week --anew
 
 A benchmark is each file beside this one that can be run, but those that make environments of other
 packages (`make -C tests/benchmarks bench-peers`). What it prints is kept in `build/bench/NAME.txt`,
@@ -42,8 +42,8 @@ WHOLE = {
     "gap_dynamics": "--seed 300",
 }
 SHORT = {
-    "adopted_classes": "100", "alert_delivery": "--alerts 12 --kills 2",
-    "any_simulator": "--cases 2", "beam_frequencies": "--repeats 5 --checked 20",
+    "alert_delivery": "--alerts 12 --kills 2",
+    "any_simulator": "--cases 2",
     "blind_trial": "FOLDER --hangers 2 --left-out 1",
     "calibration": "--draws 20 --samples 300", "clock_faults": "1", "copies": "3",
     "damage": "--minutes 0.5", "dashboard": "--hangers 4 --tests 10 --rounds 1 --warm-only",
@@ -51,23 +51,22 @@ SHORT = {
     "evidence": "--seeds 2 --textbook-seeds 2", "full_disk": "--files 1 --every 40",
     "fuzz_readers": "--files 200 --flow 5 --processes 1", "gap_calibration": "--cases 1 --jobs 1",
     "gap_dynamics": "--cases 1 --seed 300", "gap_family": "--families 1 --sound 0 --hangers 2",
-    "gap_plan": "--cases 1",
-    "general_model": "--repeats 5", "identify_ablation": "--kinds softening --seeds 3:4",
+    "identify_ablation": "--kinds softening --seeds 3:4",
     "identify_limits": "--sound 2 --faulty 1", "identify_seconds": "--runs 1",
     "identify_simulated": "--tests 4", "identify_sound": "--seeds 0:2",
     "kill_daemon": "--kills 4 --files 6",
-    "kill_stream": "--kills 4", "kill_two_daemons": "--files 12",
+    "kill_two_daemons": "--files 12",
     "kill_workers": "--kills 4 --files 6",
     "load": "--queue 4 --hangers 2 --alerts 1 --models beam2 --kinds modes",
     "mutants": "--mutants 1", "power_cuts": "--files 1 --minutes 0.3",
-    "recordings_trial": "--kinds softening --seeds 0:1", "right_hanger": "--bridges 1",
+    "recordings_trial": "--kinds softening --seeds 0:1",
     "right_signals": "--tests 2", "sharp_evidence": "--cases 2", "solid_models": "--held-out 2",
-    "stream_load": "--hangers 2 --hours 0.2", "stream_oracle": "--hangers 1",
+    "stream_load": "--hangers 2 --hours 0.2",
     "stream_trial": "--hangers 1 --years 0.2", "stream_windows": "--seeds 1 --hours 0.3",
-    "tension_coverage": "--cases 2", "updating_from_known": "--cases 8", "upload": "20",
+    "tension_coverage": "--cases 2",
     "validate": "--table A.6",
     "watch_ablation": "--only everything --world network --scenarios step5 --bridges 1",
-    "watch_ambient": "--scenarios quiet --structures 1", "wrong_diameter": "--hangers 1",
+    "wrong_diameter": "--hangers 1",
     "watch_worlds": "--world tied_arch --scenarios quiet --bridges 1 --years 1 --jobs 1",
     "week": "--tests 24 --hangers 2 --every 6 --samples 200", "worlds": "--hangers 1",
 }  # fmt: skip
@@ -75,10 +74,8 @@ SHORT = {
 TESTS = {
     "test-slow": "The slow tests.",
     "test-trials": "The statistical trials among the tests.",
-    "numerics": "The quick numerics on this processor.",
-    "without-avx512": "The quick numerics as on a processor without AVX-512.",
-    "slow-without-avx512": "The slow numerics as on a processor without AVX-512.",
-    "slow-without-avx2": "The slow numerics as on a processor without AVX2.",
+    "without-avx512": "The numerics as on a processor without AVX-512.",
+    "without-avx2": "The numerics as on a processor without AVX2 and FMA.",
 }
 # One that hangs must not keep the others waiting. `kill_workers` gives up after four hours.
 LONGEST_S, LONGEST_SHORT_S = 8 * 3600, 90

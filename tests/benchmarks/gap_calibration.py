@@ -17,7 +17,7 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -40,7 +40,6 @@ from shm.gap.probabilities import (
     CALIBRATION,
     FILE,
     Calibration,
-    Provenance,
     Share,
     _allowances,
     _linear,
@@ -139,36 +138,36 @@ def shares(cases: Sequence[Ways]) -> list[float]:
     return [float(each) for each in found]
 
 
-def calibrated(lessons: Sequence[Lesson], about: Provenance) -> Calibration:
-    """Return the values that lessons teach; others as they are."""
+def calibrated(lessons: Sequence[Lesson]) -> tuple[Calibration, str]:
+    """Return the values that lessons teach, others as they are, and how many answers they had."""
     mimics = [each.mimics for each in lessons if each.mimics is not None]
     own = [each.own for each in lessons if each.own]
     mimicking = [each.mimicking for each in lessons if each.mimicking]
     answers = f"{len(mimics)} without the true effect; laws of {len(own)} and {len(mimicking)}"
-    new = replace(CALIBRATION, provenance=replace(about, answers=answers))
+    new = CALIBRATION
     if len(mimics) >= FEWEST:
         one, two = (mimics.count(n) / len(mimics) for n in (1, 2))
         new = replace(new, mimics_one=one, mimics_two=two)
     if min(len(own), len(mimicking)) >= FEWEST:
         exact, *off = map(Share, shares(own), shares(mimicking))
         new = replace(new, exact=exact, off_by=dict(zip(CALIBRATION.off_by, off, strict=True)))
-    return new
+    return new, answers
 
 
-def text(told: Calibration) -> str:
-    """Return the data file: that of today with other values."""
-    about, values = told.provenance, FILE.read_text(encoding="utf-8").partition("[provenance]")
+def text(told: Calibration, about: Mapping[str, object]) -> str:
+    """Return the data file: that of today with other values, and `about` their trial."""
+    values = FILE.read_text(encoding="utf-8").partition("[provenance]")
     of_laws = "\n".join(
         f"    {{ fraction = {f:g}, own = {each.own:.4g}, unknown = {each.unknown:.4g} }},"
         for f, each in told.off_by.items()
     )
     return f"""{values[0]}[provenance]
-trial = "{about.trial}"
-seeds = "{about.seeds}"
-cases = "{about.cases}"
-answers = "{about.answers}"
-date = {about.date}
-command = "{about.command}"
+trial = "{about["trial"]}"
+seeds = "{about["seeds"]}"
+cases = "{about["cases"]}"
+answers = "{about["answers"]}"
+date = {about["date"]}
+command = "{about["command"]}"
 
 # Of effects that were left out of the catalogue, this share does to the data about what another
 # effect does, or two together; the rest resembles nothing in the catalogue.
@@ -216,8 +215,16 @@ def main() -> int:
         "--write"
     )
     today = datetime.now(UTC).date()
-    about = Provenance("simulated hangers", str(given.seed), str(given.cases), "", today, command)
-    told = text(calibrated(lessons, about))
+    found, answers = calibrated(lessons)
+    about = {
+        "trial": "simulated hangers",
+        "seeds": given.seed,
+        "cases": given.cases,
+        "answers": answers,
+        "date": today,
+        "command": command,
+    }
+    told = text(found, about)
     print(told)
     if given.write:
         FILE.write_text(told, encoding="utf-8")

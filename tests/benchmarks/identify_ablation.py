@@ -19,7 +19,7 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -48,13 +48,12 @@ from shm.identify.estimation import (  # noqa: E402
     amplitude_dependence,
     courses,
     postprocess,
-    stabilise,
+    ssi,
 )
 from shm.identify.measuring import screening  # noqa: E402
 from shm.identify.mode_ordering import placement  # noqa: E402
-from shm.values import PLANES, Hanger, Recording  # noqa: E402
+from shm.values import Hanger, Recording  # noqa: E402
 from tests.helpers.struck import STRUCK, recordings  # noqa: E402
-from tests.identify.signals import Planted, recording  # noqa: E402
 from tests.worlds import recordings as world  # noqa: E402
 from tests.worlds import struck_bar  # noqa: E402
 
@@ -133,15 +132,11 @@ def without_constants(cases: Iterator[world.Recording]) -> None:
 
 @dataclass
 class Test:
-    """Records of one test and its modes to be found: plane, order and Hz as the file shows them.
-
-    `axes_deg` is by how much the hanger's planes are turned from the sensors' axes, where known.
-    """
+    """Records of one test and its modes to be found: plane, order and Hz as the file shows them."""
 
     records: list[Recording]
     hanger: Hanger | None
     truths: list[tuple[str, int, float]]
-    axes_deg: float = float("nan")
 
 
 def of_world(*kinds: str) -> Callable[[int], Iterator[Test]]:
@@ -198,35 +193,12 @@ def guided(seed: int) -> Iterator[Test]:
     yield Test(recordings(records, crew), STRUCK, truths)
 
 
-def turned(seed: int) -> Iterator[Test]:
-    """Draw a hanger whose axes are not the sensors', hit along either in turn."""
-    rng = np.random.default_rng(seed)
-    angle, hit, apart = rng.uniform(1, 40), rng.uniform(0, 90), rng.uniform(0.2, 3) * 0.002
-    bars = [(hz * (1 + apart * across), across) for hz in HZ for across in (0, 1)]
-    records = []
-    for number, plane in enumerate(PLANES):
-        modes = []
-        for hz, across in bars:
-            along = np.radians(angle + 90 * across)
-            drive = float(np.cos(along - np.radians(hit + 90 * number)))
-            modes.append(Planted(hz, 0.001, (float(np.cos(along)), float(np.sin(along))), drive))
-        made = recording(modes, hits=3, seconds=6.0, rate_hz=256.0, noise=0.003, seed=seed)
-        force = replace(made.channels[0], plane=plane, x_m=1.0)
-        records.append(replace(made, channels=(force, *made.channels[1:])))
-    orders = {hz: 1 + n // 2 for n, (hz, _) in enumerate(bars)}
-    yield Test(records, None, [(PLANES[across], orders[hz], hz) for hz, across in bars], angle)
-
-
-HZ = (6.0, 13.5, 23.0)
 Draw = Callable[[int], Iterator[Test]]
 STEPS: Mapping[str, tuple[tuple[tuple[Any, str, Any], ...], Draw]] = {
-    "close pairs": (((stabilise, "told_apart", lambda one, again, *_: (one, again)),), simulated()),
-    "hits of both directions": (((identification, "alike", lambda _: False),), turned),
-    "calm part": (((identification, "_once_calm", lambda *_: None),), guided),
-    "closer look through the band": (
-        ((identification, "_closer", lambda *_: None),),
-        of_world("low_signal", "short_record", "one_axis", "close_planes"),
+    "close pairs": (
+        ((ssi, "split_close_pairs", lambda one, again, *_: (one, again)),), simulated(),
     ),
+    "calm part": (((identification, "_once_calm", lambda *_: None),), guided),
     "closer look at gaps": (
         ((placement, "_in_gaps", lambda *_: []),), of_world("plain", "close_planes", "low_signal"),
     ),
@@ -234,7 +206,7 @@ STEPS: Mapping[str, tuple[tuple[tuple[Any, str, Any], ...], Draw]] = {
         ((placement, "without_tones", lambda found, *_, **__: (list(found), [])),),
         of_world("hum_at_mode"),
     ),
-    "tones as modes, machines": (
+    "tones as modes of machines": (
         ((placement, "without_tones", lambda found, *_, **__: (list(found), [])),),
         simulated("mains", "machine"),
     ),
@@ -242,14 +214,14 @@ STEPS: Mapping[str, tuple[tuple[tuple[Any, str, Any], ...], Draw]] = {
         ((identification, "without_sidebands", lambda found: found),), of_world("sidebands"),
     ),
     "hits unlike the others": (
-        ((screening, "_with_outliers", lambda _, reasons, *__: list(reasons)),),
+        ((screening, "outliers", lambda apart: np.zeros(len(apart), dtype=bool)),),
         simulated("outlier_hit"),
     ),
     "disturbed ring-downs": (
         ((screening, "until_disturbed", lambda _, downs, faults, *__: (downs, faults)),),
         simulated("double_hit", "cable", "drop_out"),
     ),
-    "delays of channels": (((stabilise, "delays_s", lambda *_: None),), of_world("plain")),
+    "delays of channels": (((ssi, "delays_s", lambda *_: None),), of_world("plain")),
 }  # fmt: skip
 """What is put in place of each step, and the records that it was made for."""
 
@@ -279,9 +251,7 @@ def _scored(test: Test) -> dict[str, Any]:
     except ShmError:
         return {"expected": len(test.truths), "refused": 1}
     modes = list(made.test.modes)
-    found, turned_deg = 0, 0.0
-    if np.isfinite(test.axes_deg):
-        turned_deg = sum(abs(_angle_deg(mode) - test.axes_deg) for mode in modes)
+    found = 0
     for plane, order, hz in test.truths:
         own = [m for m in modes if (m.plane, m.order) == (plane, order) and _near(m, hz)]
         found += bool(own)
@@ -289,14 +259,7 @@ def _scored(test: Test) -> dict[str, Any]:
     wrong = sum(any(_near(mode, hz) for *_, hz in test.truths) for mode in modes)
     spent = round(100 * (time.process_time() - began))
     return {"expected": len(test.truths), "found": found, "wrong": wrong,
-            "false": len(modes) - wrong, "turned_deg": round(turned_deg, 1),
-            "centiseconds": spent}  # fmt: skip
-
-
-def _angle_deg(mode: Any) -> float:
-    """Return by how much the shape at the first place is turned from its plane."""
-    sign = 1 if mode.plane == PLANES[0] else -1
-    return float(np.degrees(np.arctan(sign * mode.shape[0].cross / mode.shape[0].value)))
+            "false": len(modes) - wrong, "centiseconds": spent}  # fmt: skip
 
 
 def _near(mode: Any, hz: float) -> bool:

@@ -78,7 +78,7 @@ class Watch:
         known = apart[np.isfinite(apart)]
         if len(known) >= screening.FEWEST_TO_COMPARE:
             self.seen["hit unlike the others"] += known.tolist()
-            beyond = known[known > screening.LIMIT]
+            beyond = known[known > signal_faults.MOST_UNLIKE]
             self.seen["the same over its median"] += (beyond / np.median(known)).tolist()
 
     def _wandering(self, free: Sequence[Any], _known: Any, rate_hz: float) -> None:
@@ -135,7 +135,7 @@ class Watch:
 
 # Quantity, its limit, whether sound tests lie above it, and the faults it is there for.
 LIMITS = (
-    ("hit unlike the others", screening.LIMIT, False, ("outlier_hit",)),
+    ("hit unlike the others", signal_faults.MOST_UNLIKE, False, ("outlier_hit",)),
     ("the same over its median", screening._TIMES_OTHERS, False, ("outlier_hit",)),
     ("offset over ringing", signal_faults._OFFSET_MOVES, False, ()),
     ("channel over the median one", signal_faults._SILENT_SHARE, True, ()),

@@ -49,10 +49,6 @@ ENVIRONMENTS = {
     "dynesty_walks": "nested",
     "ultranest": "nested",
     "nautilus": "nested",
-    "pocomc": "pocomc",
-    "pymc": "pymc",
-    "uqpy": "uqpy",
-    "blackjax": "blackjax",
     "emcee": "nested",
 }
 """Environment of each sampler; ours runs in the one that runs this command."""

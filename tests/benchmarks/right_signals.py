@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from shm.identify.plausibility import apparent_mass_kg, ringing, signal_doubts
 from shm.simulate.state import HammerPlan, HangerState
 from shm.values import Hanger, Recording
-from tests.benchmarks.right_hanger import interval
+from tests.benchmarks.worlds import share
 from tests.worlds.simulated.hammer import hammer_test
 
 DISTURBED = (["double_hit"], ["soft_hit"], ["mains"], ["deck"], [], [])
@@ -96,7 +96,7 @@ def main() -> None:
         for name, case in cases.items():
             found[name].append(bool(signal_doubts([case], hanger)))
     for name, doubts in found.items():
-        print(f"{name:38s} doubted {interval(sum(doubts), len(doubts))}")
+        print(f"{name:38s} doubted {share(sum(doubts), len(doubts))}")
     print(f"J/v over the hanger's mass: {min(masses):.2f} to {max(masses):.2f}")
     print(f"accelerometers ring at least {min(apart):.1f} times as much as the force")
 

@@ -146,7 +146,7 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
         hanger = hanger_of(described.description, number)
         first = tests[:baseline_tests]
         check = check_baseline(first, build("beam2", hanger))
-        posterior = baseline_of(check.kept_of(first), hanger)
+        posterior = baseline_of(check.accepted_tests(first), hanger)
         posterior = replace(posterior, baseline_check=check)
         dated = [(test, test.time) for test in tests]
         started = time.process_time()

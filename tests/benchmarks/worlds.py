@@ -1,8 +1,7 @@
 """Absolute intervals on truth that the product's authors did not write (`tests/worlds`).
 
 python tests/benchmarks/worlds.py                           # 20 hangers of each world: a look
-python tests/benchmarks/worlds.py --worlds finite_elements spectral --hangers 250 --seed 21
-python tests/benchmarks/worlds.py --diagnoses 40 --seeds 5  # two planes, baseline beam2
+python tests/benchmarks/worlds.py --worlds finite_elements --hangers 250 --seed 21
 python tests/benchmarks/worlds.py --worlds eight_kinds --hangers 40  # five hangers of each kind
 python tests/benchmarks/worlds.py --worlds eight_kinds --hangers 40 --new-keys  # ends, inclination
 
@@ -38,13 +37,11 @@ sys.path.insert(0, str(ROOT))
 
 import shm  # noqa: E402
 from docs.filling import fill_in  # noqa: E402
-from shm.gap import GapOptions, diagnose  # noqa: E402
-from shm.inference import UpdateOptions, select, update  # noqa: E402
+from shm.inference import UpdateOptions, select  # noqa: E402
 from shm.models import applicable, build  # noqa: E402
 
 WORLDS = {
     "finite_elements": "finite elements",
-    "spectral": "spectral",
     "eight_kinds": "eight kinds",
 }
 GROUPS = (
@@ -90,47 +87,6 @@ def selected(task: tuple[str, int, int, int, bool]) -> dict[str, Any]:
     }
 
 
-def against_reference(task: tuple[str, int, int, int, bool]) -> float:
-    """Width of the averaged interval over that of the true structure alone, 8000 draws."""
-    world, seed, count, index, new_keys = task
-    case = importlib.import_module(f"tests.worlds.{world}").sound_hangers(seed, count)[index]
-    hanger, tests = hanger_and_tests(case, new_keys)
-    names, _ = applicable(hanger, BEAMS)
-    averaged = select(tests, [build(n, hanger) for n in names], UpdateOptions()).averaged
-    truly = update(tests, build("beam3", hanger), UpdateOptions(samples=8000, seed=2))
-    low, high = np.quantile(truly.tension_n, [0.05, 0.95])
-    return float((averaged.tension_n.q95 - averaged.tension_n.q05) / (high - low))
-
-
-def diagnosed(task: tuple[int, int, int, int]) -> dict[str, Any]:
-    """One two-plane diagnosis with baseline beam2, by one seed of the sampler."""
-    seed, count, index, own = task
-    module = importlib.import_module("tests.worlds.finite_elements")
-    case = module.hangers_with_a_cause(seed, count)[index]
-    hanger, tests = hanger_and_tests(case)
-    started = time.process_time()
-    found = diagnose(tests, hanger, GapOptions(baseline="beam2", seed=own))
-    seconds, after = time.process_time() - started, found.tension_after_n
-    truth, leading = float(case.truth["tension_n"]), found.leading
-    sure = leading is not None and found.claim(leading) > 0.9
-    named = {leading.effect} if leading else set()
-    if leading is not None and leading.group is not None:
-        named |= set(found.groups[leading.group])
-    right = any(case.truth["cause"] in name.split(" + ") for name in named)
-    return {
-        "index": index,
-        "cause": case.truth["cause"],
-        "leads": leading.effect if leading else found.leads,
-        "covered": bool(after.q025 <= truth <= after.q975),
-        "mean": after.mean / truth,
-        "half_width": (after.q975 - after.q025) / 2 / truth,
-        "log_evidence": [c.log_bayes_factor for c in found.causes[:1]],
-        "largest_occam": max((c.log_occam for c in found.causes), default=0.0),
-        "confident_wrong": bool(sure and not (case.truth["cause"] and right)),
-        "seconds": seconds,
-    }
-
-
 def share(hits: int, count: int) -> str:
     """A share with its 90 % interval (Clopper and Pearson)."""
     if not count:
@@ -166,38 +122,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hangers", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--references", type=int, default=0)
-    parser.add_argument("--diagnoses", type=int, default=0)
-    parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--worlds", nargs="+", choices=WORLDS, default=list(WORLDS))
     parser.add_argument("--new-keys", action="store_true", help="describe ends and inclination")
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--write-docs", action="store_true")
     asked = parser.parse_args()
     with ProcessPoolExecutor(2) as pool:
-        if asked.diagnoses:
-            tasks = [
-                (asked.seed, asked.diagnoses, index, own)
-                for index in range(asked.diagnoses)
-                for own in range(1, asked.seeds + 1)
-            ]
-            rows = []
-            for row in pool.map(diagnosed, tasks):
-                rows.append(row)
-                print(json.dumps(row), flush=True)
-            hits, wrong = sum(r["covered"] for r in rows), sum(r["confident_wrong"] for r in rows)
-            print(f"tension's 95 % interval covers {share(hits, len(rows))}")
-            print(f"confident wrong cause {share(wrong, len(rows))}")
-            print(f"largest log Occam factor {max(r['largest_occam'] for r in rows):.2f}")
-            print(f"processor time {np.median([r['seconds'] for r in rows]):.1f} s in the median")
-            return
         chosen = [
             (w, asked.seed, asked.hangers, index, asked.new_keys)
             for w in asked.worlds
             for index in range(asked.hangers)
         ]
         rows = list(pool.map(selected, chosen))
-        ratios = list(pool.map(against_reference, chosen[: asked.references]))
     text = table(rows)
     seconds = [r["seconds"] for r in rows]
     text += (
@@ -206,8 +142,6 @@ def main() -> None:
         f"draws {min(r['fewest_effective'] for r in rows):.0f}; log Occam factors at most "
         f"{max(r['largest_occam'] for r in rows):.1f}."
     )
-    if ratios:
-        text += f" Width over that of the true class alone: {np.median(ratios):.2f} in the median."
     print(text)
     if asked.keep:
         asked.keep.write_text(json.dumps(rows))

@@ -90,13 +90,6 @@ def test_what_cannot_be_done_is_said_with_its_exit_code(
     assert ended.out == ""
 
 
-def test_an_alert_is_acknowledged_once(shm: Shm, workspace: Path) -> None:
-    shm("--workspace", workspace, *ACK, "--who", "Jansen")
-    ended = shm("--workspace", workspace, *ACK)
-    assert ended.code == 2
-    assert "acknowledged by Jansen" in ended.err
-
-
 def test_a_hanger_is_compared_anew_from_a_day_on(shm: Shm, workspace: Path) -> None:
     ended = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30")
     assert ended.code == 0, ended.err
@@ -151,17 +144,6 @@ def test_works_that_no_test_shows_end_no_alert(
     assert baseline.since is None, "the former baseline stays"
 
 
-def test_another_event_first_repairs_no_loss_either(shm: Shm, workspace: Path) -> None:
-    """The baseline of that event holds the loss; the alert is of the one before."""
-    order = (*ANEW, "--since", "2026-06-30", "--kind")
-    assert shm("--workspace", workspace, *order, "sensor replaced").code == 0
-    ended = shm("--workspace", workspace, *order, "repaired")
-    assert ended.code == 3, ended.out
-    assert "alert 2: tension fell by 20" in " ".join(ended.err.split())
-    with Workspace.open(workspace, {}).store() as store:
-        assert loss_in(store).resolution is None
-
-
 def test_a_loss_that_is_accepted_as_it_is_ends_on_record(shm: Shm, workspace: Path) -> None:
     ended = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30", "--who", "Jansen",
                 "--kind", "accepted as it is", "--json")  # fmt: skip
@@ -178,16 +160,6 @@ def test_a_loss_that_is_accepted_as_it_is_ends_on_record(shm: Shm, workspace: Pa
     )  # fmt: skip
 
 
-def test_retensioned_to_less_than_before_is_another_tension_all_the_same(
-    shm: Shm, workspace: Path
-) -> None:
-    after_works(workspace, 0.88)
-    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-07-01", "--kind", "repaired")
-    assert ended.code == 3, "most of the loss is left"
-    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-07-01", "--kind", "retensioned")
-    assert ended.code == 0, ended.err
-
-
 def test_an_event_ends_the_alerts_that_it_explains(shm: Shm, workspace: Path) -> None:
     after_works(workspace, 1.0)
     ended = shm("--workspace", workspace, *ANEW, "--since", "2026-07-01", "--who", "Jansen",
@@ -201,24 +173,6 @@ def test_an_event_ends_the_alerts_that_it_explains(shm: Shm, workspace: Path) ->
     assert stored.resolution is not None
     assert stored.acknowledgement is not None
     assert stored.acknowledgement.why == "explained by: retensioned: pin replaced"
-
-
-def test_an_event_leaves_open_what_it_does_not_explain(shm: Shm, workspace: Path) -> None:
-    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30", "--kind", "lamp mounted")
-    assert ended.code == 0, ended.err
-    assert "is explained" not in ended.out
-    assert "Take note of them: `shm alerts ack 2`." in ended.out
-    with Workspace.open(workspace, {}).store() as store:
-        stored = loss_in(store)
-        assert len(store.watch.list_drifts(3)) > 0
-    assert (stored.resolution, stored.acknowledgement) == (None, None)
-
-
-def test_drift_without_a_sub_command_lists_as_ever(shm: Shm, workspace: Path) -> None:
-    plain = shm("--workspace", workspace, "drift", "--json").document["drifts"]
-    assert [row["test"] for row in plain] == ["t2"]
-    after = shm("drift", "--workspace", workspace, "--hanger", 3, "--all", "--json").document
-    assert [row["test"] for row in after["drifts"]] == ["t1", "t2"]
 
 
 def test_after_it_the_shift_from_the_old_baseline_is_shown_no_more(

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import tomllib
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from shm.read import sidecar_path
 from shm.store import Workspace
 from tests.cli.conftest import Shm
 from tests.helpers.logger_exports import (
-    SIDECAR,
-    simulate_test,
     write_described_export,
     write_export,
 )
@@ -126,33 +122,6 @@ def test_import_asks_for_day(shm: Shm, workspace: Workspace, tmp_path: Path) -> 
     assert tomllib.loads(profile.read_text())["day_order"] == "month first"
 
 
-def test_import_asks_after_learning(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
-    """A profile that a file has taught describes no sensor and no hanger."""
-    in_place = ("--workspace", workspace.folder)
-    shm(*in_place, "ingest", write_described_export(tmp_path / "a.csv", "5/14/2025 9:12:31"))
-    ended = shm(*in_place, "import", write_export(tmp_path / "b.csv", "9/10/2025 9:12:31"))
-    assert ended.code == 3
-    assert "--hanger N" in ended.err
-    assert "--time" not in ended.err
-    assert "2025-09-10 09:12 UTC" in ended.out
-
-
-def test_ingest_record_past_midnight(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
-    """Rows that pass midnight prove the order: in the other one a month lies between them."""
-    found, start = simulate_test(), datetime(2025, 9, 10, 23, 59, 50, tzinfo=UTC)
-    path = tmp_path / "a.csv"
-    sidecar_path(path).write_text(SIDECAR)
-    columns = np.array([channel.values for channel in found.channels])
-    moments = [start + timedelta(seconds=n / found.sampling_rate_hz) for n in range(found.samples)]
-    rows = "".join(
-        f"{t:%m/%d/%Y %H:%M:%S.%f},{','.join(f'{v:.5g}' for v in row)}\n"
-        for t, row in zip(moments, columns.T, strict=True)
-    )
-    path.write_text(f"Time,Hammer,Acc trans,Acc long\n,N,m/s2,m/s2\n{rows}")
-    assert shm("--workspace", workspace.folder, "ingest", path).code == 0
-    assert times_of(workspace) == [start]
-
-
 def test_undated_tests_are_named(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
     """No test is dated by its receipt without a line in status and report."""
     write_test(tmp_path / "dated.modes.json", workspace)
@@ -193,28 +162,6 @@ def test_ingest_holds_two_digit_years(
     later = write_described_export(tmp_path / "b.csv", "9/10/2025 9:12:31", seed=2)
     (look,) = shm(*in_place, "ingest", "--peek", later, "--json").document["files"]
     assert look["missing"] == ["which day, 2025-10-09 or 2025-09-10"]
-
-
-def test_confirm_teaches_year_first(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
-    in_place = ("--workspace", workspace.folder)
-    shm(*in_place, "ingest", write_described_export(tmp_path / "a.csv", "25/02/03 9:12:31"))
-    said = ("--confirm", 1, "--time", "2025-02-03T09:12:31Z")
-    assert shm(*in_place, "ingest", *said).code == 0
-    assert times_of(workspace) == [at(2, 3)]
-    later = write_described_export(tmp_path / "b.csv", "25/04/05 9:12:31", seed=2)
-    (look,) = shm(*in_place, "ingest", "--peek", later, "--json").document["files"]
-    assert (look["time"], look["missing"]) == ("2025-04-05T09:12:31Z", [])
-    other = write_described_export(tmp_path / "c.csv", "4/5/2025 9:12:31", seed=3)
-    (look,) = shm(*in_place, "ingest", "--peek", other, "--json").document["files"]
-    assert look["missing"] == ["which day, 2025-05-04 or 2025-04-05"]
-
-
-def test_ingest_reads_short_days_as_learnt(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
-    in_place = ("--workspace", workspace.folder)
-    shm(*in_place, "ingest", write_described_export(tmp_path / "a.csv", "14/05/2025 9:12:31"))
-    later = write_described_export(tmp_path / "b.csv", "04/05/06 9:12:31", seed=2)
-    (look,) = shm(*in_place, "ingest", "--peek", later, "--json").document["files"]
-    assert (look["time"], look["missing"]) == ("2006-05-04T09:12:31Z", [])
 
 
 def test_import_takes_unknown_time(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ from shm.store import Workspace
 from shm.store.queries.recordings import list_holds
 from tests.cli.conftest import Shm
 from tests.helpers.flows import ingest
-from tests.helpers.web_servers import served
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put
 
 SAID = "Hanger 3: its baseline does not fit."
@@ -61,14 +60,3 @@ def test_the_report_begins_with_it(doubted: Workspace) -> None:
     undetermined = text.index("These modes do not determine the tension")
     assert text.index(SAID) < undetermined
     assert "No change" not in text[:undetermined]
-
-
-def test_the_dashboard_says_it_on_the_page_of_the_bridge_and_of_the_hanger(
-    doubted: Workspace,
-) -> None:
-    with served(doubted) as site, site.client(site.read_token) as client:
-        (hanger,) = client.get("/api/bridge").json()["hangers"]
-        assert hanger["warnings"][0].startswith(SAID)
-        assert hanger["status"] in ("alert", "watch", "check")
-        for address in ("/", "/hangers/3"):
-            assert SAID in client.get(address).text

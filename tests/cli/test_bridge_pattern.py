@@ -84,28 +84,10 @@ def test_a_common_shift_is_told_with_the_change_of_temperature(tmp_path: Path) -
     assert "+20 K from their baselines" in told
 
 
-def test_the_figure_is_written(arch: Workspace, tmp_path: Path) -> None:
-    call(arch, "--figure", str(tmp_path / "bridge.png"))
-    assert (tmp_path / "bridge.png").read_bytes().startswith(b"\x89PNG")
-
-
 def test_the_table_draws_who_lost_and_who_gained(arch: Workspace) -> None:
     told = call(arch).stdout
     assert "<=====|......" in told
     assert "......|==>..." in told
-
-
-def test_the_report_of_the_bridge_holds_the_elevation(arch: Workspace, tmp_path: Path) -> None:
-    page = tmp_path / "bridge.html"
-    ended = CliRunner().invoke(report, ["--bridge", "--out", str(page)], obj=str(arch.folder))
-    assert ended.exit_code == 0, ended.output
-    written = page.read_text()
-    assert written.count("<svg") == 2
-    assert "Load has moved from hanger 6" in written
-    told = CliRunner().invoke(report, ["--bridge", "--json"], obj=str(arch.folder)).stdout
-    document = json.loads(told)
-    assert document["schema"] == "shm.bridge_report/1"
-    assert [each["status"] for each in document["hangers"]][-2:] == ["watch", None]
 
 
 @pytest.mark.parametrize(

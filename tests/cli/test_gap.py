@@ -12,12 +12,14 @@ import pytest
 from shm.documents import dump
 from shm.models.effects import EFFECTS
 from shm.modes_document import modes_document
+from shm.pipeline.diagnosing import choose_tests
 from shm.store import Workspace
 from shm.values import PLANES, ModalTest, Mode, ShapePoint
 from tests.cli.conftest import Shm
 from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.effects import all_but
 from tests.helpers.flows import ingest
+from tests.helpers.taken_in import with_a_loss
 from tests.helpers.workspaces import make_workspace
 
 # Two effects keep a diagnosis short; the others are taken out of the catalogue.
@@ -87,6 +89,20 @@ def test_a_diagnosis_of_a_workspace_is_kept_for_the_report(shm: Shm, tmp_path: P
     kept = shm(*at, "report", "--hanger", 3, "--json").document["diagnosis"]
     assert kept == ended.document
     assert "Gap diagnosis: " in shm(*at, "report", "--hanger", 3, "--full").out
+
+
+def test_diagnose_takes_tests_since_the_last_change(shm: Shm, tmp_path: Path) -> None:
+    workspace = with_a_loss(tmp_path / "bridge")  # t1 and t2 read a fifth less tension than t0
+    kept = ("--workspace", workspace.folder, "gap", "diagnose", "--hanger", 3, *SHORT)
+    since = shm(*kept, "--json").document
+    assert since["tests"] == ["t1"]  # t2 has the same numbers
+    assert "Only the 2 tests since 2026-" in since["remarks"][0]
+    assert "--all-tests" in since["remarks"][0]
+    assert not any("contradict" in each for each in since["remarks"])
+    with workspace.store() as store:
+        every = choose_tests(store, workspace.bridge.hanger(3), every=True)
+    assert [each.id for each in every.tests] == ["t0", "t1", "t2"]
+    assert not every.remark
 
 
 def test_the_bar_has_the_sensors_of_all_tests(

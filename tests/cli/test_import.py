@@ -11,7 +11,6 @@ import pytest
 import pyuff
 from scipy.io import savemat, wavfile
 
-from shm.modes_document import load_modes
 from shm.pipeline.intake import as_taken_in
 from shm.read import read, sidecar_path
 from shm.store import Stage, Workspace
@@ -175,12 +174,6 @@ def test_a_logger_that_goes_from_hanger_to_hanger_is_asked_each_time(
     assert shm("--workspace", workspace.folder, "import", named).code == 0
 
 
-def test_another_layout_is_another_logger(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
-    shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *SAID)
-    other = export(tmp_path / "b.csv", 2, columns="B1")
-    assert shm("--workspace", workspace.folder, "import", other).code == 3
-
-
 def test_a_dry_run_keeps_nothing(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
     path = export(tmp_path / "a.csv")
     ended = shm("--workspace", workspace.folder, "import", path, *SAID, "--dry-run")
@@ -228,26 +221,6 @@ def test_volts_and_shares_of_a_full_scale_are_asked_for_what_they_are_worth(
     assert isinstance(found, Recording)
     assert [c.quantity for c in found.channels] == ["force", "acceleration"]
     assert np.std(found.channels[0].values) == pytest.approx(200, rel=0.05)
-
-
-def test_a_sensitivity_says_that_a_column_without_unit_is_in_volts(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
-    path = tmp_path / "volts.mat"
-    force, acc = np.random.default_rng(1).normal(0, 1, (2, 3000))
-    savemat(str(path), {"force": force, "acc_1": acc, "fs": 512.0})
-    told = ("--workspace", workspace.folder, "import", path, "--hanger", 3)
-    asked = shm(*told, "--json").document
-    assert [q["about"] for q in asked["questions"]] == ["unit", "unit"]
-    ended = shm(
-        *told, "--sensitivity", "force=2.5 mV/N", "--sensitivity", "acc_1=100 uV/g",
-        "--place", "2.52", "--plane", "transverse",
-    )  # fmt: skip
-    assert ended.code == 0
-    assert "acc_1 reaches" in ended.out  # 10,000 g a volt
-    found = read(workspace.spool / "volts.mat")
-    assert isinstance(found, Recording)
-    np.testing.assert_allclose(found.channels[0].values, 400 * force)
 
 
 def test_a_table_without_names_or_units_is_read_by_the_answers(
@@ -316,19 +289,6 @@ def test_modes_of_another_program_come_in_with_their_orders_and_no_made_up_uncer
     assert [point.x_m for point in test.modes[0].shape] == [2.0, 4.0, 6.0, 8.0, 10.0]
     again = shm("--workspace", workspace.folder, "import", path)
     assert again.code == 0
-
-
-def test_modes_without_places_keep_no_shape_and_are_numbered_by_frequency(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
-    path = modes_file(tmp_path / "m.uff", with_nodes=False)
-    planes = "x=transverse,y=longitudinal"
-    ended = shm("--workspace", workspace.folder, "import", path, "--hanger", 3, "--plane", planes)
-    assert ended.code == 0
-    assert "numbered from 1 by frequency" in ended.out
-    (test,) = load_modes(workspace.spool / "m.modes.json")
-    assert [mode.order for mode in test.modes] == [1, 1, 2, 2]
-    assert all(mode.shape == () for mode in test.modes)
 
 
 def modes_file(path: Path, with_nodes: bool = True) -> Path:

@@ -125,24 +125,6 @@ def a_visit(workspace: Workspace) -> str:
     return dump(modes_document([replace(test, id=name, time=at) for name, at in times.items()]))
 
 
-def test_discard_leaves_other_tests_counting(shm: Shm, held: Workspace, tmp_path: Path) -> None:
-    say = ("--workspace", held.folder, "ingest")
-    (tmp_path / "visit.modes.json").write_text(a_visit(held))
-    (row,) = shm(*say, tmp_path / "visit.modes.json", "--json").document["files"]
-    assert row["stage"] == "held"
-    ended = shm(*say, "--discard", 3, "--why", "the clock was reset")
-    assert "1970a, 1970b is discarded" in " ".join(ended.out.split())
-    assert "its other tests go on counting" in " ".join(ended.out.split())
-    with held.store() as store:
-        assert store.recordings.get(3).stage is Stage.DONE
-        assert store.recordings.get(3).reason is None
-        assert [each.test.id for each in store.tests.list_all(3)] == ["good", "sound9", "sound10"]
-    (row,) = shm(*say, tmp_path / "visit.modes.json", "--json").document["files"]
-    assert (row["outcome"], row["stage"]) == ("known already", "done")
-    back = shm(*say, "--confirm", "1970b", "--why", "right", "--time", "2026-06-01T10:00Z")
-    assert "counts again from now on; it is done" in " ".join(back.out.split())
-
-
 @pytest.mark.parametrize("verb", ["--confirm", "--discard"])
 def test_decide_refuses_part_of_hold(shm: Shm, held: Workspace, tmp_path: Path, verb: str) -> None:
     """A test that was not named is neither counted nor discarded."""
@@ -216,17 +198,6 @@ def test_a_decision_is_undone_by_the_file_beside_a_sidecar(shm: Shm, held: Works
     with held.store() as store:
         assert [test.test.id for test in store.tests.list_all(3)] == ["good"]
         assert store.watch.list_drifts(3) == ()
-
-
-def test_a_copy_is_not_confirmed_without_a_reason(shm: Shm, held: Workspace) -> None:
-    test = modelled_test("twin", held.bridge.hanger(3))
-    put(held.spool / "twin.modes.json", dump(modes_document([test])))
-    ingest_quickly(held)
-    say = ("--workspace", held.folder, "ingest", "--confirm", 3)
-    refused = shm(*say)
-    assert refused.code == 2
-    assert "is held because" in refused.err
-    assert shm(*say, "--why", "the other was filed wrongly").code == 0
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ import pytest
 
 from shm.bridge import load_hanger
 from shm.models import THESIS, build
-from shm.store import Workspace
 from shm_cli.example import HANGER_FILE
 from tests.cli.conftest import Shm
 
@@ -32,16 +31,6 @@ def test_the_document_holds_the_frequencies_of_the_model(shm: Shm, hanger_file: 
     assert [row["frequency_hz"] for row in rows] == pytest.approx(exact.ravel())
 
 
-def test_tension_and_length_are_nominal_unless_set(shm: Shm, hanger_file: Path) -> None:
-    given = shm(
-        "predict", "beam1", "--hanger-file", hanger_file, "--set", "theta_F=1",
-        "--set", "theta_L=1", "--json",
-    )  # fmt: skip
-    assert (
-        shm("predict", "beam1", "--hanger-file", hanger_file, "--json").document == given.document
-    )
-
-
 def test_a_spring_that_is_not_set_is_named(shm: Shm, hanger_file: Path) -> None:
     ended = shm("predict", "beam2", "--hanger-file", hanger_file, *STIFF[2:])
     assert ended.code == 2
@@ -57,20 +46,6 @@ def test_a_sweep_gives_a_row_for_each_value(shm: Shm, hanger_file: Path) -> None
     assert [point["theta_F"] for point in points] == [0.5, 1.0, 1.5, 2.0]
     first = [point["frequencies"][0]["frequency_hz"] for point in points]
     assert first == sorted(first)
-
-
-def test_a_hanger_of_the_workspace_serves_as_well(
-    shm: Shm, hanger_file: Path, bridge: Workspace
-) -> None:
-    of_file = shm("predict", "beam1", "--hanger-file", hanger_file, "--json")
-    of_bridge = shm("--workspace", bridge.folder, "predict", "beam1", "--hanger", 4, "--json")
-    assert of_file.document == of_bridge.document
-
-
-def test_the_table_names_planes_and_units(shm: Shm, hanger_file: Path) -> None:
-    told = shm("predict", "beam1", "--hanger-file", hanger_file).out
-    assert "transverse (Hz)" in told
-    assert "5.58" in told
 
 
 def test_the_table_of_a_sweep_has_a_column_a_mode(shm: Shm, hanger_file: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
@@ -11,16 +11,13 @@ import pytest
 from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.lineage import (
     MOVES_NOTHING,
-    diagnosis_lineage,
-    identify_lineage,
     redescribed,
-    update_terms,
 )
 from shm.pipeline.reporting import hanger_report
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.hanger_report import hanger_json, hanger_paper
-from shm.store import Lineage, Workspace
+from shm.store import Workspace
 from shm.values import Hanger, ResponsePoint
 from tests.cli.conftest import Shm
 from tests.helpers.taken_in import ingest_quickly
@@ -93,40 +90,6 @@ def test_a_changed_length_is_said_first_with_the_command_until_there_is_a_new_ba
     assert shm("--workspace", workspace.folder, *command, "--why", "taped anew").code == 0
     with workspace.store() as store:
         assert hanger_report(workspace, store, 3, START).redescribed == ()
-
-
-def test_what_no_posterior_depends_on_asks_for_nothing(before: Workspace) -> None:
-    hanger = before.bridge.hanger(3)
-    with before.store() as store:
-        baseline = store.watch.baseline(3)
-    assert baseline is not None
-    known = replace(baseline, described={**asdict(hanger), "name": "old", "limits": {}})
-    assert redescribed(replace(hanger, name="new", models=("beam1",)), known) == ()
-    assert redescribed(hanger, None) == ()
-    assert redescribed(hanger, replace(baseline, described=None)) == ()
-
-
-def test_how_a_bar_was_measured_moves_no_lineage(before: Workspace) -> None:
-    with before.store() as store:
-        (test, *_) = store.tests.list_all(3)
-        baseline = store.watch.baseline(3)
-        recording = store.recordings.get(test.recording_id)
-
-    def lineages(workspace: Workspace) -> list[Lineage]:
-        hanger = workspace.bridge.hanger(3)
-        return [
-            identify_lineage(recording, 3, workspace),
-            update_terms(hanger, ["beam1"], [test], workspace.settings)[1],
-            diagnosis_lineage([test], hanger, {}),
-        ]
-
-    plain = lineages(before)
-    line = 'measured_by = "Ann"\nlength_by = "faces"\nlength_m = 12.0'
-    stated = rewritten(before, "length_m = 12.0", line)
-    assert stated.bridge.hanger(3).survey.measured_by == "Ann"
-    assert lineages(stated) == plain
-    assert redescribed(stated.bridge.hanger(3), baseline) == ()
-    assert lineages(rewritten(stated, "length_m = 12.0", "length_m = 12.5")) != plain
 
 
 def test_a_field_that_an_older_version_did_not_know_has_its_default(before: Workspace) -> None:

@@ -24,12 +24,6 @@ def test_the_suffix_pdf_gives_a_pdf_with_origin(
     assert "band_low_hz" not in told  # the settings are an appendix of the page
 
 
-def test_the_bridge_comes_as_pdf_too(shm: Shm, bridge: Workspace, tmp_path: Path) -> None:
-    out = tmp_path / "b.pdf"
-    assert shm("--workspace", bridge.folder, "report", "--bridge", "--out", out).code == 0
-    assert out.read_bytes().startswith(b"%PDF-")
-
-
 def test_a_pdf_is_not_shown_in_a_terminal(
     shm: Shm, bridge: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -56,16 +50,6 @@ def test_a_period_without_a_test_names_the_latest(shm: Shm, bridge: Workspace) -
         assert ended.code == 4
         assert "t2" in ended.err
         assert "2026-06-30" in ended.err
-
-
-def test_the_bridge_tells_what_moved_in_the_period(shm: Shm, bridge: Workspace) -> None:
-    call = ("--workspace", bridge.folder, "report", "--bridge", "--json")
-    document = shm(*call, "--since", "2026-01-01").document
-    three, four = document["hangers"]
-    assert three["in_period"]["tests"] == 3
-    assert three["in_period"]["change"]["mean"] < -0.1
-    assert four["in_period"] == {"tests": 0, "alerts": 0, "change": None}
-    assert "3 tests of 1 hanger" in document["summary"]
 
 
 @pytest.mark.parametrize(

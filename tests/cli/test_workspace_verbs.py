@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import shutil
 import tomllib
 from pathlib import Path
@@ -14,8 +13,6 @@ import xarray
 
 from shm.store import Workspace
 from tests.cli.conftest import Shm
-from tests.helpers.taken_in import with_a_slow_loss
-from tests.helpers.workspaces import SLOW_LOSS
 
 
 def test_init_makes_a_workspace_that_status_can_read(shm: Shm, tmp_path: Path) -> None:
@@ -24,11 +21,6 @@ def test_init_makes_a_workspace_that_status_can_read(shm: Shm, tmp_path: Path) -
     ended = shm("--workspace", folder, "status", "--json")
     assert ended.code == 0
     assert ended.document["recordings"]["done"] == 0
-
-
-def test_init_takes_the_folder_of_the_global_option(shm: Shm, tmp_path: Path) -> None:
-    assert shm("--workspace", tmp_path / "arch", "init").code == 0
-    assert (tmp_path / "arch" / "bridge.toml").is_file()
 
 
 @pytest.mark.parametrize("name", ['Arch "of" Döm', "back\\slash \\1", "plain"])
@@ -40,15 +32,6 @@ def test_init_writes_the_name_of_the_bridge_and_leaves_the_rest(
     plain, named = (tomllib.loads((tmp_path / n / "bridge.toml").read_text()) for n in "ab")
     assert named["bridge"]["name"] == name
     assert {**named, "bridge": None} == {**plain, "bridge": None}
-
-
-def test_a_description_without_a_bridge_table_gets_one(
-    shm: Shm, tmp_path: Path, hanger_file: Path
-) -> None:
-    shm("init", tmp_path / "a", "--from", hanger_file, "--bridge", "Arch")
-    described = tomllib.loads((tmp_path / "a" / "bridge.toml").read_text())
-    assert described["bridge"]["name"] == "Arch"
-    assert described["hanger"][0]["id"] == 3
 
 
 def test_a_workspace_is_not_made_twice(shm: Shm, empty: Workspace) -> None:
@@ -114,19 +97,6 @@ def test_a_hanger_without_tests_has_nothing_yet(
     assert shm("--workspace", bridge.folder, verb, "--hanger", 4, *out).code == 4
 
 
-@pytest.mark.slow
-def test_drift_shows_the_latest_shift_or_all(shm: Shm, tmp_path: Path) -> None:
-    bridge = with_a_slow_loss(tmp_path / "bridge")
-    call = ("--workspace", bridge.folder, "drift", "--hanger", 3)
-    (latest,) = shm(*call, "--json").document["drifts"]
-    assert (latest["test"], latest["quantity"]) == ("t6", "tension")
-    assert latest["shift_mean"] == pytest.approx(SLOW_LOSS[-1] - 1, abs=0.02)
-    assert latest["probability"] > 0.95
-    rows = shm(*call, "--all", "--json").document["drifts"]
-    assert [row["test"] for row in rows] == [f"t{number}" for number in range(1, 7)]
-    assert "probability beyond" in shm(*call).out
-
-
 def test_alerts_are_listed_with_what_the_hooks_got(shm: Shm, bridge: Workspace) -> None:
     call = ("--workspace", bridge.folder, "alerts")
     notice, row = shm(*call, "--json").document["alerts"]
@@ -182,16 +152,6 @@ def test_an_export_of_an_unknown_kind_is_a_usage_error(
     assert ".csv, .nc, .json or .npz" in ended.err
 
 
-def test_an_old_store_is_mended_by_db_upgrade(shm: Shm, empty: Workspace) -> None:
-    empty.database.write_bytes(b"")
-    call = ("--workspace", empty.folder, "db")
-    assert shm(*call, "check").code == 5
-    assert shm(*call, "upgrade").code == 0
-    ended = shm(*call, "check")
-    assert ended.code == 0
-    assert "holds 0 recordings" in ended.out
-
-
 def test_a_workspace_without_a_store_says_so(shm: Shm, empty: Workspace) -> None:
     empty.database.unlink()
     assert shm("--workspace", empty.folder, "db", "check").code == 4
@@ -206,11 +166,6 @@ def test_a_wrong_description_names_the_key(shm: Shm, empty: Workspace) -> None:
     assert "length_m = -1" in ended.document["message"]
     assert ended.document["line"] == 7
     assert "length_m = -1" in ended.err
-
-
-def test_json_of_every_reading_verb_is_one_document(shm: Shm, bridge: Workspace) -> None:
-    for verb in (["status"], ["drift"], ["alerts"], ["report", "--hanger", 3]):
-        assert isinstance(json.loads(shm("--workspace", bridge.folder, *verb, "--json").out), dict)
 
 
 def test_manual_page(shm: Shm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

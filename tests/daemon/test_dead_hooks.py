@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from pathlib import Path
@@ -13,8 +12,8 @@ from shm.bridge import Hook
 from shm.store import Delivery, DeliveryState, Stage, Workspace
 from shm.store.queries.recordings import count_stages
 from shm.values import Alert
-from shm_daemon import HookNotifier, Wakeup, run
-from tests.helpers.flows import Clock, a_flow, threads
+from shm_daemon import Wakeup, run
+from tests.helpers.flows import a_flow, threads
 from tests.helpers.listeners import Answer, a_listener, a_silent_listener
 from tests.helpers.outboxes import make_baseline, raise_alerts
 from tests.helpers.workspaces import make_workspace
@@ -95,27 +94,6 @@ def test_a_hook_that_hangs_leaves_room_for_the_others(tmp_path: Path) -> None:
             time.sleep(0.01)
         assert len(told) == 20
         release.set()
-
-
-def test_each_failure_doubles_the_wait_and_a_webhook_that_recovers_is_told(tmp_path: Path) -> None:
-    clock = Clock()
-    with a_listener(lambda told: Answer(503)) as listener:
-        workspace = with_webhook(tmp_path / "bridge", listener.url, hook_backoff_seconds=10.0)
-        notifier = HookNotifier(workspace.folder, 10.0, os.environ)
-        with a_flow(workspace, clock=clock, notifier=notifier) as flow:
-            flow.drain()
-            waits = []
-            for _ in range(3):
-                waits.append((outbox(workspace).next_attempt_at - clock()).total_seconds())
-                clock.pass_by(waits[-1])
-                flow.drain()
-            assert waits == [10.0, 20.0, 40.0]
-            listener.answer = lambda told: Answer()
-            clock.pass_by(80.0)
-            flow.drain()
-    assert outbox(workspace).state is DeliveryState.DELIVERED
-    assert len({told.headers["Idempotency-Key"] for told in listener.told}) == 1
-    assert len(listener.told) == 5
 
 
 def until_refused(workspace: Workspace, number: int) -> None:

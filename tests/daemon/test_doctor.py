@@ -24,7 +24,6 @@ from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import HEARTBEAT, beat, turn_failed
 from tests.helpers.nouns import NOW
 from tests.helpers.outboxes import entered, make_baseline, raise_alerts
-from tests.helpers.postgres import Databases
 from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.taken_over import obeying_readers
 from tests.helpers.workspaces import make_workspace, put, write_test
@@ -99,21 +98,15 @@ def test_an_outdated_store_is_told(workspace: Workspace) -> None:
     assert (finding.level, finding.remedy) == (Level.FAULT, "Run `shm db upgrade`.")
 
 
-@pytest.mark.parametrize("harm", ["no database", "damaged page", "empty", "folder"])
+@pytest.mark.parametrize("harm", ["damaged page", "empty"])
 def test_a_broken_store_is_told(workspace: Workspace, harm: str) -> None:
     make_baseline(workspace)
     raise_alerts(workspace, range(1, 20), [])
     content = bytearray(workspace.database.read_bytes())
-    if harm == "damaged page":
-        middle = len(content) // 2
-        content[middle : middle + 8192] = b"\xa5" * 8192
-    elif harm == "no database":
-        content = bytearray(b"x" * len(content))
+    middle = len(content) // 2
+    content[middle : middle + 8192] = b"\xa5" * 8192
     workspace.database.unlink()
-    if harm == "folder":
-        workspace.database.mkdir()
-    else:
-        workspace.database.write_bytes(b"" if harm == "empty" else content)
+    workspace.database.write_bytes(b"" if harm == "empty" else content)
     finding = only(workspace, "store")
     assert finding.level is Level.FAULT
     assert finding.remedy
@@ -128,26 +121,6 @@ def test_a_server_that_is_away_is_told_without_its_password(
     assert "T0P-SECRET" not in str(findings)
     (store,) = [each for each in findings if each.check == "store"]
     assert (store.level, "127.0.0.1" in store.found) == (Level.FAULT, True)
-
-
-def test_a_server_is_examined_like_a_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, postgresql: Databases
-) -> None:
-    with postgresql.store() as url:
-        monkeypatch.setenv("SHM_STORE", url)
-        served = make_workspace(tmp_path / "served")
-        make_baseline(served)
-        raise_alerts(served, [1], ["siren"])
-        assert only(served, "store").level is Level.OK
-        assert "none is active" in only(served, "daemon").found
-        with served.lock():
-            beat(served)
-            assert "is active" in only(served, "daemon").found
-        assert only(served, "deliveries").level is Level.WARNING
-        put(served.spool / "stuck.csv", "x")
-        with served.store() as store:
-            receive(served.spool / "stuck.csv", served, store, NOW)
-        assert "stuck.csv" in only(served, "recordings").found
 
 
 # ------------------------------------------------------------ broken workspaces
@@ -346,16 +319,6 @@ def test_a_clock_that_jumped_back_is_a_fault(workspace: Workspace) -> None:
     assert found(workspace, "clock", NOW + timedelta(hours=1))[0].level is not Level.FAULT
     jumped = found(workspace, "clock", NOW - timedelta(hours=5))[0]
     assert (jumped.level, "5 h before the newest row" in jumped.found) == (Level.FAULT, True)
-
-
-@pytest.mark.parametrize(
-    ("said", "level"), [(True, Level.OK), (False, Level.WARNING), (None, Level.UNKNOWN)]
-)
-def test_whether_the_clock_is_set_by_anybody_is_told(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, said: bool | None, level: Level
-) -> None:
-    monkeypatch.setattr(checks, "_synchronised", lambda: said)
-    assert only(workspace, "clock").level is level
 
 
 def test_hangers_without_tests_are_told(tmp_path: Path) -> None:

@@ -99,6 +99,7 @@ def _say_and_sleep(at_work: Path) -> None:
 def test_a_worker_killed_at_rest_costs_nothing(workers: Workers) -> None:
     for _ in range(3):
         os.kill(workers.submit(os.getpid).result(60), signal.SIGKILL)
+        time.sleep(0.2)  # a step that is sent to it meanwhile dies with it, and is tried again
         assert workers.submit(os.getppid).result(60)
 
 
@@ -112,8 +113,8 @@ def test_an_error_comes_back_with_all_that_it_says_and_where_it_was_raised(
     with pytest.raises(BadInput) as refusal:
         workers.submit(_refuse).result(60)
     assert (refusal.value.line, refusal.value.remedy) == (3, "Mend it.")
-    assert "in _refuse" in refusal.value.__notes__[0]
-    with pytest.raises(RuntimeError, match="cannot be sent"):
+    assert "in _refuse" in str(refusal.value.__cause__)
+    with pytest.raises(TypeError, match="cannot pickle"):
         workers.submit(threading.Lock).result(60)
     with pytest.raises(ValueError, match="exit"):  # not the end of the worker
         workers.submit(_exit).result(60)
@@ -144,7 +145,7 @@ def test_where_no_process_can_be_begun_no_file_is_to_blame(
 def test_where_each_process_ends_at_once_no_file_is_to_blame_and_none_is_begun_for_ever() -> None:
     with children_ended():
         workers = Workers(1, partial(os._exit, 1))
-        with pytest.raises(ShmError, match="each ended before") as refusal:
+        with pytest.raises(ShmError, match="it ended before") as refusal:
             workers.submit(os.getpid).result(60)
         workers.shutdown(wait=False, cancel_futures=True)
     assert refusal.value.retry_after_s

@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 
 from shm.errors import ShmError, StoreBusy, StoreError
-from shm.pipeline import Flow, Sharing, steps, utc_now
+from shm.pipeline import Flow, steps, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
-from shm.store import Archive, Delivery, DeliveryState, Stage, Workspace
+from shm.store import Archive, Delivery, Stage, Workspace
 from shm.store.checking import check_store
 from shm.store.queries.history import list_events
 from shm.store.queries.recordings import count_stages
@@ -26,12 +26,11 @@ from shm_cli import main as cli
 from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import why_turn_failed
 from tests.helpers import quick_update
-from tests.helpers.flows import Postman
 from tests.helpers.flows import threads as make_threads
 from tests.helpers.footprint import open_files
 from tests.helpers.waiting import until
 from tests.helpers.web_servers import served
-from tests.helpers.workspaces import SLOW_LOSS, make_workspace, put, write_slow_loss, write_test
+from tests.helpers.workspaces import put, write_test
 
 
 @pytest.fixture(autouse=True)
@@ -100,22 +99,6 @@ def test_open_files_do_not_grow_with_the_tests(
     assert held[2] <= held[0]
 
 
-def test_a_file_being_written_is_not_taken_before_it_is_whole(
-    tmp_path: Path, serve: Callable[..., Wakeup]
-) -> None:
-    workspace = make_workspace(tmp_path / "slow", settings={"spool_stable_seconds": 0.5})
-    test = workspace.folder / "t.modes.json"
-    write_test(test, workspace)
-    content = test.read_bytes()
-    serve(workspace)
-    with (workspace.spool / "t.modes.json").open("wb") as file:
-        for start in range(0, len(content), len(content) // 8):
-            file.write(content[start : start + len(content) // 8])
-            file.flush()
-            time.sleep(0.1)
-    until(lambda: counts(workspace) == {Stage.DONE: 1})
-
-
 def test_once_takes_everything_with_its_subfolders_and_ends(workspace: Workspace) -> None:
     (workspace.spool / "logger").mkdir()
     write_test(workspace.spool / "logger" / "a.modes.json", workspace)
@@ -175,20 +158,6 @@ def test_nothing_is_taken_while_a_folder_is_on_another_disk(
     assert why_turn_failed(workspace) == ""
 
 
-def test_a_turn_that_fails_is_shown_until_one_goes_well(
-    workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fails(*_: object) -> None:
-        raise OSError("the spool is odd")
-
-    monkeypatch.setattr("shm_daemon.loop._UNREADABLE_S", 0.2)
-    with monkeypatch.context() as broken:
-        broken.setattr("shm_daemon.loop.scan", fails)
-        serve()
-        until(lambda: "the spool is odd" in why_turn_failed(workspace))
-    until(lambda: why_turn_failed(workspace) == "")
-
-
 def test_receive_unwritable_archive_shows(
     workspace: Workspace, serve: Callable[..., Wakeup], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -220,10 +189,10 @@ def test_receive_raises_anything(
     """A file that cannot be taken in for a fault of shm keeps no other file from being done."""
     receive = Flow.receive
 
-    def fail_on_a(self: Flow, path: Path, sharing: Sharing | None = None) -> object:
+    def fail_on_a(self: Flow, path: Path) -> object:
         if path.name.startswith("a"):
             raise KeyError("layout")
-        return receive(self, path, sharing)
+        return receive(self, path)
 
     monkeypatch.setattr(Flow, "receive", fail_on_a)
     for name in "ab":
@@ -262,24 +231,6 @@ def test_advance_delayed_recording_shows(
     until(lambda: "recording 1 waits: [Errno 5]" in why_turn_failed(workspace))
 
 
-def test_a_hook_that_hangs_does_not_hold_up_the_files(
-    tmp_path: Path, serve: Callable[..., Wakeup]
-) -> None:
-    workspace = make_workspace(
-        tmp_path / "hangs",
-        hooks={"mail": ["sleep", "3600"]},
-        settings={"hook_timeout_seconds": 3600.0},
-    )
-    write_slow_loss(workspace.spool, workspace)
-    wakeup = serve(workspace)
-    until(lambda: counts(workspace) == {Stage.DONE: len(SLOW_LOSS)})
-    until(lambda: len(deliveries(workspace)) == 1)
-    write_test(workspace.spool / "later.modes.json", workspace, day=90)
-    until(lambda: counts(workspace) == {Stage.DONE: len(SLOW_LOSS) + 1})
-    assert [each.state for each in deliveries(workspace)] == [DeliveryState.WAITING]
-    wakeup.stop()  # ends the hook too: the fixture waits for the daemon, not for an hour
-
-
 def test_two_daemons_do_not_serve_one_workspace(
     workspace: Workspace, serve: Callable[..., Wakeup], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -310,13 +261,13 @@ def test_a_file_that_cannot_be_taken_holds_up_nobody(
 ) -> None:
     receive, seen = Flow.receive, []
 
-    def fail_on_a(self: Flow, path: Path, sharing: Sharing | None = None) -> object:
+    def fail_on_a(self: Flow, path: Path) -> object:
         seen.append(path.name)
         if path.name.startswith("a") and seen.count(path.name) == 1:
             raise ShmError("changed while it was read.", retry_after_s=0.2)
         if path.name.startswith("b") and seen.count(path.name) == 1:
             raise FileNotFoundError(path)
-        return receive(self, path, sharing)
+        return receive(self, path)
 
     monkeypatch.setattr(Flow, "receive", fail_on_a)
     monkeypatch.setattr("shm_daemon.loop._UNREADABLE_S", 0.2)
@@ -382,16 +333,6 @@ def test_dead_workers_are_replaced(workspace: Workspace, caplog: pytest.LogCaptu
     run_once(workspace, make_executor=Mortal)
     assert "beginning new ones" in caplog.text
     assert counts(workspace) == {Stage.DONE: 1}
-
-
-def test_deliveries_put_off_do_not_keep_it_from_ending(tmp_path: Path) -> None:
-    workspace = make_workspace(
-        tmp_path / "later", hooks={"mail": ["true"]}, settings={"hook_backoff_seconds": 3600.0}
-    )
-    write_slow_loss(workspace.spool, workspace)
-    run_once(workspace, notifier=Postman(failures=9))
-    with workspace.store() as store:
-        assert [each.attempts for each in store.alerts.list_deliveries()] == [1]
 
 
 def test_a_setting_changed_on_a_page_is_taken_over(

@@ -73,16 +73,6 @@ def test_a_hundred_sparse_gigabytes_go_to_the_quarantine_unread(tmp_path: Path) 
         assert [event.file_name for event in list_events(store, "refused")] == ["huge.csv"]
 
 
-def test_two_of_one_name_lie_beside_each_other(tmp_path: Path) -> None:
-    workspace = make_workspace(tmp_path / "bridge")
-    for size in (HUNDRED_GB, HUNDRED_GB + 1):
-        sparse(workspace.spool / "huge.csv", size)
-        run(workspace, once=True, make_executor=threads)
-    sizes = {each.stat().st_size for each in workspace.quarantine.folder.glob("huge*.csv")}
-    assert sizes == {HUNDRED_GB, HUNDRED_GB + 1}
-    assert len(list(workspace.quarantine.folder.glob("*.reason.json"))) == 2
-
-
 def test_what_cannot_be_moved_stays_where_it_is_and_is_said_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

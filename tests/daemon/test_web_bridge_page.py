@@ -100,13 +100,6 @@ def test_the_table_says_the_same(client: httpx.Client) -> None:
     assert "/alerts?hanger=3" in rows[0]
 
 
-def test_the_page_says_how_old_the_last_test_is(client: httpx.Client) -> None:
-    page = " ".join(re.sub(r"<[^>]+>", " ", client.get("/").text).split())
-    assert re.search(r"Last test \d+ d ago hanger 3, \d{4}-\d\d-\d\d \d\d:\d\d UTC", page)
-    assert "1 without a result" in page
-    assert "Over the bridge nothing can be compared" in page
-
-
 def test_the_same_stands_in_json(client: httpx.Client) -> None:
     found = client.get("/api/bridge").json()
     lost, never = found["hangers"]

@@ -24,7 +24,7 @@ from shm.store import Workspace
 from shm_cli.main import run
 from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import HEARTBEAT, beat
-from shm_daemon.hooks.webhook import Lines
+from shm_daemon.http_client import HttpClient
 from shm_daemon.web.address import SUMMARY, Address
 from shm_daemon.web.bridge_summary import BridgeRow, Summary
 from shm_daemon.web.commands import without_commands
@@ -234,7 +234,7 @@ def test_a_bridge_alone_says_how_others_are_added(tmp_path: Path) -> None:
 
 def asked(listener: Listener, folder: Path, timeout_s: float = 5.0, **more: str) -> Summary:
     address = listener.url.removesuffix("/alerts")
-    return ask(OtherBridge("Severn", address, **more), folder, Lines(), timeout_s)
+    return ask(OtherBridge("Severn", address, **more), folder, HttpClient(), timeout_s)
 
 
 @pytest.mark.parametrize(
@@ -281,7 +281,7 @@ def test_a_slow_bridge_is_given_up(tmp_path: Path, drip: bytes) -> None:
         a_silent_listener(drip, 0.005) as url,
         pytest.raises(NotTold, match=r"No answer within 0\.4 s"),
     ):
-        ask(OtherBridge("Severn", url.rstrip("/")), tmp_path, Lines(), 0.4)
+        ask(OtherBridge("Severn", url.rstrip("/")), tmp_path, HttpClient(), 0.4)
 
 
 @pytest.mark.parametrize("content", [None, "", "two\nlines", "ümlaut"])
@@ -298,13 +298,13 @@ def test_a_certificate_of_an_own_authority_is_trusted_once_it_is_named(
 ) -> None:
     with served(workspace, certificate=certificate) as site:
         with pytest.raises(NotTold, match=r"certificate is not trusted.*self-signed") as caught:
-            ask(OtherBridge("Severn", site.url), tmp_path, Lines())
+            ask(OtherBridge("Severn", site.url), tmp_path, HttpClient())
         assert "certificate_file" in caught.value.remedy
         named = OtherBridge("Severn", site.url, certificate_file=str(certificate[0]))
-        assert ask(named, tmp_path, Lines()).bridge == "Test bridge"
+        assert ask(named, tmp_path, HttpClient()).bridge == "Test bridge"
     gone = replace(named, certificate_file="gone.pem")
     with pytest.raises(NotTold, match=r"no file gone\.pem"):
-        ask(gone, tmp_path, Lines())
+        ask(gone, tmp_path, HttpClient())
 
 
 # ---------------------------------------------------------------- how long a page takes

@@ -47,7 +47,8 @@ def test_an_operator_has_it_diagnosed_and_reads_it_on_the_hangers_page(
     assert browser.post(PAGE).status_code == 403
     sign_in(browser, "operator")
     assert "Diagnose now" in browser.get("/hangers/3").text
-    ordered = browser.post(PAGE)
+    assert 'name="all_tests"' in browser.get(PAGE).text
+    ordered = browser.post(PAGE, data={"all_tests": "true"})
     waiting = browser.get(ordered.headers["location"].replace("?", "/outcome?"))
     assert waiting.status_code == 202
     assert "You can leave this page" in waiting.text
@@ -56,6 +57,7 @@ def test_an_operator_has_it_diagnosed_and_reads_it_on_the_hangers_page(
     with workspace.store() as store:
         kept = find_latest_diagnosis(store, 3)
     assert kept is not None
+    assert kept.diagnosis.tests == ("t0", "t1")  # from before the loss, too; t2 is as t1
     shown = browser.get("/hangers/3").text
     assert "Diagnose anew" in shown
     summary = found.text.partition("<p>")[2].partition("</p>")[0]

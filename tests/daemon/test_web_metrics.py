@@ -18,7 +18,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from shm.pipeline import utc_now
 from shm.store import Workspace, rows
 from shm.store.columns import Number, UtcTime
-from shm.store.journal import NOTIFIED, STEPS
+from shm.store.journal import STEPS
 from shm.store.tables import metadata
 from shm_daemon.heartbeat import beat
 from tests.helpers.slow import few_of
@@ -149,22 +149,6 @@ def test_no_state_of_any_row_breaks_a_scrape(
                 )
     connection.close()
     assert errors(client) == before
-
-
-def test_a_step_that_is_no_stage_is_counted_under_its_name(
-    client: httpx.Client, bridge: Workspace
-) -> None:
-    """An alert that was delivered is such a step, for an hour after."""
-    with sqlite3.connect(bridge.database) as connection:
-        ((row, kept),) = connection.execute(
-            "SELECT MAX(id), kind FROM journal WHERE test_id IS NOT NULL"
-        ).fetchall()
-        update = "UPDATE journal SET kind = ? WHERE id = ?"
-        connection.execute(update, (NOTIFIED, row))
-        connection.commit()
-        assert said(client)["shm_stage_reached", NOTIFIED] == 1
-        connection.execute(update, (kept, row))
-    connection.close()
 
 
 def test_a_recording_or_a_delivery_in_an_unknown_state_is_counted_as_other(

@@ -6,7 +6,6 @@ import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack
-from pathlib import Path
 
 import argon2
 import httpx
@@ -25,7 +24,6 @@ from shm_daemon.web.access import engineering, reading, signed_in_person, writin
 from shm_daemon.web.address import Address
 from shm_daemon.web.app import load_pages
 from shm_daemon.web.site import MOST_WRONG, Description, Site
-from tests.helpers.taken_in import with_a_slow_loss
 from tests.helpers.waiting import until
 from tests.helpers.web_servers import served
 
@@ -88,17 +86,6 @@ def test_wrong_passwords_keep_out_neither_who_is_in_nor_others_of_the_same_addre
     assert browser.get("/api/status").status_code == 200
     browser.cookies.clear()
     assert sign_in(browser, "engineer") == 303
-
-
-def test_a_user_takes_note_by_the_own_name_whatever_is_said(tmp_path: Path) -> None:
-    workspace = with_a_slow_loss(tmp_path / "bridge")
-    with workspace.store() as store:
-        store.people.add("Ada", Role.OPERATOR, PASSWORD, utc_now())
-    told = {"why": "seen", "who": "an engineer"}
-    with served(workspace, Address("0.0.0.0")) as site, site.client(Origin=site.url) as client:
-        sign_in(client, "Ada")
-        noted = client.post("/api/alerts/1/acknowledgement", json=told).json()
-    assert noted["acknowledged"]["who"] == "Ada"
 
 
 def test_a_person_changes_the_own_password_and_ends_all_other_sessions(

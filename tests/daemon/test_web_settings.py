@@ -8,7 +8,6 @@ from collections.abc import Iterator
 import httpx
 import pytest
 
-from shm.bridge.changes import overlaid
 from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm.store.queries.history import list_changes
@@ -99,18 +98,6 @@ def test_a_wrong_value_saves_nothing_and_what_was_typed_stays_in_the_form(
     assert f'name="value.{LEVEL}" value="minus ten"' in refused.text
     with workspace.store() as store:
         assert not store.settings.list_current()
-
-
-def test_what_another_changed_is_shown_in_a_refused_form_beside_what_was_typed(
-    browser: httpx.Client,
-) -> None:
-    attempts = "settings.hook_attempts"
-    put(browser, LEVEL, "0.9")
-    told = filled_in(LEVEL, "0", value="0.7") | filled_in(attempts, "0", value="9")
-    refused = browser.post("/settings", data=told)
-    assert refused.status_code == 409
-    assert f'name="value.{LEVEL}" value="0.9"' in refused.text
-    assert f'name="value.{attempts}" value="9"' in refused.text
 
 
 def test_what_nobody_changed_is_not_set_though_all_is_one_form(
@@ -247,15 +234,6 @@ def test_no_page_changes_what_runs_on_the_computer(browser: httpx.Client) -> Non
         assert put(browser, key, "1").status_code == 404
     sign_in(browser, "operator")
     assert put(browser, LEVEL, "0.9").status_code == 403
-
-
-def test_changes_of_what_the_file_describes_no_more_do_nothing() -> None:
-    document = {"hook": [{"name": "a.b"}], "hanger": [{"id": 3}]}
-    changed = {"hook.a.b.escalation_after_seconds": 60.0, "hanger.4.limits.tension_max_n": 1.0}
-    assert overlaid(document, changed) == {
-        "hook": [{"name": "a.b", "escalation_after_seconds": 60.0}],
-        "hanger": [{"id": 3}],
-    }
 
 
 def test_an_engineer_lets_people_in_and_out_but_never_ends_the_last_engineer(

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import httpx
 import pytest
 
-from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm_daemon.web.access import COOKIE
 from shm_daemon.web.address import Address
@@ -73,17 +72,6 @@ def test_a_wrong_token_is_said_on_the_page(browser: httpx.Client) -> None:
     assert sign_in(browser, "x" * 10_000).status_code == 413
 
 
-def test_a_reader_who_signed_in_may_not_write(browser: httpx.Client, elsewhere: Served) -> None:
-    sign_in(browser, elsewhere.read_token)
-    assert browser.post(UPLOAD, content=b"x").status_code == 403
-    assert "sign in" in browser.get("/upload").text
-
-
-def test_a_writer_who_signed_in_may(browser: httpx.Client, elsewhere: Served) -> None:
-    sign_in(browser, elsewhere.write_token)
-    assert browser.post(UPLOAD, content=b"x").status_code == 202
-
-
 @pytest.mark.parametrize("origin", ["https://evil.example", "http://127.0.0.1:1", "null", ""])
 def test_a_page_of_another_site_can_send_nothing(
     browser: httpx.Client, elsewhere: Served, origin: str
@@ -96,17 +84,6 @@ def test_a_page_of_another_site_can_send_nothing(
     told = {"why": "seen"}
     posted = browser.post("/api/alerts/1/acknowledgement", json=told, headers=foreign)
     assert posted.status_code == 403
-
-
-def test_a_revoked_token_is_out_at_once(
-    browser: httpx.Client, elsewhere: Served, workspace: Workspace
-) -> None:
-    sign_in(browser, elsewhere.write_token)
-    assert browser.get("/").status_code == 200
-    with workspace.store() as store:
-        store.upkeep.revoke_token("write", utc_now())
-    assert browser.get("/").status_code == 401
-    assert browser.post(UPLOAD, content=b"x").status_code == 401
 
 
 def test_who_signs_out_is_out(browser: httpx.Client, elsewhere: Served) -> None:

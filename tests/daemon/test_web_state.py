@@ -60,12 +60,6 @@ def test_a_hanger_without_tests_is_unknown_and_not_nought(client: httpx.Client) 
     assert (hangers[1]["tension_n"], hangers[1]["model"], hangers[1]["shifts"]) == (None, None, [])
 
 
-def test_a_hanger_that_is_none_is_not_there(client: httpx.Client) -> None:
-    answer = client.get("/api/hangers/99")
-    assert answer.status_code == 404
-    assert "known: 3, 4" in answer.json()["message"]
-
-
 def test_an_alert_is_listed_and_acknowledged_once(site: Served) -> None:
     with site.client(site.write_token) as client:
         (alert,) = client.get("/api/alerts?open=true").json()["alerts"]

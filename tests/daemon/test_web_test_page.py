@@ -180,20 +180,21 @@ def test_each_hit_is_told_with_the_reason_to_drop_it(site: Site, client: httpx.C
 def test_the_response_is_chosen_and_has_the_fit_over_it(site: Site, client: httpx.Client) -> None:
     names = client.get(document_of(3, site.odd)).json()["responses"]
     assert len(names) == 4
-    captions = []
+    titles = []
     for point, name in enumerate(names):
         answer = at_last(client, f"{document_of(3, site.odd)}/figures/response?point={point}")
         document = answer.json()
-        assert name in document["caption"]
-        captions.append(document["caption"])
+        title = str(document["layout"]["annotations"])
+        assert name in title
+        titles.append(title)
         curves = {trace.get("name"): trace for trace in document["data"]}
         assert {"measured", "fit of the modes", "transverse mode"} <= set(curves)
         peak = np.nanargmax(np.array(curves["measured"]["y"], float))
         nearest = np.min(
             np.abs(np.array(curves["transverse mode"]["x"]) - curves["measured"]["x"][peak])
         )
-        assert nearest < 0.5 or "longitudinal" in document["caption"]
-    assert len(set(captions)) == 4
+        assert nearest < 0.5 or "longitudinal" in title
+    assert len(set(titles)) == 4
     page = client.get(page_of(3, site.odd), params={"response": 2}).text
     assert re.search(r'<option value="2" selected>', page)
     assert client.get(f"{document_of(3, site.odd)}/figures/response?point=99").status_code == 404

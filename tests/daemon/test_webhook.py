@@ -89,13 +89,13 @@ def test_without_its_secret_nothing_is_sent(
     assert listener.told == []
 
 
-@pytest.mark.parametrize("status", [408, 429, 500, 503, 302, 307])
+@pytest.mark.parametrize("status", [429, 503, 302])
 def test_what_may_pass_is_tried_again(tmp_path: Path, listener: Listener, status: int) -> None:
     listener.answer = lambda told: Answer(status, b"busy\x1b[31m\nnow")
     assert failure(tmp_path, listener.url) == f"answered {status}: busy [31m now"
 
 
-@pytest.mark.parametrize("status", [400, 401, 404, 410, 422])
+@pytest.mark.parametrize("status", [401, 410])
 def test_a_refusal_is_final_and_told_in_the_servers_words(
     tmp_path: Path, listener: Listener, status: int
 ) -> None:
@@ -105,7 +105,7 @@ def test_a_refusal_is_final_and_told_in_the_servers_words(
     assert len(caught.value.message) < 600
 
 
-@pytest.mark.parametrize("status", [301, 302, 303, 307, 308])
+@pytest.mark.parametrize("status", [302, 307])
 def test_an_alert_does_not_go_elsewhere(tmp_path: Path, listener: Listener, status: int) -> None:
     with a_listener() as elsewhere:
         listener.answer = lambda told: Answer(status, headers=(("Location", elsewhere.url),))

@@ -26,6 +26,7 @@ from tests.worlds.simulated.campaign import CampaignPlan, campaign
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
 FEW_EFFECTS = GapOptions(without=all_but("timebase", "bending_stiffness"))
 CLAMPS_ALONE = GapOptions(without=all_but("point_mass"))
+SOME = GapOptions(without=all_but("point_mass", "section_loss", "bending_stiffness", "timebase"))
 ONE_TEST = CampaignPlan(modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0)
 
 
@@ -46,7 +47,7 @@ def clamped_on() -> Diagnosis:
 @pytest.fixture(scope="module")
 def untouched() -> Diagnosis:
     """Of a hanger that nothing was planted on."""
-    return diagnose(planted(), PLAIN)
+    return diagnose(planted(), PLAIN, SOME)
 
 
 def test_a_planted_clamp_is_named_with_its_size_and_place(clamped_on: Diagnosis) -> None:
@@ -56,19 +57,41 @@ def test_a_planted_clamp_is_named_with_its_size_and_place(clamped_on: Diagnosis)
     assert size["mass_kg"].mean == pytest.approx(12.0, abs=4 * size["mass_kg"].sd)
     assert size["x_m"].mean == pytest.approx(3.4, abs=4 * size["x_m"].sd)
     assert clamped_on.groups == () or clamped_on.leading.group is not None
+    best = clamped_on.places[0]
+    assert best.kind == "point mass"
+    assert best.low_m - 0.05 < 3.4 < best.high_m + 0.05
+    assert best.high_m - best.low_m < 0.5
+    assert best.share > 0.9
+    x_m, density = np.array(best.profile).T
+    assert density.sum() * (x_m[1] - x_m[0]) == pytest.approx(1)
 
 
 def test_the_mirror_image_of_a_place_is_named_and_the_size_is_of_one_side() -> None:
     """Without shapes frequencies tell a place from its mirror image hardly or not at all."""
     clamp = (("point_mass", Variant()),)
     unloaded = own_campaign(clamp, (12.0, 3.4), sd=5e-5)[0]
-    leading = diagnose([unloaded], PLAIN, replace(CLAMPS_ALONE, baseline="beam1")).leading
+    found = diagnose([unloaded], PLAIN, replace(CLAMPS_ALONE, baseline="beam1"))
+    leading = found.leading
     assert leading is not None
     (place,) = (each for each in leading.parameters if each.name == "x_m")
     (other,) = leading.also_at
     mirrored_m = PLAIN.length_m - float(other.removeprefix("at ").removesuffix(" m"))
     assert place.mean == pytest.approx(mirrored_m, abs=0.1)
     assert place.q95 - place.q05 < 0.5
+    both = found.places[0]  # its interval spans the two
+    assert both.low_m < 3.6
+    assert both.high_m > 8.4
+    assert both.x_m == pytest.approx(place.mean)
+
+
+def test_an_end_that_turns_is_placed_at_its_end() -> None:
+    springs = {"log10_k1": 7.0, "log10_k2": 7.0}
+    turning = PlantedEffect("rotational_end_flexibility", "deck end", springs)
+    options = GapOptions("beam1", without=all_but(turning.name))
+    (found,) = diagnose(planted(turning), PLAIN, options).places
+    assert found.kind == "flexible end"
+    assert found.x_m == found.low_m == found.high_m == 0.0
+    assert found.share > 0.9
 
 
 def test_the_gap_shrinks_in_and_out_of_the_fit(clamped_on: Diagnosis) -> None:

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from shm.assumptions import DEFAULTS
-from shm.gap import GapOptions, diagnose, outliers
+from shm.gap import GapOptions, diagnose
 from shm.gap.observations import observed
 from shm.gap.outliers import (
     FREEDOM,
     SURE,
-    GrossError,
     acts_alone,
-    exclude_gross_errors,
     left_out,
     log_gross,
     log_ordinary,
@@ -98,6 +95,7 @@ def test_a_frequency_a_fifth_too_high_is_set_aside() -> None:
     assert [(each.plane, each.order) for each in found.outliers] == [("longitudinal", 1)]
 
 
+@pytest.mark.slow
 def test_a_wrong_frequency_whose_mode_has_a_shape_is_set_aside_as_well() -> None:
     plan = replace(ONE_TEST, shapes=True)
     tests = campaign(PLAIN, HangerState(711e3), (), plan, np.random.default_rng(101))
@@ -167,26 +165,6 @@ def test_a_frequency_left_out_is_what_conditioning_on_all_others_says() -> None:
         assert seen.log_all[node] == pytest.approx(evidence + weight, abs=1e-4)
 
 
-@pytest.mark.parametrize(("frequencies", "aside"), [(4, 0), (5, 1), (6, 1), (30, 3)])
-def test_exclude_gross_errors_leaves_enough(
-    monkeypatch: pytest.MonkeyPatch, frequencies: int, aside: int
-) -> None:
-    """Tension, stiffness, two to contradict them and nine of ten, where each looks like a slip."""
-    monkeypatch.setattr(outliers, "attribute", lambda *_: SimpleNamespace())
-    monkeypatch.setattr(outliers, "_remains", lambda *_: True)
-    monkeypatch.setattr(
-        outliers, "_find_gross_error", lambda found: GrossError(int(found.rows[0]), 1.0)
-    )
-    problem = SimpleNamespace(
-        design=SimpleNamespace(frequencies=frequencies), part=lambda rows: None
-    )
-    rng = np.random.default_rng(1)
-    found = exclude_gross_errors(problem, GapOptions(), rng)  # type: ignore[arg-type]
-    assert [each.row for each in found.excluded] == list(range(aside))
-    assert [each.row for each in found.doubted] == [aside]
-    assert found.rows.tolist() == list(range(aside, frequencies))
-
-
 def test_a_frequency_that_stands_alone_at_the_highest_level_may_be_met_by_a_guide(
     one_wrong: Diagnosis,
 ) -> None:
@@ -212,33 +190,3 @@ def test_what_another_test_hit_as_hard_shows_in_its_place_was_a_slip(
     assert (
         acts_alone(design, kept, int(every[0]), 0.5, SHARE) == 0.0
     )  # farther than any guide moves one
-
-
-@pytest.mark.slow
-def test_a_hanger_that_knocks_while_it_swings_far_is_remarked() -> None:
-    (test,) = measured()
-    few = GapOptions(without=all_but("point_mass"))
-    sound = diagnose([test], PLAIN, few)
-    knocks = diagnose([replace(test, amplitude=0.1, rattles_above=0.1)], PLAIN, few)
-    assert sound.leads == "no gap"
-    assert any("something knocks" in remark for remark in knocks.remarks)
-
-
-def _with(test: ModalTest, name: str, **given: float) -> ModalTest:
-    return replace(test, id=name, modes=tuple(replace(mode, **given) for mode in test.modes))  # type: ignore[arg-type]
-
-
-@pytest.mark.slow
-def test_what_changes_within_a_test_is_remarked() -> None:
-    """Modes found at full level though ring-downs begin astray, and damping that rises with it."""
-    (test,) = measured()
-    few = GapOptions(without=all_but("point_mass"))
-    soft = _with(test, "t2", damping_ratio=1e-3, damping_sd=5e-5)
-    lossy = [replace(m, damping_ratio=1e-3 * (1 + m.order), damping_sd=5e-5) for m in test.modes]
-    hard = replace(test, modes=tuple(lossy))
-    cases = {
-        "means over ring-downs": [replace(test, amplitude=1.0, rattles_above=0.4)],
-        "Damping rises": [replace(hard, amplitude=1.0), replace(soft, amplitude=0.2)],
-    }
-    for said, tests in cases.items():
-        assert any(said in remark for remark in diagnose(tests, PLAIN, few).remarks), said

@@ -33,24 +33,6 @@ def modes_below(q: np.ndarray, xi: np.ndarray, ka: np.ndarray, kb: np.ndarray) -
     return np.floor(q / _pi(q)).astype(int) - unsprung + sprung
 
 
-def roots_by_counting(
-    xi: np.ndarray, ka: np.ndarray, kb: np.ndarray, modes: int, kind: type = np.longdouble
-) -> np.ndarray:
-    """The q (sets, modes) at which the count reaches 1, 2, ..., by bisection in extended precision.
-
-    Nothing is assumed of where a root lies but that it is below q = (modes + 2) pi.
-    """
-    columns = [np.asarray(values).astype(kind)[:, None] for values in (xi, ka, kb)]
-    order = np.arange(1, modes + 1)
-    low = np.full((len(columns[0]), modes), 0.1, dtype=kind)
-    high = np.full_like(low, (modes + 2) * np.pi)
-    for _ in range(np.finfo(kind).nmant + 8):
-        middle = (low + high) / 2
-        above = modes_below(middle, *columns) >= order
-        high, low = np.where(above, middle, high), np.where(above, low, middle)
-    return (low + high) / 2
-
-
 def _pi(q: np.ndarray) -> np.ndarray:
     """Pi in the precision of `q`."""
     return 4 * np.arctan(np.ones(1, dtype=q.dtype))

@@ -1,15 +1,25 @@
-"""Workspaces whose hangers have permanent sensors that live, and the work on their streams."""
+"""Workspaces whose hangers have permanent sensors that live, and the work on their streams.
+
+`found_in` makes up what a window says, so that a test of the flow computes none.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
+import numpy as np
+
+from shm.models.tensioned_beam import frequencies_hz
+from shm.pipeline.stream_steps import WindowFound
 from shm.pipeline.streaming import Streaming
 from shm.read.chunk_document import chunk_document
 from shm.simulate.ambient import MonitoringPlan, described_stream, streamed
 from shm.store import Workspace
 from shm.store.ring import ring_of
+from shm.values import PLANES, Hanger, Mode
+from shm.values.stream import Piece, Stream, Window, WindowReading, period_start
 from tests.helpers.flows import Clock
 
 FIRST = datetime(2026, 6, 1, 22, tzinfo=UTC)
@@ -41,12 +51,14 @@ def send(
     *,
     first: datetime = FIRST,
     seed: int = 3,
+    at: datetime | None = None,
     **said: float,
 ) -> None:
-    """Some hours of the first stream, in chunks of ten minutes."""
+    """Send some hours of the first stream in chunks of ten minutes, each at its end or all `at`."""
     stream, hanger = workspace.bridge.streams[0], workspace.bridge.hangers[0]
     for chunk in streamed(hanger, stream, CALM, first, hours * 3600, seed):
-        ring_of(workspace).append(chunk_document(replace(chunk, **said)))
+        ring = ring_of(workspace, lambda now=at or chunk.end: now)  # type: ignore[misc]
+        ring.append(chunk_document(replace(chunk, **said)))
 
 
 def drain(streaming: Streaming, clock: Clock) -> None:
@@ -58,3 +70,33 @@ def drain(streaming: Streaming, clock: Clock) -> None:
         for running in streaming.under_way:
             running.exception(timeout=120)
         clock.pass_by(30)
+
+
+def found_in(
+    stream: Stream,
+    hanger: Hanger,
+    start: datetime,
+    seed: int,
+    temperature_c: float = 10.0,
+    factor: float = 1.0,
+) -> WindowFound:
+    """Make up a window: three exact modes a plane by a `factor` of the tension, and noise."""
+    draw = np.random.default_rng(seed)
+    each = (hanger.length_m, factor * hanger.nominal_tension_n, hanger.bending_stiffness_n_m2)
+    springs = (hanger.mass_per_length_kg_m, 3e5, 3e5)
+    hz = frequencies_hz(*map(np.asarray, (*each, *springs)), modes=3)
+    modes = tuple(
+        Mode(plane, order, float(own), 2e-4 * float(own))
+        for plane in PLANES
+        for order, own in enumerate(hz * (1 + 2e-4 * draw.normal(size=3)), 1)
+    )
+    window = Window(stream.name, hanger.id, start, 600.0, "wind", 0.02, temperature_c=temperature_c)
+    return WindowFound(WindowReading(window, modes, "tracked"), (), {})
+
+
+def find_quickly(
+    pieces: Sequence[Piece], stream: Stream, known: object, hanger: Hanger, *_: object
+) -> WindowFound:
+    """Stand in for `read_stream_window`."""
+    start = period_start(pieces[0].start, timedelta(minutes=10))
+    return found_in(stream, hanger, start, start.minute, pieces[0].temperature_c)

@@ -10,7 +10,7 @@ import numpy as np
 
 from shm.report.contents import HangerReport
 from shm.report.formatting import Interval
-from shm.report.hanger_status import HangerMessage, Status
+from shm.report.hanger_status import Status
 from shm.report.hanger_summary import HangerSummary, LatestTest
 from shm.store import ReceivedFile
 from shm.values import (
@@ -32,7 +32,6 @@ from shm.values import (
     Summary,
     WatchedTest,
 )
-from shm.values.messages import Lead
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
 
@@ -171,12 +170,3 @@ def a_summary(
 def with_now(report: HangerReport, **changes: Any) -> HangerReport:
     """Return a report of a hanger whose state now is another."""
     return replace(report, now=replace(report.now, **changes))
-
-
-def a_message(status: Status | None = None) -> HangerMessage:
-    return HangerMessage(
-        status,
-        Lead(
-            f"Hanger 3: {status.value if status else 'no test'}.", "Repeat the test within a week."
-        ),
-    )

@@ -18,7 +18,7 @@ from tests.helpers.nouns import (
     an_alert,
 )
 
-_LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 
 
 def make_baseline(workspace: Workspace) -> None:
@@ -26,7 +26,7 @@ def make_baseline(workspace: Workspace) -> None:
     with workspace.store() as store:
         (test,) = entered(store, [0])
         store.posteriors.save_selection(
-            3, [test], Selection((a_posterior(),), (1.0,)), _LINEAGE, NOW
+            3, [test], Selection((a_posterior(),), (1.0,)), LINEAGE, NOW
         )
 
 
@@ -37,7 +37,7 @@ def raise_alerts(workspace: Workspace, numbers: Iterable[int], hooks: Sequence[s
         assert baseline is not None
         for test in entered(store, numbers):
             name = test.test.id
-            store.posteriors.save(test, a_posterior(tests=(name,)), _LINEAGE, NOW)
+            store.posteriors.save(test, a_posterior(tests=(name,)), LINEAGE, NOW)
             alert = an_alert(f"hanger-3:{name}", name)
             assert store.watch.save(test, baseline, a_watched_test(name), alert, hooks, NOW)
 
@@ -49,7 +49,7 @@ def make_baselines(workspace: Workspace, hangers: Iterable[int]) -> None:
             test = _one(store, hanger, 0)
             posterior = replace(a_posterior(tests=(test.test.id,)), hanger=hanger)
             chosen = Selection((posterior,), (1.0,))
-            store.posteriors.save_selection(hanger, [test], chosen, _LINEAGE, NOW)
+            store.posteriors.save_selection(hanger, [test], chosen, LINEAGE, NOW)
 
 
 def raise_alike(workspace: Workspace, hangers: Iterable[int], hooks: Sequence[str]) -> None:
@@ -60,7 +60,7 @@ def raise_alike(workspace: Workspace, hangers: Iterable[int], hooks: Sequence[st
             assert baseline is not None
             name, now = test.test.id, utc_now()
             posterior = replace(a_posterior(tests=(name,)), hanger=hanger)
-            store.posteriors.save(test, posterior, _LINEAGE, now)
+            store.posteriors.save(test, posterior, LINEAGE, now)
             drift, message = replace(a_drift(name), hanger=hanger), f"Hanger {hanger}: fell."
             kinds, key = ("beyond threshold",), f"hanger-{hanger}:{name}"
             alert = Alert(key, hanger, name, test.time, message, (drift,), kinds)
@@ -71,7 +71,7 @@ def _one(store: Store, hanger: int, day: int) -> StoredTest:
     name = f"h{hanger}-{day}"
     received = store.recordings.receive(a_file(100 * hanger + day), NOW).recording
     found = [IdentifiedTest(a_test(name, days=day, hanger=hanger))]
-    store.tests.save(received.id, found, _LINEAGE, NOW)
+    store.tests.save(received.id, found, LINEAGE, NOW)
     (test,) = (each for each in store.tests.list_all(hanger) if each.test.id == name)
     return test
 
@@ -81,6 +81,6 @@ def entered(store: Store, numbers: Iterable[int]) -> list[StoredTest]:
     for number in numbers:
         recording = store.recordings.receive(a_file(number), NOW).recording
         test = a_test(f"t{number}", days=number / 10)
-        store.tests.save(recording.id, [IdentifiedTest(test)], _LINEAGE, NOW)
+        store.tests.save(recording.id, [IdentifiedTest(test)], LINEAGE, NOW)
         names.add(test.id)
     return [test for test in store.tests.list_all(3) if test.test.id in names]

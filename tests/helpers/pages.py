@@ -7,7 +7,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-BUILT = {DOCS / f"{name}.md" for name in ("commands", "effects", "reference", "settings", "thesis")}
+BUILT = {
+    DOCS / f"{name}.md"
+    for name in ("commands", "effects", "licences", "reference", "settings", "thesis")
+}
 """Long reference that `shm VERB --help`, `settings` and `gap effects` give too: built, not kept."""
 PAGES = sorted(
     {*DOCS.glob("*.md"), *(DOCS / "trials").glob("*.md"), DOCS / "decisions" / "index.md"} - BUILT

@@ -15,7 +15,7 @@ import httpx
 from shm.pipeline import utc_now
 from shm.store import Scope, Workspace
 from shm_daemon.web.address import Address
-from shm_daemon.web.serving import context_of, make_app, make_server
+from shm_daemon.web.serving import make_app, make_server
 
 
 @dataclass(frozen=True)
@@ -47,10 +47,9 @@ def served(
     """
     with workspace.store() as store:
         tokens = [store.upkeep.create_token(scope, scope, utc_now()) for scope in Scope]
-    context = context_of(*certificate) if certificate else None
-    server = make_server(make_app(workspace, address), Address(port=0), context)
+    server = make_server(make_app(workspace, address), Address(port=0), *certificate or ())
     with socket.create_server(("127.0.0.1", 0)) as listening:
-        url = f"http{'s' if context else ''}://127.0.0.1:{listening.getsockname()[1]}"
+        url = f"http{'s' if certificate else ''}://127.0.0.1:{listening.getsockname()[1]}"
         thread = threading.Thread(target=server.run, args=([listening],))
         thread.start()
         try:

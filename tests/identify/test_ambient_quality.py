@@ -9,7 +9,7 @@ import pytest
 
 from shm.identify import Identification, IdentifyOptions, identify
 from shm.identify.contract import Dropped, Finding, FoundMode, Poles
-from shm.identify.estimation.stabilise import merge_findings
+from shm.identify.estimation.ssi import merge_findings
 from shm.identify.measuring.ambient import LEAST_PARTS, LOUDER, ambient_measurement, set_apart
 from shm.identify.quality import Inspection
 from shm.identify.quality.of_ambient import ROWS

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.identify.measuring.frf import RATE_OVER_BAND, band_limited, least_seconds
+from shm.identify.measuring.band import RATE_OVER_BAND, band_limited, least_seconds
 
 
 @pytest.mark.parametrize("rate_hz", [512.0, 2048.0, 25_600.0])

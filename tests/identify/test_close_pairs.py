@@ -7,8 +7,8 @@ import pytest
 
 from shm.identify.contract import FoundMode
 from shm.identify.estimation.close_pairs import split_close_pairs
-from shm.identify.estimation.poles import Candidate, Pole, PoleSet
-from shm.identify.estimation.repeats import Repeats, doubt, find_again, validate_candidates
+from shm.identify.estimation.poles import Candidate, Pole, PoleSet, Repeats, find_again
+from shm.identify.estimation.validation import doubt, validate_candidates
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray
 
@@ -17,6 +17,10 @@ HITS, ORDERS = 6, (40, 44, 48, 52, 56)
 SECONDS = 12.0
 ONE, OTHER = 2 * np.pi * 20.0 * (1j - 0.001), 2 * np.pi * 20.002 * (1j - 0.001)
 SHAPES = np.array([[1.0, 0.0], [0.5, 0.0], [0.0, 1.0], [0.0, 0.6]])
+
+
+def _is_trusted(candidate: Candidate, repeat: Repeats) -> bool:
+    return not doubt(candidate, repeat, OPTIONS)
 
 
 def _models(mixing: float, alike: bool = False) -> list[list[PoleSet]]:
@@ -61,7 +65,7 @@ def _before(models: list[list[PoleSet]]) -> tuple[list[Candidate], list[Repeats]
 
 def _after(models: list[list[PoleSet]]) -> tuple[FoundMode, ...]:
     candidates, repeats = split_close_pairs(
-        *_before(models), (models[0], models[1:]), SECONDS, OPTIONS
+        *_before(models), (models[0], models[1:]), SECONDS, _is_trusted
     )
     return validate_candidates(candidates, repeats, OPTIONS)[0]
 
@@ -83,14 +87,14 @@ def test_modes_mixed_by_noise_are_both_found_with_their_own_shapes() -> None:
 def test_modes_that_noise_does_not_mix_stay_as_they_are() -> None:
     models = _models(mixing=1e-5)
     candidates, repeats = _before(models)
-    after, _ = split_close_pairs(candidates, repeats, (models[0], models[1:]), SECONDS, OPTIONS)
+    after, _ = split_close_pairs(candidates, repeats, (models[0], models[1:]), SECONDS, _is_trusted)
     assert after == candidates
 
 
 def test_poles_of_one_shape_are_not_made_into_two_modes() -> None:
     models = _models(mixing=0.05, alike=True)
     candidates, repeats = _before(models)
-    after, _ = split_close_pairs(candidates, repeats, (models[0], models[1:]), SECONDS, OPTIONS)
+    after, _ = split_close_pairs(candidates, repeats, (models[0], models[1:]), SECONDS, _is_trusted)
     assert after == candidates
 
 
@@ -98,5 +102,7 @@ def test_two_hits_prove_no_pair() -> None:
     models = _models(mixing=0.05)
     candidates = _candidates(models[0])
     repeats = find_again(candidates, models[1:3])
-    after, _ = split_close_pairs(candidates, repeats, (models[0], models[1:3]), SECONDS, OPTIONS)
+    after, _ = split_close_pairs(
+        candidates, repeats, (models[0], models[1:3]), SECONDS, _is_trusted
+    )
     assert after == candidates

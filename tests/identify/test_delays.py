@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from shm.identify import IdentifyOptions, identify
-from shm.identify.estimation.poles import Candidate, Pole, PoleSet, collinearity
-from shm.identify.estimation.stabilise import delays_s, remove_candidate_delays, remove_delays
+from shm.identify.estimation.delays import delays_s, remove_candidate_delays, remove_delays
+from shm.identify.estimation.poles import Candidate, Pole, PoleSet
+from shm.identify.estimation.shapes import collinearity
 from shm.values import Channel, FloatArray, Hanger, Recording
 
 OPTIONS = IdentifyOptions(2.0, 100.0)

@@ -13,7 +13,7 @@ import pytest
 
 from shm.identify import Identification, IdentifyOptions, identify
 from shm.identify.contract import Hit
-from shm.identify.estimation.courses import common_drift, hit_shares
+from shm.identify.estimation.drift import common_drift, hit_shares
 from shm.values import Channel, QualityCheck, Recording
 
 RATE_HZ, SLOT_S, HITS = 512.0, 6.0, 4

@@ -11,10 +11,9 @@ import pytest
 
 from shm.errors import UsageError
 from shm.identify import IDENTIFIERS, IdentifyOptions
-from shm.identify.contract import Finding, Measurement
-from shm.identify.estimation.repeats import FREQUENCY_FLOOR
+from shm.identify.contract import FREQUENCY_FLOOR, Finding, Measurement
 from shm.identify.identification import identifier
-from shm.identify.measuring.setups import measurement_of_recordings
+from shm.identify.measuring.setups import measure_recordings
 from shm.values import FloatArray, Recording
 from tests.identify.signals import Planted, Sensor, hanger_modes, recording
 
@@ -23,7 +22,7 @@ identify = IDENTIFIERS["ssi"]
 
 
 def _measured(modes: list[Planted], **keywords: object) -> Measurement:
-    return measurement_of_recordings([recording(modes, **keywords)], OPTIONS)  # type: ignore[arg-type]
+    return measure_recordings([recording(modes, **keywords)], OPTIONS)[0]  # type: ignore[arg-type]
 
 
 @cache
@@ -91,7 +90,7 @@ def test_noise_holds_no_mode() -> None:
         rng = np.random.default_rng(hits)
         record = recording(hanger_modes(), hits=hits, seconds=5.0, rate_hz=512.0)
         noise = [rng.standard_normal(len(c.values)) for c in record.accelerations]
-        measurement = measurement_of_recordings([_sensing(record, noise)], OPTIONS)
+        measurement = measure_recordings([_sensing(record, noise)], OPTIONS)[0]
         assert _frequencies(identify(measurement, OPTIONS)) == []
 
 
@@ -117,14 +116,14 @@ def test_two_channels_that_say_the_same_do_no_harm() -> None:
     for noise in (0.0, 0.02):
         record = recording(planted, (Sensor(), Sensor()), noise=noise, hits=3, seconds=5.0)
         same = _sensing(record, [record.accelerations[0].values] * 2)
-        finding = identify(measurement_of_recordings([same], OPTIONS), OPTIONS)
+        finding = identify(measure_recordings([same], OPTIONS)[0], OPTIONS)
         assert _frequencies(finding) == pytest.approx([6.0, 13.5, 23.0], rel=5e-4)
 
 
 def test_modes_out_of_the_band_are_left_out() -> None:
     narrow = IdentifyOptions(10.0, 30.0)
     record = recording(hanger_modes(), noise=0.01)
-    found = _frequencies(identify(measurement_of_recordings([record], narrow), narrow))
+    found = _frequencies(identify(measure_recordings([record], narrow)[0], narrow))
     assert len(found) == 4
     assert all(10 < frequency < 30 for frequency in found)
 

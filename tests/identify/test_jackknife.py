@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from shm.identify.estimation.repeats import FREQUENCY_FLOOR, frequency_sd, jackknife_sd, smooth_sds
+from shm.identify.contract import FREQUENCY_FLOOR
+from shm.identify.estimation.spread import frequency_sd, jackknife_sd, smooth_sds
 
 
 def _without_each(values: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 
 from shm.identify import IdentifyOptions
 from shm.identify.contract import FoundMode, Measurement
-from shm.identify.measuring.setups import measurement_of_recordings
+from shm.identify.measuring.setups import measure_recordings
 from shm.identify.setup_merging.modal_participation import levels, ringing
 from shm.values import FloatArray
 from tests.identify.signals import PULSE_S, Planted, hanger_modes, recording
@@ -46,20 +46,20 @@ def _with_unused(measurement: Measurement, number: int) -> Measurement:
 
 def test_residues_are_shape_at_the_sensor_times_shape_at_the_hammer() -> None:
     """Each of four hits says so, though the one before still rings with up to 0.7 of its level."""
-    found = ringing(measurement_of_recordings([RECORD], OPTIONS), _modes(PLANTED)).residue
+    found = ringing(measure_recordings([RECORD], OPTIONS)[0], _modes(PLANTED)).residue
     expected = np.broadcast_to(_residues(PLANTED), found.shape)
     np.testing.assert_allclose(found, expected, atol=0.02)
 
 
 def test_after_a_hit_that_is_not_used_the_next_says_nothing() -> None:
-    measurement = _with_unused(measurement_of_recordings([RECORD], OPTIONS), 1)
+    measurement = _with_unused(measure_recordings([RECORD], OPTIONS)[0], 1)
     found = ringing(measurement, _modes(PLANTED)).residue
     assert np.isnan(found).all(axis=(1, 2)).tolist() == [False, True, False]
     np.testing.assert_allclose(found[2], _residues(PLANTED), atol=0.02)
 
 
 def test_where_every_used_hit_follows_another_rest_is_assumed() -> None:
-    measurement = measurement_of_recordings([recording(PLANTED, hits=2)], OPTIONS)
+    measurement = measure_recordings([recording(PLANTED, hits=2)], OPTIONS)[0]
     found = ringing(_with_unused(measurement, 0), _modes(PLANTED)).residue
     assert np.all(np.isfinite(found))
 
@@ -72,7 +72,7 @@ def test_the_level_is_the_amplitude_right_after_the_hit() -> None:
     """
     mode = Planted(13.5, 0.001, (0.5, -0.8), 0.7)
     record = recording([mode], hits=1)
-    (hit,) = (m := measurement_of_recordings([record], OPTIONS)).hits
+    (hit,) = (m := measure_recordings([record], OPTIONS)[0]).hits
     omega = 2 * np.pi * mode.frequency_hz
     impulse = hit.peak_force_n * 2 * PULSE_S / np.pi
     shape = np.cos(omega * PULSE_S / 2) / (1 - (omega * PULSE_S / np.pi) ** 2)
@@ -82,7 +82,7 @@ def test_the_level_is_the_amplitude_right_after_the_hit() -> None:
 
 
 def test_the_level_is_that_of_the_median_hit_and_of_the_set_up_that_moves_most() -> None:
-    (ring,) = [ringing(measurement_of_recordings([RECORD], OPTIONS), _modes(PLANTED))]
+    (ring,) = [ringing(measure_recordings([RECORD], OPTIONS)[0], _modes(PLANTED))]
     median = np.median(ring.amplitude_m_s2.max(axis=1), axis=0)
     np.testing.assert_allclose(levels([ring]), median, rtol=0.1)
     louder = replace(ring, amplitude_m_s2=2 * ring.amplitude_m_s2)

@@ -13,10 +13,9 @@ from pyoma2.functions import ssi
 
 from shm.errors import UsageError
 from shm.identify import IDENTIFIERS, IdentifyOptions, identify
-from shm.identify.contract import Measurement
+from shm.identify.contract import FREQUENCY_FLOOR, Measurement
 from shm.identify.estimation.pyoma import poles_of_orders
-from shm.identify.estimation.repeats import FREQUENCY_FLOOR
-from shm.identify.measuring.setups import measurement_of_recordings
+from shm.identify.measuring.setups import measure_recordings
 from shm.values import Hanger, Recording
 from tests.identify.signals import Planted, Sensor, recording
 
@@ -36,7 +35,7 @@ def _record(noise: float = 0.02) -> Recording:
 
 
 def _measurement() -> Measurement:
-    return measurement_of_recordings([_record()], OPTIONS)
+    return measure_recordings([_record()], OPTIONS)[0]
 
 
 def test_orders_that_are_not_asked_for_change_nothing_and_each_has_pyoma2s_poles() -> None:

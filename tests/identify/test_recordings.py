@@ -9,7 +9,7 @@ import pytest
 
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify import Dropped, IdentifyOptions, identify
-from shm.identify.measuring.setups import measure_set_ups, measurement_of_recordings
+from shm.identify.measuring.setups import measure_recordings, measure_set_ups
 from shm.values import Channel, Recording
 from tests.identify.signals import BIAXIAL, Sensor, half_sine, hanger_modes, recording
 
@@ -35,7 +35,7 @@ def _channels(record: Recording, *channels: Channel) -> Recording:
 
 
 def test_each_hit_gives_a_ring_down_of_all_channels() -> None:
-    measurement = measurement_of_recordings([RECORD], OPTIONS)
+    measurement = measure_recordings([RECORD], OPTIONS)[0]
     assert [hit.used for hit in measurement.hits] == 5 * [True]
     assert {decay.shape[0] for decay in measurement.decays} == {2}
     assert len(measurement.decays) == 5
@@ -44,14 +44,14 @@ def test_each_hit_gives_a_ring_down_of_all_channels() -> None:
 
 
 def test_hits_know_their_record_and_second() -> None:
-    measurement = measurement_of_recordings([RECORD, RECORD], OPTIONS)
+    measurement = measure_recordings([RECORD, RECORD], OPTIONS)[0]
     assert [hit.record for hit in measurement.hits] == 5 * [0] + 5 * [1]
     assert measurement.hits[6].start_s == pytest.approx(8.3, abs=0.01)
 
 
 def test_no_ring_down_holds_its_hit() -> None:
     """The free motion of a mode at 13.5 Hz has no step or bump where the pulse was."""
-    measurement = measurement_of_recordings([recording(hanger_modes()[1:2])], OPTIONS)
+    measurement = measure_recordings([recording(hanger_modes()[1:2])], OPTIONS)[0]
     for decay in measurement.decays:
         begin, later = np.abs(decay[0, :20]).max(), np.abs(decay[0, 20:60]).max()
         assert begin == pytest.approx(later, rel=0.2)
@@ -59,7 +59,7 @@ def test_no_ring_down_holds_its_hit() -> None:
 
 def test_a_not_a_number_sample_of_the_force_drops_its_hit_alone() -> None:
     record = _with(RECORD, "force", first=SLOT + 4000, last=SLOT + 4001, value=np.nan)
-    measurement = measurement_of_recordings([record], OPTIONS)
+    measurement = measure_recordings([record], OPTIONS)[0]
     assert [hit.used for hit in measurement.hits] == [True, False, True, True, True]
     assert measurement.hits[1].reason == "not-a-number samples"
     assert measurement.dropped == (Dropped("hits", 1, "not-a-number samples"),)
@@ -69,7 +69,7 @@ def test_a_not_a_number_sample_of_the_force_drops_its_hit_alone() -> None:
 @pytest.mark.parametrize("late", [4000, 500])
 def test_a_gap_of_one_channel_ends_the_ring_down_or_drops_its_hit(late: int) -> None:
     record = _with(RECORD, "acc_2", first=SLOT + late, last=SLOT + late + 1, value=np.nan)
-    measurement = measurement_of_recordings([record], OPTIONS)
+    measurement = measure_recordings([record], OPTIONS)[0]
     whole = late == 4000
     assert [hit.used for hit in measurement.hits] == [True, whole, True, True, True]
     told = measurement.hits[1].cut if whole else measurement.hits[1].reason
@@ -79,7 +79,7 @@ def test_a_gap_of_one_channel_ends_the_ring_down_or_drops_its_hit(late: int) -> 
 
 def test_a_channel_that_is_mostly_not_a_number_is_dropped_instead_of_the_hits() -> None:
     record = _with(RECORD, "acc_1", first=0, last=4 * SLOT, value=np.nan)
-    measurement = measurement_of_recordings([record], OPTIONS)
+    measurement = measure_recordings([record], OPTIONS)[0]
     assert [point.name for point in measurement.points] == ["acc_2"]
     assert sum(hit.used for hit in measurement.hits) == 5
     assert measurement.dropped[0].what == "channel acc_1"
@@ -87,19 +87,19 @@ def test_a_channel_that_is_mostly_not_a_number_is_dropped_instead_of_the_hits() 
 
 def test_a_dead_channel_is_dropped() -> None:
     record = _with(RECORD, "acc_2", first=0, last=5 * SLOT, value=0.07)
-    (dropped,) = measurement_of_recordings([record], OPTIONS).dropped
+    (dropped,) = measure_recordings([record], OPTIONS)[0].dropped
     assert (dropped.what, "never changes" in dropped.reason) == ("channel acc_2", True)
 
 
 def test_a_channel_without_plane_among_others_with_is_dropped() -> None:
     record = recording(hanger_modes(), (BIAXIAL[0], Sensor(None, 2.0)))
-    (dropped,) = measurement_of_recordings([record], OPTIONS).dropped
+    (dropped,) = measure_recordings([record], OPTIONS)[0].dropped
     assert (dropped.what, "plane" in dropped.reason) == ("channel acc_2", True)
 
 
 def test_a_ring_down_cut_off_is_dropped() -> None:
     channels = [replace(c, values=c.values[: 4 * SLOT + 1000]) for c in RECORD.channels]
-    measurement = measurement_of_recordings([_channels(RECORD, *channels)], OPTIONS)
+    measurement = measure_recordings([_channels(RECORD, *channels)], OPTIONS)[0]
     assert [hit.reason for hit in measurement.hits][-1] == "ring-down cut off"
 
 
@@ -115,10 +115,10 @@ def test_no_usable_hit_is_not_identifiable_and_says_why() -> None:
     record = _with(RECORD, "acc_1", first=0, last=5 * SLOT, value=np.nan)
     record = _with(record, "acc_2", first=0, last=5 * SLOT, value=np.nan)
     with pytest.raises(NotIdentifiable, match="not-a-number"):
-        measurement_of_recordings([record], OPTIONS)
+        measure_recordings([record], OPTIONS)[0]
     silent = _with(RECORD, "force", first=0, last=5 * SLOT, value=0.0)
     with pytest.raises(NotIdentifiable, match="no hammer hit") as caught:
-        measurement_of_recordings([silent], OPTIONS)
+        measure_recordings([silent], OPTIONS)[0]
     assert (caught.value.file, caught.value.channel) == ("test.csv", "force")
     assert caught.value.remedy
 
@@ -163,7 +163,7 @@ def test_a_ring_down_is_used_from_where_it_is_no_longer_clipped() -> None:
         for c in RECORD.channels
     ]
     record = _channels(RECORD, *clipped)
-    measurement = measurement_of_recordings([record], OPTIONS)
+    measurement = measure_recordings([record], OPTIONS)[0]
     assert all(hit.used for hit in measurement.hits)
     assert {hit.cut for hit in measurement.hits} == {"clipped acceleration: acc_1"}
     found, sound = (identify([each], OPTIONS, test_id="t").test for each in (record, RECORD))
@@ -178,7 +178,7 @@ def test_double_hits_are_used_from_after_the_second_blow() -> None:
         begin = hit * SLOT + 307 + 60
         force[begin : begin + 4] += half_sine(1024.0, 600.0)
     record = _channels(RECORD, replace(RECORD.channels[0], values=force), *RECORD.channels[1:])
-    measurement = measurement_of_recordings([record], OPTIONS)
+    measurement = measure_recordings([record], OPTIONS)[0]
     assert [hit.cut for hit in measurement.hits] == [
         "",
         "double hit",

@@ -10,8 +10,7 @@ import pytest
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify import Identification, IdentifyOptions, identify
 from shm.identify.contract import FoundMode
-from shm.identify.mode_ordering.planes import directions
-from shm.identify.quality.of_sensors import sensor_places
+from shm.identify.quality.of_sensors import directions, sensor_places
 from shm.simulate import HammerPlan, HangerState
 from shm.values import NAN, PLANES, Mode, QualityCheck, Recording, ResponsePoint, ShapePoint
 from tests.helpers.beam_shapes import mode_shape

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.identify.estimation.poles import Candidate, Pole
-from shm.identify.estimation.repeats import Repeats, doubt
+from shm.identify.estimation.poles import Candidate, Pole, Repeats
 from shm.identify.estimation.ssi import _few_sums
+from shm.identify.estimation.validation import doubt
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
 

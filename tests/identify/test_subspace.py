@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.identify.estimation.poles import collinearity, real_shape
+from shm.identify.estimation.hankel import hankel
 from shm.identify.estimation.pyoma import poles_of_orders
-from shm.identify.estimation.ssi import hankel
+from shm.identify.estimation.shapes import collinearity, real_shape
 
 RATE_HZ = 256.0
 

@@ -9,7 +9,8 @@ import pytest
 
 from shm.identify import IdentifyOptions
 from shm.identify.contract import Measurement
-from shm.identify.estimation.ssi import Window, through_windows, windows
+from shm.identify.estimation.hankel import Window, windows
+from shm.identify.estimation.ssi import through_windows
 from shm.values import FloatArray, ResponsePoint
 from tests.benchmarks.recordings_limit import ring_down_covariance
 from tests.worlds.recordings import ModeTruth

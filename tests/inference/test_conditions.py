@@ -92,31 +92,6 @@ def test_an_adopted_class_recovers_the_planted_tension_and_covers_it() -> None:
     assert found.r_hat < 1.1
 
 
-@pytest.mark.slow
-def test_tests_at_two_temperatures_tell_the_tension_at_the_reference() -> None:
-    size = "tension_per_kelvin_n_k=-3300..-2700"
-    model = build(f"{WARMTH}:{size}", HANGER_3, THESIS)
-    theta = parameters(model, tension_per_kelvin_n_k=-3000.0)
-    (test,) = measured(model, theta, [a_test("a", 25.0)])
-    found = update([test], model, UpdateOptions(samples=200))
-    assert found.tension_n.mean() == pytest.approx(HANGER_3.nominal_tension_n, rel=0.02)
-    ignored = update([test], build("beam1", HANGER_3, THESIS), UpdateOptions(samples=200))
-    assert ignored.tension_n.mean() < 0.96 * HANGER_3.nominal_tension_n
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param("beam1", marks=pytest.mark.trial), "beam1+bending_stiffness@everywhere"],
-)
-def test_a_known_mass_is_part_of_the_prediction_and_not_of_the_tension(name: str) -> None:
-    adopted = build("beam1+bending_stiffness@everywhere", HANGER_3, THESIS)
-    laden = a_test("a", mass=AddedMass(25.0, 3.6))
-    (test,) = measured(adopted, parameters(adopted), [laden], modes=4)
-    found = update([test], build(name, HANGER_3, THESIS), UpdateOptions(samples=100))
-    assert found.tension_n.mean() == pytest.approx(HANGER_3.nominal_tension_n, rel=0.05)
-
-
 @pytest.mark.parametrize("name", ["beam1", "beam2"])
 def test_a_known_mass_moves_a_beam_as_finite_elements_do(name: str) -> None:
     """Beam classes take the mass's share from the general model; the simulator has its own."""

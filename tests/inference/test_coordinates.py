@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import kstest, norm
+from scipy.stats import norm
 
 from shm.inference.coordinates import Coordinates
 from shm.models import THESIS, build
@@ -17,18 +17,6 @@ def coordinates(request) -> Coordinates:
     return Coordinates(model.prior, model.swaps, 3e6)
 
 
-def test_places_inverts_theta_and_folding_keeps_each_pair(coordinates: Coordinates) -> None:
-    prior, rng = coordinates.prior, np.random.default_rng(1)
-    theta = rng.uniform(prior.lower, prior.upper, (4000, len(prior.names)))
-    z = coordinates.places(theta)
-    np.testing.assert_allclose(coordinates.theta(z), theta, rtol=1e-7)
-    folded = coordinates.fold(z)
-    assert np.isfinite(coordinates.log_prior(folded)).all()
-    np.testing.assert_array_equal(coordinates.fold(folded), folded)
-    for one, other in ((2, 4), (3, 5)) if theta.shape[1] == 6 else ():
-        np.testing.assert_allclose(np.sort(folded[:, [one, other]]), np.sort(z[:, [one, other]]))
-
-
 def test_the_folded_density_is_that_of_the_draws(coordinates: Coordinates) -> None:
     """Compare the density's integral over a region with the fraction of draws within it."""
     rng, d = np.random.default_rng(2), coordinates.dimension
@@ -39,13 +27,6 @@ def test_the_folded_density_is_that_of_the_draws(coordinates: Coordinates) -> No
     fraction = np.all(np.abs(drawn) < 0.8, axis=1).mean()
     error = np.hypot(weight.std(), np.sqrt(fraction)) / np.sqrt(100_000)
     assert weight.mean() == pytest.approx(fraction, abs=4 * error)
-
-
-def test_finished_draws_are_uniform(coordinates: Coordinates) -> None:
-    rng, prior = np.random.default_rng(3), coordinates.prior
-    theta = coordinates.finished(coordinates.draw_prior(4000, rng), rng)
-    for fraction in ((theta - prior.lower) / (prior.upper - prior.lower)).T:
-        assert kstest(fraction, "uniform").pvalue > 1e-4
 
 
 def test_a_pair_is_unfolded_where_its_posterior_reaches_the_fold() -> None:

@@ -7,16 +7,14 @@ from dataclasses import replace
 
 import pytest
 
-from shm.documents import posterior_document
 from shm.errors import BadInput
 from shm.gap import GapOptions, diagnose
 from shm.gap.data_checks import usable
-from shm.inference import UpdateOptions, refresh, update
+from shm.inference import UpdateOptions, update
 from shm.inference.data_checks import check_data, check_for_update, find_line_hz
 from shm.models import DESCRIPTION, THESIS, build
 from shm.report.diagnosis_summary import write_lead
-from shm.store.blobs import pack_samples, posterior_from
-from shm.values import NAN, Hanger, ModalTest, Mode, Posterior, Scatter, Selection
+from shm.values import NAN, Hanger, ModalTest, Mode, Scatter, Selection
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 
@@ -114,14 +112,6 @@ def test_ten_equal_readings_count_as_one_of_a_line() -> None:
     assert check_data([replace(each, hanger=None) for each in TEN], BAR).remarks == checked.remarks
 
 
-def test_a_repeatability_is_not_below_the_line() -> None:
-    ten, one = (update(tests, build("beam1", BAR), FEW) for tests in (TEN, TEN[:1]))
-    assert ten.repeatability_sd_n > 2 * 0.024 * ten.tension_n.mean()
-    assert ten.repeatability_sd_n > 20 * one.repeatability_sd_n
-    assert ten.caveats[0].startswith("Counted once")
-    assert not any("misses" in each for each in ten.faults)  # by less than a line
-
-
 @pytest.mark.parametrize(
     ("frequencies", "line_hz"),
     [
@@ -137,13 +127,6 @@ def test_the_line_is_inferred_where_it_can_be(
     frequencies: tuple[float, ...], line_hz: float
 ) -> None:
     assert find_line_hz(frequencies) == pytest.approx(line_hz)
-
-
-def test_what_differs_in_one_test_or_has_an_error_is_no_line() -> None:
-    tests = [first("a", 10.25), replace(first("b", 10.25), temperature_c=21.0), first("c", 10.5)]
-    assert check_data(tests, STAY).tests == tuple(tests)
-    stated = [modes_of("a", (10.25, 20.5), 0.1), modes_of("b", (10.25, 20.75), 0.1)]
-    assert check_data(stated, replace(STAY, nominal_tension_n=34e3)).tests == tuple(stated)
 
 
 BRIDGE = Hanger(3, 12.0, 200e9, 0.01327, 1.402e-5, 103.5, 711e3)
@@ -217,41 +200,9 @@ def test_a_slender_string_is_not_called_a_stiff_bar() -> None:
     assert "stiff a bar" not in write_lead(replace(missed, slenderness=NAN))
 
 
-def test_remarks_are_stored_and_documents_without_them_are_read() -> None:
-    posterior = update(TEN, build("beam1", BAR), FEW)
-    document = posterior_document(posterior)
-    assert document["caveats"][0] == posterior.remarks[0]
-
-    def again() -> Posterior:
-        return posterior_from(document, pack_samples(posterior))
-
-    assert again().remarks == posterior.remarks
-    assert again().caveats == posterior.caveats
-    for name in ("remarks", "taut_string_tension_n", "stated_error_percent"):
-        del document[name]
-    assert again().remarks == ()
-
-
 def test_the_thesis_counts_copies_as_given() -> None:
     assert check_for_update(TEN, build("beam1", HANGER_3, THESIS)) == (TEN, {})
     assert check_for_update(TEN, build("beam1", BAR, DESCRIPTION))[0] != TEN
-
-
-def test_a_refreshed_posterior_has_the_same_remarks() -> None:
-    model = build("beam1", BAR)
-    known = update(TEN[:1], model, FEW)
-    assert refresh(TEN, model, known, FEW).remarks == check_data(TEN, BAR).remarks
-
-
-def test_nonsense_is_left_to_those_who_refuse_it() -> None:
-    for mode in (
-        Mode("transverse", 1, 0.0),
-        Mode("transverse", 0, 5.0),
-        Mode("transverse", 1, NAN),
-    ):
-        tests = [ModalTest(name, (mode,), temperature_c=k) for k, name in enumerate("abc")]
-        assert len(check_data(tests, BRIDGE).tests) in (1, 3)
-        check_for_update(tests, build("beam1", BRIDGE))
 
 
 def test_what_is_left_must_hold_a_mode() -> None:
@@ -278,13 +229,6 @@ def test_reading_in_another_unit_is_left_out_and_said() -> None:
     assert check_data(right, TAUT).tests == tuple(right)
 
 
-def test_small_reading_of_slack_bar_is_kept() -> None:
-    slack = replace(modes_of("t1", (120.0, 330.0), 0.1), tension_read_n=300.0)
-    string_n = check_for_update([slack], build("beam1", BAR))[1]["taut_string_tension_n"]
-    assert string_n > 30 * 300.0
-    assert check_data([slack], BAR).remarks == ()
-
-
 def test_stated_error_larger_than_any_reading_is_named() -> None:
     wide = replace(SLIP, modes=(replace(SLIP.modes[0], frequency_sd_hz=100.0), *SLIP.modes[1:]))
     (remark,) = check_data([wide], TAUT).remarks
@@ -309,8 +253,3 @@ def test_other_unit_is_said_first_and_no_other_orders_where_nothing_fits() -> No
     assert "The orders decide" not in said
     assert "120 times the nominal" in said
     assert "The orders decide" in " ".join(replace(off, misfit_percent=3.0).caveats)
-
-
-def test_emcee_names_the_class_whose_evidence_is_worse() -> None:
-    posterior = replace(update(TEN[:1], build("beam1", BAR), FEW), method="emcee", sampler="")
-    assert "Trust the evidence of beam1 less" in " ".join(posterior.caveats)

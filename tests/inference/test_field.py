@@ -10,7 +10,6 @@ from scipy.special import logsumexp
 from scipy.stats import t
 
 from shm.assumptions import DEFAULTS
-from shm.errors import BadInput
 from shm.inference.field import FieldLikelihood
 from shm.inference.systematic_errors import (
     errors_of_sensors,
@@ -21,7 +20,7 @@ from shm.inference.systematic_errors import (
 )
 from shm.models import build
 from shm.models.base import Conditions
-from shm.values import NAN, PLANES, AddedMass, FloatArray, ModalTest, Mode, Plane
+from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Plane
 from tests.helpers.hangers import HANGER_3
 
 MODEL = build("beam2", HANGER_3)
@@ -126,23 +125,6 @@ def test_one_mode_under_two_conditions_shares_its_error(off: float) -> None:
     assert abs(found - alone) > 0.15
 
 
-def test_frequencies_of_unstated_error_have_the_assumed_one() -> None:
-    sd = DEFAULTS.unstated_frequency_sd.value
-    stated = FieldLikelihood([measured("a", sd=sd, off=0.0)], MODEL)
-    unstated = FieldLikelihood([measured("a", sd=NAN, off=0.0)], MODEL)
-    np.testing.assert_allclose(unstated.identification_error, stated.identification_error)
-    at = stated.predict(MODEL, THETA) * (1 + 3e-4 * np.linspace(-1, 1, 5))[:, None]
-    np.testing.assert_allclose(unstated.marginal(at), stated.marginal(at), rtol=1e-9)
-
-
-def test_several_tests_say_an_error_that_nobody_stated() -> None:
-    tests = [measured(f"t{k}", sd=NAN, off=30.0, seed=k) for k in range(12)]
-    likelihood = FieldLikelihood(tests, MODEL)
-    assert likelihood.frequencies == 3
-    single = likelihood.identification_error * np.sqrt(12)
-    np.testing.assert_allclose(single, 3e-3, rtol=0.3)
-
-
 def everything(sd: float = 1e-4) -> ModalTest:
     return measured("a", tuple((plane, order) for plane in PLANES for order in range(1, 7)), sd)
 
@@ -192,20 +174,6 @@ def test_a_reading_of_the_tension_is_one_more_datum() -> None:
         expected = -(away**2) / 2 - np.log(0.02 * 700e3 * np.sqrt(2 * np.pi))
         gain = read.marginal(whole)[0] - bare.marginal(frequencies)[0]
         assert gain == pytest.approx(expected, abs=1e-9)
-
-
-def test_each_mode_of_each_test_finds_its_prediction() -> None:
-    tests = [measured("a"), measured("b", mass=CLAMP), measured("c", FEW[::-1])]
-    likelihood = FieldLikelihood(tests, MODEL)
-    by_mode = likelihood.by_mode(likelihood.predict(MODEL, THETA))[0]
-    seen = [mode.frequency_hz for test in tests for mode in test.modes]
-    np.testing.assert_allclose(by_mode, seen, rtol=3e-3)  # supports give way a little
-    assert likelihood.highest_order == 2
-
-
-def test_tests_without_a_mode_are_refused() -> None:
-    with pytest.raises(BadInput, match="no measured frequency"):
-        FieldLikelihood([ModalTest("t", ())], MODEL)
 
 
 def test_an_unstated_radius_of_a_known_mass_is_a_load_of_its_test_alone() -> None:

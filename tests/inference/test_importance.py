@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from shm.documents import posterior_document
 from shm.inference import UpdateOptions, sampling, update
 from shm.inference.chain import run_chain
 from shm.inference.importance import Weighted
@@ -71,11 +68,6 @@ def test_emcee_agrees_with_importance_sampling(
         assert one.mean() == pytest.approx(other.mean(), abs=3 * error), name
     error = 4 * np.hypot(by_importance.log_evidence_sd, by_emcee.log_evidence_sd)
     assert by_importance.log_evidence == pytest.approx(by_emcee.log_evidence, abs=error)
-
-
-def test_the_document_states_the_method(by_importance: Posterior, by_emcee: Posterior) -> None:
-    assert posterior_document(by_importance)["method"] == "importance"
-    assert posterior_document(by_emcee)["method"] == "emcee"
 
 
 def test_emcee_continues_where_too_few_draws_are_effective(
@@ -141,18 +133,6 @@ def test_frozen_walkers_are_left_out() -> None:
     np.testing.assert_allclose(points.mean(axis=0), 0, atol=5 / np.sqrt(size))
 
 
-@pytest.mark.filterwarnings("ignore")
-def test_a_chain_that_never_moves_has_no_effective_draw() -> None:
-    class Spike(NormalProblem):
-        def log_posterior(self, points: Points) -> FloatArray:
-            return np.full(len(points.z), -np.inf)
-
-    start = np.random.default_rng(3).standard_normal((100, 3))
-    points, size, r_hat = run_chain(Spike(), start, np.random.default_rng(1))  # type: ignore[arg-type]
-    assert (size, r_hat) == (0.0, np.inf)
-    assert points.shape[1] == 3
-
-
 # ------------------------------------------------ predictions that are no number
 
 
@@ -167,17 +147,6 @@ def test_a_prediction_that_is_no_number_weighs_nothing(bad: float) -> None:
     assert np.isfinite(np.delete(log, 3)).all()
     points.predicted[:] = bad
     assert np.all(problem.log_posterior(points) == -np.inf)
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, 0.0])
-def test_a_described_bar_without_a_frequency_weighs_nothing(bad: float) -> None:
-    model = build("beam2", replace(HANGER_3, plate=None, fittings_m=(0.3, 0.3)))
-    problem = Problem.of(TESTS, model, silent)
-    points = problem.evaluate(problem.coordinates.draw_prior(5, np.random.default_rng(1)))
-    points.predicted[3] = bad
-    log = problem.log_posterior(points)
-    assert log[3] < log.max() - 100
-    assert np.isfinite(np.delete(log, 3)).all()
 
 
 class Broken(type(BEAM1)):  # type: ignore[misc]

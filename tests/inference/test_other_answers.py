@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -44,19 +42,8 @@ def a_test(
     return ModalTest("t", modes, hanger=3, **about)
 
 
-def numbered_lower(test: ModalTest) -> ModalTest:
-    return replace(test, modes=tuple(replace(m, order=m.order - 1) for m in test.modes))
-
-
 def posterior(test: ModalTest, hanger: Hanger = BAR) -> Posterior:
     return update([test], build(CLASS, hanger), OPTIONS)
-
-
-@pytest.mark.slow
-def test_higher_modes_that_are_numbered_one_too_low_are_told() -> None:
-    found = posterior(numbered_lower(a_test(range(4, 7))))
-    assert found.tension_of_other_orders_n == pytest.approx(TENSION_N, rel=0.1)
-    assert any(each.startswith("The orders decide") for each in found.faults)
 
 
 @pytest.mark.parametrize("orders", few_of([range(1, 6), range(4, 7)], 1))
@@ -84,21 +71,6 @@ def test_modes_that_a_class_meets_are_not_missed_by_it() -> None:
     assert found.faults == ()
 
 
-@pytest.mark.parametrize(
-    ("read", "says"),
-    [
-        (1.0, False),
-        pytest.param(1.3, True, marks=pytest.mark.slow),
-        pytest.param(0.8, True, marks=pytest.mark.trial),
-    ],
-)
-def test_a_reading_is_held_against_the_frequencies(read: float, says: bool) -> None:
-    test = a_test(range(1, 6), tension_read_n=read * TENSION_N, tension_read_sd_n=0.01 * TENSION_N)
-    found = posterior(test)
-    assert (found.reading_off_sd > 3) is says
-    assert any("contradicts the frequencies" in each for each in found.faults) is says
-
-
 def test_the_description_is_off_by_what_a_sound_bar_would_scatter() -> None:
     """Compare with the mean over the root of the variance that normal data take off 1."""
     rng = np.random.default_rng(1)
@@ -117,11 +89,3 @@ def test_a_diameter_that_is_wrong_by_ten_of_its_standard_deviations_is_told() ->
     found = posterior(a_test(range(1, 7)), thicker)
     assert found.description_off_sd > 3
     assert any("`shm gap diagnose`" in each for each in found.faults)
-
-
-@pytest.mark.slow
-def test_a_length_that_is_wrong_by_more_than_the_tape_is_told() -> None:
-    longer = shm.round_bar(3, diameter_m=0.05, length_m=0.96 * 9.0, **STEEL)
-    found = posterior(a_test(range(1, 8)), longer)
-    assert found.description_off_sd > 3
-    assert any(each.startswith("The description does not fit") for each in found.faults)

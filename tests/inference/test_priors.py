@@ -12,7 +12,7 @@ from scipy import stats
 from shm.assumptions import DEFAULTS
 from shm.inference.priors import SPRINGS, Ends, TensionPrior, clamped_probability, fixity_of
 from shm.inference.updating import class_probabilities
-from shm.models import THESIS, build
+from shm.models import build
 from shm.values import Hanger
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_posterior, a_test
@@ -74,13 +74,6 @@ def test_scores_invert_springs(springs: tuple[str, ...]) -> None:
     assert set(found) == set(SPRINGS)
 
 
-def test_an_end_that_no_frequency_depends_on_has_no_score() -> None:
-    ends = Ends(ROD, (), SWAPS)
-    assert not ends.felt
-    assert ends.scores({}, np.ones(3), 3).shape == (3, 0)
-    assert len(ends.log10_springs(np.empty((3, 0)), np.ones(3), np.random.default_rng(1))) == 4
-
-
 def test_folding_and_exchanging_keep_the_density_of_ends_normalised() -> None:
     ends, rng = Ends(ROD, SPRINGS, SWAPS), np.random.default_rng(3)
     scores = rng.standard_normal((40_000, 4))
@@ -128,12 +121,6 @@ def test_clamped_ends_are_as_probable_as_their_kind_states(kind: str) -> None:
     expected = clamped_probability(kind, DEFAULTS)
     assert expected == DEFAULTS[f"{kind}_clamped"].value
     assert chances == pytest.approx({"beam1": expected, "beam2": 1 - expected})
-
-
-def test_classes_of_the_thesis_are_equally_probable() -> None:
-    models = [build(name, ROD, THESIS) for name in ("beam1", "beam2")]
-    found = [replace(a_posterior(), model=each.name, log_evidence=-20.0) for each in models]
-    assert class_probabilities(found, models, [a_test()])["beam1"] == pytest.approx(0.5)
 
 
 def test_fittings_of_a_strand_are_sockets_unless_it_states_other_ends() -> None:

@@ -34,13 +34,6 @@ def modal_test(*slopes: float, amplitude: float = HITS, slope_sd: float = SLOPE_
     return ModalTest("t", modes, 3, amplitude=amplitude)
 
 
-def test_at_level_zero_is_small_amplitude() -> None:
-    (mode,) = at_level(modal_test(SLOPE), 0.0).modes
-
-    assert mode.frequency_hz == 10.0
-    assert mode.frequency_sd_hz == pytest.approx(10 * SD)
-
-
 def test_at_level_of_hits_adds_slope() -> None:
     moved = at_level(modal_test(SLOPE), HITS)
 
@@ -58,13 +51,6 @@ def test_at_level_between_holds_all_laws(share: float) -> None:
     change = mode.frequency_hz / 10 - 1
     for law in (share, share**2, share * 1.1 / (share + 0.1)):  # friction, stretching, slip
         assert abs(change - SLOPE * law) < 2 * spread
-
-
-def test_at_level_without_dependence_only_widens() -> None:
-    (mode,) = at_level(modal_test(5e-5), HITS / 2).modes
-
-    assert mode.frequency_hz == 10.0
-    assert 10 * SD < mode.frequency_sd_hz < 10 * math.hypot(SD, SLOPE_SD)
 
 
 @pytest.mark.parametrize(

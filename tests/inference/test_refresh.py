@@ -7,14 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.errors import BadInput, UsageError
+from shm.errors import UsageError
 from shm.inference import UpdateOptions, refresh, select, update
-from shm.inference.options import silent
-from shm.inference.problem import Problem
-from shm.inference.starts import known_places
 from shm.models import THESIS, Model, build, parameter_sets
 from shm.models.beam import Beam2
-from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Posterior
+from shm.values import PLANES, FloatArray, ModalTest, Mode, Posterior
 from tests.helpers.evidence_oracle import ORACLE, TABLES, modal_test
 from tests.helpers.hangers import HANGER_3
 
@@ -144,31 +141,6 @@ def test_a_mode_that_the_known_posterior_has_lost_is_found_again() -> None:
     assert found.log_evidence == pytest.approx(known.log_evidence, abs=0.25)
 
 
-def test_a_wrong_warm_start_gives_the_same_posterior() -> None:
-    """Start from a tension that is 15 % off with a narrow interval."""
-    tests, beam2 = [modal_test(TABLES["1.1"])], build("beam2", HANGER_3, THESIS)
-    expected = update(tests, beam2, UpdateOptions(1000, 5))
-    samples, column = expected.samples.copy(), expected.names.index("theta_F")
-    middle = np.median(samples[:, column])
-    samples[:, column] = 1.15 * middle + 0.002 * (samples[:, column] - middle)
-    wrong = replace(expected, samples=samples)
-    found = update(tests, beam2, UpdateOptions(1000, 5), warm_start=wrong)
-    assert_same(found, expected, ("theta_F", "theta_L"))
-    assert abs(found.log_evidence - ORACLE["1.1", "beam2", 1]) < 4 * found.log_evidence_sd
-
-
-def test_a_posterior_that_shares_no_parameter_gives_no_starts(
-    beam1: Model, known: Posterior
-) -> None:
-    problem = Problem.of([measured(beam1, 1)], beam1, silent)
-    rng = np.random.default_rng(1)
-    assert known_places(problem, replace(known, names=("mass", "damping", "sigma")), rng) is None
-    assert known_places(problem, replace(known, priors="description"), rng) is None
-    starts = known_places(problem, known, rng)
-    assert starts is not None
-    assert starts.shape[1] == 2
-
-
 class ExpensiveBeam2(Beam2):
     """State that Beam2 is expensive."""
 
@@ -215,21 +187,3 @@ def test_a_posterior_of_an_older_version_is_refreshed_and_has_usual_values() -> 
         np.testing.assert_allclose(column, model.usual(name))
     with pytest.raises(UsageError, match="was made without theta_F"):
         parameter_sets(replace(older, names=("other", *names[1:])), model)
-
-
-def test_a_posterior_of_another_class_is_refused(beam1: Model, known: Posterior) -> None:
-    later = measured(beam1, 2)
-    with pytest.raises(UsageError, match=r"beam1 says nothing about beam2"):
-        refresh([later], build("beam2", HANGER_3, THESIS), known)
-    with pytest.raises(BadInput, match="beyond the ends"):
-        refresh([replace(later, added_mass=AddedMass(25.0, 13.6))], beam1, known)
-
-
-def test_progress_is_heard_from_start_to_end(beam1: Model, known: Posterior) -> None:
-    heard: list[tuple[str, float]] = []
-    refresh(
-        [measured(beam1, 2)], beam1, known, UpdateOptions(200), lambda *args: heard.append(args)
-    )
-    assert heard[0] == ("beam1", 0.0)
-    assert heard[-1] == ("beam1", 1.0)
-    assert [fraction for _, fraction in heard] == sorted(fraction for _, fraction in heard)

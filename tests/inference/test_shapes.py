@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
 from shm.inference.options import UpdateOptions
-from shm.inference.posterior import DIFFERENCE
-from shm.inference.problem import Problem
 from shm.inference.shapes import MeasuredShapes, swaps_of
 from shm.inference.updating import update
 from shm.models import AsMade, build
@@ -19,10 +16,6 @@ from tests.helpers.hangers import HANGER_3
 
 ROD = replace(HANGER_3, plate=None)
 PLACES_M = (0.9, 1.9, 3.3)
-
-
-def silent(name: str, fraction: float) -> None:
-    """Show no progress."""
 
 
 def as_made(hanger: Hanger) -> AsMade:
@@ -116,18 +109,6 @@ def test_tests_of_one_mode_are_one_shape_whose_sensors_still_err() -> None:
     off = truth(model, log10_k1=4.3)
     ratio = np.sum(many.misfits(model, off) ** 2) / np.sum(one.misfits(model, off) ** 2)
     assert 1 < ratio < 5  # and not 100: gains and places repeat
-
-
-@pytest.mark.parametrize("hanger", [ROD, replace(ROD, fittings_m=(0.25, 0.25))])
-def test_slopes_are_differences(hanger: Hanger) -> None:
-    model = as_made(hanger)
-    problem = Problem.of([measured(model, truth(model))], model, silent)
-    z = problem.coordinates.draw_prior(2, np.random.default_rng(1))
-    found = problem.slopes(z)
-    for column, step in enumerate(1e-4 * np.eye(z.shape[1])):
-        centred = (problem.residual(z - step) - problem.residual(z + step)) / 2e-4
-        np.testing.assert_allclose(found[:, :, column], centred, atol=0.02, rtol=2e-3)
-    assert DIFFERENCE <= 1e-4
 
 
 def test_ends_are_exchanged_only_where_nothing_tells_them_apart() -> None:

@@ -103,20 +103,6 @@ def test_supports_that_give_way_lower_each_mode_as_the_general_model_does(hanger
     assert np.abs(mean).max() > 1e-5
 
 
-def test_fittings_stiffen_on_average_what_turns_little() -> None:
-    """A pinned end has no curvature: only its mass is felt there."""
-    none, fitted = (mean_of_ends(ends(HANGER_3), each)[0] for each in ((0.0, 0.0), (0.3, 0.3)))
-    assert np.all(np.abs(fitted - none) < 2e-3)
-    turning = ends(HANGER_3)[0]
-    held = replace(
-        turning,
-        cos=turning.p / np.hypot(turning.p, turning.q),
-        sin=turning.q / np.hypot(turning.p, turning.q),
-        clamped=np.ones_like(turning.q),
-    )
-    assert np.all(mean_of_ends((held, held), (0.3, 0.3)) > 0.01)
-
-
 def test_planes_share_half_of_what_is_unsure_of_an_end() -> None:
     order = np.array([0, 0])
     one = replace(
@@ -151,29 +137,3 @@ def test_a_section_that_wanders_moves_modes_as_much_as_the_general_models() -> N
     ratio = size / np.sqrt((exact**2).sum(axis=1))
     assert np.all((ratio[:4] > 0.9) & (ratio[:4] < 1.5))
     assert np.all(np.diff(size) < 0)
-
-
-def test_loads_of_sensors_and_ends_have_the_same_columns_whatever_modes_are_asked_for() -> None:
-    """What two sets of modes have in common is the product of their loads."""
-    both, few = (np.array([[0, order] for order in ORDERS[:count]]) for count in (6, 2))
-    one, _ = ends(SLIM)
-    cut = replace(
-        one, **{name: getattr(one, name)[:, :2] for name in ("q", "p", "sin", "cos", "clamped")}
-    )
-    for places_m in ((), (0.9, 3.1)):
-        whole, part = (errors_of_sensors(SLIM, felt_by(each), places_m)[1] for each in (one, cut))
-        np.testing.assert_allclose(part, whole[:2])
-    whole, part = (
-        loads_of_ends((each, each), (0.0, 0.0), *modes.T, modes=both)
-        for each, modes in ((one, both), (cut, few))
-    )
-    np.testing.assert_allclose(part, whole[:2])
-
-
-def test_a_short_bar_has_its_sensor_not_beyond_its_middle() -> None:
-    short = replace(SLIM, length_m=2.0)
-    mean, _ = found(short)
-    kg = short.mass_per_length_kg_m * short.length_m
-    x = np.linspace(0.1, 0.5, 2001)
-    expected = -SENSOR.value / kg * np.mean(np.sin(np.pi * np.outer(ORDERS, x)) ** 2, axis=1)
-    np.testing.assert_allclose(mean, expected, rtol=0.02)

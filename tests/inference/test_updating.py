@@ -10,7 +10,7 @@ import pytest
 from scipy.special import gammaincc, gammaln, logsumexp
 
 from shm.errors import BadInput, UsageError
-from shm.inference import UpdateOptions, class_probabilities, select, update
+from shm.inference import UpdateOptions, select, update
 from shm.inference.outcome import _at_bounds
 from shm.inference.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, Model, build
@@ -114,16 +114,6 @@ def test_exchangeable_ends_are_both_found() -> None:
     assert 0.4 < softer_deck < 0.6
 
 
-def test_the_most_probable_value_beats_every_sample() -> None:
-    tests = [modal_test(TABLE_1_1)]
-    model = build("beam2", HANGER_3, THESIS)
-    posterior = update(tests, model, UpdateOptions(300))
-    best = posterior.most_probable[None]
-    likelihood = ThesisLikelihood(tests)
-    predicted = likelihood.predict(model, best[:, :-1])
-    assert likelihood.joint(predicted, best[:, -1])[0] >= posterior.log_likelihood.max()
-
-
 def test_an_uncertain_frequency_counts_less() -> None:
     """One mode is 20 % off; with its standard deviation stated the tension must not follow it."""
     model = build("beam1", HANGER_3, THESIS)
@@ -135,29 +125,6 @@ def test_an_uncertain_frequency_counts_less() -> None:
     unsure = replace(sure, modes=modes)
     widths = [update([test], model, UpdateOptions(500)).tension_n.std() for test in (sure, unsure)]
     assert widths[1] < widths[0] / 5
-
-
-def test_selection_ranks_by_evidence_and_its_probabilities_add_to_one() -> None:
-    models = [build(name, HANGER_3, THESIS) for name in ("beam1", "beam2")]
-    selection = select([modal_test(TABLE_1_1)], models, UpdateOptions(300))
-    first, second = selection.posteriors
-    assert selection.selected.model == "beam2"
-    assert first.log_evidence > second.log_evidence
-    assert sum(selection.probabilities) == pytest.approx(1)
-    ratio = selection.probabilities[0] / selection.probabilities[1]
-    assert np.log(ratio) == pytest.approx(first.log_evidence - second.log_evidence)
-
-
-def test_stated_priors_of_classes_multiply_the_ratio_of_their_evidence() -> None:
-    models = [build(name, HANGER_3, THESIS) for name in ("beam1", "beam2")]
-    found = [Mock(model="beam1", log_evidence=-20.0), Mock(model="beam2", log_evidence=-21.0)]
-    test = [modal_test(TABLE_1_1)]
-    chances = class_probabilities(found, models, test, {"beam1": 30.0, "beam2": 10.0})
-    assert chances["beam1"] / chances["beam2"] == pytest.approx(3 * np.e)
-    assert sum(chances.values()) == pytest.approx(1)
-    for odd in ({"beam1": 1.0}, {"beam1": 1.0, "beam2": 0.0}, {"beam1": 1, "beam2": 1, "s1": 1}):
-        with pytest.raises(UsageError, match="prior of"):
-            select(test, models, class_priors=odd)
 
 
 def test_repeatability_is_no_less_than_the_data_can_tell() -> None:
@@ -176,18 +143,6 @@ def test_repeatability_is_no_less_than_the_data_can_tell() -> None:
     rise = np.log(frequencies_hz(1.01) / frequencies_hz(0.99)) / (0.02 * 1.4e6)
     least_n = sd / np.sqrt((rise**2).sum())
     assert posterior.repeatability_sd_n > 0.9 * least_n
-
-
-def test_progress_is_heard_from_start_to_end() -> None:
-    heard: list[tuple[str, float]] = []
-    update(
-        [modal_test(TABLE_1_1)],
-        build("beam1", HANGER_3, THESIS),
-        UpdateOptions(200),
-        lambda label, fraction: heard.append((label, fraction)),
-    )
-    assert heard[0] == ("beam1", 0.0)
-    assert heard[-1] == ("beam1", 1.0)
 
 
 def test_what_cannot_be_updated_is_refused_with_a_remedy() -> None:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from shm.inference.mixture import Normal, TMixture, effective, normalised
 from shm.inference.valley import Proposal, valleys_through
 from shm.values import FloatArray, IntArray
 
@@ -86,31 +85,6 @@ def test_a_normal_target_in_the_bent_valley_integrates_to_one(proposal: Proposal
     assert np.log(found) == pytest.approx(np.log(evidence), abs=0.03)
 
 
-def test_the_density_of_given_points_is_that_of_their_draw(proposal: Proposal) -> None:
-    (valley,) = proposal.valleys
-    y = np.random.default_rng(3).standard_normal((300, 3))
-    z, square, log_size = valley.draw(y, np.ones(len(y)), np.random.default_rng(4))
-    np.testing.assert_allclose(z @ valley.free, y, atol=1e-9)
-    found = valley.distance(z)
-    np.testing.assert_allclose(found[0], square, atol=0.1)
-    np.testing.assert_allclose(found[1], log_size, atol=0.05)
-    np.testing.assert_allclose(bend(valley.optimum(y))[:, 0], 0, atol=2 * SD)
-
-
-def test_refitting_makes_more_draws_effective(proposal: Proposal) -> None:
-    rng, problem = np.random.default_rng(5), BentProblem()
-
-    def weights(own: Proposal) -> tuple[object, FloatArray]:
-        draws = own.draw(problem, 4000, rng)  # type: ignore[arg-type]
-        target = norm(0, SD).logpdf(bend(draws.z)[:, 0]) + norm.logpdf(draws.z).sum(axis=1)
-        return draws, normalised(target - own.log_density(draws))
-
-    draws, first = weights(proposal)
-    _, second = weights(proposal.refitted(draws, first))  # type: ignore[arg-type]
-    assert effective(second) > effective(first)
-    assert effective(second) > 1500
-
-
 def test_points_in_two_valleys_make_two(proposal: Proposal) -> None:
     class Twins(BentProblem):
         """Give z0^2 = 1: two valleys 200 standard deviations apart."""
@@ -139,22 +113,3 @@ def test_points_in_two_valleys_make_two(proposal: Proposal) -> None:
     assert weight.mean() == pytest.approx(norm.pdf(1), rel=0.03)  # both, each with slope 2
     assert weight[draws.z[:, 0] > 0].sum() / weight.sum() == pytest.approx(0.5, abs=0.05)
     assert not valleys[0].follows(points[nearest == 1]).any()
-
-
-def test_a_few_points_make_one_part_of_a_mixture() -> None:
-    three = np.array([[0.0, 0.0], [50.0, 50.0], [99.0, 0.0]])
-    few = np.repeat(three, 2, axis=0) + 1e-3 * np.eye(6, 2)
-    made = TMixture.of(few, 3, np.random.default_rng(3))
-    assert len(made.parts) == 1
-    np.testing.assert_allclose(made.parts[0].mean, few.mean(axis=0))
-
-
-def test_a_part_that_few_draws_support_stays_near_what_it_was() -> None:
-    """Keep its covariance: one borrowed from all would be that of the distance of the parts."""
-    rng = np.random.default_rng(1)
-    needle = Normal(np.array([10.0, 0.0]), 1e-4 * np.eye(2))
-    parts = TMixture([Normal(np.zeros(2), np.eye(2)), needle], np.ones(2))
-    z = np.vstack([rng.standard_normal((200, 2)), needle.draw_t(3, rng)])
-    fitted = parts.refitted(z, np.full(len(z), 1 / len(z)))
-    assert np.linalg.norm(fitted.parts[1].mean - needle.mean) < 0.05
-    assert np.diag(fitted.parts[1].covariance).max() < 1e-3

@@ -10,9 +10,9 @@ import pytest
 from shm.errors import BadInput, UsageError
 from shm.inference import UpdateOptions
 from shm.models import PRIORS, THESIS, AsMade, Model, applicable, build, class_of, described
-from shm.models.adopted import AdoptedEffect, AdoptedName, missed_by_one_test, places_of
+from shm.models.adopted import AdoptedEffect, AdoptedName, places_of
 from shm.models.effects import EFFECTS, Variant
-from shm.values import AddedMass, ModalTest, Scatter
+from shm.values import AddedMass, ModalTest
 from tests.helpers import quick_update
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import modes_of
@@ -112,35 +112,6 @@ def test_every_effect_of_the_hanger_can_be_adopted_and_moves_a_frequency(
     assert np.abs(found / bare - 1).max() > 1e-4
 
 
-def test_end_springs_that_an_effect_adds_are_told_for_the_watch() -> None:
-    model = build("beam1+rotational_end_flexibility@deck_end.transverse", HANGER_3)
-    deck, arch = model.springs_n_m_rad(parameters(model, log10_k1=6.5))
-    np.testing.assert_allclose(deck, [[10**6.5, np.inf]])
-    assert np.isinf(arch).all()
-
-
-def test_a_temperature_counts_from_the_reference_of_the_name() -> None:
-    model = build(WARMTH, HANGER_3)
-    theta = parameters(model, tension_per_kelvin_n_k=-2000.0)
-    warm = model.conditions(ModalTest("t", (), temperature_c=25.0))
-    assert warm.temperature_shift_k == 15.0
-    looser = parameters(model, theta_F=1 - 30e3 / HANGER_3.nominal_tension_n)
-    np.testing.assert_allclose(
-        model.frequencies_at(theta, 6, warm), model.frequencies_hz(looser, 6), rtol=1e-9
-    )
-
-
-def test_conditions_that_no_effect_follows_are_not_noticed() -> None:
-    model = build(MASS, HANGER_3)
-    hot, cold = (
-        ModalTest("t", (), temperature_c=t, amplitude=a) for t, a in ((30, 2.0), (-5, 0.3))
-    )
-    assert model.conditions(hot) == model.conditions(cold)
-    level = build("beam1+geometric_hardening@everywhere", HANGER_3)
-    assert level.conditions(hot) != level.conditions(cold)
-    assert level.conditions(ModalTest("t", ())).amplitude == 1.0
-
-
 def test_a_known_mass_lowers_the_modes_that_move_it() -> None:
     test = ModalTest("t", modes_of(HANGER_3, 1.0), added_mass=AddedMass(25.0, 6.0))
     model = build(MASS, HANGER_3)
@@ -182,24 +153,6 @@ def test_tension_and_springs_keep_the_names_and_the_ranges_of_their_class(
     own = build(baseline, HANGER_3, priors).bounds
     shared = [name for name in own if name == "theta_F" or name.startswith("log10_k")]
     assert {name: bounds[name] for name in shared} == {name: own[name] for name in shared}
-
-
-def test_a_tension_that_was_weighed_stays_as_exact_in_an_adopted_class() -> None:
-    weighed = replace(HANGER_3, scatter=Scatter(tension=0.02))
-    assert build(MASS, weighed).bounds["theta_F"] == pytest.approx((0.98, 1.02))
-
-
-def test_a_shape_reaches_one_and_vanishes_at_clamped_ends() -> None:
-    model = build(MASS, HANGER_3)
-    theta = parameters(model, log10_mass_kg=1.0, x_m=3.4)[0]
-    shape = model.shape(theta, "longitudinal", 2, np.linspace(0, 12.0, 101))
-    assert np.abs(shape).max() == pytest.approx(1, abs=1e-3)
-    np.testing.assert_allclose(shape[[0, -1]], 0, atol=1e-9)
-
-
-def test_what_a_single_test_cannot_show_is_known() -> None:
-    assert missed_by_one_test("temperature_tension", HANGER_3)
-    assert not missed_by_one_test("point_mass", HANGER_3)
 
 
 def test_class_of_a_posterior_has_its_parameters() -> None:

@@ -120,15 +120,6 @@ def test_an_effect_says_what_it_is_and_whence(name: str) -> None:
     assert (type(effect).__doc__ or "").strip().endswith(".")
 
 
-@pytest.mark.parametrize("name", EFFECTS)
-def test_places_are_told_apart_by_their_words_and_by_their_keys(name: str) -> None:
-    variants = EFFECTS[name].variants(HANGER_3, RICH)
-    by_key = {variant.key: variant for variant in variants}
-    assert len({variant.at for variant in variants}) == len(variants) == len(by_key)
-    assert all(by_key[variant.key] == variant for variant in variants)
-    assert all(re.fullmatch(r"[\w.]+", key) for key in by_key)
-
-
 @pytest.mark.parametrize(("name", "variant"), CASES)
 def test_at_zero_nothing_is_changed(name: str, variant: Variant) -> None:
     assert changed(bar(), acting(name, variant, zero=True)) == set()
@@ -165,17 +156,6 @@ def test_a_prior_is_a_range_with_a_reason_and_the_size_comes_first(
         assert one.reason.endswith(".")
 
 
-@pytest.mark.parametrize(("name", "variant"), CASES)
-def test_a_parameter_and_its_share_of_the_prior_go_both_ways(name: str, variant: Variant) -> None:
-    share = np.array([0.0, 0.01, 0.3, 0.499, 0.501, 0.77, 1.0])
-    for one in parameters_of(name, HANGER_3, variant):
-        value = one.value(share)
-        np.testing.assert_allclose(one.share(value), share, atol=1e-12)
-        size = np.abs(value) if one.signed else value
-        assert np.all((size >= one.lower * (1 - 1e-12)) | (one.lower < 0))
-        assert np.all(size <= one.upper * (1 + 1e-12))
-
-
 def test_frequencies_of_one_plane_in_one_test_show_what_they_can() -> None:
     hidden = {name for name, each in EFFECTS.items() if each.invisible(HANGER_3, BARE)}
     assert hidden == {
@@ -206,8 +186,3 @@ def test_what_data_cannot_show_is_said_in_a_sentence(name: str, survey: Survey, 
     sentence = EFFECTS[name].invisible(HANGER_3, survey)
     assert why in sentence
     assert sentence.endswith(".")
-
-
-def test_one_test_cannot_have_a_clock_of_its_own() -> None:
-    (only,) = EFFECTS["timebase"].variants(HANGER_3, BARE)
-    assert only.at == "all tests"

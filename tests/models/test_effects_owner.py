@@ -26,27 +26,6 @@ def test_the_owners_range_replaces_the_catalogues_and_nothing_else() -> None:
     assert place == usual_place
 
 
-def test_a_range_of_one_effect_leaves_another_with_the_same_parameter_alone() -> None:
-    own = with_prior("point_mass", "mass_kg", 1, 50)
-    at = Variant("all sensors", places_m=(1.0,))
-    assert parameters_of("sensor_mass", own, at) == parameters_of("sensor_mass", HANGER_3, at)
-
-
-def test_a_spring_of_the_other_end_can_be_narrowed_too() -> None:
-    own = with_prior("rotational_end_flexibility", "log10_k4", 6, 7)
-    check_effect_priors(own)
-    _, k4 = parameters_of("rotational_end_flexibility", own, Variant("arch end", ends=(1,)))
-    assert (k4.lower, k4.upper) == (6, 7)
-
-
-def test_an_angle_may_have_a_negative_bound() -> None:
-    own = with_prior("skewed_principal_axes", "angle_deg", -45, 10)
-    check_effect_priors(own)
-    found = parameters_of("skewed_principal_axes", own, Variant("deck end", ends=(0,)))
-    angle = next(each for each in found if each.name == "angle_deg")
-    assert (angle.lower, angle.upper) == (-45, 10)
-
-
 @pytest.mark.parametrize(
     ("prior", "complaint"),
     [

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from shm.models import THESIS, build
 from shm.models.effects import EFFECTS, Case, Conditions, Survey, Variant, parameters_of
@@ -90,60 +89,6 @@ def test_a_slow_clock_raises_all_frequencies_alike_and_leaves_the_shapes() -> No
     np.testing.assert_allclose(slow.shape, solved(physical()).shape)
 
 
-def test_sag_is_irvines_cable_where_bending_does_not_count() -> None:
-    """tan(W/2) = W/2 - 4 (W/2)^3 / lambda^2 for the first symmetric mode, W = w L sqrt(m/T)."""
-    cable = replace(ROD, second_moment_m4=1e-4 * ROD.second_moment_m4)
-    found = frequencies("sag", "everywhere, transverse", (8.0,), hanger=cable)
-    taut = frequencies(hanger=cable)
-    half = brentq(lambda w: np.tan(w) - w + 4 * w**3 / 8.0, np.pi / 2 + 1e-9, np.pi - 1e-9)
-    assert found[0, 0] / taut[0, 0] == pytest.approx(2 * half / np.pi, rel=5e-3)
-    np.testing.assert_allclose(found[0, 1::2], taut[0, 1::2], rtol=1e-9)
-    np.testing.assert_allclose(found[1], taut[1], rtol=1e-9)
-
-
-def test_each_other_law_of_a_support_swings_at_a_higher_frequency_of_its_own() -> None:
-    """Between 1.5 and 6 times that of the first; a support of infinite mass has none."""
-    effect, at = EFFECTS["support_motion"], place("support_motion", "deck end, transverse")
-    values = np.array([[4000.0, 3.0], [np.inf, 3.0]])
-    ratios = []
-    for law in range(1, len(effect.other_laws) + 1):
-        moved = effect.act(
-            PhysicalHanger.clamped(ROD, np.full(2, 711e3)),
-            values,
-            Case(ROD, replace(at, law=law), Conditions("t1")),
-        )
-        (mode,) = moved.support_modes
-        mass_kg, compliance = mode.mass_kg[0, 0, 0], mode.compliance_m_n[0, 0, 0]
-        assert mass_kg > 4000.0
-        assert np.count_nonzero(mode.mass_kg) == np.count_nonzero(mode.compliance_m_n) == 1
-        ratios.append(1 / np.sqrt(mass_kg * compliance) / (2 * np.pi * 3.0))
-    assert ratios == sorted(ratios)
-    assert 1.5 < ratios[0] < ratios[-1] < 6.0
-
-
-@pytest.mark.parametrize(("law", "edge"), [(0, 0.0), (1, 0.6), (3, 0.3)])
-def test_a_loss_with_smooth_edges_is_met_best_by_its_law(law: int, edge: float) -> None:
-    """Forty steps stand for an edge that is smooth over a share of the extent at each end."""
-    effect, at = EFFECTS["section_loss"], place("section_loss", "everywhere")
-    middle_m, extent_m, left = 3.0, 3.0, 0.5
-    step = left ** (1 / 40)
-    smooth = tuple(
-        Zone(
-            *(np.array([each]) for each in (middle_m - reach_m, middle_m + reach_m, step**2, step))
-        )
-        for reach_m in extent_m / 2 * np.linspace(1 - edge, 1 + edge, 40)
-    )
-    wanted = solved(replace(physical(), zones=smooth)).frequency_hz
-    values = np.array([[1 - left, middle_m, extent_m]])
-    found = [
-        solved(effect.act(physical(), values, Case(ROD, replace(at, law=each), Conditions("t1"))))
-        for each in range(len(effect.other_laws) + 1)
-    ]
-    off = [np.abs(each.frequency_hz / wanted - 1).max() for each in found]
-    assert int(np.argmin(off)) == law
-    assert off[law] < 0.005
-
-
 def test_warmth_and_level_change_the_tension() -> None:
     warm = Conditions("t1", temperature_shift_k=10.0, amplitude=2.0)
     slack = physical("temperature_tension", values=(-3000.0,), conditions=warm)
@@ -178,11 +123,6 @@ def test_a_turned_sensor_sees_a_mode_under_its_angle() -> None:
     np.testing.assert_allclose(seen[[0, 2, 3], 1], 0, atol=1e-12)
     assert abs(seen[1, 1] / seen[1, 0]) == pytest.approx(np.tan(np.radians(10)))
     assert np.sign(seen[1, 1]) == -np.sign(straight[1, 0])
-
-
-def test_an_axis_at_45_degrees_makes_a_round_bar_swing_at_45_degrees() -> None:
-    shape = solved(physical("skewed_principal_axes", "both ends", (6.0, 45.0))).shape
-    np.testing.assert_allclose(np.abs(shape[..., 0]), np.abs(shape[..., 1]), atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.models.hanger import Zone, solve
+from shm.models.hanger import solve
 from tests.helpers.beam_shapes import mode_shape
 from tests.helpers.physical_hangers import (
     EI,
@@ -48,14 +48,6 @@ def test_a_turned_sensor_sees_both_planes() -> None:
     np.testing.assert_allclose(turned, expected * ratio[..., None, None], atol=1e-12)
 
 
-def test_places_count_from_the_axis_of_the_description() -> None:
-    """A bar from 1 to 11 m: what was at 6 m is in its middle; a sensor beyond its end is still."""
-    short = replace(clamped(), deck_end_m=np.array([1.0]), arch_end_m=np.array([11.0]))
-    shape = solve(short, 2, np.array([0.5, 3.5, 6.0, 8.5])).shape[0, 0, :, :, 0]
-    np.testing.assert_allclose(shape[0], [0, shape[0, 3], 1, shape[0, 3]], atol=1e-9)
-    np.testing.assert_allclose(np.abs(shape[1]), [0, 1, 0, 1], atol=1e-9)
-
-
 def test_joints_damp_by_their_share_of_the_strain_energy() -> None:
     """zeta = eta/2 (k/f^2) df^2/dk: half the loss factor times the springs' share, which is how
     much the frequency's square follows the springs' stiffness (Hellmann and Feynman)."""
@@ -71,15 +63,3 @@ def test_joints_damp_by_their_share_of_the_strain_energy() -> None:
     found = solve(lossy, 6, PLACES)
     np.testing.assert_allclose(found.damping_ratio, 0.1 / 2 * share, rtol=1e-4)
     assert np.isnan(solve(lossy, 6, PLACES, shapes=False).damping_ratio).all()
-
-
-def test_a_zone_may_stiffen_one_plane_alone() -> None:
-    one = np.ones(1)
-    each = [
-        Zone(0 * one, 1.1 * one, np.array([factors]), one)
-        for factors in ([30.0, 1.0], [30.0, 30.0], [1.0, 1.0])
-    ]
-    single, both, none = (frequencies_hz(replace(clamped(), zones=(z,)), 6)[0] for z in each)
-    np.testing.assert_allclose(single[0], both[0], rtol=1e-9)
-    np.testing.assert_allclose(single[1], none[1], rtol=1e-9)
-    np.testing.assert_allclose(none, frequencies_hz(clamped(), 6)[0], rtol=1e-6)

@@ -110,17 +110,3 @@ def test_sag_follows_the_tension_of_a_test() -> None:
     expected = bare.modes(tighter, PLAIN, 4, shapes=False)
     np.testing.assert_allclose(found.frequency_hz, expected.frequency_hz, rtol=1e-9)
     assert np.all(bare.physical(tighter, PLAIN).sag_parameter[:, 1] > 0.1)
-
-
-def test_names_of_effects_are_apart_from_the_class_own() -> None:
-    turning = Variant("deck end", ends=(0,))
-    springs = [("rotational_end_flexibility", turning), ("point_mass", Variant())]
-    found = HangerWithEffects(as_made("beam2", ROD), springs)
-    assert [each.name for each in found.effect_parameters] == [
-        "rotational_end_flexibility.log10_k1",
-        "rotational_end_flexibility.log10_k2",
-        "mass_kg",
-        "x_m",
-    ]
-    twice = HangerWithEffects(as_made("beam1", ROD), [("point_mass", Variant())] * 2)
-    assert "point_mass.x_m" in twice.names

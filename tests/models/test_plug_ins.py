@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -33,15 +30,6 @@ class Beam9(Beam1):
 
 class Again(UnknownPointMass):
     name = "sag"
-"""
-WRITTEN = """
-from shm.models.effects import Conditions, Effect, Parameter, Survey, Variant
-from shm.models.effects.of_mass import UnknownPointMass
-
-class Found(UnknownPointMass):
-    name = "found_law"
-
-EFFECT = Found()
 """
 
 
@@ -93,18 +81,3 @@ def test_a_name_that_is_taken_is_an_error_that_names_both(
     installed(tmp_path, monkeypatch, "[shm.effects]\nsag = bridge_extras_of_a_test:Again\n")
     with pytest.raises(UsageError, match=r"'sag', that of shm and plug-in .*bridge-extras"):
         members_with_plug_ins(EFFECTS_GROUP, EFFECTS, Effect)
-
-
-def test_a_module_that_imports_the_catalogue_is_in_it_from_the_first_import(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The catalogue is half made when such a module loads."""
-    installed(tmp_path, monkeypatch, "[shm.effects]\nfound = written_of_a_test:EFFECT\n")
-    (tmp_path / "written_of_a_test.py").write_text(WRITTEN)
-    path = os.pathsep.join(sys.path)
-    ran = subprocess.run(
-        [sys.executable, "-W", "error", "-c", "from shm.models.effects import EFFECTS as e; "
-         "print(type(e['found_law']).__name__)"],
-        env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert ran.stdout.strip() == "Found", ran.stderr

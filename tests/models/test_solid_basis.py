@@ -7,11 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.errors import UsageError
-from shm.models import build
 from shm.models.base import silent
 from shm.models.solid import S1, Solid2, basis, reduction
-from shm.values import Turnbuckle
 from tests.helpers.hangers import HANGER_3
 
 SHORT = replace(HANGER_3, length_m=3.0, plate=None)
@@ -86,26 +83,3 @@ def test_the_key_changes_with_geometry_material_prior_and_modes() -> None:
     ]
     keys = {description.key(6), description.key(12), *(other.key(6) for other in others)}
     assert len(keys) == 5
-
-
-def test_progress_is_told_and_never_falls(made) -> None:
-    _, told = made
-    assert told == sorted(told)
-    assert 0 < told[0] < told[-1] <= 1
-
-
-@pytest.mark.parametrize(
-    ("hanger", "reason"),
-    [
-        (replace(HANGER_3, plate=None), r"\[hanger.plate\]"),
-        (replace(HANGER_3, diameter_m=float("nan")), "diameter_m"),
-        (replace(HANGER_3, area_m2=0.02), "not that of diameter_m"),
-        (replace(HANGER_3, bending_stiffness_factor=0.6), "strand"),
-        (replace(HANGER_3, turnbuckles=(Turnbuckle(3.0, 0.4, 50.0, 3e6),)), "turnbuckles"),
-    ],
-)
-def test_a_hanger_that_a_solid_class_cannot_describe_is_refused_with_the_reason(
-    hanger, reason: str
-) -> None:
-    with pytest.raises(UsageError, match=reason):
-        build("solid2", hanger)

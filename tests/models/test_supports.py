@@ -14,7 +14,7 @@ from shm.models import MODELS, AsMade, applicable, build, check_baseline
 from shm.models.effects import EFFECTS, Conditions, Survey, parameters_of
 from shm.models.hanger import PhysicalHanger, solve
 from shm.models.hanger_with_effects import HangerWithEffects
-from shm.values import PLANES, FloatArray, Hanger, Scatter, Supports
+from shm.values import PLANES, FloatArray, Hanger, Supports
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import EI, LENGTH, MASS, NOWHERE, TENSION
 
@@ -75,20 +75,6 @@ def test_what_needs_a_held_end_does_not_act_at_a_free_one(
     assert bool(EFFECTS[name].invisible(hanger, EVERYTHING)) == (not ends)
 
 
-@pytest.mark.parametrize("name", ["joint_softening", "skewed_principal_axes"])
-def test_only_a_clamp_can_soften_or_be_askew(name: str) -> None:
-    mixed = replace(HANGER_3, supports=Supports("clamped", "pinned"))
-    assert {each.ends for each in EFFECTS[name].variants(mixed, EVERYTHING)} == {(0,)}
-    assert EFFECTS[name].invisible(replace(HANGER_3, supports=PINNED), EVERYTHING)
-
-
-@pytest.mark.parametrize("name", ["sag", "temperature_tension", "geometric_hardening"])
-@pytest.mark.parametrize("supports", [HANGING, FREE])
-def test_nothing_stretches_a_bar_with_a_free_end(name: str, supports: Supports) -> None:
-    assert EFFECTS[name].invisible(replace(HANGER_3, supports=supports), EVERYTHING)
-    assert not EFFECTS[name].invisible(HANGER_3, EVERYTHING)
-
-
 @pytest.mark.parametrize("name", EFFECTS)
 @pytest.mark.parametrize("supports", [FREE, HANGING, PINNED])
 @pytest.mark.parametrize("tension_n", [0.0, TENSION])
@@ -106,23 +92,6 @@ def test_every_effect_that_may_act_gives_finite_frequencies(
         assert np.isfinite(modes.frequency_hz).all(), variant
         assert (modes.frequency_hz > 0).all(), variant
         assert np.isfinite(modes.shape).all(), variant
-
-
-def test_a_bar_without_tension_has_none() -> None:
-    hanger = replace(HANGER_3, supports=FREE, nominal_tension_n=0.0)
-    theta = middle_of(hanger, [-1.0, 0.0, 1.0])
-    bars = HangerWithEffects(beam_1(hanger), ()).physical(theta, Conditions())
-    assert bars.tension_n.tolist() == [0.0, 0.0, 0.0]
-
-
-def test_a_weighed_load_has_a_normal_prior_about_the_nominal_tension() -> None:
-    weighed = replace(HANGER_3, scatter=Scatter(tension=0.02))
-    scores = [-1.0, 0.0, 1.0]
-    np.testing.assert_allclose(middle_of(weighed, scores)[:, 0], np.exp([-0.02, 0, 0.02]))
-    low, middle, high = middle_of(HANGER_3, scores)[:, 0]
-    assert high / low > 1.5
-    assert middle == pytest.approx(1, rel=0.1)
-    assert np.isinf(HANGER_3.scatter.tension)
 
 
 @pytest.mark.parametrize(

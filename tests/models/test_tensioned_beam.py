@@ -127,18 +127,3 @@ def test_a_shape_has_the_energy_of_its_frequency(xi: float, ka: float, kb: float
         energy += ka * slope[0] ** 2 + kb * slope[-1] ** 2
     omega = dimensionless_frequencies(xi, ka, kb, order)[-1]
     assert np.sqrt(energy / np.trapezoid(u**2, x)) == pytest.approx(omega, rel=1e-4)
-
-
-def test_a_shape_is_scaled_to_one_and_starts_positive() -> None:
-    x = np.linspace(0, 1, 2001)
-    for order in range(1, 9):
-        shape = mode_shape(25.0, 10.0, np.inf, order, x)
-        assert np.abs(shape).max() == pytest.approx(1, abs=1e-3)
-        assert shape[5] > 0
-
-
-def test_an_unknown_parameter_leaves_the_other_sets_alone() -> None:
-    xi, ka = np.array([3.0, np.nan, 3.0]), np.array([10.0, 10.0, np.nan])
-    found = wave_numbers(xi, ka, np.array(5.0), 4)
-    np.testing.assert_allclose(found[0], wave_numbers(xi[:1], ka[:1], np.array(5.0), 4)[0])
-    assert np.isnan(found[1:]).all()

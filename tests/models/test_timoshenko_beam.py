@@ -101,19 +101,6 @@ def test_no_mode_is_missed_or_doubled_in_a_short_thick_bar(length_m: float) -> N
     assert np.all((found > pinned) & (found < clamped))
 
 
-@pytest.mark.parametrize("shape", [(), (1,), (7,), (4, 2), (1500, 2)])
-def test_the_answer_has_the_arguments_shape_and_a_row_of_each(shape: tuple[int, ...]) -> None:
-    """Blocks of a batch are solved each by itself; what is in a batch changes nothing."""
-    rng = np.random.default_rng(1)
-    length, tension = rng.uniform(2, 12, shape), rng.uniform(1e4, 1e6, shape)
-    springs = 10 ** rng.uniform(3, 9, shape)
-    found = found_hz(springs, np.inf, 5, length, tension)
-    assert found.shape == (*shape, 5)
-    last = (-1,) * len(shape)
-    alone = found_hz(springs[last], np.inf, 5, length[last], tension[last])
-    np.testing.assert_allclose(found[last], alone, rtol=1e-13)
-
-
 @pytest.mark.parametrize("tension_n", [1.0, TENSION, 1e9])
 def test_timoshenko_pinned_beyond_cutoff(tension_n: float) -> None:
     """Keep modes below the cut-off, also where the search passes it; those beyond are unknown."""

@@ -20,8 +20,8 @@ from shm.store.queries.trends import list_history
 from shm.values import ModalTest, Posterior, PredictedFrequency
 from tests.helpers import quick_update
 from tests.helpers.diagnoses import MASS, a_diagnosis
-from tests.helpers.flows import Clock, Postman, ingest
-from tests.helpers.workspaces import START, make_workspace, put, write_test
+from tests.helpers.flows import Postman, ingest
+from tests.helpers.workspaces import START, put, write_test
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 MASS_MODEL = "beam1+point_mass@everywhere"
@@ -264,20 +264,3 @@ def test_an_effect_that_comes_no_nearer_to_the_tests_is_doubtful() -> None:
     )
     assert "Doubtful" not in nearer
     assert no_nearer.startswith("Doubtful, the model comes no nearer to the tests: beam1 with")
-
-
-def test_a_workspace_with_the_adoption_ingests_with_any_executor(tmp_path: Any) -> None:
-    workspace = make_workspace(tmp_path / "bridge", settings={"baseline_tests": 2})
-    for day in (1, 2):
-        spool(workspace, f"t{day}", day=day)
-    ingest(workspace)
-    made = adopted(workspace, "point_mass")
-    with workspace.store() as store:
-        baseline = store.watch.baseline(3)
-        assert baseline is not None
-        assert baseline.posterior.tests == ("t1", "t2")
-        assert made.adoption.gap_before_percent == pytest.approx(2.0)
-    spool(workspace, "t3", day=3)
-    ingest(workspace, clock=Clock(), lanes=2)
-    with workspace.store() as store:
-        assert models(store)["t3"] == MASS_MODEL

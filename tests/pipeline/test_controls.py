@@ -21,7 +21,7 @@ from shm.store.queries.hangers import find_latest_watches
 from shm.store.queries.trends import find_latest_trends, list_trend
 from shm.values import MonitoredHanger
 from shm_cli.main import run
-from tests.helpers.flows import ingest
+from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace, modelled_test, put, write_test
 
@@ -56,7 +56,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
             path = made.spool / f"h{hanger}-{campaign}.modes.json"
             day = MONTH * (campaign - 3) + (0.3 if hanger == CONTROL else 0.1)
             write_test(path, made, hanger=hanger, day=day, tension=factor)
-    ingest(made)
+    ingest_quickly(made)
     return made
 
 
@@ -143,7 +143,7 @@ def test_control_reading_is_the_known(tmp_path: Path) -> None:
     test = modelled_test("c1", described, 0.0, 0.9)
     read = replace(test, tension_read_n=0.9 * 711e3, tension_read_sd_n=3e3)
     put(made.spool / "c1.modes.json", dump(modes_document([read])))
-    ingest(made)
+    ingest_quickly(made)
 
     with made.store() as store:
         (chart,) = control_charts(made, store)

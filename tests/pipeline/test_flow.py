@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from shm.documents import dump
-from shm.errors import ShmError, StoreBusy, StoreError, WorkerDied
+from shm.errors import ShmError, StoreBusy, WorkerDied
 from shm.modes_document import modes_document
 from shm.pipeline import Flow, steps
 from shm.read import Limits
@@ -73,17 +73,6 @@ def test_files_go_from_the_spool_through_all_stages(workspace: Workspace) -> Non
         assert drift.shift_sd > 0
         assert store.alerts.list_all() == ()
         assert store.watch.baseline(3) is not None
-
-
-def test_the_earliest_of_the_waiting_tests_makes_the_baseline(workspace: Workspace) -> None:
-    for name, day in (("a", 9), ("b", 1), ("c", 5)):
-        spool(workspace, name, day=day)
-    ingest(workspace)
-    with workspace.store() as store:
-        baseline = store.watch.baseline(3)
-        assert baseline is not None
-        assert baseline.posterior.tests == ("b",)
-        assert [drift.test for drift in store.watch.list_drifts(3)] == ["c", "a"]
 
 
 def test_the_baseline_waits_for_a_file_that_is_slow_to_identify(
@@ -170,12 +159,6 @@ def _take_in_untold(folder: Path) -> None:
     ingest(workspace)
 
 
-def test_without_a_notifier_alerts_wait_in_the_outbox(untold: Workspace) -> None:
-    postman = Postman()
-    ingest(untold, notifier=postman)
-    assert len(postman.told) == 1
-
-
 def test_a_hook_that_fails_is_tried_again_ever_later_and_then_given_up(untold: Workspace) -> None:
     clock, postman, waits = Clock(), Postman(failures=99), []
     with a_flow(untold, clock=clock, notifier=postman) as flow:
@@ -189,23 +172,6 @@ def test_a_hook_that_fails_is_tried_again_ever_later_and_then_given_up(untold: W
     assert (delivery.state, delivery.attempts) == (DeliveryState.GIVEN_UP, 3)
     assert delivery.last_error == "no answer"
     assert set(stages(untold).values()) == {Stage.DONE}
-
-
-def test_an_alert_raised_while_the_clock_was_ahead_is_told_once_it_is_right(
-    workspace: Workspace,
-) -> None:
-    write_slow_loss(workspace.spool, workspace)
-    ahead = 400 * 86400.0
-    clock, postman = Clock(), Postman(failures=1)
-    clock.pass_by(ahead)
-    with a_flow(workspace, clock=clock, notifier=postman) as flow:
-        receive_all(flow)
-        flow.drain()
-        assert flow.store.alerts.list_deliveries(DeliveryState.WAITING)
-        clock.pass_by(-ahead)
-        flow.drain()
-        (delivery,) = flow.store.alerts.list_deliveries()
-    assert delivery.state is DeliveryState.DELIVERED
 
 
 def test_results_do_not_depend_on_order_or_executor(tmp_path: Path) -> None:
@@ -397,23 +363,6 @@ def test_healthy_files_whose_workers_are_killed_by_turns_are_done(workspace: Wor
     assert set(stages(workspace).values()) == {Stage.DONE}
 
 
-def test_a_file_at_which_alone_workers_are_killed_in_a_row_is_refused_after_minutes(
-    workspace: Workspace,
-) -> None:
-    for day, name in enumerate(("bad", "good")):
-        spool(workspace, name, day=day)
-    clock = Clock()
-    with Killed(99, ["bad"]) as pool, a_flow(workspace, executor=pool, clock=clock) as flow:
-        receive_all(flow)
-        assert drain_patiently(flow, clock) == [2.0, 8.0, 32.0, 128.0, 512.0]
-    assert list(stages(workspace).values()) == [Stage.REFUSED, Stage.DONE]
-    (reason,) = (
-        json.loads(p.read_text()) for p in workspace.quarantine.folder.glob("*.reason.json")
-    )
-    assert "killed (SIGKILL); so it went 6 times in a row." in reason["message"]
-    assert "find out who, then drop the file again" in reason["remedy"]
-
-
 def test_deaths_and_pauses_outlast_the_daemon(workspace: Workspace) -> None:
     """Each daemon lives for one kill; one that begins within the pause waits for its end."""
     spool(workspace, "bad")
@@ -498,18 +447,6 @@ def test_a_result_is_not_lost_while_the_store_is_busy(
         flow.drain()
     assert set(stages(workspace).values()) == {Stage.DONE}
     assert len(loaded) == 1  # what was computed is not computed again
-
-
-def test_a_result_that_the_store_will_not_have_refuses_its_file(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(self, *args):  # type: ignore[no-untyped-def]
-        raise StoreError("a value is out of range.")
-
-    monkeypatch.setattr(Tests, "save", refuse)
-    spool(workspace, "t1")
-    ingest(workspace)
-    assert set(stages(workspace).values()) == {Stage.REFUSED}
 
 
 @pytest.mark.parametrize(

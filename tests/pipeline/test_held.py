@@ -101,14 +101,6 @@ def test_what_is_held_counts_in_nothing(held: Workspace) -> None:
         assert [doubt.check for doubt in hold.doubts] == ["clock before the bridge"]
 
 
-def test_a_first_test_that_is_held_makes_no_baseline(workspace: Workspace) -> None:
-    spool(workspace, "first", EPOCH)
-    ingest(workspace)
-    with workspace.store() as store:
-        assert store.watch.baseline(3) is None
-        assert count_stages(store)[Stage.HELD] == 1
-
-
 def test_what_is_confirmed_counts_from_its_receipt_where_its_time_is_wrong(
     held: Workspace,
 ) -> None:
@@ -334,53 +326,6 @@ def test_a_held_test_that_is_killed_on_the_way_is_told_of_once(workspace: Worksp
         assert len(store.alerts.list_all()) == len(list_holds(store)) == 1
 
 
-@pytest.mark.parametrize(
-    ("time", "check"),
-    [
-        (datetime(1, 1, 1, tzinfo=UTC), "clock before the bridge"),
-        (datetime(1979, 12, 31, tzinfo=UTC), "clock before the bridge"),
-        (datetime(2000, 1, 1, 7, tzinfo=UTC), "clock before the bridge"),
-        (START + timedelta(days=101, hours=1), "clock ahead"),
-        (datetime(9999, 12, 31, tzinfo=UTC), "clock ahead"),
-    ],
-)
-def test_a_time_that_cannot_be_is_held(workspace: Workspace, time: datetime, check: str) -> None:
-    spool(workspace, "first", time)
-    ingest(workspace)
-    with workspace.store() as store:
-        (hold,) = list_holds(store)
-        assert [doubt.check for doubt in hold.doubts] == [check]
-        assert hold.time_unknown
-
-
-@pytest.mark.parametrize(
-    "time",
-    [
-        START + timedelta(days=100, hours=14),  # received on day 100, in another zone
-        datetime(1995, 5, 1, tzinfo=UTC),  # found in an old folder
-        None,
-    ],
-)
-def test_what_may_be_passes(workspace: Workspace, time: datetime | None) -> None:
-    spool(workspace, "good", day(0))
-    spool(workspace, "other", time)
-    ingest(workspace)
-    with workspace.store() as store:
-        assert count_stages(store)[Stage.DONE] == 2
-
-
-def test_a_time_before_the_bridge_was_built_is_held(workspace: Workspace) -> None:
-    described = workspace.folder / "bridge.toml"
-    text = described.read_text().replace('name = "Test bridge"', 'name = "B"\nbuilt = 1998-06-01')
-    described.write_text(text)
-    spool(workspace, "before", datetime(1998, 5, 31, 23, tzinfo=UTC))
-    spool(workspace, "after", datetime(1998, 6, 1, tzinfo=UTC))
-    ingest(workspace.reopened())
-    with workspace.store() as store:
-        assert counted(store) == ["after"]
-        assert "The bridge was built on 1998-06-01." in list_holds(store)[0].message
-
-
 def test_a_stuck_clock_is_held_and_a_mere_date_is_not(workspace: Workspace) -> None:
     midnight = datetime(2026, 5, 2, tzinfo=UTC)
     for name, time, tension in (
@@ -399,19 +344,6 @@ def test_a_stuck_clock_is_held_and_a_mere_date_is_not(workspace: Workspace) -> N
             "clock before the baseline",
         ]
         assert "may have lost 10 % of its tension" in hold.message
-
-
-def test_a_loss_dated_before_the_baseline_is_held_and_an_old_test_is_not(
-    workspace: Workspace,
-) -> None:
-    """A test from before the baseline can raise no alert: the watch takes it for the start."""
-    for name, number, tension in (("a", 10, 1.0), ("old", 3, 1.01), ("off", 9, 0.9)):
-        spool(workspace, name, day(number), tension)
-        ingest(workspace)
-    with workspace.store() as store:
-        assert counted(store) == ["old", "a"]
-        (hold,) = list_holds(store)
-        assert [doubt.check for doubt in hold.doubts] == ["clock before the baseline"]
 
 
 def test_the_same_modes_at_the_same_time_are_a_copy(workspace: Workspace) -> None:

@@ -9,10 +9,8 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from shm.models.tensioned_beam import frequencies_hz
 from shm.pipeline import stream_days, stream_steps, streaming
 from shm.pipeline.lineage import discarded_of_baselines
 from shm.pipeline.stream_days import hand_on_day
@@ -21,12 +19,12 @@ from shm.store import Stage, Store, Workspace
 from shm.store.queries.streams import list_pooled, load_stream_watch
 from shm.store.queries.tests import list_baseline_tests
 from shm.values import Mode
-from shm.values.stream import PooledReading, Window, WindowReading
+from shm.values.stream import PooledReading
 from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.stream_thermometer import Thermometer
 from shm.watch.stream_watch import StreamState, watch_reading
 from tests.helpers.flows import Clock, ingest
-from tests.helpers.live_streams import drain, with_live_streams
+from tests.helpers.live_streams import drain, found_in, with_live_streams
 from tests.helpers.workspaces import make_workspace
 
 FIRST = datetime(2026, 6, 1, tzinfo=UTC)
@@ -42,25 +40,13 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
 
     def window(start: datetime) -> stream_steps.WindowFound:
         hour = (start - FIRST) // HOUR
-        draw = np.random.default_rng(hour)
-        tension_n = hanger.nominal_tension_n * (0.95 if hour >= LOST else 1.0)
-        each = (hanger.length_m, tension_n, hanger.bending_stiffness_n_m2)
-        springs = (hanger.mass_per_length_kg_m, 3e5, 3e5)
-        hz = frequencies_hz(*map(np.asarray, (*each, *springs)), modes=3)
-        noisy = {p: hz * (1 + 2e-4 * draw.normal(size=3)) for p in ("transverse", "longitudinal")}
-        modes = tuple(
-            Mode(plane, order, float(own), 2e-4 * float(own))
-            for plane, found in noisy.items()
-            for order, own in enumerate(found, 1)
-        )
-        kept = Window(stream.name, hanger.id, start, 600.0, "wind", 0.02, temperature_c=10.0)
-        return stream_steps.WindowFound(WindowReading(kept, modes, "tracked"), (), {})
+        return found_in(stream, hanger, start, hour, factor=0.95 if hour >= LOST else 1.0)
 
     starts: list[datetime] = []
-    real = Streaming._begin_window
+    real = Streaming._read
     monkeypatch.setattr(
         Streaming,
-        "_begin_window",
+        "_read",
         lambda self, stream, start: (starts.append(start), real(self, stream, start))[1],
     )
     monkeypatch.setattr(stream_steps, "read_stream_window", lambda *_: window(starts[-1]))

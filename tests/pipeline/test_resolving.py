@@ -13,7 +13,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.reconcile import SHM, Condition, reconcile
 from shm.report.hanger_status import Status
-from shm.store import Reconciled, Stage, StoredAlert, Workspace
+from shm.store import Reconciled, StoredAlert, Workspace
 from shm.values import Alert
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
@@ -104,31 +104,6 @@ def test_the_same_conditions_again_change_nothing_and_one_that_is_over_closes_it
     assert (again.to_open, again.to_close) == ((), {7: "gone"})
     # A condition that comes back once its alert is closed is another alert.
     assert reconcile([told], [holds]).to_open == (holds.alert,)
-
-
-def test_tests_within_a_maintenance_window_raise_nothing_and_the_first_after_it_says_so(
-    bridge: Workspace,
-) -> None:
-    postman = Postman()
-    take(bridge, postman, 0, 1.0)
-    with bridge.store() as store:
-        period = START + timedelta(days=10), START + timedelta(days=50)
-        store.silences.make(3, period, "Ann", "new pin", START, is_maintenance=True)
-    for day in (20, 40):
-        take(bridge, postman, day, 0.5)
-    assert postman.told == []
-    with bridge.store() as store:
-        assert store.alerts.list_all() == ()
-        assert [test.stage for test in store.tests.list_all(3)] == [Stage.WATCHED] * 3
-    take(bridge, postman, 60, 0.8)
-    take(bridge, postman, 61, 0.8)
-    # The first asks to repeat the test that fits none before it.
-    assert [key.split(":")[1] for _, key in postman.told] == ["repeat-the-test", "two-tests-agree"]
-    with bridge.store() as store:
-        raised = store.alerts.list_all()[-1]
-    said = raised.alert.message
-    assert "Planned works lie in between (new pin)" in said
-    assert f"--since {period[1]:%Y-%m-%d}" in said
 
 
 @pytest.mark.parametrize("days", few_of([[40], [20, 40]], 1))

@@ -37,18 +37,39 @@ def an_event(kind: str, end: datetime) -> StreamEvent:
 
 
 @pytest.mark.parametrize(
-    ("ago", "kind", "state"),
+    ("ago", "heard_ago", "kind", "state"),
     [
-        (timedelta(minutes=4), "gap", "live"),
-        (timedelta(minutes=4), "dead", "sensor at fault"),
-        (timedelta(minutes=4), "lost modes", "sees nothing"),
-        (timedelta(minutes=6), "lost modes", "late"),
-        (2 * HOUR, "dead", "silent"),
-        (-HOUR, "dead", "clock ahead"),
+        (HOUR / 15, HOUR / 15, "gap", "live"),
+        (HOUR / 15, HOUR / 15, "dead", "sensor at fault"),
+        (HOUR / 15, HOUR / 15, "lost modes", "sees nothing"),
+        (HOUR / 10, HOUR / 10, "lost modes", "late"),
+        (2 * HOUR, 2 * HOUR, "dead", "silent"),
+        (96 * HOUR, HOUR / 15, "dead", "late"),  # it sends what it stored
+        (-HOUR, -HOUR, "dead", "clock ahead"),
     ],
 )
-def test_a_stream_is_in_one_state(ago: timedelta, kind: str, state: State) -> None:
-    assert classify_stream(NOW - ago, [an_event(kind, NOW - ago)], NOW) == state
+def test_a_stream_is_in_one_state(
+    ago: timedelta, heard_ago: timedelta, kind: str, state: State
+) -> None:
+    events = [an_event(kind, NOW - ago)]
+    assert classify_stream(NOW - ago, NOW - heard_ago, events, NOW) == state
+
+
+def test_a_backlog_of_days_that_comes_now_is_no_silence(tmp_path: Path) -> None:
+    workspace = with_live_streams(make_workspace(tmp_path / "bridge"))
+    sent_at = NOW + timedelta(days=4)
+    send(workspace, hours=0.5, first=NOW, at=sent_at)
+    with workspace.store() as store:
+        for sealed in (False, True):
+            if sealed:
+                ring_of(workspace).seal(sent_at + HOUR / 60)
+            (found,) = heard(workspace, store, sent_at + HOUR / 2)
+            assert (found.state, found.last_sample) == ("late", NOW + HOUR / 2)
+            evaluate_silent_streams(workspace, store, sent_at + HOUR / 2)
+        assert store.alerts.list_all() == ()
+        evaluate_silent_streams(workspace, store, sent_at + timedelta(days=2))
+        (raised,) = store.alerts.list_all()
+        assert raised.alert.time == sent_at  # from then on nothing came
 
 
 def test_of_a_hanger_whose_stream_is_silent_nobody_says_that_nothing_needs_doing(
@@ -87,7 +108,7 @@ def test_a_silence_of_a_day_is_one_alert_which_ends_with_it(tmp_path: Path) -> N
         evaluate_silent_streams(workspace, store, NOW + 5 * day + HOUR / 2)
         (over,) = store.alerts.list_all()
         assert over.resolution is not None
-        assert over.resolution.why == "stream hanger03 sends again"
+        assert over.resolution.why == "stream hanger03 sees its hanger again"
 
 
 def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(
@@ -106,27 +127,27 @@ def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(
             evaluate_silent_streams(workspace, store, NOW + (hours + 0.2) * HOUR)
             return len(store.alerts.list_all(standing=True))
 
-        sends(0, blind=True)
-        for start in (NOW + n * HOUR for n in range(1, 27)):  # where ten minutes lack, it goes on
-            store.streams.save_event(StreamEvent(name, "lost modes", start, start + HOUR / 2, ""))
-        assert [sends(hour, blind=True) for hour in (25, 26, 27)] == [0, 1, 1]
+        seen = a_window(0)
+        own = replace(seen.window, stream=name)
+        store.streams.save_window(replace(seen, window=own))
+        assert [sends(hour, blind=True) for hour in (1, 25, 27, 28)] == [0, 0, 1, 1]
         (raised,) = store.alerts.list_all()
-        assert raised.alert.time == NOW
+        assert raised.alert.time == NOW + HOUR / 6
         assert "is without any motion of it for longer than a day. See within a week whether" in (
             raised.alert.message
         )
         (line,) = (
-            e for e in hanger_summaries(workspace, store, NOW + 27.2 * HOUR) if e.hanger.id == 3
+            e for e in hanger_summaries(workspace, store, NOW + 28.2 * HOUR) if e.hanger.id == 3
         )
         assert line.message.status is Status.UNCLEAR
-        evaluate_silent_streams(
-            workspace, store, NOW + 60 * HOUR
-        )  # silent, too: it does not see again
-        assert len(store.alerts.list_all(standing=True)) == 2
-        assert sends(70, blind=False) == 0
+        evaluate_silent_streams(workspace, store, NOW + 60 * HOUR)  # silent: it sees no more
+        assert len(store.alerts.list_all(standing=True)) == 1
+        assert sends(70, blind=True) == 1  # it sends again, and sees nothing
+        store.streams.save_window(replace(seen, window=replace(own, start=NOW + 71 * HOUR)))
+        assert sends(71, blind=False) == 0
         assert {each.resolution.why for each in store.alerts.list_all() if each.resolution} == {
-            f"stream {name} sends again", f"stream {name} sees its hanger again"
-        }  # fmt: skip
+            f"stream {name} sees its hanger again"
+        }
 
 
 def test_a_thermometer_unlike_that_of_another_stream_is_noted(tmp_path: Path) -> None:

@@ -28,12 +28,22 @@ from shm.watch.kept_state import to_bytes
 from shm.watch.stream_reading import ModeTable
 from shm.watch.stream_watch import StreamState, StreamWatched
 from tests.helpers.flows import Clock
-from tests.helpers.live_streams import CALM, FIRST, HOUR, drain, send, with_live_streams
+from tests.helpers.live_streams import (
+    CALM,
+    FIRST,
+    HOUR,
+    drain,
+    find_quickly,
+    send,
+    with_live_streams,
+)
 from tests.helpers.workspaces import make_workspace
 
 
 @pytest.fixture
-def workspace(tmp_path: Path) -> Workspace:
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
+    """A bridge with one stream, what whose windows say is made up."""
+    monkeypatch.setattr(stream_steps, "read_stream_window", find_quickly)
     return with_live_streams(make_workspace(tmp_path / "bridge"))
 
 
@@ -145,14 +155,12 @@ def test_ten_minutes_of_which_more_comes_later_are_read_anew(workspace: Workspac
 def test_a_step_that_fails_is_said_in_its_window_and_the_stream_goes_on(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real, failing = stream_steps.read_window, FIRST + timedelta(minutes=20)
-
-    def read_window(pieces, *others):
-        if pieces[0].start == failing:
+    def find_most(pieces, *others):
+        if pieces[0].start == FIRST + timedelta(minutes=20):
             raise ValueError("odd")
-        return real(pieces, *others)
+        return find_quickly(pieces, *others)
 
-    monkeypatch.setattr(stream_steps, "read_window", read_window)
+    monkeypatch.setattr(stream_steps, "read_stream_window", find_most)
     send(workspace, 1)
     clock = Clock(FIRST + timedelta(days=1))
     with at_work(workspace, clock) as (streaming, store):

@@ -9,8 +9,7 @@ import pytest
 
 from shm.errors import BadInput, UsageError
 from shm.read import peek, read, write
-from shm.simulate import HammerPlan, HangerState, hammer_test
-from shm.values import Channel, Hanger, Recording
+from shm.values import Channel, Recording
 
 HEAD = """\
 # hanger: 3
@@ -99,19 +98,6 @@ def test_what_loggers_and_spreadsheets_make_of_it_is_read_too(
     assert_reads_as_usual(recorded(tmp_path, change(f"{HEAD}{NAMES}\n{ROWS}")))
 
 
-def test_units_become_si(tmp_path: Path) -> None:
-    head = "# sampling_rate_hz: 100\n# unit: kN, g, mm/s2, um/s2\nforce,acc_1,acc_2,acc_3\n"
-    found = recorded(tmp_path, head + "1,2,3,4\n" * 16)
-    first = [float(c.values[0]) for c in found.channels]
-    assert first == pytest.approx([1000, 2 * 9.80665, 0.003, 4e-6])
-
-
-def test_one_plane_holds_for_all_accelerations(tmp_path: Path) -> None:
-    head = HEAD.replace(", transverse, longitudinal", "longitudinal")
-    planes = [c.plane for c in recorded(tmp_path, f"{head}{NAMES}\n{ROWS}").channels]
-    assert planes == [None, "longitudinal", "longitudinal"]
-
-
 def test_names_say_what_is_measured_where_no_unit_does(tmp_path: Path) -> None:
     found = recorded(tmp_path, f"# sampling_rate_hz: 512\n{NAMES}\n{ROWS}")
     assert [c.quantity for c in found.channels] == ["force", "acceleration", "acceleration"]
@@ -180,7 +166,6 @@ WHOLE = f"{HEAD}{NAMES}\n{ROWS}"
     ("text", "where", "words"),
     [
         (WHOLE.replace("4,2.0,-4", "4,2.0"), "test.csv, line 13", "2 values where .* are 3"),
-        (WHOLE.replace("4,2.0,-4", "4,2.0,-4,5"), "test.csv, line 13", "4 values where"),
         (WHOLE.replace("4,2.0,-4", "4,2;0,-4"), "test.csv, line 13, channel acc_1", "'2;0' is not"),
         (WHOLE.replace("4,2.0,-4", "oops,2,-4"), "test.csv, line 13, channel force", "'oops'"),
         (WHOLE.replace("4,2.0,-4", "4,inf,-4"), "test.csv, line 13, channel acc_1", "infinite"),
@@ -188,16 +173,11 @@ WHOLE = f"{HEAD}{NAMES}\n{ROWS}"
         (f"{HEAD}{NAMES}\n" + "1,2\n" * 20, "test.csv, line 9", "2 values where .* are 3"),
         (timed([0.0]), "test.csv", "sampling rate is missing"),
         (WHOLE.replace("hanger: 3", "hanger: third"), "test.csv, line 1", "'third' is not"),
-        (WHOLE.replace("hanger: 3", "hanger: 3.5"), "test.csv, line 1", "whole number"),
         (WHOLE.replace("2026-05-01T12", "yesterday"), "test.csv, line 2", "ISO 8601"),
         (WHOLE.replace("12.5", "warm"), "test.csv, line 3", "'warm' is not a number"),
-        (WHOLE.replace("12.5", "inf"), "test.csv, line 3", "not a number"),
         (WHOLE.replace("512", "fast"), "test.csv, line 4", "'fast' is not a number"),
-        (WHOLE.replace("512", "0"), "test.csv, line 4", "not positive"),
-        (WHOLE.replace("512", "-5"), "test.csv, line 4", "not positive"),
         (WHOLE.replace("512", "nan"), "test.csv, line 4", "not positive"),
         (WHOLE.replace("# sampling_rate_hz: 512\n", ""), "test.csv", "sampling rate is missing"),
-        (WHOLE.replace("512", ""), "test.csv", "sampling rate is missing"),
         (WHOLE.replace(", longitudinal", ", up"), "test.csv, line 5, channel acc_2", "'up'"),
         (WHOLE.replace("N, m/s2, m/s2", "N, mV, m/s2"), "test.csv, line 6, channel acc_1", "'mV'"),
         (WHOLE.replace("N, m/s2, m/s2", "g, m/s2, m/s2"), "test.csv, line 6, channel force", "'g'"),
@@ -209,7 +189,6 @@ WHOLE = f"{HEAD}{NAMES}\n{ROWS}"
         (HEAD, "test.csv", "no columns"),
         (f"{HEAD}{NAMES}\n", "test.csv", "0 samples"),
         (f"{HEAD}{NAMES}\n" + "1,,2\n" * 20, "test.csv, channel acc_1", "no number at all"),
-        (f"{HEAD}{NAMES}\n" + "1,nan,2\n" * 20, "test.csv, channel acc_1", "no number at all"),
         ("some words\nin lines\n", "test.csv, line 2, channel some words", "'in lines' is not"),
         (WHOLE.replace("1,acc_2", "1,t7").replace("2, m/s2", "2,"), "test.csv, channel t7", "unit"),
     ],
@@ -246,13 +225,3 @@ def test_a_name_that_cannot_head_a_column_is_not_written(
     odd = Recording("", (Channel("a,b", "force", np.zeros(20)),), 10.0)
     with pytest.raises(UsageError, match="cannot head a column"):
         write(odd, tmp_path / "test.csv")
-
-
-def test_a_simulated_test_survives_to_nine_digits(tmp_path: Path) -> None:
-    hanger = Hanger(3, 12.0, 200e9, 0.0133, 1.4e-5, 103.5, 711e3)
-    original = hammer_test(hanger, HangerState(711e3), HammerPlan(hits=1), np.random.default_rng(3))
-    write(original, tmp_path / "test.csv")
-    found = read(tmp_path / "test.csv")
-    assert isinstance(found, Recording)
-    for one, other in zip(found.channels, original.channels, strict=True):
-        np.testing.assert_allclose(one.values, other.values, rtol=1e-8, atol=0)

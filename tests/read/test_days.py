@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from datetime import date
+from datetime import UTC, date, datetime
 
 import pytest
 
-from shm.read.stamps import DayOrder, find_day_order, follow_days, parsed, possible_times
+from shm.read.stamps import DayOrder, find_day_order, follow_days, possible_times, stamp_of
 
 
 @pytest.mark.parametrize(
@@ -42,19 +42,34 @@ def test_find_day_order_proof(text: str, order: DayOrder | None) -> None:
 )
 def test_possible_times_of_text(text: str, days: list[date]) -> None:
     assert [each.time.date() for each in possible_times(text)] == days
-    found = parsed(text)
+    found = stamp_of(text)
     assert found is not None
-    assert found[1] == (not days)
+    assert found.is_certain() == (not days)
 
 
-def test_parsed_order_of_another_form() -> None:
+def test_order_that_a_day_cannot_have() -> None:
     """An order that a day cannot have leaves it uncertain."""
-    found = parsed("26/02/03", "month first")
+    found = stamp_of("26/02/03")
     assert found is not None
-    assert not found[1]
+    assert not found.is_certain("month first")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("14-May-2026 09:12:00.5 PM", datetime(2026, 5, 14, 21, 12, 0, 500_000, UTC)),
+        ("Thu May 14 09:12:00 2026", datetime(2026, 5, 14, 9, 12, tzinfo=UTC)),
+        ("May 14, 2026", datetime(2026, 5, 14, tzinfo=UTC)),
+        ("31-Apr-2026", None),
+        ("14-May-2026 25:00", None),
+    ],
+)
+def test_months_that_are_words(text: str, expected: datetime | None) -> None:
+    found = stamp_of(text)
+    assert (found and found.time()) == expected
 
 
 def test_follow_days_past_midnight() -> None:
-    assert follow_days(["26/02/28 23:59", "26/03/01 00:01"]) == "year first"
-    assert follow_days(["04/05/06 23:59", "05/05/06 00:01"]) == "day first"
-    assert follow_days(["04/05/06 10:00", "04/05/06 10:01"]) is None
+    assert follow_days("26/02/28 23:59", "26/03/01 00:01") == "year first"
+    assert follow_days("04/05/06 23:59", "05/05/06 00:01") == "day first"
+    assert follow_days("04/05/06 10:00", "04/05/06 10:01") is None

@@ -178,11 +178,3 @@ def test_gzipped_files_that_cannot_be_used_are_refused(
         with pytest.raises(BadInput, match=words) as refusal:
             verb(tmp_path / name)
         assert refusal.value.remedy
-
-
-def test_damage_in_the_midst_of_gzipped_data_is_refused(tmp_path: Path) -> None:
-    packed = bytearray(gzip.compress(("force,acc_1\n" + "1,2.5\n3,4.25\n" * 4000).encode()))
-    packed[len(packed) // 2] ^= 0xFF
-    (tmp_path / "test.csv.gz").write_bytes(packed)
-    with pytest.raises(BadInput, match="cannot be unpacked"):
-        read(tmp_path / "test.csv.gz")

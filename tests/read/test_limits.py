@@ -48,12 +48,6 @@ def test_a_long_array_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
         read(path)
 
 
-def test_more_channels_than_allowed_are_refused(csv: Path) -> None:
-    csv.write_text("# sampling_rate_hz: 9\nacc_1,acc_2,acc_3\n" + "1,2,3\n" * 20)
-    with limited(Limits(max_channels=2)), pytest.raises(BadInput, match="3 accelerations; at most"):
-        read(csv)
-
-
 @pytest.mark.parametrize("text", ["# a: b\n" * 500 + HEAD, "x" * 3000 + HEAD, f"{'a,' * 2000}b\n"])
 def test_a_heading_without_end_is_refused(csv: Path, text: str) -> None:
     csv.write_text(text + "1,2\n" * 50)

@@ -11,13 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from shm.errors import BadInput, UsageError
 from shm.read import bundle, holds_test, peek, peek_test, read, read_test, sidecar_path
 from shm.read.limits import Limits, limited
-from shm.values import FrequencyResponse, Recording
+from shm.values import Recording
 from tests.helpers.written import write
 
 SUFFIXES = (".csv", ".uff", ".h5", ".mat", ".tdms", ".npz")
@@ -71,14 +69,6 @@ def test_names_are_in_the_order_that_people_count_in(recording: Recording, tmp_p
     assert [Path(r.source).name for r in records] == ["hit_1.csv", "hit_9.csv", "hit_10.csv"]
 
 
-def test_frequency_responses_make_a_test_too(response: FrequencyResponse, tmp_path: Path) -> None:
-    write(response, tmp_path / "a.csv")
-    write(response, tmp_path / "b.uff")
-    records = read_test(bundle([tmp_path / "a.csv", tmp_path / "b.uff"], tmp_path / "t.zip"))
-    assert all(isinstance(record, FrequencyResponse) for record in records)
-    assert [look.lines for look in peek_test(tmp_path / "t.zip")] == [65, 65]
-
-
 def test_a_single_file_is_a_test_of_one(files: list[Path]) -> None:
     (record,) = read_test(files[0])
     assert record.source == str(files[0])
@@ -95,12 +85,6 @@ def test_the_same_files_give_the_same_bytes(files: list[Path], tmp_path: Path) -
     with zipfile.ZipFile(io.BytesIO(first)) as archive:
         names = archive.namelist()
     assert names == sorted([*(p.name for p in files), "point_5.toml", "point_6.toml"])
-
-
-def test_a_sidecar_that_is_named_itself_is_packed_once(files: list[Path], tmp_path: Path) -> None:
-    named = [files[0], sidecar_path(files[0])]
-    with zipfile.ZipFile(bundle(named, tmp_path / "test.zip")) as archive:
-        assert archive.namelist() == ["point_5.csv", "point_5.toml"]
 
 
 def test_what_makes_no_test_is_not_packed(files: list[Path], tmp_path: Path) -> None:
@@ -246,26 +230,3 @@ def test_hidden_files_of_systems_are_passed_over_and_folders_opened(tmp_path: Pa
     hidden = {name: b"x" for name in members if name != "t/hit.csv"}
     with pytest.raises(BadInput, match="holds no recording"):
         read_test(zipped(tmp_path / "test.zip", hidden))
-
-
-@settings(max_examples=60, deadline=None, derandomize=True,
-          suppress_health_check=[HealthCheck.function_scoped_fixture])  # fmt: skip
-@given(place=st.floats(0, 1), chunk=st.binary(min_size=1, max_size=6), cut=st.booleans())
-def test_a_damaged_archive_gives_whole_records_or_a_refusal(
-    tmp_path: Path, place: float, chunk: bytes, cut: bool
-) -> None:
-    archive = zipped(tmp_path / "test.zip", {"a.csv": csv(), "b.csv": csv(40)})
-    content = bytearray(archive.read_bytes())
-    at = int(place * (len(content) - 1))
-    content[at:] = b"" if cut else chunk + content[at + len(chunk) :]
-    archive.write_bytes(content)
-    assert channels_or_refused(archive) == 2
-
-
-def channels_or_refused(archive: Path) -> int:
-    """Return the channels of each record, 2 for a refusal with a remedy too."""
-    try:
-        (channels,) = {len(r.channels) for r in read_test(archive) if isinstance(r, Recording)}
-    except BadInput as refusal:
-        return 2 if refusal.remedy else 0
-    return channels

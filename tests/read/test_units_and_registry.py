@@ -7,7 +7,6 @@ import pytest
 import shm.read
 from shm.read import FORMATS, peek, sidecar_path
 from shm.read.logger_words import accelerance_si, unit_of
-from shm.read.universal_frf import number_nodes, sign
 
 
 @pytest.mark.parametrize(
@@ -100,15 +99,3 @@ def test_a_peek_says_si_where_the_name_alone_says_what_is_measured(tmp_path: Pat
     assert [channel.unit for channel in found.channels] == ["N", "m/s2", ""]
     assert len(found.problems) == 1
     assert "channel thing" in found.problems[0]
-
-
-def test_nodes_are_shared_by_equal_places_and_own_where_the_place_is_unknown() -> None:
-    nan = float("nan")
-    assert number_nodes([1.5, 2.5, nan, 1.5, nan]) == [1, 2, 3, 1, 4]
-
-
-@pytest.mark.parametrize(
-    ("directions", "expected"), [((1,), 1), ((-2,), -1), ((0, 3), 1), ((-1, 2), -1), ((-1, -3), 1)]
-)
-def test_two_turned_directions_cancel(directions: tuple[int, ...], expected: float) -> None:
-    assert sign(*directions) == expected

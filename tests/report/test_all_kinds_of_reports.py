@@ -50,8 +50,9 @@ def watched(data: HangerReport) -> StatesOverTime:
     band = Band(level - 5e3, level, level + 5e3)
     tension = QuantityOverTime("tension", "tension", band, band, band, 700e3)
     unknown = np.full(len(times), NAN)
+    stiff = Band(*(np.full(len(times), level) for level in (6.8, 7.0, 7.2)))
     spring = QuantityOverTime(
-        "log10_k1", "spring k1", Band(unknown, unknown, unknown), band, band, 7.0
+        "log10_k1", "spring k1", Band(unknown, unknown, unknown), stiff, stiff, 7.0
     )
     return StatesOverTime(
         times, np.full(len(times), NAN), NAN, np.zeros(len(times), bool), (tension, spring),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -13,7 +12,6 @@ import pytest
 from shm import documents
 from shm.report.as_html import as_html
 from shm.report.as_pdf import as_pdf
-from shm.report.as_text import as_text
 from shm.report.bar_table import bar_document, bar_rows, bar_table, bars_table
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_json, bridge_diagnosis_paper
 from shm.report.bridge_report import bridge_json, bridge_paper
@@ -67,32 +65,6 @@ ROWS = (
     ("Sensors", "both planes at 2.5 and 4.4 m"),
     ("Bar measured by", "Bridge office, A. Berg"),
 )
-DOCUMENT = {
-    "hanger": 3,
-    "name": None,
-    "diameter_m": 0.130,
-    "area_m2": 0.013273,
-    "length_m": 12.0,
-    "length_by": "pins",
-    "length_measured": "steel tape, 2026-04",
-    "elastic_modulus_pa": 200e9,
-    "density_kg_m3": pytest.approx(7797.8, abs=0.1),
-    "mass_per_length_kg_m": 103.5,
-    "fittings_m": [0.6, 0.55],
-    "plate": None,
-    "turnbuckles": [],
-    "ends": {"deck": "pinned", "arch": "clamped", "hanging_mass_kg": 0.0},
-    "end_kind": "fork",
-    "inclination_deg": 72.5,
-    "sensors": [
-        {"name": f"acc_{number}", "plane": plane, "x_m": x_m}
-        for number, (plane, x_m) in enumerate(
-            [("transverse", 2.5), ("longitudinal", 2.5), ("transverse", 4.4),
-             ("longitudinal", 4.4)], 1,
-        )
-    ],
-    "measured_by": "Bridge office, A. Berg",
-}  # fmt: skip
 
 
 def of_hanger(season: HangerReport) -> tuple[Paper, dict[str, Any]]:
@@ -163,36 +135,6 @@ def test_html_describes_the_bar_before_figures(
     assert missing(" ".join(outline.words)) == []
 
 
-@every_report
-def test_text_describes_the_bar_first(make: Made, season: HangerReport) -> None:
-    text = as_text(make(season)[0], width=400)
-    assert missing(re.split(r"\n-+\n", text)[0]) == []  # before the second part's heading
-    assert max(map(len, as_text(make(season)[0]).splitlines())) <= 100
-
-
-@every_report
-def test_document_describes_the_bar(make: Made, season: HangerReport) -> None:
-    found = json.loads(documents.dump(make(season)[1]))
-    hits = [{"name": "hit", "plane": None, "x_m": 1.9}] if make is of_test else []
-    assert found == {**DOCUMENT, "hits": hits}
-
-
-@pytest.mark.usefixtures("unpainted")
-@pytest.mark.parametrize("name", CASES)
-def test_pdf_of_any_diagnosis_has_the_bar_on_page_1(name: str) -> None:
-    paper = diagnosis_paper(DiagnosisSheet(CASES[name], DESCRIBED, "Arch", SENSORS))
-    assert missing(Pdf.parse(as_pdf(paper)).pages[0]) == []
-
-
-@pytest.mark.usefixtures("unpainted")
-def test_many_bars_begin_on_page_1() -> None:
-    lines = tuple(a_summary(replace(DESCRIBED, id=n, length_m=10 + n / 8)) for n in range(80))
-    paper = bridge_paper(BridgeReport("Arch", lines, None, "Too few.", START, "0.1.0"))
-    first, second, *_ = Pdf.parse(as_pdf(paper)).pages
-    assert "10.125 m" in first
-    assert "19.875 m" in second
-
-
 def test_what_is_not_stated_is_said_never_invented() -> None:
     assert dict(bar_rows(describe_bar(BARE))) == {
         "Section": "area 2960 mm²",
@@ -211,12 +153,6 @@ def test_what_is_not_stated_is_said_never_invented() -> None:
         "diameter_m", "length_by", "length_measured", "fittings_m", "plate", "ends", "end_kind",
         "inclination_deg", "measured_by",
     }  # fmt: skip
-
-
-def test_stated_defaults_are_no_unknowns() -> None:
-    stated = replace(BARE, survey=Survey(stated_keys=("fittings_m", "supports")))
-    rows = dict(bar_rows(describe_bar(stated)))
-    assert (rows["Fittings"], rows["Ends"]) == ("none", "clamped (deck), clamped (arch)")
 
 
 def test_plates_turnbuckles_and_hanging_masses_are_named() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -62,14 +61,6 @@ def test_no_arch_is_drawn_without_positions(pattern: BridgePattern) -> None:
     (axes,) = bridge_illustration(pattern).figure.axes
     assert axes.get_xlabel() == "hanger, in the order of the bridge"
     assert max(len(np.asarray(line.get_xdata())) for line in axes.lines) <= len(pattern.rows)
-
-
-def test_places_in_metres_are_used_where_all_are_known() -> None:
-    placed = [replace(each, position_m=4 + 5.5 * each.place) for each in shifts()]
-    (axes,) = bridge_illustration(bridge_pattern(placed, range(1, 13))).figure.axes
-    assert axes.get_xlabel() == "along the bridge (m)"
-    (cross,) = [line for line in axes.lines if line.get_label() == "not compared"]
-    assert np.asarray(cross.get_xdata()).tolist() == pytest.approx([15.0])
 
 
 def test_numbers_of_many_hangers_do_not_overlap() -> None:

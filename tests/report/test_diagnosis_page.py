@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
-from itertools import pairwise
 
 import pytest
 
@@ -17,8 +16,7 @@ from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
 from shm.report.diagnosis_summary import facts
 from shm.report.hanger_report import hanger_json as report_json
 from shm.report.hanger_report import hanger_paper
-from shm.values import TensionEstimate
-from tests.report.diagnoses import CASES, HANGER, LED, STRING, STRING_HANGER, sheet
+from tests.report.diagnoses import LED, STRING_HANGER, sheet
 from tests.report.outline import Outline
 
 PAGES = ("led", "alike", "nothing known")
@@ -39,26 +37,6 @@ def told(outline: Outline) -> str:
     return " ".join(" ".join(outline.words).split())
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_pages_nest_fetch_nothing_and_have_sound_headings(name: str, pages: dict[str, str]) -> None:
-    outline = parsed(pages[name])
-    assert outline.open == []
-    for tag, attributes in outline.tags:
-        assert tag not in {"script", "link", "iframe"}
-        assert not {"src", "srcset", "data", "action"} & attributes.keys()
-    assert not re.search(r"url\((?!#)|@import", pages[name])
-    ids = [attributes["id"] for _, attributes in outline.tags if "id" in attributes]
-    assert len(ids) == len(set(ids))
-    levels = [int(tag[1]) for tag, _ in outline.tags if re.fullmatch(r"h[1-6]", tag)]
-    assert levels[0] == 1
-    assert all(after <= before + 1 for before, after in pairwise(levels))
-
-
-@pytest.mark.parametrize("name", PAGES)
-def test_pages_say_nan_nowhere(name: str, pages: dict[str, str]) -> None:
-    assert not re.search(r"\b(nan|inf|None(?! of))\b", told(parsed(pages[name])))
-
-
 def test_the_page_leads_with_the_cause_its_size_place_and_probability(
     pages: dict[str, str],
 ) -> None:
@@ -75,60 +53,12 @@ def test_remarks_on_bad_data_stand_beside_the_answer(pages: dict[str, str]) -> N
     assert "What to mind about these data" not in told(parsed(pages["alike"]))
 
 
-def test_the_page_tells_what_these_data_cannot_show_and_why(pages: dict[str, str]) -> None:
-    page = told(parsed(pages["led"]))
-    assert "sensor misalignment No test has shapes of biaxial sensors." in page
-
-
-def test_words_from_outside_cannot_inject_markup() -> None:
-    sly = "<script>alert(1)</script>"
-    remarked = replace(CASES["nothing known"], remarks=(sly,))
-    page = as_html(diagnosis_paper(DiagnosisSheet(remarked, HANGER, bridge=sly)))
-    assert "<script" not in page
-    assert "&lt;script&gt;" in page
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_texts_fit_a_terminal(name: str) -> None:
-    text = as_text(diagnosis_paper(sheet(name)))
-    assert max(len(line) for line in text.splitlines()) <= 100
-    assert len(text.splitlines()) <= 122
-    assert not re.search(r"\b(nan|inf|None(?! of))\b", text)
-
-
 def test_a_shortened_table_of_causes_keeps_no_gap_and_something_else() -> None:
     text = as_text(diagnosis_paper(sheet("led")))
     table = text[text.index("CAUSES") : text.index("SIZES")]
     assert "no gap" in table
     assert "something not in" in table
     assert "9 further effects" in " ".join(table.split())
-
-
-def test_tensions_below_one_kilonewton_are_told_in_newtons_everywhere() -> None:
-    small = DiagnosisSheet(STRING, STRING_HANGER)
-    text = as_text(diagnosis_paper(small))
-    words = " ".join(text.split())
-    assert "the tension is 41.0 ± 4.9 N." in words
-    assert "mean, N" in text
-    assert "kN" not in text[text.index("\nTENSION") : text.index("\nWHAT WOULD TELL")]
-    assert "41 N" in told(parsed(as_html(diagnosis_paper(small))))
-
-
-def test_both_tensions_are_told_in_kilonewtons_where_one_reaches_it() -> None:
-    mixed = replace(
-        STRING,
-        tension_before_n=TensionEstimate(960.0, 30.0, 910.0, 1010.0),
-        tension_after_n=TensionEstimate(1100.0, 40.0, 1030.0, 1170.0),
-    )
-    text = " ".join(as_text(diagnosis_paper(DiagnosisSheet(mixed, STRING_HANGER))).split())
-    assert "the tension is 1.100 ± 0.070 kN" in text
-    assert "the baseline beam1 0.9600 0.0300 0.9100 to 1.0100" in text
-
-
-def test_causes_that_cannot_be_told_apart_share_a_letter() -> None:
-    text = as_text(diagnosis_paper(sheet("alike")))
-    marked = [line for line in text.splitlines() if re.search(r"0\.\d{2} +A ", line)]
-    assert len(marked) == 3
 
 
 def test_the_document_holds_the_contract_and_the_answer_in_words() -> None:
@@ -155,7 +85,7 @@ def test_a_report_holds_the_latest_diagnosis_and_how_the_gap_has_gone(bare: Hang
     outline = parsed(as_html(hanger_paper(diagnosed)))
     assert outline.open == []
     names = {attributes.get("id") for _, attributes in outline.tags}
-    assert {"causes-title", "gap_map-title", "before_and_after-title"} <= names
+    assert {"causes-title", "gap_map-title"} <= names
     for written in (told(outline), " ".join(as_text(hanger_paper(diagnosed)).split())):
         assert "explained by point mass" in written
         assert watched in written
@@ -165,10 +95,10 @@ def test_a_report_holds_the_latest_diagnosis_and_how_the_gap_has_gone(bare: Hang
     assert document["gap_watch"] == watched
 
 
-def test_a_frequency_set_aside_leads_the_table_and_is_marked() -> None:
+def test_an_excluded_frequency_leads_the_table() -> None:
     text = as_text(diagnosis_paper(sheet("blunder")))
     rows = text[text.index("WHERE THE GAP LIES") :].splitlines()
-    marked = [line for line in rows if "set aside" in line]
+    marked = [line for line in rows if "excluded" in line]
     assert len(marked) == 1
     assert marked[0].split()[:3] == ["transverse", "3", "t4"]
     others = [line for line in rows if re.search(r" t\d ", line) and line is not marked[0]]

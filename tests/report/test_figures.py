@@ -1,162 +1,122 @@
-"""Figures: drawn where their data exist, labelled with units, without global state."""
+"""Figures of every report: drawn where their data exist, true to them, legible, well-formed."""
 
 from __future__ import annotations
 
 import io
 import re
-import subprocess
-import sys
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
-from datetime import timedelta
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 from PIL import Image
 
-from shm.report.contents import HangerReport
-from shm.report.figures.every_figure import Illustration, hanger_figures
-from shm.report.figures.specification import png
+from shm.report.contents import DiagnosisSheet, HangerReport
+from shm.report.figures.every_figure import (
+    OF_DIAGNOSIS,
+    OF_HANGER,
+    OF_MODAL_TEST,
+    modal_test_figures,
+)
+from shm.report.figures.modal_test_response import ResponseCurves
+from shm.report.figures.specification import Illustration, Specification, drawn, png
 from shm.report.figures.style import PALETTE
-from shm.report.formatting import Interval
+from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, sheet
+from tests.report.sheets import make_sheet, warned
 
 SVG = "{http://www.w3.org/2000/svg}"
+Figures = dict[str, dict[str, Illustration]]
 
 
 @pytest.fixture(scope="module")
-def drawn(season: HangerReport) -> dict[str, Illustration]:
-    return {item.name: item for item in hanger_figures(season)}
+def figures(season: HangerReport) -> Figures:
+    """Every figure of a season, of each diagnosis and of a hammer test, by its name."""
+    made = {case: drawn(OF_DIAGNOSIS, sheet(case)) for case in CASES}
+    made |= {"season": drawn(OF_HANGER, season), "test": modal_test_figures(warned(make_sheet()))}
+    return {case: {item.name: item for item in items} for case, items in made.items()}
 
 
-@pytest.fixture(scope="module")
-def elements(drawn: dict[str, Illustration]) -> dict[str, str]:
-    return {name: item.svg() for name, item in drawn.items()}
+def test_figures_are_drawn_where_their_numbers_exist(figures: Figures, bare: HangerReport) -> None:
+    assert list(figures["season"]) == ["trend", "frequencies", "stiffness", "temperature"]
+    assert [item.name for item in drawn(OF_HANGER, bare)] == ["frequencies"]
+    for case in CASES:
+        assert list(figures[case]) == ([] if case == "nothing known" else ["causes", "gap_map"])
 
 
-def test_a_whole_report_has_all_figures(drawn: dict[str, Illustration]) -> None:
-    assert list(drawn) == ["trend", "tension", "frequencies", "stiffness"]
-
-
-def test_a_bare_report_has_only_the_figures_it_has_data_for(bare: HangerReport) -> None:
-    assert [item.name for item in hanger_figures(bare)] == ["tension", "frequencies"]
-
-
-def test_every_axis_has_a_label_and_quantities_a_unit(drawn: dict[str, Illustration]) -> None:
+def test_axes_have_units(figures: Figures) -> None:
     labels = {
-        name: {axes.get_xlabel() for axes in item.figure.axes}
+        f"{case}: {name}": {axes.get_xlabel() for axes in item.figure.axes}
         | {axes.get_ylabel() for axes in item.figure.axes}
-        for name, item in drawn.items()
+        for case, items in figures.items()
+        for name, item in items.items()
     }
-    assert {"time of the test (UTC)", "tension (kN)"} <= labels["trend"]
-    assert {"tension (kN)", "probability density (1/kN)"} <= labels["tension"]
-    assert "predicted / measured frequency" in labels["frequencies"]
-    assert "stiffness (MN m/rad)" in labels["stiffness"]
+    assert {"time of the test (UTC)", "tension (kN)"} <= labels["season: trend"]
+    assert "predicted / measured frequency" in labels["season: frequencies"]
+    assert "MN m/rad" in labels["season: stiffness"]
+    assert {"order of the mode", "gap (%)"} <= labels["led: gap_map"]
 
 
-def test_captions_and_alternative_texts_are_whole_sentences_without_nan(
-    drawn: dict[str, Illustration],
-) -> None:
-    for item in drawn.values():
+def test_words_beside_figures_are_sentences(figures: Figures) -> None:
+    for item in (item for items in figures.values() for item in items.values()):
         assert item.caption.endswith(".")
-        assert len(item.alt) > 40
-        assert not re.search(r"\bnan\b", item.caption + item.alt)
+        assert len(item.alt) > 25
+        assert not re.search(r"\b(nan|inf|None)\b", item.caption + item.alt)
 
 
-def test_legends_leave_the_axes_their_room(drawn: dict[str, Illustration]) -> None:
-    """A legend wider than the figure would squeeze the axes to a strip."""
-    for name, item in drawn.items():
-        item.figure.draw_without_rendering()
-        widths = [axes.get_position().width for axes in item.figure.axes]
-        assert sum(widths) / len({axes.get_position().y0 for axes in item.figure.axes}) > 0.8, name
+@pytest.mark.parametrize("case", ["season", "alike", "blunder", "test"])
+def test_no_word_is_cut_off(case: str, figures: Figures) -> None:
+    for item in figures[case].values():
+        figure = item.figure
+        figure.draw_without_rendering()
+        used = figure.get_tightbbox()
+        assert min(used.x0, used.y0) > -0.02, item.name
+        assert used.x1 < figure.get_figwidth() + 0.02, item.name
+        assert used.y1 < figure.get_figheight() + 0.02, item.name
 
 
-def test_lines_near_the_posterior_of_tension_are_drawn_and_far_ones_named(
-    season: HangerReport,
-) -> None:
-    near = next(item for item in hanger_figures(season) if item.name == "tension").figure.axes[0]
-    assert {line.get_label() for line in near.lines} == {"nominal", "baseline"}
-    assert not near.texts
-    sharp = replace(season.posterior, samples=season.posterior.samples.copy())
-    sharp.samples[:, 0] = 650 / 711 + 1e-2 * (sharp.samples[:, 0] - 650 / 711)
-    alone = replace(season, posterior=sharp, selection=None)
-    far = next(i for i in hanger_figures(alone) if i.name == "tension")
-    named = far.figure.axes[0].get_title(loc="right")
-    assert named == "nominal 711 kN →; baseline 700.6 kN →"
+def test_many_tests_and_long_names_leave_room() -> None:
+    tests = tuple(f"t{n}" for n in range(20))
+    rows = tuple(replace(r, test=t) for r in LED.where[:40] for t in tests)
+    long = replace(
+        ALIKE.causes[0], effect="translational_end_flexibility + skewed_principal_axes",
+        at="deck end, longitudinal + both ends", group=None,
+    )  # fmt: skip
+    for diagnosis in (replace(LED, tests=tests, where=rows), replace(LED, causes=(long,))):
+        for item in drawn(OF_DIAGNOSIS, DiagnosisSheet(diagnosis, HANGER)):
+            item.figure.draw_without_rendering()
+            assert all(axes.get_position().width > 0.2 for axes in item.figure.axes), item.name
 
 
-def test_the_trend_marks_the_alerted_test_at_its_tension(
-    drawn: dict[str, Illustration], season: HangerReport
-) -> None:
-    (axes,) = drawn["trend"].figure.axes
-    marks = next(line for line in axes.lines if line.get_label() == "alert")
-    assert marks.get_ydata() == pytest.approx([season.trend[-1].tension_n.mean / 1e3])
-
-
-def test_the_thresholds_stand_either_side_of_the_baseline(
-    drawn: dict[str, Illustration], season: HangerReport
-) -> None:
-    assert season.baseline_tension_n is not None
-    (axes,) = drawn["trend"].figure.axes
-    named = [line for line in axes.lines if line.get_label() in ("baseline", "threshold")]
-    levels = [float(np.asarray(line.get_ydata())[0]) for line in named]
-    baseline = season.baseline_tension_n.mean / 1e3
-    assert levels == pytest.approx([baseline, baseline * 1.05, baseline * 0.95])
-
-
-def test_the_ratio_figure_shows_prediction_over_measurement(
-    drawn: dict[str, Illustration], season: HangerReport
-) -> None:
-    (axes,) = drawn["frequencies"].figure.axes
-    bars = [container for container in axes.containers if container.get_label() == "transverse"]
-    ratios = np.asarray(bars[0][0].get_ydata())
-    assert ratios == pytest.approx([1 + 0.004 * (-1) ** order for order in range(1, 7)])
-
-
-def test_tests_without_a_time_are_left_out_of_the_trend_and_counted(season: HangerReport) -> None:
-    undated = replace(season.trend[0], time=None)
-    item = hanger_figures(replace(season, trend=(undated, *season.trend[1:])))[0]
-    assert "1 test without a time left out" in item.caption
-
-
-def test_a_lone_test_stands_in_the_middle_of_a_narrow_trend(season: HangerReport) -> None:
-    (axes,) = hanger_figures(replace(season, trend=season.trend[:1]))[0].figure.axes
-    low, high = axes.get_xlim()
-    assert high - low == pytest.approx(timedelta(days=2) / timedelta(days=1))
-
-
-def test_the_svg_is_well_formed_and_named_for_screen_readers(elements: dict[str, str]) -> None:
+def test_svgs_are_named_and_follow_the_page(figures: Figures) -> None:
+    elements = {
+        name: item.svg()
+        for case in ("season", "led", "test")
+        for name, item in figures[case].items()
+    }
     for name, element in elements.items():
         root = ElementTree.fromstring(element)
-        assert root.get("role") == "img"
         assert root.get("aria-labelledby") == f"{name}-title {name}-alt"
-        assert root.find(f"{SVG}title") is not None
         assert root.find(f"{SVG}desc") is not None
-
-
-def test_ids_are_unique_across_figures_and_references_resolve(elements: dict[str, str]) -> None:
+        plain = re.sub(r"var\(--\w+, #[0-9a-f]{6}\)", "", element)
+        assert not re.search(r"(fill|stroke): #[0-9a-f]{6}", plain), name
+        assert set(re.findall(r"var\(--(\w+),", element)) <= set(PALETTE)
     together = "".join(elements.values())
     ids = re.findall(r'\bid="([^"]+)"', together)
     assert len(ids) == len(set(ids))
     assert set(re.findall(r'(?:href="#|url\(#)([^")]+)', together)) <= set(ids)
 
 
-def test_colours_follow_the_page_so_that_dark_pages_stay_readable(
-    elements: dict[str, str],
-) -> None:
-    for element in elements.values():
-        plain = re.sub(r"var\(--\w+, #[0-9a-f]{6}\)", "", element)
-        assert not re.search(r"(fill|stroke): #[0-9a-f]{6}", plain)
-        assert set(re.findall(r"var\(--(\w+),", element)) <= set(PALETTE)
-
-
-def test_the_same_report_gives_the_same_svg(season: HangerReport) -> None:
-    first, second = (hanger_figures(season)[1].svg() for _ in range(2))
+def test_drawing_is_repeatable_and_changes_no_setting(season: HangerReport) -> None:
+    before = dict(mpl.rcParams)
+    first, second = (drawn(OF_HANGER[:1], season)[0].svg() for _ in range(2))
     assert first == second
+    assert dict(mpl.rcParams) == before
 
 
-def test_a_png_is_a_png_and_has_room_below_for_words(drawn: dict[str, Illustration]) -> None:
-    figure = drawn["tension"].figure
+def test_a_png_has_room_below_for_words(figures: Figures) -> None:
+    figure = figures["season"]["trend"].figure
     bare, told = (
         Image.open(io.BytesIO(png(figure, 50, words))) for words in ("", "circles: seen. " * 40)
     )
@@ -165,20 +125,82 @@ def test_a_png_is_a_png_and_has_room_below_for_words(drawn: dict[str, Illustrati
     assert told.width < 1.1 * bare.width
 
 
-def test_drawing_leaves_the_global_settings_as_they_were(season: HangerReport) -> None:
-    before = dict(mpl.rcParams)
-    hanger_figures(season)[0].svg()
-    assert dict(mpl.rcParams) == before
+def test_the_trend_has_levels_and_alerts(figures: Figures, season: HangerReport) -> None:
+    assert season.baseline_tension_n is not None
+    (axes,) = figures["season"]["trend"].figure.axes
+    named = [line for line in axes.lines if line.get_label() in ("baseline", "threshold")]
+    levels = [float(np.asarray(line.get_ydata())[0]) for line in named]
+    baseline = season.baseline_tension_n.mean / 1e3
+    assert levels == pytest.approx([baseline, baseline * 1.05, baseline * 0.95])
+    marks = next(line for line in axes.lines if line.get_label() == "alert")
+    assert marks.get_ydata() == pytest.approx([season.trend[-1].tension_n.mean / 1e3])
 
 
-def test_reports_do_without_pyplot_and_its_global_figures() -> None:
-    asked = (
-        "import sys, shm.report.figures, shm.report.as_pdf; "
-        "sys.exit('matplotlib.pyplot' in sys.modules)"
-    )
-    assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0
+def test_undated_tests_are_counted_in_the_caption(season: HangerReport) -> None:
+    undated = replace(season.trend[0], time=None)
+    item = drawn(OF_HANGER[:1], replace(season, trend=(undated, *season.trend[1:])))[0]
+    assert "1 test without a time left out" in item.caption
 
 
-def test_the_trend_ends_at_the_tension_by_the_latest_test(season: HangerReport) -> None:
-    assert season.trend[-1].tension_n == Interval.of_averaged(season.by_latest_test)
-    assert season.baseline_tension_n == season.trend[0].tension_n
+def test_ratios_are_prediction_over_measurement(figures: Figures) -> None:
+    (axes,) = figures["season"]["frequencies"].figure.axes
+    bars = [each for each in axes.containers if each.get_label() == "transverse"]
+    ratios = np.asarray(bars[0][0].get_ydata())
+    assert ratios == pytest.approx([1 + 0.004 * (-1) ** order for order in range(1, 7)])
+
+
+def test_bars_are_the_probabilities_and_end_with_no_gap(figures: Figures) -> None:
+    (axes,) = figures["alike"]["causes"].figure.axes
+    widths = [bar.get_width() for bar in axes.patches]  # type: ignore[attr-defined]
+    assert widths == pytest.approx([0.52, 0.31, 0.07, 0.05, 0.049, 0.001])
+    labels = [label.get_text() for label in axes.get_yticklabels()]
+    assert labels[-1] == "no gap"
+    assert sum(label.endswith("[A]") for label in labels) == 3
+
+
+def test_the_map_shows_every_residual_once(figures: Figures) -> None:
+    axes = figures["led"]["gap_map"].figure.axes
+    marks = [line for each in axes for line in each.lines if line.get_marker() in ("o", "s")]
+    shown = np.sort(np.concatenate([np.asarray(line.get_ydata(), float) for line in marks]))
+    assert shown == pytest.approx(np.sort([r.residual_percent for r in LED.where]))
+
+
+def test_the_map_shows_what_the_cause_leaves(figures: Figures) -> None:
+    names = {each.get_label() for each in figures["led"]["gap_map"].figure.axes[0].containers}
+    assert {"with the cause", "with the cause, held out"} <= names
+    unheld = tuple(replace(r, held_out_after_percent=float("nan")) for r in LED.where)
+    item = drawn(OF_DIAGNOSIS, DiagnosisSheet(replace(LED, where=unheld), HANGER))[1]
+    assert "nothing was held out" in item.caption
+
+
+def test_an_excluded_frequency_does_not_squeeze_the_others(figures: Figures) -> None:
+    item = figures["blunder"]["gap_map"]
+    axes = item.figure.axes[0]
+    (cross,) = [line for line in axes.lines if line.get_marker() == "X"]
+    assert cross.get_label() == "excluded"
+    assert "+30.00 %" in [text.get_text() for text in axes.texts]
+    assert axes.get_ylim()[1] < 5
+    assert "Excluded as a gross error: transverse 3 in t4." in item.alt
+
+
+def test_hovers_ask_for_what_their_mark_has(season: HangerReport) -> None:
+    curves = ResponseCurves.of(warned(make_sheet()))
+    specifications = [
+        *(each.draw(season) for each in OF_HANGER),
+        *(each.draw(sheet("blunder")) for each in OF_DIAGNOSIS),
+        *(each.draw(curves) for each in OF_MODAL_TEST),
+    ]
+    marks: list[Any] = [
+        mark
+        for each in specifications
+        if isinstance(each, Specification)
+        for panel in each.panels
+        for mark in panel.marks
+        if mark.hover or len(mark.texts)
+    ]
+    assert len(marks) > 50
+    for mark in marks:
+        fields = set(re.findall(r"%\{(\w+)(?::[^}]+)?\}", mark.hover))
+        assert fields <= {"x", "y"} | ({"text"} if len(mark.texts) else set())
+        assert not len(mark.texts) or len(mark.texts) == len(mark.x)
+        assert not any(re.search(r"\bnan\b|\bNone\b", text) for text in mark.texts)

@@ -17,7 +17,8 @@ from shm.report.bridge_report import bridge_paper
 from shm.report.contents import BridgeReport, DiagnosisSheet, HangerReport, summary_of
 from shm.report.diagnosis_report import diagnosis_paper
 from shm.report.figures.along_the_bridge import bridge_illustration
-from shm.report.figures.every_figure import hanger_figures
+from shm.report.figures.hanger_trend import FIGURE as TREND
+from shm.report.figures.specification import drawn
 from shm.report.formatting import Interval
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_status import Status
@@ -116,18 +117,13 @@ def test_a_report_tells_every_tension_in_that_unit(
 def test_figures_are_labelled_in_that_unit(
     season: HangerReport, tension_n: float, unit: str
 ) -> None:
-    drawn = {each.name: each for each in hanger_figures(of_size(season, tension_n))}
-    (trend,), (posterior,) = drawn["trend"].figure.axes, drawn["tension"].figure.axes
-    assert trend.get_ylabel() == posterior.get_xlabel() == f"tension ({unit})"
-    assert posterior.get_ylabel() == f"probability density (1/{unit})"
-    latest = tension_n / force_unit(tension_n).newtons
-    low, high = posterior.get_xlim()
-    assert low < latest < high
+    (item,) = drawn((TREND,), of_size(season, tension_n))
+    (trend,) = item.figure.axes
+    assert trend.get_ylabel() == f"tension ({unit})"
     marks = next(line for line in trend.lines if line.get_label() == "alert")
-    assert marks.get_ydata() == pytest.approx([latest])
-    for said in (drawn["trend"].alt, drawn["tension"].alt, drawn["tension"].caption):
-        assert f" {unit} (90 % interval" in said
-        assert not NOTHING.search(said)
+    assert marks.get_ydata() == pytest.approx([tension_n / force_unit(tension_n).newtons])
+    assert f" {unit} (90 % interval" in item.alt
+    assert not NOTHING.search(item.alt)
 
 
 @pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
@@ -181,10 +177,12 @@ def test_a_notebook_shows_that_unit(season: HangerReport, tension_n: float, unit
     data = of_size(season, tension_n)
     assert data.selection is not None
     shown = notebook.sheet(data.posterior).html
-    (row,) = re.findall(r"<tr><td>tension</td>.*?</tr>", shown)
+    (row,) = re.findall(r"<tr><th[^>]*>tension</th>.*?</tr>", shown)
     assert f"tension in {unit}" in row
     assert not NOTHING.search(row)
-    assert f"<th>tension, {unit}</th>" in notebook.sheet(data.selection).html
-    (nominal,) = re.findall(r"nominal tension</td><td>([^<]*)", notebook.sheet(data.hanger).html)
+    assert f">tension, {unit}</th>" in notebook.sheet(data.selection).html
+    (nominal,) = re.findall(
+        r"nominal tension</th><td[^>]*>([^<]*)", notebook.sheet(data.hanger).html
+    )
     assert nominal.endswith(f" {unit}")
     assert not NOTHING.search(nominal)

@@ -92,7 +92,7 @@ def with_tension(tension: Averaged | None = None, **changes: Any) -> HangerSumma
         (
             {"is_first": True},
             "FIRST",
-            "tension 702 ± 10 kN by its first test.",
+            "tension 702 ± 10 kN, and no test after its baseline.",
             "Choose a warmer or colder day at the next planned test, so that the baseline covers "
             "temperature.",
         ),

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import pytest
 
@@ -16,13 +14,11 @@ from shm.report.as_text import as_text
 from shm.report.contents import ModalTestReport
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.shared_tables import headline
-from shm.values import ModalTest, QualityCheck
+from shm.values import QualityCheck
 from tests.report.outline import Outline
 from tests.report.sheets import (
-    HANGER,
     ambient,
     given_responses,
-    make_poles,
     make_sheet,
     one_sensor,
     refused,
@@ -57,33 +53,6 @@ def told(outline: Outline) -> str:
     return " ".join(" ".join(outline.words).split())
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_pages_nest_fetch_nothing_and_are_small(
-    name: str, pages: dict[str, str], outlines: dict[str, Outline]
-) -> None:
-    outline, page = outlines[name], pages[name]
-    assert outline.open == []
-    for tag, attributes in outline.tags:
-        assert tag not in {"script", "link", "iframe"}
-        assert not {"src", "srcset", "data", "action"} & attributes.keys()
-    assert not re.search(r"url\((?!#)|@import", page)
-    assert "http" not in page.replace("http://www.w3.org/", "")
-    assert len(page) < 2_000_000
-
-
-@pytest.mark.parametrize("name", PAGES)
-def test_pages_have_unique_ids_sound_headings_and_no_nan(
-    name: str, outlines: dict[str, Outline]
-) -> None:
-    outline = outlines[name]
-    ids = [attributes["id"] for _, attributes in outline.tags if "id" in attributes]
-    assert len(ids) == len(set(ids))
-    levels = [int(tag[1]) for tag, _ in outline.tags if re.fullmatch(r"h[1-6]", tag)]
-    assert levels[0] == 1
-    assert all(after <= before + 1 for before, after in pairwise(levels))
-    assert not re.search(r"\b(nan|inf|None)\b", " ".join(outline.words))
-
-
 def test_the_page_begins_with_what_was_measured_what_came_of_it_and_what_to_do(
     outlines: dict[str, Outline],
 ) -> None:
@@ -93,7 +62,7 @@ def test_the_page_begins_with_what_was_measured_what_came_of_it_and_what_to_do(
         "4 acceleration channels at 2 places in both planes and 6 hits: 5 used",
         "1 dropped (1 double hit)",
         "12 modes were identified: transverse 1 to 6 (5.8 to 34.8 Hz) and longitudinal 1 to 6",
-        "Set aside as no modes of the hanger: harmonic at 11.6 Hz, tone at 50 Hz and deck at",
+        "Excluded, as they are no modes of the hanger: harmonic at 11.6 Hz, tone at 50 Hz and",
         "The modes can be used with care: 2 of 4 checks warn (double hits and tones)",
         "Next: Hit freely. Move the cables",
     ):
@@ -116,12 +85,6 @@ def test_the_page_holds_every_number_that_a_person_checks(outlines: dict[str, Ou
         "Hanger 3 (north), 12 m, nominal tension 711 kN",
     ):
         assert words in page, words
-
-
-def test_verdicts_are_marked_on_their_rows(outlines: dict[str, Outline]) -> None:
-    rows = [attributes["class"] for tag, attributes in outlines["dropped"].tags
-            if tag == "tr" and "class" in attributes]  # fmt: skip
-    assert rows == ["warning", "good", "good", "warning", "unknown"]
 
 
 @pytest.mark.parametrize(
@@ -153,14 +116,6 @@ def test_a_test_of_good_checks_is_trusted() -> None:
     assert text.startswith("Test t1, Hanger 3 (north): Good")
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_texts_fit_a_terminal(name: str) -> None:
-    text = as_text(modal_test_paper(CASES[name]()))
-    assert max(len(line) for line in text.splitlines()) <= 100
-    assert len(text.splitlines()) < 82
-    assert not re.search(r"\b(nan|inf|None)\b", text)
-
-
 def test_the_text_tells_doubts_in_full_and_counts_good_checks() -> None:
     text = " ".join(as_text(modal_test_paper(CASES["dropped"]())).split())
     assert "double hits ! warning 1 hits 0 hits hit 2 struck twice Hit freely." in text
@@ -168,33 +123,6 @@ def test_the_text_tells_doubts_in_full_and_counts_good_checks() -> None:
     assert "2 further checks good." in text
     assert "1 transverse order 4 was not found" in text
     assert "LEFT OUT what how many why" in text
-
-
-def test_missing_orders_show_in_the_paragraph() -> None:
-    sheet = make_sheet()
-    kept = tuple(m for m in sheet.modes if m.plane == "transverse" and m.order not in (3, 5))
-    test = replace(sheet.identification.test, modes=kept)
-    text = as_text(
-        modal_test_paper(replace(sheet, identification=replace(sheet.identification, test=test)))
-    )
-    assert "transverse 1 to 2, 4, 6 (5.8 to 34.8 Hz)" in " ".join(text.split())
-
-
-def test_names_from_outside_cannot_inject_markup() -> None:
-    sly = "<script>alert(1)</script>"
-    sheet = given_responses()
-    bare = replace(
-        sheet.identification,
-        test=ModalTest(sly, ()),
-        frequency_response=None,
-        poles=make_poles((), orders=0),
-        notes=(sly,),
-    )
-    page = as_html(
-        modal_test_paper(replace(sheet, identification=bare, hanger=replace(HANGER, name=sly)))
-    )
-    assert "<script" not in page
-    assert "&lt;script&gt;" in page
 
 
 def test_the_document_survives_json_and_holds_what_the_page_tells() -> None:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from shm.report.figures.specification import envelope_places, peak_places
+from shm.report.figures.time_axes import places as thinned_places
+from shm.values import FloatArray
 
 VALUES = st.lists(st.floats(-1e6, 1e6) | st.just(float("nan")), min_size=1, max_size=300)
 
@@ -44,3 +47,15 @@ def test_of_each_bin_the_largest_stays(values: list[float], bins: int) -> None:
     known = signal[np.isfinite(signal)]
     if len(known):
         assert np.nanmax(signal[places]) == known.max()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_places_keep_the_extremes_of_every_curve(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    curves: list[FloatArray] = [rng.normal(size=20_000) for _ in range(3)]
+    chosen = thinned_places(*curves, always=(7, 11))
+    for curve in curves:
+        assert curve[chosen].max() == curve.max()
+        assert curve[chosen].min() == curve.min()
+    assert {0, 7, 11, 19_999} <= set(chosen.tolist())
+    assert np.all(np.diff(chosen) > 0)

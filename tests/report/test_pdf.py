@@ -16,7 +16,6 @@ from shm.report.paper import Paper, Section, Table
 from tests.helpers.nouns import with_now
 from tests.helpers.painting import paint_blank
 from tests.helpers.pdf_words import Pdf
-from tests.report.diagnoses import UNEXPLAINED
 
 
 @pytest.fixture(scope="module")
@@ -137,24 +136,6 @@ def test_narrow_columns_keep_one_line_and_wide_ones_share_the_rest() -> None:
     assert narrow + wide == pytest.approx(300.0)
     small = Table("t", ("a", "b"), (("1", "2"),))
     assert sum(widths(small, 300.0, 8.0, 6.0)) < 60
-
-
-@pytest.mark.parametrize("cell", ["3", "word " * 80, "x" * 400])
-@pytest.mark.parametrize("marks", [(), ("warning",)])
-def test_a_table_of_one_column_is_set(cell: str, marks: tuple[str, ...]) -> None:
-    table = Table("Alone", ("what",), ((cell,),), marks=marks)
-    (only,) = widths(table, 300.0, 8.0, 6.0)
-    assert 0 < only <= 300
-    paper = Paper("One column", "", "first", [Section("In short", tables=[table])], "That is all.")
-    told = Pdf.parse(as_pdf(paper)).words
-    assert "".join(cell.split()) in "".join(told.split())
-
-
-def test_the_gap_has_the_colour_of_its_own_answer_as_on_the_page(season: HangerReport) -> None:
-    calm = replace(season.drifts[0], probability=0.01)
-    paper = hanger_paper(replace(with_now(season, drifts=(calm,)), diagnosis=UNEXPLAINED))
-    gaps = [part for part in paper.parts if part.title.endswith("Gap diagnosis")]
-    assert [(paper.style, gap.style) for gap in gaps] == [("steady", "alert")] * 2
 
 
 @pytest.mark.parametrize(("columns", "marked"), [(1, 0), (2, 1), (3, 1), (5, 1)])

@@ -1,7 +1,7 @@
 """State one verdict everywhere: text, page, document, facts, figures and remarks of a diagnosis.
 
 Over every combination of what is probable, what is left, how the sampler did and which frequencies
-were excluded, and over all diagnoses that tests have made by hand.
+were excluded, over all diagnoses that tests have made by hand, and over the golden files.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import pytest
 
@@ -22,9 +23,11 @@ from shm.report.as_text import as_text
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_report import causes, diagnosis_json, diagnosis_paper, diagnosis_part
 from shm.report.diagnosis_summary import write_lead, write_summary
-from shm.report.figures import gap_before_and_after, gap_causes
+from shm.report.figures import gap_causes, gap_map
 from shm.values import NAN, Cause, Diagnosis, Outcome, Outlier, Shrinkage
 from shm.values.verdict import Reason
+from tests.benchmarks.blind_scores import find_contradictions
+from tests.contracts import gap_calls as calls
 from tests.helpers.diagnoses import a_diagnosis
 from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, MASS, make_cause
 
@@ -76,7 +79,24 @@ def construct() -> Iterator[tuple[str, Diagnosis]]:
 
 
 CONSTRUCTED = dict(construct())
-STORED = {**CASES, "helper": a_diagnosis()}
+
+
+def read_golden() -> Iterator[tuple[str, Diagnosis]]:
+    for name in calls.SINGLE:
+        yield f"golden {name}", _timed(calls.golden(name))
+    for each in calls.golden("bridge")["diagnoses"]:
+        yield f"golden bridge, hanger {each['hanger']}", _timed(each)
+    for name, each in calls.golden("former").items():
+        yield f"golden former {name}", diagnosis_of(each)
+
+
+def _timed(document: dict[str, Any]) -> Diagnosis:
+    """Return the diagnosis of a golden document, which states no seconds."""
+    return diagnosis_of({**document, calls.VOLATILE: 0.0})
+
+
+COMPUTED = dict(read_golden())
+STORED = {**CASES, "helper": a_diagnosis(), **COMPUTED}
 # A page and a document take time: one diagnosis of each verdict is written out in full.
 IN_FULL = {
     (each.verdict.outcome, each.verdict.reason, each.verdict.is_uncertain): each
@@ -157,6 +177,12 @@ def test_words_agree_stored(name: str) -> None:
     check_words(STORED[name])
 
 
+@pytest.mark.parametrize("name", COMPUTED)
+def test_no_answer_contradicts_itself(name: str) -> None:
+    """Probabilities, verdict, lead, remarks, residuals and interval, each computed once more."""
+    assert find_contradictions(COMPUTED[name]) == []
+
+
 def test_every_outcome_is_constructed() -> None:
     assert {outcome for outcome, *_ in IN_FULL} == set(Outcome)
 
@@ -177,7 +203,7 @@ def test_text_page_and_document_agree(key: tuple[Outcome, Reason, bool]) -> None
     assert document["summary"].startswith(lead)
     assert lead in " ".join(diagnosis.summary().split())
     assert outcome.value.lower() in repr(diagnosis)
-    is_drawn = gap_before_and_after.specify(sheet) is not None
+    is_drawn = gap_map.has_cause(sheet)
     assert is_drawn <= (diagnosis.verdict.claim is not None)
     assert lead in gap_causes.FIGURE.alt(sheet)
 

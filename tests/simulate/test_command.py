@@ -43,20 +43,6 @@ def test_every_format_is_offered_and_can_be_read(tmp_path: Path, form: str) -> N
     assert len(recording.accelerations) == 4
 
 
-def test_sensors_hammer_and_rate_are_those_that_were_asked_for(tmp_path: Path) -> None:
-    recording = simulated(tmp_path, "--sensors", "3", "--hammer-x", "1.5", "--rate", "1024")
-    assert len(recording.accelerations) == 6
-    assert recording.sampling_rate_hz == 1024
-    assert recording.force is not None
-    assert recording.force.x_m == 1.5
-
-
-def test_nobody_hits_in_wind_and_traffic(tmp_path: Path) -> None:
-    recording = simulated(tmp_path, "--ambient", "--seconds", "10")
-    assert recording.force is None
-    assert recording.duration_s == 10.0
-
-
 def test_an_effect_is_planted_in_a_recording(tmp_path: Path) -> None:
     usual = simulated(tmp_path / "a")
     clamp = "point_mass:everywhere:mass_kg=60,x_m=3.4"

@@ -63,18 +63,6 @@ def test_the_same_seed_gives_the_same_samples_however_they_are_cut(hanger: Hange
     assert not np.array_equal(samples(hanger, QUIET, 120), samples(hanger, QUIET, 120, seed=6))
 
 
-def test_samples_go_on_across_the_seam_of_two_chunks(hanger: Hanger) -> None:
-    """Steps between samples are as large there as elsewhere."""
-    steps = np.abs(np.diff(samples(hanger, QUIET, 600)))
-    seams = steps[:, 11_999::12_000]
-    assert seams.mean() == pytest.approx(steps.mean(), rel=0.5)
-
-
-def test_a_train_is_louder_than_the_wind_alone(hanger: Hanger) -> None:
-    with_trains = MonitoringPlan(trains_a_day=18 * 60.0, knocks_a_day=0.0)
-    assert samples(hanger, with_trains, 600).std() > 2 * samples(hanger, QUIET, 600).std()
-
-
 def test_summer_is_warmer_than_winter_and_the_weather_is_the_same_for_all() -> None:
     weather, again = (Weather(7, QUIET) for _ in range(2))
     days = [START + timedelta(hours=n) for n in range(0, 24 * 20, 7)]

@@ -1,7 +1,7 @@
 """Counts that may only fall: numeric constants, and docstrings under an ignore of ruff.
 
-Both are explained in docs/decisions/0001-counts-that-only-fall.md. When a count has fallen, write
-the new one here in the same commit, so that it cannot rise again.
+Both are explained in docs/decisions/0001-counts-and-the-walk-of-a-stranger.md. When a count has
+fallen, write the new one here in the same commit, so that it cannot rise again.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("shm", "cli/shm_cli", "daemon/shm_daemon")
 
-NUMERIC_CONSTANTS = 1504
-DOCSTRING_ERRORS = 1111
+NUMERIC_CONSTANTS = 1445
+DOCSTRING_ERRORS = 1032
 
 
 def is_number(value: ast.expr) -> bool:

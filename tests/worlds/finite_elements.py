@@ -37,7 +37,6 @@ from scipy.linalg import eigh
 Array = NDArray[np.float64]
 
 PLANES = ("transverse", "longitudinal")
-CAUSES = ("point_mass", "section_loss", "intermediate_support")
 GRAVITY_M_S2 = 9.81
 POISSON = 0.3  # EN 1993-1-1, 3.2.6
 COWPER_ROUND = 6 * (1 + POISSON) / (7 + 6 * POISSON)  # Cowper (1966), solid circle: 0.8864
@@ -243,7 +242,6 @@ class _Draw:
     planes: tuple[str, ...]
     modes: tuple[int, int]  # for each plane
     tests: int
-    cause: str = ""
 
 
 def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
@@ -281,49 +279,6 @@ def _sound(rng: np.random.Generator) -> _Draw:
     planes = PLANES if share >= 0.35 else PLANES[:1] if share < 0.25 else PLANES[1:]
     modes = (int(rng.integers(3, 15)), int(rng.integers(3, 15)))
     return _Draw(strand, diameter, springs, ratio, planes, modes, int(rng.integers(1, 6)))
-
-
-def _perhaps_with_a_cause(rng: np.random.Generator) -> _Draw:
-    diameter = _log_uniform(rng, 0.040, 0.140)
-    springs, ratio = _springs(rng, 3.0, 1000.0), float(rng.uniform(0.5, 1.5))
-    modes = (int(rng.integers(5, 10)), int(rng.integers(5, 10)))
-    tests, which = int(rng.integers(1, 4)), CAUSES[int(rng.integers(3))]
-    cause = which if rng.random() < 0.5 else ""
-    return _Draw(False, diameter, springs, ratio, PLANES, modes, tests, cause)
-
-
-def _plant(rng: np.random.Generator, cause: str, bar: Bar) -> dict[str, float | str]:
-    """Return the record of a cause, fit for this hanger. Always the same draws."""
-    length, place = bar.length_m, bar.length_m * float(rng.uniform(0.15, 0.85))
-    draw, width, coin = float(rng.random()), float(rng.uniform(0.03, 0.10)) * length, rng.random()
-    planes = " ".join(PLANES)
-    if cause == "point_mass":
-        size, width = 2 + 13 * draw, 0.0  # kg: a lamp, a sign
-    elif cause == "section_loss":
-        size = 0.2 + 0.4 * draw  # lost part of the second moment; the area follows as for a round
-    elif cause == "intermediate_support":
-        # A fifth to twenty times the hanger's own lateral stiffness there: string plus simply
-        # supported beam (3 EI L/(a b)^2, any handbook), N/m.
-        across = length / (place * (length - place))
-        own = bar.tension_n * across + 3 * bar.bending_stiffness_n_m2 / length * across**2
-        size, width = own * 0.2 * 100**draw, 0.0
-        if coin < 0.5:  # a part that touches on one side
-            planes = PLANES[int(coin < 0.25)]
-    else:
-        return {"cause": ""}
-    where = {"cause_place_m": place, "cause_length_m": width}
-    return {"cause": cause, "cause_planes": planes, "cause_size": size, **where}
-
-
-def _with_cause(bar: Bar, plane: str, planted: dict[str, float | str]) -> Bar:
-    if not planted["cause"] or plane not in str(planted["cause_planes"]):
-        return bar
-    place, size, width = (float(planted[f"cause_{key}"]) for key in ("place_m", "size", "length_m"))
-    if planted["cause"] == "point_mass":
-        return replace(bar, masses=(*bar.masses, (place, size)))
-    if planted["cause"] == "section_loss":
-        return replace(bar, loss=(place - width / 2, place + width / 2, size))
-    return replace(bar, supports=((place, size),))
 
 
 def _measure(
@@ -412,13 +367,13 @@ def _case(rng: np.random.Generator, index: int, draw: _Draw, nuisances: Nuisance
         masses=((sensor_m, sensor_kg),),
     )
     diameter = draw.diameter_m * math.sqrt(true_area / area)  # overall, for a strand
-    planted = _plant(rng, draw.cause, bare)
+    rng.random(4)  # unused: seeds give the hangers that pages quote
     exact: dict[str, Array] = {}
     for plane, ends, count in zip(PLANES, ((0, 2), (1, 3)), draw.modes, strict=True):
         deck, arch = (draw.springs[i] * bending / true_length for i in ends)
         bar = replace(bare, spring_deck_n_m_rad=deck, spring_arch_n_m_rad=arch)
         if plane in draw.planes:
-            exact[plane] = natural_frequencies_hz(_with_cause(bar, plane, planted), count)
+            exact[plane] = natural_frequencies_hz(bar, count)
     modes, measured = _measure(rng, draw, exact, nuisances)
     truth: dict[str, float | str] = {"tension_n": tension, "tension_ratio": draw.ratio}
     truth |= {"kind": "strand" if draw.strand else "rod", "planes": float(len(draw.planes))}
@@ -428,7 +383,7 @@ def _case(rng: np.random.Generator, index: int, draw: _Draw, nuisances: Nuisance
     truth |= {"bending_factor": factor if draw.strand else 1.0}
     truth |= {"sensor_mass_kg": sensor_kg, "sensor_place_m": sensor_m}
     truth |= {f"spring_k{i}": k for i, k in enumerate(draw.springs, 1)}  # k L/EI
-    truth |= planted | measured
+    truth |= measured
     return Case(index, toml, modes, truth, _groups(draw, diameter))
 
 
@@ -442,8 +397,3 @@ def _population(
 def sound_hangers(seed: int, count: int, nuisances: Nuisances | None = None) -> list[Case]:
     """Return hangers with nothing wrong; case i depends on (seed, i) alone, not on the count."""
     return _population(_sound, (seed, 1), count, nuisances or Nuisances())
-
-
-def hangers_with_a_cause(seed: int, count: int, nuisances: Nuisances | None = None) -> list[Case]:
-    """Return rods of which about half carry one planted cause, named in truth["cause"]."""
-    return _population(_perhaps_with_a_cause, (seed, 2), count, nuisances or Nuisances())

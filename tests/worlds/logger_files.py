@@ -7,7 +7,7 @@ what no reader can find in it and a sidecar has to say.  Place and plane of a se
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -181,8 +181,3 @@ FORMATS: dict[str, Format] = {
 def write(name: str, path: Path, recording: Recording) -> Held | None:
     """Writes `recording` at `path` in the shape `name`, and says what the file holds."""
     return FORMATS[name].write(path, recording)
-
-
-def first_seconds(recording: Recording, seconds: float) -> Recording:
-    """The beginning of a recording: a minute at 5 kHz is long text.  Its truth is the whole's."""
-    return replace(recording, data=recording.data[: int(seconds * recording.rate_hz)])

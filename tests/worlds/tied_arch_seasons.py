@@ -488,15 +488,6 @@ class Frame:
             answers.append(Response(tension, r, u))
         return answers
 
-    def arch_end_forces(self, load: "Load", response: "Response") -> Array:
-        """What the springings give the arch: (x, y, moment) at the left, at the right."""
-        members = _members(self)
-        found = []
-        for m, at in ((members[0], slice(0, 3)), (members[self.count], slice(3, 6))):
-            own = m.stiffness @ m.turn @ response.moved[m.where] + self._strained(m, load)
-            found.append((m.turn.T @ own)[at])
-        return np.array(found)
-
     def unit(self, **what: Any) -> "Load":
         """A load of this frame, zero but for what is named."""
         nothing = (0.0,) * self.count

@@ -24,7 +24,9 @@ class Trial:
     seconds: float
 
     def sentence(self, hook: Hook) -> str:
-        return f"The hook {hook.name} took the test alert in {self.seconds:.1f} s: {self.answer}."
+        """Return that it arrived, and what the hook answered, unless that is the document again."""
+        answer = self.answer.partition(": {")[0]
+        return f"The hook {hook.name} took the test alert in {self.seconds:.1f} s: {answer}."
 
 
 def send_test_alert(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,11 +13,12 @@ from fastapi import Depends, Request
 from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm.pipeline.reporting import hanger_now, hanger_states
-from shm.report.contents import DiagnosisSheet, HangerReport
+from shm.report.contents import Deed, DiagnosisSheet, HangerReport
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.store import (
     Baseline,
     BaselineGlance,
+    EventKind,
     HangerEvent,
     Store,
     StoredWatch,
@@ -40,6 +41,12 @@ from shm_daemon.web.models import HangerNumber
 from shm_daemon.web.site import described
 
 log = logging.getLogger(__name__)
+
+_DEEDS = {
+    EventKind.BASELINE: "baseline set",
+    EventKind.ADOPTED: "effect adopted",
+    EventKind.UNDONE: "adoption undone",
+}
 
 
 @dataclass(frozen=True)
@@ -108,7 +115,19 @@ class HangerView:
         """Return the report after the latest test; None before the first is processed."""
         if not self.trend:
             return None
-        return hanger_now(self.workspace, self.store, self.hanger, self.trend, utc_now())
+        report = hanger_now(self.workspace, self.store, self.hanger, self.trend, utc_now())
+        rows = zip(report.trend, self.trend, strict=True)
+        return replace(
+            report,
+            # A test without a time stands at its receipt.
+            trend=tuple(replace(row, time=point.time) for row, point in rows),
+            states=self.states or NOTHING_WATCHED,
+            deeds=tuple(
+                Deed(_DEEDS[event.kind], event.at, f"by {event.who}: {event.why}")
+                for event in self.events
+                if event.kind in _DEEDS
+            ),
+        )
 
     @cached_property
     def sheet(self) -> DiagnosisSheet | None:

@@ -26,14 +26,14 @@ from shm.store.queries.recordings import count_stages
 from shm.store.queries.tests import count_tests, list_test_rows
 from shm.store.queries.trends import list_trend
 from shm.values import Hanger
-from shm.values.rounding import ForceUnit
+from shm.values.rounding import ForceUnit, force_unit
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import test_page
 from shm_daemon.web.background_work import RETRY_AFTER
 from shm_daemon.web.faults import answers
-from shm_daemon.web.hanger_figures import FIGURES, tension_unit
+from shm_daemon.web.hanger_figures import FIGURES
 from shm_daemon.web.hanger_view import HangerView, View
 from shm_daemon.web.models import (
     LARGEST_NUMBER,
@@ -127,6 +127,11 @@ class HangerTests(BaseModel):
     hanger: int
     tests: list[TestState]
     next_before: int | None = Field(description="To go on with; null at the oldest test.")
+
+
+def tension_unit(points: Sequence[StoredPoint]) -> ForceUnit:
+    """Return the one unit of the tensions of a hanger's tests."""
+    return force_unit(*(point.averaged.tension_n.mean for point in points))
 
 
 @dataclass(frozen=True)
@@ -227,7 +232,7 @@ def hanger(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Any:
 def _now(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
     """Return the state of many hangers with as many queries as for one."""
     store = site.store
-    known = HangersNow.of(site.workspace, store, hangers, utc_now())
+    known = HangersNow(site.workspace, store, hangers, utc_now())
     tests = count_tests(store)
     set_at = {id_: each.set_at for id_, each in known.baselines.items()}
     return [
@@ -314,13 +319,14 @@ def figure(
     name: Annotated[str, Path(max_length=40, description="`trend`, `stiffness`, ...")],
 ) -> JSONResponse:
     """Return a plotly document with its caption; with `Retry-After` where it is not whole yet."""
-    found = next((each for each in FIGURES if each.name == name and each.is_there(view)), None)
-    if found is None:
+    found = next((each for each in FIGURES if each.member.name == name), None)
+    document = found.document(view) if found else None
+    if found is None or document is None:
+        known = ", ".join(each.member.name for each in FIGURES if each.specify(view)) or "none"
         raise NothingThere(
-            f"hanger {view.hanger.id} has no figure {name}.",
-            remedy=f"Figures: {', '.join(e.name for e in FIGURES if e.is_there(view)) or 'none'}.",
+            f"hanger {view.hanger.id} has no figure {name}.", remedy=f"Figures: {known}."
         )
-    made = JSONResponse(found.document(view))
+    made = JSONResponse(document)
     made.headers.update(_headers(view) if found.shows_states else {})
     return made
 

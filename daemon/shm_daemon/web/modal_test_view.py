@@ -83,7 +83,7 @@ MEMBERS: tuple[TestFigure, ...] = (
         "Shapes",
         SHAPES,
         "store",
-        lambda sheet: _REST_PX + _ROW_PX * len(rows_of(sheet, is_on_screen=True)),
+        lambda sheet: _REST_PX + _ROW_PX * len(rows_of(sheet)),
         is_wide=True,
     ),
 )

@@ -14,8 +14,6 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from threading import Lock
 
-import requests
-
 import shm
 from shm.bridge import OtherBridge
 from shm.documents import ValidationError, value_of
@@ -24,7 +22,7 @@ from shm.pipeline import utc_now
 from shm.values.messages import Lead
 from shm_daemon.heartbeat import duration_words
 from shm_daemon.hooks.contract import one_line
-from shm_daemon.hooks.webhook import Lines, reason_of, unchanged
+from shm_daemon.http_client import HttpClient, NoAnswer
 from shm_daemon.web.address import SUMMARY
 from shm_daemon.web.bridge_summary import BridgeRow, Summary
 
@@ -47,33 +45,25 @@ class NotTold(ShmError):
     """A bridge did not say how it is."""
 
 
-def ask(bridge: OtherBridge, folder: Path, lines: Lines, timeout_s: float = LONGEST_S) -> Summary:
+def ask(
+    bridge: OtherBridge, folder: Path, client: HttpClient, timeout_s: float = LONGEST_S
+) -> Summary:
     """Return the summary of another bridge; `folder` is that of our workspace. Raises NotTold."""
     headers = {"Accept": "application/json", "User-Agent": "shm", **_token(bridge, folder)}
-    verify = _certificate(bridge, folder)
-    with lines.session(timeout_s) as (session, line):
-        try:
-            with session.get(
-                f"{bridge.address}{SUMMARY}",
-                headers=headers,
-                timeout=timeout_s,
-                allow_redirects=False,
-                stream=True,
-                verify=verify,
-                auth=unchanged,
-            ) as response:
-                body = bytearray()
-                for piece in response.iter_content(4096):
-                    body += piece
-                    if len(body) > _LARGEST_BYTES:
-                        raise _no_shm(f"more than {_LARGEST_BYTES // 1024} kB")
-        except (requests.RequestException, OSError) as error:
-            if not line.cut_off and not isinstance(error, requests.Timeout):
-                raise _failure(error) from None
-            line.cut_off = True
-        if line.cut_off:  # an answer that ends early may look like a whole one
-            raise NotTold(f"No answer within {timeout_s:g} s.", remedy=_LOOK)
-    return _judged(bridge, response.status_code, body)
+    try:
+        answer = client.send(
+            "GET",
+            f"{bridge.address}{SUMMARY}",
+            timeout_s,
+            _LARGEST_BYTES,
+            headers=headers,
+            verify=_certificate(bridge, folder),
+        )
+    except NoAnswer as error:
+        raise _failure(error) from None
+    if answer.is_cut:
+        raise _no_shm(f"more than {_LARGEST_BYTES // 1024} kB")
+    return _judged(bridge, answer.status, answer.body)
 
 
 def _token(bridge: OtherBridge, folder: Path) -> dict[str, str]:
@@ -103,17 +93,19 @@ def _certificate(bridge: OtherBridge, folder: Path) -> str | bool:
     return str(path)
 
 
-def _failure(error: Exception) -> NotTold:
-    if isinstance(error, requests.exceptions.SSLError):
+def _failure(error: NoAnswer) -> NotTold:
+    if error.is_late:
+        return NotTold(f"{error.reason.capitalize()}.", remedy=_LOOK)
+    if error.is_untrusted:
         return NotTold(
-            f"Its certificate is not trusted ({reason_of(error)}).",
+            f"Its certificate is not trusted ({error.reason}).",
             remedy="Have it renewed or, where an authority of your own made it, name that "
             "authority's certificate in bridge.toml: certificate_file.",
         )
-    return NotTold(f"The connection failed ({reason_of(error)}).", remedy=_LOOK)
+    return NotTold(f"The connection failed ({error.reason}).", remedy=_LOOK)
 
 
-def _judged(bridge: OtherBridge, status: int, body: bytes | bytearray) -> Summary:
+def _judged(bridge: OtherBridge, status: int, body: bytes) -> Summary:
     """Return the summary of an answer; raises NotTold."""
     try:
         found = json.loads(body)
@@ -173,7 +165,7 @@ class OtherBridges:
         clock: Callable[[], datetime] = utc_now,
     ):
         self._timeout_s, self._page_waits_s, self._clock = timeout_s, page_waits_s, clock
-        self._lines, self._lock = Lines(), Lock()
+        self._client, self._lock = HttpClient(), Lock()
         self._pool = ThreadPoolExecutor(_SIDE_BY_SIDE, "bridges")
         self._known: dict[OtherBridge, _Known] = {}
         self._asking: dict[OtherBridge, Future[None]] = {}
@@ -194,12 +186,12 @@ class OtherBridges:
 
     def close(self) -> None:
         """Break off what is being asked."""
-        self._lines.close()
+        self._client.close()
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def _note(self, bridge: OtherBridge, folder: Path, now: datetime) -> None:
         try:
-            summary = ask(bridge, folder, self._lines, self._timeout_s)
+            summary = ask(bridge, folder, self._client, self._timeout_s)
             found, why = _Known(now, summary, self._clock()), None
         except NotTold as error:
             found, why = _Known(now), Lead(error.message, error.remedy)

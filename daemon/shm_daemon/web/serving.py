@@ -54,14 +54,14 @@ def serve(
     """
     refuse_uninstalled()
     refuse_unguarded(workspace, address)
-    context = context_of(certificate, key)
+    refuse_bad_certificate(certificate, key)
     announce()
     if not address.is_loopback and certificate is None:
         log.warning("tokens and data go over the network in clear: give --certificate and --key")
     _allow_connections()
     app = make_app(workspace, address, warms_up=True)
     with ending_in_order():
-        make_server(app, address, context).run()
+        make_server(app, address, certificate, key).run()
 
 
 def make_app(
@@ -122,18 +122,18 @@ def leaving() -> Iterator[None]:
 
 
 def make_server(
-    app: ASGIApp, address: Address, certificate: ssl.SSLContext | None = None
+    app: ASGIApp, address: Address, certificate: Path | None = None, key: Path | None = None
 ) -> uvicorn.Server:
-    """Return a server that limits each caller and says little of itself and of callers."""
+    """Return a server that says little of itself and of callers."""
     import uvicorn
-
-    from shm_daemon.web.connections import ConnectionLimits, guarded_by
 
     config = uvicorn.Config(
         app,
         host=address.host,
         port=address.port,
-        http=guarded_by(ConnectionLimits(certificate)),
+        ssl_certfile=certificate,
+        ssl_keyfile=key,
+        http="h11",
         ws="none",
         loop="asyncio",
         log_config=None,
@@ -147,25 +147,20 @@ def make_server(
     return uvicorn.Server(config)
 
 
-def context_of(certificate: Path | None, key: Path | None) -> ssl.SSLContext | None:
-    """Return the TLS context of HTTPS; None if no certificate is given.
-
-    Raises BadInput where it cannot be used, UsageError for a key without one.
-    """
+def refuse_bad_certificate(certificate: Path | None, key: Path | None) -> None:
+    """Raise BadInput for a certificate that cannot be used, UsageError for a key without one."""
     if certificate is None:
         if key is not None:
             raise UsageError("--key is of no use alone.", remedy="Give its --certificate as well.")
-        return None
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        return
     try:
-        context.load_cert_chain(certificate, key)
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key)
     except OSError as error:  # of which ssl.SSLError is a kind
         raise BadInput(
             "it holds no certificate with a key that fits.",
             file=certificate,
             remedy="Give both as PEM files, with --certificate and --key.",
         ) from error
-    return context
 
 
 def refuse_uninstalled() -> None:
@@ -221,7 +216,7 @@ def web_with_daemon(
         return
     refuse_uninstalled()
     refuse_unguarded(workspace, address)
-    context_of(certificate, key)
+    refuse_bad_certificate(certificate, key)
     if log_file:  # daemon.web.log by daemon.log
         log_file = log_file.with_name(f"{log_file.stem}.web{log_file.suffix}")
     keeper = _Keeper(_command(workspace.folder, address, certificate, key, log_file))

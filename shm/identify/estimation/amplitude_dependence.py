@@ -6,8 +6,10 @@ the method of averaging (Nayfeh and Mook 1979, chapter 2),
 
     phase = phase_0 + 2 pi (f0 - f) t + 2 pi f0 c integral of g(A / A_hit) dt,
 
-linear in f0 - f and c. Phases and amplitudes A come from stretches of the ring-downs, in each of
-which the found poles and shapes are fitted to all channels by least squares. Laws g are friction
+linear in f0 - f and c. A drift turns the phase of the ring-down that begins at the fraction tau of
+the way from the first hit to the last by 2 pi f drift (tau - 1/2) t more. Phases and amplitudes A
+come from stretches of the ring-downs, in each of which the found poles and shapes are fitted to all
+channels by least squares. Laws g are friction
 (A), stretching (A^2) and joints that slip no further (A / (A + h)), averaged by how well they fit:
 where a ring-down ends before it is small, they differ in the limit of zero, and the interval
 widens.
@@ -20,25 +22,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
-from shm.identify.contract import Finding, FoundMode, Measurement
+from shm.identify.contract import LEAST_HITS, Finding, FoundMode, Measurement
 from shm.identify.estimation.courses import (
     OVERLAP,
     TINY,
     RingDownCourse,
     Row,
     course_of,
-    least_squares,
     phases_of,
-    with_drift,
 )
-from shm.identify.estimation.repeats import LEAST_HITS, widening
-from shm.values import NAN, BoolArray, FloatArray
+from shm.identify.estimation.drift import hit_shares, with_drift
+from shm.identify.estimation.spread import are_sure, widening
+from shm.values import NAN, FloatArray
 from shm.values.modes import MOST_SLOPE, SURE_SDS
 
-_LEAST_SLOPE = 2e-5
-"""Relative. A phase is known so well that a clock's shaking would show; no one needs less."""
 _TO_ZERO = 0.01
 """Of a slope: by how much the frequency of small amplitude is off by the law's form at most; 1 % of
 1e-3 is four standard deviations of all else in tests/identify/test_amplitude_dependence.py."""
@@ -54,9 +52,6 @@ _SHIFT_ERROR = 0.02
 """Of a shift: the phase of a stretch is that of its middle, the amplitude is smoothed."""
 _HALVES = (0.1, 0.3, 1.0)
 """Of A_hit: h. Above, it is friction; below, ring-downs end before it shows (judgement)."""
-_BY_CHANCE = 0.01
-"""Probability that as many modes, or one by so much, are sure by chance, above which none is. Of a
-test of twenty modes one is beyond `SURE_SDS` by chance in 22 %."""
 _ALONE = 1e-3
 """A shift beyond that of one mode while the others stay: no joint does it. It only widens."""
 _INDEPENDENT = 8.0
@@ -68,11 +63,15 @@ _MAX_MISFIT = 0.1
 """Radians by which phases leave a law, the surer ones counting more: then it is something else that
 turns them. A law that is wrong by a tenth of 0.5 % leaves 0.03 in a second of 20 Hz."""
 _FINE = 16  # technical: steps of the integral a stretch
+_WORST = 1e10  # technical: of the condition, so that six digits are left
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """`left` is the relative change of the frequency that is left where the ring-downs end."""
+    """Hold what the phases of one mode give; of one hit, that of `drift` is not known.
+
+    `left` is the relative change of the frequency that is left where the ring-downs end.
+    """
 
     shift_hz: float
     shift_sd_hz: float
@@ -81,23 +80,8 @@ class _Fit:
     left: float
     misfit: float
     freedom: int
-
-
-def are_sure(slopes: FloatArray, sds: FloatArray) -> BoolArray:
-    """Return which frequencies depend on amplitude by more than chance and less than nonsense.
-
-    Where several are beyond `SURE_SDS` that is no chance; one alone must be by more, the more modes
-    there are. `slopes` and `sds` (modes,) are NaN where they are not known.
-    """
-    known = int(np.sum(np.isfinite(slopes)))
-    size = np.where(np.isfinite(slopes), np.abs(slopes), 0.0)
-    possible = (size > _LEAST_SLOPE) & (size < MOST_SLOPE)
-    sure = possible & (size > SURE_SDS * sds)
-    count, one = int(np.sum(sure)), 2 * scipy.special.ndtr(-SURE_SDS)
-    if not count or scipy.special.bdtrc(count - 1, known, one) < _BY_CHANCE:
-        return np.asarray(sure)
-    alone = -scipy.special.ndtri(_BY_CHANCE / (2 * known))
-    return np.asarray(possible & (size > alone * sds))
+    drift: float
+    drift_sd: float
 
 
 def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Finding:
@@ -111,7 +95,8 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
         course_of(decay, found.modes, measurement.sampling_rate_hz) for decay in measurement.decays
     ]
     leads_s = _leads_s(measurement)
-    fits = [_fits(mode, index, courses, leads_s) for index, mode in enumerate(found.modes)]
+    shares = hit_shares([hit for hit in measurement.hits if hit.used])
+    fits = [_fits(mode, index, courses, leads_s, shares) for index, mode in enumerate(found.modes)]
     slopes = np.array([(NAN, NAN) if fit is None else (fit.slope, fit.slope_sd) for fit in fits])
     sure = are_sure(*slopes.T)
     shifts = [
@@ -127,8 +112,8 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
         _unlike(_with_slope(mode, fit, bool(is_sure), expected, usual), index, courses, mode)
         for index, (mode, fit, is_sure) in enumerate(zip(found.modes, fits, sure, strict=True))
     )
-    used = [hit for hit in measurement.hits if hit.used]
-    return with_drift(replace(found, modes=modes), courses, used)
+    drifts = [(fit.drift, fit.drift_sd) for fit in fits if fit is not None and fit.drift_sd > 0]
+    return with_drift(replace(found, modes=modes), drifts)
 
 
 def _with_slope(
@@ -181,18 +166,25 @@ def _leads_s(measurement: Measurement) -> list[float]:
 
 
 def _fits(
-    mode: FoundMode, index: int, courses: Sequence[RingDownCourse], leads_s: Sequence[float]
+    mode: FoundMode,
+    index: int,
+    courses: Sequence[RingDownCourse],
+    leads_s: Sequence[float],
+    shares: FloatArray,
 ) -> _Fit | None:
     """Return the estimate averaged over the laws; None where too little of the phase is known."""
     decay = 2 * math.pi * mode.frequency_hz * mode.damping_ratio
     seen = [phases_of(course, index, decay) for course in courses]
+    at = [number for number, row in enumerate(seen) if row is not None]
     rows = [row for row in seen if row is not None]
     if not rows:
         return None
-    leads = np.array([lead for lead, row in zip(leads_s, seen, strict=True) if row is not None])
+    leads = np.array(leads_s)[at]
     starts = np.array([size[0] for *_, size in rows])
     at_hit = float(np.median(starts * np.exp(decay * leads)))
-    laws = [_fit(mode, [_through(row, decay, law, at_hit) for row in rows]) for law in LAWS]
+    laws = [
+        _fit(mode, [_through(row, decay, law, at_hit) for row in rows], shares[at]) for law in LAWS
+    ]
     fit = _averaged([law for law in laws if law is not None])
     if fit is None:
         return None
@@ -276,36 +268,51 @@ def _through(row: Row, decay: float, law: _Law, at_hit: float) -> _Grown:
     return time_s, phase, sd, grown[::_FINE], float(height[-1])
 
 
-def _fit(mode: FoundMode, rows: Sequence[_Grown]) -> _Fit | None:
-    """Fit a phase for each ring-down, and shift and slope for all, by weighted least squares."""
-    count = len(rows)
-    blocks = []
-    for number, (time_s, _, _, grown, _) in enumerate(rows):
-        columns = np.zeros((len(time_s), count + 2))
-        columns[:, number] = 1
-        columns[:, count] = 2 * np.pi * time_s
-        columns[:, count + 1] = 2 * np.pi * mode.frequency_hz * grown
-        blocks.append(columns)
-    matrix, values = np.vstack(blocks), np.concatenate([row[1] for row in rows])
-    weight = 1 / np.concatenate([row[2] for row in rows])
-    freedom = len(values) - matrix.shape[1]
-    if freedom < 2:
+def _fit(mode: FoundMode, rows: Sequence[_Grown], shares: FloatArray) -> _Fit | None:
+    """Fit a phase for each ring-down, and shift and slope for all, by weighted least squares.
+
+    The drift is what then best explains the rest.
+    """
+    count, turns = len(rows), 2 * np.pi * mode.frequency_hz
+    time_s, values, sds, grown = (np.concatenate([row[n] for row in rows]) for n in range(4))
+    of_row = np.repeat(np.arange(count), [len(row[0]) for row in rows])
+    weight = 1 / sds
+    weighted = weight[:, np.newaxis] * np.column_stack([
+        of_row[:, np.newaxis] == np.arange(count), 2 * np.pi * time_s, turns * grown,
+    ])  # fmt: skip
+    freedom, scale = len(values) - weighted.shape[1], np.linalg.norm(weighted, axis=0)
+    if freedom < 2 or np.any(scale == 0):
         return None
-    solution = least_squares(matrix, values, weight)
-    if solution is None:
+    square = (weighted / scale).T @ (weighted / scale)
+    if np.linalg.cond(square) > _WORST:
         return None
-    solved, inverse, left_over = solution
+    inverse = np.linalg.inv(square) / np.outer(scale, scale)
+    solved = inverse @ (weighted.T @ (values * weight))
+    left_over = values * weight - weighted @ solved
+    late = weight * turns * shares[of_row] * time_s
+    late = late - weighted @ (inverse @ (weighted.T @ late))
+    drift = float(late @ left_over / (late @ late)) if np.ptp(shares) > 0 else 0.0
+    steady = float(np.sum((left_over - drift * late) ** 2))
+    if steady > (_MAX_MISFIT * np.linalg.norm(weight)) ** 2:
+        return None
     misfit = float(left_over @ left_over)
-    if misfit > (_MAX_MISFIT * np.linalg.norm(weight)) ** 2:
-        return None
-    spread = np.sqrt(np.diag(inverse) * max(1.0, misfit / freedom)) * widening(freedom) * OVERLAP
-    spread = np.fmax(
-        spread, _by_ring_downs(matrix * weight[:, np.newaxis], left_over, inverse, rows)
+    chance = math.sqrt(max(1.0, misfit / freedom)) * OVERLAP
+    by_hits = _by_ring_downs(weighted, left_over, inverse, rows)
+    spread = np.fmax(np.sqrt(np.diag(inverse)) * chance * widening(freedom), by_hits)
+    slope = float(solved[count + 1])
+    return _Fit(
+        shift_hz=float(solved[count]),
+        shift_sd_hz=float(spread[count]),
+        slope=slope,
+        slope_sd=math.hypot(float(spread[count + 1]), _SLOPE_ERROR * slope),
+        left=slope * float(np.median([row[4] for row in rows])),
+        misfit=misfit,
+        freedom=freedom,
+        drift=drift,
+        drift_sd=OVERLAP * math.sqrt(max(1.0, steady / freedom) / (late @ late))
+        if np.ptp(shares) > 0
+        else NAN,
     )
-    shift_hz, slope = solved[count:].tolist()
-    left = slope * float(np.median([row[4] for row in rows]))
-    slope_sd = math.hypot(float(spread[count + 1]), _SLOPE_ERROR * slope)
-    return _Fit(shift_hz, float(spread[count]), slope, slope_sd, left, misfit, freedom)
 
 
 def _by_ring_downs(

@@ -12,14 +12,13 @@ Of 84 modes of simulated tests that lie within 0.1 % of another, 82 are found wi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.identify.estimation.poles import Candidate, Pole, PoleSet
-from shm.identify.estimation.repeats import LEAST_HITS, Repeats, doubt, repeats_of
-from shm.identify.options import IdentifyOptions
+from shm.identify.contract import LEAST_HITS
+from shm.identify.estimation.poles import Candidate, Pole, PoleSet, Repeats, repeats_of
 from shm.values import ComplexArray, FloatArray, IntArray
 
 _NEAR = 0.2
@@ -53,7 +52,7 @@ def split_close_pairs(
     repeats: Sequence[Repeats],
     models: tuple[Sequence[PoleSet], Sequence[Sequence[PoleSet]]],
     seconds: float,
-    options: IdentifyOptions,
+    is_trusted: Callable[[Candidate, Repeats], bool],
 ) -> tuple[list[Candidate], list[Repeats]]:
     """Return the candidates with close pairs, one of which would be dropped, separated on axes.
 
@@ -61,30 +60,24 @@ def split_close_pairs(
     that remain untrusted stay unchanged; so do all below three hits. The axes are chosen so
     that noise does not rotate them: the scatter of shapes is that of the shapes without them.
     """
-    by_id = {id(c): (c, r) for c, r in zip(candidates, repeats, strict=True)}
-    if len(models[1]) >= LEAST_HITS:
-        for one, other in _doubtful_pairs(by_id, seconds, options):
-            pair = _pair(one, other, seconds)
-            apart = _apart(pair, (one, other), models) if pair else []
-            if apart and not any(doubt(c, r, options) for c, r in apart):
-                for old, (candidate, repeat) in zip((one, other), apart, strict=True):
-                    by_id[id(old)] = candidate, replace(repeat, shape=by_id[id(old)][1].shape)
-    return [c for c, _ in by_id.values()], [r for _, r in by_id.values()]
-
-
-def _doubtful_pairs(
-    by_id: dict[int, tuple[Candidate, Repeats]], seconds: float, options: IdentifyOptions
-) -> Iterator[tuple[Candidate, Candidate]]:
-    """Yield close neighbours of which one or both would be dropped, each candidate once."""
-    known = sorted(by_id.values(), key=lambda entry: entry[0].frequency_hz)
-    index = 0
-    while index + 1 < len(known):
-        (one, first), (other, second) = known[index : index + 2]
+    known = sorted(zip(candidates, repeats, strict=True), key=lambda each: each[0].frequency_hz)
+    first = 0
+    while len(models[1]) >= LEAST_HITS and first + 1 < len(known):
+        both = known[first : first + 2]
+        one, other = (candidate for candidate, _ in both)
         near = other.frequency_hz - one.frequency_hz < _reach_hz(one, other, seconds)
-        pair = near and (doubt(one, first, options) or doubt(other, second, options))
-        if pair:
-            yield one, other
-        index += 2 if pair else 1
+        if not near or all(is_trusted(*each) for each in both):
+            first += 1
+            continue
+        pair = _pair(one, other, seconds)
+        apart = _apart(pair, (one, other), models) if pair else []
+        if apart and all(is_trusted(*each) for each in apart):
+            known[first : first + 2] = [
+                (candidate, replace(repeat, shape=old.shape))
+                for (candidate, repeat), (_, old) in zip(apart, both, strict=True)
+            ]
+        first += 2
+    return [candidate for candidate, _ in known], [repeat for _, repeat in known]
 
 
 def _reach_hz(one: Candidate, other: Candidate, seconds: float) -> float:

@@ -1,30 +1,19 @@
-"""Follow amplitude and phase of each mode through each ring-down, and estimate a common drift.
+"""Follow amplitude and phase of each mode through each ring-down.
 
 In each stretch the found poles and shapes are fitted to all channels by least squares.
-
-A logger's clock that drifts, or a hanger that warms up, moves every mode by the same fraction; a
-joint or stretching moves each by its amount, equally in every hit of equal strength. With the phase
-of a mode in ring-down h, begun at the fraction tau_h of the way from the first hit to the last,
-
-    phase = phase_h + 2 pi f (shift + drift (tau_h - 1/2)) t + 2 pi f slope integral of g,
-
-linear in shift, slope and drift (the laws g of `amplitude_dependence`), each mode gives a drift;
-their common part, and how far they differ, is the test's.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 
-from shm.identify.contract import Drift, Finding, FoundMode, Hit
+from shm.identify.contract import FoundMode, poles_of_modes
 from shm.values import ComplexArray, FloatArray
-from shm.values.modes import SLOPE_OF_NOTE
 
 _LEAK = 0.01
 """Of a neighbour's motion, at least: comes into a mode's by the error of its shape."""
@@ -61,9 +50,7 @@ def course_of(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> 
     hop = max(int(_STRETCH_SECONDS * rate_hz) // 2, samples // _MOST_STRETCHES, 1)
     length = min(2 * hop, samples)
     shapes = np.array([mode.shape for mode in modes])  # (modes, channels)
-    omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])
-    damping = np.array([mode.damping_ratio for mode in modes])
-    poles = omega * (-damping + 1j * np.sqrt(1 - damping**2))
+    poles = poles_of_modes(modes)
     waves = np.exp(np.outer(poles, np.arange(length) / rate_hz))  # (modes, length)
     # Columns Re and -Im of shape times wave, for all channels: the same in every stretch.
     window = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
@@ -83,7 +70,7 @@ def course_of(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> 
     half = len(modes)
     motion = solved[:, :half] + 1j * solved[:, half:]
     begin_s = np.arange(len(flat)) * hop / rate_hz
-    hertz = omega / (2 * np.pi)
+    hertz = np.array([mode.frequency_hz for mode in modes])
     unresolved = np.abs(hertz[:, np.newaxis] - hertz) < _RESOLUTION_HZ
     np.fill_diagonal(unresolved, False)
     sd = np.sqrt(np.outer(noise, variance[:half] + variance[half:]) / 2)
@@ -117,133 +104,3 @@ def phases_of(course: RingDownCourse, index: int, decay: float) -> Row | None:
     sd = np.maximum(sd[:last] / np.maximum(size, TINY), _PHASE_SD)
     smooth = np.polynomial.Polynomial.fit(course.middle_s[:last], np.log(size), 2, w=1 / sd)
     return course.middle_s[:last], phase, sd, np.exp(smooth(course.middle_s[:last]))
-
-
-_BY_CHANCE = 0.01
-"""Two-sided probability that modes of a steady test, apart by chance alone, agree on a drift: a
-check may warn of one sound test in a hundred."""
-_LEAST_RING_DOWNS = 2  # of a mode: where each plane is hit in turn, it rings after half of the hits
-_WORST = 1e10  # technical: of the condition, so that six digits are left
-_LEAST_MODES = 3  # two are in the same ratio by chance
-
-
-def hit_shares(hits: Sequence[Hit]) -> FloatArray:
-    """Return the position of each used hit between first and last, minus a half: (hits,).
-
-    Hits of several records are taken as evenly spaced: their files' clocks may not agree.
-    """
-    used = [hit for hit in hits if hit.used]
-    one = len({hit.record for hit in used}) == 1
-    at = np.array([hit.start_s if one else n for n, hit in enumerate(used)], dtype=float)
-    span = float(np.ptp(at)) if len(at) else 0.0
-    return (at - at[0]) / span - 0.5 if span > 0 else np.zeros(len(at))
-
-
-def common_drift(drifts: Sequence[float], sds: Sequence[float]) -> Drift | None:
-    """Return the weighted mean of the modes' drifts; None below three modes.
-
-    The variance between modes beyond their scatter is estimated (DerSimonian and Laird,
-    Controlled Clinical Trials 7, 1986), the standard deviation is that of Hartung and Knapp
-    (Statistics in Medicine 20, 2001), whose ratio to the mean is Student's with modes - 1
-    degrees of freedom.
-    """
-    value, sd = np.array(drifts), np.array(sds)
-    if len(value) < _LEAST_MODES:
-        return None
-    weight = sd**-2.0
-    apart = weight @ (value - weight @ value / weight.sum()) ** 2
-    room = weight.sum() - weight @ weight / weight.sum()
-    weight = 1 / (sd**2 + max(0.0, (apart - (len(value) - 1)) / room))
-    mean = float(weight @ value / weight.sum())
-    scatter = max(1.0, float(weight @ (value - mean) ** 2) / (len(value) - 1))
-    mean_sd = math.sqrt(scatter / weight.sum())
-    quantile = float(scipy.special.stdtrit(len(value) - 1, 1 - _BY_CHANCE / 2))
-    sure = abs(mean) > max(quantile * mean_sd, SLOPE_OF_NOTE)
-    return Drift(mean, mean_sd, len(value), sure)
-
-
-def with_drift(found: Finding, courses: Sequence[RingDownCourse], hits: Sequence[Hit]) -> Finding:
-    """Return the finding with its drift; where that is sure, frequencies are known no closer.
-
-    Which end of it is right nobody knows: half of it either way, as far as hits are in the
-    middle.
-    """
-    shares = hit_shares(hits)
-    if len(shares) != len(courses):
-        return found
-    seen = [_drift(mode, index, courses, shares) for index, mode in enumerate(found.modes)]
-    known = [each for each in seen if each is not None]
-    drift = common_drift([value for value, _ in known], [sd for _, sd in known])
-    if drift is None or not drift.sure:
-        return replace(found, drift=drift)
-    modes = tuple(
-        replace(
-            mode,
-            frequency_sd_hz=math.hypot(mode.frequency_sd_hz, drift.change / 2 * mode.frequency_hz),
-        )
-        for mode in found.modes
-    )
-    return replace(found, modes=modes, drift=drift)
-
-
-def _drift(
-    mode: FoundMode, index: int, courses: Sequence[RingDownCourse], shares: FloatArray
-) -> tuple[float, float] | None:
-    """Return the relative change from first to last hit and its standard deviation.
-
-    A weighted least-squares fit; amplitude and its square absorb the amplitude dependence.
-    """
-    decay = 2 * math.pi * mode.frequency_hz * mode.damping_ratio
-    seen = [phases_of(course, index, decay) for course in courses]
-    rows = [(row, share) for row, share in zip(seen, shares, strict=True) if row is not None]
-    if len(rows) < _LEAST_RING_DOWNS:
-        return None
-    largest = max(float(row[3][0]) for row, _ in rows)
-    blocks = []
-    for number, ((time_s, _, _, size), share) in enumerate(rows):
-        columns = np.zeros((len(time_s), len(rows) + 4))
-        columns[:, number] = 1
-        columns[:, -4:] = 2 * math.pi * mode.frequency_hz * np.column_stack([
-            share * time_s,
-            time_s,
-            *(_grown(time_s, (size / largest) ** power, power * decay) for power in (1, 2)),
-        ])  # fmt: skip
-        blocks.append(columns)
-    matrix = np.vstack(blocks)
-    values = np.concatenate([row[1] for row, _ in rows])
-    weight = 1 / np.concatenate([row[2] for row, _ in rows])
-    freedom = len(values) - matrix.shape[1]
-    solution = least_squares(matrix, values, weight) if freedom >= 2 else None
-    if solution is None:
-        return None
-    solved, inverse, rest = solution
-    at = len(rows)
-    variance = inverse[at, at] * max(1.0, float(rest @ rest) / freedom) * OVERLAP**2
-    return float(solved[at]), math.sqrt(variance)
-
-
-def least_squares(
-    matrix: FloatArray, values: FloatArray, weight: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Solve `matrix` (values, unknowns) for its unknowns by weighted least squares.
-
-    Returns the unknowns, the inverse of the normal equations and the weighted residuals; None
-    where the unknowns cannot be separated.
-    """
-    weighted = matrix * weight[:, np.newaxis]
-    scale = np.linalg.norm(weighted, axis=0)
-    if np.any(scale == 0):
-        return None
-    square = (weighted / scale).T @ (weighted / scale)
-    if np.linalg.cond(square) > _WORST:
-        return None
-    inverse = np.linalg.inv(square) / np.outer(scale, scale)
-    solved = inverse @ (weighted.T @ (values * weight))
-    return solved, inverse, (values - matrix @ solved) * weight
-
-
-def _grown(time_s: FloatArray, size: FloatArray, decay: float) -> FloatArray:
-    """Return the integral of `size` exp(-`decay` t) from 0 to each time."""
-    height = size * np.exp(-decay * time_s)
-    areas = np.diff(time_s) * (height[1:] + height[:-1]) / 2
-    return np.concatenate(([0.0], np.cumsum(areas)))

@@ -1,6 +1,6 @@
 """Find mode candidates: poles of state-space models followed over rising model orders.
 
-A mode stays at its frequency and shape, noise moves. Also: how real shapes are.
+A mode stays at its frequency and shape, noise moves; it is there again with each hit left out.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import scipy
 from numpy.typing import NDArray
 
 from shm.identify.contract import Dropped, Poles
+from shm.identify.estimation.shapes import aligned, collinearity, median_shape
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray, FloatArray
 
@@ -57,48 +58,6 @@ def in_band(poles: PoleSet, options: IdentifyOptions) -> BoolArray:
 def plausibly_damped(poles: PoleSet, options: IdentifyOptions) -> BoolArray:
     """Return the mask (poles,) of poles that decay, and no faster than a hanger's mode."""
     return np.asarray((poles.damping_ratio > 0) & (poles.damping_ratio < options.max_damping_ratio))
-
-
-def collinearity(shape: ComplexArray) -> FloatArray:
-    """Return the modal phase collinearity (...) of complex shapes (..., channels), 1 in phase.
-
-    Pappa, Elliott and Schenk (1993), eq. 3 to 7, without the removal of the mean.
-    """
-    real, imaginary = shape.real, shape.imag
-    xx, yy = np.sum(real**2, axis=-1), np.sum(imaginary**2, axis=-1)
-    xy = np.sum(real * imaginary, axis=-1)
-    total = xx + yy
-    return np.asarray(((xx - yy) ** 2 + 4 * xy**2) / np.where(total > 0, total, np.inf) ** 2)
-
-
-def real_shape(shape: ComplexArray) -> FloatArray:
-    """Return `shape` (channels,) rotated to be most real, its largest value 1."""
-    turned = (shape * np.exp(-0.5j * np.angle(np.sum(shape**2)))).real
-    return np.asarray(turned / turned[np.argmax(np.abs(turned))])
-
-
-def modal_assurance(one: FloatArray, other: FloatArray) -> float:
-    """Return the modal assurance criterion of two real shapes (channels,); 1 for one channel.
-
-    Allemang and Brown (1982).
-    """
-    return float((one @ other) ** 2 / ((one @ one) * (other @ other)))
-
-
-def aligned(shape: FloatArray, reference: FloatArray) -> FloatArray:
-    """Scale `shape` (channels,) to fit `reference` best by least squares."""
-    return np.asarray(shape * (shape @ reference) / (shape @ shape))
-
-
-def median_shape(shapes: Sequence[ComplexArray]) -> FloatArray:
-    """Return the median over complex shapes (channels,) made real, its largest value 1."""
-    given = np.array(shapes)
-    turn = np.exp(-0.5j * np.angle(np.sum(given**2, axis=1, keepdims=True)))
-    real = (given * turn).real
-    # By least squares to the last one, whose own scale is taken out at the end.
-    scale = (real @ real[-1]) / np.sum(real**2, axis=1)
-    middle = np.median(scale[:, np.newaxis] * real, axis=0)
-    return np.asarray(middle / middle[np.argmax(np.abs(middle))])
 
 
 # judgement: noise moves a mode by less than max_frequency_sd, 0.1 %, from order to order, and poles
@@ -319,3 +278,72 @@ def continued(known: Sequence[Pole], poles: PoleSet) -> list[Pole | None]:
         if cost[row, column] < FAR:
             best[row] = candidates[column]
     return best
+
+
+@dataclass(frozen=True, eq=False)
+class Repeats:
+    """One candidate found again with each hit left out in turn.
+
+    `frequency_hz`, `damping_ratio` (hits,) and `shape` (hits, channels); NaN where not found.
+    """
+
+    frequency_hz: FloatArray
+    damping_ratio: FloatArray
+    shape: FloatArray
+
+
+def find_again(
+    candidates: Sequence[Candidate], models: Sequence[Sequence[PoleSet]]
+) -> list[Repeats]:
+    """Return the repeats of each candidate; `models` has pole sets for each left-out hit."""
+    matches = [_in_one_model(candidates, sets) for sets in models]
+    return [
+        repeats_of(candidate, [of_model[index] for of_model in matches])
+        for index, candidate in enumerate(candidates)
+    ]
+
+
+def repeats_of(candidate: Candidate, matches: Sequence[Sequence[tuple[Pole, Pole]]]) -> Repeats:
+    """Return the repeats from matches: for each left-out hit, old poles and the same again."""
+    rows = [_repeat(candidate, of_model) for of_model in matches]
+    return Repeats(
+        np.array([frequency for frequency, _, _ in rows]),
+        np.array([damping for _, damping, _ in rows]),
+        np.array([shape for _, _, shape in rows]).reshape(len(rows), len(candidate.shape)),
+    )
+
+
+def _in_one_model(
+    candidates: Sequence[Candidate], sets: Sequence[PoleSet]
+) -> list[list[tuple[Pole, Pole]]]:
+    matches: list[list[tuple[Pole, Pole]]] = [[] for _ in candidates]
+    for poles in sets:
+        known = [
+            (index, pole)
+            for index, candidate in enumerate(candidates)
+            for pole in candidate.poles
+            if pole.order == poles.order
+        ]
+        again = continued([pole for _, pole in known], poles)
+        for (index, pole), match in zip(known, again, strict=True):
+            if match is not None:
+                matches[index].append((pole, match))
+    return matches
+
+
+def _repeat(
+    candidate: Candidate, matches: Sequence[tuple[Pole, Pole]]
+) -> tuple[float, float, FloatArray]:
+    """Return frequency, damping and shape of a repeat: the candidate's plus the median change."""
+    if 2 * len(matches) < len(candidate.poles):
+        return np.nan, np.nan, np.full(len(candidate.shape), np.nan)
+    change = [
+        (b.frequency_hz - a.frequency_hz, b.damping_ratio - a.damping_ratio) for a, b in matches
+    ]
+    frequency, damping = np.median(change, axis=0)
+    shape = aligned(median_shape([match.shape for _, match in matches]), candidate.shape)
+    return (
+        candidate.frequency_hz + float(frequency),
+        candidate.damping_ratio + float(damping),
+        shape,
+    )

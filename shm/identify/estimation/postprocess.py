@@ -15,7 +15,7 @@ import numpy as np
 
 from shm.identify.contract import Dropped, Finding, FoundMode, Measurement
 from shm.identify.estimation.amplitude_dependence import with_amplitude_dependence
-from shm.identify.estimation.poles import modal_assurance
+from shm.identify.estimation.shapes import modal_assurance
 from shm.identify.measuring.responses import recorded_window_rate
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray

@@ -19,9 +19,16 @@ from typing import Any
 
 import numpy as np
 
-from shm.identify.contract import Dropped, Finding, FoundMode, Measurement, Poles
-from shm.identify.estimation.poles import PoleSet, real_shape
-from shm.identify.estimation.repeats import FREQUENCY_FLOOR
+from shm.identify.contract import (
+    FREQUENCY_FLOOR,
+    Dropped,
+    Finding,
+    FoundMode,
+    Measurement,
+    Poles,
+)
+from shm.identify.estimation.poles import PoleSet
+from shm.identify.estimation.shapes import real_shape
 from shm.identify.options import IdentifyOptions
 from shm.values import NAN, FloatArray
 

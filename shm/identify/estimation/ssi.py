@@ -8,127 +8,26 @@ the same way: the covariances of white-noise-driven modes are sums of free decay
 pyOMA2 cuts state-space models of rising order from the sum and solves them. Leaving out a hit need
 not cost a decomposition of the whole: the Hankel matrix without it, times the leading right
 singular vectors of the whole one, spans the same columns but for terms of second order.
-
-A model of the whole band spends its lags on its highest frequency: of a long hanger it sees a
-second, while two planes beat for ten. So ring-downs are also seen through narrow windows: shifted
-down and sampled slowly, a part of the band is seen for longer by a smaller model, and what rings
-outside of it does not mask it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache, reduce
-from itertools import pairwise
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import reduce
 
 import numpy as np
-import scipy
 
-from shm.identify.contract import Finding, Measurement
-from shm.identify.estimation.poles import PoleSet
+from shm.identify.contract import LEAST_HITS, Dropped, Finding, FoundMode, Measurement, Poles
+from shm.identify.estimation.close_pairs import split_close_pairs
+from shm.identify.estimation.delays import delays_s, remove_candidate_delays, remove_delays
+from shm.identify.estimation.hankel import STOPPED, Window, hankel, references, windows
+from shm.identify.estimation.poles import PoleSet, diagram, find_again, resolved, stable_candidates
 from shm.identify.estimation.pyoma import poles_of_orders
-from shm.identify.estimation.repeats import LEAST_HITS
-from shm.identify.estimation.stabilise import (
-    empty_finding,
-    final_orders,
-    merge_findings,
-    stabilised,
-)
+from shm.identify.estimation.shapes import modal_assurance
+from shm.identify.estimation.validation import doubt, validate_candidates
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
-
-WIDTH_HZ = 12.0
-"""judgement: up to twenty modes of a long hanger. Of those that anybody could identify in ten
-records with few hits or none (tests/worlds/recordings.py, seeds 5001 and 5004) the whole band
-gives 36 %, with windows of 10 Hz 68 %, of 5 Hz 57 %."""
-_GUARD = 0.2  # of the width, on either side: there the filter falls
-_FILTER_ORDER, _STOP_DB = 12, 90.0
-"""Hits ring 60 to 90 dB above the noise: with 50 dB, modes of other windows are found as images."""
-STOPPED = 1e-4
-"""Share of the whole motion, -80 dB, below which a window holds but what its filter lets by."""
-_SETTLING = 1.5  # in 1 / guard: what is left of its start is 70 dB below the whole (test_zoom)
-_ORDERS_IN_WINDOW = 40
-_SURE_BELOW_HZ = 30.0
-"""Of 221 modes in 16 records with few hits or none (tests/worlds/recordings.py, seeds 5000, 5001)
-windows find 186 and 13 others; 177 and 23 with order 60 and without `_SURE_BELOW_HZ`."""
-_OVERLAP = 0.05  # of the width: a mode at the edge of two windows is found in either
-
-
-@dataclass(frozen=True)
-class Window:
-    """A part of the band; modes are looked for between `low_hz` and `high_hz`."""
-
-    low_hz: float
-    high_hz: float
-
-    @property
-    def _reach_hz(self) -> float:
-        """From the middle to where nothing passes."""
-        return (0.5 + _GUARD) * (self.high_hz - self.low_hz)
-
-    @property
-    def shift_hz(self) -> float:
-        """By how much frequencies are lower in the window."""
-        return (self.low_hz + self.high_hz) / 2 - self._reach_hz
-
-    def rate_hz(self, sampling_rate_hz: float) -> float:
-        return sampling_rate_hz / self._step(sampling_rate_hz)
-
-    def _step(self, sampling_rate_hz: float) -> int:
-        return max(1, int(sampling_rate_hz / (4 * self._reach_hz)))
-
-    def through(self, decay: FloatArray, sampling_rate_hz: float) -> FloatArray:
-        """Return a free decay (channels, samples) lowered by `shift_hz`, at `rate_hz`.
-
-        The filter runs from the end to the beginning: so a sum of decaying sines stays one
-        from its first sample on, and only its end, where the filter starts, is lost.
-        """
-        middle = self.shift_hz + self._reach_hz
-        turned = decay * np.exp(-2j * np.pi * middle / sampling_rate_hz * np.arange(decay.shape[1]))
-        passed = scipy.signal.sosfilt(
-            _low_pass(2 * self._reach_hz / sampling_rate_hz), turned[:, ::-1]
-        )[:, ::-1]
-        rate = self.rate_hz(sampling_rate_hz)
-        slow = passed[:, :: self._step(sampling_rate_hz)]
-        spoilt = int(_SETTLING / (_GUARD * (self.high_hz - self.low_hz)) * rate)
-        slow = slow[:, : max(slow.shape[1] - spoilt, slow.shape[1] // 2)]
-        back = np.exp(2j * np.pi * self._reach_hz / rate * np.arange(slow.shape[1]))
-        return np.asarray((slow * back).real)
-
-    def options(self, options: IdentifyOptions) -> IdentifyOptions:
-        """Return the options with this window's band; windows overlap to miss no mode.
-
-        Poles of noise are as dense in one window as in another, so the tolerance of a
-        frequency from model to model grows with it no further than `_SURE_BELOW_HZ`.
-        """
-        more = _OVERLAP * (self.high_hz - self.low_hz)
-        strict = min(1.0, 2 * _SURE_BELOW_HZ / (self.low_hz + self.high_hz))
-        return replace(
-            options,
-            band_low_hz=max(self.low_hz - more, options.band_low_hz),
-            band_high_hz=min(self.high_hz + more, options.band_high_hz),
-            max_order=min(options.max_order or _ORDERS_IN_WINDOW, _ORDERS_IN_WINDOW),
-            max_frequency_sd=strict * options.max_frequency_sd,
-            max_frequency_spread=strict * options.max_frequency_spread,
-        )
-
-
-@lru_cache(maxsize=16)
-def _low_pass(edge: float) -> FloatArray:
-    """Return the sections of a Chebyshev filter that stops above a fraction of half the rate."""
-    return np.asarray(scipy.signal.cheby2(_FILTER_ORDER, _STOP_DB, min(edge, 0.99), output="sos"))
-
-
-def windows(sampling_rate_hz: float, options: IdentifyOptions) -> Iterator[Window]:
-    """Yield windows of equal width, side by side over the band."""
-    low_hz = options.band_low_hz
-    high_hz = min(options.band_high_hz, sampling_rate_hz / 2)
-    count = max(1, round((high_hz - low_hz) / WIDTH_HZ))
-    edges = np.linspace(low_hz, high_hz, count + 1)
-    for low, high in pairwise(edges.tolist()):
-        yield Window(low, high)
-
 
 _AMBIENT_SD = 2.0
 """The chance in ambient motion moves a frequency more than noise does a ring-down's: so many times
@@ -145,7 +44,6 @@ _BLOCK_ROWS_FEW = (60, 120)
 larger model makes of noise."""
 _BLOCK_ROWS_ALONE = 320
 """A single channel tells close modes apart by time alone: it needs more lags."""
-_REFERENCES = 4  # judgement: two planes, and two modes that are close in each
 _REFERENCES_AMBIENT = 8
 """Of what nobody hit, the channels' mixture by energy loses a low mode, whose accelerations are
 small: the first of five of pyOMA2's example (4 references find four modes, 5 all). judgement: more
@@ -168,11 +66,18 @@ _COARSE_FROM = 60  # judgement: thirty orders or so tell what stays, and more on
 _LEAST_ORDER = 2  # one mode
 _RANK_TOLERANCE = 1e-17
 """Singular values below this share of the first are zero but for rounding."""
+# judgement: as a pole is followed from order to order, see `candidates`; chance at three deviations
+_SAME, _LIKE, _DEVIATIONS = 0.005, 0.8, 3.0
+_FINAL_ORDERS = 5  # judgement: the median of five bears two strays; each costs a fit a hit
 
 
 def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Finding:
     """Return modes of a measurement by multi-hit SSI (see the module's text)."""
     is_ambient = measurement.frequency_response is None and not measurement.hits
+    most = {"most": _REFERENCES_AMBIENT} if is_ambient else {}
+    mixed = references(measurement.decays, **most)
+    rows = block_rows(measurement, options)
+    matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
     if is_ambient:
         samples = sum(part.shape[1] for part in measurement.decays)
         options = replace(
@@ -180,10 +85,6 @@ def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Fin
             max_frequency_sd=_AMBIENT_SD * options.max_frequency_sd,
             ambient_s=samples / measurement.sampling_rate_hz,
         )
-    mixed = references(measurement.decays, _REFERENCES_AMBIENT if is_ambient else _REFERENCES)
-    rows = block_rows(measurement, options)
-    matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
-    if is_ambient:
         matrices = _few_sums(matrices)
     found = modes_of_hankel(matrices, rows, measurement, options)
     if is_ambient:
@@ -198,14 +99,11 @@ def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Fin
 
 
 def search_windows(
-    measurement: Measurement, options: IdentifyOptions, at_hz: Sequence[float] | None = None
+    measurement: Measurement, options: IdentifyOptions, at_hz: Sequence[float]
 ) -> Finding | None:
-    """Identify modes in windows around `at_hz`, or over the band.
-
-    Returns None where windows were used before or cannot be.
-    """
+    """Identify modes in windows around `at_hz`; None where windows were used or cannot be."""
     every = windows(measurement.sampling_rate_hz, options)
-    around = [w for w in every if at_hz is None or any(w.low_hz <= hz <= w.high_hz for hz in at_hz)]
+    around = [w for w in every if any(w.low_hz <= hz <= w.high_hz for hz in at_hz)]
     if not around or not measurement.hits or not _repeated(measurement):
         return None
     return through_windows(measurement, options, around)
@@ -224,7 +122,7 @@ def _in_window(window: Window, measurement: Measurement, options: IdentifyOption
     least = _LONG * by_length[-min(LEAST_HITS, len(by_length))]
     long = [decay for decay in measurement.decays if decay.shape[1] >= least]
     decays = tuple(window.through(decay, rate) for decay in long)
-    if _size(decays) < STOPPED * _size(long):
+    if max(map(np.std, decays)) < STOPPED * max(map(np.std, long)):
         return empty_finding(len(decays))
     mixed = references(decays)
     rows = min(_ROWS_WINDOW, min(decay.shape[1] for decay in decays) // 3)
@@ -238,35 +136,6 @@ def _in_window(window: Window, measurement: Measurement, options: IdentifyOption
 def _few_sums(matrices: Sequence[FloatArray]) -> list[FloatArray]:
     """Return the matrices as no more than ten sums, each to be left out in turn."""
     return [np.sum(matrices[n::_MOST_SUMS], axis=0) for n in range(min(len(matrices), _MOST_SUMS))]
-
-
-def _size(decays: Sequence[FloatArray]) -> float:
-    return max(float(np.std(decay)) for decay in decays)
-
-
-@dataclass(frozen=True)
-class _Size:
-    """Size of the models, and the model orders that are looked at."""
-
-    block_rows: int
-    max_order: int
-    sampling_rate_hz: float
-    shift_hz: float = 0.0
-
-    @property
-    def orders(self) -> list[int]:
-        step = 2 if self.max_order < _COARSE_FROM else 4
-        return list(range(self.max_order, 0, -step))[::-1]
-
-
-def references(responses: Sequence[FloatArray], most: int = _REFERENCES) -> FloatArray:
-    """Return rows (references, channels) that mix channels into the `most` with most energy."""
-    channels = len(responses[0])
-    if channels <= most:
-        return np.eye(channels)
-    covariance = np.sum([response @ response.T for response in responses], axis=0)
-    _, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors[:, -most:].T)
 
 
 def _repeated(measurement: Measurement) -> bool:
@@ -294,18 +163,24 @@ def modes_of_hankel(
 ) -> Finding:
     """Return modes from the Hankel matrices of the hits, each of `rows` blocks of rows.
 
-    `shift_hz` is what their frequencies lie below the true ones.
+    `shift_hz` is what their frequencies lie below the true ones. With each hit left out in turn,
+    the models are made in the columns that the leading right singular vectors combine.
     """
-    total = np.sum(matrices, axis=0)
+    total, rate_hz = np.sum(matrices, axis=0), measurement.sampling_rate_hz
     left, values, right = np.linalg.svd(total, full_matrices=False)
     max_order = _max_order(total.shape, values, rows, options.max_order or _MAX_ORDER)
     if max_order < _LEAST_ORDER:
         return empty_finding(len(matrices))
-    size = _Size(rows, max_order, measurement.sampling_rate_hz, shift_hz)
+    orders = list(range(max_order, 0, -2 if max_order < _COARSE_FROM else -4))[::-1]
     leading = left[:, :max_order] * values[:max_order]
-    sets = poles_of_orders(leading, rows, size.orders, size.sampling_rate_hz, shift_hz)
-    without_each = _models_without_each_hit(matrices, right[:max_order].T, size)
-    seconds = max(decay.shape[1] for decay in measurement.decays) / size.sampling_rate_hz
+    sets = poles_of_orders(leading, rows, orders, rate_hz, shift_hz)
+    projected = [matrix @ right[:max_order].T for matrix in matrices]
+    whole, final = np.sum(projected, axis=0), final_orders(orders)
+    without_each = [
+        poles_of_orders(whole - each, rows, final, rate_hz, shift_hz)
+        for each in (projected if len(projected) > 1 else ())
+    ]
+    seconds = max(decay.shape[1] for decay in measurement.decays) / rate_hz
     return stabilised(sets, without_each, seconds, options)
 
 
@@ -317,46 +192,75 @@ def _max_order(shape: tuple[int, int], values: FloatArray, rows: int, most: int)
     return int(largest // 2 * 2)
 
 
-def _models_without_each_hit(
-    matrices: Sequence[FloatArray], basis: FloatArray, size: _Size
-) -> list[list[PoleSet]]:
-    """Return the models with each hit left out, in the columns that `basis` combines.
+def final_orders(orders: Sequence[int]) -> list[int]:
+    """Return the orders that estimates are taken from: up to five, spread over the upper half."""
+    upper = [order for order in orders if 2 * order >= max(orders)]
+    picks = np.linspace(0, len(upper) - 1, _FINAL_ORDERS).round().astype(int)
+    return [upper[pick] for pick in sorted(set(picks.tolist()))]
 
-    `basis` are right singular vectors of the full matrix.
+
+def stabilised(
+    sets: Sequence[PoleSet],
+    without_each_hit: Sequence[Sequence[PoleSet]],
+    seconds: float,
+    options: IdentifyOptions,
+) -> Finding:
+    """Return the modes among the poles of models of rising order, `sets`.
+
+    `without_each_hit` holds the poles at the final orders with each hit left out in turn; empty
+    where there is one hit. `seconds` of ring-down decide what can be told apart.
+
+    Every pole is in a mode's track or counted with the reason why not.
     """
-    if len(matrices) < 2:
-        return []
-    projected = [matrix @ basis for matrix in matrices]
-    total = np.sum(projected, axis=0)
-    orders = final_orders(size.orders)
-    return [
-        poles_of_orders(total - each, size.block_rows, orders, size.sampling_rate_hz, size.shift_hz)
-        for each in projected
-    ]
+    orders = final_orders([poles.order for poles in sets])
+    # Where hits cannot prove a mode, the orders must: noise seldom makes a pole at nearly all.
+    gaps = len(without_each_hit) >= LEAST_HITS
+    candidates, unstable = stable_candidates(sets, orders, options, gaps=gaps)
+    late_s = delays_s(candidates, options)
+    if late_s is not None:
+        sets = [remove_delays(poles, late_s) for poles in sets]
+        without_each_hit = [[remove_delays(p, late_s) for p in of] for of in without_each_hit]
+        candidates = [remove_candidate_delays(candidate, late_s) for candidate in candidates]
+    single, doubles = resolved(candidates, seconds)
+    again = find_again(single, without_each_hit)
+    final = [poles for poles in sets if poles.order in orders]
+    separated, again = split_close_pairs(
+        single, again, (final, without_each_hit), seconds,
+        lambda candidate, repeat: not doubt(candidate, repeat, options),
+    )  # fmt: skip
+    modes, accepted, doubtful, refused = validate_candidates(separated, again, options)
+    lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in accepted)
+    followed = Dropped("poles", lost, "stable, but of a mode that was dropped")
+    dropped = (*unstable, followed, *doubles, *refused)
+    return Finding(modes, dropped, diagram(sets, accepted, options), doubtful)
 
 
-def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> FloatArray:
-    """Sum over time of future responses times past references.
+def merge_findings(found: Finding, other: Finding) -> Finding:
+    """Return `found` with the modes of `other` that it lacks; dropped are those of both."""
+    added = [mode for mode in other.modes if not any(_same(mode, each) for each in found.modes)]
+    modes = tuple(sorted((*found.modes, *added), key=lambda mode: mode.frequency_hz))
+    dropped = tuple(
+        entry for entry in found.dropped if not any(_of(entry, mode.frequency_hz) for mode in added)
+    )
+    doubtful = (*found.doubtful, *other.doubtful)
+    return replace(found, modes=modes, dropped=dropped, doubtful=doubtful)
 
-    `response` (channels, samples) and `reference` (references, samples) give a matrix of shape
-    (channels * block_rows, references * block_rows). For a free decay it is exact, and it leaves
-    out lag zero, hence white noise. As pyOMA2's method `cov`, but the sums at all lags are made
-    once, by Fourier transform: from one block column to the next they lose a sample and gain one.
-    """
-    channels, samples = response.shape
-    count = samples - 2 * block_rows + 1
-    lines = scipy.fft.next_fast_len(samples, real=True)
-    begun = np.fft.rfft(reference[:, :count], lines).conj()
-    sums = np.fft.irfft(np.fft.rfft(response, lines)[:, np.newaxis] * begun, lines)
-    sums = sums[..., 1 : 2 * block_rows]
-    matrix = np.empty((block_rows, channels, block_rows, len(reference)))
-    for at, column in enumerate(reversed(range(block_rows))):
-        matrix[:, :, column] = np.moveaxis(sums[..., column : column + block_rows], -1, 0)
-        if column:
-            lags = column + block_rows - 1
-            lost, gained = (
-                response[:, np.newaxis, k + 1 : k + 1 + lags] * reference[:, k, np.newaxis]
-                for k in (at, at + count)
-            )
-            sums = sums[..., :lags] + gained - lost
-    return np.asarray(matrix.reshape(channels * block_rows, -1) * (samples / count))
+
+def _same(one: FoundMode, other: FoundMode) -> bool:
+    """Return whether the two may be one mode."""
+    sd_hz = np.hypot(one.frequency_sd_hz, other.frequency_sd_hz)
+    reach_hz = max(_SAME * one.frequency_hz, _DEVIATIONS * float(np.nan_to_num(sd_hz)))
+    near = abs(one.frequency_hz - other.frequency_hz) < reach_hz
+    return near and modal_assurance(one.shape, other.shape) > _LIKE
+
+
+def _of(entry: Dropped, frequency_hz: float) -> bool:
+    """Return whether the dropped pole is at that frequency."""
+    return abs(entry.frequency_hz - frequency_hz) < _SAME * frequency_hz
+
+
+def empty_finding(hits: int) -> Finding:
+    """Return the finding where no sensor moves after any of `hits`."""
+    nothing = np.empty(0)
+    dropped = (Dropped("ring-downs", hits, "nothing moves in them"),)
+    return Finding((), dropped, Poles(nothing, nothing, nothing, nothing.astype(bool)))

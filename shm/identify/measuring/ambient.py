@@ -12,9 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.errors import NotIdentifiable
-from shm.identify.contract import Dropped, Measurement
-from shm.identify.measuring.frf import band_limited, least_seconds
-from shm.identify.measuring.responses import point_of
+from shm.identify.contract import Dropped, Measurement, point_of
+from shm.identify.measuring.band import band_limited, least_seconds
 from shm.identify.options import IdentifyOptions
 from shm.values import BoolArray, Channel, FloatArray, Recording
 

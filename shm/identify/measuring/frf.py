@@ -1,7 +1,4 @@
-"""Windowed spectra, accelerance (H1, H2, Hv) and coherence from the ring-downs of several hits.
-
-Ring-downs are low-passed and thinned to the band; the exponentials in them stay what they are.
-"""
+"""Compute windowed spectra, accelerance (H1, H2, Hv) and coherence from several hits."""
 
 from __future__ import annotations
 
@@ -11,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.lib.stride_tricks import sliding_window_view
 
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES, HitRecord
 from shm.values import ComplexArray, FloatArray
@@ -21,11 +17,6 @@ MOST_LINES = 8192  # judgement: 65 s of a band of 100 Hz, more than crews wait b
 END_LEVEL = 0.01
 """A ring-down that is above this share at the end of its window gets an exponential one."""
 _TINY = np.finfo(float).tiny
-RATE_OVER_BAND = 2.56  # of any analyser: 1/2.56 of the rate is flat behind its anti-alias filter
-_HALF_LENGTH = 16
-"""Of the filter, in samples of its output: what folds into the band is 90 dB down."""
-_KAISER_BETA = 9.0  # 0.1102 (90.4 dB - 8.7): J. F. Kaiser (1974)
-LEAST_SAMPLES = 64  # judgement: 25 periods of the highest mode; fewer have no order to stabilise
 
 
 @dataclass(frozen=True)
@@ -178,32 +169,3 @@ _ESTIMATORS: dict[str, Callable[[ComplexArray, FloatArray, FloatArray], ComplexA
     "h2": _h2,
     "hv": _hv,
 }
-
-
-def least_seconds(band_high_hz: float) -> float:
-    """Return the shortest signal that leaves enough samples for an identification."""
-    return (LEAST_SAMPLES + 4 * _HALF_LENGTH) / (RATE_OVER_BAND * band_high_hz)
-
-
-def filter_reach(sampling_rate_hz: float, band_high_hz: float) -> tuple[int, int]:
-    """Return the reach of the filter of `band_limited` to either side, and the thinning."""
-    factor = max(1, int(sampling_rate_hz // (RATE_OVER_BAND * band_high_hz)))
-    return (_HALF_LENGTH * factor if factor > 1 else 0), factor
-
-
-def band_limited(
-    signals: FloatArray, sampling_rate_hz: float, band_high_hz: float
-) -> tuple[FloatArray, float]:
-    """Return signals (channels, samples) at the lowest whole fraction of their rate with the band.
-
-    Only outputs for which the filter is completely inside the signal are used: there a finite
-    filter turns a sum of exponentials into the same exponentials, so poles come out unchanged.
-    """
-    reach, factor = filter_reach(sampling_rate_hz, band_high_hz)
-    if factor < 2:
-        return signals, sampling_rate_hz
-    if signals.shape[-1] <= 2 * reach:
-        return signals[..., :0], sampling_rate_hz / factor
-    taps = np.sinc(np.arange(-reach, reach + 1) / factor) * np.kaiser(2 * reach + 1, _KAISER_BETA)
-    parts = sliding_window_view(signals, 2 * reach + 1, axis=-1)[..., ::factor, :]
-    return np.asarray(parts @ (taps / taps.sum())), sampling_rate_hz / factor

@@ -31,17 +31,6 @@ or nothing was better than no jump, in 18."""
 _RIDGE = 1e-9  # judgement: 90 dB below the signal, beneath the noise of recordings
 
 
-def thinned(signals: FloatArray, sampling_rate_hz: float, wanted_rate_hz: float) -> FloatArray:
-    """Return means of neighbouring samples, (channels, fewer samples), at the wanted rate or more.
-
-    What folds back stays a sum of decaying sines, which is all that counts here.
-    """
-    factor = max(1, int(sampling_rate_hz / wanted_rate_hz))
-    samples = signals.shape[1] // factor * factor
-    parts = signals[:, :samples].reshape(len(signals), -1, factor)
-    return np.asarray(parts.mean(axis=2))
-
-
 def surprise(ring_downs: Sequence[FloatArray]) -> FloatArray:
     """Return the largest prediction error of one channel's ring-downs, each (samples,): (hits,).
 

@@ -14,33 +14,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import compress, pairwise
-from typing import TypeAlias
 
 import numpy as np
 
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify.contract import Dropped, Measurement
-from shm.identify.measuring.frf import LEAST_SAMPLES, band_limited
+from shm.identify.measuring.band import LEAST_SAMPLES, band_limited
 from shm.identify.measuring.hits import RINGING_SAMPLES
 from shm.identify.measuring.prediction import prediction_rule
 from shm.identify.options import IdentifyOptions
-from shm.values import Channel, FloatArray, FrequencyResponse, Plane, ResponsePoint
-
-Place: TypeAlias = tuple[Plane | None, float | None, str]
-"""Plane, position in m where stated, else the name: equal for one point in several set-ups."""
-
-
-def point_of(channel: Channel) -> ResponsePoint:
-    """Return the point where a channel's sensor is mounted, or its hammer hits."""
-    return ResponsePoint(channel.name, channel.plane, channel.x_m)
-
-
-def place_of(point: ResponsePoint) -> Place:
-    """Return what identifies a point in several set-ups."""
-    if math.isnan(point.x_m):
-        return point.plane, None, point.name
-    return point.plane, point.x_m, ""
-
+from shm.values import FloatArray, FrequencyResponse
 
 _MOST_SAMPLES = 16_000  # judgement: a minute at 256 Hz, in which all modes have rung down
 _MOST_SAMPLES_ROVING = 1_000

@@ -15,10 +15,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Dropped, Hit
-from shm.identify.measuring.frf import least_seconds
+from shm.identify.measuring.band import least_seconds
 from shm.identify.measuring.hits import (
     LEAST_SHARE_OF_HARDEST,
     PULSE_SECONDS,
@@ -32,6 +33,8 @@ from shm.identify.measuring.signal_faults import (
     CLIPPED,
     CUT_OFF,
     DOUBLE_HIT,
+    FEWEST_TO_COMPARE,
+    MOST_UNLIKE,
     NOT_A_NUMBER,
     OUTLIER,
     clipped_ends,
@@ -43,16 +46,10 @@ from shm.identify.options import IdentifyOptions
 from shm.values import NAN, BoolArray, Channel, ComplexArray, FloatArray, Plane, Recording
 
 _LEAST_SHARE_OF_LONGEST = 0.25  # judgement: a quarter as sharp, it blurs the others
-FEWEST_TO_COMPARE = 3
-"""Of two that differ nobody can say which is right."""
-# identify_limits.py (docs/trials/identification_benchmarks.md): sound hits lie below 0.013, planted
-# outliers above 0.23 and 136 times the median. 0.05 is midway; the factor is judgement, for tests
-# in which all hits differ
-LIMIT = 0.05
-_TIMES_OTHERS = 5.0
+_TIMES_OTHERS = 5.0  # judgement: for tests in which all hits differ
 # judgement: long enough to tell lines 1 % apart, short enough to end before the next hit
 _PERIODS_OF_BAND = 100.0
-LEAST_SAMPLES = 32  # judgement: sixteen lines
+_LEAST_SAMPLES = 32  # judgement: sixteen lines
 _HARDLY = 0.1  # 20 dB below the largest, usual in impact testing (Ewins 2000, 3.4)
 
 
@@ -77,27 +74,41 @@ def screen(records: Sequence[Recording], options: IdentifyOptions) -> Screening:
     ends = clipped_ends(channels, ring_downs)
     ring_downs = [replace(r, clipped_end=end) for r, (end, _) in zip(ring_downs, ends, strict=True)]
     faults = faults_of_channels(channels, ring_downs, rate, options)
-    least = _least_samples(ring_downs, rate, options)
+    longest = max((r.pulse.stop - r.free for r in ring_downs), default=0)
+    least = max(least_seconds(options.band_high_hz) * rate, _LEAST_SHARE_OF_LONGEST * longest)
     ring_downs, faults = until_disturbed(channels, ring_downs, faults, least, rate, options)
     rows, dropped = _usable_channels(channels, faults)
-    ring_downs = _with_rows(ring_downs, rows)
-    reasons = _reasons(ring_downs, [[each[row] for row in rows] for each in faults], rate, options)
-    planes = [channels[row].plane for row in rows]
-    forced = records[0].force is not None
-    if forced:
-        reasons = _with_outliers(ring_downs, reasons, rate, options, planes)
-    used = [ring_down for ring_down, reason in zip(ring_downs, reasons, strict=True) if not reason]
+    chosen = {id(r.accelerations): r.accelerations[rows] for r in ring_downs}
+    ring_downs = [replace(r, accelerations=chosen[id(r.accelerations)]) for r in ring_downs]
+    reasons = [
+        _hit_fault(ring_down, [names[row] for row in rows], least)
+        for ring_down, names in zip(ring_downs, faults, strict=True)
+    ]
+    apart = np.full(len(reasons), NAN)
+    if records[0].force is not None:
+        sound = [index for index, reason in enumerate(reasons) if not reason]
+        band_hz = options.band_low_hz, options.band_high_hz
+        planes = [channels[row].plane for row in rows]
+        apart[sound] = disagreement([ring_downs[n] for n in sound], rate, band_hz, planes)
+        odd = outliers(apart)
+        reasons = [OUTLIER if is_odd else r for r, is_odd in zip(reasons, odd, strict=True)]
+    used = [index for index, reason in enumerate(reasons) if not reason]
     if not used or not rows:
         raise _nothing_left(records, reasons, dropped)
     judged = [
         replace(hit, used=not reason, reason=reason, cut="" if reason else _cut(ring_down, names))
         for hit, reason, ring_down, (_, names) in zip(hits, reasons, ring_downs, ends, strict=True)
     ]
-    unlike = NAN
-    if forced and len(used) >= FEWEST_TO_COMPARE:
-        apart = disagreement(used, rate, (options.band_low_hz, options.band_high_hz), planes)
-        unlike = float(np.nanmedian(apart)) if np.isfinite(apart).any() else NAN
-    return Screening(tuple(judged), tuple(used), tuple(rows), dropped + _counted(reasons), unlike)
+    known = np.isfinite(apart[used])
+    return Screening(
+        hits=tuple(judged),
+        used=tuple(ring_downs[index] for index in used),
+        rows=tuple(rows),
+        dropped=dropped + _counted(reasons),
+        unlike=float(np.median(apart[used][known]))
+        if len(used) >= FEWEST_TO_COMPARE and known.any()
+        else NAN,
+    )
 
 
 def pulses_of(record: Recording, options: IdentifyOptions) -> list[Pulse]:
@@ -133,17 +144,6 @@ def _cut(ring_down: HitRecord, clipped_channels: Sequence[str]) -> str:
     return DOUBLE_HIT if ring_down.pulse.second_peak > 0 else ""
 
 
-def _with_rows(ring_downs: Sequence[HitRecord], rows: list[int]) -> list[HitRecord]:
-    """Return the hits with some rows of their accelerations; hits of one record share them."""
-    chosen = {
-        id(r.accelerations): r.accelerations
-        if len(rows) == len(r.accelerations)
-        else r.accelerations[rows]
-        for r in {id(r.accelerations): r for r in ring_downs}.values()
-    }
-    return [replace(r, accelerations=chosen[id(r.accelerations)]) for r in ring_downs]
-
-
 def _usable_channels(
     channels: Sequence[Channel], faults: Sequence[Sequence[str]]
 ) -> tuple[list[int], tuple[Dropped, ...]]:
@@ -153,13 +153,13 @@ def _usable_channels(
     """
     columns = [[each[row] for each in faults] for row in range(len(channels))]
     some_plane = any(channel.plane for channel in channels)
-    reasons = [
-        _channel_fault(c, f, 0.5, some_plane) for c, f in zip(channels, columns, strict=True)
-    ]
-    if all(reasons):
-        reasons = [
-            _channel_fault(c, f, 1.0, some_plane) for c, f in zip(channels, columns, strict=True)
-        ]
+    reasons: list[str] = []
+    for most in (0.5, 1.0):
+        if all(reasons):
+            reasons = [
+                _channel_fault(c, f, most, some_plane)
+                for c, f in zip(channels, columns, strict=True)
+            ]
     dropped = [
         Dropped(f"channel {c.name}", 1, r) for c, r in zip(channels, reasons, strict=True) if r
     ]
@@ -177,51 +177,15 @@ def _channel_fault(channel: Channel, faults: Sequence[str], most: float, some_pl
     return ""
 
 
-def _reasons(
-    ring_downs: Sequence[HitRecord],
-    faults: Sequence[Sequence[str]],
-    sampling_rate_hz: float,
-    options: IdentifyOptions,
-) -> list[str]:
-    """Return the reason why each hit cannot be used; empty where it can."""
-    least = _least_samples(ring_downs, sampling_rate_hz, options)
-    return [_hit_fault(r, f, least) for r, f in zip(ring_downs, faults, strict=True)]
-
-
-def _least_samples(
-    ring_downs: Sequence[HitRecord], sampling_rate_hz: float, options: IdentifyOptions
-) -> float:
-    """Return the shortest useful ring-down in samples."""
-    longest = max((r.pulse.stop - r.free for r in ring_downs), default=0)
-    return max(
-        least_seconds(options.band_high_hz) * sampling_rate_hz, _LEAST_SHARE_OF_LONGEST * longest
-    )
-
-
 def _hit_fault(ring_down: HitRecord, faults: Sequence[str], least_samples: float) -> str:
+    """Return the reason why a hit cannot be used; empty where it can."""
     pulse = ring_down.pulse
-    if not np.all(np.isfinite(ring_down.force[pulse.start : pulse.stop])):
-        return NOT_A_NUMBER
-    if NOT_A_NUMBER in faults:
+    force = ring_down.force[pulse.start : pulse.stop]
+    if NOT_A_NUMBER in faults or not np.all(np.isfinite(force)):
         return NOT_A_NUMBER
     if pulse.stop - ring_down.free < least_samples:
         return CUT_OFF
     return next((fault for fault in faults if fault), "")
-
-
-def _with_outliers(
-    ring_downs: Sequence[HitRecord],
-    reasons: Sequence[str],
-    sampling_rate_hz: float,
-    options: IdentifyOptions,
-    planes: Sequence[Plane | None],
-) -> list[str]:
-    """Return the reasons, with one added for each sound hit that disagrees with the others."""
-    sound = [index for index, reason in enumerate(reasons) if not reason]
-    band_hz = options.band_low_hz, options.band_high_hz
-    apart = disagreement([ring_downs[index] for index in sound], sampling_rate_hz, band_hz, planes)
-    odd = {index for index, is_odd in zip(sound, outliers(apart), strict=True) if is_odd}
-    return [OUTLIER if index in odd else reason for index, reason in enumerate(reasons)]
 
 
 def _counted(reasons: Sequence[str]) -> tuple[Dropped, ...]:
@@ -294,7 +258,7 @@ def outliers(apart: FloatArray) -> BoolArray:
     judged = apart[np.isfinite(apart)]
     if len(judged) < FEWEST_TO_COMPARE:
         return np.zeros(len(apart), dtype=bool)
-    found = apart > max(LIMIT, _TIMES_OTHERS * float(np.median(judged)))
+    found = apart > max(MOST_UNLIKE, _TIMES_OTHERS * float(np.median(judged)))
     return np.asarray(found if 2 * np.sum(found) < len(judged) else np.zeros_like(found))
 
 
@@ -303,7 +267,7 @@ def _step(hits: Sequence[HitRecord], sampling_rate_hz: float, band_hz: tuple[flo
     gap = _gap(sampling_rate_hz)
     room = min((hit.pulse.stop - hit.pulse.start for hit in hits), default=0)
     wanted = int(_PERIODS_OF_BAND / band_hz[1] * sampling_rate_hz)
-    return max(min(wanted, room // 3), min(LEAST_SAMPLES, room)) + gap
+    return max(min(wanted, room // 3), min(_LEAST_SAMPLES, room)) + gap
 
 
 def _gap(sampling_rate_hz: float) -> int:
@@ -338,21 +302,25 @@ def _responses(
 
 
 def _response(hit: HitRecord, gap: int, window: FloatArray) -> ComplexArray:
-    start, length = hit.pulse.start, len(window)
-    cut = slice(start, hit.pulse.stop)
-    offset = hit.accelerations[:, cut].mean(axis=1, keepdims=True)
+    pulse, length = hit.pulse, len(window)
+    offset = hit.accelerations[:, pulse.start : pulse.stop].mean(axis=1, keepdims=True)
 
     def spectrum(begin: int) -> ComplexArray:
         part = hit.accelerations[:, begin : begin + length] - offset
         return np.asarray(np.fft.rfft(part * window, axis=1))
 
-    after, step = spectrum(start), length + gap
-    if start - 2 * step > 0:
-        after = after - _carried_on(spectrum(start - 2 * step), spectrum(start - step))
-    force = _force_spectrum(hit, gap, length)
+    after, step = spectrum(pulse.start), length + gap
+    if pulse.start - 2 * step > 0:
+        earlier, later = spectrum(pulse.start - 2 * step), spectrum(pulse.start - step)
+        after = after - _carried_on(earlier, later)
+    known = hit.force[pulse.start : min(pulse.end + gap, pulse.start + length)]
+    push = np.zeros(length)
+    # A force may have lost samples before the hit: its level is that of the others.
+    push[: len(known)] = known - np.nanmedian(hit.force[max(0, pulse.start - gap) : pulse.stop])
+    force = np.fft.rfft(push)
     size = np.abs(force)
     # Lines that the hammer hardly excites would be noise over nothing: they fade out instead.
-    return after * force.conj() / (size**2 + (_HARDLY * float(size.max())) ** 2)
+    return np.asarray(after * force.conj() / (size**2 + (_HARDLY * float(size.max())) ** 2))
 
 
 def _carried_on(earlier: ComplexArray, later: ComplexArray) -> ComplexArray:
@@ -361,24 +329,9 @@ def _carried_on(earlier: ComplexArray, later: ComplexArray) -> ComplexArray:
     A single mode rotates and shrinks by the same factor each step: z2 / z1, here from three
     lines.
     """
-    cross = _three_lines(later * earlier.conj())
-    power = np.maximum(_three_lines(np.abs(earlier) ** 2), np.finfo(float).tiny)
+    three = np.ones((1, 3))
+    cross = scipy.signal.convolve2d(later * earlier.conj(), three, mode="same")
+    power = scipy.signal.convolve2d(np.abs(earlier) ** 2, three, mode="same")
     with np.errstate(invalid="ignore"):  # lost samples come to nothing known: NaN
-        factor = cross / power
+        factor = cross / np.maximum(power, np.finfo(float).tiny)
         return np.asarray(later * factor / np.maximum(1.0, np.abs(factor)))
-
-
-def _three_lines(values: ComplexArray | FloatArray) -> ComplexArray:
-    padded = np.pad(values, ((0, 0), (1, 1)))
-    return np.asarray(padded[:, :-2] + padded[:, 1:-1] + padded[:, 2:])
-
-
-def _force_spectrum(hit: HitRecord, gap: int, length: int) -> ComplexArray:
-    """Return the spectrum of the pulse alone, (lines,)."""
-    pulse = hit.pulse
-    begin = max(0, pulse.start - gap)
-    force = np.zeros(length)
-    known = hit.force[pulse.start : min(pulse.end + gap, pulse.start + length)]
-    # A force may have lost samples before the hit: its level is that of the others.
-    force[: len(known)] = known - np.nanmedian(hit.force[begin : pulse.stop])
-    return np.asarray(np.fft.rfft(force))

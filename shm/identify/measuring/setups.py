@@ -1,13 +1,8 @@
-"""From the records of one test to a measurement of each of its set-ups.
+"""Make one measurement of each set-up of a test.
 
 Records belong to one set-up where the same sensors and the hammer were at the same places. A test
-with a roving hammer or a roving sensor has several.
-
-Cuts what belongs to one hit out of its record, low-passed and thinned to the band.
-
-From time records of hits, as received, to the measurement of one set-up.
-
-Sensors stand on the hanger: what is said to be off it is mistyped.
+with a roving hammer or a roving sensor has several. Sensors stand on the hanger: what is said to be
+off it is mistyped.
 """
 
 from __future__ import annotations
@@ -19,24 +14,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.errors import BadInput, NotIdentifiable
-from shm.identify.contract import Dropped, Hit, Measurement
+from shm.identify.contract import Dropped, Measurement, point_of
 from shm.identify.measuring.ambient import ambient_measurement
-from shm.identify.measuring.frf import (
-    LEAST_SAMPLES,
-    Window,
-    averaged_response,
-    band_limited,
-    common_window,
-    filter_reach,
-)
+from shm.identify.measuring.band import LEAST_SAMPLES, band_limited, filter_reach
+from shm.identify.measuring.frf import Window, averaged_response, common_window
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
-from shm.identify.measuring.responses import measurement_of_responses, point_of
-from shm.identify.measuring.screening import FEWEST_TO_COMPARE, Screening, pulses_of, screen
-from shm.identify.measuring.signal_faults import HITS_NOT_SHOWN, KNOCK
+from shm.identify.measuring.responses import measurement_of_responses
+from shm.identify.measuring.screening import Screening, pulses_of, screen
+from shm.identify.measuring.signal_faults import FEWEST_TO_COMPARE, HITS_NOT_SHOWN, KNOCK
 from shm.identify.options import IdentifyOptions
 from shm.values import (
     Channel,
-    ComplexArray,
     FloatArray,
     FrequencyResponse,
     Hanger,
@@ -47,14 +35,6 @@ from shm.values import (
 _MOST_SECONDS_A_HIT = 90.0  # judgement: crews wait half a minute at most
 _SAME_RATE = 1e-5
 """Rates read off columns of rounded times differ by less, and no frequency feels it."""
-
-
-@dataclass(frozen=True, eq=False)
-class _SetUp:
-    """Records of one set-up and where they stand among those of the test."""
-
-    records: tuple[Recording, ...]
-    places: tuple[int, ...]
 
 
 def measure_set_ups(
@@ -81,23 +61,25 @@ def measure_set_ups(
 def measure_recordings(
     records: Sequence[Recording], options: IdentifyOptions
 ) -> tuple[Measurement, ...]:
-    """Return one measurement a set-up of time records; see `measured`."""
+    """Return one measurement a set-up of time records; see `measure_set_ups`."""
     hammered = any(record.force is not None for record in records)
     for record in records:
-        _refuse_incomplete(record, hammered, options)
-        _refuse_other_rate(records[0], record)
-    set_ups = _grouped(records)
+        _refuse_unusable(record, records[0], hammered, options)
+    set_ups: dict[Hashable, list[int]] = {}
+    for place, record in enumerate(records):
+        set_ups.setdefault(_layout(record), []).append(place)
     if not hammered and not all(_has_hits(record, options) for record in records):
-        return tuple(ambient_measurement(set_up.records, options) for set_up in set_ups)
+        return tuple(
+            ambient_measurement([records[place] for place in places], options)
+            for places in set_ups.values()
+        )
     try:
-        if len(set_ups) == 1:
-            found = measurement_of_recordings(records, options)
-            if hammered and _misses_hits(records, found, options):
-                raise NotIdentifiable("the force does not show most hits.", file=found.source)
-            return (found,)
-        return _measured_apart(set_ups, options)
+        found = _measured(records, list(set_ups.values()), options)
+        if hammered and _misses_hits(records, found, options):
+            raise NotIdentifiable("the force does not show most hits.", file=found[0].source)
     except NotIdentifiable as refused:
         return _by_motion_alone(records, refused, options)
+    return found
 
 
 def without_unused_force(
@@ -110,14 +92,15 @@ def without_unused_force(
 
 
 def _misses_hits(
-    records: Sequence[Recording], found: Measurement, options: IdentifyOptions
+    records: Sequence[Recording], found: Sequence[Measurement], options: IdentifyOptions
 ) -> bool:
-    """Return whether the motion shows more hits than the force does, some in its ring-downs."""
-    few = sum(hit.used for hit in found.hits) < FEWEST_TO_COMPARE
-    if not few or all(hit.cut != KNOCK for hit in found.hits):
+    """Return whether the motion of a set-up shows hits that the force does not, in ring-downs."""
+    hits = found[0].hits
+    few = len(found) == 1 and sum(hit.used for hit in hits) < FEWEST_TO_COMPARE
+    if not few or all(hit.cut != KNOCK for hit in hits):
         return False
     rest = [replace(record, channels=record.accelerations) for record in records]
-    return sum(len(pulses_of(record, options)) for record in rest) > len(found.hits)
+    return sum(len(pulses_of(record, options)) for record in rest) > len(hits)
 
 
 def _by_motion_alone(
@@ -146,61 +129,24 @@ def _has_hits(record: Recording, options: IdentifyOptions) -> bool:
     return record.duration_s <= _MOST_SECONDS_A_HIT * len(pulses_of(record, options))
 
 
-def _measured_apart(set_ups: Sequence[_SetUp], options: IdentifyOptions) -> tuple[Measurement, ...]:
-    """Return the measurements of several set-ups, with the same window."""
-    usable, lost = _screened(set_ups, options)
-    hits = [hit for _, found in usable for hit in found.used]
-    rate = set_ups[0].records[0].sampling_rate_hz
-    window = common_window(hits, rate, options.band_high_hz)
-    measurements = [
-        screened_measurement(set_up.records, _renumbered(found, set_up), window, options)
-        for set_up, found in usable
-    ]
-    first = replace(measurements[0], dropped=lost + measurements[0].dropped)
-    return (first, *measurements[1:])
-
-
-def _refuse_incomplete(record: Recording, hammered: bool, options: IdentifyOptions) -> None:
-    missing = [
-        name
-        for name, absent in (
-            ("force", hammered and record.force is None),
-            ("acceleration", not record.accelerations),
-        )
-        if absent
-    ]
-    if missing:
-        raise BadInput(
-            f"no {missing[0]} channel.",
-            file=record.source,
-            remedy="State the unit of each column: N for the hammer, m/s^2 for accelerometers.",
-        )
-    if record.sampling_rate_hz < 2 * options.band_high_hz:
-        raise BadInput(
-            f"sampled at {record.sampling_rate_hz:g} Hz, too slow for modes up to "
-            f"{options.band_high_hz:g} Hz.",
-            file=record.source,
-            remedy="Sample faster, or lower band_high_hz to less than half the sampling rate.",
-        )
-
-
-def _refuse_other_rate(first: Recording, record: Recording) -> None:
-    if not math.isclose(record.sampling_rate_hz, first.sampling_rate_hz, rel_tol=_SAME_RATE):
-        raise BadInput(
-            f"its sampling rate differs from that of {first.source}.",
-            file=record.source,
-            remedy="Identify records of different sampling rates one by one.",
-        )
-
-
-def _grouped(records: Sequence[Recording]) -> list[_SetUp]:
-    groups: dict[Hashable, list[int]] = {}
-    for place, record in enumerate(records):
-        groups.setdefault(_layout(record), []).append(place)
-    return [
-        _SetUp(tuple(records[place] for place in places), tuple(places))
-        for places in groups.values()
-    ]
+def _refuse_unusable(
+    record: Recording, first: Recording, hammered: bool, options: IdentifyOptions
+) -> None:
+    """Raise BadInput for a record that lacks a channel, is too slow or of another rate."""
+    rate = record.sampling_rate_hz
+    fault = remedy = ""
+    if (hammered and record.force is None) or not record.accelerations:
+        missing = "force" if hammered and record.force is None else "acceleration"
+        fault = f"no {missing} channel."
+        remedy = "State the unit of each column: N for the hammer, m/s^2 for accelerometers."
+    elif rate < 2 * options.band_high_hz:
+        fault = f"sampled at {rate:g} Hz, too slow for modes up to {options.band_high_hz:g} Hz."
+        remedy = "Sample faster, or lower band_high_hz to less than half the sampling rate."
+    elif not math.isclose(rate, first.sampling_rate_hz, rel_tol=_SAME_RATE):
+        fault = f"its sampling rate differs from that of {first.source}."
+        remedy = "Identify records of different sampling rates one by one."
+    if fault:
+        raise BadInput(fault, file=record.source, remedy=remedy)
 
 
 def _layout(record: Recording) -> Hashable:
@@ -213,27 +159,70 @@ def _place(channel: Channel) -> tuple[str | None, float | None]:
     return channel.plane, None if math.isnan(channel.x_m) else channel.x_m
 
 
-def _screened(
-    set_ups: Sequence[_SetUp], options: IdentifyOptions
-) -> tuple[list[tuple[_SetUp, Screening]], tuple[Dropped, ...]]:
-    """Return the set-ups with something to use; a set-up without is left out if another has."""
+def _measured(
+    records: Sequence[Recording], set_ups: Sequence[Sequence[int]], options: IdentifyOptions
+) -> tuple[Measurement, ...]:
+    """Return the measurements of set-ups with hits, all with the same window.
+
+    A set-up without a hit to use is left out if another has one; else NotIdentifiable is raised.
+    """
     usable, failures = [], []
-    for set_up in set_ups:
+    for places in set_ups:
         try:
-            usable.append((set_up, screen(set_up.records, options)))
+            usable.append((places, screen([records[place] for place in places], options)))
         except NotIdentifiable as failure:
             failures.append(failure)
     if not usable:
         raise failures[0]
-    return usable, tuple(Dropped(f"set-up {f.file}", 1, f.message) for f in failures)
-
-
-def _renumbered(found: Screening, set_up: _SetUp) -> Screening:
-    """Return `found` with each hit's record counted among all records of the test."""
-    hits: tuple[Hit, ...] = tuple(
-        replace(hit, record=set_up.places[hit.record]) for hit in found.hits
+    hits = [hit for _, found in usable for hit in found.used]
+    window = common_window(hits, records[0].sampling_rate_hz, options.band_high_hz)
+    first, *others = (
+        _measurement(records, places, found, window, options) for places, found in usable
     )
-    return replace(found, hits=hits)
+    lost = tuple(Dropped(f"set-up {f.file}", 1, f.message) for f in failures)
+    return (replace(first, dropped=lost + first.dropped), *others)
+
+
+def _measurement(
+    records: Sequence[Recording],
+    places: Sequence[int],
+    found: Screening,
+    window: Window,
+    options: IdentifyOptions,
+) -> Measurement:
+    """Return the measurement in the records of one set-up, at `places` among those of the test."""
+    first = records[places[0]]
+    rate, high_hz = first.sampling_rate_hz, options.band_high_hz
+    cuts = [cut(hit, rate, high_hz) for hit in found.used]
+    measurement = Measurement(
+        source=first.source,
+        points=tuple(point_of(first.accelerations[row]) for row in found.rows),
+        decays=tuple(each.decay for each in cuts),
+        sampling_rate_hz=cuts[0].sampling_rate_hz,
+        frequency_response=None,
+        hits=tuple(replace(hit, record=places[hit.record]) for hit in found.hits),
+        dropped=found.dropped,
+        unlike=found.unlike,
+    )
+    if first.force is None:
+        return measurement
+    average = averaged_response(found.used, rate, high_hz, options.estimator, window)
+    response = FrequencyResponse(
+        source=first.source,
+        points=measurement.points,
+        frequency_hz=average.frequency_hz,
+        accelerance=average.accelerance,
+        coherence=average.coherence,
+        **collect_conditions(first),
+    )
+    return replace(
+        measurement,
+        frequency_response=response,
+        driven=tuple(each.driven for each in cuts),
+        spectra=average.spectra,
+        hammer=point_of(first.force),
+        window_time_constant_s=window.time_constant_s,
+    )
 
 
 LEAD_SECONDS = 0.02
@@ -285,71 +274,6 @@ def _centred(hit: HitRecord, begin: int, free: int) -> FloatArray:
     before = known[:, : hit.pulse.start - first]
     before[:] = np.nan_to_num(before)
     return signals
-
-
-def measurement_of_recordings(
-    records: Sequence[Recording], options: IdentifyOptions
-) -> Measurement:
-    """Return the measurement in records of one set-up, each with one hit or several.
-
-    Raises NotIdentifiable where no hit is left to use.
-    """
-    found = screen(records, options)
-    window = common_window(found.used, records[0].sampling_rate_hz, options.band_high_hz)
-    return screened_measurement(records, found, window, options)
-
-
-def screened_measurement(
-    records: Sequence[Recording], found: Screening, window: Window, options: IdentifyOptions
-) -> Measurement:
-    """Return the measurement in the records of one set-up, of which `found` can be used."""
-    rate = records[0].sampling_rate_hz
-    cuts = [cut(hit, rate, options.band_high_hz) for hit in found.used]
-    if records[0].force is None:
-        return Measurement(
-            source=records[0].source,
-            points=tuple(point_of(records[0].accelerations[row]) for row in found.rows),
-            decays=tuple(each.decay for each in cuts),
-            sampling_rate_hz=cuts[0].sampling_rate_hz,
-            frequency_response=None,
-            hits=found.hits,
-            dropped=found.dropped,
-            unlike=found.unlike,
-        )
-    response, spectra = _response(records[0], found, window, options)
-    force = records[0].force
-    return Measurement(
-        source=records[0].source,
-        points=response.points,
-        decays=tuple(each.decay for each in cuts),
-        sampling_rate_hz=cuts[0].sampling_rate_hz,
-        frequency_response=response,
-        driven=tuple(each.driven for each in cuts),
-        spectra=spectra,
-        hammer=point_of(force) if force else None,
-        window_time_constant_s=window.time_constant_s,
-        hits=found.hits,
-        dropped=found.dropped,
-        unlike=found.unlike,
-    )
-
-
-def _response(
-    first: Recording, found: Screening, window: Window, options: IdentifyOptions
-) -> tuple[FrequencyResponse, ComplexArray]:
-    """Return the frequency response of a set-up, and the spectra it is an average of."""
-    average = averaged_response(
-        found.used, first.sampling_rate_hz, options.band_high_hz, options.estimator, window
-    )
-    response = FrequencyResponse(
-        source=first.source,
-        points=tuple(point_of(first.accelerations[row]) for row in found.rows),
-        frequency_hz=average.frequency_hz,
-        accelerance=average.accelerance,
-        coherence=average.coherence,
-        **collect_conditions(first),
-    )
-    return response, average.spectra
 
 
 _ROUNDED = 0.01

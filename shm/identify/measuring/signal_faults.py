@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.identify.measuring.frf import RATE_OVER_BAND
+from shm.identify.measuring.band import RATE_OVER_BAND, thinned
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
-from shm.identify.measuring.prediction import is_cut_short, knocked_at, surprise, thinned
+from shm.identify.measuring.prediction import is_cut_short, knocked_at, surprise
 from shm.identify.options import IdentifyOptions
 from shm.values import PLANES, BoolArray, Channel, FloatArray, Plane
 
@@ -30,6 +30,12 @@ HITS_NOT_SHOWN = "cable fault: without the hits that the motion shows"
 LOST = "drop-out: samples are lost, the motion jumps to what it would be later"
 KNOCK = "disturbed: something other than the hammer struck"
 OUTLIER = "outlier: its response is unlike that of the other hits"
+FEWEST_TO_COMPARE = 3
+"""Of two that differ nobody can say which is right."""
+# identify_limits.py (docs/trials/identification_benchmarks.md): sound hits lie below 0.013, planted
+# outliers above 0.23 and 136 times the median
+MOST_UNLIKE = 0.05
+"""Midway: how unlike hits are to each other, 0 alike, 1 unlike."""
 
 _SURPRISE = 5.0
 """Of 7,114 ring-downs of 110 sound simulated tests, 20 to 60 dB above noise, none was above 3.1; of

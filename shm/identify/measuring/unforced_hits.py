@@ -9,14 +9,13 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from shm.identify.measuring.frf import RATE_OVER_BAND
+from shm.identify.measuring.band import RATE_OVER_BAND, thinned
 from shm.identify.measuring.hits import (
     GROUP_SECONDS,
     PULSE_SECONDS,
     RINGING_SAMPLES,
     Pulse,
 )
-from shm.identify.measuring.prediction import thinned
 from shm.values import NAN, FloatArray
 
 _WINDOW_SECONDS = 0.04

@@ -11,7 +11,7 @@ leaves open, and shows where an order is missing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias
 
@@ -53,6 +53,7 @@ MOST_FOREIGN = 0.4  # share of the modes from which on the bars themselves are d
 _MOST_FOREIGN_ONE_AXIS = 0.7  # one axis hears the other plane, too
 _FREE = 2  # level and xi: two frequencies fit some bar
 _MOST_OFF = 3.0  # standard deviations of a plain bar, beyond which a mode's order stays open
+_SHIFTS = 2  # orders up and down: what the grid leaves open
 
 Basis: TypeAlias = Literal["description", "pattern", "counting"]
 Orders: TypeAlias = tuple[tuple[int, ...], ...]
@@ -90,13 +91,8 @@ class Numbering:
     @property
     def least_margin(self) -> float:
         """Return the least margin of a mode with an order; inf where none has one."""
-        known = [
-            margin
-            for orders, margins in zip(self.orders, self.margins, strict=True)
-            for order, margin in zip(orders, margins, strict=True)
-            if order
-        ]
-        return min(known, default=np.inf)
+        orders, margins = _flat(self.orders), np.concatenate([*self.margins, [np.inf]])
+        return float(np.min(margins[:-1][orders > 0], initial=np.inf))
 
 
 def number_modes(planes: Sequence[PlaneModes], hanger: Hanger | None) -> Numbering:
@@ -128,19 +124,16 @@ def _is_believed(planes: Sequence[PlaneModes], found: Numbering, bars: Bars | No
     hanger. Without a description, the first few modes only find out what bar it is.
     """
     lowest_hz = float(np.exp(bars.log_factor.min() + bars.offset.min())) if bars else 0.0
-    orders = [
-        order
-        for plane, of_plane in zip(planes, found.orders, strict=True)
-        for hz, order in zip(plane.frequency_hz, of_plane, strict=True)
-        if hz >= lowest_hz
-    ]
+    frequency_hz = np.concatenate([plane.frequency_hz for plane in planes])
+    orders = _flat(found.orders)[frequency_hz >= lowest_hz]
     most = MOST_FOREIGN if len(planes) > 1 or not bars else _MOST_FOREIGN_ONE_AXIS
-    return orders.count(0) <= most * max(len(orders) - (0 if bars else _FREE), 0)
+    free = 0 if bars else _FREE
+    return int(np.sum(orders == 0)) <= most * max(len(orders) - free, 0)
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Hold the fit of a plane on a grid of (tensions, units), at the best springs.
+    """Hold the fit of modes on a grid of (tensions, units), at the best springs.
 
     `total` is the cost, `number` the orders from 1, 0 for foreign, and `misfit` the error of
     the frequency, both (modes, tensions, units).
@@ -153,88 +146,91 @@ class _Fit:
 
 def _cheapest(planes: Sequence[PlaneModes], bars: Bars, basis: Basis) -> Numbering:
     """Return the orders by the cheapest bar over both tolerances."""
-    fits = []
-    for tolerance in _TOLERANCES:
-        each = [_fit(plane, bars, tolerance) for plane in planes]
-        total, shift = _together([fit.total for fit in each], bars)
-        numbers = [each[0].number, *(_moved(fit.number, shift) for fit in each[1:])]
-        misfits = [each[0].misfit, *(_moved(fit.misfit, shift) for fit in each[1:])]
-        fits.append((total + bars.prior, numbers, misfits))
-    total, numbers, misfits = min(fits, key=lambda fit: float(fit[0].min()))
-    least = float(total.min())
-    tension, unit = divmod(int(total.argmin()), total.shape[1])
-    orders = tuple(tuple(number[:, tension, unit].tolist()) for number in numbers)
-    margins = tuple(
-        tuple(
-            min(
-                float(np.min(cost[(n[p][m] > 0) & (n[p][m] != order)], initial=np.inf))
-                for cost, n, _ in fits
-            )
-            - least
-            for m, order in enumerate(numbered)
-        )
-        for p, numbered in enumerate(orders)
+    fits = [_fit(planes, bars, tolerance) for tolerance in _TOLERANCES]
+    best = min(fits, key=lambda fit: float(fit.total.min()))
+    tension, unit = divmod(int(best.total.argmin()), best.total.shape[1])
+    orders, misfits = best.number[:, tension, unit], best.misfit[:, tension, unit]
+    others = [np.where((fit.number > 0) & (fit.number != orders[:, None, None]), fit.total, np.inf)
+              for fit in fits]  # fmt: skip
+    margins = np.min(others, axis=(0, 2, 3)) - best.total.min()
+    irregular = _apart((orders == 1) & (misfits >= FOREIGN), planes)
+    return Numbering(
+        _apart(orders, planes), _apart(margins, planes), tuple(map(any, irregular)), basis
     )
-    irregular = tuple(
-        any(n == 1 and misfits[p][m, tension, unit] >= FOREIGN for m, n in enumerate(numbered))
-        for p, numbered in enumerate(orders)
-    )
-    return Numbering(orders, margins, irregular, basis)
 
 
-def _fit(plane: PlaneModes, bars: Bars, tolerance: tuple[float, float]) -> _Fit:
-    """Return the cost of a plane's modes, each at its nearest order, at the best springs."""
+def _apart(values: Any, planes: Sequence[PlaneModes]) -> tuple[tuple[Any, ...], ...]:
+    """Return values of the modes of all planes (modes,) plane by plane."""
+    ends = np.cumsum([len(plane.frequency_hz) for plane in planes])[:-1]
+    return tuple(tuple(part.tolist()) for part in np.split(np.asarray(values), ends))
+
+
+def _flat(orders: Orders) -> IntArray:
+    """Return orders plane by plane as those of the modes of all planes, (modes,)."""
+    return np.array([order for of_plane in orders for order in of_plane], dtype=int)
+
+
+def _fit(planes: Sequence[PlaneModes], bars: Bars, tolerance: tuple[float, float]) -> _Fit:
+    """Return the fit of one or two planes; the second may be stiffer or softer."""
+    one, *others = (_fit_plane(plane, bars, tolerance) for plane in planes)
+    total, numbers, misfits = one.total + bars.prior, [one.number], [one.misfit]
+    reach, units = round(2.5 * PLANE_SD / bars.unit_step), one.total.shape[1]
+    t, u = np.ogrid[: one.total.shape[0], :units]
+    for other in others:
+        padded = np.pad(other.total, ((0, 0), (reach, reach)), constant_values=np.inf)
+        tried = np.array([
+            padded[:, reach + by : reach + by + units] + (by * bars.unit_step / PLANE_SD) ** 2
+            for by in range(-reach, reach + 1)
+        ])  # fmt: skip
+        at = np.clip(u + tried.argmin(axis=0) - reach, 0, units - 1)
+        total = total + tried.min(axis=0)
+        numbers.append(other.number[:, t, at])
+        misfits.append(other.misfit[:, t, at])
+    return _Fit(total, np.concatenate(numbers), np.concatenate(misfits))
+
+
+def _fit_plane(plane: PlaneModes, bars: Bars, tolerance: tuple[float, float]) -> _Fit:
+    """Return the fit of a plane's modes, each at its nearest order, at the best springs."""
     logs = bars.log_factor
     limits = ((logs[..., 1:] + logs[..., :-1]) / 2)[:, np.newaxis]
     shaped = _shape_costs(plane, bars, tolerance[1])
     t, _, s = np.ogrid[: len(logs), :1, : logs.shape[1]]
     loose = 2 * np.log(tolerance[0] / _TOLERANCES[0][0])
-    numbers, costs, misfits = [], [], []
+    grid = (len(plane.frequency_hz), *bars.offset.shape, logs.shape[1])
+    number, cost, misfit = np.zeros(grid, dtype=int), np.empty(grid), np.empty(grid)
     for mode, hz in enumerate(plane.frequency_hz):
         log_ratio = (np.log(hz) - bars.offset)[:, :, np.newaxis]
         near = np.sum(log_ratio[..., np.newaxis] > limits, axis=-1)
         off = log_ratio - logs[t, s, near]
-        misfit = (off / tolerance[0]) ** 2
+        squared = (off / tolerance[0]) ** 2
         first = (near == 0) & (off > -_FARTHEST_BELOW)
-        cost = np.where(first, np.minimum(misfit, _IRREGULAR), misfit) + loose
+        misfit[mode] = squared + loose
+        cost[mode] = np.where(first, np.minimum(squared, _IRREGULAR), squared) + loose
         if shaped is not None:
-            cost = cost + shaped[mode][t, s, near]
-        numbers.append(np.where(cost < FOREIGN, near + 1, 0))
-        costs.append(np.minimum(cost, FOREIGN))
-        misfits.append(misfit + loose)
-    _settle(numbers, costs, plane.strength)
-    return _at_best_springs(numbers, costs, misfits, bars)
+            cost[mode] += shaped[mode][t, s, near]
+        number[mode] = np.where(cost[mode] < FOREIGN, near + 1, 0)
+    _leave_one_of_each_order(number, cost, plane.strength)
+    _cut_off(number, cost, bars.missing_cost)
+    passed_over = number.max(axis=0, initial=0) - (number > 0).sum(axis=0)
+    total = np.where(number > 0, cost, FOREIGN).sum(axis=0) + bars.missing_cost * passed_over
+    spring = total.argmin(axis=-1)[..., np.newaxis]
+    total, number, misfit = (
+        np.take_along_axis(each, spring if each.ndim == 3 else spring[np.newaxis], -1)[..., 0]
+        for each in (total, number, misfit)
+    )
+    return _Fit(total, number, misfit)
 
 
-def _settle(numbers: list[IntArray], costs: list[FloatArray], strength: FloatArray) -> None:
+def _leave_one_of_each_order(number: IntArray, cost: FloatArray, strength: FloatArray) -> None:
     """Leave of two modes at one order the likelier one; the other is foreign."""
-    for i in range(len(numbers)):
+    for i in range(len(number)):
         for j in range(i - 1, -1, -1):  # by rising frequency: only neighbours share an order
-            clash = (numbers[i] == numbers[j]) & (numbers[i] > 0)
+            clash = (number[i] == number[j]) & (number[i] > 0)
             if not clash.any() and i - j > 1:
                 break
-            loses = costs[i] - strength[i] >= costs[j] - strength[j]
-            numbers[i] = np.where(clash & loses, 0, numbers[i])
-            numbers[j] = np.where(clash & ~loses, 0, numbers[j])
-
-
-def _at_best_springs(
-    numbers: Sequence[IntArray], costs: Sequence[FloatArray], misfits: Sequence[FloatArray],
-    bars: Bars,
-) -> _Fit:  # fmt: skip
-    shape = (*bars.offset.shape, bars.log_factor.shape[1])
-    number = np.array(numbers, dtype=int).reshape(-1, *shape)
-    cost = np.array(costs).reshape(-1, *shape)
-    _cut_off(number, cost, bars.missing_cost)
-    total = np.where(number > 0, cost, FOREIGN).sum(axis=0)
-    passed_over = number.max(axis=0, initial=0) - (number > 0).sum(axis=0)
-    total += bars.missing_cost * passed_over
-    spring = total.argmin(axis=-1)[..., np.newaxis]
-    return _Fit(
-        np.take_along_axis(total, spring, -1)[..., 0],
-        np.take_along_axis(number, spring[np.newaxis], -1)[..., 0],
-        np.take_along_axis(np.array(misfits).reshape(-1, *shape), spring[np.newaxis], -1)[..., 0],
-    )
+            loses = cost[i] - strength[i] >= cost[j] - strength[j]
+            number[i][clash & loses] = 0
+            number[j][clash & ~loses] = 0
 
 
 def _cut_off(number: IntArray, cost: FloatArray, missing_cost: float) -> None:
@@ -243,7 +239,7 @@ def _cut_off(number: IntArray, cost: FloatArray, missing_cost: float) -> None:
     for mode in range(len(number) - 1, -1, -1):
         passed_over = number[mode] - number[:mode].max(axis=0, initial=0) - 1
         dear = cost[mode] + missing_cost * passed_over > FOREIGN
-        number[mode] = np.where(dear & ~above, 0, number[mode])
+        number[mode][dear & ~above] = 0
         above |= number[mode] > 0
         if above.all():
             break
@@ -259,28 +255,6 @@ def _shape_costs(plane: PlaneModes, bars: Bars, tolerance: float) -> FloatArray 
     likeness = product / (np.sum(expected**2, axis=-1) * norm + np.finfo(float).tiny)
     sd = np.nan_to_num(plane.shape_sd)[:, np.newaxis, np.newaxis, np.newaxis]
     return np.asarray(np.minimum((1 - likeness) / (tolerance**2 + sd**2 / norm), _MOST_SHAPE_COST))
-
-
-def _together(totals: Sequence[FloatArray], bars: Bars) -> tuple[FloatArray, IntArray]:
-    """Return the costs of one or two planes, and by how many units the second differs there."""
-    least, shift = totals[0], np.zeros(totals[0].shape, int)
-    if len(totals) == 2:
-        reach = round(2.5 * PLANE_SD / bars.unit_step)
-        padded = np.pad(totals[1], ((0, 0), (reach, reach)), constant_values=np.inf)
-        units = totals[0].shape[1]
-        tried = np.array([
-            padded[:, reach + by : reach + by + units] + (by * bars.unit_step / PLANE_SD) ** 2
-            for by in range(-reach, reach + 1)
-        ])  # fmt: skip
-        shift = np.argmin(tried, axis=0) - reach
-        least = least + np.min(tried, axis=0)
-    return least, shift
-
-
-def _moved(values: Any, shift: IntArray) -> Any:
-    """Return values (modes, tensions, units) of the second plane, as the first one's units."""
-    t, u = np.ogrid[: shift.shape[0], : shift.shape[1]]
-    return values[:, t, np.clip(u + shift, 0, shift.shape[1] - 1)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,89 +279,72 @@ class FittedBar:
     @property
     def is_plain(self) -> bool:
         """Return whether the modes are its own to a thousandth."""
-        known = self.off[np.isfinite(self.off)]
-        return bool(np.sqrt(np.mean(known**2)) < PLAIN_BAR)
+        return bool(np.sqrt(np.nanmean(self.off**2)) < PLAIN_BAR)
 
 
 def fit_bar(planes: Sequence[FloatArray], orders: Orders, hanger: Hanger) -> FittedBar:
     """Fit tension, stiffness and each plane's fixity to frequencies in Hz of given orders."""
-    described = Description.of(hanger)
-    shift = turnbuckle_shift(hanger)
-    number = np.concatenate([np.array(of_plane, float) for of_plane in orders])
-    number[number == 0] = np.nan
-    start = np.array([described.log_unit, described.log_xi, *([0.5] * len(planes))])
-    if not np.nanmin(number) >= 1 or np.nanmax(number) > HIGHEST_ORDER:
-        return FittedBar(orders, np.inf, np.full(number.shape, np.nan), start, shift)
-    log_hz = np.log(np.concatenate(planes))
-    log_hz = log_hz - np.append(np.nan, shift)[np.nan_to_num(number).astype(int)]
-    plane_of = np.repeat(np.arange(len(planes)), [len(of_plane) for of_plane in orders])
+    described, shift, number = Description.of(hanger), turnbuckle_shift(hanger), _flat(orders)
+    known = number > 0
+    plane_of = np.repeat(np.arange(len(planes)), [len(of_plane) for of_plane in orders])[known]
+    log_hz = np.log(np.concatenate(planes))[known] - shift[number[known] - 1]
 
     def off(at: FloatArray) -> FloatArray:
-        return np.asarray(log_hz - at[0] - log_factor(at[1], at[2:][plane_of], number))
+        factor = log_factor(at[1], at[2:][plane_of], number[known].astype(float))
+        return np.asarray(log_hz - at[0] - factor)
 
     def misfit(at: FloatArray) -> FloatArray:
         unit = at[0] - described.log_unit
         string = unit + at[1] - described.log_xi
-        rest = off(at) / PLAIN_BAR
-        every = np.append(rest[np.isfinite(rest)], [string / TENSION_SD, unit / UNIT_SD])
+        every = np.append(off(at) / PLAIN_BAR, [string / TENSION_SD, unit / UNIT_SD])
         return np.asarray(np.sign(every) * np.sqrt(heavy_tailed(every)))
 
-    low, high = np.append([-np.inf, 0.0], 0 * start[2:]), np.append([np.inf] * 2, 0 * start[2:] + 1)
+    start = np.array([described.log_unit, described.log_xi, *([0.5] * len(planes))])
+    low = np.array([-np.inf, 0.0, *([0.0] * len(planes))])
+    high = np.array([np.inf, np.inf, *([1.0] * len(planes))])
     best = scipy.optimize.least_squares(misfit, start, bounds=(low, high), method="dogbox")
-    return FittedBar(orders, 2 * float(best.cost), off(best.x), best.x, shift)
+    every_off = np.full(number.shape, np.nan)
+    every_off[known] = off(best.x)
+    return FittedBar(orders, 2 * float(best.cost), every_off, best.x, shift)
 
 
 def decided_by_bar(planes: Sequence[PlaneModes], found: Numbering, hanger: Hanger) -> Numbering:
     """Return the orders and margins of the shift that a bar fits to a thousandth, where one does.
 
-    Tried are shifts of all orders, as far as they fit better, and of one plane's beside the other.
-    Shapes have no say: a sensor's gain or place is one cause for the shapes of all modes.
+    Tried are shifts of all orders, and of one plane's beside the other. Shapes have no say: a
+    sensor's gain or place is one cause for the shapes of all modes.
     """
-    known = sum(order > 0 for of_plane in found.orders for order in of_plane)
-    if known < LEAST_MODES:
+    if np.sum(_flat(found.orders) > 0) < LEAST_MODES:
         return found
     frequency_hz = [plane.frequency_hz for plane in planes]
     first = fit_bar(frequency_hz, found.orders, hanger)
-    if found.least_margin >= LEAST_MARGIN and (first.is_plain or not _has_shapes(planes)):
+    if found.least_margin >= LEAST_MARGIN and first.is_plain:
         return found
-    tried = list(_shifted_while_better(first, frequency_hz, hanger))
+    tried = [
+        fit_bar(frequency_hz, orders, hanger)
+        for by in range(-_SHIFTS, _SHIFTS + 1)
+        for orders in _shifted(found.orders, (by, by))
+    ]
     best = min(tried, key=lambda bar: bar.cost)
-    if all(any(of_plane) for of_plane in found.orders) and len(planes) > 1:
-        single_shifts = ((0, 1), (0, -1))
-        tried += [fit_bar(frequency_hz, _shifted(best.orders, by), hanger) for by in single_shifts]
+    if sum(map(any, found.orders)) > 1:
+        tried += [
+            fit_bar(frequency_hz, orders, hanger)
+            for by in (1, -1)
+            for orders in _shifted(best.orders, (0, by))
+        ]
     best, *others = sorted(tried, key=lambda bar: bar.cost)
     if not best.is_plain:
         return found
     margin = min((bar.cost for bar in others), default=np.inf) - best.cost
     sure = np.where(np.abs(best.off) < _MOST_OFF * PLAIN_BAR, margin, 0.0)
-    apart = np.split(sure, np.cumsum([len(of_plane) for of_plane in best.orders])[:-1])
-    return replace(
-        found, orders=best.orders, margins=tuple(tuple(of_plane.tolist()) for of_plane in apart)
-    )
+    return replace(found, orders=best.orders, margins=_apart(sure, planes))
 
 
-def _has_shapes(planes: Sequence[PlaneModes]) -> bool:
-    return any(len(plane.position) > 1 for plane in planes)
-
-
-def _shifted_while_better(
-    first: FittedBar, frequency_hz: Sequence[FloatArray], hanger: Hanger
-) -> Iterator[FittedBar]:
-    """Yield bars of all orders lower and higher, as far as they cost little more than the best."""
-    yield first
-    least = first.cost
-    for step in (1, -1):
-        bar, shift = first, step
-        while bar.cost < least + LEAST_MARGIN and np.isfinite(bar.cost):
-            bar = fit_bar(frequency_hz, _shifted(first.orders, (shift, shift)), hanger)
-            least = min(least, bar.cost)
-            yield bar
-            shift += step
-
-
-def _shifted(orders: Orders, shifts: Sequence[int]) -> Orders:
-    """Return orders higher by `shifts`, one a plane; what comes below 1 makes a bar of no cost."""
-    return tuple(
-        tuple(order and (order + by if order + by > 0 else HIGHEST_ORDER + 1) for order in of_plane)
+def _shifted(orders: Orders, shifts: Sequence[int]) -> list[Orders]:
+    """Return orders higher by `shifts`, one a plane; nothing where one would be outside."""
+    moved = tuple(
+        tuple(order + by if order else 0 for order in of_plane)
         for of_plane, by in zip(orders, shifts, strict=False)
     )
+    numbered = _flat(moved)[_flat(orders) > 0]
+    return [moved] if numbered.min() >= 1 and numbered.max() <= HIGHEST_ORDER else []

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.identify.contract import FoundMode
-from shm.identify.mode_ordering.bars import described_bars
+from shm.identify.mode_ordering.bars import described_shapes
 from shm.identify.mode_ordering.numbering import PlaneModes
 from shm.values import FloatArray, Hanger
 
@@ -44,55 +43,51 @@ class AxisOrders:
     undecided: int
 
 
-def tell_planes(
-    found: Sequence[FoundMode], orders: Sequence[int], modes: PlaneModes, hanger: Hanger
-) -> AxisOrders:
+def tell_planes(orders: Sequence[int], modes: PlaneModes, hanger: Hanger) -> AxisOrders:
     """Compare each mode with an order with the nearest one that has none.
 
     Of those without such a neighbour the ones that have no bar's shape are the other plane's, where
     most of the series have one.
     """
     in_axis, cross_axis = list(orders), [0] * len(orders)
-    pairs = _pairs(found, orders)
-    at = {i: order for i, order in enumerate(orders) if order}
-    misfit = _shape_misfits(modes, at | {j: orders[i] for i, j in pairs}, hanger)
-    if 2 * sum(misfit[i] < _GOOD_SHAPE for i in at) >= len(at):
-        for i in at.keys() - {i for i, _ in pairs}:
+    partner = _pair_up(modes.frequency_hz, orders)
+    numbered = {i: order for i, order in enumerate(orders) if order}
+    misfit = _shape_misfits(modes, numbered | {j: orders[i] for i, j in partner.items()}, hanger)
+    if 2 * sum(misfit[i] < _GOOD_SHAPE for i in numbered) >= len(numbered):
+        for i in numbered.keys() - partner.keys():
             if misfit[i] >= _ODD_SHAPE:
-                in_axis[i], cross_axis[i] = 0, at[i]
-    cost = np.array([
-        COST_OF_RATIO * _log_ratio(found[i], found[j]) + misfit[j] - misfit[i] for i, j in pairs
-    ])  # fmt: skip
-    above = np.array([np.sign(found[i].frequency_hz - found[j].frequency_hz) for i, j in pairs])
+                in_axis[i], cross_axis[i] = 0, numbered[i]
+    first, second = list(partner), list(partner.values())
+    cost = modes.strength[first] - modes.strength[second] + misfit[second] - misfit[first]
+    above = np.sign(modes.frequency_hz[first] - modes.frequency_hz[second])
     together = float(np.sum(above * cost))  # one plane is the stiffer at all orders
     if abs(together) >= _DECIDED:
         cost = np.where(np.abs(cost) < _DECIDED, above * together, cost)
-    undecided = 0
-    for (i, j), each in zip(pairs, cost.tolist(), strict=True):
-        order = orders[i]
+    for i, j, each in zip(first, second, cost.tolist(), strict=True):
         if abs(each) < _DECIDED:
-            in_axis[i], undecided = 0, undecided + 1
+            in_axis[i] = 0
         elif each > 0:
-            cross_axis[j] = order
+            cross_axis[j] = orders[i]
         else:
-            in_axis[i], in_axis[j], cross_axis[i] = 0, order, order
+            in_axis[i], in_axis[j], cross_axis[i] = 0, orders[i], orders[i]
+    undecided = int(np.sum(np.abs(cost) < _DECIDED))
     return AxisOrders(tuple(in_axis), tuple(cross_axis), undecided)
 
 
-def _pairs(found: Sequence[FoundMode], orders: Sequence[int]) -> Sequence[tuple[int, int]]:
-    """Return each mode with an order and the nearest to it that has none, where one is near."""
-    log_hz = np.log([mode.frequency_hz for mode in found])
+def _pair_up(frequency_hz: FloatArray, orders: Sequence[int]) -> dict[int, int]:
+    """Return for each mode with an order the nearest to it that has none, where one is near."""
+    log_hz = np.log(frequency_hz)
     near = sorted(
         (abs(log_hz[i] - log_hz[j]), i, j)
         for i, order in enumerate(orders)
         for j, other in enumerate(orders)
         if order and not other
     )
-    partners: dict[int, int] = {}
+    partner: dict[int, int] = {}
     for apart, i, j in near:
-        if apart < _REACH and i not in partners and j not in partners.values():
-            partners[i] = j
-    return list(partners.items())
+        if apart < _REACH and i not in partner and j not in partner.values():
+            partner[i] = j
+    return partner
 
 
 def _shape_misfits(modes: PlaneModes, at: Mapping[int, int], hanger: Hanger) -> FloatArray:
@@ -100,18 +95,11 @@ def _shape_misfits(modes: PlaneModes, at: Mapping[int, int], hanger: Hanger) -> 
     misfit = np.zeros(len(modes.frequency_hz))
     if len(modes.position) < 2 or not at:
         return misfit
-    every = described_bars(hanger).shapes(modes.position)
-    for mode, order in at.items():
-        expected = every[:, :, order - 1]
-        shape, sd = modes.shapes[mode], float(np.nan_to_num(modes.shape_sd[mode]))
-        norm = np.sum(shape**2)
-        likeness = (expected @ shape) ** 2 / (np.sum(expected**2, axis=-1) * norm)
-        variance = _SHAPE_TOLERANCE**2 + sd**2 / norm
-        misfit[mode] = min((1 - float(likeness.max())) / variance, _MOST_SHAPE_COST)
+    rows, orders = list(at), np.array(list(at.values()))
+    expected = described_shapes(modes.position * hanger.length_m, orders, hanger)
+    shapes, sd = modes.shapes[rows], np.nan_to_num(modes.shape_sd[rows])
+    norm = np.sum(shapes**2, axis=1)
+    likeness = np.sum(expected * shapes, axis=-1) ** 2 / (np.sum(expected**2, axis=-1) * norm)
+    variance = _SHAPE_TOLERANCE**2 + sd**2 / norm
+    misfit[rows] = np.minimum((1 - likeness.max(axis=0)) / variance, _MOST_SHAPE_COST)
     return misfit
-
-
-def _log_ratio(one: FoundMode, other: FoundMode) -> float:
-    """Return that of the strengths; 0 where they are not known, as in wind."""
-    ratio = one.acceleration_m_s2 / other.acceleration_m_s2
-    return float(np.log(ratio)) if np.isfinite(ratio) and ratio > 0 else 0.0

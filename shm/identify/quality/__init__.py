@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from shm.errors import NotIdentifiable
 from shm.identify.quality import of_ambient, of_hits, of_modes, of_signals
 from shm.identify.quality import tones as of_tones
-from shm.identify.quality.inspection import Inspection
-from shm.identify.quality.table import Row
+from shm.identify.quality.table import Inspection, Row
 from shm.identify.quality.tones import tones
 from shm.values import QualityCheck
 

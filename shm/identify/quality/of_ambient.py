@@ -9,8 +9,7 @@ import scipy
 
 from shm.identify.contract import Measurement
 from shm.identify.measuring.ambient import LOUD, loudness
-from shm.identify.quality.inspection import Inspection
-from shm.identify.quality.table import Reading, Row
+from shm.identify.quality.table import Inspection, Reading, Row
 from shm.values import NAN, FloatArray, Recording
 from shm.values.rounding import listed
 

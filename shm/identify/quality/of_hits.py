@@ -7,13 +7,25 @@ from collections import Counter
 
 import numpy as np
 
-from shm.identify.contract import Hit
-from shm.identify.estimation.repeats import LEAST_HITS
+from shm.identify.contract import LEAST_HITS, Hit
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES
-from shm.identify.measuring.screening import FEWEST_TO_COMPARE, LIMIT
-from shm.identify.measuring.signal_faults import CUT_OFF, DOUBLE_HIT, KNOCK, OUTLIER
-from shm.identify.quality.inspection import Inspection, hits_for, hits_of, places
-from shm.identify.quality.table import Reading, Row, fault_reading
+from shm.identify.measuring.signal_faults import (
+    CUT_OFF,
+    DOUBLE_HIT,
+    FEWEST_TO_COMPARE,
+    KNOCK,
+    MOST_UNLIKE,
+    OUTLIER,
+)
+from shm.identify.quality.table import (
+    Inspection,
+    Reading,
+    Row,
+    fault_reading,
+    hits_for,
+    hits_of,
+    places,
+)
 from shm.values import NAN, FloatArray
 
 _RUNG_DOWN_DB = -3.0
@@ -166,11 +178,11 @@ _USED = "{used} of {all} hits are used{more}"
 _ENDS = "{cut}it ends {below:.0f} dB below its beginning"
 HITS = Row("hits", _hits_used, LEAST_HITS, "", _USED, _USED, _HIT_MORE, is_least=True)
 DOUBLE_HITS = Row(
-    "double hits", _double_hits, 0.0, "", "each hit is a single blow", "{faults}",
+    "double hits", _double_hits, 0.0, "", "no hit is double", "{faults}",
     "Hit from the wrist and let the hammer spring back at once; repeat these hits.",
 )  # fmt: skip
 PRE_TRIGGER = Row(
-    "pre-trigger", _pre_trigger, NAN, "ms", "every pulse is recorded whole",
+    "pre-trigger", _pre_trigger, NAN, "ms", "every pulse is recorded completely",
     "too little before {short}: frequency responses may lack a part of the pulse, frequencies and "
     "damping do not",
     "Set a pre-trigger of half a second, or start the logger before hitting.",
@@ -181,7 +193,7 @@ RING_DOWN = Row(
     "Wait longer before the next hit and before stopping the logger: until nothing moves.",
 )  # fmt: skip
 REPEATABILITY = Row(
-    "repeatability", _repeatability, LIMIT, "", "the hits are alike",
+    "repeatability", _repeatability, MOST_UNLIKE, "", "the hits agree",
     "the hits differ, and not one against the rest",
     "Hit the same point in the same direction, and let nobody touch the hanger.",
 )  # fmt: skip

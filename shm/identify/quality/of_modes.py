@@ -9,12 +9,11 @@ from itertools import compress
 import numpy as np
 
 from shm.identify.contract import Measurement
-from shm.identify.estimation.amplitude_dependence import are_sure
+from shm.identify.estimation.spread import are_sure
 from shm.identify.measuring.frf import response_of
 from shm.identify.measuring.hits import hits_by_plane
 from shm.identify.mode_ordering.bars import Description, log_factor
-from shm.identify.quality.inspection import Inspection
-from shm.identify.quality.table import Reading, Row
+from shm.identify.quality.table import Inspection, Reading, Row
 from shm.values import (
     NAN,
     PLANES,

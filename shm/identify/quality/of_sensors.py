@@ -1,4 +1,4 @@
-"""Check unit, gain and position of the sensors against the described hanger.
+"""Check unit, gain, position and direction of the sensors.
 
 A hit's residue is the shape at the sensor times that at the hammer, each for unit modal mass. Away
 from its ends a hanger of mass M has the shape sqrt(2/M) sin(beta s + theta), whatever tension and
@@ -8,15 +8,28 @@ whether one reads too much or too little, or is elsewhere: that one change corre
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from shm.identify.contract import FoundMode, Measurement
 from shm.identify.mode_ordering.bars import HIGHEST_ORDER, described_shapes
 from shm.identify.setup_merging.modal_participation import ringing
-from shm.values import NAN, PLANES, FloatArray, Hanger, IntArray, Mode, Plane, QualityCheck, Verdict
+from shm.values import (
+    NAN,
+    PLANES,
+    FloatArray,
+    Hanger,
+    IntArray,
+    Mode,
+    Plane,
+    QualityCheck,
+    ResponsePoint,
+    Verdict,
+)
 
 LARGEST_FACTOR = 2.0
 """Of motion over force."""
@@ -80,11 +93,10 @@ def sensor_gain(
         return None
     value = float(np.median(factors))
     times, side = max(value, 1 / value), "more" if value > 1 else "less"
-    text = (
-        f"the hanger moves {times:.2g} times {side} for the force than its described mass lets it"
-    )
     if times < LARGEST_FACTOR:
+        text = f"the response agrees with the described mass (ratio {value:.2f})"
         return QualityCheck("gain", "good", value, LARGEST_FACTOR, "", text)
+    text = f"the hanger moves {times:.2g} times {side} than its described mass allows"
     cause = ", as accelerations in g do under the name m/s2" if 7 < 1 / value < 14 else ""
     return QualityCheck(
         "gain", "warning", value, LARGEST_FACTOR, "", text + cause,
@@ -237,3 +249,51 @@ def _misfits(values: FloatArray, shapes: FloatArray) -> FloatArray:
     product = np.sum(values * shapes, axis=-1) ** 2
     norms = np.sum(values**2, axis=-1) * np.sum(shapes**2, axis=-1)
     return np.asarray(1 - product / np.maximum(norms, 1e-300))
+
+
+LARGEST_DEGREES = 15.0
+"""Judgement: three times what a sensor clamped on by eye is off; it then sees 7 % of the other
+plane's energy."""
+_EXCHANGED_DEGREES = 45.0  # beyond it the other plane's name fits better
+_SHARE_SEEN = 0.25  # judgement, of the largest motion: nearer to a node the direction is noise
+_MODES_SEEN = 3  # a median that one mode cannot make
+
+
+def directions(modes: Sequence[FoundMode], points: Sequence[ResponsePoint]) -> QualityCheck | None:
+    """Compare places pair by pair; None where fewer than two have axes in both planes."""
+    rows = [
+        {p.x_m: row for row, p in enumerate(points) if p.plane == plane and not math.isnan(p.x_m)}
+        for plane in PLANES
+    ]
+    biaxial = {x_m: (rows[0][x_m], rows[1][x_m]) for x_m in rows[0].keys() & rows[1].keys()}
+    apart = [
+        (degrees, one, other)
+        for one, other in combinations(sorted(biaxial), 2)
+        if not math.isnan(degrees := _apart(modes, biaxial[one], biaxial[other]))
+    ]
+    if not apart:
+        return None
+    worst, one, other = max(apart)
+    about = f"the sensors at {one:g} m and {other:g} m see the modes move {worst:.0f} degrees apart"
+    verdict: Verdict = "good"
+    remedy = ""
+    if worst > LARGEST_DEGREES:
+        verdict, remedy = "warning", "Align both sensors with the planes of the bridge."
+    if worst > _EXCHANGED_DEGREES:
+        verdict = "refused"
+        remedy = "The planes of one of them are exchanged: correct its axes or its description."
+    return QualityCheck("directions", verdict, worst, LARGEST_DEGREES, "degrees", about, remedy)
+
+
+def _apart(modes: Sequence[FoundMode], one: tuple[int, int], other: tuple[int, int]) -> float:
+    """Return the degrees, 0 to 90, between directions at two positions; the median over modes."""
+    pairs = [(mode.shape[list(one)], mode.shape[list(other)]) for mode in modes]
+    sizes = [(np.hypot(*here), np.hypot(*there)) for here, there in pairs]
+    cosines = [
+        min(1.0, abs(float(here @ there)) / float(np.prod(size)))
+        for (here, there), size in zip(pairs, sizes, strict=True)
+        if min(size) >= _SHARE_SEEN
+    ]
+    if len(cosines) < _MODES_SEEN:
+        return math.nan
+    return math.degrees(math.acos(float(np.median(cosines))))

@@ -7,7 +7,6 @@ import numpy as np
 from shm.identify.contract import Hit, Measurement
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES
 from shm.identify.measuring.responses import recorded_window_rate
-from shm.identify.measuring.screening import LEAST_SAMPLES
 from shm.identify.measuring.signal_faults import (
     CABLE,
     CLIPPED,
@@ -22,14 +21,16 @@ from shm.identify.measuring.signal_faults import (
     clipped,
     same_peaks,
 )
-from shm.identify.quality.inspection import (
+from shm.identify.quality.table import (
     Inspection,
+    Reading,
+    Row,
     channels_for,
+    fault_reading,
     hits_for,
     hits_of,
     places,
 )
-from shm.identify.quality.table import Reading, Row, fault_reading
 from shm.values import NAN, Channel, FloatArray, Recording
 from shm.values.rounding import listed
 
@@ -44,7 +45,7 @@ _MOST_DB = 200.0
 """More than any converter resolves: what stands higher is computed, not measured."""
 # judgement: lines of 2 Hz, so that the lowest mode is seen; a fifth still tells loud from quiet
 _STRETCH_S = 0.5
-_LEAST_STRETCH_S = 0.1
+_LEAST_STRETCH_S, _LEAST_SAMPLES = 0.1, 32
 
 
 def _units(inspection: Inspection) -> Reading | None:
@@ -238,7 +239,7 @@ def _power(
     """Return the mean square in the band of the first or last 0.5 s of a stretch, (channels,)."""
     rate, options = record.sampling_rate_hz, inspection.options
     length = min(stop - first, int(_STRETCH_S * rate))
-    if length < max(_LEAST_STRETCH_S * rate, LEAST_SAMPLES):
+    if length < max(_LEAST_STRETCH_S * rate, _LEAST_SAMPLES):
         return None
     begin = stop - length if last else first
     cut = np.array([c.values[begin : begin + length] for c in record.accelerations])

@@ -16,12 +16,10 @@ import scipy
 from numpy.typing import NDArray
 
 from shm.identify.contract import Hit, Measurement, Tone
-from shm.identify.measuring.frf import LEAST_SAMPLES, RATE_OVER_BAND
+from shm.identify.measuring.band import LEAST_SAMPLES, RATE_OVER_BAND, thinned
 from shm.identify.measuring.hits import RINGING_SAMPLES
-from shm.identify.measuring.prediction import thinned
 from shm.identify.options import IdentifyOptions
-from shm.identify.quality.inspection import Inspection
-from shm.identify.quality.table import Reading, Row
+from shm.identify.quality.table import Inspection, Reading, Row
 from shm.values import BoolArray, Channel, ComplexArray, FloatArray, Recording
 
 _PROMINENCE = 30.0

@@ -16,9 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.identify.contract import Measurement
-from shm.identify.estimation.repeats import LEAST_HITS
-from shm.identify.setup_merging.hit_directions import have_same_sensors, pool_hits
+from shm.identify.contract import LEAST_HITS, Measurement, place_of, poles_of_modes
 from shm.values import ComplexArray, FloatArray, Mode
 
 LEFT_OUT = (1 / 4, 1 / 2, 3 / 4)
@@ -39,10 +37,14 @@ _UNSURE = 0.3  # judgement: of a damping without standard deviation
 def late_parts(measurements: Sequence[Measurement], left_out: float) -> tuple[Measurement, ...]:
     """Return the measurements without the beginnings of their ring-downs.
 
-    Hits in several directions count together, since what the force says of them went with the
+    Those of the same sensors count together, since what the force says of them went with the
     beginning.
     """
-    whole = (pool_hits(measurements),) if have_same_sensors(measurements) else tuple(measurements)
+    whole = list(measurements)
+    if len({tuple(place_of(point) for point in each.points) for each in measurements}) == 1:
+        decays = tuple(decay for each in measurements for decay in each.decays)
+        hits = tuple(hit for each in measurements for hit in each.hits)
+        whole = [replace(measurements[0], decays=decays, hits=hits)]
     return tuple(
         replace(each, decays=tuple(_later(decay, left_out) for decay in each.decays), driven=())
         for each in whole
@@ -98,8 +100,7 @@ def _unpredicted(
     rate = measurement.sampling_rate_hz
     omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])
     damping = np.array([mode.damping_ratio for mode in modes])
-    poles = omega * (-damping + 1j * np.sqrt(1 - damping**2))
-    poles = poles - 1 / measurement.decay_time_constant_s
+    poles = poles_of_modes(modes) - 1 / measurement.decay_time_constant_s
     if refine:
         real = np.array([(mode.damping_sd, mode.frequency_sd_hz) for mode in modes])
         decay_sd = omega * np.where(real[:, 0] > 0, real[:, 0], _UNSURE * damping)

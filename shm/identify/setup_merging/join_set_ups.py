@@ -14,15 +14,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from shm.identify.contract import Dropped, Finding, FoundMode, Measurement, Poles
-from shm.identify.estimation.poles import FAR, modal_assurance
-from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS, widening
-from shm.identify.measuring.responses import Place, place_of
+from shm.identify.contract import (
+    FREQUENCY_FLOOR,
+    LEAST_HITS,
+    Dropped,
+    Finding,
+    FoundMode,
+    Measurement,
+    Place,
+    Poles,
+    place_of,
+)
+from shm.identify.estimation.poles import FAR
+from shm.identify.estimation.shapes import modal_assurance
+from shm.identify.estimation.spread import widening
 from shm.identify.mode_ordering.planes import transverse_share
 from shm.identify.options import IdentifyOptions
 from shm.identify.setup_merging.modal_participation import levels, ringing, with_levels
 from shm.identify.setup_merging.products import (
-    Shapes,
     hammer_roves,
     joined_shapes,
     of_hits,
@@ -57,31 +66,39 @@ def join_set_ups(
     or more validate it there. Without a force, modes that not all set-ups see are dropped:
     their shape is not known at all points. Raises BadInput where set-ups cannot be joined.
     """
+    first = measurements[0]
     if len(measurements) == 1:
-        return _single(measurements[0], findings[0])
-    groups = matched(measurements, [finding.modes for finding in findings])
-    accepted, lost = _sorted_out(groups, len(measurements), bool(measurements[0].driven))
-    dropped = _summed([d for finding in findings for d in finding.dropped]) + lost
-    poles = _all_poles([finding.poles for finding in findings])
+        modes = findings[0].modes
+        if first.driven and modes:
+            modes = with_levels(modes, [ringing(first, modes)])
+        return JoinedFinding(first.points, replace(findings[0], modes=modes), (modes,))
+    counts: Counter[tuple[str, str]] = Counter()
+    for entry in (entry for finding in findings for entry in finding.dropped):
+        counts[entry.what, entry.reason] += entry.count
+    dropped = [Dropped(what, count, reason) for (what, reason), count in counts.items()]
+    accepted: list[list[ModeInSetUp]] = []
+    for group in matched(measurements, [finding.modes for finding in findings]):
+        if reason := _doubt(group, len(measurements), bool(first.driven)):
+            dropped.append(Dropped(f"mode at {group[0].mode.frequency_hz:.4g} Hz", 1, reason))
+        else:
+            accepted.append(group)
+    parts = [finding.poles for finding in findings]
+    poles = Poles(
+        np.concatenate([each.order for each in parts]),
+        np.concatenate([each.frequency_hz for each in parts]),
+        np.concatenate([each.damping_ratio for each in parts]),
+        np.concatenate([each.stable for each in parts]),
+    )
     if not accepted:
-        return JoinedFinding(
-            measurements[0].points, Finding((), dropped, poles), ((),) * len(findings)
-        )
+        nothing = Finding((), tuple(dropped), poles)
+        return JoinedFinding(first.points, nothing, ((),) * len(findings))
     pools = [_pool(group, options.frequency_allowance) for group in accepted]
     apart = tuple(_as_seen(accepted, pools, number) for number in range(len(measurements)))
     points, modes = _over_all_points(measurements, pools, apart, accepted)
     drifts = [finding.drift for finding in findings if finding.drift is not None]
     drift = max(drifts, key=lambda each: (each.sure, abs(each.change)), default=None)
-    return JoinedFinding(
-        points, Finding(modes, dropped, poles, drift=drift), apart, (_note(measurements),)
-    )
-
-
-def _single(measurement: Measurement, found: Finding) -> JoinedFinding:
-    modes = found.modes
-    if measurement.driven and modes:
-        modes = with_levels(modes, [ringing(measurement, modes)])
-    return JoinedFinding(measurement.points, replace(found, modes=modes), (modes,))
+    found = Finding(modes, tuple(dropped), poles, drift=drift)
+    return JoinedFinding(points, found, apart, (_note(measurements),))
 
 
 def _over_all_points(
@@ -107,7 +124,11 @@ def _over_all_points(
         products = [of_shapes(modes) for modes in apart]
         level_m_s2 = np.full(len(pools), NAN)
     shapes = joined_shapes(measurements, products)
-    return shapes.points, _modes(pools, shapes, level_m_s2)
+    modes = tuple(
+        replace(pool, shape=value, shape_sd=sd, acceleration_m_s2=float(level))
+        for pool, value, sd, level in zip(pools, shapes.values, shapes.sds, level_m_s2, strict=True)
+    )
+    return shapes.points, modes
 
 
 def _see_the_same(measurements: Sequence[Measurement]) -> bool:
@@ -123,19 +144,6 @@ def _note(measurements: Sequence[Measurement]) -> str:
     if hammer_roves(measurements):
         return f"{count} set-ups are joined; by reciprocity, shapes stand at the hammer's places"
     return f"{count} set-ups are joined by the force of their hits"
-
-
-def _sorted_out(
-    groups: Sequence[list[ModeInSetUp]], set_ups: int, hammered: bool
-) -> tuple[list[list[ModeInSetUp]], tuple[Dropped, ...]]:
-    accepted, lost = [], []
-    for group in groups:
-        reason = _doubt(group, set_ups, hammered)
-        if reason:
-            lost.append(Dropped(f"mode at {group[0].mode.frequency_hz:.4g} Hz", 1, reason))
-        else:
-            accepted.append(group)
-    return accepted, tuple(lost)
 
 
 def _doubt(group: Sequence[ModeInSetUp], set_ups: int, hammered: bool) -> str:
@@ -173,31 +181,6 @@ def _as_seen(
     return tuple(
         next((seen.mode for seen in group if seen.set_up == number), pool)
         for group, pool in zip(groups, pools, strict=True)
-    )
-
-
-def _modes(
-    pools: Sequence[FoundMode], shapes: Shapes, level_m_s2: FloatArray
-) -> tuple[FoundMode, ...]:
-    return tuple(
-        replace(pool, shape=value, shape_sd=sd, acceleration_m_s2=float(level))
-        for pool, value, sd, level in zip(pools, shapes.values, shapes.sds, level_m_s2, strict=True)
-    )
-
-
-def _summed(dropped: Sequence[Dropped]) -> tuple[Dropped, ...]:
-    counts: Counter[tuple[str, str]] = Counter()
-    for entry in dropped:
-        counts[entry.what, entry.reason] += entry.count
-    return tuple(Dropped(what, count, reason) for (what, reason), count in counts.items())
-
-
-def _all_poles(parts: Sequence[Poles]) -> Poles:
-    return Poles(
-        np.concatenate([poles.order for poles in parts]),
-        np.concatenate([poles.frequency_hz for poles in parts]),
-        np.concatenate([poles.damping_ratio for poles in parts]),
-        np.concatenate([poles.stable for poles in parts]),
     )
 
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.identify.contract import FoundMode, Hit, Measurement
+from shm.identify.contract import FoundMode, Hit, Measurement, poles_of_modes
 from shm.identify.options import IdentifyOptions
 from shm.values import BoolArray, ComplexArray, FloatArray, FrequencyResponse
 
@@ -52,8 +52,29 @@ def ringing(
     none: the ring-down would be divided between the two by chance.
     """
     rings = np.ones(len(modes), bool) if all(seen) else ~_hidden(measurement, modes, seen)
-    found = _ringing(measurement, [mode for mode, each in zip(modes, rings, strict=True) if each])
-    return Ringing(_spread(found.amplitude_m_s2, rings), _spread(found.residue, rings))
+    poles = poles_of_modes(modes)[rings]
+    longest = max(signals.shape[1] for signals in measurement.driven)
+    waves = np.exp(np.outer(poles, np.arange(longest) / measurement.sampling_rate_hz))
+    free = [
+        driven.shape[1] - decay.shape[1]
+        for driven, decay in zip(measurement.driven, measurement.decays, strict=True)
+    ]
+    # Complex amplitudes (points, modes) of each ring-down at the first sample of its cut.
+    starts = [
+        _amplitudes(decay, waves) / waves[:, first]
+        for decay, first in zip(measurement.decays, free, strict=True)
+    ]
+    shape = (len(starts), len(measurement.points), len(modes))
+    amplitude, residue = np.zeros(shape), np.zeros(shape)
+    for hit, (before, seconds) in enumerate(_before(measurement.hits)):
+        old = starts[before] * np.exp(poles * seconds) if before >= 0 else 0.0
+        force = measurement.driven[hit][0, : free[hit]]
+        peak = int(np.argmax(np.abs(force)))
+        transform = (force / measurement.sampling_rate_hz) @ (1 / waves[:, : len(force)]).T
+        made = (starts[hit] - old) / transform
+        amplitude[hit][:, rings] = np.abs(starts[hit] * waves[:, peak])
+        residue[hit][:, rings] = (made * 1j * poles.imag / poles**2).real
+    return Ringing(amplitude, residue)
 
 
 def _hidden(
@@ -65,34 +86,6 @@ def _hidden(
     away = np.abs(np.subtract.outer(frequency_hz, frequency_hz[known]))
     near = away < measurement.sampling_rate_hz / samples
     return np.asarray(~known & near.any(axis=1))
-
-
-def _spread(values: FloatArray, chosen: BoolArray) -> FloatArray:
-    """Return values (hits, points, chosen) among zeros, (hits, points, modes)."""
-    spread = np.zeros((*values.shape[:2], len(chosen)))
-    spread[:, :, chosen] = values
-    return spread
-
-
-def _ringing(measurement: Measurement, modes: Sequence[FoundMode]) -> Ringing:
-    poles = poles_of_modes(modes)
-    longest = max(signals.shape[1] for signals in measurement.driven)
-    waves = np.exp(np.outer(poles, np.arange(longest) / measurement.sampling_rate_hz))
-    starts = [
-        _at_start(driven, decay, waves)
-        for driven, decay in zip(measurement.driven, measurement.decays, strict=True)
-    ]
-    amplitude, residue = [], []
-    for index, (before, seconds) in enumerate(_before(measurement.hits)):
-        old = starts[before] * np.exp(poles * seconds) if before >= 0 else 0.0
-        driven, decay = measurement.driven[index], measurement.decays[index]
-        force = driven[0, : driven.shape[1] - decay.shape[1]]
-        peak = int(np.argmax(np.abs(force)))
-        transform = (force / measurement.sampling_rate_hz) @ (1 / waves[:, : len(force)]).T
-        made = (starts[index] - old) / transform
-        amplitude.append(np.abs(starts[index] * waves[:, peak]))
-        residue.append((made * 1j * poles.imag / poles**2).real)
-    return Ringing(np.array(amplitude), np.array(residue))
 
 
 def levels(rings: Sequence[Ringing]) -> FloatArray:
@@ -109,42 +102,15 @@ def with_levels(modes: Sequence[FoundMode], rings: Sequence[Ringing]) -> tuple[F
     )
 
 
-def poles_of_modes(modes: Sequence[FoundMode]) -> ComplexArray:
-    """Return the poles in rad/s above the real axis, (modes,)."""
-    omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])
-    damping = np.array([mode.damping_ratio for mode in modes])
-    return np.asarray(omega * (-damping + 1j * np.sqrt(1 - damping**2)))
-
-
-def _at_start(driven: FloatArray, decay: FloatArray, waves: ComplexArray) -> ComplexArray:
-    """Return complex amplitudes (points, modes) of a ring-down at the first sample of its cut."""
-    free = driven.shape[1] - decay.shape[1]
-    return _amplitudes(decay, waves) / waves[:, free]
-
-
 def _amplitudes(decay: FloatArray, waves: ComplexArray) -> ComplexArray:
     """Return least-squares c (points, modes) of decay = Re(c waves), `waves` (modes, samples)."""
-    samples = decay.shape[1]
-    used = waves[:, :samples]
-    right = np.hstack([decay @ used.real.T, -decay @ used.imag.T])
-    gram = _gram(waves[:, 1], samples)
-    scale = np.sqrt(np.diag(gram))
-    scaled = gram / np.outer(scale, scale) + _RIDGE * np.eye(len(gram))
-    solved = np.linalg.solve(scaled, (right / scale).T).T / scale
-    modes = len(waves)
-    return np.asarray(solved[:, :modes] + 1j * solved[:, modes:])
-
-
-def _gram(step: ComplexArray, samples: int) -> FloatArray:
-    """Return inner products of the rows [Re waves; -Im waves], sampled powers of `step`."""
-    crossed = _geometric(np.outer(step, step.conj()), samples)
-    straight = _geometric(np.outer(step, step), samples)
-    same, other = (crossed + straight) / 2, (crossed - straight) / 2
-    return np.block([[same.real, other.imag], [-same.imag, other.real]])
-
-
-def _geometric(ratio: ComplexArray, terms: int) -> ComplexArray:
-    return np.asarray((1 - ratio**terms) / (1 - ratio))
+    used = waves[:, : decay.shape[1]]
+    rows = np.vstack([used.real, -used.imag])
+    scale = np.linalg.norm(rows, axis=1, keepdims=True)
+    rows = rows / scale
+    square = rows @ rows.T + _RIDGE * np.eye(len(rows))
+    solved = np.linalg.solve(square, rows @ decay.T) / scale
+    return np.asarray(solved[: len(waves)] + 1j * solved[len(waves) :]).T
 
 
 def _before(hits: Sequence[Hit]) -> list[tuple[int, float]]:

@@ -16,9 +16,8 @@ import numpy as np
 import scipy
 
 from shm.errors import BadInput
-from shm.identify.contract import FoundMode, Measurement
-from shm.identify.estimation.repeats import jackknife_sd
-from shm.identify.measuring.responses import Place, place_of
+from shm.identify.contract import FoundMode, Measurement, Place, place_of
+from shm.identify.estimation.spread import jackknife_sd
 from shm.identify.setup_merging.modal_participation import Ringing
 from shm.values import BoolArray, FloatArray, FrequencyResponse, Plane, ResponsePoint
 

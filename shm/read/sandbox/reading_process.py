@@ -1,68 +1,121 @@
 """The side that asks: one reading process for each of ours, which forks a child for every file.
 
 The reading process has read nothing itself, so that no file can touch the reading of the next; it
-begins with an empty environment, in a session of its own, and ends when we do.
+begins with an empty environment, in a session of its own, and ends when we do. Values come back as
+an .npz of arrays with a header in JSON, never a pickle, and become values by the types that their
+classes declare.
 """
 
 from __future__ import annotations
 
 import atexit
+import io
 import json
 import os
-import select
 import signal
 import socket
 import struct
 import subprocess
 import sys
+import tempfile
 import threading
-import time
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 
+import numpy as np
+from numpy.typing import NDArray
+
+from shm.documents import finite, reader, value_of
 from shm.errors import BadInput, ShmError, WorkerDied
+from shm.read.base import Layout, Peek, Survey
+from shm.read.bundles import holds_test
+from shm.read.content import is_gzipped
 from shm.read.limits import Limits
-from shm.read.sandbox.protocol import Answer, decoded
+from shm.read.modal_sets import ForeignModes
 from shm.resources import KILLING
+from shm.values import FrequencyResponse, ModalTest, Recording
+
+_KINDS: dict[str, type] = {
+    kind.__name__: kind
+    for kind in (ForeignModes, FrequencyResponse, Layout, ModalTest, Peek, Recording, Survey)
+}
 
 BEGUN = b"+"
 """A child writes it once its limits are in force."""
+HEADER = "header"
+"""The JSON among the arrays of an answer: the name of its class and a node for each value."""
 LARGEST_ANSWER = 2
 """An answer may be so many times what is read at once."""
-WALL_SECONDS = 3.0
-"""A child may take so many times its processor time: beyond, it waits for something."""
+_DAMAGED = "The file is damaged or made to harm: export it anew from its source."
 # judgement: ending a child takes milliseconds, starting the reader seconds, far longer on a full
-# machine; what a kernel refuses is not mended within the minute
-_GRACE_S, _START_S, _UNCONFINED_S = 5.0, 120.0, 60.0
+# machine; what fails at the start is not mended within the minute
+_GRACE_S, _START_S, _RETRY_S = 5.0, 120.0, 60.0
 _CODE = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
     "from shm.read.sandbox.serving import serve; serve()"
 )
-_TIME_IS_UP = b"late"
-_PASSED_ON = ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")
-_OURS = {
-    "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
-    "HDF5_USE_FILE_LOCKING": "FALSE",  # nobody writes what is archived
-}  # fmt: skip
-_DAMAGED = "The file is damaged or made to harm: export it anew from its source."
+_OURS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "HDF5_USE_FILE_LOCKING": "FALSE"}
+_PASSED_ON = {"LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH"}
 
 
-def ask(verb: str, path: Path, folder: str, limits: Limits) -> Answer:
-    """Return the answer of a child that has read a file, and may unpack it in a folder if any.
+def ask(verb: str, path: Path, limits: Limits | None = None) -> list[Any]:
+    """Return the values that a child found in a file; raises BadInput, and where it died of it."""
+    limits = limits or Limits()
+    if not holds_test(path) and not is_gzipped(path):
+        return _answer(verb, path, "", limits)
+    # It is unpacked in a folder of ours, which also goes where the child is killed.
+    with tempfile.TemporaryDirectory(prefix="shm-read-") as folder:
+        return _answer(verb, path, folder, limits)
 
-    Raises BadInput where the child died of the file.
-    """
+
+def _answer(verb: str, path: Path, folder: str, limits: Limits) -> list[Any]:
     request = {
         "verb": verb, "path": str(path), "working_folder": str(Path.cwd()), "folder": folder,
         "limits": asdict(limits),
     }  # fmt: skip
     with _one_at_a_time:
         try:
-            return _reader().ask(request, limits)
+            raw, status = _reader().ask(request, limits)
         except ConnectionError:  # the reading process died before: not the file's doing
             _forget()
-            return _reader().ask(request, limits)
+            raw, status = _reader().ask(request, limits)
+    try:
+        with np.load(io.BytesIO(raw[len(BEGUN) :]), allow_pickle=False) as packed:
+            arrays = {name: packed[name] for name in packed.files}
+        found = [(str(kind), node) for kind, node in json.loads(arrays.pop(HEADER).tobytes())]
+    except Exception:  # noqa: BLE001 - whatever a child has left
+        raise _death(status, path, limits, begun=raw.startswith(BEGUN)) from None
+    if found and found[0][0] == "refusal":
+        raise BadInput(**found[0][1])
+    return _values(found, arrays, path)
+
+
+def _values(
+    found: Sequence[tuple[str, Any]], arrays: Mapping[str, NDArray[Any]], path: Path
+) -> list[Any]:
+    """Return values of the classes named, each part of the type that it must be."""
+
+    def is_array(kind: Any) -> bool:
+        return get_origin(kind) is np.ndarray
+
+    def array(node: Any, kind: Any) -> NDArray[Any]:
+        found = arrays.get(str(node.get("array"))) if isinstance(node, dict) else None
+        if found is None or found.dtype != np.dtype(get_args(get_args(kind)[1])[0]):
+            raise ValueError("an array is not there, or of another type")
+        return found
+
+    by = reader(finite)
+    by.register_structure_hook_func(is_array, array)
+    try:
+        return [value_of(_KINDS[kind], node, by=by) for kind, node in found]
+    except (ValueError, TypeError) as error:
+        raise BadInput(
+            f"the file made the reader give an answer that cannot be: {error}.",
+            file=path,
+            remedy=_DAMAGED,
+        ) from error
 
 
 class _Reader:
@@ -76,16 +129,16 @@ class _Reader:
                 [sys.executable, "-I", "-X", "utf8", "-c", _CODE, paths],
                 stdin=theirs.fileno(),
                 stdout=subprocess.DEVNULL,
-                env={name: os.environ[name] for name in _PASSED_ON if name in os.environ} | _OURS,
+                env={key: os.environ[key] for key in _PASSED_ON & set(os.environ)} | _OURS,
                 start_new_session=True,
             )
-        self.owner, self.requests = os.getpid(), ours
+        self.requests = ours
         if not self._heard(1, _START_S):  # its start does not count as reading
             self.end()
             raise ShmError(
                 "the process that reads files does not start.",
                 remedy="See its message above; try `python -c 'import shm.read'`.",
-                retry_after_s=60.0,
+                retry_after_s=_RETRY_S,
             )
 
     def _heard(self, count: int, seconds: float) -> bytes:
@@ -95,57 +148,30 @@ class _Reader:
         except (TimeoutError, ConnectionError):
             return b""
 
-    def ask(self, request: dict[str, Any], limits: Limits) -> Answer:
-        """Return an answer; where none comes this reader is ended, as it may still wait."""
+    def ask(self, request: dict[str, Any], limits: Limits) -> tuple[bytes, int]:
+        """Return an answer and how the child ended; a reader that does not say it is ended."""
         out, into = os.pipe()
-        status = None
-        try:
+        with os.fdopen(out, "rb") as stream:
             try:
                 socket.send_fds(self.requests, [json.dumps(request).encode()], [into])
             finally:
                 os.close(into)
-            raw = _received(out, limits)
-            received = self._heard(4, _GRACE_S)
-            status = int(struct.unpack("i", received)[0]) if len(received) == 4 else None
-        finally:
-            os.close(out)
-            if status is None:
-                _forget()
-        try:
-            return decoded(raw)
-        except ValueError:
-            timed_out = -signal.SIGALRM if raw.startswith(_TIME_IS_UP) else -signal.SIGKILL
-            status = timed_out if status is None else status
-            raise _death(status, request["path"], limits, begun=raw[:1] == BEGUN) from None
+            raw = stream.read(LARGEST_ANSWER * limits.bytes_at_once + (1 << 21))
+        received = self._heard(4, _GRACE_S)
+        if len(received) == 4:
+            return raw, int(struct.unpack("i", received)[0])
+        _forget()
+        return raw, -signal.SIGKILL
 
     def end(self) -> None:
-        """End it and whatever it has begun; a copy in a forked process is only forgotten."""
+        """End it and whatever it has begun."""
         self.requests.close()
-        if self.owner != os.getpid():
-            self.process.returncode = 0  # ours to forget, not to wait for
-        elif self.process.poll() is None:
+        if self.process.poll() is None:
             os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait()
 
 
-def _received(pipe: int, limits: Limits) -> bytes:
-    """Return all that a child writes, `_TIME_IS_UP` where that takes too long."""
-    deadline = time.monotonic() + WALL_SECONDS * limits.parse_seconds + _GRACE_S
-    most = LARGEST_ANSWER * limits.bytes_at_once + (1 << 21)
-    parts, poll = [b""], select.poll()
-    poll.register(pipe, select.POLLIN | select.POLLHUP)
-    while most > 0:
-        left = deadline - time.monotonic()
-        if left <= 0 or not poll.poll(1000 * left):
-            return _TIME_IS_UP
-        parts.append(os.read(pipe, 1 << 20))
-        most -= len(parts[-1])
-        if not parts[-1]:
-            break
-    return b"".join(parts)
-
-
-def _death(status: int, path: str, limits: Limits, *, begun: bool) -> ShmError:
+def _death(status: int, path: Path, limits: Limits, *, begun: bool) -> ShmError:
     """Return why a child gave no answer: a file is not to blame before it was opened."""
     if status in (-signal.SIGXCPU, -signal.SIGALRM):
         remedy = f"{_DAMAGED} Split a long record, or raise the setting parse_seconds."
@@ -153,13 +179,13 @@ def _death(status: int, path: str, limits: Limits, *, begun: bool) -> ShmError:
         return BadInput(what, file=path, remedy=remedy)
     if -status in KILLING:
         how = signal.Signals(-status).name
-        what = f"the process that read {Path(path).name} was killed ({how})."
+        what = f"the process that read {path.name} was killed ({how})."
         return WorkerDied(what, how=how)
     if not begun:
         return ShmError(
             "the process that reads files cannot be confined, so that nothing is read.",
             remedy="See `shm doctor`; it is tried again.",
-            retry_after_s=_UNCONFINED_S,
+            retry_after_s=_RETRY_S,
         )
     how = signal.Signals(-status).name if status < 0 else f"exit code {status}"
     return BadInput(f"the file made the reader crash ({how}).", file=path, remedy=_DAMAGED)
@@ -171,7 +197,7 @@ _known: list[_Reader] = []
 
 def _reader() -> _Reader:
     """Return the reading process of this process, begun at the first file."""
-    if _known and (_known[0].owner != os.getpid() or _known[0].process.poll() is not None):
+    if _known and _known[0].process.poll() is not None:
         _forget()
     if not _known:
         _known.append(_Reader())
@@ -187,7 +213,10 @@ def _after_fork() -> None:
     """Let a forked process neither talk to its parent's reader nor inherit a held lock."""
     global _one_at_a_time
     _one_at_a_time = threading.Lock()
-    _forget()
+    while _known:
+        reader = _known.pop()
+        reader.requests.close()
+        reader.process.returncode = 0  # ours to forget, not to wait for
 
 
 atexit.register(_forget)

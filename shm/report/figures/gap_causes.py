@@ -6,7 +6,6 @@ Which hangers have a shared cause, and how large it is in each.
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shm.report import formatting
@@ -15,69 +14,35 @@ from shm.report.diagnosis_summary import write_lead
 from shm.report.diagnosis_wording import label
 from shm.report.figures import specification as spec
 from shm.report.sizes import quantity, size
-from shm.values import BridgeDiagnosis, Cause, Claim, Diagnosis, effect_label, group_causes
+from shm.values import BridgeDiagnosis, Cause, Diagnosis, effect_label, group_causes
 from shm.values.parameter_names import is_logarithm
 
-_MOST, _MOST_ON_SCREEN = 10, 8
-_ROW_INCHES, _TALL_ROW_INCHES = 0.3, 0.4
+_MOST = 8
+"""Causes that are drawn, at most."""
 _LEAST_SHOWN = 0.0005
-_LABEL, _LABEL_ON_SCREEN = 40, 30
-"""Longest line of a label, in letters: a phone shows the bars too."""
-_BRACKET_TEXT = 0.42
-"""Room for the words beside a bracket and the column of Bayes factors."""
+_LEAST = 3
+"""Causes that are drawn at least, however improbable."""
+# Layout: inches of a row, and the longest line of a label in letters, which a phone shows, too.
+_ROW_INCHES, _TALL_ROW_INCHES = 0.3, 0.4
+_LABEL = 30
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
 @dataclass(frozen=True)
 class Bar:
-    """One row of the figure; `claim` is the group that it belongs to, None for a lone one."""
+    """One row of the figure."""
 
     label: str
     probability: float
     colour: str
-    besides: str = ""
-    claim: Claim | None = None
 
 
 def specify(sheet: DiagnosisSheet) -> spec.Specification | None:
-    """Return bars with Bayes factors, and brackets around indistinguishable causes."""
+    """Return bars; causes that cannot be told apart have the same letter."""
     bars = _bars(sheet.diagnosis)
     if not any(bar.probability > 0 for bar in bars):
         return None
-    brackets, outermost = _brackets(bars)
-    right = max(1.3, outermost + _BRACKET_TEXT)
-    besides = [(-0.85, "log Bayes factor"), *enumerate(bar.besides for bar in bars)]
-    column = _notes(
-        [right] * len(besides), [row for row, _ in besides], [wording for _, wording in besides]
-    )
-    return probability_bars(bars, _LABEL, (-1.2, right), [*brackets, column])
-
-
-def specify_on_screen(sheet: DiagnosisSheet) -> spec.Specification:
-    """Return fewer bars, those that cannot be told apart with one letter."""
-    pairs = [
-        (claim, cause) for claim in group_causes(sheet.diagnosis.causes) for cause in claim.causes
-    ]
-    bars = [
-        Bar(label(cause) + _letter(cause.group), cause.probability, "blue")
-        for _, cause in pairs[:_MOST_ON_SCREEN]
-    ]
-    return probability_bars([*bars, *_others(sheet.diagnosis)], _LABEL_ON_SCREEN)
-
-
-def _letter(group: int | None) -> str:
-    return "" if group is None else f" [{_LETTERS[group % len(_LETTERS)]}]"
-
-
-def probability_bars(
-    bars: Sequence[Bar], longest: int = _LABEL_ON_SCREEN,
-    ends: tuple[float, float] = (-0.6, 1.15), marks: Sequence[spec.Mark] = (),
-) -> spec.Specification:  # fmt: skip
-    """Return bars one below the other, their labels broken at so many letters.
-
-    `ends` are the upper end of the one axis and the right one of the other.
-    """
-    labels = [textwrap.fill(bar.label, longest) for bar in bars]
+    labels = [textwrap.fill(bar.label, _LABEL) for bar in bars]
     is_tall = any(label.count("\n") > 1 for label in labels)
     drawn = [
         spec.Bars(
@@ -89,89 +54,47 @@ def probability_bars(
     ]  # fmt: skip
     panel = spec.Panel(
         y=spec.Axis(
-            range=(len(bars) - 0.45, ends[0]), ticks=range(len(bars)), tick_labels=labels,
-            grid=False,
+            range=(len(bars) - 0.45, -0.6), ticks=range(len(bars)), tick_labels=labels, grid=False
         ),
-        x=spec.Axis(label="probability", range=(0, ends[1]), ticks=(0, 0.2, 0.4, 0.6, 0.8, 1)),
-        marks=[*drawn, *marks],
-    )  # fmt: skip
+        x=spec.Axis(label="probability", range=(0, 1.15), ticks=(0, 0.2, 0.4, 0.6, 0.8, 1)),
+        marks=drawn,
+    )
     return spec.stacked([panel], (_TALL_ROW_INCHES if is_tall else _ROW_INCHES) * len(bars) + 1.0)
 
 
 def _bars(diagnosis: Diagnosis) -> list[Bar]:
     return [
         *(
-            Bar(
-                label(cause),
-                cause.probability,
-                "blue",
-                formatting.number(cause.log_bayes_factor, "+z.1f"),
-                claim if len(claim.causes) > 1 else None,
-            )
-            for claim, cause in _shown(diagnosis)
+            Bar(label(cause) + _letter(cause.group), cause.probability, "blue")
+            for cause in _shown(diagnosis)
         ),
-        *_others(diagnosis),
+        Bar("something not in the catalogue", diagnosis.unexplained_probability, "orange"),
+        Bar("no gap", diagnosis.no_gap_probability, "green"),
     ]
 
 
-def _others(diagnosis: Diagnosis) -> tuple[Bar, Bar]:
-    rest = Bar("something not in the catalogue", diagnosis.unexplained_probability, "orange")
-    return rest, Bar("no gap", diagnosis.no_gap_probability, "green")
+def _letter(group: int | None) -> str:
+    return "" if group is None else f" [{_LETTERS[group % len(_LETTERS)]}]"
 
 
-def _shown(diagnosis: Diagnosis) -> list[tuple[Claim, Cause]]:
+def _shown(diagnosis: Diagnosis) -> list[Cause]:
     """Return causes of relevant probability, at least three where there are so many."""
-    all_causes = [
-        (claim, cause) for claim in group_causes(diagnosis.causes) for cause in claim.causes
-    ]
-    probable = [pair for pair in all_causes if pair[1].probability >= _LEAST_SHOWN]
-    return probable[:_MOST] if len(probable) >= 3 else all_causes[:3]
+    causes = [cause for claim in group_causes(diagnosis.causes) for cause in claim.causes]
+    probable = [cause for cause in causes if cause.probability >= _LEAST_SHOWN]
+    return probable[:_MOST] if len(probable) >= _LEAST else causes[:_LEAST]
 
 
-def _brackets(bars: Sequence[Bar]) -> tuple[list[spec.Mark], float]:
-    """Return a bracket around causes that the data cannot tell apart, with what they have together.
-
-    And the place of the outermost bracket.
-    """
-    outermost = 0.0
-    marks: list[spec.Mark] = []
-    found: dict[int, tuple[Claim, list[int]]] = {}
-    for row, bar in enumerate(bars):
-        if bar.claim is not None:
-            found.setdefault(id(bar.claim), (bar.claim, []))[1].append(row)
-    for claim, rows in found.values():
-        x = max(bars[row].probability for row in rows) + 0.13
-        top, bottom = rows[0] - 0.3, rows[-1] + 0.3
-        sides, heights = [x - 0.012, x, x, x - 0.012], [top, top, bottom, bottom]
-        wording = f"not told apart:\n{formatting.probability(claim.probability)} together"
-        marks += [
-            spec.Line(x=sides, y=heights, colour="purple", width=1.4),
-            _notes([x + 0.01], [(top + bottom) / 2], [wording], "purple", "right"),
-        ]
-        outermost = max(outermost, x)
-    return marks, outermost
-
-
-def _notes(
-    x: Sequence[float], y: Sequence[float], wording: Sequence[str], colour: str = "quiet",
-    side: spec.Side = "left",
-) -> spec.Points:  # fmt: skip
-    """Return text without markers."""
-    return spec.Points(x=x, y=y, size=0, labels=wording, label_side=side, colour=colour)
-
-
-def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
+def _caption(sheet: DiagnosisSheet) -> str:
     diagnosis = sheet.diagnosis
-    shown = _MOST_ON_SCREEN if is_on_screen else len(_shown(diagnosis))
-    left = len(diagnosis.causes) - shown
+    left = len(diagnosis.causes) - len(_shown(diagnosis))
     verb = "is" if left == 1 else "are"
     more = f" {formatting.counted(left, 'less probable cause')} {verb} not drawn."
-    similar = (
-        "Causes with the same letter cannot be told apart with these data"
-        if is_on_screen
-        else "A bracket holds causes that these data cannot tell apart"
+    groups = (
+        " Causes with the same letter cannot be told apart with these data; what counts is their "
+        "sum."
+        if diagnosis.groups
+        else ""
     )
-    groups = f" {similar}; what counts is their sum." if diagnosis.groups else ""
     return (
         "Probability of each cause, of something that the catalogue does not hold, and of no gap; "
         f"all add to 1.{groups}{more if left > 0 else ''}"
@@ -185,7 +108,7 @@ def _alt(sheet: DiagnosisSheet) -> str:
     return f"{write_lead(sheet.diagnosis)} Probabilities: {'; '.join(bars)}."
 
 
-FIGURE = spec.FigureSpec("causes", "What causes the gap", specify, caption, _alt)
+FIGURE = spec.FigureSpec("causes", "What causes the gap", specify, _caption, _alt)
 
 
 _INCHES = 4.2  # technical: two panels of the height that others have

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
@@ -21,6 +21,7 @@ from shm.watch.state import Band as Bounds
 
 END_STIFFNESS_UNIT = "N m/rad"
 """The unit of what `shm.models.end_stiffness` returns."""
+_PANEL_INCHES = 1.5  # layout
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,22 +40,15 @@ class StiffnessHistory:
     unit: str = END_STIFFNESS_UNIT
 
 
-def specify(
-    courses: Sequence[StiffnessHistory], reach_decades: float, is_on_screen: bool = False
+def _specify(
+    courses: Sequence[StiffnessHistory], reach_decades: float
 ) -> spec.Specification | None:
-    """Return side by side on paper, one below the other on a screen, which may be narrow."""
+    """Return panels one below the other, over one axis of time."""
     if not courses:
         return None
-    panels = [_panel(course, reach_decades, is_on_screen) for course in courses]
-    if is_on_screen:
-        return spec.stacked([*(replace(each, x=None) for each in panels[:-1]), panels[-1]], 3.0)
-    units = " or ".join(sorted({course.unit for course in courses if course.unit}))
-    ends = [float(end) for panel in panels for end in panel.y.range or ()]  # type: ignore[arg-type]
-    axis = _axis("", min(ends), max(ends))
-    shared = [replace(each, y=axis, shares_y=place > 0) for place, each in enumerate(panels)]
-    label = f"stiffness (M{units})" if units else "stiffness (millions)"
-    shared[0] = replace(shared[0], y=replace(axis, label=label))
-    return spec.Specification(rows=[shared], height_inches=3.0)
+    panels = [_panel(course, reach_decades) for course in courses]
+    panels[:-1] = [replace(each, x=None) for each in panels[:-1]]
+    return spec.stacked(panels, _PANEL_INCHES * len(panels) + 0.8)
 
 
 def _axis(label: str, low: float, high: float) -> spec.Axis:
@@ -72,7 +66,7 @@ def _in_millions(decades: Bounds) -> Bounds:
     return Bounds(*(10.0 ** (each - 6) for each in (decades.low, decades.middle, decades.high)))
 
 
-def _panel(course: StiffnessHistory, reach: float, is_on_screen: bool) -> spec.Panel:
+def _panel(course: StiffnessHistory, reach: float) -> spec.Panel:
     alone = course.alone
     chosen = time_axes.places(alone.middle, alone.low, alone.high)
     when = [course.times[place] for place in chosen.tolist()]
@@ -109,7 +103,7 @@ def _panel(course: StiffnessHistory, reach: float, is_on_screen: bool) -> spec.P
     )  # fmt: skip
 
 
-def caption(courses: Sequence[StiffnessHistory], reach_decades: float, remark: str = "") -> str:
+def _caption(courses: Sequence[StiffnessHistory], reach_decades: float) -> str:
     what = (
         "Stiffness of the ends in MN m/rad (MN/m per node for a solid class), by each test "
         "and as a state from all tests up to each, with 90 % intervals; the ends stand apart where "
@@ -128,11 +122,11 @@ def caption(courses: Sequence[StiffnessHistory], reach_decades: float, remark: s
     fewer = time_axes.thinned_words(max((len(course.times) for course in courses), default=0))
     return (
         f"{what}{levels} A wide band means that the measured modes hardly feel the stiffness."
-        f"{fewer}{remark}"
+        f"{fewer}"
     )
 
 
-def alt(courses: Sequence[StiffnessHistory]) -> str:
+def _alt(courses: Sequence[StiffnessHistory]) -> str:
     wording = "; ".join(_last(course) for course in courses)
     return f"End stiffness over time; at last: {wording}."
 
@@ -146,6 +140,18 @@ def _last(course: StiffnessHistory) -> str:
 
 
 def _courses(data: HangerReport) -> list[StiffnessHistory]:
+    """Return what the watch compares of the ends; each test alone where it compares nothing."""
+    states = data.states.within(data.period)
+    watched = [each for each in states.quantities if not each.is_tension]
+    if watched:
+        named = {row.time: row.test for row in data.trend}
+        tests = [named.get(time, "test") for time in states.times]
+        return [
+            StiffnessHistory(
+                each.title, states.times, tests, each.read, each.baseline, each.filtered, each.unit
+            )
+            for each in watched
+        ]
     rows = time_axes.dated(data)
     base = end_stiffness(data.baseline, data.hanger) if data.baseline else {}
     return [
@@ -156,13 +162,8 @@ def _courses(data: HangerReport) -> list[StiffnessHistory]:
             time_axes.bounds_of([row.row.stiffness.get(name) for row in rows]),
             float(base[name].mean()) if name in base else math.nan,
         )
-        for name in names_of(row.row.stiffness for row in rows)
+        for name in sorted({name for row in rows for name in row.row.stiffness})[::-1]
     ]
-
-
-def names_of(rows: Iterable[Mapping[str, object]]) -> list[str]:
-    """Return the names of the stiffnesses, `transverse_end_stiffness` first."""
-    return sorted({name for row in rows for name in row})[::-1]
 
 
 def _reach(data: HangerReport) -> float:
@@ -171,8 +172,8 @@ def _reach(data: HangerReport) -> float:
 
 FIGURE = spec.FigureSpec[HangerReport](
     "stiffness",
-    "Trend of the end stiffness",
-    lambda data: specify(_courses(data), _reach(data)),
-    lambda data: caption(_courses(data), _reach(data)),
-    lambda data: alt(_courses(data)),
+    "End stiffness over time",
+    lambda data: _specify(_courses(data), _reach(data)),
+    lambda data: _caption(_courses(data), _reach(data)),
+    lambda data: _alt(_courses(data)),
 )

@@ -11,7 +11,7 @@ from datetime import datetime
 import numpy as np
 
 from shm.report import formatting
-from shm.report.contents import HangerReport
+from shm.report.contents import Deed, HangerReport
 from shm.report.figures import specification as spec
 from shm.report.figures import time_axes
 from shm.report.formatting import Interval
@@ -23,24 +23,15 @@ from shm.watch.state import Band as Bounds
 
 _LONGEST_WORDS = 200  # layout: characters of a note in a hover; the page has all
 _AT_FOOT = 0.03  # layout: of the height, where signs of what people did stand
-_SYMBOLS: dict[NoteKind, tuple[spec.Symbol, bool]] = {
-    NoteKind.NOTE: ("thin cross", True),
-    NoteKind.INSPECTION: ("circle", False),
-    NoteKind.REPAIR: ("cross", True),
+_LOOKS: dict[str, tuple[spec.Symbol, bool, str]] = {
+    "baseline set": ("square", True, "green"),
+    "effect adopted": ("diamond", True, "purple"),
+    "adoption undone": ("diamond", False, "purple"),
+    NoteKind.NOTE: ("thin cross", True, "ink"),
+    NoteKind.INSPECTION: ("circle", False, "ink"),
+    NoteKind.REPAIR: ("cross", True, "ink"),
 }
-"""Of a note by its kind, and whether it is filled."""
-
-
-@dataclass(frozen=True)
-class TrendEvent:
-    """An action of a person, and why: it is drawn at the foot of the figure."""
-
-    kind: str
-    symbol: spec.Symbol
-    filled: bool
-    colour: str
-    at: datetime
-    why: str
+"""Of what people did, by its kind: symbol, whether it is filled, colour."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +54,7 @@ class TensionHistory:
     state_times: Sequence[datetime] = ()
     reference_temperature_c: float = math.nan
     changes: Sequence[CalledChange] | None = None
-    deeds: Sequence[TrendEvent] = ()
-    notes: Sequence[Note] = ()
+    deeds: Sequence[Deed] = ()
     excluded: Collection[int] = ()
     remark: str = ""
     bounds_n: Bounds = field(init=False)
@@ -78,7 +68,7 @@ class TensionHistory:
         return force_unit(*(each.mean for each in self.tensions_n))
 
 
-def specify(course: TensionHistory) -> spec.Specification | None:
+def _specify(course: TensionHistory) -> spec.Specification | None:
     if not course.times:
         return None
     scale, bounds = 1 / course.unit.newtons, course.bounds_n
@@ -110,7 +100,7 @@ def specify(course: TensionHistory) -> spec.Specification | None:
 def _shown(course: TensionHistory) -> list[datetime]:
     """Return the times of the tests, and of what was noted after the last of them."""
     last = max(course.times)
-    return [*course.times, *(each.at for each in course.notes if each.at > last)]
+    return [*course.times, *(each.at for each in course.deeds if each.at > last)]
 
 
 def _picked(times: Sequence[datetime], chosen: list[int]) -> list[datetime]:
@@ -200,30 +190,23 @@ def _excluded(course: TensionHistory, scale: float) -> list[spec.Mark]:
 
 def _deeds(course: TensionHistory) -> list[spec.Mark]:
     """Return the marks of what people did and noted, by kind."""
-    deeds = [*course.deeds, *_noted(course.notes)]
-    kinds = {deed.kind: deed for deed in deeds}
-    return [
-        spec.Points(
-            x=[deed.at for deed in deeds if deed.kind == kind],
-            y=[_AT_FOOT for deed in deeds if deed.kind == kind], in_shares=True,
-            symbol=like.symbol, filled=like.filled, size=7, colour=like.colour, name=kind,
-            texts=[f"{kind} {deed.why}" for deed in deeds if deed.kind == kind],
-        )
-        for kind, like in kinds.items()
-    ]  # fmt: skip
+    marks: list[spec.Mark] = []
+    for kind in dict.fromkeys(each.kind for each in course.deeds):
+        symbol, filled, colour = _LOOKS[kind]
+        deeds = [each for each in course.deeds if each.kind == kind]
+        marks.append(
+            spec.Points(
+                x=[each.at for each in deeds], y=[_AT_FOOT] * len(deeds), in_shares=True,
+                symbol=symbol, filled=filled, size=7, colour=colour, name=kind,
+                texts=[f"{kind} {each.why}" for each in deeds],
+            )
+        )  # fmt: skip
+    return marks
 
 
-def _noted(notes: Sequence[Note]) -> list[TrendEvent]:
-    return [
-        TrendEvent(
-            each.kind,
-            *_SYMBOLS[each.kind],
-            "ink",
-            each.at,
-            f"of {each.of} by {each.who}: {textwrap.shorten(each.text, _LONGEST_WORDS)}",
-        )
-        for each in notes
-    ]
+def _noted(note: Note) -> Deed:
+    words = textwrap.shorten(note.text, _LONGEST_WORDS)
+    return Deed(note.kind, note.at, f"of {note.of} by {note.who}: {words}")
 
 
 def _range(course: TensionHistory, scale: float) -> tuple[float, float]:
@@ -248,7 +231,7 @@ def _range(course: TensionHistory, scale: float) -> tuple[float, float]:
     return scale * low, scale * (high + written * (high - low))
 
 
-def caption(course: TensionHistory) -> str:
+def _caption(course: TensionHistory) -> str:
     parts = (_tests(course), _lines(course), _marks(course), course.remark)
     return " ".join(part for part in parts if part)
 
@@ -293,16 +276,14 @@ def _marks(course: TensionHistory) -> str:
         if course.changes
         else "",
         "crosses, or triangles at the edge: tests taken for blunders" if course.excluded else "",
-        "at the foot: what was set, adopted, seen or repaired"
-        if course.deeds or course.notes
-        else "",
+        "at the foot: what was set, adopted, seen or repaired" if course.deeds else "",
     ]
     found = "; ".join(filter(None, wording))
     fewer = time_axes.thinned_words(len(course.times))
     return ((found[:1].upper() + found[1:] + "." if found else "") + fewer).strip()
 
 
-def alt(course: TensionHistory) -> str:
+def _alt(course: TensionHistory) -> str:
     first, last = (
         f"{formatting.tension(course.tensions_n[place], course.unit)} on "
         f"{course.times[place]:%Y-%m-%d}"
@@ -332,9 +313,9 @@ def _course(data: HangerReport) -> TensionHistory:
         baseline_n=baseline_n.mean if baseline_n else None,
         reach=data.hanger.thresholds.tension_shift_fraction,
         alerts={i: alerted[r.row.test] for i, r in enumerate(rows) if r.row.test in alerted},
-        notes=data.inspections,
-        excluded=excluded([row.time for row in rows], states),
-        state=averaged_state(states, baseline_n.mean) if baseline_n else None,
+        deeds=(*data.deeds, *map(_noted, data.inspections)),
+        excluded=_excluded_places([row.time for row in rows], states),
+        state=_averaged_state(states, baseline_n.mean) if baseline_n else None,
         state_times=states.times,
         reference_temperature_c=states.reference_temperature_c,
         changes=states.changes if states.times else None,
@@ -342,7 +323,7 @@ def _course(data: HangerReport) -> TensionHistory:
     )
 
 
-def averaged_state(states: StatesOverTime, baseline_n: float) -> QuantityOverTime | None:
+def _averaged_state(states: StatesOverTime, baseline_n: float) -> QuantityOverTime | None:
     """Return the state of the tension at the level of the average over classes.
 
     It is of one model class: of a change all classes say the same fraction, so the band, which
@@ -356,7 +337,7 @@ def averaged_state(states: StatesOverTime, baseline_n: float) -> QuantityOverTim
     return replace(found, filtered=time_axes.part(found.filtered, whole, ratio))
 
 
-def excluded(times: Sequence[datetime], states: StatesOverTime) -> tuple[int, ...]:
+def _excluded_places(times: Sequence[datetime], states: StatesOverTime) -> tuple[int, ...]:
     """Return the places of the tests that the watch takes for blunders."""
     outliers = {
         time for time, is_outlier in zip(states.times, states.outlier, strict=True) if is_outlier
@@ -367,7 +348,7 @@ def excluded(times: Sequence[datetime], states: StatesOverTime) -> tuple[int, ..
 FIGURE = spec.FigureSpec[HangerReport](
     "trend",
     "Trend of the tension",
-    lambda data: specify(_course(data)),
-    lambda data: caption(_course(data)),
-    lambda data: alt(_course(data)),
+    lambda data: _specify(_course(data)),
+    lambda data: _caption(_course(data)),
+    lambda data: _alt(_course(data)),
 )

@@ -1,12 +1,12 @@
 """Draw the records of a test, what each hit left in them, and all hits superposed.
 
-Superposed are pulse, force spectrum and ring-down.
+Superposed are pulse and force spectrum.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -47,16 +47,6 @@ def _in_turn(channels: tuple[Channel, ...], rows: list[int]) -> list[int]:
 
 def _ends_first(rows: list[int]) -> list[int]:
     return [rows[0], *rows[:0:-1]] if rows else []
-
-
-def strongest_row(sheet: ModalTestReport) -> int:
-    """Return the row of the sound acceleration that moves most in the first record."""
-    faults = sheet.channel_faults
-    peaks = [
-        -1.0 if channel.name in faults else float(np.nanmax(np.abs(channel.values), initial=0.0))
-        for channel in sheet.recordings[0].accelerations
-    ]
-    return int(np.argmax(peaks))
 
 
 _BINS = 700
@@ -141,7 +131,6 @@ _TRANSFORM_S = 0.5
 _LEAD, _TAIL = 0.7, 3.0
 """Room before and after a pulse in a figure, in widths of it."""
 _TINY = 1e-9  # stands for a level of 0 on an axis of dB
-_FADE_BINS = 80  # layout: steps that the eye takes for a line
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +138,7 @@ class HitRecord:
     """Hold the signals of one hit.
 
     `time_s` and `force_n` (samples,) of its pulse, 0 s where it begins; `spectrum_hz` and
-    `spectrum_db` (lines,), relative to the spectrum's largest value; `fade_s` and `fade_m_s2_n`
-    (bins,): largest accelerations after the hit per peak force.
+    `spectrum_db` (lines,), relative to the spectrum's largest value.
     """
 
     number: int
@@ -159,8 +147,6 @@ class HitRecord:
     force_n: FloatArray
     spectrum_hz: FloatArray
     spectrum_db: FloatArray
-    fade_s: FloatArray
-    fade_m_s2_n: FloatArray
 
     @property
     def near_s(self) -> tuple[float, float]:
@@ -182,8 +168,7 @@ class HitRecord:
 
 def hit_records(sheet: ModalTestReport) -> list[HitRecord]:
     """Return every hit whose record is at hand, in the order of the hits."""
-    row = strongest_row(sheet) if sheet.recordings else 0
-    found = [_hit_record(sheet, number, hit, row) for number, hit in located_hits(sheet)]
+    found = [_hit_record(sheet, number, hit) for number, hit in located_hits(sheet)]
     return [hit_record for hit_record in found if hit_record is not None]
 
 
@@ -199,18 +184,14 @@ def hit_name(hit_record: HitRecord) -> str:
     return f"hit {hit_record.number}{reason}"
 
 
-def _hit_record(sheet: ModalTestReport, number: int, hit: Hit, row: int) -> HitRecord | None:
+def _hit_record(sheet: ModalTestReport, number: int, hit: Hit) -> HitRecord | None:
     record = sheet.recordings[hit.record]
-    force, motion = record.force, channel_of(record, row)
-    if force is None or motion is None:
+    if (force := record.force) is None:
         return None
     rate, stop = record.sampling_rate_hz, _stop(sheet, hit)
     time_s, force_n = _pulse(force.values[:stop], hit, rate)
     spectrum_hz, spectrum_db = _spectrum(force_n, rate)
-    fade_s, fade = _fade(motion.values[hit.start : stop], rate)
-    return HitRecord(
-        number, hit, time_s, force_n, spectrum_hz, spectrum_db, fade_s, fade / hit.peak_force_n
-    )
+    return HitRecord(number, hit, time_s, force_n, spectrum_hz, spectrum_db)
 
 
 def _run(hit_at: BoolArray) -> int:
@@ -250,27 +231,17 @@ def _spectrum(force_n: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]
     return np.fft.rfftfreq(length, 1 / rate).astype(np.float64), np.asarray(decibel)
 
 
-def _fade(motion: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    known = motion[np.isfinite(motion)]
-    size = np.abs(motion - np.mean(known)) if len(known) else np.full(len(motion), np.nan)
-    places = spec.peak_places(size, min(_FADE_BINS, len(size)))
-    return places / rate, size[places]
-
-
 _COLOURS = ("blue", "orange", "green", "purple")
 _DASHES: tuple[spec.Dash, ...] = ("solid", "dash", "dot")
 _DROPPED_DASHES: tuple[spec.Dash, ...] = ("dash", "dot", "dashdot", "longdash")
-_FADE_ROOM = 1.3  # layout: room to the right of the last hit
 
 
 def _draw(shown: ResponseCurves) -> spec.Specification | None:
     hits = shown_hits(shown.sheet)
     if not hits:
         return None
-    panels = [_pulses(hits), _force_spectra(shown, hits), _fades(hits)]
-    rows = [[each] for each in panels] if shown.is_on_screen else [panels[:2], panels[2:]]
     columns = 6 if all(hit_record.hit.used for hit_record in hits) else 3
-    return spec.Specification(rows=rows, height_inches=5.4, legend_columns=columns)
+    return spec.stacked([_pulses(hits), _force_spectra(shown, hits)], 5.0, columns)
 
 
 def _look(hit_record: HitRecord, place: int) -> dict[str, Any]:
@@ -332,35 +303,12 @@ def _force_spectra(shown: ResponseCurves, hits: Sequence[HitRecord]) -> spec.Pan
     )  # fmt: skip
 
 
-def _fades(hits: Sequence[HitRecord]) -> spec.Panel:
-    values = np.concatenate([hit_record.fade_m_s2_n for hit_record in hits])
-    known = values[np.isfinite(values) & (values > 0)]
-    low, high = (float(known.min()), float(known.max())) if len(known) else (0.1, 1.0)
-    axis = spec.Axis(scale="log", range=(low / _FADE_ROOM, high * _FADE_ROOM))
-    return spec.Panel(
-        y=replace(axis, label="largest acceleration\nper peak force (m/s²/N)"),
-        marks=[
-            spec.Line(
-                x=hit_record.fade_s, y=hit_record.fade_m_s2_n, hover="%{x:.2f} s: %{y:.3g} m/s²/N",
-                **_look(hit_record, place),
-            )
-            for place, hit_record in enumerate(hits)
-        ],
-        x=spec.Axis(
-            label="time from the start of the hit (s)",
-            range=(0, max(float(hit_record.fade_s[-1]) for hit_record in hits)),
-        ),
-    )  # fmt: skip
-
-
 def _caption(shown: ResponseCurves) -> str:
     sheet = shown.sheet
     some = formatting.some(len(shown_hits(sheet)), len(sheet.hits), "hits")
     return (
-        "Above, the force of each hit and its spectrum, each relative to its largest value: it "
-        "should stay above a tenth (-20 dB) up to the end of the band. Below, the largest "
-        "acceleration of each short span after the hit, per peak force: sound hits lie over each "
-        f"other.{some}"
+        "The force of each hit, and its spectrum relative to its largest value: it should stay "
+        f"above a tenth (-20 dB) up to the end of the band. Sound hits lie over each other.{some}"
     )
 
 
@@ -375,4 +323,4 @@ def _alt(shown: ResponseCurves) -> str:
     )
 
 
-FIGURE = spec.FigureSpec("hits", "Hits: pulses, force spectra, ring-downs", _draw, _caption, _alt)
+FIGURE = spec.FigureSpec("hits", "Hits: pulses and force spectra", _draw, _caption, _alt)

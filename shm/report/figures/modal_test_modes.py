@@ -87,7 +87,7 @@ def _poles_caption(shown: ResponseCurves) -> str:
     return (
         f"{len(poles.order)} poles over the order of the model that gave them, {stable} of them "
         "stable; a column of stable poles is a mode. Marks on top: the chosen modes by plane, and "
-        "what was set aside."
+        "what was excluded."
     )
 
 
@@ -171,9 +171,8 @@ def guide(sheet: ModalTestReport, mode: Mode) -> Guide | None:
     return Guide(places, size * np.sin(wave * places))
 
 
-# Layout: panels beside each other on a page, and on a screen.
-_MOST_COLUMNS, _LEAST_COLUMNS = 7, 4
-_MOST_ON_SCREEN = 4
+# Layout: panels beside each other.
+_MOST_COLUMNS = 5
 _PANEL_INCHES = 1.12
 
 
@@ -181,23 +180,19 @@ def _draw_shapes(shown: ResponseCurves) -> spec.Specification | None:
     sheet = shown.sheet
     if not shown_modes(sheet):
         return None
-    rows = [
-        [_shape_panel(sheet, mode) for mode in row] for row in rows_of(sheet, shown.is_on_screen)
-    ]
+    rows = [[_shape_panel(sheet, mode) for mode in row] for row in rows_of(sheet)]
     return spec.Specification(
         rows=rows, height_inches=_PANEL_INCHES * len(rows) + 0.85, is_grid=True,
         x_label="position from the deck end (m)" if sheet.hanger else "position (m)",
     )  # fmt: skip
 
 
-def rows_of(sheet: ModalTestReport, is_on_screen: bool) -> list[list[Mode]]:
+def rows_of(sheet: ModalTestReport) -> list[list[Mode]]:
     """Return the modes in about equally full rows; each plane begins a new row."""
     modes = shown_modes(sheet)
     planes = [[mode for mode in modes if mode.plane == plane] for plane in PLANES]
     longest = max(map(len, planes)) or 1
-    most = _MOST_ON_SCREEN if is_on_screen else _MOST_COLUMNS
-    columns = math.ceil(longest / math.ceil(longest / most))
-    columns = columns if is_on_screen else max(_LEAST_COLUMNS, columns)
+    columns = math.ceil(longest / math.ceil(longest / _MOST_COLUMNS))
     return [this[i : i + columns] for this in planes for i in range(0, len(this), columns)]
 
 

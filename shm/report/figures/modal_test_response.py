@@ -60,9 +60,9 @@ def spectrum(sheet: ModalTestReport) -> Spectrum | None:
 
 @dataclass(frozen=True, eq=False)
 class ResponseCurves:
-    """A sheet, the curve its modes are peaks of, and on screen which response of it is asked for.
+    """A sheet, the curve its modes are peaks of, and which response of it is asked for.
 
-    `point` is an index into the points of `spectrum`; None on paper, where several are shown.
+    `point` is an index into the points of `spectrum`; None: those that show the modes best.
     """
 
     sheet: ModalTestReport
@@ -73,10 +73,6 @@ class ResponseCurves:
     def of(cls, sheet: ModalTestReport, point: int | None = None) -> ResponseCurves:
         """Return the curves computed from the records of the sheet, which must be there."""
         return cls(sheet, spectrum(sheet), point)
-
-    @property
-    def is_on_screen(self) -> bool:
-        return self.point is not None
 
 
 def _density(records: Sequence[Recording]) -> Spectrum | None:
@@ -177,7 +173,7 @@ def mode_marks(sheet: ModalTestReport, low_hz: float, high_hz: float) -> list[sp
     apart = [s for s in sheet.identification.set_aside if low_hz <= s.frequency_hz <= high_hz]
     at = [each.frequency_hz for each in apart]
     texts = [f"{each.kind}, {each.frequency_hz:.4g} Hz: {each.reason}" for each in apart]
-    name = "set aside"
+    name = "excluded"
     return found + _marked_row(at, _EXCLUDED_ROW, "red", "cross", name, texts, [], "dot")
 
 
@@ -265,7 +261,7 @@ def _magnitude(
     return spec.Panel(
         y=spec.Axis(label=label, scale="log", range=with_headroom_log(*extent) if extent else None),
         marks=[*marks, *mode_marks(shown.sheet, *band_hz)],
-        title="" if shown.is_on_screen else point_name(point), height=1.35,
+        title=point_name(point), height=1.35,
     )  # fmt: skip
 
 
@@ -329,31 +325,22 @@ def _caption(shown: ResponseCurves) -> str:
     found, identified = shown.spectrum, shown.sheet.identification
     assert found is not None
     response = identified.frequency_response
-    on_screen = f"{point_name(found.points[shown.point])}: " if shown.point is not None else ""
-    some = formatting.some(
-        min(_MOST_POINTS, len(found.points)), len(found.points), "measured points"
-    )
-    some = "" if on_screen else some
+    some = formatting.some(len(_points(shown)), len(found.points), "measured points")
     if response is None:
-        density = "power spectral density of the accelerations; nobody hit."
-        return f"{_begun(on_screen + density)} {_MARKS}{some}"
+        density = "Power spectral density of the accelerations; nobody hit."
+        return f"{density} {_MARKS}{some}"
     below = (
         "The coherence is not known. "
         if response.coherence is None
-        else "Below, coherence: 1 where the force explains the response"
-        + (". " if on_screen else ", dashed at the second point of a plane. ")
+        else "Below, coherence: 1 where the force explains the response, dashed at the second "
+        "point of a plane. "
     )
     fit = (
         "the fit of the modes is not at hand. "
         if identified.fit is None
         else "the fit made of the identified modes is the thin dark line. "
     )
-    what = f"{on_screen}acceleration per force{'' if on_screen else ' at each point'}"
-    return f"{_begun(what)}, magnitude and phase; {fit}{below}{_MARKS}{some}"
-
-
-def _begun(text: str) -> str:
-    return text if ": " in text else text[:1].upper() + text[1:]
+    return f"Acceleration per force, magnitude and phase; {fit}{below}{_MARKS}{some}"
 
 
 _MARKS = "Marks and lines: modes by plane, with their order where there is room."

@@ -1,4 +1,4 @@
-"""Force and accelerations over the whole test, every hit marked; on paper one hit from near."""
+"""Draw force and accelerations over the complete test, every hit marked."""
 
 from __future__ import annotations
 
@@ -11,15 +11,12 @@ from shm.report import formatting
 from shm.report.contents import ModalTestReport
 from shm.report.figures import specification as spec
 from shm.report.figures.modal_test_hits import (
-    HitRecord,
     borders_s,
     channel_of,
-    hit_records,
     hit_time_s,
     located_hits,
     offsets_s,
     shown_rows,
-    strongest_row,
     thinned,
     unknown_times_s,
 )
@@ -30,12 +27,8 @@ if TYPE_CHECKING:
     from shm.identify import Hit
 
 _MOST_NUMBERS = 40
-_ZOOM_INCHES = 1.9
-_MOTION_NEAR_S = (-0.05, 0.3)
 _LEAD = 0.012
 """Room before the first record, as a share of all: a hit may begin with it."""
-_NEAR_BINS = 300
-_MOST_DOTS = 150
 _MARKS_AT, _ROOM = 0.84, 0.35
 """Where the marks of the hits stand in the uppermost panel, as a share of its height, and the room
 above the curve that is left to them, as a share of the curve's."""
@@ -53,12 +46,7 @@ def _draw(shown: ResponseCurves) -> spec.Specification | None:
     several = "" if len(records) == 1 else ", the records one after the other"
     across = spec.Axis(label=f"time{several} (s)", range=(-_LEAD * end_s, end_s))
     panels[-1] = replace(panels[-1], x=across)
-    typical = None if shown.is_on_screen else _typical(sheet)
-    near = [_near(sheet, typical)] if typical else []
-    height = sum(p.height for p in panels) + 0.9 + (_ZOOM_INCHES if near else 0)
-    return spec.Specification(
-        rows=[*([panel] for panel in panels), *near], height_inches=height, legend_columns=3
-    )
+    return spec.stacked(panels, sum(panel.height for panel in panels) + 0.9, 3)
 
 
 def _history(sheet: ModalTestReport, row: int | None, is_top: bool) -> spec.Panel:
@@ -154,45 +142,6 @@ def _wording(number: int, hit: Hit, at_s: float) -> str:
     """Describe a hit; `at_s` is on the axis, also where records follow each other."""
     what = "used" if hit.used else f"dropped: {hit.reason}"
     return f"hit {number}, {at_s:.3f} s, {formatting.plain(hit.peak_force_n, 4)} N, {what}"
-
-
-def _typical(sheet: ModalTestReport) -> HitRecord | None:
-    """Return the used hit of median force, else any."""
-    found = hit_records(sheet)
-    hits = [hit_record for hit_record in found if hit_record.hit.used] or found
-    hits = sorted(hits, key=lambda hit_record: hit_record.hit.peak_force_n)
-    return hits[len(hits) // 2] if hits else None
-
-
-def _near(sheet: ModalTestReport, near: HitRecord) -> list[spec.Panel]:
-    record, start = sheet.recordings[near.hit.record], near.hit.start
-    force, motion = record.force, channel_of(record, strongest_row(sheet))
-    assert force is not None
-    assert motion is not None
-    rate = record.sampling_rate_hz
-    across = spec.Axis(label=f"time from the start of hit {near.number} (ms)")
-    name = formatting.place(motion.name, motion.plane, motion.x_m)
-    return [
-        spec.Panel(
-            y=spec.Axis(label="force (N)"), marks=_zoom(force.values, rate, start, near.near_s),
-            x=across, height=_ZOOM_INCHES,
-        ),
-        spec.Panel(
-            y=spec.Axis(label="m/s²"), marks=_zoom(motion.values, rate, start, _MOTION_NEAR_S),
-            x=across, title=name,
-        ),
-    ]  # fmt: skip
-
-
-def _zoom(
-    values: FloatArray, rate: float, start: int, span_s: tuple[float, float]
-) -> list[spec.Mark]:  # fmt: skip
-    first = max(0, start + int(span_s[0] * rate))
-    part = values[first : start + int(span_s[1] * rate) + 2]
-    places = spec.envelope_places(part, _NEAR_BINS)
-    time_ms = 1e3 * (first + places - start) / rate
-    curve = spec.Line(x=time_ms, y=part[places], width=0.8, dots=len(part) <= _MOST_DOTS)
-    return [curve, spec.Rule(at=0, axis="x", colour="green", width=0.7)]
 
 
 def _caption(shown: ResponseCurves) -> str:

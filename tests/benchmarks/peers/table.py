@@ -33,10 +33,6 @@ TITLES = {
     "dynesty_walks": "dynesty, random walks",
     "ultranest": "ultranest",
     "nautilus": "nautilus",
-    "pocomc": "pocoMC",
-    "pymc": "PyMC `sample_smc`",
-    "uqpy": "UQpy TMCMC",
-    "blackjax": "blackjax tempered SMC",
     "emcee": "emcee",
 }
 COLUMNS = (

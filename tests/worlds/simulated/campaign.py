@@ -178,18 +178,6 @@ def campaign_with_truth(
     return Campaign(measured, truth)
 
 
-def realised(
-    hanger: Hanger,
-    state: HangerState,
-    effects: Sequence[PlantedEffect],
-    plan: CampaignPlan,
-    rng: np.random.Generator,
-) -> CampaignTruth:
-    """The truth of `campaign_with_truth` for the same generator state, without measuring."""
-    made, _ = rng.spawn(2)
-    return _realised(hanger, state, effects, plan, made)[0]
-
-
 def bar_in_test(
     hanger: Hanger, state: HangerState, truth: CampaignTruth, plan: CampaignPlan, test: ModalTest
 ) -> Bar:

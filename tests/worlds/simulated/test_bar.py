@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from shm.errors import UsageError
 from shm.simulate import HangerState
 from shm.values import FloatArray, Hanger, Turnbuckle
-from tests.worlds.simulated.bar.description import Bar, Mass, Spring, Stretch, bar_of
+from tests.worlds.simulated.bar.description import Bar, bar_of
 from tests.worlds.simulated.bar.modes import bar_modes
 from tests.worlds.simulated.elements import natural_frequencies
 
@@ -74,39 +73,6 @@ def test_a_pinned_timoshenko_bar_in_tension_has_the_frequencies_of_its_sine(
     np.testing.assert_allclose(frequencies(bar), [exact, exact], rtol=5e-6)
 
 
-def test_frequencies_are_right_to_a_hundred_thousandth(hanger: Hanger) -> None:
-    clamped = HangerState(711e3)
-    for bar in (
-        bar_of(hanger, clamped),
-        sheared(hanger, clamped),
-        replace(bar_of(hanger, clamped), sag_parameter=(3.0, 0.5)),
-    ):
-        np.testing.assert_allclose(frequencies(bar), frequencies(bar, refined=2), rtol=4e-6)
-
-
-def test_a_string_like_bar_is_right_beside_a_mass_and_a_spring(hanger: Hanger) -> None:
-    """It bends in layers of 3 cm there, a twentieth of an element elsewhere."""
-    string = replace(hanger, length_m=100.0, second_moment_m4=1e-3 * hanger.second_moment_m4)
-    bar = replace(
-        bar_of(string, HangerState(3e6)),
-        masses=(Mass(28.3, 100.0),),
-        springs=(Spring(37.0, (6e5, 6e4)),),
-    )
-    np.testing.assert_allclose(frequencies(bar), frequencies(bar, refined=3), rtol=4e-6)
-
-
-def test_places_next_to_each_other_do_no_harm(hanger: Hanger) -> None:
-    """A mass a hundredth of a millimetre from a sensor, from a zone's edge and from another."""
-    apart = 1e-5
-    bar = replace(
-        bar_of(hanger, HangerState(711e3)),
-        stretches=(Stretch(5.4, 6.0, (2.0, 2.0)),),
-        masses=(Mass(5.4 + apart, 10.0), Mass(5.4 + 2 * apart, 10.0)),
-    )
-    same = replace(bar, masses=(Mass(5.4, 20.0),))
-    np.testing.assert_allclose(frequencies(bar), frequencies(same), rtol=2e-6)
-
-
 def test_a_sagging_string_obeys_irvines_equation(hanger: Hanger) -> None:
     """Symmetric modes: tan(W/2) = W/2 - 4/lambda^2 (W/2)^3, W = omega L sqrt(m/T)."""
     string = replace(hanger, second_moment_m4=hanger.second_moment_m4 * 1e-7)
@@ -159,22 +125,3 @@ def test_equal_planes_that_an_end_couples_split_along_its_axis(hanger: Hanger) -
     transverse, longitudinal = (own.at(PLACES) for own in found)
     np.testing.assert_allclose(transverse[:, 1], math.tan(angle) * transverse[:, 0], atol=1e-6)
     np.testing.assert_allclose(longitudinal[:, 0], -math.tan(angle) * longitudinal[:, 1], atol=1e-6)
-
-
-def test_shapes_are_mass_normalised_sines_of_a_pinned_bar(hanger: Hanger) -> None:
-    seen = bar_modes(bar_of(hanger, PINNED), 3, PLACES)[1].at(PLACES)[:, 1]
-    amplitude = math.sqrt(2 / (hanger.mass_per_length_kg_m * hanger.length_m))
-    exact = amplitude * np.sin(np.outer(PLACES, np.arange(1, 4)) * np.pi / hanger.length_m)
-    np.testing.assert_allclose(np.abs(seen), np.abs(exact), atol=1e-6 * amplitude)
-
-
-def test_a_place_beyond_an_end_sees_nothing(hanger: Hanger) -> None:
-    bar = replace(bar_of(hanger, HangerState(711e3)), deck_end_m=2.0)
-    seen = bar_modes(bar, 2, (1.56, 3.48))[0].at((1.56, 3.48))
-    assert np.all(seen[0] == 0)
-    assert np.all(seen[1, 0] != 0)
-
-
-def test_a_compression_beyond_buckling_is_refused(hanger: Hanger) -> None:
-    with pytest.raises(UsageError, match="buckles"):
-        frequencies(bar_of(hanger, HangerState(-1e6, 0, 0, 0, 0)))

@@ -10,12 +10,13 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 
 from shm.pipeline import utc_now
-from shm.pipeline.diagnosing import LATEST_TESTS, diagnose_stored, latest_tests
+from shm.pipeline.diagnosing import choose_tests, diagnose_stored, latest_tests
 from shm.report import formatting
 from shm.report.diagnosis_summary import write_summary
 from shm.store import Workspace
 from shm.store.journal import Actor
 from shm_daemon.web.access import AtSite, Reader, Writer
+from shm_daemon.web.forms import Form
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import HangerNumber
 from shm_daemon.web.ordered_work import ordered_work_of, still_at_work
@@ -26,12 +27,16 @@ router = APIRouter(prefix="/hangers/{hanger_id}/diagnosis", include_in_schema=Fa
 
 @dataclass(frozen=True)
 class Diagnose:
-    """An order to diagnose the latest tests of a hanger, as of one moment: it is made once."""
+    """A request to diagnose the latest tests of a hanger, as of one moment: it is made once.
+
+    With `every` tests from before the last change are among them.
+    """
 
     folder: Path
     hanger: int
     actor: Actor
     at: datetime
+    every: bool = False
 
     def make(self) -> str:
         """Diagnose and keep it; return its first paragraph."""
@@ -41,18 +46,23 @@ class Diagnose:
         hanger = workspace.bridge.hanger(self.hanger)
         with workspace.store() as store:
             acting = store.acting_as(self.actor)
-            stored = latest_tests(acting, hanger, LATEST_TESTS)
-            return write_summary(diagnose_stored(acting, stored, hanger, GapOptions(), self.at))
+            chosen = choose_tests(acting, hanger, every=self.every)
+            found = diagnose_stored(acting, chosen, hanger, GapOptions(), self.at)
+            return f"{write_summary(found)} {chosen.remark}".rstrip()
 
 
 @router.post("")
 def order_diagnosis(
-    request: Request, site: AtSite, writer: Writer, hanger_id: HangerNumber
+    request: Request,
+    site: AtSite,
+    writer: Writer,
+    hanger_id: HangerNumber,
+    form: Form,
 ) -> Response:
     """Have it made beside the interface."""
     one = described(site.workspace, hanger_id)
     latest_tests(site.store, one, 1)
-    wanted = Diagnose(site.workspace.folder, one.id, writer.actor, utc_now())
+    wanted = Diagnose(site.workspace.folder, one.id, writer.actor, utc_now(), "all_tests" in form)
     word = ordered_work_of(request).place(wanted)
     return RedirectResponse(f"/hangers/{one.id}/diagnosis?order={word}", 303)
 

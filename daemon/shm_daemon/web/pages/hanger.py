@@ -76,7 +76,6 @@ class Chart:
     address: str
     caption: str
     height_px: int
-    is_wide: bool
 
 
 @router.get("/hangers/{hanger_id}")
@@ -131,7 +130,7 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
         "facts": facts(report),
         "is_called": bool(report.now.called),
         "charts": {
-            part: [_chart(view, e) for e in FIGURES if e.part == part and e.is_there(view)]
+            part: [_chart(view, e) for e in FIGURES if e.part == part and e.specify(view)]
             for part in ("trends", "model", "gap", "gap_details")
         },
         "tables": {part: [each for each in of if each.rows] for part, of in tables.items()},
@@ -153,8 +152,8 @@ def _diagnosis_tables(sheet: DiagnosisSheet | None) -> dict[str, tuple[Table, ..
 
 
 def _chart(view: HangerView, figure: HangerFigure) -> Chart:
-    address = f"/api/hangers/{view.hanger.id}/figures/{figure.name}"
-    return Chart(figure.title, address, figure.caption(view), figure.height_px, figure.is_wide)
+    address = f"/api/hangers/{view.hanger.id}/figures/{figure.member.name}"
+    return Chart(figure.member.title, address, figure.caption(view), figure.height_px)
 
 
 def _events(view: HangerView) -> Table:

@@ -122,7 +122,7 @@ def _facts(view: ModalTestView) -> tuple[tuple[str, str, str], ...]:
             formatting.moment(test.time),
             f"received {formatting.moment(view.recording.received_at)}",
         ),
-        ("Set aside", str(n_foreign), "resonances without an order"),
+        ("Excluded", str(n_foreign), "resonances without an order"),
     )
 
 

@@ -35,16 +35,17 @@ router = APIRouter(include_in_schema=False)
 
 _Value = float | QuietHours | None
 
+_IN = {"": "", "s": " (seconds)"}
 _MEANINGS = {
-    "thresholds.tension_shift_fraction": "shift of tension that matters, as a fraction",
-    "thresholds.stiffness_shift_decades": "shift of end stiffness that matters, in decades",
+    "thresholds.tension_shift_fraction": "shift of tension that matters (fraction)",
+    "thresholds.stiffness_shift_decades": "shift of end stiffness that matters (decades)",
     "thresholds.alert_probability": "probability of such a shift that raises an alert",
-    "thresholds.false_call_years": "mean time between false alarms of this hanger, in years",
-    "limits.tension_max_n": "upper limit of the tension, in N",
-    "limits.tension_min_n": "lower limit of the tension, in N",
-    "escalation_after_seconds": "escalate alerts that nobody has acknowledged after, in seconds",
+    "thresholds.false_call_years": "mean time between false alarms of this hanger (years)",
+    "limits.tension_max_n": "upper limit of the tension (N)",
+    "limits.tension_min_n": "lower limit of the tension (N)",
+    "escalation_after_seconds": "escalate alerts that nobody has acknowledged after (seconds)",
     QUIET_HOURS: "quiet hours, only urgent alerts are sent; in time_zone of bridge.toml, else UTC",
-    **{row.name: f"{row.help}{f', in {row.unit}' if row.unit else ''}" for row in TABLE},
+    **{row.name: row.help + _IN.get(row.unit, f" ({row.unit})") for row in TABLE},
 }
 
 

@@ -22,12 +22,10 @@ from tests.worlds.simulated.effects.base import (
     Where,
     where_of,
 )
-from tests.worlds.simulated.off_catalogue import UNLISTED
 
 __all__ = [
     "LAWS",
     "PLANTED",
-    "UNLISTED",
     "PlantedEffect",
     "TestConditions",
     "choices",
@@ -152,7 +150,6 @@ def drawn(name: str, at: str, hanger: Hanger, rng: np.random.Generator) -> Plant
 
 
 def _known(name: str) -> Plantable:
-    known = {**PLANTED, **UNLISTED}
-    if name not in known:
+    if name not in PLANTED:
         raise UsageError(f"{name!r} is no effect.", remedy=f"Use one of {', '.join(PLANTED)}.")
-    return known[name]
+    return PLANTED[name]
