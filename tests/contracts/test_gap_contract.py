@@ -26,7 +26,6 @@ from shm.store import Lineage
 from shm.store.rows import StoredDiagnosis
 from tests.contracts import gap_calls as calls
 from tests.contracts.inference_calls import ROD, call
-from tests.contracts.test_inference_contract import bare
 
 TOLERANCES = {
     r"(.*_)?probability|share|fit_p_value|acts_alone|scatter": {"abs": 0.05},
@@ -243,3 +242,14 @@ def test_bad_input_is_refused_with_its_exit_code(code: int, words: tuple[object,
     ended = call("gap", "diagnose", *words)
     assert (ended.code, ended.out) == (code, ""), ended.err
     assert ended.err
+
+
+def bare(parameter: inspect.Parameter) -> inspect.Parameter:
+    """Return a parameter without its type; a default that is a function becomes its name."""
+
+    class Named:
+        def __repr__(self) -> str:
+            return str(parameter.default.__name__)
+
+    default = Named() if inspect.isfunction(parameter.default) else parameter.default
+    return parameter.replace(annotation=inspect.Parameter.empty, default=default)
