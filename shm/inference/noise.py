@@ -76,7 +76,8 @@ def grid_sd_factors(
     prior = log - scipy.special.logsumexp(log)
     joint = prior - freedom * grid - 0.5 * scatter * np.exp(-2 * grid)
     total = float(scipy.special.logsumexp(joint))
-    share = np.exp(joint - total).cumsum()
+    share = np.exp(joint - total)
+    reached = share.cumsum() - share / 2
     middle = (np.arange(count) + 0.5) / count
-    nodes = np.interp(middle, share, grid)
+    nodes = np.interp(middle, reached, grid)
     return np.exp(nodes), np.full(count, total - np.log(count))
