@@ -50,7 +50,19 @@ class Beam(Model):
             deck,
             arch,
             modes,
+            np.asarray(self.shear_compliance_1_n),
+            np.asarray(self.gyration_m),
         )
+
+    @property
+    def shear_compliance_1_n(self) -> float:
+        """Return 1/(kappa G A), 0 for a bar that does not shear."""
+        return 0.0
+
+    @property
+    def gyration_m(self) -> float:
+        """Return the radius of gyration of the section, 0 where it does not resist turning."""
+        return 0.0
 
     def _coupled(self, theta: FloatArray) -> PhysicalHanger:
         bar = coupled_bar(self.hanger, self._length_m(theta), self._tension_n(theta))
@@ -63,20 +75,15 @@ class Beam(Model):
         length = self._length_m(theta)[:, None]
         slenderness = length / self.hanger.bending_stiffness_n_m2
         deck, arch = (springs * slenderness for springs in self.springs_n_m_rad(theta))
-        tension = self._tension_n(theta)[:, None] * length * slenderness
-        waves = self._waves(tension, slenderness * length, deck, arch, modes)
+        waves = tensioned_beam.waves(
+            self._tension_n(theta)[:, None] * length * slenderness,
+            deck,
+            arch,
+            modes,
+            self.shear_compliance_1_n / (length * slenderness),
+            (self.gyration_m / length) ** 2,
+        )
         return tensioned_beam.shapes(waves, deck[..., None], x_m / length[..., None, None])
-
-    def _waves(
-        self,
-        tension: FloatArray,
-        flexibility: FloatArray,
-        deck: FloatArray,
-        arch: FloatArray,
-        modes: int,
-    ) -> tensioned_beam.Waves:
-        """Return the waves of bars of T L2/EI (n, 1) and L2/EI (n, 1) with k L/EI (n, 2)."""
-        return tensioned_beam.waves(np.sqrt(tension), deck, arch, modes)
 
     def _length_m(self, theta: FloatArray) -> FloatArray:
         return self.stiffness_mass_length(theta)[2] * self.hanger.length_m
@@ -126,43 +133,19 @@ class Beam3(Beam2):
     name = "beam3"
     title = "Beam 3: rotational end springs, shear and rotary inertia"
 
-    def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
-        if self.hanger.turnbuckles:
-            return super().frequencies_hz(theta, modes)
-        hanger = self.hanger
-        deck, arch = self.springs_n_m_rad(theta)
-        return tensioned_beam.timoshenko_frequencies_hz(
-            self._length_m(theta)[:, None],
-            self._tension_n(theta)[:, None],
-            np.asarray(hanger.bending_stiffness_n_m2),
-            np.asarray(hanger.mass_per_length_kg_m),
-            np.asarray(hanger.shear_stiffness_n),
-            np.asarray(np.sqrt(hanger.second_moment_m4 / hanger.area_m2)),
-            deck,
-            arch,
-            modes,
-        )
+    @property
+    def shear_compliance_1_n(self) -> float:
+        return 1 / self.hanger.shear_stiffness_n
 
-    def _waves(
-        self,
-        tension: FloatArray,
-        flexibility: FloatArray,
-        deck: FloatArray,
-        arch: FloatArray,
-        modes: int,
-    ) -> tensioned_beam.Waves:
-        hanger = self.hanger
-        gyration = hanger.second_moment_m4 / hanger.area_m2
-        turning = gyration / (flexibility * hanger.bending_stiffness_n_m2)
-        shear = hanger.shear_stiffness_n * flexibility
-        return tensioned_beam.timoshenko_waves(tension, shear, turning, deck, arch, modes)
+    @property
+    def gyration_m(self) -> float:
+        return float(np.sqrt(self.hanger.second_moment_m4 / self.hanger.area_m2))
 
     def _coupled(self, theta: FloatArray) -> PhysicalHanger:
         """Return the same with shear, in turnbuckles the bar's, and rotary inertia of the mass."""
-        hanger, one = self.hanger, np.ones(len(theta))
-        turning = hanger.mass_per_length_kg_m * hanger.second_moment_m4 / hanger.area_m2
+        one = np.ones(len(theta))
         return replace(
             super()._coupled(theta),
-            shear_compliance_1_n=one / hanger.shear_stiffness_n,
-            rotary_inertia_kg_m=turning * one,
+            shear_compliance_1_n=self.shear_compliance_1_n * one,
+            rotary_inertia_kg_m=self.hanger.mass_per_length_kg_m * self.gyration_m**2 * one,
         )

@@ -48,9 +48,9 @@ def tension_n(
     places = np.array(orders) - 1
 
     def off(point: FloatArray) -> FloatArray:
-        xi, spring = np.sqrt(point[:1]), _HALF_WAY * point[1:] / (1 - point[1:])
-        q = wave_numbers(xi, spring, spring, orders[-1])[0, places]
-        return np.asarray(np.log(q * np.hypot(xi, q)) - measured)
+        tension, spring = point[:1], _HALF_WAY * point[1:] / (1 - point[1:])
+        q = wave_numbers(tension, spring, spring, orders[-1])[0, places]
+        return np.asarray(np.log(q * np.sqrt(tension + q * q)) - measured)
 
     # As if pinned: f^2 is 1/4 n^2 pi^2 of xi^2 + n^2 pi^2 in these units.
     half_waves = (math.pi * orders[-1]) ** 2

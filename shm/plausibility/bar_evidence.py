@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from shm.models.tensioned_beam import timoshenko_frequencies_hz
+from shm.models.tensioned_beam import frequencies_hz
 from shm.values import NAN, PLANES, BoolArray, FloatArray, Hanger, ModalTest
 
 OriginKind: TypeAlias = Literal["hanger", "unknown bar", "time base", "planes"]
@@ -363,16 +363,16 @@ class _Solver:
         stiffer = np.exp(2 * theta[..., 1])
         stiffness = self._stiffness * stiffer
         springs = 10 ** theta[..., _SPRINGS] * (stiffness / self._length)[..., None]
-        hz = timoshenko_frequencies_hz(
+        hz = frequencies_hz(
             self._length[:, None],
             (self._nominal * np.exp(theta[..., 0]))[..., None],
             stiffness[..., None],
             self._mass[:, None],
-            (self._shear * stiffer / theta[..., _SHARE])[..., None],
-            self._gyration[:, None],
             springs[..., :2],
             springs[..., 2:],
             self._orders,
+            (theta[..., _SHARE] / (self._shear * stiffer))[..., None],
+            self._gyration[:, None],
         )
         return np.asarray(np.log(hz).reshape(*theta.shape[:2], -1))
 

@@ -11,7 +11,7 @@ from shm.values import FloatArray
 def mode_shape(xi: float, ka: float, kb: float, order: int, x: FloatArray) -> FloatArray:
     """Return the shape at `x` (points,) from 0 to 1, largest value 1, its first lobe positive."""
     deck = np.array([float(ka)])
-    along = waves(np.array([float(xi)]), deck, np.array([float(kb)]), order)
+    along = waves(np.array([float(xi) ** 2]), deck, np.array([float(kb)]), order)
     fine = np.linspace(0, 1, 40 * order + 1)
     found = shapes(along, deck[:, None], np.append(x, fine))[0, -1]
     of_fine = found[len(x) :]

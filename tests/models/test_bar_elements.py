@@ -60,8 +60,9 @@ def test_a_bar_that_shears_has_the_frequencies_of_its_closed_form(
     shear, turning = 1 / (3 * gyration**2), gyration**2
     elements = bar_elements([], xi, MODES, True)
     found = circular_frequencies(elements, xi**2, ends, shear=shear, turning=turning)
-    bar = map(np.array, (1.0, xi**2, 1.0, 1.0, shear, gyration, *ends))
-    expected = 2 * np.pi * tensioned_beam.timoshenko_frequencies_hz(*bar, MODES)
+    bar = map(np.array, (1.0, xi**2, 1.0, 1.0, *ends))
+    section = map(np.array, (1 / shear, gyration))
+    expected = 2 * np.pi * tensioned_beam.frequencies_hz(*bar, MODES, *section)
     np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 

@@ -31,8 +31,9 @@ def found_hz(
     shear_n: object = SHEAR,
     gyration_m: object = GYRATION,
 ) -> FloatArray:
-    sets = (length_m, tension_n, EI, MASS, shear_n, gyration_m, deck, arch)
-    return tensioned_beam.timoshenko_frequencies_hz(*map(np.asarray, sets), modes)
+    bar = map(np.asarray, (length_m, tension_n, EI, MASS, deck, arch))
+    section = 1 / np.asarray(shear_n), np.asarray(gyration_m)
+    return tensioned_beam.frequencies_hz(*bar, modes, *section)
 
 
 @pytest.mark.parametrize("length_m", [2.0, 3.0, 12.0])

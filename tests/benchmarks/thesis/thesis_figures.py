@@ -306,7 +306,7 @@ def solutions(figure: Drawn, points: int = _POINTS) -> Solutions:
     """What a figure shows."""
     xi = np.linspace(figure.low, figure.high, points)
     springs = np.full_like(xi, figure.spring)
-    q = wave_numbers(xi, springs, springs, MODES)
+    q = wave_numbers(xi**2, springs, springs, MODES)
     omega = q * np.hypot(xi[:, None], q)
     order = np.arange(1, MODES + 1)
     if figure.quantity == "eta":
