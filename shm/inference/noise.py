@@ -57,6 +57,7 @@ def grid_model_errors(
     if beyond_usual:
         density[nodes > usual] = (1 - likely) / (top - usual)
     share = density * (nodes[1] - nodes[0])
+    share[-1] /= 2
     # The first stands for all that is too small to be felt.
     share[0] = share[0] / 2 + likely * (lowest - smallest) / (usual - smallest)
     return np.exp(nodes), np.log(share / share.sum())
