@@ -70,7 +70,7 @@ def _of_frequencies(
     sd = observations.sd[: observations.design.frequencies]
     design, assumed = observations.design, observations.assumed
     known = np.isfinite(sd)
-    same = correlate_model_errors(design.frequency_plane, design.frequency_order, assumed)
+    same = correlate_model_errors(design.planes_and_orders, design.planes_and_orders, assumed)
     return [
         (
             errors * np.outer(frequency_sd, frequency_sd) + sigma**2 * same,

@@ -105,7 +105,7 @@ class FieldLikelihood(MeasuredFrequencies):
         # One more for what is `renumbered`, which so has the same reduced basis.
         self._modes = 1 + max(self.highest_order, self.shapes.highest_order)
         self._tension = model.parameter_names.index(TENSION)
-        self._together = correlate_model_errors(self._plane, self._order + 1, self._assumed)
+        self._together = self._correlate()
         self._shift, self._loads = self._systematic(model, self._typical(model))
 
     def predict(self, model: Model, theta: FloatArray) -> FloatArray:
@@ -151,7 +151,7 @@ class FieldLikelihood(MeasuredFrequencies):
         """Return the same with all orders higher `by` 1, or -1, settled at `theta` (d,)."""
         found = copy(self)
         found._order, found.shapes = self._order + by, self.shapes.renumbered(by)
-        found._together = correlate_model_errors(self._plane, found._order + 1, self._assumed)
+        found._together = found._correlate()
         found.settle(model, theta)
         return found
 
@@ -275,6 +275,11 @@ class FieldLikelihood(MeasuredFrequencies):
     def by_mode(self, predicted: FloatArray) -> FloatArray:
         """Predictions (n, modes) of every mode of every test, `explained`."""
         return self.explained(predicted)[:, self.of_mode]
+
+    def _correlate(self) -> FloatArray:
+        """Return the correlation (F, F) of the errors that repeat."""
+        modes = self._plane, self._order + 1
+        return correlate_model_errors(modes, modes, self._assumed)
 
     def sigma_grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
         least_sd = float(self.identification_error[: self.frequencies].min())

@@ -25,15 +25,21 @@ UNFELT = 0.1
 """Of the least standard deviation of a datum: loads and tau below that change nothing."""
 
 
-def correlate_model_errors(plane: IntArray, order: IntArray, assumed: Assumptions) -> FloatArray:
-    """Return the correlation (F, F) of the model's errors of modes, orders from 1.
+def correlate_model_errors(
+    modes: tuple[IntArray, IntArray],
+    others: tuple[IntArray, IntArray],
+    assumed: Assumptions,
+) -> FloatArray:
+    """Return the correlation (F, G) of the model's errors of `modes` with those of `others`.
 
-    Those of one plane and order are one error, whatever the test.
+    Both are planes (F,) and orders (F,) from 1. Those of one plane and order are one error,
+    whatever the test.
     """
-    log = np.log(order.astype(float))
-    apart = np.subtract.outer(log, log) / assumed.model_error_reach.value
-    same_plane = np.equal.outer(plane, plane)
-    same_mode = same_plane & np.equal.outer(order, order)
+    (plane, order), (other_plane, other_order) = modes, others
+    same_plane = np.equal.outer(plane, other_plane)
+    same_mode = same_plane & np.equal.outer(order, other_order)
+    apart = np.subtract.outer(np.log(order), np.log(other_order))
+    apart = apart / assumed.model_error_reach.value
     shared = np.exp(-0.5 * apart**2) * np.where(same_plane, 1.0, 0.5)
     together = assumed.model_error_shared.value
     return np.asarray((1 - together) * same_mode + together * shared)
