@@ -759,15 +759,6 @@ _DIAGNOSIS = (
         most=0.5,
     ),
     Assumption(
-        "field_noise_share",
-        0.5,
-        "probability",
-        JUDGEMENT,
-        "Of a diagnosis, that a bar is as rough as in the field, not as clean as in a simulator: "
-        "even odds.",
-        most=1.0,
-    ),
-    Assumption(
         "overlap_of_peaks",
         0.004,
         "of the frequency",

@@ -61,6 +61,11 @@ class Design:
         return np.asarray(self.frequency_plane * orders + self.frequency_order)
 
     @property
+    def planes_and_orders(self) -> tuple[IntArray, IntArray]:
+        """Return the plane and the order of each frequency, both (F,)."""
+        return self.frequency_plane, self.frequency_order
+
+    @property
     def amplitude(self) -> FloatArray:
         """At which each frequency (F,) was measured."""
         return np.array([each.amplitude for each in self.conditions])[self.frequency_test]

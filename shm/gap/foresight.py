@@ -12,10 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from shm.assumptions import Assumptions
 from shm.gap.contract import Design, Fit
 from shm.gap.noise import same_mode
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import identification_sd
+from shm.inference.noise import correlate_model_errors
 from shm.values import NAN, FloatArray, IntArray
 
 _STEP_IN_SDS = 0.1  # numerical: far from rounding, near enough for slopes to hold
@@ -38,14 +40,15 @@ class Errors:
     """The errors of data: of old frequencies by `frequency_sd` (F,), of any shape by `shape_sd`.
 
     Frequencies err by `repeated` as well, a fraction: the model error, the same for a mode in all
-    tests. Explanations that are compared are given the same errors, lest a difference in errors
-    pass for one in prediction. Something unknown adds a `remainder`, a fraction that comes again in
-    every test, alike over orders by `pattern`.
+    tests, correlated as is `assumed`. Explanations that are compared are given the same errors,
+    lest a difference in errors pass for one in prediction. Something unknown adds a `remainder`, a
+    fraction that comes again in every test, alike over orders by `pattern`.
     """
 
     frequency_sd: FloatArray
     shape_sd: float
     repeated: float
+    assumed: Assumptions
     remainder: float = 0.0
     pattern: Pattern = same_mode
 
@@ -58,12 +61,17 @@ class Errors:
             sd[:count],
             float(np.median(sd[count:])) if len(sd) > count else unseen,
             fit.model_error if np.isfinite(known).any() else 0.0,
+            problem.observations.assumed,
         )
 
     def between(self, one: Design, other: Design) -> FloatArray:
         """Return the covariance (F of one, F of the other) of what repeats."""
-        of_modes = self.repeated**2 * same_mode(one, other)
-        return np.asarray(of_modes + self.remainder**2 * self.pattern(one, other))
+        together = correlate_model_errors(
+            one.planes_and_orders, other.planes_and_orders, self.assumed
+        )
+        return np.asarray(
+            self.repeated**2 * together + self.remainder**2 * self.pattern(one, other)
+        )
 
 
 class NewTests:

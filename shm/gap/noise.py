@@ -1,20 +1,15 @@
 """The unknown errors of the data, and the discrepancy that stands for what is not in the catalogue:
 a few possibilities, each a covariance with a prior weight.
 
-The frequencies err by their identification, by a small model error that belongs to a mode and so
-repeats in every test, and by what repeats in any case (`shm.gap.repeated_errors`): cov = factor^2
-diag(sd) R diag(sd) + sigma^2 [same plane and order] + repeated. Identification errs independently,
-but for peaks of both planes that overlap in a test: R correlates those by an unknown part, and a
-frequency of small amplitude with the same one at that of the hit. sigma is as likely half-normal of
-2e-5, as the general model agrees with independent finite elements, as it is log-uniform from there
-to 3e-3: sound hangers of others had errors of up to 5e-4 that repeat in every test, and whoever
-takes none of it for scatter finds a cause in each. Stated standard deviations rest on a few hits
-and are themselves uncertain: those of one mode in several tests are drawn together as far as they
-differ by chance, and `factor`, what is left and common to all, has a log-normal prior of 20 %. That
-of the shapes is taken from their own scatter between tests. Where no standard deviations are given
-there is instead one unknown standard deviation for all, log-uniform, beside what rounding adds
-(`shm.gap.observations`); where some are, both. Unknowns are integrated by the trapezoidal rule over
-their logarithm.
+The frequencies err by their identification, as stated to within a factor phi, by an error of each
+mode that repeats in all tests, of unknown size tau (`shm.inference.noise`), and by what repeats in
+any case (`shm.gap.repeated_errors`): cov = phi^2 diag(sd) R diag(sd) + tau^2 [together] + repeated.
+Identification errs independently, but for peaks of both planes that overlap in a test: R correlates
+those by an unknown part, and a frequency of small amplitude with the same one at that of the hit.
+Stated standard deviations of one mode in several tests are drawn together as far as they differ by
+chance. That of the shapes is taken from their own scatter between tests. Where no standard
+deviations are given there is instead one unknown standard deviation for all, log-uniform, beside
+what rounding adds (`shm.gap.observations`); where some are, both.
 
 The discrepancy is a remainder of the data that is free to take many forms. That of the frequencies
 is a Gaussian process over their fractional deviations (Kennedy and O'Hagan, J. R. Stat. Soc. B 63,
@@ -35,13 +30,11 @@ from shm.gap.contract import Design, Observations
 from shm.gap.observations import rounding_covariance
 from shm.gap.repeated_errors import Repeated, turned_modes
 from shm.inference.likelihood import Covariance, NoiseNode
+from shm.inference.noise import correlate_model_errors, grid_model_errors, grid_sd_factors
 from shm.values import FloatArray, IntArray
 
-# As the general model and other finite elements differ at most (docs/gap.md, what is compared).
-MODEL_ERROR_SCALE = 2e-5
-MEAN_MODEL_ERROR = MODEL_ERROR_SCALE * float(np.sqrt(2 / np.pi))  # of a half-normal
-# Technical: below 3e-6 nothing shows; ten steps of a factor of 2 to the usual model error's end.
-_SIGMA_LOWER, _SIGMAS = 3e-6, 10
+# Numerical: a mean over finer ones is hardly another.
+_PHI_NODES, _STEP_IN_SD = 3, 1.6
 _CHANCE = 1 / 40  # variance of the logarithm of a standard deviation that has 20 degrees of freedom
 _SDS, _SDS_OF_SOME = 32, 12  # technical: steps of a fifth and a half in the logarithm
 # Judgement: three standard deviations are wild; data that scatter by less than half of what they
@@ -75,7 +68,9 @@ def _of_frequencies(
 ) -> list[tuple[FloatArray, float, float]]:
     """Covariances (F, F) of what does not repeat in any case, weights, and the errors they mean."""
     sd = observations.sd[: observations.design.frequencies]
-    known, same = np.isfinite(sd), same_mode(observations.design)
+    design, assumed = observations.design, observations.assumed
+    known = np.isfinite(sd)
+    same = correlate_model_errors(design.planes_and_orders, design.planes_and_orders, assumed)
     return [
         (
             errors * np.outer(frequency_sd, frequency_sd) + sigma**2 * same,
@@ -83,9 +78,9 @@ def _of_frequencies(
             float(sigma if known.any() else common),
         )
         for errors, of_errors in correlations
-        for common, of_common in zip(*_unknown_sds(known, observations.assumed), strict=True)
-        for factor, of_factor in zip(*_factors(known, observations.assumed), strict=True)
-        for sigma, of_sigma in zip(*_model_errors(known, observations.assumed), strict=True)
+        for common, of_common in zip(*_unknown_sds(known, assumed), strict=True)
+        for factor, of_factor in zip(*_factors(known, assumed), strict=True)
+        for sigma, of_sigma in zip(*_model_errors(observations), strict=True)
         for frequency_sd in [np.where(known, factor * sd, common)]
     ]
 
@@ -168,8 +163,8 @@ def _factors(known: FloatArray, assumed: Assumptions) -> tuple[FloatArray, Float
     """Values of true over stated standard deviations of frequencies, and their weights."""
     if not known.any():
         return np.ones(1), np.ones(1)
-    away, share = np.array(_HERMITE).T
-    return np.exp(assumed.stated_sd_log_sd.value * away), share
+    values, log_share = grid_sd_factors(_PHI_NODES, assumed)
+    return values, np.exp(log_share)
 
 
 def _factors_of_shapes(observations: Observations) -> list[tuple[float, float]]:
@@ -210,27 +205,21 @@ def _between_tests(observations: Observations) -> tuple[float, float]:
     return max(scatter, _LEAST_SCATTER), freedom
 
 
-def _model_errors(known: FloatArray, assumed: Assumptions) -> tuple[FloatArray, FloatArray]:
-    """Values of sigma and their weights; no sigma where all standard deviations are unknown."""
-    if not known.any():
+def _model_errors(observations: Observations) -> tuple[FloatArray, FloatArray]:
+    """Values of tau and their weights; no tau where all standard deviations are unknown."""
+    sd = observations.sd[: observations.design.frequencies]
+    if not np.isfinite(sd).any():
         return np.zeros(1), np.ones(1)
-    values = np.geomspace(_SIGMA_LOWER, assumed.model_error.upper, _SIGMAS)
-    density = values * np.exp(-((values / MODEL_ERROR_SCALE) ** 2) / 2)
-    # Below its smallest value the prior is flat: its integral there is the density by logarithm.
-    rayleigh = _trapezoidal(density, below=density[0] / np.log(values[1] / values[0]))
-    field = _trapezoidal((values >= MODEL_ERROR_SCALE).astype(float))
-    share = assumed.field_noise_share.value
-    return values, np.asarray((1 - share) * rayleigh + share * field)
+    step = _STEP_IN_SD / float(np.sqrt(2 * len(np.unique(observations.design.mode))))
+    least_sd = float(np.nanmin(sd))
+    values, log_share = grid_model_errors(least_sd, step, observations.assumed, beyond_usual=False)
+    return values, np.exp(log_share)
 
 
-def _trapezoidal(density: FloatArray, below: float = 0.0) -> FloatArray:
-    """Weights of values evenly spaced in the logarithm, of a density by the logarithm.
-
-    The first gets what lies `below` it as well, in units of the spacing.
-    """
+def _trapezoidal(density: FloatArray) -> FloatArray:
+    """Weights of values evenly spaced in the logarithm, of a density by the logarithm."""
     weights = density.copy()
     weights[[0, -1]] /= 2
-    weights[0] += below
     return np.asarray(weights / weights.sum())
 
 

@@ -12,7 +12,6 @@ import numpy as np
 import scipy
 
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.noise import MEAN_MODEL_ERROR
 from shm.gap.problem import GapProblem
 from shm.inference.linear import Linear
 from shm.values import BoolArray, FloatArray
@@ -133,8 +132,7 @@ def _scanned(
 
 
 def usual_error(linear: Linear) -> int:
-    """Return the index of the likeliest errors among those with a usual model error."""
+    """Return the index of the likeliest errors among those with the least model error."""
     error = np.array([each.model_error for each in linear.likelihood.nodes])
-    away = np.abs(np.log(np.maximum(error, 1e-12) / MEAN_MODEL_ERROR))
-    usual = away < away.min() + 1e-9
-    return int(np.where(usual, linear.likelihood.log_weight, -np.inf).argmax())
+    least = error <= error.min()
+    return int(np.where(least, linear.likelihood.log_weight, -np.inf).argmax())

@@ -1,14 +1,10 @@
 """The noise of the field: what a measured frequency of a real hanger is off by, in three parts.
 
-- The identification's error, with the standard deviation s that was stated, which is itself an
-  estimate: the true one is phi s, phi log-normal with a spread of 20 % and heavier tails (a
-  jackknife over five hits is no better). Tests of one mode that repeat teach phi.
-- An error of each mode that repeats in all tests, of unknown size tau: what no model has.
-  Log-uniform from 1e-5 to 3e-3 with probability 0.95 (sound hangers that others measured had up to
-  5e-4), and up to 0.3 with the rest: a class that does not fit gets a wide posterior, not a sharp
-  one at a wrong place. Half of its variance is each mode's own, half goes together in neighbouring
-  orders: what a model lacks is seldom of one mode alone, and many modes that lack
-  the same thing teach less than as many that err by themselves.
+- The identification's error, as stated to within a factor phi, and an error of each mode that
+  repeats in all tests, of unknown size tau (`shm.inference.noise`). Tests of one mode that repeat
+  teach phi.
+- What physics says of errors that tests share (`shm.inference.systematic_errors`): a mean and loads
+  U. The covariance is phi^2 S + tau^2 R + U U' with S = diag(s^2).
 - A measured tension errs by its own standard deviation and by what frequencies do not see of the
   bar's mass and length.
 
@@ -16,8 +12,6 @@ Mode shapes have their own errors (`shm.inference.shapes`).
 
 Both unknowns are integrated out on a grid: tau in steps of 1.6 standard deviations of what the data
 can tell, phi at equally probable values.
-What physics says of errors that tests share (`shm.inference.systematic_errors`) adds a mean and
-loads U: the covariance is phi^2 S + tau^2 R + U U' with S = diag(s^2).
 """
 
 from __future__ import annotations
@@ -28,11 +22,16 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-import scipy
 
 from shm.assumptions import Assumptions
 from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
 from shm.inference.measured import MeasuredFrequencies, conditions_of, predicted_hz
+from shm.inference.noise import (
+    UNFELT,
+    correlate_model_errors,
+    grid_model_errors,
+    grid_sd_factors,
+)
 from shm.inference.shapes import SHAPES, MeasuredShapes
 from shm.inference.systematic_errors import (
     errors_of_sensors,
@@ -49,9 +48,6 @@ from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
 # Numerical: log likelihoods within 0.06 of those by 25 nodes where data miss by their own standard
 # deviation; where they miss by more tau takes it up. Cost is in proportion.
 _PHI_NODES = 3
-
-_UNFELT = 0.1
-"""Of the least standard deviation of a datum: loads and tau below that change nothing."""
 
 
 class FieldLikelihood(MeasuredFrequencies):
@@ -95,8 +91,9 @@ class FieldLikelihood(MeasuredFrequencies):
         self.identification_error: FloatArray = np.append(
             total**-0.5, [tension_sd] * self.has_reading
         )
-        self._phi, self._log_phi = _sd_factors(scatter, len(keys) - len(distinct), self._assumed)
-        jacobian = -float(value.sum()) - (len(keys) - len(distinct)) / 2 * np.log(2 * np.pi)
+        repeated = len(keys) - len(distinct)
+        self._phi, self._log_phi = grid_sd_factors(_PHI_NODES, self._assumed, scatter, repeated)
+        jacobian = -float(value.sum()) - repeated / 2 * np.log(2 * np.pi)
         of_means = np.log(total**-0.5).sum() - np.log(sd).sum()
         self._constant = jacobian + float(of_means)
         if reading is not None:
@@ -108,7 +105,7 @@ class FieldLikelihood(MeasuredFrequencies):
         # One more for what is `renumbered`, which so has the same reduced basis.
         self._modes = 1 + max(self.highest_order, self.shapes.highest_order)
         self._tension = model.parameter_names.index(TENSION)
-        self._together = self._goes_together()
+        self._together = self._correlate()
         self._shift, self._loads = self._systematic(model, self._typical(model))
 
     def predict(self, model: Model, theta: FloatArray) -> FloatArray:
@@ -154,7 +151,7 @@ class FieldLikelihood(MeasuredFrequencies):
         """Return the same with all orders higher `by` 1, or -1, settled at `theta` (d,)."""
         found = copy(self)
         found._order, found.shapes = self._order + by, self.shapes.renumbered(by)
-        found._together = found._goes_together()
+        found._together = found._correlate()
         found.settle(model, theta)
         return found
 
@@ -186,7 +183,7 @@ class FieldLikelihood(MeasuredFrequencies):
         smallest = self._assumed.model_error.lower
         least = max(self.identification_error[: self.frequencies].min(), smallest)
         left, size, _ = np.linalg.svd(loads, full_matrices=False)
-        felt = size > _UNFELT * least
+        felt = size > UNFELT * least
         return np.append(mean, np.zeros(int(self.has_reading))), left[:, felt] * size[felt]
 
     def _log_with_radius(self, model: Model, theta: FloatArray) -> Callable[[float], FloatArray]:
@@ -279,33 +276,15 @@ class FieldLikelihood(MeasuredFrequencies):
         """Predictions (n, modes) of every mode of every test, `explained`."""
         return self.explained(predicted)[:, self.of_mode]
 
-    def _goes_together(self) -> FloatArray:
-        """Correlation (F, F) of the errors that repeat."""
-        log = np.log(self._order + 1.0)
-        apart = np.subtract.outer(log, log) / self._assumed.model_error_reach.value
-        plane = np.equal.outer(self._plane, self._plane)
-        same_mode = plane & np.equal.outer(self._order, self._order)
-        shared = np.exp(-0.5 * apart**2) * np.where(plane, 1.0, 0.5)
-        together = self._assumed.model_error_shared.value
-        return np.asarray((1 - together) * same_mode + together * shared)
+    def _correlate(self) -> FloatArray:
+        """Return the correlation (F, F) of the errors that repeat."""
+        modes = self._plane, self._order + 1
+        return correlate_model_errors(modes, modes, self._assumed)
 
     def sigma_grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
+        least_sd = float(self.identification_error[: self.frequencies].min())
         step = step_in_sd / np.sqrt(2 * self.frequencies)
-        least = 2 * _UNFELT * float(self.identification_error[: self.frequencies].min())
-        smallest, usual = np.log(self._assumed.model_error.bounds)
-        likely = self._assumed.usual_model_error_share.value
-        lowest = np.clip(np.log(least), smallest, max(smallest, usual - np.log(10)))
-        top = np.log(self._assumed.largest_model_error.value)
-        nodes = np.linspace(lowest, top, int((top - lowest) / step) + 2)
-        density = np.where(
-            nodes <= usual,
-            likely / (usual - smallest),
-            (1 - likely) / (top - usual),
-        )
-        share = density * (nodes[1] - nodes[0])
-        # The first stands for all that is too small to be felt.
-        share[0] = share[0] / 2 + likely * (lowest - smallest) / (usual - smallest)
-        return np.exp(nodes), np.log(share / share.sum())
+        return grid_model_errors(least_sd, step, self._assumed, beyond_usual=True)
 
 
 def _values(
@@ -326,21 +305,3 @@ def _values(
     unstated = assumed.unstated_frequency_sd.value
     scatter = np.sqrt(((value - mean[of_mode]) ** 2).sum() / free) if free > 1 else unstated
     return value, np.where(known, sd, max(float(scatter), assumed.model_error.lower))
-
-
-def _sd_factors(
-    scatter: float, freedom: int, assumed: Assumptions
-) -> tuple[FloatArray, FloatArray]:
-    """Equally probable values of phi (k,), and log weights (k,) that hold what the tests' scatter
-    about their means, `scatter` in stated variances with its degrees of `freedom`, says of them.
-    """
-    grid = np.linspace(-1.5, 2.5, 401)
-    spread, tails = assumed.stated_sd_log_sd.value, assumed.stated_sd_freedom.value
-    log = -(tails + 1) / 2 * np.log1p((grid / spread) ** 2 / tails)
-    prior = log - scipy.special.logsumexp(log)
-    joint = prior - freedom * grid - 0.5 * scatter * np.exp(-2 * grid)
-    total = float(scipy.special.logsumexp(joint))
-    share = np.exp(joint - total).cumsum()
-    middle = (np.arange(_PHI_NODES) + 0.5) / _PHI_NODES
-    nodes = np.interp(middle, share, grid)
-    return np.exp(nodes), np.full(_PHI_NODES, total - np.log(_PHI_NODES))

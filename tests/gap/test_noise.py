@@ -12,8 +12,6 @@ from scipy.special import logsumexp
 from shm.assumptions import DEFAULTS
 from shm.gap.contract import Observations
 from shm.gap.noise import (
-    MEAN_MODEL_ERROR,
-    MODEL_ERROR_SCALE,
     drawn_together,
     nodes,
 )
@@ -22,9 +20,6 @@ from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
 from shm.values import FloatArray
 from tests.gap import linear_toy as toy
 
-SIGMA_UPPER = 3e-3
-"""The largest error of a mode that repeats in all tests, as the module's docstring has it."""
-FACTOR_SPREAD = DEFAULTS.stated_sd_log_sd.value
 SD_LOWER, SD_UPPER = DEFAULTS.unstated_frequency_sd.bounds
 
 
@@ -89,8 +84,8 @@ def test_peaks_that_overlap_may_err_together() -> None:
 def test_the_mean_model_error_is_that_of_its_prior() -> None:
     found = nodes(_observations())
     mean = sum(np.exp(node.log_weight) * node.model_error for node in found)
-    field = (SIGMA_UPPER - MODEL_ERROR_SCALE) / np.log(SIGMA_UPPER / MODEL_ERROR_SCALE)
-    assert mean == pytest.approx((MEAN_MODEL_ERROR + field) / 2, rel=0.1)
+    least, most = DEFAULTS.model_error.bounds
+    assert mean == pytest.approx((most - least) / np.log(most / least), rel=0.1)
 
 
 def test_the_model_error_and_the_factor_are_integrated_right() -> None:
@@ -107,17 +102,15 @@ def test_the_model_error_and_the_factor_are_integrated_right() -> None:
     )
     found = Likelihood(nodes(Observations(few, np.zeros(1), np.array([1e-4]))))
 
-    log_factor = np.linspace(np.log(0.5), np.log(2.0), 121)
-    factor = np.exp(log_factor)[:, None]
-    sigma = np.concatenate([np.linspace(0, 1.5e-4, 301), np.geomspace(1.501e-4, SIGMA_UPPER, 300)])
-    with np.errstate(divide="ignore"):
-        field = 1 / sigma / np.log(SIGMA_UPPER / MODEL_ERROR_SCALE)
-    own = stats.halfnorm.pdf(sigma, scale=MODEL_ERROR_SCALE)
-    whole = (own + np.where(sigma >= MODEL_ERROR_SCALE, field, 0.0)) / 2
-    prior = whole * stats.norm.pdf(log_factor[:, None], scale=FACTOR_SPREAD)
+    log_factor = np.linspace(-2.0, 2.0, 401)
+    spread, freedom = DEFAULTS.stated_sd_log_sd.value, DEFAULTS.stated_sd_freedom.value
+    of_factor = stats.t.pdf(log_factor / spread, freedom) / spread
+    log_tau = np.linspace(*np.log(DEFAULTS.model_error.bounds), 400)
+    of_tau = 1 / np.ptp(log_tau)
     for residual in (0.0, 1e-4, 3e-4, 2e-3):
-        values = prior * stats.norm.pdf(residual, scale=np.hypot(1e-4 * factor, sigma))
-        exact = integrate.trapezoid(integrate.trapezoid(values, sigma), log_factor)
+        sd = np.hypot(1e-4 * np.exp(log_factor[:, None]), np.exp(log_tau))
+        values = of_tau * of_factor[:, None] * stats.norm.pdf(residual, scale=sd)
+        exact = integrate.trapezoid(integrate.trapezoid(values, log_tau), log_factor)
         assert found.log(np.array([[residual]]))[0] == pytest.approx(np.log(exact), abs=0.12)
 
 

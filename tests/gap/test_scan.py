@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from shm.gap.contract import Hypothesis
-from shm.gap.noise import MEAN_MODEL_ERROR
 from shm.gap.scan import VISIBLE, Scan, scan, scan_pair
 from shm.gap.search import fit_alone
 from shm.inference.linear import Linear
@@ -46,9 +45,9 @@ def test_scan_visible_beyond_baseline() -> None:
     problem, rng = problem_of(campaign()), np.random.default_rng(1)
     before, found = fit_alone(problem, rng), scan_of(problem, STIFFER)
     nodes = problem.likelihood(Hypothesis()).nodes
-    away = np.abs(np.log([node.model_error / MEAN_MODEL_ERROR for node in nodes]))
+    error = np.array([node.model_error for node in nodes])
     off = []
-    for node in (n for n, each in zip(nodes, away, strict=True) if each < away.min() + 1e-6):
+    for node in (n for n, each in zip(nodes, error, strict=True) if each <= error.min()):
         covariance = node.covariance.frequency + before.slopes @ before.slopes.T
         square = np.einsum("gi,ig->g", found.shift, np.linalg.solve(covariance, found.shift.T))
         off.append(np.abs(found.visible / np.sqrt(square) - 1).max())
