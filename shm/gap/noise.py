@@ -34,7 +34,7 @@ from shm.inference.noise import correlate_model_errors, grid_model_errors, grid_
 from shm.values import FloatArray, IntArray
 
 # Numerical: a mean over finer ones is hardly another.
-_PHI_NODES, _STEP_IN_SD = 3, 1.6
+_STEP_IN_SD = 1.6
 _CHANCE = 1 / 40  # variance of the logarithm of a standard deviation that has 20 degrees of freedom
 _SDS, _SDS_OF_SOME = 32, 12  # technical: steps of a fifth and a half in the logarithm
 # Judgement: three standard deviations are wild; data that scatter by less than half of what they
@@ -163,7 +163,7 @@ def _factors(known: FloatArray, assumed: Assumptions) -> tuple[FloatArray, Float
     """Values of true over stated standard deviations of frequencies, and their weights."""
     if not known.any():
         return np.ones(1), np.ones(1)
-    values, log_share = grid_sd_factors(_PHI_NODES, assumed)
+    values, log_share = grid_sd_factors(assumed)
     return values, np.exp(log_share)
 
 

@@ -45,10 +45,6 @@ from shm.models import AsMade, Model
 from shm.models.as_made import TENSION
 from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
 
-# Numerical: log likelihoods within 0.06 of those by 25 nodes where data miss by their own standard
-# deviation; where they miss by more tau takes it up. Cost is in proportion.
-_PHI_NODES = 3
-
 
 class FieldLikelihood(MeasuredFrequencies):
     """Measured frequencies, one mode in all tests of like conditions together; their likelihood.
@@ -92,7 +88,7 @@ class FieldLikelihood(MeasuredFrequencies):
             total**-0.5, [tension_sd] * self.has_reading
         )
         repeated = len(keys) - len(distinct)
-        self._phi, self._log_phi = grid_sd_factors(_PHI_NODES, self._assumed, scatter, repeated)
+        self._phi, self._log_phi = grid_sd_factors(self._assumed, scatter, repeated)
         jacobian = -float(value.sum()) - repeated / 2 * np.log(2 * np.pi)
         of_means = np.log(total**-0.5).sum() - np.log(sd).sum()
         self._constant = jacobian + float(of_means)

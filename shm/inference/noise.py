@@ -21,6 +21,10 @@ import scipy
 from shm.assumptions import Assumptions
 from shm.values import FloatArray, IntArray
 
+# Numerical: log likelihoods within 0.06 of those by 25 nodes where data miss by their own standard
+# deviation; where they miss by more tau takes it up. Cost is in proportion.
+_PHI_NODES = 3
+
 UNFELT = 0.1
 """Of the least standard deviation of a datum: loads and tau below that change nothing."""
 
@@ -70,9 +74,9 @@ def grid_model_errors(
 
 
 def grid_sd_factors(
-    count: int, assumed: Assumptions, scatter: float = 0.0, freedom: int = 0
+    assumed: Assumptions, scatter: float = 0.0, freedom: int = 0
 ) -> tuple[FloatArray, FloatArray]:
-    """Return equally probable values of phi (count,), and log weights (count,).
+    """Return equally probable values of phi (k,), and log weights (k,).
 
     `scatter` is that of tests about their means, in stated variances, with its degrees of
     `freedom`; the weights hold what it says of phi.
@@ -85,6 +89,6 @@ def grid_sd_factors(
     total = float(scipy.special.logsumexp(joint))
     share = np.exp(joint - total)
     reached = share.cumsum() - share / 2
-    middle = (np.arange(count) + 0.5) / count
+    middle = (np.arange(_PHI_NODES) + 0.5) / _PHI_NODES
     nodes = np.interp(middle, reached, grid)
-    return np.exp(nodes), np.full(count, total - np.log(count))
+    return np.exp(nodes), np.full(_PHI_NODES, total - np.log(_PHI_NODES))
