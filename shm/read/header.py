@@ -141,7 +141,7 @@ class Header:
 
     @property
     def operator(self) -> str:
-        """Who measured; empty where nothing says it."""
+        """Return the person who measured; empty where nothing says it."""
         entry = self._given("operator")
         return "" if entry is None else entry.text
 

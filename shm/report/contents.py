@@ -89,7 +89,7 @@ class Dated:
 
 @dataclass(frozen=True)
 class Deed:
-    """What a person did with the hanger, such as `baseline set`, and by whom and why."""
+    """Hold an act of a person on the hanger, such as `baseline set`, and by whom and why."""
 
     kind: str
     at: datetime

@@ -1,4 +1,4 @@
-"""How a chunk fits those that came before it, and how chunks are joined to pieces without a gap.
+"""Compare a chunk with those that came before it, and join chunks to pieces without a gap.
 
 Whatever stamps say to the millisecond. Where two chunks are of one time, the samples of the one
 that came first count, unless its clock was ahead.

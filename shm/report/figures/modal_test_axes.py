@@ -1,4 +1,4 @@
-"""What the figures of a hammer test share: their data, the range of frequencies, marks of modes."""
+"""Prepare the figures of a hammer test: their data, the range of frequencies, marks of modes."""
 
 from __future__ import annotations
 
