@@ -30,7 +30,7 @@ from shm.modes_document import load_modes
 from shm.values import Hanger, ModalTest
 from shm_cli import errors
 from shm_cli.flags import wants_json
-from shm_cli.terminal import Terminal
+from shm_cli.terminal import Terminal, escape_controls
 
 if TYPE_CHECKING:
     from shm.report.figures.specification import Illustration
@@ -70,7 +70,9 @@ def show_rows(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]
     from shm.report.paper import Table
 
     width = shutil.get_terminal_size((_WIDTH_OF_A_FILE, 24)).columns
-    made = Table("", tuple(headings), tuple(tuple(row) for row in rows))
+    # Before click leaves out what would colour a terminal, and as wide as it is then.
+    escaped = tuple(tuple(escape_controls(cell) for cell in row) for row in rows)
+    made = Table("", tuple(headings), escaped)
     if title:
         click.echo(title)
     click.echo(laid_out(made, width).strip("\n") + "\n")

@@ -93,7 +93,7 @@ class _Blocks:
         return np.asarray(self._whitening @ residual.T[self._rows])
 
     def add_weighed(self, columns: FloatArray, total: FloatArray) -> None:
-        """Adds C^-1 X of columns X (data, c) to `total` (nodes, F, c)."""
+        """Add C^-1 X of columns X (data, c) to `total` (nodes, F, c)."""
         white = self._whitening @ columns[self._rows]
         total[:, self._rows] += np.swapaxes(self._whitening, 2, 3) @ white
 
@@ -173,7 +173,7 @@ class Likelihood:
 
     @classmethod
     def of(cls, errors: Covariance, model_error: float) -> Likelihood:
-        """That of errors of known size."""
+        """Return that of errors of known size."""
         return cls([NoiseNode(errors, 0.0, model_error)])
 
     def by_node(self, residual: FloatArray) -> FloatArray:
@@ -243,7 +243,7 @@ def _rows(covariances: FloatArray) -> list[IntArray]:
 
 
 def _distinct(arrays: Sequence[tuple[FloatArray, ...]]) -> tuple[list[int], IntArray]:
-    """Indices of those that differ and, for each of all, which of them it is."""
+    """Return indices of those that differ and, for each of all, which of them it is."""
     found: dict[tuple[bytes, ...], int] = {}
     first: list[int] = []
     index = np.empty(len(arrays), dtype=np.int64)

@@ -38,7 +38,7 @@ class Normal:
 
     @classmethod
     def of(cls, z: FloatArray, weights: FloatArray | None = None) -> Normal:
-        """The normal of a population (n, d) with optional weights (n,)."""
+        """Return the normal of a population (n, d) with optional weights (n,)."""
         covariance = np.atleast_2d(np.cov(z.T, aweights=weights))
         return cls(np.average(z, axis=0, weights=weights), covariance)
 
@@ -47,7 +47,7 @@ class Normal:
         return np.asarray((z - self.mean) @ self.inverse_factor.T)
 
     def colour(self, y: FloatArray) -> FloatArray:
-        """The inverse of `whiten`."""
+        """Return points (n, d) of what `whiten` returned."""
         return np.asarray(self.mean + y @ self.factor.T)
 
     def draw_t(self, n: int, rng: np.random.Generator) -> FloatArray:
@@ -89,12 +89,12 @@ class TMixture:
         return cls([_shrunk(cluster, whole) for cluster in members], shares)
 
     def mixed(self, other: TMixture, share: float) -> TMixture:
-        """This mixture and `other`, which gets `share` of it."""
+        """Return this mixture and `other`, which gets `share` of it."""
         shares = np.append((1 - share) * self.shares, share * other.shares)
         return TMixture([*self.parts, *other.parts], shares)
 
     def joined(self, parts: Sequence[Normal], share: float) -> TMixture:
-        """This mixture with `parts` added, which get `share` of it in equal measure."""
+        """Return this mixture with `parts`, which get `share` of it in equal measure."""
         added = np.full(len(parts), share / len(parts))
         return TMixture([*self.parts, *parts], np.append((1 - share) * self.shares, added))
 
@@ -141,7 +141,7 @@ class TMixture:
 
 
 def _shrunk(cluster: FloatArray, whole: Normal) -> Normal:
-    """The normal of a cluster; a small one borrows covariance from the whole."""
+    """Return the normal of a cluster; a small one borrows covariance from the whole."""
     n, d = cluster.shape
     borrowed = (d + 2) / (n + d + 2)
     covariance = np.atleast_2d(np.cov(cluster.T))
@@ -149,7 +149,7 @@ def _shrunk(cluster: FloatArray, whole: Normal) -> Normal:
 
 
 def _fitted(z: FloatArray, owned: FloatArray, pulled: FloatArray, former: Normal) -> Normal:
-    """The t part of points `z` with their weights (n,) in it, plain and by distance."""
+    """Fit a t part to points `z` with their weights (n,) in it, plain and by distance."""
     effective = owned.sum() ** 2 / (owned**2).sum()
     retained = (z.shape[1] + 2) / (effective + z.shape[1] + 2)
     mean = (1 - retained) * (pulled @ z / pulled.sum()) + retained * former.mean
@@ -166,13 +166,13 @@ class Rows:
     """
 
     def take(self, rows: BoolArray | IntArray) -> Self:
-        """Some of the points, by index or choice."""
+        """Return some of the points, by index or choice."""
         return self._mapped(
             lambda field: field.take(rows) if isinstance(field, Rows) else field[rows]
         )
 
     def joined(self, other: Self) -> Self:
-        """These points and then the others."""
+        """Return these points and then the others."""
         return self._mapped(
             lambda field, its: (
                 field.joined(its) if isinstance(field, Rows) else np.concatenate([field, its])
@@ -181,7 +181,7 @@ class Rows:
         )
 
     def where(self, chosen: BoolArray, other: Self) -> Self:
-        """These points where `chosen` (n,), elsewhere the `other` ones."""
+        """Return these points where `chosen` (n,), elsewhere the `other` ones."""
 
         def either(field: Any, its: Any) -> Any:
             if isinstance(field, Rows):
@@ -244,7 +244,7 @@ class Pool(Generic[P, B]):
         self._append([(proposal, draws)], batch, log_target)
 
     def absorb(self, other: Pool[P, B]) -> None:
-        """The draws of another pool of the same target."""
+        """Add the draws of another pool of the same target."""
         self._append(other._proposals, other.batch, other._log_target)
 
     def _append(self, proposals: list[tuple[P, int]], batch: B, log_target: FloatArray) -> None:
@@ -301,6 +301,6 @@ def tempered(
 
 
 def systematic(weights: FloatArray, n: int, rng: np.random.Generator) -> IntArray:
-    """Indices (n,) drawn with `weights` by systematic resampling."""
+    """Draw indices (n,) with `weights` by systematic resampling."""
     positions = (np.arange(n) + rng.random()) / n
     return np.searchsorted(np.cumsum(weights), positions).clip(0, len(weights) - 1).astype(int)

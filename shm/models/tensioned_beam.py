@@ -144,7 +144,8 @@ def frequencies_hz(
     """Return natural frequencies, shape S + (modes,), where the arguments broadcast to the shape S.
 
     `shear_compliance_1_n` is 1/(kappa G A), `gyration_m` the radius of gyration sqrt(I/A). Modes
-    beyond the cut-off, at which sections swing by themselves, are NaN.
+    beyond the cut-off, at which sections swing by themselves, are NaN, as are those of a bar under
+    compression.
     """
 
     def solve(
@@ -155,6 +156,7 @@ def frequencies_hz(
         r: FloatArray,
         scale: FloatArray,
     ) -> FloatArray:
+        t = np.where(t < 0, np.nan, t)
         omega2 = _Section(t, e, r).omega_squared(_roots(t, ka, kb, e, r, modes))
         return np.asarray(scale * np.sqrt(np.where(e * r * omega2 < 1, omega2, np.nan)))
 

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import cache
 
 import numpy as np
 import scipy
@@ -36,8 +37,12 @@ _TAIL = 0.05  # 90 % lie between
 _DIGITS = 3  # probabilities that read alike are ordered by tension first
 _TRADED = 0.25  # judgement: of what an end does, that looks like another tension
 _BEYOND_DOUBT = 1e4  # judgement: times what a detection takes
-# Technical: draws of a standard normal law, evenly in probability.
-_NORMAL = scipy.special.ndtri((np.arange(SAMPLES) + 0.5) / SAMPLES)
+
+
+@cache
+def _normal() -> FloatArray:
+    """Return draws (samples,) of a standard normal distribution, evenly in probability."""
+    return np.asarray(scipy.special.ndtri((np.arange(SAMPLES) + 0.5) / SAMPLES))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +82,7 @@ class SummaryContext:
 
     def with_model(self, shifts: FloatArray) -> FloatArray:
         """Return draws of shifts (draws, q) with what the model leaves open."""
-        normal = np.random.default_rng(2).permutation(_NORMAL)[: len(shifts), None]
+        normal = np.random.default_rng(2).permutation(_normal())[: len(shifts), None]
         return np.asarray(shifts + self.model_uncertainty(shifts) * normal)
 
 
@@ -282,7 +287,7 @@ def summarize_drifts(
             its, _ = _draw_shifts(subject, evidence, part, loadings, is_last_counted=is_alone)
             shifts = its[:, j] if len(its) else shifts
         elif not evidence.called and not is_baseline:
-            shifts = quantity.step_sd * math.sqrt(float(np.exp(LOG_SHARES) @ SIZES**2)) * _NORMAL
+            shifts = quantity.step_sd * math.sqrt(float(np.exp(LOG_SHARES) @ SIZES**2)) * _normal()
         threshold = threshold_of(quantity.name, subject.hanger)
         least = subject.options.least_frequency_shift
         down, up = (
@@ -370,7 +375,7 @@ def drift_of_normal(
     quantity: WatchedQuantity, hanger: Hanger, at: tuple[str, datetime], mean: float, sd: float
 ) -> Drift:
     """Return the shift of which the coordinate has a normal law."""
-    shifts, threshold = mean + sd * _NORMAL, threshold_of(quantity.name, hanger)
+    shifts, threshold = mean + sd * _normal(), threshold_of(quantity.name, hanger)
     ways = (_share(_is_beyond(quantity, shifts, threshold, way, 0.0)) for way in (-1, 1))
     return drift_of(quantity, hanger, at, shifts, max(ways))
 

@@ -16,7 +16,7 @@ from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass
 from tests.helpers.gap_campaigns import fit_of, problem_of
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension
+from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, repeated, tension
 from tests.worlds.simulated.campaign import CampaignPlan
 from tests.worlds.simulated.campaign import campaign as simulated
 
@@ -75,13 +75,14 @@ def test_the_divergence_of_two_normal_distributions_is_the_closed_form():
 
 
 def test_what_is_foreseen_of_a_linear_toy_is_its_exact_predictive_distribution():
-    """Joint normal of old and new data, a mode's model error shared, conditioned on the old."""
+    """Joint normal of old and new data, the model's errors shared, conditioned on the old."""
     problem, error = toy(), 2e-3
     fit = problem.fit(STIFFER, model_error=error)
     new = like_the_present(problem.observations.design)
     seen = NewTests(problem, new).foresee(fit, Errors.of(problem, fit))
     slopes = np.vstack([with_order(problem.observations.design), with_order(new)])
-    joint = slopes @ slopes.T + SD**2 * np.eye(12) + error**2 * np.tile(np.eye(6), (2, 2))
+    shared = error**2 * repeated(new)
+    joint = slopes @ slopes.T + SD**2 * np.eye(12) + np.tile(shared, (2, 2))
     gain = joint[6:, :6] @ np.linalg.inv(joint[:6, :6])
     assert seen.mean == pytest.approx(gain @ problem.observations.value, abs=1e-9)
     assert seen.covariance == pytest.approx(joint[6:, 6:] - gain @ joint[:6, 6:], abs=1e-10)

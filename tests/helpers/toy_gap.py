@@ -70,10 +70,7 @@ class ToyProblem:
         """The exact posterior."""
         design, sd = self.observations.design, self.observations.sd
         f = design.frequencies
-        same = (design.frequency_plane[:, None] == design.frequency_plane) & (
-            design.frequency_order[:, None] == design.frequency_order
-        )
-        frequency = np.diag(sd[:f] ** 2) + model_error**2 * same
+        frequency = np.diag(sd[:f] ** 2) + model_error**2 * repeated(design)
         noise = Covariance(frequency, sd[f:] ** 2, np.zeros((len(sd) - f, 0)))
         precision = np.zeros((design.size, design.size))
         precision[:f, :f] = np.linalg.inv(noise.frequency)
@@ -96,6 +93,14 @@ class ToyProblem:
             log_evidence_sd=NAN,
             method="normal",
         )
+
+
+def repeated(design: Design) -> FloatArray:
+    """Return how a model's errors go together: half of the variance within an octave of orders."""
+    log = np.log(design.frequency_order)
+    same_plane = np.equal.outer(design.frequency_plane, design.frequency_plane)
+    near = np.exp(-((np.subtract.outer(log, log) / 0.7) ** 2) / 2) * np.where(same_plane, 1, 0.5)
+    return np.asarray((same_plane & np.equal.outer(log, log)) / 2 + near / 2)
 
 
 def design_of(
