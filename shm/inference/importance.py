@@ -15,12 +15,13 @@ import scipy
 from shm.inference.mixture import Pool, effective, evidence_error, normalised, systematic, tempered
 from shm.inference.posterior import Density
 from shm.inference.valley import Draws, Proposal
-from shm.values import FloatArray
+from shm.values import ENOUGH_EFFECTIVE, FloatArray
 
 # Numerical: the cost of a batch, and of all.
 _TRIAL, _MOST_TRIALS = 400, 8
-_FIRST, _FEWEST, _HOPELESS = 2.0, 200, 0.03
+_FIRST, _FEWEST = 2.0, 200
 _MOST_EXTENSIONS, _LONGEST, _MOST = 3, 3.0, 10_000
+_HOPELESS = ENOUGH_EFFECTIVE / _MOST  # of the trials: the most draws would not give enough
 
 _FEWEST_TO_FIT = 10  # effective draws a parameter: fewer make a covariance nearly singular
 _BATCHES = 4  # Gelman and Rubin's few chains: a quarter of the draws each
