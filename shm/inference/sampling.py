@@ -14,7 +14,7 @@ import numpy as np
 from shm.inference.chain import run_chain
 from shm.inference.importance import Weighted, weigh
 from shm.inference.likelihood import Covariance, Likelihood
-from shm.inference.mixture import normalised
+from shm.inference.mixture import effective, normalised, systematic
 from shm.inference.options import EMCEE, IMPORTANCE
 from shm.inference.posterior import Density, Peak, Points, climb
 from shm.inference.valley import Proposal, Valley, valleys_through
@@ -33,7 +33,8 @@ class Numerics:
     The first mixture has `clusters` parts. Where less than `poor` of the wanted draws are
     effective, it begins again from `again` points where the weight is, `attempts` times in all.
     `enough` draws are effective for each sample to keep, `fewest_effective` in all: fewer repeat
-    draws, more cost in proportion.
+    draws, more cost in proportion. Of a chain `candidates` times as many draws as are kept are
+    weighted.
     """
 
     along: int = 160
@@ -47,6 +48,7 @@ class Numerics:
     poor: float = 0.7
     again: int = 100
     enough: float = 0.35
+    candidates: int = 2
     fewest_effective: float = 1.5 * ENOUGH_EFFECTIVE
 
 
@@ -154,9 +156,14 @@ def _continue(
 ) -> tuple[Points, float, float]:
     """Return equal draws by emcee, how many of them are effective, and R-hat.
 
-    Half of the walkers start at weighted draws, half at points along the valley.
+    Half of the walkers start at weighted draws, half at points along the valley. They walk in the
+    rough density; what that is off by, weights of the draws correct.
     """
     drawn = weighted.resampled(len(points), rng).z
-    chain, size, r_hat = run_chain(density, np.vstack([drawn, points]), rng)
-    chosen = chain[rng.choice(len(chain), samples, replace=len(chain) < samples)]
-    return density.evaluate(chosen), size, r_hat
+    chain, size, r_hat = run_chain(density.rough, np.vstack([drawn, points]), rng)
+    count = _SET.candidates * samples
+    chosen = chain[rng.choice(len(chain), count, replace=len(chain) < count)]
+    exact = density.evaluate(chosen)
+    weights = normalised(density.log_posterior(exact) - density.rough.log(chosen))
+    kept = rng.permutation(systematic(weights, samples, rng))
+    return exact.take(kept), size * effective(weights) / count, r_hat
