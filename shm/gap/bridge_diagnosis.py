@@ -93,7 +93,7 @@ def examine_hanger(
     """Return the evidence of a hanger that is diagnosed for itself."""
     diagnosis, attribution = examined(tests, hanger, options, progress)
     rng = np.random.default_rng([options.seed, hanger.id])
-    return weigh_hanger(hanger, diagnosis, attribution, rng)
+    return weigh_hanger(hanger, tests, diagnosis, attribution, rng)
 
 
 def _check(hangers: Sequence[Hanger]) -> None:

@@ -12,22 +12,44 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.gap.contract import Fit
+from shm.gap.contract import Fit, Hypothesis
 from shm.gap.coordinates import scale_free
 from shm.gap.probabilities import NO_GAP, PAIR, SINGLE, UNKNOWN, ScoredHypothesis
 from shm.gap.problem import GapProblem
 from shm.gap.scan import Scan
 from shm.gap.search import Attribution, Search, possible
+from shm.inference.linear import Linear
 from shm.inference.mixture import normalised, systematic
 from shm.models.effects import Parameter, Variant, parameters_of
-from shm.values import Diagnosis, FloatArray, Hanger
+from shm.values import BoolArray, Diagnosis, FloatArray, Hanger, ModalTest
 
 Place = tuple[str, str]
 """An effect of the catalogue and where it acts, in words."""
 
 ALONE = SINGLE / (SINGLE + PAIR)
 """How often a shared cause is the only one: as often as one cause is in a single hanger."""
-_DRAWS = 1000  # numerical: a mean to 3 % of its standard deviation
+
+
+@dataclass(frozen=True)
+class SharingOptions:
+    """Hold the settings of evidence that hangers share, sizes in decades, numerical but for one.
+
+    Sizes down to `below` what is visible count, by judgement: what one hanger sees by half a
+    standard deviation, ten see by 1.5. `step` is the least scatter of sizes; normals so far apart
+    add up evenly. `draws` give a mean to 3 % of its standard deviation. Points `about` so far from
+    each other are those of a scan. A log has an exponential up to `most_gain`; nothing is divided
+    by less than `tiny`, or has its logarithm.
+    """
+
+    below: float = 0.5
+    step: float = 0.03
+    draws: int = 1000
+    about: float = 0.15
+    most_gain: float = 500.0
+    tiny: float = 1e-300
+
+
+SHARING = SharingOptions()
 
 
 @dataclass(frozen=True)
@@ -74,17 +96,20 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class EffectEvidence:
-    """The evidence for one effect at one place in one hanger, at points (n,) of visible sizes.
+    """The evidence for one effect at one place in one hanger, at points (n,) of its size.
 
-    With sizes `x` of a `sign` and of density f the likelihood of the effect is the sum of `weight`
-    f(x), against all that a hanger may have otherwise. `tension_n` is that of the hanger with each.
-    `log_mimic_odds` are those of something unknown that passes for the effect, against the effect.
+    Points `x` with their `sign` are of `visible` sizes or of smaller ones. With sizes of density f
+    the likelihood of a visible effect is the sum of `weight` f(x), against all that a hanger may
+    have otherwise; that of a smaller one is the same sum over its points, against no effect.
+    `tension_n` is that of the hanger with each. `log_mimic_odds` are those of something unknown
+    that passes for the effect, against the effect.
     """
 
     sizes: Sizes
     x: FloatArray
     sign: FloatArray
     weight: FloatArray
+    visible: BoolArray
     tension_n: FloatArray
     log_mimic_odds: float
 
@@ -98,6 +123,7 @@ class HangerEvidence:
     """
 
     hanger: Hanger
+    tests: tuple[ModalTest, ...]
     diagnosis: Diagnosis
     no_gap: float
     gap: float
@@ -108,6 +134,7 @@ class HangerEvidence:
 
 def weigh_hanger(
     hanger: Hanger,
+    tests: Sequence[ModalTest],
     diagnosis: Diagnosis,
     attribution: Attribution,
     rng: np.random.Generator,
@@ -118,6 +145,7 @@ def weigh_hanger(
     tension_n = _resampled(parts, rng)[0]
     return HangerEvidence(
         hanger=hanger,
+        tests=tuple(tests),
         diagnosis=diagnosis,
         no_gap=none / NO_GAP,
         gap=(1 - none) / (1 - NO_GAP),
@@ -135,7 +163,10 @@ def _effects(
     attribution: Attribution, tension_n: FloatArray, rng: np.random.Generator
 ) -> Iterator[tuple[Place, EffectEvidence]]:
     search, tried = attribution.search, _by_probability(attribution)
-    problem = search.problem
+    problem, baseline = search.problem, search.baseline
+    linear = Linear(problem.likelihood(Hypothesis()), baseline.slopes)
+    residual = problem.value - baseline.predicted
+    log_nothing = float(linear.marginal(residual[None], baseline.z[None])[0][0])
     for single, scan in search.scans.items():
         if not np.isfinite(scan.log_evidence):
             continue
@@ -145,17 +176,21 @@ def _effects(
         visible = _of_fits(problem, effect, held, sizes, rng)
         if visible is None:
             visible = _of_scan(scan, sizes, tension_n, rng)
+        small, ratio = _too_small_to_see(search, scan, sizes, log_nothing, rng)
         factor = _bayes_factor(search, effect, held, any(_is_pair(each) for _, each in tried))
         span = factor * np.ptp(sizes.ends) * len(sizes.signs)
-        x, sign, tensions_n = visible
+        x, sign, tensions = np.hstack([visible, small])
         yield (
             (effect[0], effect[1].at),
             EffectEvidence(
                 sizes=sizes,
                 x=x,
                 sign=sign,
-                weight=np.full(len(x), span / len(x)),
-                tension_n=tensions_n,
+                weight=np.append(
+                    np.full(visible.shape[1], span / visible.shape[1]), SHARING.step * ratio
+                ),
+                visible=np.arange(len(x)) < visible.shape[1],
+                tension_n=tensions,
                 log_mimic_odds=sum(
                     each.log_mimic - each.log_evidence
                     for _, each in held
@@ -216,17 +251,40 @@ def _of_scan(
 ) -> FloatArray:
     """Return the same of an effect that was only scanned; the tension is that of the hanger."""
     value = scan.effect[:, 0]
-    rows = systematic(normalised(np.where(scan.seen, scan.log, -np.inf)), _DRAWS, rng)
+    rows = systematic(normalised(np.where(scan.seen, scan.log, -np.inf)), SHARING.draws, rng)
     spacing = np.ptp(sizes.x(value)) * len(sizes.signs) / len(value)
-    x = sizes.x(value[rows]) + spacing * (rng.random(_DRAWS) - 0.5)
-    tensions = rng.choice(tension_n, _DRAWS)
+    x = sizes.x(value[rows]) + spacing * (rng.random(SHARING.draws) - 0.5)
+    tensions = rng.choice(tension_n, SHARING.draws)
     return np.array([x.clip(*sizes.ends), sizes.sign(value[rows]), tensions])
 
 
+def _too_small_to_see(
+    search: Search, scan: Scan, sizes: Sizes, log_nothing: float, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Return points (3, n) of x, sign and tension below the visible sizes, and their likelihoods.
+
+    The latter (n,) are over that of no effect. A scan is as good as a fit there, since small
+    effects are linear; far from all of its points they are those of no effect.
+    """
+    problem, baseline, every = search.problem, search.baseline, sizes.x(scan.effect[:, 0])
+    rows = np.flatnonzero((every < sizes.ends[0]) & np.isfinite(scan.log))
+    line = sizes.ends[0] - SHARING.step * (np.arange(np.ceil(SHARING.below / SHARING.step)) + 0.5)
+    x, sign = np.tile(line, len(sizes.signs)), np.repeat(sizes.signs, len(line))
+    near = np.exp(-(((every[rows] - x[:, None]) / SHARING.about) ** 2) / 2)
+    near *= sizes.sign(scan.effect[rows, 0]) == sign[:, None]
+    near /= near.sum(axis=1, keepdims=True) + SHARING.tiny
+    steps = np.vstack([np.zeros(len(baseline.z)), scan.step[rows]])
+    moved_n = problem.tension_n(Hypothesis(), baseline.z + steps)
+    tension_n = rng.choice(_tension_n(problem, baseline, rng), len(x))
+    tension_n = tension_n * (1 + near @ (moved_n[1:] / moved_n[0] - 1))
+    gain = np.minimum(scan.log[rows] - log_nothing, SHARING.most_gain)
+    return np.array([x, sign, tension_n]), 1 + near @ np.expm1(gain)
+
+
 def _resampled(parts: Sequence[tuple[float, FloatArray]], rng: np.random.Generator) -> FloatArray:
-    """Return equal draws (k, _DRAWS) of parts (k, n), each with its probability."""
+    """Return equal draws (k, draws) of parts (k, n), each with its probability."""
     weight = np.concatenate([np.full(each.shape[1], p / each.shape[1]) for p, each in parts])
-    rows = systematic(weight / weight.sum(), _DRAWS, rng)
+    rows = systematic(weight / weight.sum(), SHARING.draws, rng)
     return np.asarray(np.hstack([each for _, each in parts])[:, rows])
 
 

@@ -22,6 +22,7 @@ from shm.assumptions import DEFAULTS  # noqa: E402
 from shm.gap.check import CheckOptions  # noqa: E402
 from shm.gap.contract import GapOptions  # noqa: E402
 from shm.gap.sampling import SamplingOptions  # noqa: E402
+from shm.gap.shared_evidence import SharingOptions  # noqa: E402
 from shm.identify.options import IdentifyOptions  # noqa: E402
 from shm.inference.data_checks import CheckLimits  # noqa: E402
 from shm.inference.options import UpdateOptions  # noqa: E402
@@ -36,8 +37,8 @@ from shm.watch.stream_watch import StreamOptions  # noqa: E402
 GOLDEN = Path(__file__).parent / "golden" / "defaults.json"
 OPTIONS = (
     AcquireOptions, CheckLimits, CheckOptions, GapOptions, IdentifyOptions, NeighbourOptions,
-    SamplingOptions, ShapeOptions, StateOptions, StreamOptions, Thresholds, UpdateOptions,
-    WatchOptions,
+    SamplingOptions, ShapeOptions, SharingOptions, StateOptions, StreamOptions, Thresholds,
+    UpdateOptions, WatchOptions,
 )  # fmt: skip
 _WORDS = ("name", "unit", "source", "reason", "origin")
 

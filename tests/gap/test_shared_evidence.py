@@ -9,8 +9,9 @@ import pytest
 
 from shm.gap.contract import GapOptions
 from shm.gap.probabilities import NO_GAP, SINGLE, UNKNOWN
+from shm.gap.scan import VISIBLE
 from shm.gap.search import Attribution, attribute
-from shm.gap.shared_evidence import HangerEvidence, weigh_hanger
+from shm.gap.shared_evidence import SHARING, HangerEvidence, weigh_hanger
 from shm.simulate import HangerState, PlantedEffect
 from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.effects import all_but
@@ -30,7 +31,12 @@ def weigh(*planted: PlantedEffect) -> tuple[Attribution, HangerEvidence]:
     tests = campaign(ROD, HangerState(711e3), planted, PLAN, np.random.default_rng(1))
     options = GapOptions(without=all_but(PLACE[0]), draws=200)
     found = attribute(problem_of(tests, hanger=ROD), options, np.random.default_rng(1))
-    return found, weigh_hanger(ROD, a_diagnosis(), found, np.random.default_rng(1))
+    return found, weigh_hanger(ROD, tests, a_diagnosis(), found, np.random.default_rng(1))
+
+
+@pytest.fixture(scope="module")
+def sound() -> tuple[Attribution, HangerEvidence]:
+    return weigh()
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +49,7 @@ def test_the_likelihoods_give_the_probabilities_back(
 ) -> None:
     found, evidence = heavier
     effect = evidence.effects[PLACE]
-    chance = SINGLE * effect.weight.sum() / np.ptp(effect.sizes.ends)
+    chance = SINGLE * effect.weight[effect.visible].sum() / np.ptp(effect.sizes.ends)
     assert chance == pytest.approx(found.explanations[0].probability, rel=1e-6)
     assert NO_GAP * evidence.no_gap == pytest.approx(found.no_gap_probability)
     assert UNKNOWN * evidence.unknown == pytest.approx(found.unexplained_probability)
@@ -54,14 +60,24 @@ def test_visible_points_are_draws_of_the_size(
 ) -> None:
     effect = heavier[1].effects[PLACE]
     low, high = effect.sizes.ends
-    assert low <= effect.x.min() <= effect.x.max() <= high
-    size = effect.sizes.value(effect.x)
+    assert low <= effect.x[effect.visible].min() <= effect.x[effect.visible].max() <= high
+    size = effect.sizes.value(effect.x[effect.visible])
     assert np.quantile(size, 0.02) < 0.12 < np.quantile(size, 0.98)
 
 
+def test_a_smaller_size_is_less_told_from_none(
+    sound: tuple[Attribution, HangerEvidence],
+) -> None:
+    effect = sound[1].effects[PLACE]
+    small = ~effect.visible
+    order = np.argsort(effect.x[small])
+    told = np.abs(np.log(effect.weight[small] / SHARING.step)[order])
+    assert told[0] < 0.5 * told[-1]
+    assert told.max() < VISIBLE**2
+
+
 def test_the_tension_follows_the_size(heavier: tuple[Attribution, HangerEvidence]) -> None:
-    found, evidence = heavier
-    effect, baseline = evidence.effects[PLACE], found.baseline
-    assert np.corrcoef(effect.x, effect.tension_n)[0, 1] > 0.5
-    alone_n = found.search.problem.tension_n(baseline.hypothesis, baseline.draws)
-    assert effect.tension_n.mean() > alone_n.mean()
+    effect = heavier[1].effects[PLACE]
+    visible = effect.visible
+    assert np.corrcoef(effect.x[visible], effect.tension_n[visible])[0, 1] > 0.5
+    assert effect.tension_n[visible].mean() > effect.tension_n[~visible].mean()
