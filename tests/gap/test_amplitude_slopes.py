@@ -56,7 +56,7 @@ def test_both_frequencies_of_a_mode_share_their_error_but_that_of_the_slope() ->
     seen = [node.covariance.frequency for node in nodes(found)]
     factors = {round(float(weights @ each @ weights) / SLOPE_SD**2, 2) for each in seen}
     assert 1.0 in factors
-    assert len(factors) == 3  # of stated standard deviations, see the module
+    assert len(factors) == 5  # of stated standard deviations, see the module
     assert min(np.linalg.eigvalsh(each).min() for each in seen) > 0.1 * SLOPE_SD**2
 
 
