@@ -61,7 +61,7 @@ def test_axes_have_units(figures: Figures) -> None:
 def test_words_beside_figures_are_sentences(figures: Figures) -> None:
     for item in (item for items in figures.values() for item in items.values()):
         assert item.caption.endswith(".")
-        assert len(item.alt) > 25
+        assert len(item.alt) > 40
         assert not re.search(r"\b(nan|inf|None)\b", item.caption + item.alt)
 
 

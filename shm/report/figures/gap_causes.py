@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_summary import write_lead
 from shm.report.diagnosis_wording import label
 from shm.report.figures import specification as spec
 from shm.report.sizes import quantity, size
@@ -104,7 +105,7 @@ def _alt(sheet: DiagnosisSheet) -> str:
     bars = [
         f"{bar.label} {formatting.probability(bar.probability)}" for bar in _bars(sheet.diagnosis)
     ]
-    return f"{sheet.diagnosis.verdict.outcome.value}. Probabilities: {'; '.join(bars)}."
+    return f"{write_lead(sheet.diagnosis)} Probabilities: {'; '.join(bars)}."
 
 
 FIGURE = spec.FigureSpec("causes", "What causes the gap", specify, _caption, _alt)
