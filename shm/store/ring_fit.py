@@ -7,24 +7,21 @@ that came first count, unless its clock was ahead.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
-from itertools import pairwise
-from statistics import median
 
 import numpy as np
 
 from shm.read.chunk_document import BY_TIME
 from shm.store.ring_days import Row
 from shm.values import NAN
-from shm.values.stream import PERIODS, Chunk, Piece
+from shm.values.stream import Chunk, Piece
 
 _JITTER_S = 0.05  # judgement: of a logger's stamps; a radio clock or NTP is within 10 ms
 _DRIFT = 1e-3  # judgement: no crystal is further off; a long chunk differs by that from its stamps
 _AHEAD_US = 60_000_000  # judgement: of the server's clock, which may be off as well
 _OF_A_SAMPLE = 0.501  # derived: up to half a sample, and a stamp's microsecond, is the same sample
-_HOUR_US = PERIODS["hour"] // timedelta(microseconds=1)
 
 
 def slack_s(before: int, sequence: int, sampling_rate_hz: float, length_s: float) -> float:
@@ -78,66 +75,9 @@ def runs_on(before: Chunk, chunk: Chunk) -> bool:
     return is_next and before.start <= chunk.start
 
 
-def is_half(before: Chunk, chunk: Chunk) -> bool:
-    """Return True if two chunks have half of the shorter one's time in common.
-
-    Less is a correction of the clock by seconds.
-    """
-    common = min(before.end, chunk.end) - max(before.start, chunk.start)
-    return 2 * common >= min(before.end - before.start, chunk.end - chunk.start)
-
-
 def came_early(row: Row) -> bool:
     """Return True if a chunk came before it ends by its stamps: its clock was ahead."""
     return row.end_us - row.arrived_us > _AHEAD_US
-
-
-def find_hour_step(
-    rows: Iterable[Row],
-    chunk: Row,
-    known_us: Collection[int],
-    tolerance_us: int = 2_000_000,
-) -> tuple[int, list[Row]]:
-    """Find what a clock dated ahead by whole hours; return the hours, 0 of none, and the chunks.
-
-    In the order in which they came, samples must begin whole hours later than usual after those
-    before them, and end that much, give or take half of it, after those that came next begin; these
-    may be `chunk`, which contradicts them. Their true time must be free. `known_us` are when the
-    samples of former steps begin.
-    """
-    by_arrival = sorted(rows, key=lambda row: (row.arrived_us, row.sequence, row.start_us))
-    jumps = [after.start_us - before.end_us for before, after in pairwise(by_arrival)]
-    pauses = [each for each in jumps if tolerance_us < each < _HOUR_US - tolerance_us]
-    usual_us = median(pauses or [0])
-    for first, jump_us in reversed(list(enumerate(jumps, start=1))):
-        lengths_us = jump_us, jump_us - usual_us
-        hours = max(_whole_hours(length_us, tolerance_us) for length_us in lengths_us)
-        start_us, step_us = by_arrival[first].start_us, hours * _HOUR_US
-        if not hours or any(abs(start_us - each) < _HOUR_US for each in known_us):
-            continue
-        wrong, end_us = [by_arrival[first]], by_arrival[first].end_us
-        for following in (*by_arrival[first + 1 :], chunk):
-            if following.start_us < end_us - step_us / 2:
-                break
-            wrong.append(following)
-            end_us = max(end_us, following.end_us)
-        if following is wrong[-1] or abs(end_us - following.start_us - step_us) > step_us / 2:
-            continue
-        true_span = start_us - step_us, end_us - step_us
-        if not any(_is_within(row, true_span) for row in set(by_arrival) - set(wrong)):
-            return hours, wrong
-    return 0, []
-
-
-def _whole_hours(time_us: float, tolerance_us: int) -> int:
-    hours = round(time_us / _HOUR_US)
-    return hours if hours > 0 and abs(time_us - hours * _HOUR_US) <= tolerance_us else 0
-
-
-def _is_within(row: Row, span: tuple[int, int]) -> bool:
-    """Return True if half of a chunk's time is within a span."""
-    common_us = min(span[1], row.end_us) - max(span[0], row.start_us)
-    return 2 * common_us > row.end_us - row.start_us
 
 
 def join(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Piece, ...]:

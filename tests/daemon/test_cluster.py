@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
-import shm
 from shm.errors import BadInput, ShmError
 from shm.pipeline.streaming import Streaming
 from shm.store import Stage, Workspace
 from shm.store.queries.recordings import count_stages
 from shm.store.queries.streams import list_windows
 from shm_daemon import run
-from shm_daemon.cluster import Cluster, run_if_same_versions, traits
-from shm_daemon.execution import executor_of
+from shm_daemon.cluster import Cluster
 from tests.helpers import clusters
 from tests.helpers.canonical import canonical
 from tests.helpers.flows import Clock
@@ -70,22 +67,6 @@ def test_an_error_of_a_step_comes_back_as_it_was(pool: Cluster) -> None:
     assert caught.value.remedy == "Mend it."
 
 
-def test_a_worker_of_another_version_is_refused_and_the_step_tried_again(
-    pool: Cluster, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    own = re.escape(shm.__version__)
-    monkeypatch.setattr(shm, "__version__", "9.9.9")
-    with pytest.raises(ShmError, match=rf"has shm {own}, the daemon 9\.9\.9") as caught:
-        pool.submit(os.getpid)
-    assert caught.value.retry_after_s is not None
-
-
-def test_a_worker_that_came_later_is_asked_too() -> None:
-    assert run_if_same_versions(traits(), lambda: 7) == 7
-    with pytest.raises(ShmError, match="has numpy"):
-        run_if_same_versions({**traits(), "numpy": "0.1"}, lambda: 7)
-
-
 @pytest.mark.slow
 def test_a_scheduler_that_does_not_answer_is_waited_for() -> None:
     with pytest.raises(ShmError, match="cannot be reached") as caught:
@@ -100,12 +81,6 @@ def test_a_step_that_kills_every_worker_is_told_as_a_crash(tmp_path: Path) -> No
         with pytest.raises(BrokenExecutor):
             pool.submit(os._exit, 1).result(60)
         pool.shutdown()
-
-
-def test_without_a_scheduler_steps_run_in_processes_of_our_own(workspace: Workspace) -> None:
-    executor = executor_of(workspace.settings)
-    assert executor.submit(os.getpid).result(60) != os.getpid()
-    executor.shutdown(cancel_futures=True)
 
 
 def _refuse() -> None:

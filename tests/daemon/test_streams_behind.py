@@ -119,14 +119,3 @@ def test_faces_name_unread_hours(
     ring_of(bridge).seal(utc_now() + PERIOD)
     with bridge.store() as store:
         assert stream_leads(bridge, store, utc_now()) == ()
-
-
-def test_faces_know_readings_after_restore(bridge: Workspace, faces: Faces) -> None:
-    """A backup leaves the ring out; the readings are there."""
-    start = period_start(utc_now(), PERIOD) - 15 * PERIOD
-    save_windows(bridge, start, 3)
-    found = faces(bridge)
-    last = start + 3 * PERIOD
-    for name, text in found.items():
-        assert "never sent" not in text, name
-        assert f"h3 (last sample {last:%Y-%m-%d %H:%M} UTC)" in text, name

@@ -15,14 +15,13 @@ from shm.documents import dump
 from shm.inference import UpdateOptions
 from shm.models import Model
 from shm.modes_document import modes_document
-from shm.pipeline import rebaselining, utc_now
+from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
-from shm.pipeline.rebaselining import Order, rebaseline
 from shm.pipeline.reporting import hanger_report
 from shm.report.hanger_sentences import summary
 from shm.report.hanger_status import Status
 from shm.store import Workspace
-from shm.values import ModalTest, Posterior
+from shm.values import ModalTest
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, ingest
 from tests.helpers.modelled_tests import misnamed
@@ -120,36 +119,6 @@ def test_a_test_by_a_wrong_clock_is_left_out_and_the_hanger_is_not_quiet(
     assert "test t1: all its frequencies" in report.lineage["left_out_of_the_baseline"]
     assert line.warnings == report.now.warnings
     assert report.status is line.status is Status.CHECK
-
-
-def test_a_new_baseline_is_checked_as_the_first_one_was(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def quick(
-        tests: Sequence[ModalTest],
-        model: Model,
-        options: UpdateOptions,
-        *_: Any,
-        warm_start: Posterior,
-    ) -> Posterior:
-        return quick_update.update(tests, model, options)
-
-    monkeypatch.setattr(rebaselining, "update", quick)
-    wrong = partial(misnamed, plane="longitudinal", order=3)
-    for number in range(8):
-        spool(workspace, number, wrong if number == 6 else None)
-    ingest(workspace)
-    order = Order(START + timedelta(days=3.5), "a new pin", "engineer")
-    with workspace.store() as store:
-        made = rebaseline(workspace, store, workspace.bridge.hangers[0], order, Clock().now)
-        again = store.watch.baseline(3)
-    check = made.posterior.baseline_check
-    assert check is not None
-    assert [(each.test, each.plane, each.order) for each in check.modes] == [
-        ("t6", "longitudinal", 3)
-    ]
-    assert again is not None
-    assert again.posterior.baseline_check == check
 
 
 def test_a_mode_that_three_tests_have_wrong_is_one_notice_and_an_open_warning(

@@ -45,23 +45,6 @@ def test_only_one_is_active_and_the_other_is_told_who(location: str | Path, tmp_
         assert not lock.held()
 
 
-def test_who_gives_up_waiting_is_told_why(location: str | Path, tmp_path: Path) -> None:
-    told: list[StoreError] = []
-
-    def twice(error: StoreError) -> bool:
-        told.append(error)
-        return len(told) < 2
-
-    file = tmp_path / "shm.lock"
-    with (
-        active(location, file, None),
-        pytest.raises(StoreBusy, match="already ingests"),
-        active(location, file, twice),
-    ):
-        pytest.fail("two were active")
-    assert len(told) == 2
-
-
 def test_a_standby_takes_over_when_the_active_one_ends(
     location: str | Path, tmp_path: Path
 ) -> None:
@@ -173,32 +156,6 @@ def test_who_loses_the_connection_is_no_longer_active(
             assert not lock.held()
 
 
-def test_who_is_cut_off_while_waiting_goes_on_waiting(
-    server: str, postgresql: Databases, tmp_path: Path
-) -> None:
-    told: list[StoreError] = []
-
-    def wait(error: StoreError) -> bool:
-        told.append(error)
-        if len(told) == 1:
-            assert postgresql.cut_connections(server) == 2
-        time.sleep(0.02)
-        return len(told) < 10
-
-    with active(server, tmp_path / "a", None), active(server, tmp_path / "b", wait) as lock:
-        assert lock.held()
-    assert {type(error) for error in told} <= {StoreBusy, StoreError}
-    assert type(told[1]) is StoreError
-
-
-def test_a_lock_that_cannot_be_made_is_told(sqlite: Path, tmp_path: Path) -> None:
-    with (
-        pytest.raises(StoreError, match=r"cannot be written .* Give this user write access"),
-        active(sqlite, tmp_path / "no such folder" / "shm.lock", None),
-    ):
-        pytest.fail("nobody can be active")
-
-
 def test_a_server_that_is_down_is_waited_for(tmp_path: Path) -> None:
     told: list[StoreError] = []
 
@@ -214,16 +171,6 @@ def test_a_server_that_is_down_is_waited_for(tmp_path: Path) -> None:
         pytest.fail("nobody can be active")
     assert [error.retry_after_s for error in told] == [5.0, 5.0]
     assert not any(isinstance(error, StoreBusy) for error in told)
-
-
-def test_a_database_that_is_missing_is_not_waited_for(
-    postgresql: Databases, tmp_path: Path
-) -> None:
-    with (
-        pytest.raises(StoreError, match="createdb"),
-        active(postgresql.url("nowhere"), tmp_path / "shm.lock", patient()),
-    ):
-        pytest.fail("nobody can be active")
 
 
 def test_who_finds_the_lock_file_removed_is_no_longer_active(sqlite: Path, tmp_path: Path) -> None:

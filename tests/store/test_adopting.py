@@ -115,14 +115,3 @@ def test_an_adoption_cut_short_leaves_nothing_behind(
                 adopted(filled)
         assert rows(filled) == held
         assert list_selected_models(filled) == {3: "beam2"}
-
-
-def test_a_name_of_two_effects_with_ranges_fits(filled: Store) -> None:
-    place = "rotational_end_flexibility@deck_end.transverse"
-    long = f"beam1+{place}+temperature_tension@everywhere:reference_c=11.5:" + (
-        "tension_per_kelvin_n_k=-1091.11..-908.889"
-    )
-    PROBABILITIES[long] = 0.9
-    adopted(filled, long)
-    assert list_selected_models(filled) == {3: long}
-    assert selections.c.model.type.length > len(long)  # type: ignore[attr-defined]

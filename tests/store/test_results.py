@@ -105,15 +105,6 @@ def test_the_most_probable_class_is_selected_and_its_posterior_the_baseline(stor
     assert store.recordings.get(first.recording_id).stage is Stage.DONE
 
 
-def test_a_second_first_selection_is_not_kept(store: Store) -> None:
-    (first,) = identified(store, 1)
-    (second,) = identified(store, 2)
-    baseline_of_two_models(store, first)
-    baseline_of_two_models(store, second)
-    assert len(list_posteriors(store, 3)) == 1
-    assert store.tests.get(second.id).stage is Stage.IDENTIFIED
-
-
 def test_several_tests_may_make_one_baseline(store: Store) -> None:
     tests = (*identified(store, 1), *identified(store, 2))
     baseline_of_two_models(store, *tests)

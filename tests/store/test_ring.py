@@ -233,21 +233,6 @@ def test_a_gap_is_noted_and_filled_by_what_comes_late(logger: Logger) -> None:
     assert np.array_equal(piece.values, samples(minutes(*range(30))))
 
 
-@pytest.mark.slow
-def test_three_days_offline_are_caught_up_in_any_order(logger: Logger) -> None:
-    before, offline = minutes(0, 1, 2), minutes(*range(3, 3 * 1440, 40))
-    after = minutes(3 * 1440)
-    logger.send(*before)
-    logger.send(*after)
-    random.Random(1).shuffle(offline)
-    for some in (offline[:50], offline[50:]):
-        logger.send(*some)
-    found = logger.ring.read("h3", NOW, NOW + timedelta(days=4))
-    sent = sorted([*before, *offline, *after], key=lambda chunk: chunk.start)
-    assert np.array_equal(np.concatenate([p.values for p in found], axis=1), samples(sent))
-    assert logger.kinds.count("late") >= 1
-
-
 def test_an_hour_that_comes_days_late_is_kept_counted_and_read(logger: Logger) -> None:
     """A logger kept it while it was offline; its windows were sealed and left long ago."""
     before, offline, after = minutes(0, 1), minutes(*range(2, 62)), minutes(*range(62, 75))
@@ -287,58 +272,6 @@ def test_a_clock_that_jumps_is_noted_and_jitter_is_not(logger: Logger) -> None:
     assert "+7.020 s before chunk 3" in logger.events[0].detail
     lengths = [piece.values.shape[1] for piece in logger.ring.read("h3", NOW, NOW + HOUR)]
     assert lengths == [18_000, 12_000]
-
-
-@pytest.mark.parametrize("hole", [(2, 8), (4, 35)])
-@pytest.mark.parametrize("seals", [False, True])
-def test_a_clock_that_steps_into_a_gap_is_noted(
-    logger: Logger, hole: tuple[int, int], seals: bool
-) -> None:
-    """By numbers: those that are the gap's own fill it, those of a later time are noted."""
-    first, last = hole
-    logger.send(*minutes(*range(first), *range(last, 40)), seals=seals)
-    back = timedelta(minutes=40 - first)
-    stepped = [replace(each, start=each.start - back) for each in minutes(41, 42, 43)]
-    logger.send(*stepped[:2], seals=seals)
-    logger.send(*stepped[2:], *minutes(last - 1))
-    told = [each.detail for each in logger.events if "does not belong" in each.detail]
-    numbers = {int(n) for each in told for n in each.partition(" is ")[0].split()[1::2]}
-    assert numbers >= {41, 43}
-    assert all(f"between chunks {first - 1} and" in each for each in told)
-    assert not any(f"chunk {last - 1} is" in each for each in told)
-
-
-@pytest.mark.parametrize("seals", [False, True])
-@pytest.mark.parametrize("pause_s", [0, 5, 300])
-@pytest.mark.parametrize(("first", "length"), [(5000, 17), (0, 2), (1, 20)])
-def test_seal_accepts_restarted_numbers(
-    logger: Logger, first: int, length: int, pause_s: float, seals: bool
-) -> None:
-    """The logger counts from the beginning again after each of three pauses."""
-    start = NOW
-    for session in range(4):
-        for number in range(length if session % 2 == 0 else 33):
-            sequence = number if session else first + number
-            logger.send(a_chunk(sequence, start, samples=6000), seals=False)
-            start += timedelta(minutes=1)
-            if seals:
-                logger.ring.seal(logger.now)
-        start += timedelta(seconds=pause_s)
-    logger.seal()
-    assert "clock step" not in logger.kinds
-
-
-@pytest.mark.slow
-def test_a_clock_that_drifts_is_noted(logger: Logger) -> None:
-    """250 ppm more samples than the stamps say."""
-    start = NOW
-    for number in range(8 * 12):
-        logger.send(a_chunk(number, start, samples=30_000), seals=False)
-        start += timedelta(seconds=300 / (1 + 250e-6))
-    logger.seal()
-    assert logger.kinds == ["clock drift"]
-    assert logger.events[0].detail.startswith("250 ppm more")
-    assert len(logger.ring.read("h3", NOW, NOW + 8 * HOUR)) == 1
 
 
 def test_damaged_days_and_samples_are_set_aside_and_others_go_on(logger: Logger) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from shm.errors import BadInput, SchemaOutdated, StoreBusy, StoreError
+from shm.errors import BadInput, StoreBusy, StoreError
 from shm.store import Outcome, Stage, Store, Workspace, database
 from shm.store.database import make_engine, shown, url_of
 from shm.store.queries.recordings import count_stages, list_recordings
@@ -103,48 +103,6 @@ def test_a_server_that_is_down_is_waited_for_and_its_password_not_told() -> None
     assert caught.value.retry_after_s == 5.0
     assert "postgresql://shm:***@127.0.0.1:1/shm" in str(caught.value)
     assert "hush" not in str(caught.value)
-
-
-def test_a_server_without_a_connection_to_spare_is_waited_for(postgresql: Databases) -> None:
-    postgresql.run("CREATE ROLE guest LOGIN CONNECTION LIMIT 0")
-    with pytest.raises(StoreError, match="no connection free") as caught:
-        Store.open(postgresql.url(user="guest"))
-    assert caught.value.retry_after_s == 5.0
-
-
-def test_who_may_not_write_is_told_so(server: str, postgresql: Databases) -> None:
-    postgresql.run("CREATE ROLE reader LOGIN")
-    name = str(url_of(server).database)
-    postgresql.run("GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader", server)
-    with Store.open(postgresql.url(name, user="reader")) as store:
-        assert list_recordings(store) == ()
-        with pytest.raises(StoreError, match="Give this user write access"):
-            store.recordings.receive(a_file(1), NOW)
-
-
-def test_waiting_does_not_make_a_user_or_a_database(postgresql: Databases) -> None:
-    for url in (postgresql.url("nowhere"), postgresql.url(user="nobody")):
-        with pytest.raises(StoreError) as caught:
-            Store.open(url)
-        assert caught.value.retry_after_s is None
-
-
-def test_a_database_without_tables_says_how_to_make_them(unready: str) -> None:
-    with pytest.raises(SchemaOutdated, match="shm db upgrade"):
-        Store.open(unready)
-    Store.upgrade(unready)
-    with Store.open(unready) as store:
-        assert list_recordings(store) == ()
-
-
-def test_an_upgrade_that_fails_on_a_server_leaves_nothing_half_done(
-    unready: str, postgresql: Databases
-) -> None:
-    postgresql.run("CREATE TABLE tests (id INTEGER)", unready)
-    with pytest.raises(StoreError):
-        Store.upgrade(unready)
-    tables = postgresql.run("SELECT tablename FROM pg_tables WHERE schemaname = 'public'", unready)
-    assert tables == [("tests",)]
 
 
 @pytest.mark.parametrize(
