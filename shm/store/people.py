@@ -16,9 +16,9 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError
+from shm.store.columns import value_in
 from shm.store.database import Repository, insert
 from shm.store.journal import note
-from shm.store.mapping import value_in
 from shm.store.rows import Role, Scope, StoredToken, User
 from shm.store.tables import sessions, tokens, users
 

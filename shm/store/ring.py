@@ -8,12 +8,11 @@ What may leave the ring: the old, and the oldest where it grows too large.
 
 from __future__ import annotations
 
-import json
 import logging
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from itertools import groupby
 from pathlib import Path
@@ -24,15 +23,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shm.bridge.streams import stream_named
-from shm.documents import ValidationError, dump, format_time, value_of
+from shm.documents import dump, format_time
 from shm.errors import BadInput, DoubledChunk
 from shm.read.atomic import replace_text
 from shm.read.chunk_document import numbered, parse_chunk, refuse_long_chunk
 from shm.store.archive import disk_error, sync
+from shm.store.ring_chunks import (
+    EARLY,
+    GRACE,
+    OVERLAP,
+    agree,
+    came_early,
+    find_taken,
+    join,
+    list_events,
+    repeats,
+    runs_on,
+)
 from shm.store.ring_conversion import convert_former_files
 from shm.store.ring_days import PERIOD_US, Row, StreamDays, query, row_of, size_of, writing
-from shm.store.ring_events import EARLY, GRACE, OVERLAP, list_events
-from shm.store.ring_fit import agree, came_early, find_taken, join, repeats, runs_on
 from shm.values.stream import PERIOD, Chunk, Piece, Stream, StreamEvent, microseconds, time_of
 
 if TYPE_CHECKING:
@@ -46,7 +55,6 @@ then further off than the setting frequency_allowance grants. Crystals keep to i
 """
 _OVER_RANGE = 2.0
 """Of full_scale. Judgement: a sensor that clips at 5 V, before a converter that does at 10 V."""
-_SWEEP = "last_sweep.json"
 _UNFINISHED_S = 3600.0  # technical: no file takes so long; a killed process left it
 _QUIET = timedelta(seconds=10)  # technical: a window is not read again for each late chunk
 _DAY = timedelta(days=1)
@@ -87,22 +95,6 @@ class ReceivedSamples:
     apart_s: float
     start: datetime | None
     end: datetime | None
-
-
-@dataclass(frozen=True)
-class Swept:
-    """Count the days of streams that were removed or thinned, and what is left in the ring.
-
-    `unread_bytes` are of days with samples that the watch has not read, `recent_bytes` of the day
-    before them, `kept_bytes` of what is kept for good: none of these is removed to meet a limit.
-    """
-
-    days: int
-    freed_bytes: int
-    left_bytes: int
-    unread_bytes: int = 0
-    recent_bytes: int = 0
-    kept_bytes: int = 0
 
 
 class Ring:
@@ -196,51 +188,34 @@ class Ring:
         ring_bytes: int = 200 * 10**9,
         unread: Mapping[str, Collection[datetime]] = MappingProxyType({}),
         recent: timedelta = _DAY,
-    ) -> Swept:
-        """Remove days older than so many days, and the oldest beyond so many bytes.
+    ) -> int:
+        """Remove days older than so many days, and the oldest beyond a size; return how many.
 
         `unread` are the beginnings of the ten minutes that nobody has read, by stream. Their days
         stay, and so does what is `recent` before them or before now: an alert keeps it for good.
-        What is kept for good stays. What was left is noted for `last_sweep`.
+        What is kept for good stays.
         """
         found = [(path, days) for days in self._all_days() for path in days.paths()]
         sizes = {path: size_of(path) for path, _ in found}
-        total, removed = sum(sizes.values()), 0
-        held = dict.fromkeys(("unread_bytes", "recent_bytes", "kept_bytes"), 0)
+        removed = 0
         for path, days in sorted(found, key=lambda each: each[0].name):
             start = _day_of(path)
             waiting = unread.get(days.folder.name, ())
             is_old = start + _DAY <= now - timedelta(days=ring_days)
-            if any(start <= each < start + _DAY for each in waiting):
-                held["unread_bytes"] += sizes[path]
-            elif not is_old and start + _DAY > min(waiting, default=now) - recent:
-                held["recent_bytes"] += sizes[path]
-            elif is_old or sum(sizes.values()) > ring_bytes:
-                before = sizes[path]
-                days.thin(path, _kept(days), may_go=start + _DAY < now - self._late)
-                sizes[path] = size_of(path)
-                held["kept_bytes"] += sizes[path]
-                removed += sizes[path] < before
+            is_unread = any(start <= each < start + _DAY for each in waiting)
+            is_recent = not is_old and start + _DAY > min(waiting, default=now) - recent
+            if is_unread or is_recent or not (is_old or sum(sizes.values()) > ring_bytes):
+                continue
+            before = sizes[path]
+            days.thin(path, _kept(days), may_go=start + _DAY < now - self._late)
+            sizes[path] = size_of(path)
+            removed += sizes[path] < before
         for days in self._all_days():
             for left in days.folder.glob(".*.part*"):
                 with suppress(FileNotFoundError):
                     if left.stat().st_mtime < time.time() - _UNFINISHED_S:
                         left.unlink()
-        left_bytes = sum(sizes.values())
-        swept = Swept(removed, total - left_bytes, left_bytes, **held)
-        if self.folder.is_dir():
-            replace_text(self.folder / _SWEEP, dump(asdict(swept)) + "\n")
-        return swept
-
-    def last_sweep(self) -> Swept | None:
-        """Return what the last sweep left; None where there was none or its note is damaged."""
-        try:
-            return value_of(Swept, json.loads((self.folder / _SWEEP).read_text(encoding="utf-8")))
-        except FileNotFoundError:
-            return None
-        except (ValidationError, ValueError) as error:
-            log.warning("%s cannot be read: %s", self.folder / _SWEEP, error)
-            return None
+        return removed
 
     def latest(self) -> dict[str, datetime]:
         """Return when the last sample of each stream ended."""

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 import pytest
 
 from shm.errors import BadInput, ShmError
-from shm.pipeline.streaming import Streaming
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import count_stages
-from shm.store.queries.streams import list_windows
+from shm.store.recordings import count_stages
 from shm_daemon import run
 from shm_daemon.cluster import Cluster
 from tests.helpers import clusters
 from tests.helpers.canonical import canonical
-from tests.helpers.flows import Clock
-from tests.helpers.live_streams import FIRST, HOUR, drain, send, with_live_streams
 from tests.helpers.workspaces import make_workspace, put, write_test
 
 FILES = 1
@@ -85,19 +81,3 @@ def test_a_step_that_kills_every_worker_is_told_as_a_crash(tmp_path: Path) -> No
 
 def _refuse() -> None:
     raise BadInput("odd.", line=3, remedy="Mend it.")
-
-
-@pytest.mark.slow
-def test_windows_of_a_stream_are_read_on_a_cluster_to_the_bit(
-    tmp_path: Path, pool: Cluster
-) -> None:
-    found = []
-    for number, executor in enumerate((pool, ThreadPoolExecutor(1))):
-        workspace = with_live_streams(make_workspace(tmp_path / f"bridge{number}"))
-        send(workspace, hours=1 / 6)
-        with workspace.store() as store:
-            clock = Clock(FIRST + HOUR)
-            drain(Streaming(workspace, store, executor, clock=clock, lanes=2), clock)
-            found.append(list_windows(store, 3, FIRST, FIRST + HOUR))
-    assert len(found[0]) == 1
-    assert found[0] == found[1]

@@ -14,7 +14,7 @@ import pytest
 from shm.pipeline.intake import receive
 from shm.store import Archive, DeliveryState, Workspace
 from shm_cli.main import run
-from shm_daemon import doctor_checks as checks
+from shm_daemon import doctor as checks
 from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import HEARTBEAT, beat, turn_failed
 from tests.helpers.nouns import NOW

@@ -16,8 +16,7 @@ from shm.pipeline import Flow, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
 from shm.store import Archive, Stage, Workspace
-from shm.store.queries.recordings import count_stages
-from shm.store.stored_recordings import Recordings
+from shm.store.recordings import Recordings, count_stages
 from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import why_turn_failed
 from tests.helpers import quick_update

@@ -14,7 +14,7 @@ from shm.errors import BadInput
 from shm.pipeline import utc_now
 from shm.pipeline.intake import receive
 from shm.store import Outcome, Workspace
-from shm.store.queries.history import list_events
+from shm.store.journal import list_events
 from shm_daemon.mqtt import Broker as Address
 from shm_daemon.mqtt import Listener, messages
 from shm_daemon.spool import scan

@@ -11,8 +11,8 @@ import pytest
 from shm.errors import TooLarge
 from shm.pipeline.intake import receive
 from shm.store import Stage
-from shm.store.queries.history import list_events
-from shm.store.queries.recordings import list_recordings
+from shm.store.journal import list_events
+from shm.store.recordings import list_recordings
 from shm_daemon import run
 from tests.helpers.flows import threads
 from tests.helpers.workspaces import START, make_workspace, put, write_test

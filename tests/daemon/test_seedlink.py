@@ -15,8 +15,8 @@ from pymseed import MS3Record, nslc2sourceid
 
 import shm_daemon
 from shm.store import Workspace
-from shm.store.queries.streams import list_stream_events
 from shm.store.ring import Ring
+from shm.store.streams import list_stream_events
 from shm.values import FloatArray
 from shm_daemon.heartbeat import HEARTBEAT
 from shm_daemon.seedlink import Pace, streams_asked

@@ -20,8 +20,7 @@ pytest.importorskip("authlib", reason="single sign-on is untested: pip install '
 from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm.store.rows import Role
-from shm_daemon.doctor import examine
-from shm_daemon.doctor_checks import Level
+from shm_daemon.doctor import Level, examine
 from shm_daemon.web.access import COOKIE
 from shm_daemon.web.address import Address
 from shm_daemon.web.pages import signing_in

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from shm.store import Workspace
-from shm.store.queries.streams import list_stream_events
 from shm.store.ring import ring_of
-from shm.store.ring_events import EARLY
+from shm.store.ring_chunks import EARLY
+from shm.store.streams import list_stream_events
 from shm.values import Channel, Recording
 from shm.values.stream import StreamEvent
 from shm_daemon.streams import StreamKeeper

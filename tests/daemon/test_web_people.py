@@ -17,7 +17,7 @@ from fastapi.routing import APIRoute
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Workspace
-from shm.store.queries.history import list_changes
+from shm.store.journal import list_changes
 from shm.store.rows import Role
 from shm.store.tables import users
 from shm_daemon.web.access import engineering, reading, signed_in_person, writing

@@ -13,7 +13,7 @@ from shm.models import Model
 from shm.pipeline import adopting, steps
 from shm.pipeline.adopting import AdoptionRequest, adopt, gap_watch
 from shm.store import Lineage, Store, StoredAdoption, Workspace
-from shm.store.queries.trends import list_history
+from shm.store.posteriors import list_history
 from shm.values import ModalTest, Posterior, PredictedFrequency
 from tests.helpers import quick_update
 from tests.helpers.diagnoses import MASS, a_diagnosis

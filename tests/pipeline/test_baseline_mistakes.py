@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
@@ -18,7 +17,6 @@ from shm.modes_document import modes_document
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.reporting import hanger_report
-from shm.report.hanger_sentences import summary
 from shm.report.hanger_status import Status
 from shm.store import Workspace
 from shm.values import ModalTest
@@ -39,20 +37,6 @@ def spool(workspace: Workspace, number: int, change: Any = None, tension: float 
     test = change(test) if change else test
     put(workspace.spool / f"t{number}.modes.json", dump(modes_document([test])))
     return test
-
-
-def times(factor: float) -> Any:
-    """All frequencies of a test, as by a wrong clock."""
-
-    def changed(test: ModalTest) -> ModalTest:
-        return replace(
-            test,
-            modes=tuple(
-                replace(mode, frequency_hz=factor * mode.frequency_hz) for mode in test.modes
-            ),
-        )
-
-    return changed
 
 
 @pytest.fixture
@@ -101,24 +85,6 @@ def test_a_mistaken_mode_enters_neither_the_posterior_nor_the_watch_and_the_orig
     assert report.now.warnings == line.warnings == ()
     assert report.now.message == line.message
     assert "transverse 2" not in line.message.words
-
-
-def test_a_test_by_a_wrong_clock_is_left_out_and_the_hanger_is_not_quiet(
-    workspace: Workspace, updated_from: list[list[ModalTest]]
-) -> None:
-    for number in range(4):
-        spool(workspace, number, times(1.015) if number == 1 else None)
-    spool(workspace, 9)
-    ingest(workspace)
-
-    assert [test.id for test in updated_from[0]] == ["t0", "t2", "t3"]
-    with workspace.store() as store:
-        report = hanger_report(workspace, store, 3, Clock().now)
-        (line,) = hanger_summaries(workspace, store, utc_now())
-    assert summary(report).startswith("Hanger 3: its baseline is made without test t1.")
-    assert "test t1: all its frequencies" in report.lineage["left_out_of_the_baseline"]
-    assert line.warnings == report.now.warnings
-    assert report.status is line.status is Status.CHECK
 
 
 def test_a_mode_that_three_tests_have_wrong_is_one_notice_and_an_open_warning(

@@ -13,7 +13,7 @@ from shm.pipeline.importing import Answers, keep_profile, look_into
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import list_holds, list_recordings
+from shm.store.recordings import list_holds, list_recordings
 from tests.helpers.flows import ingest
 from tests.helpers.workspaces import START, make_workspace
 

@@ -16,8 +16,8 @@ from shm.errors import BadInput
 from shm.modes_document import modes_document
 from shm.pipeline.controls import control_charts
 from shm.store import Workspace
-from shm.store.queries.hangers import find_latest_watches
-from shm.store.queries.trends import list_trend
+from shm.store.posteriors import list_trend
+from shm.store.watch import find_latest_watches
 from shm_cli.main import run
 from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.workspaces import make_workspace, modelled_test, put, write_test

@@ -25,11 +25,11 @@ from shm.modes_document import modes_document
 from shm.pipeline import Flow, steps
 from shm.read import Limits
 from shm.store import DeliveryState, Stage, Workspace
-from shm.store.queries.hangers import find_latest_watches
-from shm.store.queries.recordings import list_recordings
-from shm.store.queries.trends import list_history
-from shm.store.stored_tests import Tests
-from shm.values import AddedMass, ModalTest, Posterior
+from shm.store.posteriors import list_history
+from shm.store.recordings import list_recordings
+from shm.store.tests import Tests
+from shm.store.watch import find_latest_watches
+from shm.values import ModalTest, Posterior
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all, tension_kn
 from tests.helpers.taken_in import copied
@@ -378,7 +378,7 @@ def test_a_result_is_not_lost_while_the_store_is_busy(
     [
         ("shm.pipeline.work.judge", KeyError("tension")),
         ("shm.pipeline.work.reconciled", ValueError("The truth value of an array is ambiguous")),
-        ("shm.store.stored_posteriors.Posteriors.save", TypeError("not a number")),
+        ("shm.store.posteriors.Posteriors.save", TypeError("not a number")),
     ],
 )
 def test_advance_storing_raises(
@@ -401,22 +401,6 @@ def test_advance_storing_raises(
     assert list(stages(workspace).values()) == [Stage.DONE, Stage.REFUSED, Stage.DONE, Stage.DONE]
     reason = json.loads((workspace.folder / "quarantine/t2.modes.json.reason.json").read_text())
     assert repr(error) in reason["message"]
-
-
-def test_a_test_with_a_mass_beyond_the_hanger_is_refused_with_its_file(
-    workspace: Workspace,
-) -> None:
-    test = write_test(workspace.spool / "x.modes.json", workspace)
-    heavy = replace(test, id="heavy", added_mass=AddedMass(25.0, 13.6))
-    put(workspace.spool / "x.modes.json", dump(modes_document([test, heavy])))
-    spool(workspace, "good")
-    ingest(workspace)
-    assert stages(workspace) == {"good.modes.json": Stage.DONE, "x.modes.json": Stage.REFUSED}
-    with workspace.store() as store:
-        assert [test.test.id for test in store.tests.list_all()] == ["good"]
-        (refused,) = list_recordings(store, Stage.REFUSED)
-        assert refused.reason is not None
-        assert "heavy" in refused.reason["message"]
 
 
 def test_a_refused_test_does_not_stop_the_others_of_its_file(

@@ -15,14 +15,14 @@ from shm.errors import NothingThere, UsageError
 from shm.modes_document import modes_document
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Decision, Outcome, Stage, Store, StoredAlert, Workspace
-from shm.store.checking import check_store
-from shm.store.queries.recordings import (
+from shm.store.backups import check_store
+from shm.store.posteriors import list_history, list_posteriors, list_trend
+from shm.store.recordings import (
     count_stages,
     find_oldest_waiting,
     list_holds,
 )
-from shm.store.queries.tests import count_tests, list_test_rows, list_waiting_tests
-from shm.store.queries.trends import list_history, list_posteriors, list_trend
+from shm.store.tests import count_tests, list_test_rows, list_waiting_tests
 from shm.values import ModalTest, Recording
 from tests.helpers.contents import quiet
 from tests.helpers.flows import a_flow, ingest, receive_all
@@ -261,45 +261,11 @@ def test_a_held_test_that_is_killed_on_the_way_is_told_of_once(workspace: Worksp
         assert len(store.alerts.list_all()) == len(list_holds(store)) == 1
 
 
-def test_a_held_recording_that_is_done_again_waits_for_nobody_twice(held: Workspace) -> None:
-    with a_flow(held) as flow:
-        flow.store.recordings.rerun(2, Stage.IDENTIFIED, flow.clock())
-        flow.drain()
-        assert len(list_holds(flow.store)) == 1
-        former, _ = flow.store.alerts.list_all()
-        assert former.acknowledgement is not None
-
-
 @cache
 def a_recording(seed: int = 1) -> Recording:
     state = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
     rng = np.random.default_rng(seed)
     return hammer_test(HANGER_3, state, QUICK_PLAN, rng, time=day(0), source="s")
-
-
-@pytest.mark.slow
-def test_one_impact_counts_once_in_whatever_format_it_comes_again(workspace: Workspace) -> None:
-    """It confirmed itself: the watch calls a change at the second test that shows it."""
-    first = a_recording()
-    write(first, workspace.spool / "a.npz")
-    ingest(workspace)
-    scaled = [replace(c, values=c.values[5:] * 1.0) for c in first.channels[::-1]]
-    again = replace(first, channels=tuple(scaled), time=day(30))
-    for name in ("b.uff", "c.csv", "d.h5"):
-        write(again, workspace.spool / name)
-        ingest(workspace)
-    write(replace(a_recording(2), time=day(60)), workspace.spool / "e.npz")
-    ingest(workspace)
-    with workspace.store() as store:
-        assert counted(store) == ["a", "e"]
-        assert [hold.file_name for hold in list_holds(store)] == [
-            "b.uff",
-            "c.csv",
-            "d.h5",
-        ]
-        for hold in list_holds(store):
-            assert "copy" in [doubt.check for doubt in hold.doubts]
-            assert "again" in hold.message
 
 
 def test_a_corrected_sidecar_ends_a_hold(workspace: Workspace) -> None:

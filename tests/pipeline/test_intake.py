@@ -11,9 +11,8 @@ from shm.errors import BadInput
 from shm.pipeline import intake
 from shm.pipeline.intake import receive
 from shm.store import Outcome, Receipt, Stage, Workspace
-from shm.store.queries.history import list_events
-from shm.store.queries.recordings import list_recordings
-from shm.store.stored_recordings import Recordings
+from shm.store.journal import list_events
+from shm.store.recordings import Recordings, list_recordings
 from tests.helpers.workspaces import START, put
 
 

@@ -14,7 +14,7 @@ import pytest
 from shm.bridge import Hook
 from shm.errors import UsageError
 from shm.pipeline import Flow
-from shm.pipeline.notification_plan import after_works, quiet_until, works_before
+from shm.pipeline.courier import after_works, quiet_until, works_before
 from shm.store import IdentifiedTest, Lineage, Silence, Store, StoredTest, Workspace
 from shm.values import Alert, Selection
 from tests.helpers.flows import Clock, a_flow

@@ -8,9 +8,9 @@ import pytest
 
 from shm.pipeline.watching import differences
 from shm.store import Stage, StoredAlert, Workspace
-from shm.store.queries.hangers import find_latest_watches
-from shm.store.queries.recordings import count_stages
-from shm.store.queries.tests import list_waiting_tests
+from shm.store.recordings import count_stages
+from shm.store.tests import list_waiting_tests
+from shm.store.watch import find_latest_watches
 from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all
 from tests.helpers.workspaces import make_workspace, write_loss, write_slow_loss, write_test
 

@@ -12,13 +12,11 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.reconcile import SHM, Condition, reconcile
 from shm.report.hanger_status import Status
-from shm.store import Reconciled, StoredAlert, Workspace
-from shm.values import Alert
+from shm.store import StoredAlert, Workspace
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
-from tests.helpers.nouns import NOW, a_drift, an_alert
+from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.slow import few_of
-from tests.helpers.streams import a_reading
 from tests.helpers.workspaces import START, make_workspace, write_test
 
 
@@ -51,25 +49,6 @@ def test_a_tension_that_comes_back_resolves_its_alert(bridge: Workspace) -> None
         (found,) = (each for each in store.alerts.list_all() if each.alert.key == raised)
         assert found.resolution is not None
         assert found.resolution.who == "shm"
-
-
-@pytest.mark.parametrize(("lost", "rings"), [(0.2, False), (0.1, True)])
-def test_a_loss_that_a_stream_has_told_rings_again_only_where_tests_show_more(
-    bridge: Workspace, *, lost: float, rings: bool
-) -> None:
-    postman = Postman()
-    take(bridge, postman, 0, 1.0)
-    at = START + timedelta(days=58, hours=12)
-    drift = replace(a_drift(), shift_mean=-lost, shift_sd=0.002)
-    told = Alert("hanger-3:stream", 3, "h3 hour", at, "It fell.", (drift,), ("sudden change",))
-    with bridge.store() as store:
-        store.streams.save_pooled(replace(a_reading(), start=at), None, Reconciled((told,)))
-    for day in (59, 60):
-        take(bridge, postman, day, 0.8)
-    assert bool(postman.told) is rings
-    if not rings:
-        with bridge.store() as store:
-            assert [each.alert.key for each in store.alerts.list_all()] == [told.key]
 
 
 def test_the_same_conditions_again_change_nothing_and_one_that_is_over_closes_its_alert() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import multiprocessing
 import os
 import threading
@@ -132,18 +131,6 @@ def test_holder_names_process(location: str | Path, tmp_path: Path) -> None:
         time.sleep(0.02)
 
 
-def test_active_excludes_older_version(sqlite: Path, tmp_path: Path) -> None:
-    """Processes of 1.0.0 lock by flock(2) alone: no two of either are active together."""
-    file = tmp_path / "shm.lock"
-    with file.open("a+") as older:
-        fcntl.flock(older, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        with pytest.raises(StoreBusy), active(sqlite, file, None):
-            pytest.fail("two were active")
-        fcntl.flock(older, fcntl.LOCK_UN)
-        with active(sqlite, file, None), pytest.raises(BlockingIOError):
-            fcntl.flock(older, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
 def test_who_loses_the_connection_is_no_longer_active(
     server: str, postgresql: Databases, tmp_path: Path
 ) -> None:
@@ -171,13 +158,3 @@ def test_a_server_that_is_down_is_waited_for(tmp_path: Path) -> None:
         pytest.fail("nobody can be active")
     assert [error.retry_after_s for error in told] == [5.0, 5.0]
     assert not any(isinstance(error, StoreBusy) for error in told)
-
-
-def test_who_finds_the_lock_file_removed_is_no_longer_active(sqlite: Path, tmp_path: Path) -> None:
-    file = tmp_path / "shm.lock"
-    with active(sqlite, file, None) as lock:
-        file.unlink()
-        assert not lock.held()
-        with active(sqlite, file, None) as other:
-            assert other.held()
-            assert not lock.held()

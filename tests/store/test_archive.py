@@ -14,7 +14,7 @@ import pytest
 
 from shm.errors import BadInput, ShmError, StoreError
 from shm.store import Archive, Quarantine, ReceivedFile, archive
-from shm.store.archive import checksum, safe_name, suffix_of
+from shm.store.archive import checksum, safe_name
 
 REASON = {"message": "no sampling rate.", "remedy": "Give it.", "sha256": "0" * 64}
 
@@ -182,20 +182,6 @@ def test_another_refused_file_of_the_same_name_is_laid_beside_it(
     )
     assert (quarantine.folder / "h3.csv").read_bytes() == b"one"
     assert (quarantine.folder / other).read_bytes() == b"two"
-
-
-@pytest.mark.parametrize(
-    ("name", "suffix"),
-    [
-        ("h3.CSV", ".csv"),
-        ("h3.modes.json", ".modes.json"),
-        ("h3", ""),
-        ("h3.2026-05-01", ""),
-        ("h3.c/v", ""),
-    ],
-)
-def test_only_plain_endings_are_kept(name: str, suffix: str) -> None:
-    assert suffix_of(name) == suffix
 
 
 def test_names_that_no_database_or_file_system_holds_are_made_safe() -> None:

@@ -11,11 +11,10 @@ import sqlalchemy as sa
 from sqlalchemy.engine import RowMapping
 
 from shm.errors import StoreError, UsageError
-from shm.store import Store, copying
-from shm.store.backups import copy_store
-from shm.store.checking import check_store
-from shm.store.queries.recordings import list_recordings
-from shm.store.queries.trends import list_history
+from shm.store import Store, backups
+from shm.store.backups import check_store, copy_store
+from shm.store.posteriors import list_history
+from shm.store.recordings import list_recordings
 from shm.store.tables import posteriors
 from tests.helpers.contents import held, quiet
 from tests.helpers.nouns import NOW, a_file
@@ -54,14 +53,14 @@ def test_a_copy_that_differs_is_undone(
 ) -> None:
     fill(file_store)
     Store.create(empty).close()
-    written = copying._write
+    written = backups._write
 
     def altered(connection: sa.Connection, table: sa.Table, rows: Sequence[RowMapping]) -> None:
         written(connection, table, rows)
         if table is posteriors:
             connection.execute(sa.update(posteriors).values(log_evidence=0.5))
 
-    monkeypatch.setattr(copying, "_write", altered)
+    monkeypatch.setattr(backups, "_write", altered)
     with pytest.raises(StoreError, match="differs from the store in posteriors;"):
         copy_store(file_store, empty, quiet)
     with Store.open(empty) as copy:

@@ -21,14 +21,14 @@ from shm.store import (
     StoredTest,
     StoredWatch,
 )
-from shm.store.outbox import resolve
-from shm.store.queries.alerts import (
+from shm.store.alerts import (
     count_alerts,
     count_open_alerts,
     list_alert_page,
+    resolve,
 )
-from shm.store.queries.hangers import find_latest_watches
-from shm.store.queries.tests import list_test_rows
+from shm.store.tests import list_test_rows
+from shm.store.watch import find_latest_watches
 from shm.values import Selection
 from tests.helpers.nouns import (
     NOW,

@@ -8,10 +8,10 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import Baseline, IdentifiedTest, Lineage, Stage, Store, StoredTest, WatchCheckpoint
-from shm.store.queries.history import list_events, list_former_tests
-from shm.store.queries.recordings import find_recording
-from shm.store.queries.tests import list_baseline_tests, list_waiting_tests
-from shm.store.queries.trends import list_history, list_posteriors
+from shm.store.journal import list_events, list_former_tests
+from shm.store.posteriors import list_history, list_posteriors
+from shm.store.recordings import find_recording
+from shm.store.tests import list_baseline_tests, list_waiting_tests
 from shm.values import Selection
 from tests.helpers.nouns import NOW, a_file, a_posterior, a_test, a_watched_test
 

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from shm.store import IdentifiedTest, Judgement, Lineage, Stage, Store, StoredTest
+from shm.store import tests as judging
 from shm.store.blobs import unpack
-from shm.store.queries import judging
-from shm.store.queries.hangers import list_selected_models
-from shm.store.queries.judging import list_known_samples
-from shm.store.queries.tests import load_frequency_response
-from shm.store.queries.trends import list_history, list_posteriors
+from shm.store.posteriors import list_history, list_posteriors
+from shm.store.tests import list_known_samples, load_frequency_response
+from shm.store.watch import list_selected_models
 from shm.values import AddedMass, Fingerprint, Selection
 from tests.helpers.comparing import assert_same
 from tests.helpers.nouns import (

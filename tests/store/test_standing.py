@@ -5,12 +5,12 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 
 from shm.store import Deaths, IdentifiedTest, Lineage, Store
-from shm.store.queries.history import list_events
-from shm.store.queries.recordings import (
+from shm.store.journal import list_events
+from shm.store.recordings import (
     count_deaths,
     list_stage_seconds,
 )
-from shm.store.stored_tests import StoredTest
+from shm.store.tests import StoredTest
 from tests.helpers.nouns import NOW, a_file, a_test
 
 HOUR, DAY = timedelta(hours=1), timedelta(days=1)

@@ -9,6 +9,7 @@ from datetime import datetime
 import pytest
 import sqlalchemy as sa
 
+import shm.store.posteriors as stored
 from shm.models import described, end_stiffness
 from shm.store import (
     Adoption,
@@ -19,11 +20,10 @@ from shm.store import (
     Store,
     StoredTest,
     TrendPoint,
-    trends,
 )
-from shm.store.queries.hangers import find_baseline_temperatures, list_baselines_in_force
-from shm.store.queries.trends import find_latest_trends, list_history, list_trend
+from shm.store.posteriors import find_latest_trends, list_history, list_trend
 from shm.store.tables import posteriors
+from shm.store.watch import find_baseline_temperatures, list_baselines_in_force
 from shm.values import Hanger, Limits, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
 from tests.helpers.hangers import HANGER_3
@@ -200,14 +200,14 @@ def test_only_what_is_not_kept_is_made_from_samples(
     assert file_store.posteriors.save_summaries(HANGER_3) == 0
     updated(file_store, 2, 0.95)
     made: list[tuple[str, ...]] = []
-    summarised = trends.summarised
+    summarised = stored.summarised
 
     def noted(posterior: Posterior, hanger: Hanger, selection: Selection | None) -> Numbers:
         made.append(posterior.tests)
         return summarised(posterior, hanger, selection)
 
     with monkeypatch.context() as patched:
-        patched.setattr(trends, "summarised", noted)
+        patched.setattr(stored, "summarised", noted)
         assert [point.test for point in list_trend(file_store, HANGER_3)] == ["t1", "t2"]
     assert made == [("t2",)]
     assert file_store.posteriors.save_summaries(HANGER_3) == 1

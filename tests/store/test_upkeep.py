@@ -10,7 +10,7 @@ import pytest
 
 from shm.store import Store
 from shm.store.archive import Archive, Quarantine
-from shm.store.checking import (
+from shm.store.backups import (
     CheckedArchive,
     CheckedStore,
     check_archive,
@@ -18,8 +18,8 @@ from shm.store.checking import (
     quick_troubles,
     unknown_files,
 )
-from shm.store.queries.recordings import list_recordings
-from shm.store.queries.upkeep import find_last_backup, find_newest_step
+from shm.store.recordings import list_recordings
+from shm.store.upkeep import find_last_backup, find_newest_step
 from tests.helpers.contents import quiet
 from tests.helpers.nouns import NOW, a_file
 
