@@ -39,17 +39,16 @@ from shm.store import (
     TrendPoint,
     Workspace,
 )
-from shm.store.queries.alerts import count_open_alerts
-from shm.store.queries.hangers import (
+from shm.store.alerts import count_open_alerts, describe_silence, silenced_until
+from shm.store.posteriors import find_latest_trends, list_trend
+from shm.store.tests import list_undated_names, load_frequency_response
+from shm.store.watch import (
     find_baseline_temperatures,
     find_latest_watches,
     list_baselines_in_force,
     list_detected_changes,
     list_detections,
 )
-from shm.store.queries.tests import list_undated_names, load_frequency_response
-from shm.store.queries.trends import find_latest_trends, list_trend
-from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead

@@ -33,15 +33,15 @@ from shm.report.formatting import Interval
 from shm.report.hanger_report import StructureReport
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
 from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
-from shm.store.queries.alerts import count_open_alerts
-from shm.store.queries.hangers import list_detections
-from shm.store.queries.tests import (
+from shm.store.alerts import count_open_alerts
+from shm.store.posteriors import find_latest_trends, list_trend
+from shm.store.tests import (
     count_tests,
     list_baseline_tests,
     list_undated_names,
     load_frequency_response,
 )
-from shm.store.queries.trends import find_latest_trends, list_trend
+from shm.store.watch import list_detections
 from shm.values import Hanger, ResponsePoint, WatchedTest
 from shm.values.stated_tension import averaged_now
 from shm.watch import WatchOptions, watch_hanger

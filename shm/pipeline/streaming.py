@@ -33,7 +33,8 @@ from shm.pipeline.stream_health import (
 )
 from shm.store import Reconciled, Store, Workspace
 from shm.store.archive import do_nothing
-from shm.store.queries.streams import (
+from shm.store.ring import ring_of
+from shm.store.streams import (
     find_first_unpooled,
     find_first_window,
     find_pooled_range,
@@ -44,7 +45,6 @@ from shm.store.queries.streams import (
     list_windows,
     load_stream_watch,
 )
-from shm.store.ring import ring_of
 from shm.values import Mode, Plane
 from shm.values.stream import (
     PERIOD,

@@ -21,7 +21,7 @@ from shm.pipeline.bridge_reporting import hanger_shifts, hanger_summaries
 from shm.report import formatting
 from shm.report.hanger_status import BridgeMessage, bridge_message
 from shm.report.hanger_summary import HangerSummary
-from shm.store.queries.tests import count_tests
+from shm.store.tests import count_tests
 from shm.values import NAN, Hanger
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
