@@ -23,7 +23,6 @@ from shm_daemon.web.bridge_view import summarize_hangers
 from shm_daemon.web.faults import answers, handle_faults
 from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.middleware import Pages
-from shm_daemon.web.ordered_work import OrderedWork
 from shm_daemon.web.other_bridges import OtherBridges
 from shm_daemon.web.pages import (
     alerts,
@@ -86,7 +85,6 @@ def load_pages(site: Site) -> Pages:
     )
     app.state.site = site
     app.state.background_worker = BackgroundWorker()
-    app.state.ordered_work = OrderedWork(app.state.background_worker)
     app.state.uploads = Counter[str]()
     app.state.passwords = ThreadPoolExecutor(1, "passwords")
     app.state.sign_ons = signing_in.SignOns()

@@ -17,10 +17,10 @@ from shm.store import Workspace
 from shm.store.journal import Actor
 from shm.watch.repair_check import EVENT_KINDS
 from shm_daemon.web.access import AtSite, Engineer
+from shm_daemon.web.background_work import background_worker_of, still_at_work
 from shm_daemon.web.forms import Form, reason_in, time_in
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import HangerNumber
-from shm_daemon.web.ordered_work import ordered_work_of, still_at_work
 from shm_daemon.web.site import described
 
 router = APIRouter(prefix="/hangers/{hanger_id}/baseline", include_in_schema=False)
@@ -86,14 +86,14 @@ def order_baseline(
         raise BadInput(f"{kind!r} is nothing that can be done.", remedy="Choose it in the form.")
     order = Order(since, why, engineer.actor.name, EVENT_KINDS[kind] if kind else None)
     wanted = SetBaseline(site.workspace.folder, one.id, order, engineer.actor, utc_now())
-    word = ordered_work_of(request).place(wanted)
+    word = background_worker_of(request).place(wanted)
     return RedirectResponse(f"/hangers/{one.id}/baseline?order={word}", 303)
 
 
 @router.get("/outcome")
 def outcome(request: Request, _: Engineer, hanger_id: HangerNumber, order: str) -> Response:
     """Return the outcome of a request without the frame; 202 while it is computed."""
-    found = ordered_work_of(request).outcome(
+    found = background_worker_of(request).outcome(
         order, f"Whether it was made, the page of hanger {hanger_id} says."
     )
     if found is None:

@@ -16,10 +16,10 @@ from shm.report.diagnosis_summary import write_summary
 from shm.store import Workspace
 from shm.store.journal import Actor
 from shm_daemon.web.access import AtSite, Reader, Writer
+from shm_daemon.web.background_work import background_worker_of, still_at_work
 from shm_daemon.web.forms import Form
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import HangerNumber
-from shm_daemon.web.ordered_work import ordered_work_of, still_at_work
 from shm_daemon.web.site import described
 
 router = APIRouter(prefix="/hangers/{hanger_id}/diagnosis", include_in_schema=False)
@@ -63,7 +63,7 @@ def order_diagnosis(
     one = described(site.workspace, hanger_id)
     latest_tests(site.store, one, 1)
     wanted = Diagnose(site.workspace.folder, one.id, writer.actor, utc_now(), "all_tests" in form)
-    word = ordered_work_of(request).place(wanted)
+    word = background_worker_of(request).place(wanted)
     return RedirectResponse(f"/hangers/{one.id}/diagnosis?order={word}", 303)
 
 
@@ -80,7 +80,7 @@ def diagnosis_page(
 @router.get("/outcome")
 def outcome(request: Request, _: Reader, hanger_id: HangerNumber, order: str) -> Response:
     """Return the outcome of a request without the frame; 202 while it is computed."""
-    work = ordered_work_of(request)
+    work = background_worker_of(request)
     found = work.outcome(order, f"Whether it was made, the page of hanger {hanger_id} says.")
     if found is None:
         return still_at_work(
