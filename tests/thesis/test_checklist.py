@@ -25,10 +25,11 @@ PROGRAM = "python tests/benchmarks/validate.py"
 COMMANDS = sorted({i["where"] for i in ITEMS if i["where"].startswith(("shm ", "python "))})
 VALIDATE = [each for each in COMMANDS if each.startswith(PROGRAM)]
 SELECT = [each for each in COMMANDS if each.startswith("shm select")]
-# Beams, and what was measured: a second. The solids take seconds each, the choice among all classes
-# and the sampled formulas minutes.
+# Of beams and of each way to update one: a second each. Solids and the other updates take seconds,
+# the choice among all classes and the sampled formulas minutes.
 QUICK = [
-    each for each in VALIDATE if each.split()[-1] in ("1.1", "A.6", "A.7") or "--update" in each
+    *(f"{PROGRAM} --table {table}" for table in ("1.1", "A.6", "A.7")),
+    *(f"{PROGRAM} --update{way}" for way in ("", " --sigma plane", " --textbook")),
 ]
 MINUTES = [
     PROGRAM,
@@ -85,6 +86,7 @@ def test_every_page_of_it_exists() -> None:
 
 
 def test_every_table_has_its_own_command() -> None:
+    assert set(QUICK) <= set(VALIDATE)
     tables = {name.split()[1] for name in OF_THE_THESIS if name.startswith("table")}
     assert set(validate.TABLES) == tables
     assert {f"{PROGRAM} --table {number}" for number in tables} <= set(VALIDATE)
@@ -107,6 +109,7 @@ def test_a_command_of_it_runs(command: str, capsys: pytest.CaptureFixture[str]) 
 
 
 # By the quickest classes and few samples: what a class costs is of no interest here.
+@pytest.mark.slow
 @pytest.mark.parametrize("command", SELECT)
 def test_a_selection_of_it_runs(command: str) -> None:
     files = {"MODES.json": str(MODES_FILE), "H.toml": str(HANGER_FILE)}
