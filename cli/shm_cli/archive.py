@@ -114,7 +114,7 @@ def _prune_archive(
 ) -> _Pruned:
     found = Retention((), {})
     if keep_days is not None:
-        with progress_bar("comparing") as tell:
+        with progress_bar() as tell:
             before = utc_now() - timedelta(days=keep_days)
             found = removable(store, workspace.archive, before, tell)
     freed = found.size_bytes

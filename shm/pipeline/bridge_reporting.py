@@ -47,7 +47,7 @@ from shm.store.queries.hangers import (
     list_detected_changes,
     list_detections,
 )
-from shm.store.queries.tests import list_undated_names, load_frequency_response
+from shm.store.queries.tests import count_tests, list_undated_names, load_frequency_response
 from shm.store.queries.trends import find_latest_trends, list_trend
 from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest
@@ -173,6 +173,7 @@ class HangersNow:
         self.undated = list_undated_names(store)
         self.charts = control_charts(workspace, store)
         self._discarded = discarded_of_baselines(store)
+        self._tests = count_tests(store)
 
     def summary(self, hanger: Hanger) -> HangerSummary:
         """Return the state of a hanger, as every face shows it."""
@@ -200,6 +201,7 @@ class HangersNow:
             else blind,
             undated=self.undated.get(hanger.id, ()),
             control=control,
+            tests=self._tests[hanger.id].tests if hanger.id in self._tests else 0,
         )
 
     def _warnings(
