@@ -41,7 +41,7 @@ from shm.store import (
 )
 from shm.store.alerts import count_open_alerts, describe_silence, silenced_until
 from shm.store.posteriors import find_latest_trends, list_trend
-from shm.store.tests import list_undated_names, load_frequency_response
+from shm.store.tests import count_tests, list_undated_names, load_frequency_response
 from shm.store.watch import (
     find_baseline_temperatures,
     find_latest_watches,
@@ -172,6 +172,7 @@ class HangersNow:
         self.undated = list_undated_names(store)
         self.charts = control_charts(workspace, store)
         self._discarded = discarded_of_baselines(store)
+        self._tests = count_tests(store)
 
     def summary(self, hanger: Hanger) -> HangerSummary:
         """Return the state of a hanger, as every face shows it."""
@@ -199,6 +200,7 @@ class HangersNow:
             else blind,
             undated=self.undated.get(hanger.id, ()),
             control=control,
+            tests=self._tests[hanger.id].tests if hanger.id in self._tests else 0,
         )
 
     def _warnings(
