@@ -1,12 +1,8 @@
-"""Watched quantities of a hanger, and coordinates that frequencies follow nearly linearly.
+"""Define what is watched of a hanger, in coordinates that frequencies follow nearly linearly.
 
-Base point of all is the baseline's most probable parameter set: the parameters of a posterior go
-together along curved valleys, in which a mean of each by itself need not lie. The tension that
-people see is the posterior's mean all the same, as on every sheet: only its ratio enters the model.
-
-What 0.3 decades do is taken at the base point or, where that is more, as the root mean square over
-the baseline's samples. An end that seems clamped may have its most probable stiffness anywhere in
-its upper range, where 0.3 decades do nothing; a change there would be ruled out before any data.
+Base point of all is the baseline's most probable parameter set; the tension that people see is the
+posterior's mean. What 0.3 decades do is taken at the base point or, where that is more, as the root
+mean square over the baseline's samples: an end that seems clamped may have any stiffness there.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ from shm.values.stream import (  # noqa: E402
     WindowReading,
 )
 from shm.watch.kept_state import to_bytes  # noqa: E402
-from shm.watch.stream_reading import exchanged, usable  # noqa: E402
+from shm.watch.stream_reading import usable  # noqa: E402
 from shm.watch.stream_watch import (  # noqa: E402
     HOURS_A_DAY,
     TOGETHER,
@@ -62,7 +62,6 @@ from shm.watch.stream_watch import (  # noqa: E402
 WORLDS = ("living_bridge", "road_bridge_hours")
 DAYS_A_YEAR = 365.25
 HOUR = timedelta(hours=1)
-OPPOSITE = {"transverse": "longitudinal", "longitudinal": "transverse"}
 
 
 @dataclass(frozen=True)
@@ -98,9 +97,6 @@ SCENARIOS = {
     "ice": Scenario({"kind": "ice", "size": 8.0, "over_days": 0.5}),
     "remounted": Scenario({"kind": "sensor_remounted", "size": 0.3}, is_fault=True),
     "clock": Scenario(fault=lambda mode, size: off_by(mode, 0.005 * size), is_fault=True),
-    "swapped": Scenario(
-        fault=lambda mode, _: replace(mode, plane=OPPOSITE[mode.plane]), is_fault=True
-    ),
     "dead": Scenario(fault=lambda mode, _: None if mode.plane == "transverse" else mode,
                      is_fault=True),
     "gain": Scenario(louder=3.0, is_fault=True),
@@ -236,8 +232,6 @@ def daily_shift(state: StreamState, hours: Sequence[PooledReading]) -> tuple[flo
     seen, between = [], state.contrast.along(compensated(state.contrast))
     for reading in hours:
         modes = usable(reading)
-        if state.table.are_exchanged(modes):
-            modes = exchanged(modes)
         known = [mode for mode in modes if (mode.plane, mode.order) in state.table.modes]
         if known:
             kelvin = float(np.nan_to_num(reading.temperature_c - state.reference[0]))

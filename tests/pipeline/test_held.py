@@ -281,7 +281,7 @@ def test_the_whole_counts_in_place_of_its_part(workspace: Workspace) -> None:
     ingest(workspace)
     with a_flow(workspace) as flow:
         (hold,) = list_holds(flow.store)
-        assert "it holds all of part.npz (recording 1), 67 % of its own samples" in hold.message
+        assert "it holds part.npz (recording 1)" in hold.message
         assert (
             "`shm ingest --discard 1 --why TEXT`, then `shm ingest --confirm 2 --why TEXT`"
             in hold.message
@@ -295,7 +295,7 @@ def test_the_whole_counts_in_place_of_its_part(workspace: Workspace) -> None:
         receive_all(flow)
         flow.drain()
         (hold,) = list_holds(flow.store)
-        assert "a part of whole.npz (recording 2), 67 % of that one, sent again" in hold.message
+        assert "a part of whole.npz (recording 2), sent again" in hold.message
 
 
 def test_the_other_tests_of_a_file_go_on(workspace: Workspace) -> None:
