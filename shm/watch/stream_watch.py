@@ -34,10 +34,16 @@ from shm.values import (
     WatchedTest,
 )
 from shm.values.rounding import NINETY_PERCENT
-from shm.values.stream import PERIODS, PooledReading, StreamEvent, WindowReading
+from shm.values.stream import (
+    PERIODS,
+    PooledReading,
+    StreamEvent,
+    StreamEventKind,
+    WindowReading,
+)
 from shm.watch.causes import TIMEBASE
 from shm.watch.kept_state import from_bytes, to_bytes
-from shm.watch.stream_causes import StreamCause, find_cause
+from shm.watch.stream_causes import EXCHANGED, StreamCause, find_cause
 from shm.watch.stream_filter import CLIP, FAST, FEATURES, LEVEL, NOTHING, SLOW, Bank, Evidence
 from shm.watch.stream_reading import ModeTable, SeenReading, planes_of, usable
 from shm.watch.stream_thermometer import Believed, Thermometer, believed
@@ -233,6 +239,10 @@ _MODEL_OFF = 0.2  # judgement: by what the part of bending in a sensitivity is k
 _CLOCK = (
     "All frequencies moved by one same fraction, {size}: the time base, not the tension. Check the "
     "logger's clock and sampling rate."
+)
+_EXCHANGED = (
+    "The modes of each plane lie where those of the other did: the planes are exchanged, "
+    "not the tension. Check the cables of the sensors."
 )
 _SENSORS = (
     "Each mode moved by its own fraction: the sensors, not the tension. Check which sensors are "
@@ -627,12 +637,16 @@ def _event(
     reading: PooledReading,
     end: datetime,
 ) -> StreamEvent:
-    is_clock = cause.name == TIMEBASE
     size = f"{100 * cause.by_mode[0]:+.2f} %"
+    kinds: dict[str, tuple[StreamEventKind, str]] = {
+        TIMEBASE: ("clock drift", _CLOCK.format(size=size)),
+        EXCHANGED: ("swapped", _EXCHANGED),
+    }
+    kind, detail = kinds.get(cause.name, ("drifting", _SENSORS))
     return StreamEvent(
         stream=reading.stream,
-        kind="clock drift" if is_clock else "drifting",
+        kind=kind,
         start=_at(state, evidence.after_day),
         end=end,
-        detail=_CLOCK.format(size=size) if is_clock else _SENSORS,
+        detail=detail,
     )

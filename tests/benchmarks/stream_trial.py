@@ -62,6 +62,7 @@ from shm.watch.stream_watch import (  # noqa: E402
 WORLDS = ("living_bridge", "road_bridge_hours")
 DAYS_A_YEAR = 365.25
 HOUR = timedelta(hours=1)
+OPPOSITE = {"transverse": "longitudinal", "longitudinal": "transverse"}
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,9 @@ SCENARIOS = {
     "ice": Scenario({"kind": "ice", "size": 8.0, "over_days": 0.5}),
     "remounted": Scenario({"kind": "sensor_remounted", "size": 0.3}, is_fault=True),
     "clock": Scenario(fault=lambda mode, size: off_by(mode, 0.005 * size), is_fault=True),
+    "swapped": Scenario(
+        fault=lambda mode, _: replace(mode, plane=OPPOSITE[mode.plane]), is_fault=True
+    ),
     "dead": Scenario(fault=lambda mode, _: None if mode.plane == "transverse" else mode,
                      is_fault=True),
     "gain": Scenario(louder=3.0, is_fault=True),

@@ -12,7 +12,7 @@ import pytest
 
 from shm.errors import BadInput
 from shm.models.tensioned_beam import frequencies_hz
-from shm.values import FloatArray, Hanger, ModalTest, Mode
+from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, StreamEvent
 from shm.watch.ambient_hammer import ambient_bias
@@ -169,6 +169,22 @@ def test_a_time_base_that_steps_is_the_measurements() -> None:
     assert event.kind == "clock drift"
     assert event.start < START + timedelta(hours=501) < event.end
     assert abs(found[-1].compensated_shift) < 0.002
+
+
+@pytest.mark.parametrize("apart", [2e-3, 0.02])
+def test_exchanged_planes_are_an_event(apart: float) -> None:
+    plain = hours(130, modes=lambda _: np.repeat([0.0, -apart], 5))
+    other = dict(zip(PLANES, PLANES[::-1], strict=True))
+    off = [
+        replace(each, modes=tuple(replace(m, plane=other[m.plane]) for m in each.modes))
+        for each in plain[100:]
+    ]
+    found, _ = watched([*plain[:100], *off])
+    assert not any(each.alert for each in found)
+    (event,) = [event for each in found for event in each.events]
+    assert event.kind == "swapped"
+    assert event.end <= START + timedelta(hours=106)
+    assert abs(found[-1].compensated_shift) < 0.003
 
 
 def test_a_mode_that_went_astray_moves_nothing() -> None:
