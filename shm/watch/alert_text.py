@@ -44,7 +44,7 @@ _SURE = 0.9  # judgement: below nine in ten a sentence says "most likely"
 _EITHER_LIKELY = 0.8  # judgement: four to one that it was sudden, or slow
 _CERTAIN = 0.995  # reads 1.00 in two decimals, which nobody may claim
 _LEAST_SHARE, _LARGEST_FACTOR = 0.05, 1e3  # judgement: beyond, an end is as good as free or clamped
-_WHICH_END = "which end is not known"
+_WHICH_END, _FORMER = "which end is not known", " of its former value"
 _LONGEST_TEST, _DIGITS = 80, 12  # of a key's 255 characters
 
 
@@ -106,7 +106,7 @@ def is_stiffness(quantity: str) -> bool:
 
 
 def shift_words(quantity: str, mean: float, sd: float) -> str:
-    """Return `fell by 8.2 ± 1.1 %`; of a stiffness `fell to about 33 %`.
+    """Return `fell by 8.2 ± 1.1 %`; of a stiffness `fell to about 33 % of its former value`.
 
     `mean` and `sd` are a fraction of the tension, of the frequencies' mean where `quantity` is
     another cause, or decades of a stiffness.
@@ -118,7 +118,7 @@ def shift_words(quantity: str, mean: float, sd: float) -> str:
         if times < _LEAST_SHARE:
             return f"{verb} to less than a twentieth"
         if times < 1:
-            return f"{verb} to about {100 * times:.0f} %"
+            return f"{verb} to about {100 * times:.0f} %{_FORMER}"
         about = "" if times > _LARGEST_FACTOR else "about "
         return f"{verb} to {about}{factor(mean)} times its former value"
     if verb == "moved":
@@ -231,7 +231,7 @@ def _kind(group: Sequence[Moved], *, sized: bool = False) -> str:
     if tension is not None and len(group) > 1:
         name = "tension, with end stiffness,"
     lead = tension or first
-    return f"{name} {size_words(lead) if sized else _way(lead)}"
+    return f"{name} {size_words(lead).removesuffix(_FORMER) if sized else _way(lead)}"
 
 
 def _way(each: Moved) -> str:
