@@ -20,9 +20,9 @@ import numpy as np
 from shm.assumptions import DEFAULTS, Assumptions
 from shm.models import class_of
 from shm.models.tensioned_beam import frequencies_hz
-from shm.values import NAN, PLANES, BoolArray, FloatArray, Hanger, Mode, Posterior
+from shm.values import PLANES, BoolArray, FloatArray, Hanger, Mode, Posterior
 from shm.values.stream import PooledReading
-from shm.watch.quantities import MeasuredMode, base_point, log_frequencies
+from shm.watch.quantities import MeasuredMode, base_point, log_frequencies, posterior_at
 
 LEAST_SD = 3e-5
 """Of an hourly log frequency: 1 Hz is read to 1/30 mHz at best, and clocks wander by as much."""
@@ -72,30 +72,8 @@ def baseline_of(
     theta = np.array([tension_n[at, 0, of] / nominal_n, 1.0, *ends])
     factor = hanger.bending_stiffness_factor * float(shares[of])
     bar = replace(hanger, bending_stiffness_factor=factor, nominal_tension_n=nominal_n)
-    return _as_posterior(theta, bar), bar
-
-
-def _as_posterior(theta: FloatArray, hanger: Hanger) -> Posterior:
-    """Return one parameter set of class beam2 as a posterior."""
-    return Posterior(
-        model="beam2",
-        hanger=hanger.id,
-        names=("theta_F", "theta_L", "log10_k1", "log10_k2", "log10_k3", "log10_k4"),
-        samples=theta[None],
-        log_likelihood=np.zeros(1),
-        most_probable=theta,
-        nominal_tension_n=hanger.nominal_tension_n,
-        log_evidence=0.0,
-        log_evidence_sd=0.0,
-        effective_sample_size=NAN,
-        r_hat=NAN,
-        evaluations=0,
-        predicted=(),
-        tests=(),
-        seed=0,
-        seconds=0.0,
-        method="none",
-    )
+    names = ("theta_F", "theta_L", "log10_k1", "log10_k2", "log10_k3", "log10_k4")
+    return posterior_at("beam2", bar, dict(zip(names, theta.tolist(), strict=True))), bar
 
 
 @dataclass(frozen=True, eq=False)
