@@ -46,7 +46,7 @@ from shm.store.watch import (
 )
 from shm.values import Hanger, Summary
 from shm.values.rounding import ForceUnit, force_unit, listed, rounded_percent
-from shm.watch.alert_text import frequency_words
+from shm.watch.alert_text import watch_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document
@@ -309,7 +309,7 @@ def _structures(
                 "latest_test": found.time if found else None,
                 "baseline_since": min((test.time for test in of_baseline), default=None),
                 "open_alerts": open_alerts[each.id],
-                "said": frequency_words([one.watched for one in watched], each),
+                "said": watch_words([one.watched for one in watched], each),
                 "dated_by_receipt": list(undated.get(each.id, ())),
             }
         )
