@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 import pytest
 
+import shm
 from shm.errors import BadInput, ShmError
 from shm.store import Stage, Workspace
 from shm.store.recordings import count_stages
@@ -81,3 +83,13 @@ def test_a_step_that_kills_every_worker_is_told_as_a_crash(tmp_path: Path) -> No
 
 def _refuse() -> None:
     raise BadInput("odd.", line=3, remedy="Mend it.")
+
+
+def test_a_worker_of_another_version_is_refused_and_the_step_tried_again(
+    pool: Cluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = re.escape(shm.__version__)
+    monkeypatch.setattr(shm, "__version__", "9.9.9")
+    with pytest.raises(ShmError, match=rf"has shm {own}, the daemon 9\.9\.9") as caught:
+        pool.submit(os.getpid)
+    assert caught.value.retry_after_s is not None

@@ -311,3 +311,10 @@ def test_looking_changes_nothing(workspace: Workspace) -> None:
     before = state()
     examine(workspace.folder, datetime.now(UTC))
     assert state() == before
+
+
+def test_a_wrong_description_is_told_with_its_place(workspace: Workspace) -> None:
+    path = workspace.folder / "bridge.toml"
+    path.write_text(path.read_text().replace("length_m = 12.0", "length_m = -1"))
+    finding = only(workspace, "bridge.toml")
+    assert (finding.level, "length_m" in finding.found) == (Level.FAULT, True)

@@ -155,3 +155,13 @@ def test_a_step_that_grows_without_end_gets_an_error_before_the_machine_is_full(
 def _less_memory() -> None:
     execution._MOST_OF_MEMORY *= 1e9 / memory_of_machine()
     execution._bound_memory()
+
+
+@pytest.mark.slow
+def test_where_each_process_ends_at_once_no_file_is_to_blame_and_none_is_begun_for_ever() -> None:
+    with children_ended():
+        workers = Workers(1, partial(os._exit, 1))
+        with pytest.raises(ShmError, match="it ended before") as refusal:
+            workers.submit(os.getpid).result(60)
+        workers.shutdown(wait=False, cancel_futures=True)
+    assert refusal.value.retry_after_s

@@ -79,3 +79,9 @@ def test_more_than_is_taken_is_refused_before_it_is_kept(tmp_path: Path) -> None
 )
 def test_a_name_is_its_last_part_without_what_harms(given: str, name: str) -> None:
     assert landing_name(given) == name
+
+
+def test_the_same_again_lies_there_already(tmp_path: Path) -> None:
+    land(tmp_path, **SAID)
+    assert land(tmp_path, **SAID).path == tmp_path / "a.csv"
+    assert names(tmp_path) == {"a.csv", "a.toml"}

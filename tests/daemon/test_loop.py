@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -16,6 +17,8 @@ from shm.pipeline import Flow, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
 from shm.store import Archive, Stage, Workspace
+from shm.store.backups import check_store
+from shm.store.journal import list_events
 from shm.store.recordings import Recordings, count_stages
 from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import why_turn_failed
@@ -230,3 +233,32 @@ def test_a_setting_changed_on_a_page_is_taken_over(
     with workspace.store() as store:
         workspace.change_setting(store, key, 0.9, utc_now(), "anna")
     until(lambda: "a setting has changed and is taken over" in caplog.text)
+
+
+_ODD_NAMES = (
+    "x" * 251 + ".csv",  # its sidecar's name would be too long
+    "y" * 244 + ".modes.json",
+    "two\nlines.csv",
+    "tab\t.csv",
+    "escape\x1b[31m.csv",
+    "turned\u202e.csv",
+    "next\x85.csv",
+)
+
+
+def test_no_name_of_a_file_holds_up_the_others(
+    workspace: Workspace, serve: Callable[..., Wakeup]
+) -> None:
+    serve()
+    for name in _ODD_NAMES:
+        (workspace.spool / name).write_text(f"no recording: {name!r}")
+    os.mkfifo(workspace.spool / "pipe.csv")
+    write_test(workspace.spool / "good.modes.json", workspace)
+    until(lambda: counts(workspace) == {Stage.DONE: 1, Stage.REFUSED: len(_ODD_NAMES)})
+    assert [path.name for path in workspace.spool.iterdir()] == ["pipe.csv"]
+    assert why_turn_failed(workspace) == ""
+    with workspace.store() as store:
+        assert check_store(store, lambda *_: None).troubles == ()
+        names = [event.file_name for event in list_events(store, "refused")]
+    assert len(names) == len(_ODD_NAMES)
+    assert all(name.isprintable() and len(name) <= 200 for name in names)

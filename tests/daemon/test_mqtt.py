@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+import tracemalloc
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -181,3 +182,38 @@ def test_a_wrong_address_is_refused_without_telling_a_password(url: str) -> None
         Address.of(url, {})
     assert "secret" not in str(refused.value)
     assert "SHM_MQTT_PASSWORD" in str(refused.value)
+
+
+@pytest.mark.slow
+def test_what_came_while_the_daemon_was_down_is_taken_in(bridge: Workspace, broker: Broker) -> None:
+    with listening(bridge):
+        pass
+    broker.publish(f"{TOPIC}/meanwhile.csv", b"meanwhile")
+    with listening(bridge) as back:
+        until(lambda: back.waiting)
+        assert received(bridge) == [Outcome.NEW]
+        until(lambda: not back.waiting)
+
+
+def test_flood_waits_at_broker(tmp_path: Path, broker: Broker) -> None:
+    settings = {"mqtt_url": broker.url, "mqtt_max_bytes": 3_500_000}
+    workspace = make_workspace(tmp_path / "bridge", settings=settings)
+    names = sorted(f"hit{number:02d}.csv" for number in range(9))
+    with listening(workspace):
+        away = workspace.spool.rename(tmp_path / "away")
+        tracemalloc.start()
+        try:
+            for number, name in enumerate(names):
+                broker.publish(f"{TOPIC}/{name}", b"%02d" % number * 500_000)
+            time.sleep(1.0)  # all that will come have come
+            held_bytes = tracemalloc.get_traced_memory()[0]
+        finally:
+            tracemalloc.stop()
+        away.rename(workspace.spool)
+        outcomes: list[Outcome] = []
+        until(lambda: outcomes.extend(received(workspace)) or len(outcomes) >= len(names))
+    assert held_bytes < 6_000_000  # 9 MB were sent
+    assert outcomes == [Outcome.NEW] * len(names)
+    with listening(workspace) as again:
+        time.sleep(0.5)
+        assert (spooled(workspace), again.waiting) == ([], [])  # all are acknowledged

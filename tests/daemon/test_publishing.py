@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import logging
 import re
 import shutil
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+import httpx
 import pytest
 import yaml
 from click.testing import CliRunner
@@ -20,13 +22,14 @@ from shm.store import Workspace
 from shm.store.point_outbox import PointOutbox
 from shm_cli.main import cli
 from shm_daemon.doctor import examine
-from shm_daemon.publishing import results_published
+from shm_daemon.publishing import Pace, results_published
 from tests.helpers.flows import ingest, threads
 from tests.helpers.listeners import Answer, Told, a_listener
 from tests.helpers.pages import ROOT
 from tests.helpers.quick_update import stand_in
 from tests.helpers.streams import a_reading, with_stream
 from tests.helpers.time_series import a_victoria_metrics, an_influxdb
+from tests.helpers.waiting import until
 from tests.helpers.workspaces import SLOW_LOSS, make_workspace, write_test
 
 SERIES = re.compile(r"(?:\\.|[^ \\])+")
@@ -317,3 +320,81 @@ def test_publish_state_when_it_changes(workspace: Workspace, server: Server) -> 
         store.alerts.acknowledge(alert.id, "ann", "seen", utc_now())
     publish(workspace)
     assert len(states()) == 2
+
+
+def test_influxdb_refuses_some_points(bridge: Workspace, tmp_path: Path, caplog) -> None:
+    with an_influxdb(tmp_path) as database:
+        database.influxql("CREATE DATABASE shm")
+        # In the shard of t4 the field is a text, as somebody else wrote it.
+        somebodys = 'shm_test,hanger=9 counts="yes" 1777636800000000000'
+        httpx.post(f"{database.url}/write?db=shm", content=somebodys).raise_for_status()
+        workspace = publishing(bridge, database.url)
+        with caplog.at_level(logging.WARNING):
+            publish(workspace)
+
+        assert "field type conflict" in caplog.text
+        assert "points were refused; the log says why" in status(workspace)
+        found = counts(database)
+        assert (found["shm_mode"], found["shm_hour"]) == (98, 1)
+        assert waiting(workspace) == 0
+
+        database.influxql("DROP MEASUREMENT shm_test")
+        publish(workspace)
+        assert "refused" not in status(workspace)
+        assert counts(database)["shm_test"] == 8
+
+
+def test_dashboards_query_victoria_metrics(bridge: Workspace, tmp_path: Path) -> None:
+    with a_victoria_metrics(tmp_path) as database:
+        publish(publishing(bridge, database.url))
+
+        boards = {name: queries("prometheus", name) for name in ("overview", "hanger", "sensors")}
+        empty = {
+            panel
+            for board in boards.values()
+            for panel, query in board.items()
+            if not database.promql(query)
+        }
+    # The page for Prometheus alone knows the streams.
+    assert empty == {*EMPTY, "Since the last sample A", "Lost of the last day A"}
+
+
+@pytest.mark.parametrize("answer", [Answer(503, b"<html>"), Answer(302), Answer(cut=True)])
+def test_publish_after_failure(workspace: Workspace, server: Server, answer: Answer) -> None:
+    server.answer, server.takes = answer, False
+    publish(workspace)
+    n_points = waiting(workspace)
+    assert n_points > 100
+    assert f"{n_points} points wait" in status(workspace)
+
+    server.answer, server.takes = Answer(204), True
+    publish(workspace)
+    assert waiting(workspace) == 0
+    assert len(server.taken) >= n_points
+    assert set(server.taken.values()) == {1}
+
+
+@pytest.mark.parametrize(
+    ("kind", "header"),
+    [
+        ('database = "shm"', "Basic YW5uOnNlY3JldA=="),
+        ('organisation = "city"\nbucket = "shm"', "Token ann:secret"),
+    ],
+)
+def test_publish_sends_token(
+    bridge: Workspace, monkeypatch: pytest.MonkeyPatch, kind: str, header: str
+) -> None:
+    monkeypatch.setenv("INFLUX_TOKEN", "ann:secret")
+    with a_listener(lambda _: Answer(204)) as listener:
+        url = listener.url.removesuffix("/alerts")
+        publish(publishing(bridge, url, f'{kind}\ntoken_env = "INFLUX_TOKEN"'))
+    assert {told.headers["Authorization"] for told in listener.told} == {header}
+
+
+def test_running_daemon_goes_on(workspace: Workspace, server: Server) -> None:
+    server.answer, server.takes = Answer(500), False
+    with results_published(workspace, utc_now, pace=Pace(look_s=0.05, retry_s=0.05)):
+        until(lambda: waiting(workspace) > 100)
+        server.answer, server.takes = Answer(204), True
+        until(lambda: waiting(workspace) == 0)
+    assert set(server.taken.values()) == {1}

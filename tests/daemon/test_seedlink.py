@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import shutil
 import threading
 from collections.abc import Iterator, Sequence
@@ -229,3 +230,56 @@ def test_daemon_takes_stream_over(bridge: Workspace) -> None:
         shm_daemon.run(bridge, clock=clock, wakeup=wakeup, make_executor=threads)
         thread.join()
     assert n_stored(bridge) > 0
+
+
+@pytest.mark.parametrize("jump", [timedelta(hours=5, minutes=1), timedelta(days=27_000)])
+def test_clock_that_jumps(bridge: Workspace, jump: timedelta) -> None:
+    counts = samples(250)
+    wrong = samples(130, seed=2)
+    records = interleaved(counts)
+    ahead = [
+        record
+        for pair in zip(
+            *(records_of(row, START + jump, code) for row, code in zip(wrong, CODES, strict=True)),
+            strict=True,
+        )
+        for record in pair
+    ]
+    half = len(records) // 4 * 2
+    with a_seedlink_server([*records[:half], *ahead, *records[half:]]) as server:
+        workspace = asking(bridge, server.port)
+        n_full = full(counts, END_OF_FULL)
+        with asked(workspace):
+            until(lambda: n_stored(workspace) >= n_full, 30.0)
+    found, true = stored(workspace)[:, :n_full], counts[:, :n_full] * COUNT
+    there = np.isfinite(found)
+    np.testing.assert_allclose(found[there], true[there], rtol=1e-6)
+    # Where the clock jumps one channel may be a record ahead: of the other's as much is lost.
+    assert np.count_nonzero(~there) < 2 * RATE
+    is_refused = any("which is to come" in detail for _, detail in events(workspace))
+    assert is_refused == (jump > timedelta(days=1))
+
+
+def test_late_record_does_no_harm(bridge: Workspace) -> None:
+    counts = samples(250)
+    records = records_of(counts[0])
+    late = records_of(counts[1], code="HN2")[:1]
+    with a_seedlink_server([*records, *late]) as server:
+        workspace = asking(bridge, server.port)
+        pace = Pace(retry_s=0.05, patience_s=60.0)
+        with asked(workspace, pace):
+            until(lambda: len(records) + 1 in server.sent, 30.0)
+            server.add(*records_of(samples(130)[0], START + timedelta(seconds=250)))
+            n_full = full(samples(400), START + timedelta(seconds=292))
+            until(lambda: n_stored(workspace) >= n_full, 30.0)
+    found = stored(workspace)[0, : counts.shape[1]]
+    np.testing.assert_allclose(found, counts[0] * COUNT, rtol=1e-6)
+
+
+def test_garbage_is_said(bridge: Workspace) -> None:
+    random.seed(1)
+    with a_seedlink_server([random.randbytes(512)] * 3) as server:
+        workspace = asking(bridge, server.port)
+        with asked(workspace):
+            until(lambda: events(workspace), 30.0)
+    assert "miniSEED" in events(workspace)[0][1]

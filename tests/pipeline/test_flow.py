@@ -455,3 +455,15 @@ def test_documents_that_cannot_be_read_stop_their_hanger_and_not_the_beginning(
         assert flow.store.tests.named(4, "h4-90").stage is Stage.WATCHED
         assert find_latest_watches(flow.store, [bridge.bridge.hanger(4)])[4].watched.test == "h4-90"
     assert "hanger 3 cannot be judged again" in caplog.text
+
+
+def test_healthy_files_whose_workers_are_killed_by_turns_are_done(workspace: Workspace) -> None:
+    """As 18 of 20 were refused, when an operator or the kernel killed each worker twice."""
+    names = [f"t{number}." for number in range(6)]
+    for day, name in enumerate(names):
+        spool(workspace, name.rstrip("."), day=day)
+    clock = Clock()
+    with Killed(5, names) as pool, a_flow(workspace, executor=pool, clock=clock) as flow:
+        receive_all(flow)
+        drain_patiently(flow, clock, most=1000)
+    assert set(stages(workspace).values()) == {Stage.DONE}

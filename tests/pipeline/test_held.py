@@ -316,3 +316,33 @@ def test_a_corrected_sidecar_ends_a_hold(workspace: Workspace) -> None:
 def alerts_but_notices(store: Store) -> list[StoredAlert]:
     """Without those that ask to repeat a test that agrees with none before it."""
     return [each for each in store.alerts.list_all() if each.alert.kinds != ("repeat the test",)]
+
+
+def test_a_stuck_clock_is_held_and_a_mere_date_is_not(workspace: Workspace) -> None:
+    midnight = datetime(2026, 5, 2, tzinfo=UTC)
+    for name, time, tension in (
+        ("a", day(0), 1.0),
+        ("b", day(0), 0.9),
+        ("c", midnight, 1.0),
+        ("d", midnight, 1.001),
+    ):
+        spool(workspace, name, time, tension)
+        ingest(workspace)
+    with workspace.store() as store:
+        assert counted(store) == ["a", "c", "d"]
+        (hold,) = list_holds(store)
+        assert [doubt.check for doubt in hold.doubts] == [
+            "clock stuck",
+            "clock before the baseline",
+        ]
+        assert "may have lost 10 % of its tension" in hold.message
+
+
+def test_two_tests_of_a_loss_in_the_wrong_order_raise_an_alert(workspace: Workspace) -> None:
+    for name, when, tension in (("good", 0, 1.0), ("later", 80, 0.9), ("earlier", 40, 0.9)):
+        spool(workspace, name, day(when), tension=tension)
+        ingest(workspace)
+    with workspace.store() as store:
+        (alert,) = (stored.alert for stored in alerts_but_notices(store))
+        assert alert.test == "earlier"
+        assert "Tests later and earlier both read beyond its threshold" in alert.message

@@ -152,3 +152,40 @@ def test_what_came_under_the_same_names_since_it_was_read_stays(
     assert second.outcome is Outcome.NEW
     assert second.recording.file.sidecar_as is not None
     assert files_in(workspace.spool) == []
+
+
+def test_a_sidecar_swapped_for_a_link_after_the_look_sends_nothing_in(
+    workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    secret = tmp_path / "secret.toml"
+    secret.write_text("secret = 1\n")
+    put(workspace.spool / "h3.csv", "force,acc_1\n")
+    (workspace.spool / "h3.toml").symlink_to(secret)
+    with monkeypatch.context() as patched:
+        patched.setattr(intake, "_is_plain", lambda sidecar: True)
+        with pytest.raises(BadInput, match=r"h3\.toml: it is a link"):
+            take(workspace, "h3.csv")
+    assert files_in(workspace.archive.folder) == []
+    assert take(workspace, "h3.csv").recording.file.sidecar_as is None
+
+
+def test_a_subfolder_swapped_for_a_link_after_the_scan_sends_nothing_in(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    (tmp_path / "private").mkdir()
+    put(tmp_path / "private" / "h3.csv", "secret\n")
+    (workspace.spool / "logger").symlink_to(tmp_path / "private")
+    with pytest.raises(BadInput, match="leads out of the spool"):
+        take(workspace, "logger/h3.csv")
+    assert files_in(workspace.archive.folder) == []
+
+
+def test_the_spool_itself_may_be_a_link_to_another_disk(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    workspace.spool.rmdir()
+    (tmp_path / "disk").mkdir()
+    workspace.spool.symlink_to(tmp_path / "disk")
+    put(workspace.spool / "h3.csv", "force,acc_1\n")
+    assert take(workspace, "h3.csv").recording.file.file_name == "h3.csv"
+    assert files_in(tmp_path / "disk") == []

@@ -227,3 +227,33 @@ def test_the_good_file_that_comes_again_heals_the_rotten_one(
     assert checksum(path) == file.sha256
     with kept_in.opened(file) as shown:
         assert shown.read_bytes() == b"force,acc_1\n1,2\n"
+
+
+def test_a_name_given_to_a_link_while_it_is_read_is_noticed(
+    kept_in: Archive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, secret = a_source(tmp_path), a_source(tmp_path, "secret.csv", b"secret\n")
+    copy, copied = archive._copy_hashed, []
+
+    def swap_and_copy(reading: BinaryIO, target: Path, *more: Any) -> tuple[str, int]:
+        source.unlink()
+        source.symlink_to(secret)
+        sha256, size = copy(reading, target, *more)
+        copied.append(target.read_bytes())
+        return sha256, size
+
+    monkeypatch.setattr(archive, "_copy_hashed", swap_and_copy)
+    with pytest.raises(ShmError, match="changed while it was read"):
+        kept_in.keep(source)
+    assert copied == [b"force,acc_1\n"]
+    assert files_in(kept_in.folder) == []
+
+
+def test_the_archive_is_out_of_reach_of_edits_in_the_quarantine(
+    kept_in: Archive, quarantine: Quarantine, tmp_path: Path
+) -> None:
+    kept = kept_in.keep(a_source(tmp_path))
+    archived = kept_in.folder / kept.archived_as
+    target = quarantine.put(archived, "h3.csv", REASON, tmp_path / "none.toml")
+    target.write_bytes(b"edited")
+    assert archived.read_bytes() == b"force,acc_1\n"

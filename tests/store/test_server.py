@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -119,3 +120,30 @@ def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "psycopg", None)
     with pytest.raises(StoreError, match=re.escape("pip install shm[postgres]")):
         make_engine("postgresql://shm@db.example.org/arch")
+
+
+@pytest.fixture
+def unready(postgresql: Databases) -> Iterator[str]:
+    """A database without tables."""
+    with postgresql.database() as url:
+        yield url
+
+
+def test_who_may_not_write_is_told_so(server: str, postgresql: Databases) -> None:
+    postgresql.run("CREATE ROLE reader LOGIN")
+    name = str(url_of(server).database)
+    postgresql.run("GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader", server)
+    with Store.open(postgresql.url(name, user="reader")) as store:
+        assert list_recordings(store) == ()
+        with pytest.raises(StoreError, match="Give this user write access"):
+            store.recordings.receive(a_file(1), NOW)
+
+
+def test_an_upgrade_that_fails_on_a_server_leaves_nothing_half_done(
+    unready: str, postgresql: Databases
+) -> None:
+    postgresql.run("CREATE TABLE tests (id INTEGER)", unready)
+    with pytest.raises(StoreError):
+        Store.upgrade(unready)
+    tables = postgresql.run("SELECT tablename FROM pg_tables WHERE schemaname = 'public'", unready)
+    assert tables == [("tests",)]
