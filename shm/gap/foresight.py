@@ -100,7 +100,7 @@ class NewTests:
             self._predictions[fit] = self._predict(fit)
         mean, spread = (each.copy() for each in self._predictions[fit])
         new, size = design.frequencies, design.size
-        was, mode_loads = problem.repeated, self._of_frequencies
+        was, mode_loads = problem.repeated_with(fit.hypothesis.effects), self._of_frequencies
         shared = errors.between(design, old) + self._section @ was.section.T
         among_old = errors.between(old, old) + was.frequency + np.diag(errors.frequency_sd**2)
         gain = np.linalg.solve(among_old, shared.T).T

@@ -141,10 +141,16 @@ def _conditions(tests: Sequence[ModalTest], assumed: Assumptions) -> tuple[Condi
     reference = temperature[known].mean() if known.any() else 0.0
     shift = np.where(known, temperature - reference, 0.0)
     shift_read = _tension_shifts(tests, assumed)
+    sd_k = np.where(known, assumed.thermometer_sd_k.value, assumed.unknown_temperature_sd_k.value)
     amplitude = [test.amplitude if np.isfinite(test.amplitude) else 1.0 for test in tests]
     return tuple(
         Conditions(
-            test.id, float(shift[t]), float(amplitude[t]), test.added_mass, *shift_read[t].tolist()
+            test.id,
+            float(shift[t]),
+            float(amplitude[t]),
+            test.added_mass,
+            *shift_read[t].tolist(),
+            float(sd_k[t]),
         )
         for t, test in enumerate(tests)
     )

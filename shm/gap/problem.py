@@ -34,7 +34,7 @@ from shm.inference.systematic_errors import (
 from shm.models import AsMade
 from shm.models.as_made import BENDING
 from shm.models.beam import Beam3
-from shm.models.effects import Conditions, Variant, parameters_of
+from shm.models.effects import EFFECTS, Conditions, Variant, parameters_of
 from shm.models.hanger import HangerModes
 from shm.models.hanger_with_effects import HangerWithEffects
 from shm.values import NAN, BoolArray, FloatArray, IntArray, ModalTest
@@ -83,7 +83,8 @@ class GapProblem:
         self.alone: Fit | None = None
         self.rivals: list[tuple[float, GapProblem]] = []
         self._hangers: dict[Effects, HangerWithEffects] = {}
-        self._likelihoods: dict[bool, Likelihood] = {}
+        self._likelihoods: dict[tuple[Effects, bool], Likelihood] = {}
+        self._thermometers: dict[Effects, FloatArray] = {}
         self._scaling = ShapeScaling.measured(observations)
 
     # ------------------------------------------------ what the posterior of a hypothesis asks for
@@ -118,6 +119,25 @@ class GapProblem:
         square = self.likelihood(alone).squares(np.nan_to_num(bent, nan=np.inf, posinf=1e3))
         straight = candidates[square[:, node] < _STRAIGHT**2]
         self._linear = np.union1d(self.described.always_linear, straight)
+
+    def settle_temperatures(self, hypothesis: Hypothesis, z: FloatArray) -> bool:
+        """Take from z (d,) what an error of the steel's temperature in each test does by effects.
+
+        Return False where no effect of the hypothesis follows the temperature.
+        """
+        effects, design = hypothesis.effects, self.design
+        if not any("temperature" in EFFECTS[name].follows for name, _ in effects):
+            return False
+        moved = tuple(
+            replace(each, temperature_shift_k=each.temperature_shift_k + each.temperature_sd_k)
+            for each in design.conditions
+        )
+        here, there = (
+            self.predict(hypothesis, z[None], each)[0, : design.frequencies]
+            for each in (design, replace(design, conditions=moved))
+        )
+        self._thermometers[effects] = of_each_test(design, there - here)
+        return True
 
     # ------------------------------------------------ coordinates and predictions
 
@@ -193,11 +213,19 @@ class GapProblem:
 
     def likelihood(self, hypothesis: Hypothesis) -> Likelihood:
         """Return the likelihood of residuals; with something unknown if the hypothesis has it."""
-        flexible = hypothesis.flexible
-        if flexible not in self._likelihoods:
-            make = flexible_nodes if flexible else nodes
-            self._likelihoods[flexible] = Likelihood(make(self.observations, self.repeated))
-        return self._likelihoods[flexible]
+        repeated = self.repeated_with(hypothesis.effects)
+        key = (hypothesis.effects if repeated is not self.repeated else (), hypothesis.flexible)
+        if key not in self._likelihoods:
+            make = flexible_nodes if hypothesis.flexible else nodes
+            self._likelihoods[key] = Likelihood(make(self.observations, repeated))
+        return self._likelihoods[key]
+
+    def repeated_with(self, effects: Effects) -> Repeated:
+        """Return what repeats; where effects follow the temperature, its errors are among it."""
+        loads = self._thermometers.get(effects)
+        if loads is None:
+            return self.repeated
+        return replace(self.repeated, tensions=np.hstack([self.repeated.tensions, loads]))
 
     @cached_property
     def repeated(self) -> Repeated:
@@ -228,8 +256,7 @@ class GapProblem:
         )
         there = self._predicted_near(replace(design, conditions=moved))
         change = (there - self._predicted_near(design))[: design.frequencies] / _STEP_SD
-        of_test = np.array(names)[design.frequency_test, None] == list(dict.fromkeys(names))
-        return np.where(of_test, change[:, None], 0.0)
+        return of_each_test(design, change)
 
     def masses_of(self, design: Design) -> FloatArray:
         """Return what unstated radii of gyration do to the frequencies of a design: loads (F, k).
@@ -309,7 +336,7 @@ class GapProblem:
         each by three of its standard deviations at most, for what is larger is no such error.
         """
         residual = (self.value - fit.predicted)[: self.design.frequencies]
-        loads = self.repeated.of_frequencies
+        loads = self.repeated_with(fit.hypothesis.effects).of_frequencies
         size = loads.T @ np.linalg.solve(fit.noise.frequency, residual)
         return np.asarray(residual - loads @ size.clip(-_MOST_REPEATED, _MOST_REPEATED))
 
@@ -351,18 +378,22 @@ class GapProblem:
         """
         frequencies = np.arange(self.design.frequencies)[rows]
         shapes = np.flatnonzero(np.isin(self.design.shape_mode, frequencies))
-        return self._with(self.observations.part(frequencies, shapes))
+        return self._with(frequencies, shapes)
 
     def without_shape(self, row: int) -> GapProblem:
         """Return the problem without the shape of the mode `row`; itself where it has none."""
         components = np.flatnonzero(self.design.shape_mode != row)
         if len(components) == len(self.design.shape_mode):
             return self
-        return self._with(self.observations.part(np.arange(self.design.frequencies), components))
+        return self._with(np.arange(self.design.frequencies), components)
 
-    def _with(self, part: Observations) -> GapProblem:
+    def _with(self, frequencies: IntArray, components: IntArray) -> GapProblem:
+        part = self.observations.part(frequencies, components)
         problem = GapProblem(self.model, self.tests, part, self.described)
         problem.smallest, problem._hangers = self.smallest, self._hangers
+        problem._thermometers = {
+            effects: loads[frequencies] for effects, loads in self._thermometers.items()
+        }
         return problem
 
     @property
@@ -416,6 +447,12 @@ class GapProblem:
         conditions = [design.conditions[test] for test in tests]
         orders, shapes = int(design.frequency_order.max()), len(design.shape_mode) > 0
         return zip(tests, composed.modes_of_tests(theta, conditions, orders, shapes), strict=True)
+
+
+def of_each_test(design: Design, change: FloatArray) -> FloatArray:
+    """Return a change of the frequencies (F,) as loads (F, tests), of each test by itself."""
+    names = np.array([each.test for each in design.conditions])[design.frequency_test]
+    return np.where(names[:, None] == np.unique(names), change[:, None], 0.0)
 
 
 def _sensor_places_m(design: Design) -> tuple[float, ...]:

@@ -83,7 +83,8 @@ def identification_sd(problem: GapProblem, fit: Fit) -> FloatArray:
     Less what repeats in any case, which is no error of identification.
     """
     sd, count = problem.observations.sd, problem.design.frequencies
-    variance = np.diag(fit.noise.frequency - problem.repeated.frequency)
+    repeated = problem.repeated_with(fit.hypothesis.effects).frequency
+    variance = np.diag(fit.noise.frequency - repeated)
     return np.concatenate(
         [np.where(np.isfinite(sd[:count]), sd[:count], np.sqrt(variance)), sd[count:]]
     )
@@ -282,7 +283,8 @@ def _residuals(problem: GapProblem, fit: Fit, folds: BoolArray) -> FloatArray:
         _, step, *_ = errors.linear(fit.slopes[rows], residual[rows], fit.z)
         rest = (residual - fit.slopes @ step)[: design.frequencies]
         # What repeats in all frequencies is known by those that are kept.
-        across = problem.repeated.frequency[np.ix_(out, kept)]
+        repeated = problem.repeated_with(fit.hypothesis.effects).frequency
+        across = repeated[np.ix_(out, kept)]
         covariance = fit.noise.frequency[np.ix_(kept, kept)]
         left[fold, out] = rest[out] - across @ np.linalg.solve(covariance, rest[kept])
     return left

@@ -442,21 +442,15 @@ def sample(
     return sampling.fit(draws) if sampling.effective >= enough else sampling.fit_by_chain(draws)
 
 
-def approximate(
-    target: Target, peaks: Sequence[Peak], draws: int, rng: np.random.Generator, beyond: float
-) -> Fit:
-    """Return the fit of a hypothesis by normal distributions on its peaks (Laplace's method).
-
-    `beyond` is added to the log evidence: the difference to sampling of a like posterior.
-    """
+def approximate(target: Target, peaks: Sequence[Peak], draws: int, rng: np.random.Generator) -> Fit:
+    """Return the fit of a hypothesis by normal distributions on its peaks (Laplace's method)."""
     log = np.array([peak.log_evidence for peak in peaks])
     counts = rng.multinomial(draws, normalised(log))
     found = np.vstack(
         [rng.multivariate_normal(p.z, p.covariance, n) for p, n in zip(peaks, counts, strict=True)]
     )
     nan = float("nan")
-    log_evidence = laplace(peaks) + beyond, nan
-    return _fit(_Collapsed(target, peaks), peaks, found, log_evidence, nan, "normal")
+    return _fit(_Collapsed(target, peaks), peaks, found, (laplace(peaks), nan), nan, "normal")
 
 
 def _choose_near_best(peaks: Sequence[Peak]) -> list[Peak]:

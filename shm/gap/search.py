@@ -107,10 +107,6 @@ class Search:
         self.baseline = fit_alone(problem, rng, options.draws)
         self.fits: dict[Hypothesis, Fit] = {ALONE: self.baseline}
         self.rough: dict[Hypothesis, float] = {ALONE: laplace(self.baseline.peaks)}
-        # What sampling finds beyond Laplace's method is nearly common: the hanger's own part. Where
-        # the hanger alone misses the data by far, both are extrapolations and share nothing.
-        beyond = self.baseline.log_evidence - self.rough[ALONE]
-        self._beyond = beyond if abs(beyond) < HOPELESS else 0.0  # record 0013
         linear = Linear(problem.likelihood(ALONE), self.baseline.slopes)
         every = hypotheses(problem, options.without)
         scans = {h: scan(problem, self.baseline, linear, h) for h in every}
@@ -151,7 +147,7 @@ class Search:
             tried.append(score)
         # What was not fitted is no better than what is hopeless: a scan may say anything far off.
         most = max(each.log_evidence for each in tried) - HOPELESS
-        rest = {h: min(e + self._beyond, most) for h, e in self.rough.items() if h not in self.fits}
+        rest = {h: min(e, most) for h, e in self.rough.items() if h not in self.fits}
         return tried + [ScoredHypothesis(h, log, log) for h, log in rest.items()]
 
     def _level(self, hypothesis: Hypothesis) -> float:
@@ -191,6 +187,9 @@ class Search:
             best = max(self._level(h) for h in (*self.fits, *climbed))
             hopeless = -np.inf if hypothesis.flexible else self._needed(target, best - 2 * HOPELESS)
             peaks = find_peaks(target, z, hopeless)
+            if peaks and self.problem.settle_temperatures(hypothesis, peaks[0].z):
+                again = np.array([peak.z for peak in peaks])
+                peaks = find_peaks(Target(self.problem, hypothesis), again)
             if peaks:
                 climbed[hypothesis] = peaks
                 self.rough[hypothesis] = laplace(peaks)
@@ -200,7 +199,7 @@ class Search:
                 target = Target(self.problem, hypothesis)
                 peaks = self._with_mirrored(target, peaks)
                 self.rough[hypothesis] = laplace(peaks)
-                found = approximate(target, peaks, self.draws, self.rng, self._beyond)
+                found = approximate(target, peaks, self.draws, self.rng)
                 # Where two modes change places a prediction is one thing in a batch, another alone.
                 if found.log_fit + log_normal(found.z[None])[0] > peaks[0].log - AS_GOOD_A_FIT:
                     self.fits[hypothesis] = found

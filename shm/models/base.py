@@ -288,7 +288,8 @@ class Conditions:
     `temperature_shift_k` counts from the reference (the mean of the tests), 0 where unknown: the
     diagnosis says so; `amplitude` is relative to the reference level, 1 where unknown.
     `tension_shift_n` is by how much the tension read in the test exceeds the mean of all readings,
-    0 where none was read, and `tension_shift_sd_n` the standard deviation of the reading.
+    0 where none was read, and `tension_shift_sd_n` the standard deviation of the reading;
+    `temperature_sd_k` is that of the steel's temperature.
     """
 
     test: str = ""
@@ -297,6 +298,7 @@ class Conditions:
     added_mass: AddedMass | None = None
     tension_shift_n: float = 0.0
     tension_shift_sd_n: float = 0.0
+    temperature_sd_k: float = 0.0
 
     def with_usual_radius(self, radius_m: float) -> Conditions:
         """Return the same with this radius of gyration of a known mass that states none."""

@@ -55,7 +55,6 @@ _REASONS: Mapping[Reason, str] = {
     "of something else is {unknown}",
     "much would fit": "{nearest} fits, but so would much that has another cause, and the "
     "probability of something else is {unknown}",
-    "no nearer": "{nearest} is the most probable cause, but brings the frequencies no nearer",
     "weak evidence": "{nearest} is the most probable cause, but leaves more than the errors allow",
     "none is more probable than not": "no cause is more probable than all else",
     "sampler failed": "no cause is claimed from such draws",

@@ -33,9 +33,6 @@ DESCRIPTION_EFFECTS = (
 )
 """Effects of the catalogue that say no more than that the description is wrong."""
 
-SHAPE_EFFECTS = ("sensor_misalignment",)
-"""Effects of the catalogue that change mode shapes alone: no frequency comes nearer with them."""
-
 
 class Outcome(Enum):
     """Name the five outcomes of a diagnosis."""
@@ -61,7 +58,6 @@ Reason = Literal[
     "acts alone",
     "unknown is more probable",
     "much would fit",
-    "no nearer",
     "weak evidence",
     "none is more probable than not",
     "sampler failed",
@@ -98,11 +94,6 @@ class Claim:
         """Return whether it may be no more than a wrong description."""
         names = {effect for cause in self.causes for effect in cause.effects}
         return not names.isdisjoint(DESCRIPTION_EFFECTS)
-
-    @property
-    def is_of_shapes(self) -> bool:
-        """Return whether the leading cause changes no frequency."""
-        return set(self.leading.effects) <= set(SHAPE_EFFECTS)
 
 
 @dataclass(frozen=True)
@@ -205,8 +196,6 @@ def _judge_gap(diagnosis: Diagnosis, found: GapVerdict) -> GapVerdict:
         found = replace(found, runner_up=nearest)
     if found.is_uncertain:
         return replace(found, reason="sampler failed")
-    if not nearest.is_of_shapes and _is_no_nearer(diagnosis.shrinkage):
-        return replace(found, reason="no nearer")
     if left:
         is_worth_naming = nearest.probability >= MIN_RUNNER_UP
         if is_worth_naming and nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR:
@@ -266,10 +255,6 @@ def _doubt_no_gap(diagnosis: Diagnosis, found: GapVerdict) -> Reason:
     if found.is_few:
         return "few modes"
     return "" if diagnosis.no_gap_probability >= MIN_CLAIM else "less probable than not"
-
-
-def _is_no_nearer(shrinkage: Shrinkage) -> bool:
-    return shrinkage.rms_after_percent >= shrinkage.rms_before_percent
 
 
 def _holds_out(shrinkage: Shrinkage) -> bool | None:

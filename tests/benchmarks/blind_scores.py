@@ -158,9 +158,8 @@ def find_contradictions(found: Diagnosis) -> list[str]:
     if is_settled and (left > MAX_RMS_Z or found.fit_p_value < MIN_FIT_P_VALUE):
         said.append(f"settled, with residuals of {left:.1f} sd, p {found.fit_p_value:.2g}")
     shrinkage = found.shrinkage
-    of_shapes = claim is not None and claim.is_of_shapes
     no_nearer = shrinkage.rms_after_percent >= shrinkage.rms_before_percent
-    if is_claim and no_nearer and not of_shapes:
+    if is_claim and no_nearer and _rms_z(found, "z") > MAX_RMS_Z:
         said.append("a cause is named that brings the frequencies no nearer")
     failed = [each for each in found.remarks if each.startswith("The sampler failed")]
     if is_settled and (failed or found.effective_draws < ENOUGH_EFFECTIVE):

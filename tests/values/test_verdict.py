@@ -77,11 +77,8 @@ STRONG = replace(LED, causes=(cause("point_mass", 0.3, bayes=300.0),), unexplain
         ),
         (replace(LED, effective_draws=199.0), Outcome.UNEXPLAINED, "sampler failed"),
         (replace(LED, effective_draws=200.0), Outcome.EXPLAINED, ""),
-        (
-            replace(LED, shrinkage=Shrinkage(0.1, 0.23, 0.15, 0.15)),
-            Outcome.UNEXPLAINED,
-            "no nearer",
-        ),
+        # The hanger alone fits as well, by a description that is far off.
+        (replace(LED, shrinkage=Shrinkage(0.1, 0.1001, 0.15, 0.13)), Outcome.EXPLAINED, ""),
         (
             replace(LED, no_gap_probability=NAN, unexplained_probability=NAN,
                     causes=(cause("point_mass", NAN),)),
@@ -129,14 +126,6 @@ def test_judge_no_gap(diagnosis: Diagnosis, reason: str) -> None:
     assert (found.outcome, found.reason) == (Outcome.NO_GAP, reason)
     assert found.claim is found.runner_up is None
     assert found.probability == diagnosis.no_gap_probability
-
-
-def test_judge_cause_of_shapes() -> None:
-    """A turned sensor changes no frequency, and is claimed all the same."""
-    none_nearer = Shrinkage(0.1, 0.1001, NAN, NAN)
-    turned = replace(LED, shrinkage=none_nearer, causes=(cause("sensor_misalignment", 0.9),))
-    assert judge(turned).outcome is Outcome.EXPLAINED
-    assert judge(replace(LED, shrinkage=none_nearer)).reason == "no nearer"
 
 
 def test_judge_unknown_leads_beyond_errors() -> None:

@@ -148,7 +148,7 @@ class Effect:
     what one is called that a diagnosis looks for at each place along the hanger.
 
     An effect that says no more than that the description is wrong is also named in
-    `DESCRIPTION_EFFECTS`, one that changes no frequency in `SHAPE_EFFECTS` (shm/values/verdict.py).
+    `DESCRIPTION_EFFECTS` (shm/values/verdict.py).
     """
 
     name: ClassVar[str]
