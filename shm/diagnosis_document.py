@@ -24,16 +24,15 @@ GAP_CHECK_SCHEMA = "shm.gap_check/1"
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the document of `shm gap diagnose --json`."""
     document = asdict(diagnosis)
+    before, after = document.pop("tension_before_n"), document.pop("tension_after_n")
+    following = document.pop("next_measurements")
     return {
         "schema": DIAGNOSIS_SCHEMA,
-        "tension_n": {
-            "before": document.pop("tension_before_n"),
-            "after": document.pop("tension_after_n"),
-        },
-        "next_measurement": document.pop("next_measurements"),
         **document,
         "causes": [_cause_document(cause) for cause in diagnosis.causes],
         "invisible": [{"effect": name, "why": why} for name, why in diagnosis.invisible],
+        "tension_n": {"before": before, "after": after},
+        "next_measurement": following,
         "verdict": _verdict_document(diagnosis.verdict),
     }
 

@@ -149,8 +149,9 @@ def _conditions(tests: Sequence[ModalTest], assumed: Assumptions) -> tuple[Condi
             float(shift[t]),
             float(amplitude[t]),
             test.added_mass,
-            *shift_read[t].tolist(),
-            float(sd_k[t]),
+            tension_shift_n=float(shift_read[t, 0]),
+            tension_shift_sd_n=float(shift_read[t, 1]),
+            temperature_sd_k=float(sd_k[t]),
         )
         for t, test in enumerate(tests)
     )
