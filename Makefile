@@ -31,9 +31,9 @@ demo: .venv/runtime
 demo-live: .venv/runtime
 	$(BIN)/shm demo --live --folder shm-demo-live
 
-# Three parts at once, because many tests wait for a daemon, a server or a browser.
+# Both parts at once, because many tests wait for a daemon, a server or a browser.
 test: .venv/development
-	$(MAKE) --jobs 3 --directory tests/benchmarks lint tests sample-without-avx2
+	$(MAKE) --jobs 2 --directory tests/benchmarks lint tests
 
 lint: .venv/development
 	$(BIN)/ruff check .

@@ -20,34 +20,20 @@ DIAGNOSIS_SCHEMA = "shm.diagnosis/1"
 BRIDGE_DIAGNOSIS_SCHEMA = "shm.bridge_diagnosis/1"
 GAP_CHECK_SCHEMA = "shm.gap_check/1"
 
-_PLAIN = (
-    "hanger", "baseline", "no_gap_probability", "unexplained_probability", "fit_p_value",
-    "model_error_percent", "seed", "seconds", "widest_swing_m", "effective_draws",
-    "slenderness",
-)  # fmt: skip
-
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the document of `shm gap diagnose --json`."""
+    document = asdict(diagnosis)
     return {
         "schema": DIAGNOSIS_SCHEMA,
-        **{name: getattr(diagnosis, name) for name in _PLAIN},
-        "tests": list(diagnosis.tests),
-        "where": [asdict(residual) for residual in diagnosis.where],
-        "trends": [asdict(trend) for trend in diagnosis.trends],
-        "places": [asdict(place) for place in diagnosis.places],
-        "causes": [_cause_document(cause) for cause in diagnosis.causes],
-        "groups": [list(group) for group in diagnosis.groups],
-        "shrinkage": asdict(diagnosis.shrinkage),
         "tension_n": {
-            "before": asdict(diagnosis.tension_before_n),
-            "after": asdict(diagnosis.tension_after_n),
+            "before": document.pop("tension_before_n"),
+            "after": document.pop("tension_after_n"),
         },
-        "next_measurement": [asdict(each) for each in diagnosis.next_measurements],
+        "next_measurement": document.pop("next_measurements"),
+        **document,
+        "causes": [_cause_document(cause) for cause in diagnosis.causes],
         "invisible": [{"effect": name, "why": why} for name, why in diagnosis.invisible],
-        "left_out": list(diagnosis.left_out),
-        "remarks": list(diagnosis.remarks),
-        "outliers": [asdict(outlier) for outlier in diagnosis.outliers],
         "verdict": _verdict_document(diagnosis.verdict),
     }
 

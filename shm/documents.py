@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from datetime import UTC, datetime
 from difflib import get_close_matches
 from typing import Any, Literal, TypeVar, get_args, get_origin
@@ -218,6 +218,13 @@ def key_meant(key: str, known: Sequence[str]) -> str | None:
 
 # ---------------------------------------------------------------- posteriors
 
+_OTHERWISE_IN_DOCUMENT = {
+    "names", "units", "samples", "log_likelihood", "most_probable", "predicted", "baseline_check",
+}  # fmt: skip
+_PLAIN_FIELDS = tuple(
+    each.name for each in fields(Posterior) if each.name not in _OTHERWISE_IN_DOCUMENT
+)
+
 
 def summary(samples: FloatArray, most_probable: float) -> dict[str, float]:
     """Return mean, standard deviation, quantiles and most probable value of samples (samples,)."""
@@ -229,29 +236,22 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
 
     A structure without a model has no tension: `tension_n` is null.
     """
-
-    def of(*names: str) -> dict[str, Any]:
-        return {name: getattr(posterior, name) for name in names}
-
     most_probable = dict(zip(posterior.names, posterior.most_probable, strict=True))
     tension = None
     if posterior.model != WITHOUT_MODEL:
         at = most_probable["theta_F"] * posterior.nominal_tension_n
         tension = summary(posterior.tension_n, at)
     return {
-        **of("model", "hanger"),
-        "tests": list(posterior.tests),
+        "model": posterior.model,
         "tension_n": tension,
-        **of("repeatability_sd_n", "nominal_tension_n"),
         "parameters": {
             name: summary(posterior.parameter(name), most_probable[name])
             | ({"unit": unit} if (unit := posterior.unit(name)) else {})
             for name in posterior.names
         },
-        **of("log_evidence", "log_evidence_sd"),
+        **{name: getattr(posterior, name) for name in _PLAIN_FIELDS},
         "probability": probability,
         "samples": len(posterior.samples),
-        **of("effective_sample_size", "r_hat", "evaluations"),
         "predicted": [
             {
                 "plane": p.plane,
@@ -261,14 +261,7 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
             }
             for p in posterior.predicted
         ],
-        **of("seconds", "seed", "method", "priors"),
-        "at_bounds": list(posterior.at_bounds),
-        **of("misfit_percent", "log_occam", "tension_of_other_ends_n"),
-        **of("tension_of_other_orders_n", "description_off_sd", "reading_off_sd"),
-        **of("taut_string_tension_n", "stated_error_percent"),
-        **of("sampler", "inclination_share_of_variance", "ends_share_of_variance"),
-        "remarks": list(posterior.remarks),
-        "caveats": list(posterior.caveats),
+        "caveats": posterior.caveats,
         "baseline_check": posterior.baseline_check and asdict(posterior.baseline_check),
     }
 

@@ -12,7 +12,7 @@ from shm.pipeline.adopting import AdoptionRequest, gap_watch
 from shm.pipeline.adopting import adopt as adopt_in_store
 from shm.report.formatting import model_class
 from shm.store import Store, StoredAdoption
-from shm.store.queries.hangers import list_adoptions, list_selected_models
+from shm.store.watch import list_adoptions, list_selected_models
 from shm_cli import completion, flags
 from shm_cli.common import answer, opened_store, progress_bar, show, show_rows
 

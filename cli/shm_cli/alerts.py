@@ -15,9 +15,9 @@ from shm.bridge import Bridge, Hook
 from shm.documents import alert_document
 from shm.errors import UsageError, suggest
 from shm.pipeline import utc_now
-from shm.pipeline.notification_plan import quiet_until
+from shm.pipeline.courier import quiet_until
 from shm.store import Delivery, DeliveryState, Silence, StoredAlert
-from shm.store.stored_alerts import hangers_of, silenced_until
+from shm.store.alerts import hangers_of, silenced_until
 from shm_cli import completion, flags
 from shm_cli.common import answer, open_workspace, opened_store, paragraph, show_rows
 

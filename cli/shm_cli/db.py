@@ -12,18 +12,20 @@ import rich_click as click
 
 from shm.errors import BadInput, StoreError, UsageError, sentence
 from shm.store import Archive, Store, Workspace
-from shm.store.backups import back_up, copy_store, restore
-from shm.store.checking import (
+from shm.store.backups import (
     CheckedArchive,
+    TableContent,
     archived_names,
+    back_up,
     check_archive,
     check_store,
+    copy_store,
     of_no_recording,
+    restore,
     unknown_files,
 )
-from shm.store.copying import TableContent
-from shm.store.queries.upkeep import list_removed_names
 from shm.store.retention import CopiedArchive, copy_archive
+from shm.store.upkeep import list_removed_names
 from shm_cli import flags
 from shm_cli.common import (
     answer,

@@ -39,9 +39,9 @@ from shm.report.hanger_report import hanger_paper
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.simulate.ambient import Loss, MonitoringPlan, described_stream, streamed
 from shm.store import Stage, Store, StoredAlert, Workspace
-from shm.store.queries.recordings import count_stages, list_recordings
-from shm.store.queries.streams import find_progress
+from shm.store.recordings import count_stages, list_recordings
 from shm.store.ring import ring_of
+from shm.store.streams import find_progress
 from shm.values import Hanger
 from shm_cli import example, flags
 from shm_cli.common import counting_bar

@@ -31,7 +31,7 @@ from shm.report.figures.gap_causes import SHARED
 from shm.report.figures.specification import Illustration, drawn
 from shm.report.paper import Paper
 from shm.store import Store
-from shm.store.queries.tests import load_frequency_response
+from shm.store.tests import load_frequency_response
 from shm.values import Diagnosis, Hanger, ModalTest, ResponsePoint
 from shm.values.bar_description import describe_bar, list_sensors
 from shm_cli import completion, flags

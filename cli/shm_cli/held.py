@@ -16,9 +16,9 @@ import rich_click as click
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Decision, Exclusion, Hold, Stage, Store, StoredAlert, Workspace
-from shm.store.holding import discarded_reason, taking_back
-from shm.store.queries.history import list_former_tests
-from shm.store.queries.recordings import find_latest_hold, find_recording, list_holds
+from shm.store.disposition import discarded_reason, taking_back
+from shm.store.journal import list_former_tests
+from shm.store.recordings import find_latest_hold, find_recording, list_holds
 from shm_cli import flags
 from shm_cli.common import paragraph, show
 

@@ -18,23 +18,21 @@ from typing import Any
 import rich_click as click
 
 from shm.errors import BadInput, UsageError
-from shm.pipeline.import_answers import (
-    answer_time,
-    answer_to,
-    channel_answer,
-    import_document,
-    plane_named,
-    question_document,
-    unit_recorded,
-)
 from shm.pipeline.importing import (
     Answers,
     Import,
     Question,
     Understood,
+    answer_time,
+    answer_to,
+    channel_answer,
+    import_document,
     keep_profile,
     look_into,
+    plane_named,
+    question_document,
     understand,
+    unit_recorded,
 )
 from shm.pipeline.importing_modes import ImportedModes, keep_modes_profile, understand_modes
 from shm.pipeline.lineage import read_limits

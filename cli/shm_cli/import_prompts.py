@@ -11,8 +11,7 @@ from typing import TypeVar
 import rich_click as click
 
 from shm.errors import BadInput, UsageError
-from shm.pipeline.import_answers import ANSWERS_OF_TEST
-from shm.pipeline.importing import Answers, Question
+from shm.pipeline.importing import ANSWERS_OF_TEST, Answers, Question
 from shm.store import Workspace
 
 T = TypeVar("T")

@@ -32,7 +32,7 @@ from shm.store import (
     Workspace,
 )
 from shm.store.archive import refuse_oversize
-from shm.store.queries.recordings import find_discard
+from shm.store.recordings import find_discard
 from shm.values import Alert
 from shm_cli import flags
 from shm_cli.common import is_workspace, open_workspace, show, show_rows

@@ -9,7 +9,7 @@ import rich_click as click
 
 from shm.errors import UsageError
 from shm.pipeline import utc_now
-from shm.store.queries.history import list_changes
+from shm.store.journal import list_changes
 from shm.values.notes import NoteKind
 from shm_cli import flags
 from shm_cli.common import answer, opened_store, show_rows

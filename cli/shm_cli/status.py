@@ -19,7 +19,7 @@ from shm.documents import creep_document
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.controls import control_charts
-from shm.pipeline.notification_plan import quiet_until
+from shm.pipeline.courier import quiet_until
 from shm.pipeline.stream_health import stream_leads
 from shm.report.control_report import chart_document
 from shm.report.formatting import Interval, with_half
@@ -27,27 +27,26 @@ from shm.report.hanger_status import Status, bridge_message
 from shm.report.hanger_summary import HangerSummary
 from shm.report.open_warnings import dated_by_receipt
 from shm.store import ENDED, Decision, DeliveryState, Store, Workspace
+from shm.store.alerts import count_deliveries, count_open_alerts, describe_silence
+from shm.store.journal import list_events, list_former_tests, list_steps
 from shm.store.point_outbox import PointOutbox
-from shm.store.queries.alerts import count_deliveries, count_open_alerts
-from shm.store.queries.hangers import (
+from shm.store.recordings import (
+    count_stages,
+    find_oldest_waiting,
+    find_recording,
+    list_holds,
+)
+from shm.store.tests import count_tests, list_baseline_tests, list_undated_names
+from shm.store.watch import (
     find_latest_watches,
     list_adoptions,
     list_baselines_in_force,
     list_detections,
     list_selected_models,
 )
-from shm.store.queries.history import list_events, list_former_tests, list_steps
-from shm.store.queries.recordings import (
-    count_stages,
-    find_oldest_waiting,
-    find_recording,
-    list_holds,
-)
-from shm.store.queries.tests import count_tests, list_baseline_tests, list_undated_names
-from shm.store.stored_alerts import describe_silence
 from shm.values import Hanger, Summary
 from shm.values.rounding import ForceUnit, force_unit, listed, rounded_percent
-from shm.watch.alert_text import frequency_words
+from shm.watch.alert_text import watch_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document
@@ -310,7 +309,7 @@ def _structures(
                 "latest_test": found.time if found else None,
                 "baseline_since": min((test.time for test in of_baseline), default=None),
                 "open_alerts": open_alerts[each.id],
-                "said": frequency_words([one.watched for one in watched], each),
+                "said": watch_words([one.watched for one in watched], each),
                 "dated_by_receipt": list(undated.get(each.id, ())),
             }
         )

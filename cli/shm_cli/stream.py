@@ -22,9 +22,9 @@ from shm.pipeline.stream_state import (
 from shm.read import write
 from shm.report.formatting import number
 from shm.store import Store, Workspace
-from shm.store.queries.streams import list_stream_events
 from shm.store.ring import ring_of
 from shm.store.ring_export import recording_of
+from shm.store.streams import list_stream_events
 from shm.values import NAN
 from shm.watch.ambient_hammer import AmbientBias
 from shm_cli import completion, flags

@@ -16,7 +16,7 @@ from shm.modes_document import load_modes
 from shm.notebook import posterior_sheet, selection_sheet
 from shm.report.assumed import assumptions_line, with_assumptions
 from shm.settings import load_settings
-from shm.store.queries.hangers import list_adoptions
+from shm.store.watch import list_adoptions
 from shm.values import Hanger, Limits, ModalTest, Posterior
 from shm_cli import completion, flags
 from shm_cli.common import (

@@ -13,8 +13,8 @@ import rich_click as click
 from shm.errors import NothingThere, StoreBusy
 from shm.pipeline import Flow, utc_now
 from shm.store import ENDED, Rerun, Stage, Store, Workspace
-from shm.store.queries.recordings import find_recording
-from shm.store.queries.upkeep import list_removed
+from shm.store.recordings import find_recording
+from shm.store.upkeep import list_removed
 from shm_cli.common import counting_bar
 from shm_daemon.execution import children_ended, executor_of
 from shm_daemon.hooks import HookNotifier

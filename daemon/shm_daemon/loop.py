@@ -35,12 +35,11 @@ from shm_daemon.publishing import results_published
 from shm_daemon.seedlink import streams_asked
 from shm_daemon.spool import FileStabilityTracker, scan
 from shm_daemon.streams import streams_kept
-from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
+from shm_daemon.wakeup import Wakeup, stopped_by_signals
 from shm_daemon.web.site import modified_ns
 
-# Technical: how soon it looks again, against the work of looking; hints come in bursts.
+# Technical: how soon it looks again, against the work of looking.
 _RECEIVING_S = 1.0
-_HINT_DELAY_S = 0.1
 _UNREADABLE_S = 60.0
 _STANDING_BY_S = 1.0
 _DELIVERING_S = 10.0  # technical: an escalation is promised within 60 s, however seldom is scanned
@@ -151,7 +150,6 @@ class Daemon:
             workspace, store, executor, clock=clock, lanes=settings.workers, wake=wakeup.ring
         )
         stack.callback(self._streaming.close)
-        stack.enter_context(rung_by_changes(wakeup, workspace.spool))
         stack.enter_context(messages(workspace))
         sealed = self._streaming.note_sealed
         self._described: tuple[Described, ...] = (
@@ -185,21 +183,20 @@ class Daemon:
             busy = self._turn()
             if self._once and not busy and not self._tracker.watching:
                 break
-            if SPOOL in self._rest():
-                self._scan_at = min(self._scan_at, time.monotonic() + _HINT_DELAY_S)
+            self._rest()
         log.info("ended")
         return True
 
-    def _rest(self) -> set[str]:
+    def _rest(self) -> None:
         """Waits for a ring, the next scan or the next look at what is owed to hooks, with a sign
         from time to time.
         """
         look_at = time.monotonic() + _DELIVERING_S
         while (pause_s := min(self._scan_at, look_at) - time.monotonic()) > self._longest_wait_s:
-            if (heard := self._wakeup.wait(self._longest_wait_s)) or self._wakeup.stopped:
-                return heard
+            if self._wakeup.wait(self._longest_wait_s) or self._wakeup.stopped:
+                return
             self._pulse.beat()
-        return self._wakeup.wait(max(0.0, pause_s))
+        self._wakeup.wait(max(0.0, pause_s))
 
     def _end_executor(self) -> None:
         self._flow.executor.shutdown(wait=False, cancel_futures=True)

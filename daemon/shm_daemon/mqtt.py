@@ -28,7 +28,7 @@ from shm.pipeline.faults import move_to_quarantine
 from shm.read import FORMATS
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
-from shm.store.queries.recordings import find_by_checksum
+from shm.store.recordings import find_by_checksum
 from shm_daemon.spool import Landed, incoming, landing_name
 from shm_daemon.streams import take_chunks
 from shm_daemon.web.site import Description

@@ -31,7 +31,6 @@ from shm.read import sidecar_path
 from shm.read.sidecar import SIDECAR_SUFFIX, Described, sidecar_text
 from shm.store.archive import (
     MODES_SUFFIX,
-    checksum,
     refuse_oversize,
     safe_name,
     suffix_of,
@@ -266,8 +265,6 @@ class Incoming:
         self.whole()
         sidecar = self._sidecar(described)
         for target in _places(self._spool, name, self.sha256):
-            if self._lies_there(target, sidecar):
-                return Landed(target, self.sha256, self.size_bytes)
             if self._placed(target, sidecar):
                 sync(self._spool)
                 return Landed(target, self.sha256, self.size_bytes)
@@ -288,18 +285,6 @@ class Incoming:
             file.flush()
             os.fsync(file.fileno())
         return path
-
-    def _lies_there(self, target: Path, sidecar: Path | None) -> bool:
-        """Return True if the same bytes wait already under that name, with the same sidecar."""
-        beside = sidecar_path(target)
-        try:
-            if target.stat().st_size != self.size_bytes:
-                return False
-            told = beside.read_bytes() if beside.exists() else b""
-            ours = sidecar.read_bytes() if sidecar is not None else b""
-            return told == ours and checksum(target) == self.sha256
-        except OSError:
-            return False
 
     def _placed(self, target: Path, sidecar: Path | None) -> bool:
         """Return True if the place was free, of the file and of its sidecar, and is ours now."""

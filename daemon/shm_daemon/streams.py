@@ -36,8 +36,8 @@ from shm.read.chunk_document import BY_TIME, chunk_document
 from shm.read.sandbox import read_test
 from shm.store import Store, Workspace
 from shm.store.archive import checksum, refuse_oversize
-from shm.store.queries.streams import list_stream_events
 from shm.store.ring import StoredChunk, ring_of
+from shm.store.streams import list_stream_events
 from shm.values import Channel, FloatArray, Recording
 from shm.values.stream import Chunk, Stream, StreamEvent
 from shm_daemon.background import repeated

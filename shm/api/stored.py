@@ -76,7 +76,7 @@ class Store:
 
     def tensions(self, hanger_id: int) -> dict[str, Averaged]:
         """Return the tension by each test of a hanger, oldest first: see `tension`."""
-        from shm.store.queries.trends import list_trend
+        from shm.store.posteriors import list_trend
 
         points = list_trend(self._store, self.hanger(hanger_id))
         return {point.test: point.averaged for point in points}
@@ -128,7 +128,7 @@ class Store:
 
         For the tension over all classes see `tensions`.
         """
-        from shm.store.queries.trends import list_history
+        from shm.store.posteriors import list_history
 
         self.hanger(hanger_id)
         return tuple(posterior for _, posterior in list_history(self._store, hanger_id))
@@ -146,7 +146,7 @@ class Store:
 
     def diagnosis(self, hanger_id: int) -> Diagnosis:
         """Return the latest gap diagnosis of a hanger; raises NothingThere."""
-        from shm.store.queries.hangers import find_latest_diagnosis
+        from shm.store.watch import find_latest_diagnosis
 
         self.hanger(hanger_id)
         found = find_latest_diagnosis(self._store, hanger_id)
@@ -169,7 +169,7 @@ class Store:
 
     def frequency_response(self, hanger_id: int, test_id: str) -> FrequencyResponse:
         """Return the response behind a test's modes; raises NothingThere without one."""
-        from shm.store.queries.tests import load_frequency_response
+        from shm.store.tests import load_frequency_response
 
         found = load_frequency_response(self._store, self._stored(hanger_id, test_id))
         if found is None:

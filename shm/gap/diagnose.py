@@ -123,7 +123,7 @@ def examined(
         outliers=excluded,
         widest_swing_m=_widest_motion_m(found.tests),
         effective_draws=_effective_draws(answer),
-        slenderness=_slenderness(hanger, before_n.mean),
+        slenderness=hanger.slenderness(before_n.mean),
     ), attribution
 
 
@@ -167,13 +167,6 @@ def _effective_draws(answer: Sequence[tuple[float, Fit]]) -> float:
 def _widest_motion_m(tests: Sequence[ModalTest]) -> float:
     swings = [test.widest_swing_m for test in tests]
     return max((each for each in swings if each > 0), default=NAN)
-
-
-def _slenderness(hanger: Hanger, tension_n: float) -> float:
-    """Return L sqrt(T/EI), about 10 of a bar and above 100 of a string; NaN without a tension."""
-    if not (tension_n > 0 and hanger.bending_stiffness_n_m2 > 0):
-        return NAN
-    return hanger.length_m * math.sqrt(tension_n / hanger.bending_stiffness_n_m2)
 
 
 def _following(

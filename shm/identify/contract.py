@@ -144,32 +144,17 @@ class FoundMode:
     amplitude_slope_sd: float = NAN
 
 
-@dataclass(frozen=True)
-class Drift:
-    """Hold the relative `change` of frequency from first to last hit that all `modes` share.
-
-    `sd` is its standard deviation; `sure` is False where chance may explain it.
-    """
-
-    change: float
-    sd: float
-    modes: int
-    sure: bool
-
-
 @dataclass(frozen=True, eq=False)
 class Finding:
     """Hold the modes that an identifier found, by rising frequency, and the poles that it dropped.
 
-    `doubtful` are dropped ones that may be modes: one hit or one order disagrees. An identifier
-    leaves `drift` out.
+    `doubtful` are dropped ones that may be modes: one hit or one order disagrees.
     """
 
     modes: tuple[FoundMode, ...]
     dropped: tuple[Dropped, ...]
     poles: Poles
     doubtful: tuple[FoundMode, ...] = ()
-    drift: Drift | None = None
 
 
 def poles_of_modes(modes: Sequence[FoundMode] | Sequence[Mode]) -> ComplexArray:

@@ -29,7 +29,7 @@ _BEFORE_S, _AFTER_S = 2.0, 3.0  # judgement: a train comes and goes without a bl
 _KNOCK_RISE_S = 0.5  # judgement: an impulse is at its highest in two blocks, a train in seconds
 _KNOCK_S = 20.0  # judgement: a knock's ring-down falls by a factor of five in less
 _QUIET_DB = 5.0
-"""As the prominence of a peak in shm/identify/quality/of_ambient.py."""
+"""judgement: five deviations of a mean of twenty spectra."""
 _STRONG_DB, _STRONG_PEAKS = 10.0, 3
 """judgement: peaks that no known mode explains and that a search from scratch may understand."""
 

@@ -40,7 +40,7 @@ from shm.store import (
     StoredTest,
     Workspace,
 )
-from shm.store.queries.hangers import find_latest_diagnosis, list_adoptions
+from shm.store.watch import find_latest_diagnosis, list_adoptions
 from shm.values import BaselineCheck, Cause, EffectEstimate, Hanger
 from shm.values.diagnosis import joined
 from shm.watch import gap_percent, has_grown

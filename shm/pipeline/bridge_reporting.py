@@ -39,17 +39,15 @@ from shm.store import (
     TrendPoint,
     Workspace,
 )
-from shm.store.queries.alerts import count_open_alerts
-from shm.store.queries.hangers import (
-    find_baseline_temperatures,
+from shm.store.alerts import count_open_alerts, describe_silence, silenced_until
+from shm.store.posteriors import find_latest_trends, list_trend
+from shm.store.tests import count_tests, list_undated_names, load_frequency_response
+from shm.store.watch import (
     find_latest_watches,
     list_baselines_in_force,
     list_detected_changes,
     list_detections,
 )
-from shm.store.queries.tests import count_tests, list_undated_names, load_frequency_response
-from shm.store.queries.trends import find_latest_trends, list_trend
-from shm.store.stored_alerts import describe_silence, silenced_until
 from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
@@ -296,12 +294,10 @@ def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]
     """The latest known shift of each hanger that has one, in their `order` along the bridge."""
     from shm.watch.neighbours import shifts_of
 
-    latest, before_c = find_latest_watches(store), find_baseline_temperatures(store)
+    latest = find_latest_watches(store)
     compared = [latest[hanger] for hanger in order if hanger in latest]
     drifts = {each.hanger: _known_drifts(store, each) for each in compared}
-    changes = {each.hanger: each.watched.temperature_c - before_c[each.hanger] for each in compared}
-    known = {hanger: change for hanger, change in changes.items() if math.isfinite(change)}
-    return shifts_of(drifts, order, temperature_changes_k=known)
+    return shifts_of(drifts, order)
 
 
 def _known_drifts(store: Store, latest: StoredWatch) -> Sequence[Drift]:

@@ -8,7 +8,7 @@ from math import isfinite
 
 from shm.report.control_report import campaign_warning
 from shm.store import Store, Workspace
-from shm.store.queries.trends import list_trend
+from shm.store.posteriors import list_trend
 from shm.values import ControlHanger, Hanger
 from shm.watch.control_chart import ControlChart, chart_control
 

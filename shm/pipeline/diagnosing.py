@@ -11,12 +11,12 @@ from shm.inference.options import Progress, silent
 from shm.pipeline.lineage import diagnosis_lineage
 from shm.report.hanger_status import still_detected
 from shm.store import Store, StoredTest
-from shm.store.queries.hangers import (
+from shm.store.tests import list_test_rows
+from shm.store.watch import (
     find_latest_diagnosis,
     find_latest_watches,
     list_detected_changes,
 )
-from shm.store.queries.tests import list_test_rows
 from shm.values import Diagnosis, Hanger, ModalTest
 
 if TYPE_CHECKING:

@@ -28,9 +28,9 @@ from shm.pipeline.work import Queue, Task, Work
 from shm.read import sidecar_path
 from shm.store import Outcome, Receipt, Store, StoredAlert, Workspace
 from shm.store.archive import ProgressCallback, do_nothing
-from shm.store.queries.hangers import list_selected_models
-from shm.store.queries.history import list_events
-from shm.store.queries.recordings import count_deaths, is_waiting
+from shm.store.journal import list_events
+from shm.store.recordings import count_deaths, is_waiting
+from shm.store.watch import list_selected_models
 
 _MOST_DEATHS = 6
 """A recording is refused when so many processes died at it, whoever ended them."""

@@ -34,7 +34,7 @@ from shm.store.archive import (
     refuse_oversize,
     safe_name,
 )
-from shm.store.queries.history import list_events
+from shm.store.journal import list_events
 
 
 def receive(

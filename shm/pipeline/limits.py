@@ -12,7 +12,7 @@ from math import isclose, isfinite, isnan
 
 from shm.pipeline.reconcile import SHM, Condition, reconcile
 from shm.store import Store, StoredAlert, Workspace
-from shm.store.queries.trends import find_latest_trends, list_trend
+from shm.store.posteriors import find_latest_trends, list_trend
 from shm.store.rows import TrendPoint
 from shm.values import Alert, AlertKind, Averaged, CrossedLimit, Hanger
 

@@ -33,8 +33,8 @@ from shm.store import (
     StoredTest,
     Workspace,
 )
-from shm.store.queries.recordings import find_discard
-from shm.store.queries.tests import list_refused_of_baselines
+from shm.store.recordings import find_discard
+from shm.store.tests import list_refused_of_baselines
 from shm.values import Hanger, Posterior
 
 IDENTIFY_SETTINGS = (

@@ -26,15 +26,15 @@ from shm.store import (
     StoredTest,
     Workspace,
 )
-from shm.store.holding import time_note
-from shm.store.queries.judging import (
+from shm.store.disposition import time_note
+from shm.store.recordings import list_holds
+from shm.store.tests import (
+    list_baseline_tests,
     list_decisions,
     list_known_samples,
     list_latest_tests,
     list_tests_taken_at,
 )
-from shm.store.queries.recordings import list_holds
-from shm.store.queries.tests import list_baseline_tests
 from shm.values import Alert, Doubt, Hanger, ModalTest
 
 log = logging.getLogger(__name__)

@@ -13,10 +13,10 @@ from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
 from shm.report.hanger_summary import HangerSummary
 from shm.store import Store, StoredAlert, Workspace
+from shm.store.journal import find_newest_entry
 from shm.store.point_outbox import PointOutbox, key_of
-from shm.store.queries.history import find_newest_entry
-from shm.store.queries.streams import list_pooled
-from shm.store.queries.trends import list_trend
+from shm.store.posteriors import list_trend
+from shm.store.streams import list_pooled
 from shm.values import Hanger, Mode
 from shm.values.messages import URGENCIES, Lead
 

@@ -19,7 +19,7 @@ from shm.pipeline.lineage import update_terms
 from shm.pipeline.steps import checked, options_of
 from shm.pipeline.watching import dated_tests
 from shm.store import Baseline, Stage, Store, StoredAlert, StoredTest, Workspace
-from shm.store.queries.hangers import list_detected_changes
+from shm.store.watch import list_detected_changes
 from shm.values import Change, Hanger
 from shm.values.rounding import force_unit
 from shm.watch.readings import Reader

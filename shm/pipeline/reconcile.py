@@ -3,17 +3,25 @@
 Tests, limits, silent streams and the sensors' watch each state their conditions. Done again, judged
 again, late or after a changed threshold: `reconcile` is given the conditions of now and the alerts
 that are open now, and decides what to open and what to close.
+
+The conditions of tests end as they begin: by tests of two visits that agree, after which nothing
+contradicts. A van on the deck, a wrong hanger or a mistaken mode disturbs one visit, and must not
+silence a loss that still stands.
+
+Nothing here imports what computes: the daemon decides it when it keeps what the watch said.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 from shm.store import Reconciled, StoredAlert
-from shm.values import Alert, AlertKind, Change, Drift, Moved
+from shm.values import Alert, AlertKind, Change, Drift, Hanger, Moved, Posterior, WatchedTest
+from shm.values.drift import OF_ONE_VISIT
 
 SHM = "shm"
 """Who ends an alert where tests do, and no person."""
@@ -139,3 +147,237 @@ def subjects_of(alert: Alert) -> frozenset[tuple[str, float]]:
     return frozenset(
         (each.quantity, math.copysign(1, each.shift_mean)) for each in alert.drifts
     ) | frozenset((kind, 0.0) for kind in alert.kinds if kind == "gap")
+
+
+_HALF = 0.5  # judgement: of a shift, so much must be left of it
+_ODD = 0.5  # likelier than not: such a test agrees with nothing, and says nothing of a shift
+_REPEATS = (REPEAT, ("tests disagree",))
+JUDGED_AGAIN = "judged again with the thresholds in force"
+
+GapStands = Callable[[WatchedTest], bool]
+"""Whether the gap of an adopted class is still larger at a test than when it was adopted."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The last watched tests against a baseline, by time, and what the watch calls for.
+
+    `newest` is the test that was watched just now. `called` are alerts that tests in force call
+    for: where tests are done again of all, else of the newest alone.
+    """
+
+    hanger: Hanger
+    tests: Sequence[WatchedTest]
+    newest: str
+    gap_stands: GapStands
+    called: Sequence[Alert]
+    is_again: bool = False
+
+
+def conditions_of(
+    known: Sequence[StoredAlert], found: Evidence, baseline_id: int
+) -> tuple[Condition, ...]:
+    """Return the conditions of all alerts `known` against one baseline, and of those called for."""
+    conditions = list(_conditions(known, found))
+    return tuple(replace(each, baseline_id=baseline_id) for each in conditions)
+
+
+def _conditions(known: Sequence[StoredAlert], found: Evidence) -> Iterator[Condition]:
+    ended = [each for each in known if each.resolution]
+    # What other thresholds closed may be called for again.
+    resolved = [each for each in ended if not _is_closed(each)]
+    is_open: list[StoredAlert] = []
+    for each in (each for each in known if not each.resolution):
+        if over := why_over(each.alert, found) or _why_closed(each, found):
+            yield Condition(each.alert, "over", over)
+        else:
+            is_open.append(each)
+    for alert in found.called:
+        if found.is_again and set(alert.kinds) & OF_CHANGES:
+            if not why_over(alert, found) and not _is_past(alert, resolved):
+                text = f"{alert.message} Raised when the stored tests were judged again."
+                yield Condition(with_free_key(replace(alert, message=text), ended), "holds")
+        elif alert.test == found.newest and all(alert.key != each.alert.key for each in known):
+            yield Condition(alert, "holds")
+    if (anew := _shown_again(resolved, is_open, found)) is not None:
+        yield Condition(anew, "holds")
+
+
+def why_over(alert: Alert, found: Evidence) -> str:
+    """Return why the condition of an alert has ended; empty while it stands or is unknown.
+
+    The last of the tests and one of a visit before must agree that it is gone, and none in between
+    may differ. A shift is gone once both are improbable, by half the level: that it is beyond its
+    threshold, and that half of what was told is left. Where no change is behind it, as of two tests
+    that agree while their clocks left the watch no time for a change, the probability was low all
+    along: the shift must have come back, too. A held test ends by a decision, a silence by samples,
+    never here.
+
+    A notice that asks to repeat one test ends with one: that agrees with those before it and does
+    not clearly read beyond a threshold. The next odd one asks anew.
+    """
+    if {"held", "silent"} & set(alert.kinds):
+        return ""
+    end = found.hanger.thresholds.end_probability
+    later = [test for test in found.tests if test.time > alert.time]
+    gone = _agreeing(later, lambda test: _left(alert, test, found) < end)
+    if not gone:
+        return ""
+    if alert.kinds == REPEAT:
+        return f"test {gone[-1].test} agrees with those before it"
+    if len(gone) < 2:
+        return ""
+    both = f"tests {gone[0].test} and {gone[1].test}, of two visits,"
+    if "check the modes" in alert.kinds and not alert.drifts:
+        return f"all modes of {both} fit again"
+    if "check the baseline" in alert.kinds:
+        return f"{both} do not speak against the baseline any more"
+    if alert.kinds in _REPEATS:
+        return f"{both} agree with those before them"
+    return f"{both} do not show it any more"
+
+
+def _why_closed(stored: StoredAlert, found: Evidence) -> str:
+    """Return why tests that are done again do not call for an open alert; empty where they do."""
+    alert, kinds = stored.alert, set(stored.alert.kinds)
+    if not found.is_again or not kinds <= OF_CHANGES:
+        return ""
+    same = [each for each in found.called if set(each.kinds) & OF_CHANGES == kinds]
+    if tells(same, alert):
+        return ""
+    limits = found.hanger.thresholds
+    return (
+        f"{JUDGED_AGAIN} (tension {100 * limits.tension_shift_fraction:.3g} %, end stiffness "
+        f"{limits.stiffness_shift_decades:.3g} decades, probability "
+        f"{limits.alert_probability:.3g}): its tests do not call for it as it was told"
+    )
+
+
+def _is_closed(stored: StoredAlert) -> bool:
+    """Return True where other thresholds have closed an alert, not its tests or a person."""
+    return stored.resolution is not None and stored.resolution.why.startswith(JUDGED_AGAIN)
+
+
+def _is_past(alert: Alert, resolved: Sequence[StoredAlert]) -> bool:
+    """Return True where a person has looked since into what tests done again call for, or an alert
+    told it that has ended."""
+    past = [
+        each.alert
+        for each in resolved
+        if (end := each.resolution)
+        and alert.time <= (each.alert.time if end.who == SHM else end.at)
+    ]
+    return tells(past, alert)
+
+
+def _shown_again(
+    resolved: Sequence[StoredAlert], is_open: Iterable[StoredAlert], found: Evidence
+) -> Alert | None:
+    """Return an alert anew whose condition was resolved and which tests of two visits show again.
+
+    What an open alert tells needs no other. Where a person has resolved one, only tests count that
+    are dated later: those before are what was looked into. It must be as probable as an alert asks
+    for.
+    """
+    known = {each for stored in is_open for each in subjects_of(stored.alert)}
+    level = found.hanger.thresholds.alert_probability
+    for stored in reversed(resolved):
+        alert, end = stored.alert, stored.resolution
+        own = subjects_of(alert)
+        if end is None or own <= known:
+            continue
+        known |= own
+        since = alert.time if end.who == SHM else end.at
+        later = [test for test in found.tests if test.time > since]
+        shown = _agreeing(later, partial(_is_shown, alert, found, level))
+        if len(shown) > 1:
+            return _anew(stored, shown, found.hanger)
+    return None
+
+
+def _is_shown(alert: Alert, found: Evidence, level: float, test: WatchedTest) -> bool:
+    return _left(alert, test, found) >= level
+
+
+def _agreeing(
+    tests: Sequence[WatchedTest], holds: Callable[[WatchedTest], bool]
+) -> tuple[WatchedTest, ...]:
+    """Return the last test and the next one of a visit before, of all of which back to there
+    something holds; the last alone where it holds of no such visit; empty where not even of the
+    last."""
+    last = None
+    for test in reversed(tests):
+        if not holds(test):
+            break
+        last = last or test
+        if last.time - test.time > OF_ONE_VISIT:
+            return test, last
+    return () if last is None else (last,)
+
+
+def _left(alert: Alert, test: WatchedTest, found: Evidence) -> float:
+    """Return the probability that what was told is there at a test; NaN where that is not known."""
+    if "check the modes" in alert.kinds and not alert.drifts:
+        return float(any(each.is_notable for each in test.mistaken))
+    if "check the baseline" in alert.kinds:
+        return float(test.change.is_baseline_alone)
+    is_odd = test.change.outlier_probability > _ODD
+    if alert.kinds in _REPEATS:
+        return float(is_odd or any(each.is_clearly_beyond for each in test.drifts))
+    if "gap" in alert.kinds and found.gap_stands(test):
+        return 1.0
+    if is_odd or not ("gap" in alert.kinds or alert.drifts):
+        return math.nan
+    now = {drift.quantity: drift for drift in test.drifts}
+    left = [_left_of(alert, told, now.get(told.quantity)) for told in alert.drifts]
+    return math.nan if any(map(math.isnan, left)) else max(left, default=0.0)
+
+
+def _left_of(alert: Alert, told: Drift, later: Drift | None) -> float:
+    """Return the probability that a shift is beyond its threshold as it was, or that half of it is
+    left; NaN where that is not known."""
+    if later is None or not later.shift_sd > 0 or math.isnan(later.probability):
+        return math.nan
+    way = math.copysign(1, told.shift_mean)
+    off = way * later.shift_mean - _HALF * abs(told.shift_mean)
+    half = 0.5 * math.erfc(-off / (math.sqrt(2) * later.shift_sd))
+    if abs(told.shift_mean) < told.threshold:
+        return half
+    if alert.change is None and later.may_be_beyond(told.shift_mean):
+        return 1.0
+    is_same_way = way == math.copysign(1, later.shift_mean)
+    return max(half, later.probability if is_same_way else 0.0)
+
+
+def _anew(stored: StoredAlert, shown: Sequence[WatchedTest], hanger: Hanger) -> Alert:
+    alert, end, test = stored.alert, stored.resolution, shown[-1]
+    now = {drift.quantity: drift for drift in test.drifts}
+    drifts = tuple(now[each.quantity] for each in alert.drifts)
+    since = f" on {end.at:%Y-%m-%d}" if end else ""
+    again = (
+        f"Alert {stored.id}, which told of it, was resolved{since}; tests {shown[0].test} and "
+        f"{test.test}, of two visits, show it again."
+    )
+    message = f"{_message_now(alert, drifts, test, hanger)} {again}"
+    anew = replace(alert, test=test.test, time=test.time, drifts=drifts, message=message)
+    return with_free_key(replace(anew, tension=None), [stored])
+
+
+def _message_now(alert: Alert, drifts: Sequence[Drift], test: WatchedTest, hanger: Hanger) -> str:
+    """Return what an alert says of what it told, as a later test has it."""
+    if not drifts:
+        return alert.message
+    from shm.watch.alert_text import message_of  # it computes: not before it is needed
+
+    level = hanger.thresholds.alert_probability
+    beyond = [drift for drift in drifts if drift.probability >= level]
+    if not beyond and alert.change is None:
+        beyond = list(drifts)
+    return message_of(test, hanger, alert.change, beyond, is_call=False, is_further=False)
+
+
+def is_gap_larger(baseline: Posterior, current: Posterior) -> bool:
+    """Return True where the gap of an adopted class is still larger than when it was adopted."""
+    from shm.watch.gap import gap_percent, has_grown  # it computes: not before it is needed
+
+    return has_grown(gap_percent(baseline), gap_percent(current))

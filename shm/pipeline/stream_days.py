@@ -13,8 +13,8 @@ from shm.pipeline.reconcile import SHM
 from shm.read.atomic import replace_text
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX
-from shm.store.queries.streams import find_first_window, find_pooled_range, list_window_starts
-from shm.store.queries.tests import list_test_rows
+from shm.store.streams import find_first_window, find_pooled_range, list_window_starts
+from shm.store.tests import list_test_rows
 from shm.values import ModalTest, Posterior
 from shm.values.stream import PERIOD, PERIODS, Stream, period_start
 

@@ -13,19 +13,18 @@ from typing import Literal
 
 from shm.pipeline.reconcile import Condition, reconcile
 from shm.store import Store, Workspace
-from shm.store.queries.streams import (
+from shm.store.ring import Ring, ring_of
+from shm.store.streams import (
     find_progress,
     list_latest_with_modes,
-    list_pooled,
     list_stream_events,
     list_window_starts,
     list_windows,
 )
-from shm.store.ring import Ring, ring_of
 from shm.values import Alert, AlertKind
 from shm.values.messages import WEEK, Lead
 from shm.values.rounding import listed
-from shm.values.stream import PERIOD, PooledReading, Stream, StreamEvent
+from shm.values.stream import PERIOD, Stream, StreamEvent
 
 State = Literal[
     "live", "late", "silent", "never sent", "sensor at fault", "sees nothing", "clock ahead"
@@ -124,9 +123,9 @@ def classify_stream(
 
 
 def stream_leads(workspace: Workspace, store: Store, now: datetime) -> tuple[Lead, ...]:
-    """Return what somebody should know of the streams and of the ring of their samples."""
+    """Return what somebody should know of the streams."""
     found = heard(workspace, store, now)
-    return (*leads_of(found), *backlog_leads(found), *ring_leads(workspace))
+    return (*leads_of(found), *backlog_leads(found))
 
 
 def backlog_leads(
@@ -193,34 +192,6 @@ def sweep_ring(workspace: Workspace, ring: Ring, store: Store, now: datetime) ->
     names = [stream.name for stream in workspace.bridge.streams]
     unread = {name: list_unread(workspace, ring, store, name, now) for name in names}
     ring.sweep(now, settings.ring_days, settings.ring_bytes, unread)
-
-
-def ring_leads(workspace: Workspace) -> tuple[Lead, ...]:
-    """Return what to say of a ring that is larger than `ring_bytes` though it was swept."""
-    if not (workspace.folder / "ring").is_dir():
-        return ()
-    limit, swept = workspace.settings.ring_bytes, ring_of(workspace).last_sweep()
-    if swept is None:
-        return ()
-    held = {
-        "are unread": swept.unread_bytes,
-        "are of the last day": swept.recent_bytes,
-        "are kept for good until their file in ring/NAME/kept/ is removed": swept.kept_bytes,
-    }
-    if sum(held.values()) <= limit:  # the next sweep meets it
-        return ()
-    parts = [f"{_gigabytes(size)} {what}" for what, size in held.items() if size]
-    return (
-        Lead(
-            f"The ring holds {_gigabytes(swept.left_bytes)}, more than ring_bytes "
-            f"({_gigabytes(limit)}), and nothing more may be removed.",
-            f"Raise ring_bytes in bridge.toml: {listed(parts)}.",
-        ),
-    )
-
-
-def _gigabytes(size: int) -> str:
-    return f"{size / 1e9:.3g} GB"
 
 
 def blind_hangers(found: Sequence[StreamHealth]) -> dict[int, Lead]:
@@ -301,21 +272,3 @@ def note_blindness(store: Store, stream: Stream, start: datetime) -> None:
     event = sees_nothing(windows, reported)
     for each in [event] if event else find_lost_planes(windows, stream, reported):
         store.streams.save_event(each)
-
-
-_COMPARED = timedelta(days=1)  # the sun's round: it warms one side first
-
-
-def compare_thermometers(workspace: Workspace, store: Store, at: datetime) -> None:
-    """Notes which streams' thermometers differ from the others over the last day."""
-    streams = workspace.bridge.streams
-    if len(streams) < 2:
-        return
-    from shm.watch.stream_thermometer import disagreeing  # it computes
-
-    hours: dict[str, list[PooledReading]] = {stream.name: [] for stream in streams}
-    for hanger in dict.fromkeys(stream.hanger for stream in streams):
-        for each in list_pooled(store, hanger, "hour", at - _COMPARED, at):
-            hours.get(each.stream, []).append(each)
-    for event in disagreeing(hours):
-        store.streams.save_event(event)

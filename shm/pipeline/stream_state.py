@@ -12,7 +12,8 @@ import numpy as np
 from shm.pipeline.stream_health import LATELY, StreamHealth, heard
 from shm.report.figures.stream_course import StreamHistory
 from shm.store import Store, Workspace
-from shm.store.queries.streams import (
+from shm.store.ring import ReceivedSamples, Ring
+from shm.store.streams import (
     find_last_window,
     find_pooled_range,
     list_hours_near,
@@ -20,8 +21,7 @@ from shm.store.queries.streams import (
     list_spectra,
     list_stream_events,
 )
-from shm.store.queries.tests import list_test_rows
-from shm.store.ring import ReceivedSamples, Ring
+from shm.store.tests import list_test_rows
 from shm.values import NAN, FloatArray
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import (

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING
 
 import shm
 from shm.errors import NothingThere
-from shm.pipeline.conditions import Evidence, conditions_of, is_gap_larger
-from shm.pipeline.reconcile import reconcile
+from shm.pipeline.reconcile import Evidence, conditions_of, is_gap_larger, reconcile
 from shm.settings import Settings
 from shm.store import (
     Baseline,
@@ -32,18 +31,18 @@ from shm.store import (
     TestRow,
     Workspace,
 )
-from shm.store.queries.hangers import find_latest_watches
-from shm.store.queries.recordings import list_holds
-from shm.store.queries.tests import list_baseline_tests
-from shm.store.queries.watching import (
+from shm.store.recordings import list_holds
+from shm.store.rows import StoredWatch
+from shm.store.tests import (
     find_watch_state,
     is_caught_up,
     is_watched_again,
+    list_baseline_tests,
     list_tests_by_receipt,
     list_tests_by_time,
     list_watched_tests,
 )
-from shm.store.rows import StoredWatch
+from shm.store.watch import find_latest_watches
 from shm.values import Alert, Beside, Hanger, ModalTest, WatchedTest
 from shm.values.drift import threshold_of
 

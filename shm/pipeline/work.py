@@ -18,9 +18,9 @@ from shm.errors import NothingThere
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline import Clock
 from shm.pipeline.controls import campaign_warnings, control_charts
+from shm.pipeline.courier import after_works, with_tension, works_before
 from shm.pipeline.limits import evaluate_limit_alerts
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
-from shm.pipeline.notification_plan import after_works, with_tension, works_before
 from shm.pipeline.plausibility_check import judge
 from shm.pipeline.remote_file import Opens, RemoteFile, WatchResult, run_step
 from shm.pipeline.watching import find_neighbouring_tests, reconciled, to_watch
@@ -35,10 +35,9 @@ from shm.store import (
     Workspace,
 )
 from shm.store.archive import do_nothing
-from shm.store.queries.hangers import list_detected_changes, list_selected_models
-from shm.store.queries.recordings import list_waiting_recordings
-from shm.store.queries.tests import list_waiting_tests
-from shm.store.queries.watching import find_latest_weighed, list_weighed
+from shm.store.recordings import list_waiting_recordings
+from shm.store.tests import find_latest_weighed, list_waiting_tests, list_weighed
+from shm.store.watch import list_detected_changes, list_selected_models
 from shm.values import NAN, WITHOUT_MODEL, Alert, Hanger, ModalTest
 from shm.values.stated_tension import averaged_now
 

@@ -191,7 +191,7 @@ def practice(data: HangerReport) -> Table:
     rows.append(("ours, by all modes of the same test", *both, "as inferred", "", "", ""))
     planes = (f"{plane} ({unit.name})" for plane in PLANES)
     heads = ("formula", *planes, "ends", "from xi", "error", "leaves out")
-    xi = hanger.length_m * math.sqrt(data.averaged.tension_n.mean / hanger.bending_stiffness_n_m2)
+    xi = hanger.slenderness(data.averaged.tension_n.mean)
     note = (
         "Each from the modes that it names, of one plane. "
         f"xi = L sqrt(T/EI) is some {xi:.2g} here: below its range a formula says nothing; error: "

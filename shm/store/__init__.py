@@ -1,9 +1,7 @@
 """Keep every value of the flow: tables, transactions, the archive of raw files, schema upgrade."""
 
 from shm.store.archive import Archive, Quarantine
-from shm.store.disposition import Exclusion
-from shm.store.holding import Judgement
-from shm.store.rerun import RERUN_STAGES
+from shm.store.disposition import RERUN_STAGES, Exclusion, Judgement
 from shm.store.rows import (
     ENDED,
     Acknowledgement,

@@ -33,7 +33,6 @@ log = logging.getLogger(__name__)
 MODES_SUFFIX = ".modes.json"
 _FETCH = "Drop the file into the spool again, which heals it, or run `shm archive fetch`."
 _CHUNK = 1 << 20  # technical: 1 MB, between which the heart beats
-_HOLE = bytes(_CHUNK)
 _SYNC_BYTES = 16 << 20  # a slow memory card takes some 2 s for so much, and nobody waits longer
 _NAME_BYTES = 200  # file systems end at 255; the quarantine puts ".reason.json" behind
 _SUFFIX = re.compile(r"(\.[a-z0-9]{1,12}){1,2}")
@@ -330,22 +329,18 @@ def _opened(source: Path, follow: bool) -> Iterator[BinaryIO]:
 def _copy_hashed(
     reading: BinaryIO, target: Path, most_bytes: int, on_progress: ProgressCallback
 ) -> tuple[str, int]:
-    """Copies no more than a chunk beyond `most_bytes`, should the file grow; holes stay holes."""
+    """Copies no more than a chunk beyond `most_bytes`, should the file grow."""
     digest, size, synced = hashlib.sha256(), 0, 0
     with target.open("wb") as writing:
         while size <= most_bytes and (chunk := reading.read(_CHUNK)):
             digest.update(chunk)
             size += len(chunk)
-            if chunk == _HOLE:
-                writing.seek(size)
-            else:
-                writing.write(chunk)
+            writing.write(chunk)
             if size - synced >= _SYNC_BYTES:
                 writing.flush()
                 os.fdatasync(writing.fileno())
                 synced = size
             on_progress()
-        writing.truncate(size)
         writing.flush()
         os.fsync(writing.fileno())
     return digest.hexdigest(), size

@@ -1,26 +1,385 @@
-"""Backups of a store, and the way back; copies of a store into an empty one.
-
-A backup is one SQLite file, whichever kind the store is of, so that it opens everywhere.
-"""
+"""Check a store and its archive; back it up, restore it and copy it, each compared row by row."""
 
 from __future__ import annotations
 
+import hashlib
 import sqlite3
-from collections.abc import Iterator
+import zlib
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
+from zipfile import BadZipFile
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Engine
+from sqlalchemy.engine import Connection, Engine, RowMapping
 
 from shm.errors import NothingThere, SchemaOutdated, StoreDamaged, StoreError, UsageError, sentence
+from shm.read.sidecar import SIDECAR_SUFFIX
 from shm.store import schema
-from shm.store.archive import sync
-from shm.store.checking import CheckedStore, check_store
-from shm.store.copying import TableContent, Tell, copy_rows, delete_rows, row_counts
+from shm.store.archive import Archive, checksum, sync
+from shm.store.blobs import unpack
+from shm.store.columns import Document, loads
 from shm.store.database import BUSY_SECONDS, Database, make_engine, translated
+from shm.store.schema import changed_objects
+from shm.store.store import Store
+from shm.store.tables import fingerprints, metadata, posteriors, recordings, tests
+from shm.store.upkeep import list_removed_names
+
+Tell = Callable[[str, float], None]
+"""Is told what is being done and which fraction of all is done."""
+
+_ROWS_AT_ONCE = 50  # a row may hold a frequency response of some 100 kB
+
+
+@dataclass(frozen=True)
+class TableContent:
+    """Content of a table: number of rows, and a checksum that does not depend on their order."""
+
+    table: str
+    rows: int
+    checksum: str
+
+
+def row_counts(connection: Connection) -> dict[str, int]:
+    """Count the rows of each table, the tables that others refer to first."""
+    counted = {}
+    for table in metadata.sorted_tables:
+        count = connection.scalar(sa.select(sa.func.count()).select_from(table))
+        counted[table.name] = int(count or 0)
+    return counted
+
+
+def contents(
+    connection: Connection,
+    tell: Tell,
+    use: Callable[[sa.Table, Sequence[RowMapping]], object] = lambda *_: None,
+) -> tuple[TableContent, ...]:
+    """Read every row of every table and `use` some at a time; raise ValueError where one cannot be
+    decoded."""
+    progress = _Progress(tell, "reading rows", sum(row_counts(connection).values()))
+    return tuple(
+        _read(connection, table, progress, partial(use, table)) for table in metadata.sorted_tables
+    )
+
+
+def copy_rows(source: Connection, target: Connection, tell: Tell) -> tuple[TableContent, ...]:
+    """Writes all rows of one store of the present schema into another, which holds none.
+
+    `target` is in a transaction, to be undone where this raises: StoreError where the rows read
+    back are not those that were written.
+    """
+    progress = _Progress(tell, "copying rows", 2 * sum(row_counts(source).values()))
+    written = tuple(
+        _read(source, table, progress, partial(_write, target, table))
+        for table in metadata.sorted_tables
+    )
+    arrived = tuple(_read(target, table, progress) for table in metadata.sorted_tables)
+    differing = [here.table for here, there in zip(written, arrived, strict=True) if here != there]
+    if differing:
+        raise StoreError(
+            f"the copy differs from the store in {', '.join(differing)}; nothing was changed.",
+            remedy="Run `shm db check` on both.",
+        )
+    _number_on(target)
+    return arrived
+
+
+def delete_rows(connection: Connection) -> None:
+    """Empties every table."""
+    for table in reversed(metadata.sorted_tables):
+        connection.execute(sa.delete(table))
+
+
+def _read(
+    connection: Connection,
+    table: sa.Table,
+    progress: _Progress,
+    use: Callable[[Sequence[RowMapping]], object] = lambda _: None,
+) -> TableContent:
+    rows, total = 0, 0
+    query = sa.select(_plain(table)).order_by(*(sa.column(c.name) for c in table.primary_key))
+    query = query.execution_options(yield_per=_ROWS_AT_ONCE)
+    for some in connection.execute(query).mappings().partitions():
+        rows += len(some)
+        total = (total + sum(map(_digest, some))) % 2**256
+        use(some)
+        progress.advance(len(some))
+    return TableContent(table.name, rows, f"{total:064x}")
+
+
+def _write(connection: Connection, table: sa.Table, rows: Sequence[RowMapping]) -> None:
+    connection.execute(sa.insert(_plain(table)), [dict(row) for row in rows])
+
+
+def _digest(row: RowMapping) -> int:
+    """Return a SHA-256 of a row's values, the same in SQLite and in PostgreSQL."""
+    text = "\n".join(f"{name}={_plain_value(value)!r}" for name, value in row.items())
+    return int.from_bytes(hashlib.sha256(text.encode()).digest(), "big")
+
+
+def _plain_value(value: object) -> object:
+    if isinstance(value, memoryview):
+        return bytes(value)
+    if isinstance(value, float):
+        return value + 0.0  # SQLite has no negative zero
+    return value
+
+
+@cache
+def _plain(table: sa.Table) -> sa.TableClause:
+    """The table with its documents as the text they are kept as, to the letter."""
+    return sa.table(
+        table.name,
+        *(
+            sa.column(c.name, sa.Text() if isinstance(c.type, Document) else c.type)
+            for c in table.columns
+        ),
+    )
+
+
+def _number_on(connection: Connection) -> None:
+    """Rows to come are numbered after those that were copied; SQLite does so by itself."""
+    if connection.dialect.name != "postgresql":
+        return
+    for table in metadata.sorted_tables:
+        column = table.autoincrement_column
+        if column is not None:
+            sequence = sa.func.pg_get_serial_sequence(table.name, column.name)
+            following = sa.select(sa.func.coalesce(sa.func.max(column), 0) + 1).scalar_subquery()
+            connection.execute(sa.select(sa.func.setval(sequence, following, False)))
+
+
+class _Progress:
+    """Counts rows over all tables."""
+
+    def __init__(self, tell: Tell, label: str, total: int):
+        self._tell, self._label, self._total, self._done = tell, label, max(total, 1), 0
+
+    def advance(self, rows: int) -> None:
+        self._done += rows
+        self._tell(self._label, self._done / self._total)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong: its `kind` to count it by, where it is, what it is, what to do."""
+
+    kind: str
+    where: str
+    what: str
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.what} {self.remedy}".rstrip()
+
+
+@dataclass(frozen=True)
+class CheckedStore:
+    """Hold the content of every table, and the faults of file, references and schema."""
+
+    tables: tuple[TableContent, ...]
+    faults: tuple[str, ...] = ()
+    """What SQLite finds wrong with its file."""
+    references: tuple[tuple[str, str], ...] = ()
+    """Rows that refer to a row that is not there, each with the table of that one."""
+    changed: tuple[str, ...] = ()
+    """Tables and indexes that are not as the migrations make them."""
+    unreadable: tuple[tuple[str, str], ...] = ()
+    """Rows of which a document or packed arrays cannot be read, each with the columns."""
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """A finding for each fault, broken reference and changed part of the schema."""
+        gone = "it refers to a row of {} that is not there."
+        return (
+            *(
+                Finding("fault of the file", "store", sentence(said), _RESTORE)
+                for said in self.faults
+            ),
+            *(
+                Finding("broken reference", where, gone.format(table), _RESTORE)
+                for where, table in self.references
+            ),
+            *(Finding("changed schema", name, _CHANGED, _COPY) for name in self.changed),
+            *(
+                Finding("unreadable row", where, f"its {what} cannot be read.", _RESTORE)
+                for where, what in self.unreadable
+            ),
+        )
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """The same as sentences."""
+        return tuple(map(str, self.findings))
+
+    @property
+    def unfit(self) -> tuple[str, ...]:
+        """Troubles for which it cannot be put in another's place; a schema is not copied, and a
+        row that cannot be read stops its hanger alone."""
+        return tuple(str(each) for each in self.findings if each.kind not in _ALLOWED)
+
+
+_ALLOWED = ("changed schema", "unreadable row")
+
+
+_RESTORE = "Restore the store from a backup: `shm db restore FILE --replace`."
+_CHANGED = "its schema is not what the migrations make; rows may be read or kept wrongly."
+_COPY = "Write `shm db backup FILE` and restore it with `shm db restore FILE --replace`."
+
+
+@dataclass(frozen=True)
+class CheckedArchive:
+    """Raw files by their path in the archive: those that are as they were, and those that are not.
+
+    `unreferenced` belong to no recording, as after a crash; they do no harm. `removed` is how many
+    were taken out on purpose, as copies of them lie elsewhere.
+    """
+
+    whole: int
+    missing: tuple[str, ...]
+    damaged: tuple[str, ...]
+    unreferenced: tuple[str, ...]
+    removed: int = 0
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        return file_troubles(self.missing, self.damaged)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """A finding a file."""
+        gone = ("missing raw file", "it is not in the archive.", self.missing)
+        changed = ("damaged raw file", "it has another SHA-256.", self.damaged)
+        return tuple(
+            Finding(kind, f"archive/{name}", what, _HEAL)
+            for kind, what, names in (gone, changed)
+            for name in names
+        )
+
+
+_HEAL = "Drop the same file into the spool again, or bring it back: `shm archive fetch`."
+
+
+def file_troubles(missing: Iterable[str], damaged: Iterable[str]) -> tuple[str, ...]:
+    """A sentence a file."""
+    return (
+        *(f"{name} is not in the archive" for name in missing),
+        *(f"{name} of the archive has another SHA-256" for name in damaged),
+    )
+
+
+def quick_troubles(store: Database) -> tuple[str, ...]:
+    """Return what a look at the pages of a SQLite file finds wrong; of a server, nothing."""
+    with store.reading() as connection:
+        return _faults(connection, "quick_check(5)")
+
+
+def check_store(store: Database, tell: Tell) -> CheckedStore:
+    """Read everything that the store holds; raises StoreError where it cannot be read."""
+    with store.reading() as connection:
+        try:
+            faults, references = _faults(connection, "integrity_check"), _references(connection)
+            changed, unreadable = changed_objects(connection), list[tuple[str, str]]()
+            tables = contents(connection, tell, partial(_note_unreadable, unreadable))
+            return CheckedStore(tables, faults, references, changed, tuple(unreadable))
+        except (sa.exc.DatabaseError, ValueError) as error:
+            if connection.dialect.name != "sqlite":
+                raise
+            cause = getattr(error, "orig", None) or error
+            return CheckedStore((), (f"the file is damaged: {cause}",))
+
+
+def _note_unreadable(
+    found: list[tuple[str, str]], table: sa.Table, rows: Sequence[RowMapping]
+) -> None:
+    for row in rows:
+        columns = [c.name for c in table.c if not _is_readable(c, row[c.name])]
+        if columns:
+            key = ",".join(str(row[column.name]) for column in table.primary_key)
+            found.append((f"{table.name}/{key}", " and ".join(columns)))
+
+
+def _is_readable(column: sa.Column[Any], value: Any) -> bool:
+    try:
+        if value is not None and isinstance(column.type, Document):
+            loads(value)
+        elif value is not None and column in _PACKED:
+            unpack(bytes(value))  # each array has a checksum
+    except (StoreDamaged, ValueError, OSError, KeyError, EOFError, BadZipFile, zlib.error):
+        return False
+    return True
+
+
+_PACKED = {posteriors.c.samples, tests.c.frequency_response, fingerprints.c.shapes}
+
+
+def check_archive(store: Store, archive: Archive, tell: Tell) -> CheckedArchive:
+    """Reads every raw file that the store refers to and compares it with its name, a SHA-256."""
+    referenced, removed = archived_names(store), list_removed_names(store, archive)
+    names = [name for name in referenced if name not in removed]
+    missing, damaged = [], []
+    for number, name in enumerate(names, start=1):
+        path = archive.folder / name
+        if not path.is_file():
+            missing.append(name)
+        elif checksum(path) != path.name[:64]:
+            damaged.append(name)
+        tell("archive", number / len(names))
+    whole = len(names) - len(missing) - len(damaged)
+    return CheckedArchive(
+        whole, tuple(missing), tuple(damaged), _unreferenced(archive, referenced), len(removed)
+    )
+
+
+def archived_names(store: Database) -> tuple[str, ...]:
+    """Every file of the archive that a recording refers to, sidecars too, each once."""
+    rows = store.rows(sa.select(recordings.c.archived_as, recordings.c.sidecar_as))
+    return tuple(sorted({name for row in rows for name in row if name is not None}))
+
+
+def unknown_files(store: Database, archive: Archive) -> tuple[str, ...]:
+    """Raw files that no recording refers to, by their path in the archive; no sidecars."""
+    found = _unreferenced(archive, archived_names(store))
+    return tuple(name for name in found if not name.endswith(SIDECAR_SUFFIX))
+
+
+def of_no_recording(names: Sequence[str]) -> tuple[str, str]:
+    """Return a message on such files, and what to do."""
+    return (
+        f"{len(names)} of the archive belong to no recording: {names[0]}"
+        + (" and others" if names[1:] else ""),
+        "They came after the backup that was restored, or while a process ended. Take each in "
+        f"again: `shm ingest archive/{names[0]}`.",
+    )
+
+
+def _unreferenced(archive: Archive, names: Collection[str]) -> tuple[str, ...]:
+    kept = (path.relative_to(archive.folder).as_posix() for path in archive.folder.glob("??/*"))
+    return tuple(sorted(set(kept) - set(names)))
+
+
+def _faults(connection: Connection, check: str) -> tuple[str, ...]:
+    """Return what SQLite finds wrong with its file.
+
+    A PostgreSQL server watches over its own pages.
+    """
+    if connection.dialect.name != "sqlite":
+        return ()
+    found = connection.exec_driver_sql(f"PRAGMA {check}").scalars()
+    return tuple(f"the file is damaged: {said}" for said in found if said != "ok")
+
+
+def _references(connection: Connection) -> tuple[tuple[str, str], ...]:
+    """Rows that refer to one that is not there; a PostgreSQL server allows none."""
+    if connection.dialect.name != "sqlite":
+        return ()
+    broken = connection.exec_driver_sql("PRAGMA foreign_key_check")
+    return tuple((f"{row[0]}/{row[1]}", str(row[2])) for row in broken)
+
 
 _PAGES_AT_ONCE = 1000  # technical: 4 MB, between which the daemon may write
 

@@ -9,9 +9,9 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
 from shm.errors import UsageError
+from shm.store.columns import value_in
 from shm.store.database import Repository, insert
 from shm.store.journal import note
-from shm.store.mapping import value_in
 from shm.store.rows import ChangedSetting, said
 from shm.store.tables import changed_settings
 

@@ -12,9 +12,9 @@ from datetime import datetime, timedelta
 import sqlalchemy as sa
 
 from shm.errors import BadInput, NothingThere, UsageError
+from shm.store.columns import insert_value, value_in
 from shm.store.database import Repository
 from shm.store.journal import note
-from shm.store.mapping import insert_value, value_in
 from shm.store.tables import notes
 from shm.values.notes import Note, NoteKind
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import hmac
-import re
 import secrets
 import unicodedata
 from collections.abc import Collection
@@ -17,9 +16,9 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError
+from shm.store.columns import value_in
 from shm.store.database import Repository, insert
 from shm.store.journal import note
-from shm.store.mapping import value_in
 from shm.store.rows import Role, Scope, StoredToken, User
 from shm.store.tables import sessions, tokens, users
 
@@ -32,15 +31,6 @@ _NO_PASSWORD = ""
 """In place of a password's hash: the user comes by single sign-on alone."""
 _SECRET_BYTES = 32  # 256 bits: nobody guesses it
 _NOTED_AGAIN_AFTER = timedelta(minutes=1)
-_UNSEEN = re.compile(
-    "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0"
-    "\U000e0100-\U000e01ef]"
-)
-"""Drawn as nothing though no control characters: Default_Ignorable_Code_Point of Unicode 15, and
-the empty pattern of Braille."""
-_CHINESE = {"CJK", "IDEOGRAPHIC"}
-_TOGETHER = (_CHINESE | {"HIRAGANA", "KATAKANA"}, _CHINESE | {"HANGUL"}, _CHINESE | {"BOPOMOFO"})
-"""Scripts in which one name is written: Unicode technical standard 39, 5.2, but without Latin."""
 
 
 class People(Repository):
@@ -208,26 +198,14 @@ def _fit(name: str) -> str:
     """A name in one form; raises UsageError for one that can pass for another."""
     made = _in_one_form(name)
     is_clear = all(unicodedata.category(each)[0] != "C" for each in name.strip())
-    if not made or len(made) > _LONGEST_NAME or not is_clear or _UNSEEN.search(name):
+    if not made or len(made) > _LONGEST_NAME or not is_clear:
         raise UsageError(
             "the name of a user is a short text without invisible characters.",
             remedy="Type the person's name.",
         )
     if same_name(made) == "shm":
         raise UsageError("shm itself writes as shm.", remedy="Type the person's name.")
-    scripts = {
-        re.split("[ -]", unicodedata.name(each, "?"))[0] for each in made if _is_written(each)
-    }
-    if len(scripts) > 1 and not any(scripts <= together for together in _TOGETHER):
-        found = " and ".join(sorted(each.capitalize() for each in scripts))
-        raise UsageError(
-            f"the name mixes letters that look alike: {found}.", remedy="Type it in one script."
-        )
     return made
-
-
-def _is_written(character: str) -> bool:
-    return character.isalnum() and not (character.isascii() and character.isdigit())
 
 
 def _refuse_last(connection: Connection, id_: int) -> None:

@@ -1,4 +1,4 @@
-"""Second copies of raw files, and what may leave the archive and the quarantine for having one.
+"""Second copies of raw files, and what may leave the archive for having one.
 
 A copy counts only if it is another file than the one here and has its SHA-256 at the moment of the
 removal; that it was noted once is not enough. Rows and results always stay.
@@ -6,25 +6,20 @@ removal; that it was noted once is not enough. Rows and results always stay.
 
 from __future__ import annotations
 
-import json
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 from shm.errors import NothingThere, StoreError
-from shm.read import sidecar_path
-from shm.store.archive import Archive, checksum, is_whole
-from shm.store.checking import file_troubles
-from shm.store.copying import Tell
-from shm.store.queries.recordings import find_by_checksum, list_recordings
-from shm.store.queries.upkeep import list_copies
+from shm.store.archive import Archive, is_whole
+from shm.store.backups import Tell, file_troubles
+from shm.store.recordings import list_recordings
 from shm.store.rows import Stage, StoredRecording
 from shm.store.store import Store
+from shm.store.upkeep import list_copies
 
-REASON_SUFFIX = ".reason.json"
 _ENDED = (Stage.DONE, Stage.REFUSED)
 # Why an old raw file stays.
 _NO_COPY = "no copy is noted"
@@ -67,17 +62,6 @@ class Retention:
     @property
     def size_bytes(self) -> int:
         return sum(removal.size_bytes for removal in self.removals)
-
-
-@dataclass(frozen=True)
-class Refused:
-    """A refused file in the quarantine, with its reason and sidecar, and when it was laid there."""
-
-    path: Path
-    reason: Path
-    refused_at: datetime
-    size_bytes: int
-    sha256: str
 
 
 def copy_archive(
@@ -171,35 +155,6 @@ def fetch(store: Store, archive: Archive, recording: StoredRecording) -> str:
     )
 
 
-def refused_files(quarantine: Path, before: datetime) -> tuple[Refused, ...]:
-    """Refused files that were laid in the quarantine before a time, the oldest first."""
-    found = (_refused(reason) for reason in quarantine.glob(f"*{REASON_SUFFIX}"))
-    old = [each for each in found if each is not None and each.refused_at < before]
-    return tuple(sorted(old, key=lambda each: each.refused_at))
-
-
-def expendable(store: Store, archive: Archive, files: Iterable[Refused]) -> tuple[Refused, ...]:
-    """Of refused files those whose bytes lie in the archive too, or in a whole copy of it."""
-    folders = _folders(store)
-    kept = []
-    for file in files:
-        recording = find_by_checksum(store, file.sha256)
-        if recording is not None and recording.file.archived_as is not None:
-            places = [str(archive.folder), *folders[recording.id]]
-            name = recording.file.archived_as
-            if any(_is_copy(Path(place) / name, file.path) for place in places):
-                kept.append(file)
-    return tuple(kept)
-
-
-def empty_quarantine(files: Iterable[Refused]) -> None:
-    """Takes refused files out of the quarantine, with their sidecars; the reason goes last."""
-    for file in files:
-        file.path.unlink(missing_ok=True)
-        sidecar_path(file.path).unlink(missing_ok=True)
-        file.reason.unlink(missing_ok=True)
-
-
 def _has(target: Archive, source: Archive, name: str) -> bool:
     """Files appear in an archive whole or not at all, so one of the right size is the right one."""
     path, original = target.folder / name, source.folder / name
@@ -245,16 +200,3 @@ def _size(path: Path) -> int:
         return path.stat().st_size
     except OSError:
         return 0
-
-
-def _refused(reason: Path) -> Refused | None:
-    """None for what is no reason of ours, or without its file."""
-    path = reason.with_name(reason.name.removesuffix(REASON_SUFFIX))
-    try:
-        document: Any = json.loads(reason.read_text(encoding="utf-8"))
-        sha256, refused_at = str(document["sha256"]), datetime.fromisoformat(str(document["time"]))
-        if document["sha256"] is None or checksum(path) != sha256:
-            return None  # too large to have been read: it lies nowhere else
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-    return Refused(path, reason, refused_at, _size(path), sha256)

@@ -8,12 +8,11 @@ What may leave the ring: the old, and the oldest where it grows too large.
 
 from __future__ import annotations
 
-import json
 import logging
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from itertools import groupby
 from pathlib import Path
@@ -24,36 +23,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shm.bridge.streams import stream_named
-from shm.documents import ValidationError, dump, format_time, value_of
+from shm.documents import dump, format_time
 from shm.errors import BadInput, DoubledChunk
 from shm.read.atomic import replace_text
-from shm.read.chunk_document import BY_TIME, numbered, parse_chunk, refuse_long_chunk
+from shm.read.chunk_document import numbered, parse_chunk, refuse_long_chunk
 from shm.store.archive import disk_error, sync
-from shm.store.ring_conversion import convert_former_files
-from shm.store.ring_days import PERIOD_US, Row, StreamDays, query, row_of, size_of, writing
-from shm.store.ring_events import (
-    DRIFT_PPM,
-    DRIFT_US,
+from shm.store.ring_chunks import (
     EARLY,
     GRACE,
-    HOURS_AHEAD,
     OVERLAP,
-    find_drift,
-    hours_ahead,
-    is_of_clock,
-    list_clock_events,
-    list_events,
-)
-from shm.store.ring_fit import (
     agree,
     came_early,
-    find_hour_step,
     find_taken,
-    is_half,
     join,
+    list_events,
     repeats,
     runs_on,
 )
+from shm.store.ring_conversion import convert_former_files
+from shm.store.ring_days import PERIOD_US, Row, StreamDays, query, row_of, size_of, writing
 from shm.values.stream import PERIOD, Chunk, Piece, Stream, StreamEvent, microseconds, time_of
 
 if TYPE_CHECKING:
@@ -61,17 +49,15 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-_RATE_OFF = DRIFT_PPM * 1e-6
+_RATE_OFF_PPM = 100.0
 """Of the described rate, within which a chunk is taken as of that rate. Derived: no frequency is
 then further off than the setting frequency_allowance grants. Crystals keep to it: NI 9234, 50 ppm.
 """
 _OVER_RANGE = 2.0
 """Of full_scale. Judgement: a sensor that clips at 5 V, before a converter that does at 10 V."""
-_SWEEP = "last_sweep.json"
 _UNFINISHED_S = 3600.0  # technical: no file takes so long; a killed process left it
 _QUIET = timedelta(seconds=10)  # technical: a window is not read again for each late chunk
 _DAY = timedelta(days=1)
-_STEP_REACH_US = 96 * 3_600_000_000  # as late_hours: how long ago a clock may have stepped ahead
 
 _LATEST_END = """SELECT MAX(end_us) FROM chunks
 WHERE start_us >= (SELECT MAX(start_us) FROM chunks) - 2 * 600000000"""
@@ -109,22 +95,6 @@ class ReceivedSamples:
     apart_s: float
     start: datetime | None
     end: datetime | None
-
-
-@dataclass(frozen=True)
-class Swept:
-    """Count the days of streams that were removed or thinned, and what is left in the ring.
-
-    `unread_bytes` are of days with samples that the watch has not read, `recent_bytes` of the day
-    before them, `kept_bytes` of what is kept for good: none of these is removed to meet a limit.
-    """
-
-    days: int
-    freed_bytes: int
-    left_bytes: int
-    unread_bytes: int = 0
-    recent_bytes: int = 0
-    kept_bytes: int = 0
 
 
 class Ring:
@@ -218,51 +188,34 @@ class Ring:
         ring_bytes: int = 200 * 10**9,
         unread: Mapping[str, Collection[datetime]] = MappingProxyType({}),
         recent: timedelta = _DAY,
-    ) -> Swept:
-        """Remove days older than so many days, and the oldest beyond so many bytes.
+    ) -> int:
+        """Remove days older than so many days, and the oldest beyond a size; return how many.
 
         `unread` are the beginnings of the ten minutes that nobody has read, by stream. Their days
         stay, and so does what is `recent` before them or before now: an alert keeps it for good.
-        What is kept for good stays. What was left is noted for `last_sweep`.
+        What is kept for good stays.
         """
         found = [(path, days) for days in self._all_days() for path in days.paths()]
         sizes = {path: size_of(path) for path, _ in found}
-        total, removed = sum(sizes.values()), 0
-        held = dict.fromkeys(("unread_bytes", "recent_bytes", "kept_bytes"), 0)
+        removed = 0
         for path, days in sorted(found, key=lambda each: each[0].name):
             start = _day_of(path)
             waiting = unread.get(days.folder.name, ())
             is_old = start + _DAY <= now - timedelta(days=ring_days)
-            if any(start <= each < start + _DAY for each in waiting):
-                held["unread_bytes"] += sizes[path]
-            elif not is_old and start + _DAY > min(waiting, default=now) - recent:
-                held["recent_bytes"] += sizes[path]
-            elif is_old or sum(sizes.values()) > ring_bytes:
-                before = sizes[path]
-                days.thin(path, _kept(days), may_go=start + _DAY < now - self._late)
-                sizes[path] = size_of(path)
-                held["kept_bytes"] += sizes[path]
-                removed += sizes[path] < before
+            is_unread = any(start <= each < start + _DAY for each in waiting)
+            is_recent = not is_old and start + _DAY > min(waiting, default=now) - recent
+            if is_unread or is_recent or not (is_old or sum(sizes.values()) > ring_bytes):
+                continue
+            before = sizes[path]
+            days.thin(path, _kept(days), may_go=start + _DAY < now - self._late)
+            sizes[path] = size_of(path)
+            removed += sizes[path] < before
         for days in self._all_days():
             for left in days.folder.glob(".*.part*"):
                 with suppress(FileNotFoundError):
                     if left.stat().st_mtime < time.time() - _UNFINISHED_S:
                         left.unlink()
-        left_bytes = sum(sizes.values())
-        swept = Swept(removed, total - left_bytes, left_bytes, **held)
-        if self.folder.is_dir():
-            replace_text(self.folder / _SWEEP, dump(asdict(swept)) + "\n")
-        return swept
-
-    def last_sweep(self) -> Swept | None:
-        """Return what the last sweep left; None where there was none or its note is damaged."""
-        try:
-            return value_of(Swept, json.loads((self.folder / _SWEEP).read_text(encoding="utf-8")))
-        except FileNotFoundError:
-            return None
-        except (ValidationError, ValueError) as error:
-            log.warning("%s cannot be read: %s", self.folder / _SWEEP, error)
-            return None
+        return removed
 
     def latest(self) -> dict[str, datetime]:
         """Return when the last sample of each stream ended."""
@@ -322,71 +275,59 @@ class Ring:
         return sum(size_of(path) for path in self._days(stream).paths())
 
     def _seal(self, days: StreamDays, now: datetime) -> list[int]:
-        stream = days.folder.name
+        stream, sealed = days.folder.name, []
         convert_former_files(self, days.folder)
-        waiting = days.unsealed()
-        of_clock = [row for row in waiting if is_of_clock(row)]
-        for event in list_clock_events(stream, of_clock):
-            self._note(event)
-        days.seal(of_clock)
-        others = sorted((r for r in waiting if not is_of_clock(r)), key=lambda row: row.start_us)
-        sealed = {r.period_us for r in of_clock if time_of(r.period_us) + PERIOD + GRACE <= now}
-        last = self._last_sealed(days) if others else None
-        for start_us, group in groupby(others, key=lambda row: row.period_us):
+        waiting = sorted(days.unsealed(), key=lambda row: row.start_us)
+        last = self._last_sealed(days) if waiting else None
+        for start_us, group in groupby(waiting, key=lambda row: row.period_us):
             rows = list(group)
-            is_quiet = all(abs(now - time_of(row.arrived_us)) >= _QUIET for row in rows)
+            is_quiet = all(
+                row.excluded or abs(now - time_of(row.arrived_us)) >= _QUIET for row in rows
+            )
             if time_of(start_us) + PERIOD + GRACE > now or not is_quiet:
                 continue
-            if last is not None and start_us // DRIFT_US > last.start_us // DRIFT_US:
-                for event in find_drift(stream, self._hours(days, last)):
-                    self._note(event)
             events, last = list_events(stream, last, rows)
             for event in events:
                 self._note(event)
             days.seal(rows)
-            sealed.add(start_us)
-        return sorted(sealed)
+            sealed.append(start_us)
+        return sealed
 
     def _last_sealed(self, days: StreamDays) -> Row | None:
         where = (
-            "is_sealed AND excluded IN ('', ?) AND start_us = "
-            "(SELECT MAX(start_us) FROM chunks WHERE is_sealed AND excluded IN ('', ?))"
+            "is_sealed AND excluded = '' AND start_us = "
+            "(SELECT MAX(start_us) FROM chunks WHERE is_sealed AND excluded = '')"
         )
-        found = (days.rows([path], where, OVERLAP, OVERLAP) for path in reversed(days.paths()))
+        found = (days.rows([path], where) for path in reversed(days.paths()))
         return next((rows[-1] for rows in found if rows), None)
 
-    def _hours(self, days: StreamDays, row: Row) -> list[Row]:
-        """Return what counts of the six hours that a chunk is in."""
-        start_us = row.start_us // DRIFT_US * DRIFT_US
-        where = "excluded = '' AND start_us >= ? AND start_us < ?"
-        return days.rows([row.day], where, start_us, start_us + DRIFT_US)
-
     def _place(self, chunk: Chunk, arrived_us: int, is_former: bool) -> StoredChunk:
+        """Store a chunk unless it is there; what came first counts, if its clock was not ahead."""
         days, row = self._days(chunk.stream), row_of(chunk, arrived_us)
         made = StoredChunk(chunk.stream, chunk.sequence, chunk.start, chunk.end, is_new=False)
         around = days.between(row.start_us, row.end_us)
-        for same in around:
-            if (same.start_us, same.sequence) == (row.start_us, row.sequence):
-                known = self._load(days, same)
-                if known and same.samples >= row.samples and agree(known, chunk):
-                    return made
+        namesakes = [
+            each
+            for each in around
+            if (each.start_us, each.sequence) == (row.start_us, row.sequence)
+        ]
+        for same in namesakes:
+            known = self._load(days, same)
+            if known and same.samples >= row.samples and agree(known, chunk):
+                return made
         covered, conflicts = self._compare(days, chunk, around)
-        if conflicts and self._exclude_ahead(days, chunk, row, conflicts):
-            around = days.between(row.start_us, row.end_us)
-            covered, conflicts = self._compare(days, chunk, around)
-        name = row.start_us, row.sequence
-        is_doubled = any((each.start_us, each.sequence) == name for each, _ in conflicts)
+        if conflicts and not came_early(row) and all(came_early(each) for each, _ in conflicts):
+            days.exclude((each for each, _ in conflicts), EARLY)
+            covered, conflicts = self._compare(days, chunk, days.between(row.start_us, row.end_us))
+        is_doubled = any(each in namesakes for each, _ in conflicts)
         if is_doubled and not is_former:
             raise _doubled(chunk)
         if is_doubled or any(not runs_on(before, chunk) for _, before in conflicts):
             row = row._replace(covered=row.samples, excluded=OVERLAP)
         elif covered.all() and not conflicts:
             return made
-        else:
-            grown = any((each.start_us, each.sequence) == name for each in around)
-            number = 0 if grown else int(covered.sum())
-            row = row._replace(covered=number)
-            row = row._replace(misplaced=self._misplaced(days, row))
+        elif not namesakes:  # of one that has grown what was there is there no more
+            row = row._replace(covered=int(covered.sum()))
         days.add(row._replace(is_sealed=int(is_former)), chunk)
         return replace(made, is_new=True)
 
@@ -407,48 +348,6 @@ class Ring:
             if before and taken.stop and not repeats(before, chunk, taken):
                 conflicts.append((row, before))
         return covered, conflicts
-
-    def _exclude_ahead(
-        self, days: StreamDays, chunk: Chunk, row: Row, conflicts: Sequence[tuple[Row, Chunk]]
-    ) -> bool:
-        """Exclude what a chunk contradicts if its clock was ahead; return True if so."""
-        telling = {
-            each for each, old in conflicts if is_half(old, chunk) or not runs_on(old, chunk)
-        }
-        if not telling:
-            return False
-        since_us = row.start_us - _STEP_REACH_US
-        rows = days.rows(days.paths(since_us), "start_us >= ?", since_us)
-        former_us = [each.start_us for each in rows if each.excluded.endswith(HOURS_AHEAD)]
-        counted = [each for each in rows if not each.excluded]
-        hours, wrong = find_hour_step(counted, row, former_us)
-        if hours and telling <= set(wrong):
-            days.exclude(wrong, hours_ahead(hours))
-            return True
-        if came_early(row) or not all(came_early(each) for each, _ in conflicts):
-            return False
-        days.exclude((each for each, _ in conflicts), EARLY)
-        return True
-
-    def _misplaced(self, days: StreamDays, row: Row) -> str:
-        """Return the numbers of the neighbours in time that a chunk's number does not belong to.
-
-        It belongs after both: the clock stepped back into a gap. A number below both may be of a
-        logger that counts from the beginning again.
-        """
-        if row.covered or row.sequence >= BY_TIME:
-            return ""
-        place = row.start_us, row.sequence
-        sql = "SELECT sequence FROM chunks WHERE excluded = '' AND misplaced = '' "
-        sql += "AND (start_us, sequence) "
-        after = sql + "> (?, ?) ORDER BY start_us, sequence LIMIT 1"
-        until = sql + "< (?, ?) ORDER BY start_us DESC, sequence DESC LIMIT 1"
-        behind = _first(days.paths(row.start_us), after, place)
-        if behind is None or behind > row.sequence:
-            return ""
-        before = _first(reversed(days.paths(None, row.start_us)), until, place)
-        is_between = before is not None and before < behind
-        return f"{before} and {behind}" if is_between else ""
 
     def _fitting(self, chunk: Chunk, stream: str) -> Chunk:
         if stream not in ("", chunk.stream):
@@ -484,11 +383,6 @@ class Ring:
         for path in sorted(self.folder.glob("*")):
             if path.is_dir():
                 yield StreamDays(path)
-
-
-def _first(paths: Iterable[Path], sql: str, values: Sequence[object]) -> int | None:
-    found = (query(path, sql, *values) for path in paths)
-    return next((int(rows[0][0]) for rows in found if rows), None)
 
 
 def _day_of(path: Path) -> datetime:
@@ -535,10 +429,10 @@ def _refuse_other(chunk: Chunk, stream: Stream) -> None:
             f"{_named(chunk)} has not the channels of bridge.toml: {', '.join(sorted(missing))}.",
             remedy="Send null for a sensor that is away, or correct [[stream.channel]].",
         )
-    if abs(rate - stream.sampling_rate_hz) > _RATE_OFF * stream.sampling_rate_hz:
+    if abs(rate - stream.sampling_rate_hz) > 1e-6 * _RATE_OFF_PPM * stream.sampling_rate_hz:
         raise BadInput(
             f"{_named(chunk)} has {rate:.10g} Hz where bridge.toml "
-            f"says {stream.sampling_rate_hz:.10g}; {DRIFT_PPM:g} ppm of difference are taken.",
+            f"says {stream.sampling_rate_hz:.10g}; {_RATE_OFF_PPM:g} ppm of difference are taken.",
             remedy=f"Write sampling_rate_hz = {rate:.10g} there, or correct the logger.",
         )
     for channel in stream.channels:

@@ -51,7 +51,6 @@ CREATE TABLE chunks (
     valid INTEGER NOT NULL,                              -- samples that any channel has
     missing TEXT NOT NULL,                               -- counts without a value, by channel
     covered INTEGER NOT NULL,                            -- samples that were there already
-    misplaced TEXT NOT NULL,                             -- numbers it does not belong between
     excluded TEXT NOT NULL,
     is_sealed INTEGER NOT NULL
 );
@@ -80,7 +79,6 @@ class Row(NamedTuple):
     valid: int
     missing: str
     covered: int = 0
-    misplaced: str = ""
     excluded: str = ""
     is_sealed: int = 0
     day: Path = Path()

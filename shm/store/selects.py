@@ -12,10 +12,9 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.documents import posterior_document
 from shm.store.blobs import pack_samples, posterior_from, test_from_document
-from shm.store.columns import loads
+from shm.store.columns import loads, value_in
 from shm.store.database import Repository, insert
 from shm.store.files import is_counted, is_current
-from shm.store.mapping import value_in
 from shm.store.rows import DESCRIBED, Baseline, Lineage, Stage, StoredSelection, StoredTest, TestRow
 from shm.store.tables import (
     adoptions,

@@ -10,18 +10,18 @@ from sqlalchemy.engine import Engine
 
 from shm.errors import NothingThere
 from shm.store import schema
+from shm.store.alerts import Alerts, Silences
 from shm.store.changed_settings import ChangedSettings
 from shm.store.database import Database, make_engine
 from shm.store.journal import Actor, Journal, acting_as
 from shm.store.notes import Notes
 from shm.store.people import People
-from shm.store.stored_alerts import Alerts, Silences
-from shm.store.stored_posteriors import Posteriors
-from shm.store.stored_recordings import Recordings
-from shm.store.stored_streams import Streams
-from shm.store.stored_tests import Tests
-from shm.store.stored_watch import Watch
+from shm.store.posteriors import Posteriors
+from shm.store.recordings import Recordings
+from shm.store.streams import Streams
+from shm.store.tests import Tests
 from shm.store.upkeep import Upkeep
+from shm.store.watch import Watch
 
 
 class Store(Database):

@@ -20,6 +20,7 @@ from shm.store.columns import (
     UtcTime,
     identity,
     index_in_force,
+    mapped,
     model,
     note_on_alert,
     reference,
@@ -27,7 +28,6 @@ from shm.store.columns import (
     unique_where,
 )
 from shm.store.columns import metadata as metadata
-from shm.store.mapping import mapped
 from shm.store.rows import (
     ArchiveCopy,
     Baseline,

@@ -255,6 +255,12 @@ class Hanger(Displayable):
     def bending_stiffness_n_m2(self) -> float:
         return self.elastic_modulus_pa * self.second_moment_m4 * self.bending_stiffness_factor
 
+    def slenderness(self, tension_n: float) -> float:
+        """Return L sqrt(T/EI): about 10 of a bar, above 100 of a string; NaN of a slack one."""
+        if not (tension_n > 0 and self.bending_stiffness_n_m2 > 0):
+            return NAN
+        return self.length_m * math.sqrt(tension_n / self.bending_stiffness_n_m2)
+
     @property
     def end_kind(self) -> str:
         """Return how its ends are made: as stated; a strand's fittings are sockets."""

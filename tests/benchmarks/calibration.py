@@ -85,11 +85,9 @@ class Terms:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """The ranks of one draw from the prior, as fractions (quantities,), and the truth."""
+    """The ranks of one draw from the prior, as fractions (quantities,), of the draws counted."""
 
     ranks: FloatArray
-    truth: FloatArray
-    log_ratio: float
     counted: int
 
 
@@ -180,8 +178,7 @@ def case_of(terms: Terms, number: int) -> Case:
     truth = values(model, np.append(theta, sigma)[None], true_likelihood)[0]
     below = (drawn < truth).sum(axis=0)
     ranks = (below + rng.random(len(truth))) / (len(drawn) + 1)
-    log_ratio = float(np.log(np.median(posterior.parameter("theta_F")) / theta[0]))
-    return Case(ranks, truth, log_ratio, len(drawn))
+    return Case(ranks, len(drawn))
 
 
 def p_values(ranks: FloatArray) -> tuple[float, float]:
@@ -216,44 +213,6 @@ def report(name: str, labels: Sequence[str], cases: Sequence[Case]) -> bool:
     return adjusted > THRESHOLD
 
 
-def report_soft_ends(labels: Sequence[str], cases: Sequence[Case]) -> None:
-    """Bias of the tension given the truth's softest end: the pull of the prior, not a fault."""
-    springs = [index for index, label in enumerate(labels) if label.startswith("log10_k")]
-    if not springs:
-        return
-    softest = np.array([case.truth[springs].min() for case in cases])
-    ranks = np.array([case.ranks[0] for case in cases])
-    log_ratio = np.array([case.log_ratio for case in cases])
-    print("tension by the softest true end: cases, mean rank, mean of the median's error, covered")
-    for low, high in ((5.0, 6.4), (6.4, 8.0), (8.0, 12.0)):
-        chosen = (softest >= low) & (softest < high)
-        if chosen.any():
-            covered = np.mean((ranks[chosen] > 0.05) & (ranks[chosen] < 0.95))
-            print(
-                f"  10^{low} to 10^{high}: {chosen.sum():4} {ranks[chosen].mean():.3f} "
-                f"{log_ratio[chosen].mean():+.2%} {covered:.0%}"
-            )
-
-
-def save_figure(file: Path, labels: Sequence[str], cases: Sequence[Case]) -> None:
-    """The rank histograms as an image."""
-    import matplotlib.pyplot as plt
-
-    columns = 4
-    rows = -(-len(labels) // columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(12, 2.4 * rows), squeeze=False)
-    for axis in axes.flat[len(labels) :]:
-        axis.axis("off")
-    for axis, label, ranks in zip(
-        axes.flat, labels, np.array([case.ranks for case in cases]).T, strict=False
-    ):
-        axis.hist(ranks, BINS, range=(0, 1))
-        axis.axhline(len(ranks) / BINS, color="black", linewidth=0.8)
-        axis.set_title(label, fontsize=9)
-    figure.tight_layout()
-    figure.savefig(file)
-
-
 def main() -> None:
     """Runs the trial; exit code 1 where ranks are not uniform."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
@@ -265,7 +224,6 @@ def main() -> None:
     parser.add_argument("--sigma", type=float, nargs=2, default=(0.001, 0.03))
     parser.add_argument("--identification-error", type=float, default=0.0)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--figure", type=Path, help="PNG, one a model class: NAME-beam1.png")
     arguments = parser.parse_args()
     passed = True
     pool = ProcessPoolExecutor(arguments.workers) if arguments.workers > 1 else nullcontext()
@@ -284,12 +242,7 @@ def run(name: str, arguments: argparse.Namespace, executor: Executor | None) -> 
     mapped = (executor.map if executor else map)(partial(case_of, terms), range(arguments.draws))
     cases = list(track(mapped, name, total=arguments.draws))
     labels = quantities(build(name, HANGER_3, THESIS))
-    passed = report(name, labels, cases)
-    report_soft_ends(labels, cases)
-    if arguments.figure:
-        file = arguments.figure
-        save_figure(file.with_name(f"{file.stem}-{name}{file.suffix}"), labels, cases)
-    return passed
+    return report(name, labels, cases)
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import shm_daemon
 from shm.errors import ShmError
 from shm.store import Workspace
-from shm.store.checking import check_archive, check_store
+from shm.store.backups import check_archive, check_store
 from shm_daemon.wakeup import Wakeup
 from tests.helpers import quick_update
 from tests.helpers.contents import quiet

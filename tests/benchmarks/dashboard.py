@@ -28,7 +28,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
-from shm.store.queries.tests import list_test_rows
+from shm.store.tests import list_test_rows
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 

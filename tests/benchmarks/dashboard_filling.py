@@ -26,9 +26,9 @@ from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Archive, IdentifiedTest, Lineage, Outcome, Store, Workspace
 from shm.store.archive import ArchivedFile
 from shm.store.columns import Document
+from shm.store.posteriors import key_of
 from shm.store.rows import Role
 from shm.store.tables import alerts, metadata, recordings, summaries
-from shm.store.trends import key_of
 from shm.values import (
     PLANES,
     Change,

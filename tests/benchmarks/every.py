@@ -45,7 +45,7 @@ SHORT = {
     "alert_delivery": "--alerts 12 --kills 2",
     "any_simulator": "--cases 2",
     "blind_trial": "FOLDER --hangers 2 --left-out 1",
-    "calibration": "--draws 20 --samples 300", "clock_faults": "1", "copies": "3",
+    "calibration": "--draws 20 --samples 300", "clock_faults": "1",
     "damage": "--minutes 0.5", "dashboard": "--hangers 4 --tests 10 --rounds 1 --warm-only",
     "durations": "--repeats 1",
     "evidence": "--seeds 2 --textbook-seeds 2", "full_disk": "--files 1 --every 40",

@@ -23,7 +23,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from shm.store.queries.recordings import list_recordings
+from shm.store.recordings import list_recordings
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 

@@ -17,7 +17,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from shm.store.queries.history import list_events
+from shm.store.journal import list_events
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 

@@ -25,7 +25,7 @@ from datetime import datetime, timedelta
 from functools import cache
 from pathlib import Path
 
-from shm.store.queries.recordings import count_stages
+from shm.store.recordings import count_stages
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 

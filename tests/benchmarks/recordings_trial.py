@@ -23,14 +23,13 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-import scipy.interpolate
 from rich.console import Console
 from rich.table import Table
 
@@ -100,19 +99,6 @@ def as_record(case: world.Recording) -> Recording:
     )
 
 
-def drifting(case: world.Recording, share: float) -> world.Recording:
-    """The recording with a clock whose frequencies move by `share` from its first to last sample.
-
-    By cubic splines, which also take something off what is near half the sampling rate.
-    """
-    count = len(case.data)
-    at = np.linspace(0, 1, count)
-    shown = (count - 1) * np.clip(at + share * (at**2 - at) / 2, 0, 1)
-    data = np.where(np.isfinite(case.data), case.data, 0.0)
-    moved = scipy.interpolate.CubicSpline(np.arange(count), data, axis=0)(shown)
-    return replace(case, data=np.where(np.isfinite(case.data), moved, np.nan))
-
-
 def described(case: world.Recording) -> Hanger:
     """The hanger as its owner describes it: what is no bar as a structure of any kind."""
     told = case.truth.description
@@ -134,11 +120,9 @@ def described(case: world.Recording) -> Hanger:
     )
 
 
-def answered(kind: str, seed: int, clock_drift: float = 0.0) -> Answer:
+def answered(kind: str, seed: int) -> Answer:
     """Draws, identifies and judges one recording."""
     case = world.case(kind, seed)
-    if clock_drift:
-        case = drifting(case, clock_drift)
     answer = Answer(kind, seed)
     record, hanger = as_record(case), described(case)
     began = time.process_time()
@@ -284,7 +268,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kinds", default=",".join(KINDS), help="names, parted by commas")
     parser.add_argument("--seeds", default="0:6", help="first:end")
-    parser.add_argument("--clock-drift", type=float, default=0.0, help="relative, in each record")
     parser.add_argument("--answers", type=Path, help="a line of JSON for each recording")
     arguments = parser.parse_args()
     first, end = (int(part) for part in arguments.seeds.split(":"))
@@ -292,7 +275,7 @@ def main() -> None:
     lines = arguments.answers.open("w") if arguments.answers else None
     for kind in arguments.kinds.split(","):
         for seed in range(first, end):
-            answers.append(answered(kind, seed, arguments.clock_drift))
+            answers.append(answered(kind, seed))
             if lines:
                 lines.write(json.dumps(asdict(answers[-1])) + "\n")
                 lines.flush()

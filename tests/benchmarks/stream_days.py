@@ -25,8 +25,8 @@ from datetime import UTC, datetime, timedelta
 from itertools import groupby
 from pathlib import Path
 
-from shm.store.queries.streams import find_progress, list_pooled, list_stream_events
-from shm.store.queries.tests import list_test_rows
+from shm.store.streams import find_progress, list_pooled, list_stream_events
+from shm.store.tests import list_test_rows
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -21,7 +21,7 @@ from datetime import UTC, datetime, timedelta
 from itertools import islice
 from pathlib import Path
 
-from shm.store.queries.streams import find_progress
+from shm.store.streams import find_progress
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 

@@ -128,12 +128,12 @@ def described(entry: dict[str, Any]) -> tuple[Hanger, Stream]:
 
 
 def windows(
-    seed: int, hangers: Sequence[int], hours: float, flags: world.Flags
+    seed: int, hangers: Sequence[int], hours: float
 ) -> Iterator[tuple[int, datetime, list[Piece]]]:
     """Hanger, begin and pieces of each window that is complete; a lost chunk leaves a gap."""
     kept: dict[tuple[int, int], dict[int, dict[str, Any]]] = {}
     last = 0
-    for chunk in world.raw(seed, hangers, START, hours, flags=flags):
+    for chunk in world.raw(seed, hangers, START, hours):
         minute = round((datetime.fromisoformat(chunk["time"]) - START) / timedelta(minutes=1))
         kept.setdefault((minute // 10, chunk["hanger"]), {})[minute] = chunk
         if minute // 10 > last + 1:
@@ -176,17 +176,14 @@ def true_hz(seed: int, hanger: int, times: Sequence[datetime]) -> dict[str, Any]
 
 
 def followed(
-    seed: int, hangers: Sequence[int], given: argparse.Namespace, score: Score
+    seed: int, hangers: Sequence[int], hours: float, score: Score
 ) -> dict[int, list[WindowReading]]:
     """All windows of these hangers, each read by what the one before left known."""
     sites = {each["id"]: described(each) for each in world.describe(seed, hangers)}
     known: dict[int, dict[tuple[str, int], Mode]] = {h: {} for h in hangers}
     found: dict[int, list[WindowReading]] = {h: [] for h in hangers}
     options = IdentifyOptions(band_high_hz=HIGHEST_HZ)
-    flags = world.Flags(rate=given.rate)
-    if given.calm:
-        flags = world.Flags.none(noise=True, resolution=True)
-    for h, start, pieces in windows(seed, hangers, given.hours, flags):
+    for h, start, pieces in windows(seed, hangers, hours):
         before = tuple(known[h].values())
         begun = time.process_time()
         reading = read_window(pieces, sites[h][1], before, sites[h][0], options)
@@ -195,10 +192,6 @@ def followed(
         score.kinds[f"{reading.window.kind}, {reading.how}"] += 1
         for part in reading.why.split("; "):
             score.why[part.split(":")[0] if "set apart" not in part else "set apart"] += 1
-        if given.verbose:
-            print(h, start.time(), reading.window.kind, reading.how, len(reading.modes),
-                  f"{reading.window.level_m_s2:.4f} {reading.window.unrest:.1f} "
-                  f"{reading.window.signal_to_noise_db:.1f} dB", reading.why)  # fmt: skip
         if before and reading.window.kind != "unusable":
             score.followed.append(len(reading.modes) / len(before))
         times = [start + part * WINDOW for part in (0.2, 0.5, 0.8)]
@@ -232,15 +225,12 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--hours", type=float, default=2.0)
-    parser.add_argument("--rate", type=float, default=1.0, help="of faults; 1 is as in service")
-    parser.add_argument("--calm", action="store_true", help="no train, knock, fault, softening")
-    parser.add_argument("--verbose", action="store_true")
     given = parser.parse_args()
     score = Score()
     for seed in range(given.seed, given.seed + given.seeds):
         draw = np.random.default_rng([seed, 32])
         hangers = sorted(draw.choice(np.arange(1, 21), 2, replace=False).tolist())
-        readings = followed(seed, hangers, given, score)
+        readings = followed(seed, hangers, given.hours, score)
         pool(seed, readings, score, given.hours)
         print(f"seed {seed}: hangers {hangers}", file=sys.stderr, flush=True)
     print(score.said())

@@ -1,8 +1,7 @@
-"""The figures of the thesis next to ours, with a gate: tables, pictures, formulas, its sampler.
+"""The tables of the thesis next to ours, with a gate; formulas of practice and its sampler.
 
     python tests/benchmarks/validate.py                    # what `make validate` runs: minutes
     python tests/benchmarks/validate.py --table A.5
-    python tests/benchmarks/validate.py --figure 2.4 --out figure_2_4.png
     python tests/benchmarks/validate.py --formulas
     python tests/benchmarks/validate.py --update --sigma plane
     python tests/benchmarks/validate.py --update --textbook --repeat 10
@@ -16,7 +15,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -29,31 +28,17 @@ from shm.errors import GateNotMet, ShmError
 from shm.inference import UpdateOptions, update
 from shm.models import THESIS, build
 from shm.resources import one_thread_a_process
-from shm.values import Hanger
 from shm_cli.common import progress_bar, show_rows
 from shm_cli.example import HANGER_FILE, MODES_FILE
 from tests.benchmarks.thesis import (
     formulas,
     frequencies,
     selection,
-    solid_figures,
     thesis_data,
-    thesis_figures,
     thesis_tables,
 )
 from tests.benchmarks.thesis.grouped_likelihood import update_grouped
 from tests.benchmarks.thesis.textbook_tmcmc import update_textbook
-from tests.benchmarks.thesis.thesis_figures import Figure
-
-Progress = Callable[[str, float], None]
-
-FIGURES: dict[str, Callable[[Hanger, Progress, str], Figure]] = {
-    **dict.fromkeys(thesis_figures.SOLUTIONS, thesis_figures.solution),
-    **solid_figures.FIGURES,
-    **dict.fromkeys(thesis_figures.POSTERIORS, thesis_figures.posterior),
-    **dict.fromkeys(thesis_figures.MODE_SHAPES, thesis_figures.mode_shape),
-}
-"""How each figure of the thesis is made, by its number."""
 
 TABLES = tuple(sorted((*frequencies.TABLES, *thesis_tables.TABLES)))
 
@@ -65,9 +50,6 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     question = parser.add_mutually_exclusive_group()
-    question.add_argument(
-        "--figure", choices=tuple(FIGURES), metavar="N", help="one figure of the thesis, ours"
-    )
     question.add_argument("--table", choices=TABLES, help="one table of the thesis")
     question.add_argument(
         "--formulas", action="store_true", help="formulas of practice on beams of known tension"
@@ -78,7 +60,6 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     question.add_argument(
         "--list", action="store_true", help="every item of the thesis, and where it is shown"
     )
-    parser.add_argument("--out", type=png_file, metavar="FILE.png", help="draw the --figure here")
     parser.add_argument("--classes", default="beam1,beam2", help="of --update")
     parser.add_argument("--repeat", type=int, default=1, help="how often the data count (N_D)")
     parser.add_argument("--samples", type=int, default=1000, help="posterior samples of --update")
@@ -92,8 +73,6 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", action="store_true", help="one JSON document")
     given = parser.parse_args(arguments)
-    if given.out and not given.figure:
-        parser.error("--out draws one figure: add --figure 2.4, say")
     if (given.sigma or given.textbook or given.repeat != 1) and not given.update:
         parser.error("--sigma, --textbook and --repeat are options of --update")
     if given.repeat < 1 or given.samples < 1:
@@ -101,32 +80,9 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     return given
 
 
-def png_file(text: str) -> Path:
-    path = Path(text)
-    if path.suffix.lower() != ".png":
-        raise argparse.ArgumentTypeError(f"{path} is no name of a .png file")
-    if not path.absolute().parent.is_dir():
-        raise argparse.ArgumentTypeError(f"{path.absolute().parent} is no folder")
-    return path
-
-
 def print_json(document: object) -> None:
     """Print a document on stdout: no verb of `shm` runs, whose schema it could have."""
     print(dump(document))
-
-
-def show_figure(number: str, out: Path | None, as_json: bool) -> None:
-    with progress_bar("validating") as progress:
-        found = FIGURES[number](load_hanger(HANGER_FILE), progress, number)
-    if out is not None:
-        found.write(out)
-    if as_json:
-        print_json(found.document)
-    else:
-        show_rows(found.title, found.heads, found.cells)
-        print(found.statement)
-    if found.missed:
-        raise GateNotMet(found.missed, remedy="Report this: the beam's solver is at fault.")
 
 
 def show_table(wanted: str, seed: int, as_json: bool) -> None:
@@ -252,9 +208,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Answer one question; return the exit code."""
     given = parse(arguments)
     try:
-        if given.figure:
-            show_figure(given.figure, given.out, given.json)
-        elif given.table:
+        if given.table:
             show_table(given.table, given.seed, given.json)
         elif given.formulas:
             show_formulas(given.seed, given.json)

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
 
-from shm.store.queries.recordings import count_stages
+from shm.store.recordings import count_stages
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 

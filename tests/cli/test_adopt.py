@@ -10,7 +10,7 @@ import pytest
 
 from shm.pipeline import adopting
 from shm.store import Store, Workspace
-from shm.store.queries.hangers import list_adoptions
+from shm.store.watch import list_adoptions
 from tests.cli.conftest import Shm
 from tests.helpers import quick_update
 

@@ -70,14 +70,3 @@ def test_young_files_stay_and_something_must_be_asked_for(call: Call, tmp_path: 
     assert "archive: 0 files removed" in call("archive", "prune", "--keep-days", 36500).out
     assert raw_files(tmp_path) == 3
     assert call("archive", "prune").code == 2
-
-
-def test_a_refused_file_leaves_the_quarantine_once_it_is_old(call: Call, tmp_path: Path) -> None:
-    bad = tmp_path / "bad.csv"
-    bad.write_text("no recording")
-    assert call("ingest", bad).code == 3
-    quarantine = tmp_path / "bridge" / "quarantine"
-    assert len(list(quarantine.iterdir())) == 2
-    ended = call("archive", "prune", "--quarantine-days", 90, "--json")
-    assert ended.document["quarantine"]["files"] == ["bad.csv"]
-    assert list(quarantine.iterdir()) == []

@@ -14,7 +14,7 @@ from shm.pipeline.reporting import hanger_report
 from shm.report.as_text import as_text
 from shm.report.hanger_report import hanger_paper
 from shm.store import Workspace
-from shm.store.queries.recordings import list_holds
+from shm.store.recordings import list_holds
 from tests.cli.conftest import Shm
 from tests.helpers.flows import ingest
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put

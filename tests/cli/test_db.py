@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from shm.store import Store, Workspace
-from shm.store.queries.recordings import list_recordings
-from shm.store.queries.upkeep import list_copies
+from shm.store.recordings import list_recordings
+from shm.store.upkeep import list_copies
 from tests.cli.conftest import Shm
 from tests.helpers.postgres import Databases
 from tests.helpers.workspaces import write_test

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from shm.store import Store, Workspace
-from shm.store.backups import copy_store
-from shm.store.checking import check_store
+from shm.store.backups import check_store, copy_store
 from shm.store.tables import SCHEMA
 from tests.cli.conftest import Shm
 from tests.helpers.contents import held, quiet

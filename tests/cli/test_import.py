@@ -14,7 +14,7 @@ from scipy.io import savemat, wavfile
 from shm.pipeline.intake import as_taken_in
 from shm.read import read, sidecar_path
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import list_recordings
+from shm.store.recordings import list_recordings
 from shm.values import Channel, Recording
 from tests.cli.conftest import Shm
 from tests.helpers.flows import ingest

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from shm.store import Workspace
-from shm.store.queries.recordings import list_recordings
-from shm.store.queries.trends import list_history
+from shm.store.posteriors import list_history
+from shm.store.recordings import list_recordings
 from shm_cli.main import run
 from tests.cli.conftest import Shm
 from tests.helpers.workspaces import make_workspace, write_test

@@ -12,7 +12,7 @@ from shm.documents import dump
 from shm.modes_document import modes_document
 from shm.pipeline.lineage import discarded_of_baselines
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import count_stages, list_holds
+from shm.store.recordings import count_stages, list_holds
 from tests.cli.conftest import Shm
 from tests.helpers.taken_in import copied, ingest_quickly
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put, write_test

@@ -11,7 +11,7 @@ import pytest
 from shm.identify import Identification, identify
 from shm.pipeline import reporting
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import count_stages
+from shm.store.recordings import count_stages
 from shm_cli import working
 from shm_cli.main import run
 from tests.cli.conftest import Shm

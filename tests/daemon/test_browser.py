@@ -25,7 +25,7 @@ from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
 from shm.store.journal import Actor
-from shm.store.queries.recordings import list_recordings
+from shm.store.recordings import list_recordings
 from shm.store.rows import Role
 from shm_daemon.web.address import test_page as page_of
 from shm_daemon.web.background_work import BackgroundWorker

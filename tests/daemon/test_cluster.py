@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 import pytest
 
-import shm
 from shm.errors import BadInput, ShmError
-from shm.pipeline.streaming import Streaming
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import count_stages
-from shm.store.queries.streams import list_windows
+from shm.store.recordings import count_stages
 from shm_daemon import run
-from shm_daemon.cluster import Cluster, run_if_same_versions, traits
-from shm_daemon.execution import executor_of
+from shm_daemon.cluster import Cluster
 from tests.helpers import clusters
 from tests.helpers.canonical import canonical
-from tests.helpers.flows import Clock
-from tests.helpers.live_streams import FIRST, HOUR, drain, send, with_live_streams
 from tests.helpers.workspaces import make_workspace, put, write_test
 
 FILES = 1
@@ -70,22 +63,6 @@ def test_an_error_of_a_step_comes_back_as_it_was(pool: Cluster) -> None:
     assert caught.value.remedy == "Mend it."
 
 
-def test_a_worker_of_another_version_is_refused_and_the_step_tried_again(
-    pool: Cluster, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    own = re.escape(shm.__version__)
-    monkeypatch.setattr(shm, "__version__", "9.9.9")
-    with pytest.raises(ShmError, match=rf"has shm {own}, the daemon 9\.9\.9") as caught:
-        pool.submit(os.getpid)
-    assert caught.value.retry_after_s is not None
-
-
-def test_a_worker_that_came_later_is_asked_too() -> None:
-    assert run_if_same_versions(traits(), lambda: 7) == 7
-    with pytest.raises(ShmError, match="has numpy"):
-        run_if_same_versions({**traits(), "numpy": "0.1"}, lambda: 7)
-
-
 @pytest.mark.slow
 def test_a_scheduler_that_does_not_answer_is_waited_for() -> None:
     with pytest.raises(ShmError, match="cannot be reached") as caught:
@@ -102,27 +79,5 @@ def test_a_step_that_kills_every_worker_is_told_as_a_crash(tmp_path: Path) -> No
         pool.shutdown()
 
 
-def test_without_a_scheduler_steps_run_in_processes_of_our_own(workspace: Workspace) -> None:
-    executor = executor_of(workspace.settings)
-    assert executor.submit(os.getpid).result(60) != os.getpid()
-    executor.shutdown(cancel_futures=True)
-
-
 def _refuse() -> None:
     raise BadInput("odd.", line=3, remedy="Mend it.")
-
-
-@pytest.mark.slow
-def test_windows_of_a_stream_are_read_on_a_cluster_to_the_bit(
-    tmp_path: Path, pool: Cluster
-) -> None:
-    found = []
-    for number, executor in enumerate((pool, ThreadPoolExecutor(1))):
-        workspace = with_live_streams(make_workspace(tmp_path / f"bridge{number}"))
-        send(workspace, hours=1 / 6)
-        with workspace.store() as store:
-            clock = Clock(FIRST + HOUR)
-            drain(Streaming(workspace, store, executor, clock=clock, lanes=2), clock)
-            found.append(list_windows(store, 3, FIRST, FIRST + HOUR))
-    assert len(found[0]) == 1
-    assert found[0] == found[1]

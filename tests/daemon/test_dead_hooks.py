@@ -10,7 +10,7 @@ import pytest
 
 from shm.bridge import Hook
 from shm.store import Delivery, DeliveryState, Stage, Workspace
-from shm.store.queries.recordings import count_stages
+from shm.store.recordings import count_stages
 from shm.values import Alert
 from shm_daemon import Wakeup, run
 from tests.helpers.flows import a_flow, threads

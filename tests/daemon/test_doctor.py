@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import sqlite3
-import sys
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from unittest.mock import Mock
 
 import pytest
 
 from shm.pipeline.intake import receive
-from shm.read import sandbox
-from shm.store import Archive, DeliveryState, Stage, Workspace
-from shm.store.queries.recordings import count_stages
+from shm.store import Archive, DeliveryState, Workspace
 from shm_cli.main import run
-from shm_daemon import doctor_checks as checks
+from shm_daemon import doctor as checks
 from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import HEARTBEAT, beat, turn_failed
 from tests.helpers.nouns import NOW
-from tests.helpers.outboxes import entered, make_baseline, raise_alerts
+from tests.helpers.outboxes import make_baseline, raise_alerts
 from tests.helpers.taken_in import ingest_quickly
-from tests.helpers.taken_over import obeying_readers
 from tests.helpers.workspaces import make_workspace, put, write_test
 
 
@@ -64,30 +58,7 @@ def test_every_warning_and_fault_says_what_to_do(workspace: Workspace) -> None:
     assert all(each.remedy for each in troubled)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux lets a process confine itself")
-def test_bounds_of_reading_that_are_not_in_force_are_told_and_why(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert only(workspace, "confinement").level is Level.OK
-    why = {"a limit of memory": "only Linux enforces one"}
-    monkeypatch.setattr(sandbox, "missing_bounds", lambda: why)
-    finding = only(workspace, "confinement")
-    assert finding.level is Level.WARNING
-    assert "without a limit of memory: only Linux" in finding.found
-    with obeying_readers("serving.resource.setrlimit = lambda *_: 1 / 0"):
-        monkeypatch.undo()
-        finding = only(workspace, "confinement")
-    assert (finding.level, "nothing is read" in finding.found) == (Level.FAULT, True)
-
-
 # ------------------------------------------------------------ broken stores
-
-
-def test_a_missing_store_is_told(workspace: Workspace) -> None:
-    workspace.database.unlink()
-    finding = only(workspace, "store")
-    assert (finding.level, "no store" in finding.found) == (Level.FAULT, True)
-    assert only(workspace, "flow").level is Level.UNKNOWN
 
 
 def test_an_outdated_store_is_told(workspace: Workspace) -> None:
@@ -134,30 +105,6 @@ def test_no_folder_and_no_description_are_told(tmp_path: Path) -> None:
         "folders",
         "bridge.toml",
     ]
-
-
-def test_a_wrong_description_is_told_with_its_place(workspace: Workspace) -> None:
-    path = workspace.folder / "bridge.toml"
-    path.write_text(path.read_text().replace("length_m = 12.0", "length_m = -1"))
-    finding = only(workspace, "bridge.toml")
-    assert (finding.level, "length_m" in finding.found) == (Level.FAULT, True)
-
-
-def test_a_model_class_that_the_daemon_would_not_begin_with_is_told(workspace: Workspace) -> None:
-    assert only(workspace, "models").level is Level.OK
-    path = workspace.folder / "bridge.toml"
-    path.write_text(path.read_text().replace('"beam1"', '"beam77"'))
-    finding = only(workspace, "models")
-    assert (finding.level, "'beam77'" in finding.found) == (Level.FAULT, True)
-    assert "beam2" in finding.remedy
-
-
-def test_looking_does_not_hide_that_a_folder_is_missing(workspace: Workspace) -> None:
-    """An archive on a disk that is not mounted must not be begun anew, empty."""
-    shutil.rmtree(workspace.folder / "archive")
-    for _ in range(2):
-        finding = only(workspace, "folders")
-        assert (finding.level, "archive missing" in finding.found) == (Level.FAULT, True)
 
 
 def test_a_description_that_everybody_may_change_is_a_fault(workspace: Workspace) -> None:
@@ -223,17 +170,6 @@ def test_raw_files_that_came_after_a_restored_backup_are_named_and_can_be_taken_
     assert only(workspace, "raw files").level is Level.OK
 
 
-def test_what_will_never_be_taken_is_told_at_once(workspace: Workspace) -> None:
-    os.mkfifo(workspace.spool / "pipe.csv")
-    (workspace.spool / "link.csv").symlink_to("/etc/hostname")
-    (workspace.spool / "campaign").symlink_to("/tmp")
-    queue, never = found(workspace, "spool", datetime.now(UTC))
-    assert queue.level is Level.OK
-    assert never.level is Level.WARNING
-    for named in ("pipe.csv is a named pipe", "link.csv is a link", "campaign is a link"):
-        assert named in never.found
-
-
 def test_a_turn_that_failed_is_a_fault_until_one_goes_well(workspace: Workspace) -> None:
     with workspace.lock():
         beat(workspace)
@@ -254,29 +190,6 @@ def test_a_recording_that_stands_still_is_told(workspace: Workspace) -> None:
     finding = only(workspace, "recordings", NOW + timedelta(hours=2))
     assert (finding.level, "stuck.csv" in finding.found) == (Level.WARNING, True)
     assert "shm ingest --again 1" in finding.remedy
-
-
-def test_a_long_queue_that_moves_is_not_stuck(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    now = NOW + timedelta(hours=2)
-    for name, at in (("first", NOW), ("last", now)):
-        put(workspace.spool / f"{name}.csv", name)
-        with workspace.store() as store:
-            receive(workspace.spool / f"{name}.csv", workspace, store, at)
-    assert only(workspace, "recordings", now).level is Level.OK
-    monkeypatch.setattr(checks, "_STUCK_BEHIND_OTHERS", timedelta(hours=1))
-    assert only(workspace, "recordings", now).level is Level.WARNING
-
-
-def test_tests_that_wait_for_a_baseline_are_not_stuck(tmp_path: Path) -> None:
-    workspace = make_workspace(tmp_path / "three", settings={"baseline_tests": 3})
-    with workspace.store() as store:
-        entered(store, [1, 2])
-        assert count_stages(store)[Stage.IDENTIFIED] == 2
-    assert "none is on its way" in only(workspace, "recordings", NOW + timedelta(days=9)).found
-    forming = [each.found for each in found(workspace, "hangers")]
-    assert "no baseline yet: 3 (2 of 3 tests)" in forming
 
 
 def test_the_quarantine_and_missing_raw_files_are_told(workspace: Workspace) -> None:
@@ -319,14 +232,6 @@ def test_a_clock_that_jumped_back_is_a_fault(workspace: Workspace) -> None:
     assert found(workspace, "clock", NOW + timedelta(hours=1))[0].level is not Level.FAULT
     jumped = found(workspace, "clock", NOW - timedelta(hours=5))[0]
     assert (jumped.level, "5 h before the newest row" in jumped.found) == (Level.FAULT, True)
-
-
-def test_hangers_without_tests_are_told(tmp_path: Path) -> None:
-    workspace = make_workspace(tmp_path / "two", hangers=(3, 4))
-    make_baseline(workspace)
-    assert [each.found for each in found(workspace, "hangers", NOW)] == ["no test yet: 4"]
-    later = found(workspace, "hangers", NOW + timedelta(days=500))
-    assert "no test for 400 days: 3" in [each.found for each in later]
 
 
 def test_deliveries_that_fail_and_that_were_given_up_are_told(workspace: Workspace) -> None:
@@ -382,16 +287,6 @@ def test_secrets_that_are_missing_or_open_to_others_are_told_and_never_shown(
     assert "T0P-SECRET" not in str(examine(workspace.folder, NOW))
 
 
-def test_an_extra_that_the_settings_call_for_must_be_installed(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert only(workspace, "extras").level is Level.OK
-    monkeypatch.setattr("shm_daemon.doctor.find_spec", lambda name: None)
-    monkeypatch.setenv("SHM_MQTT_URL", "mqtts://broker:8883")
-    finding = only(workspace, "extras")
-    assert (finding.level, finding.remedy) == (Level.FAULT, "pip install 'shm[mqtt]'")
-
-
 def test_a_check_that_fails_hides_no_other(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -416,15 +311,3 @@ def test_looking_changes_nothing(workspace: Workspace) -> None:
     before = state()
     examine(workspace.folder, datetime.now(UTC))
     assert state() == before
-
-
-@pytest.mark.parametrize(("since", "said"), [(3, "3 h"), (-1, "0 s")])
-def test_held_counts_with_its_wait(monkeypatch: pytest.MonkeyPatch, since: int, said: str) -> None:
-    """No time is negative where the clock was set back."""
-    examined = Mock(now=NOW)
-    hold = Mock(held_at=NOW - timedelta(hours=since), file_name="a.csv")
-    monkeypatch.setattr(checks, "list_holds", lambda _: [hold])
-    (finding,) = checks.check_held(examined)
-    assert finding.level is Level.WARNING
-    assert finding.found == f"1 recording, the first for {said}: a.csv"
-    assert "--held" in finding.remedy

@@ -95,14 +95,6 @@ def _say_and_sleep(at_work: Path) -> None:
     time.sleep(0.5)
 
 
-@pytest.mark.slow
-def test_a_worker_killed_at_rest_costs_nothing(workers: Workers) -> None:
-    for _ in range(3):
-        os.kill(workers.submit(os.getpid).result(60), signal.SIGKILL)
-        time.sleep(0.2)  # a step that is sent to it meanwhile dies with it, and is tried again
-        assert workers.submit(os.getppid).result(60)
-
-
 def _refuse() -> None:
     raise BadInput("cannot be used.", file="a.csv", line=3, remedy="Mend it.")
 
@@ -139,16 +131,6 @@ def test_where_no_process_can_be_begun_no_file_is_to_blame(
         assert refusal.value.retry_after_s
         assert workers.submit(os.getpid).result(60)
         workers.shutdown(wait=False)
-
-
-@pytest.mark.slow
-def test_where_each_process_ends_at_once_no_file_is_to_blame_and_none_is_begun_for_ever() -> None:
-    with children_ended():
-        workers = Workers(1, partial(os._exit, 1))
-        with pytest.raises(ShmError, match="it ended before") as refusal:
-            workers.submit(os.getpid).result(60)
-        workers.shutdown(wait=False, cancel_futures=True)
-    assert refusal.value.retry_after_s
 
 
 def _grow() -> int:

@@ -13,7 +13,7 @@ from shm.read.base import PeekChannel
 from shm.read.sidecar import write_sidecar
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage
-from shm.store.queries.recordings import list_recordings
+from shm.store.recordings import list_recordings
 from tests.helpers.flows import Clock, threads
 from tests.helpers.workspaces import START, make_workspace
 from tests.helpers.written import write

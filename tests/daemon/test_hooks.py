@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 import threading
 import time
@@ -16,7 +15,6 @@ import pytest
 from shm.bridge import CommandHook
 from shm_daemon import HookFailed, HookNotifier
 from tests.helpers.nouns import an_alert
-from tests.helpers.waiting import until
 
 ENVIRONMENT = {"PATH": os.environ["PATH"], "HOME": "/home/owner", "SHM_SECRET": "token"}
 
@@ -85,47 +83,6 @@ def test_a_hook_that_hangs_is_ended_with_all_its_children(tmp_path: Path) -> Non
     with pytest.raises(HookFailed, match="ended after 1 s"):
         a_notifier(tmp_path, timeout_s=1.0)(python(code), an_alert())
     assert is_gone(int((tmp_path / "child").read_text()))
-
-
-@pytest.mark.parametrize("rest", ["exit 0", "exec sleep 60"])
-def test_hook_ends_with_double_forks(tmp_path: Path, rest: str) -> None:
-    script = tmp_path / "hook.sh"
-    script.write_text(
-        "#!/bin/sh\n"
-        "(setsid sh -c 'echo $$ > one; setsid sleep 60 & echo $! > two; wait' &)\n"
-        "while [ ! -s two ]; do sleep 0.02; done\n" + rest + "\n"
-    )
-    script.chmod(0o755)
-    notifier, hook = a_notifier(tmp_path, timeout_s=3.0), CommandHook("page", (str(script),))
-    if rest == "exit 0":
-        assert notifier(hook, an_alert()) == "exit code 0"
-    else:
-        with pytest.raises(HookFailed, match="ended after 3 s"):
-            notifier(hook, an_alert())
-    left = [name for name in ("one", "two") if not is_gone(int((tmp_path / name).read_text()))]
-    assert left == []
-
-
-def test_hook_ends_with_its_daemon(tmp_path: Path) -> None:
-    told = tmp_path / "told.py"
-    told.write_text(
-        "import os, sys, pathlib\n"
-        "from shm.bridge import CommandHook\n"
-        "from shm_daemon import HookNotifier\n"
-        "from tests.helpers.nouns import an_alert\n"
-        "hook = CommandHook('page', ('sh', '-c', 'echo $$ > hook; setsid sleep 60'))\n"
-        "HookNotifier(pathlib.Path(sys.argv[1]), 60.0, os.environ)(hook, an_alert())\n"
-    )
-    daemon = subprocess.Popen(
-        [sys.executable, str(told), str(tmp_path)],
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
-    )
-    try:
-        until(lambda: (tmp_path / "hook").exists() and (tmp_path / "hook").read_text())
-    finally:
-        daemon.kill()
-        daemon.wait()
-    assert is_gone(int((tmp_path / "hook").read_text()))
 
 
 def test_hook_output_needs_no_disk(tmp_path: Path) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import time
 from pathlib import Path
 
 import pytest
@@ -33,12 +31,6 @@ def test_a_file_lands_with_its_sidecar_and_nothing_is_left_under_way(tmp_path: P
     assert landed == Landed(tmp_path / "a.csv", DIGEST, len(CONTENT))
     assert landed.path.read_bytes() == CONTENT
     assert (tmp_path / "a.toml").read_text() == "hanger = 3\n"
-    assert names(tmp_path) == {"a.csv", "a.toml"}
-
-
-def test_the_same_again_lies_there_already(tmp_path: Path) -> None:
-    land(tmp_path, **SAID)
-    assert land(tmp_path, **SAID).path == tmp_path / "a.csv"
     assert names(tmp_path) == {"a.csv", "a.toml"}
 
 
@@ -73,30 +65,6 @@ def test_more_than_is_taken_is_refused_before_it_is_kept(tmp_path: Path) -> None
         with pytest.raises(ShmError):
             file.write(b"x")
         assert file.size_bytes == 10
-
-
-def test_a_file_system_without_links_gets_the_file_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def unknown(*_: object) -> None:
-        raise OSError(1, "not permitted")
-
-    monkeypatch.setattr(Path, "hardlink_to", unknown)
-    assert land(tmp_path, **SAID).path == tmp_path / "a.csv"
-    assert land(tmp_path, content=b"else").path.read_bytes() == b"else"
-    assert (tmp_path / "a.csv").read_bytes() == CONTENT
-    assert len(names(tmp_path)) == 3
-
-
-def test_what_a_killed_process_left_goes_after_a_day(tmp_path: Path) -> None:
-    folder = tmp_path / ".landing"
-    folder.mkdir()
-    for age_s in (86_000, 87_000):
-        left = folder / f"{age_s}.part"
-        left.touch()
-        os.utime(left, (time.time() - age_s,) * 2)
-    land(tmp_path)
-    assert names(folder) == {"86000.part"}
 
 
 @pytest.mark.parametrize(

@@ -61,13 +61,6 @@ def test_a_file_name_cannot_write_lines_of_its_own() -> None:
     assert "a\\n2026-01-01 ERROR forged\\x1b[2J.csv: new" in line
 
 
-def test_the_journal_gets_the_importance_and_no_second_time() -> None:
-    journal = formatter("text", journal=True)
-    assert journal.format(a_record("all is well")) == "<6>all is well"
-    assert journal.format(a_record("hm", logging.WARNING)) == "<4>hm"
-    assert formatter("json", journal=True).format(a_record("x", logging.DEBUG))[:4] == "<7>{"
-
-
 def test_a_log_file_is_put_aside_as_it_grows_and_old_ones_go(tmp_path: Path) -> None:
     begin_logging(Settings(log_file_bytes=10_000, log_files=2), tmp_path / "shm.log")
     for number in range(1000):

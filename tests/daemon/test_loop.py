@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import errno
 import logging
-import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -14,22 +12,16 @@ from pathlib import Path
 import pytest
 
 from shm.errors import ShmError, StoreBusy, StoreError
-from shm.pipeline import Flow, steps, utc_now
+from shm.pipeline import Flow, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
-from shm.store import Archive, Delivery, Stage, Workspace
-from shm.store.checking import check_store
-from shm.store.queries.history import list_events
-from shm.store.queries.recordings import count_stages
-from shm.store.stored_recordings import Recordings
-from shm_cli import main as cli
+from shm.store import Archive, Stage, Workspace
+from shm.store.recordings import Recordings, count_stages
 from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import why_turn_failed
 from tests.helpers import quick_update
 from tests.helpers.flows import threads as make_threads
-from tests.helpers.footprint import open_files
 from tests.helpers.waiting import until
-from tests.helpers.web_servers import served
 from tests.helpers.workspaces import put, write_test
 
 
@@ -70,11 +62,6 @@ def counts(workspace: Workspace) -> dict[Stage, int]:
         return {stage: count for stage, count in count_stages(store).items() if count}
 
 
-def deliveries(workspace: Workspace) -> tuple[Delivery, ...]:
-    with workspace.store() as store:
-        return store.alerts.list_deliveries()
-
-
 def test_files_dropped_while_it_runs_are_done(
     workspace: Workspace, serve: Callable[..., Wakeup]
 ) -> None:
@@ -85,20 +72,6 @@ def test_files_dropped_while_it_runs_are_done(
     assert list(workspace.spool.iterdir()) == []
 
 
-@pytest.mark.slow
-def test_open_files_do_not_grow_with_the_tests(
-    workspace: Workspace, serve: Callable[..., Wakeup]
-) -> None:
-    serve()
-    held = []
-    for last in (3, 6, 9):
-        for day in range(last - 3, last):
-            write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
-        until(lambda done=last: counts(workspace) == {Stage.DONE: done})  # type: ignore[misc]
-        held.append(min(open_files(os.getpid()) for _ in range(20)))  # a scan opens folders too
-    assert held[2] <= held[0]
-
-
 def test_once_takes_everything_with_its_subfolders_and_ends(workspace: Workspace) -> None:
     (workspace.spool / "logger").mkdir()
     write_test(workspace.spool / "logger" / "a.modes.json", workspace)
@@ -106,35 +79,6 @@ def test_once_takes_everything_with_its_subfolders_and_ends(workspace: Workspace
     run_once(workspace)
     assert counts(workspace) == {Stage.DONE: 1, Stage.REFUSED: 1}
     assert list(workspace.spool.rglob("*")) == [workspace.spool / "logger"]
-
-
-_ODD_NAMES = (
-    "x" * 251 + ".csv",  # its sidecar's name would be too long
-    "y" * 244 + ".modes.json",
-    "two\nlines.csv",
-    "tab\t.csv",
-    "escape\x1b[31m.csv",
-    "turned\u202e.csv",
-    "next\x85.csv",
-)
-
-
-def test_no_name_of_a_file_holds_up_the_others(
-    workspace: Workspace, serve: Callable[..., Wakeup]
-) -> None:
-    serve()
-    for name in _ODD_NAMES:
-        (workspace.spool / name).write_text(f"no recording: {name!r}")
-    os.mkfifo(workspace.spool / "pipe.csv")
-    write_test(workspace.spool / "good.modes.json", workspace)
-    until(lambda: counts(workspace) == {Stage.DONE: 1, Stage.REFUSED: len(_ODD_NAMES)})
-    assert [path.name for path in workspace.spool.iterdir()] == ["pipe.csv"]
-    assert why_turn_failed(workspace) == ""
-    with workspace.store() as store:
-        assert check_store(store, lambda *_: None).troubles == ()
-        names = [event.file_name for event in list_events(store, "refused")]
-    assert len(names) == len(_ODD_NAMES)
-    assert all(name.isprintable() and len(name) <= 200 for name in names)
 
 
 def test_nothing_is_taken_while_a_folder_is_on_another_disk(
@@ -158,50 +102,6 @@ def test_nothing_is_taken_while_a_folder_is_on_another_disk(
     assert why_turn_failed(workspace) == ""
 
 
-def test_receive_unwritable_archive_shows(
-    workspace: Workspace, serve: Callable[..., Wakeup], capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Wherever people look they see that files are not taken in, and why, until they are."""
-    obstacle = workspace.archive.folder / ".incoming"
-    obstacle.write_text("where files are copied to")
-    write_test(workspace.spool / "a.modes.json", workspace)
-    serve()
-    until(lambda: "a.modes.json is not taken in" in why_turn_failed(workspace))
-    with served(workspace) as site, site.client(Accept="text/html") as client:
-        health = client.get("/health")
-        home = client.get("/").text
-    assert (health.status_code, health.json()["status"]) == (503, "failing")
-    assert "a.modes.json is not taken in" in home
-    assert str(workspace.folder) not in home
-    for verb in ("status", "doctor"):
-        cli.run(["--workspace", str(workspace.folder), verb])
-        assert "a.modes.json is not taken in" in " ".join(capsys.readouterr().out.split())
-    obstacle.unlink()
-    (workspace.spool / "a.modes.json").unlink()
-    write_test(workspace.spool / "b.modes.json", workspace)
-    until(lambda: counts(workspace) == {Stage.DONE: 1})
-    until(lambda: why_turn_failed(workspace) == "")
-
-
-def test_receive_raises_anything(
-    workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A file that cannot be taken in for a fault of shm keeps no other file from being done."""
-    receive = Flow.receive
-
-    def fail_on_a(self: Flow, path: Path) -> object:
-        if path.name.startswith("a"):
-            raise KeyError("layout")
-        return receive(self, path)
-
-    monkeypatch.setattr(Flow, "receive", fail_on_a)
-    for name in "ab":
-        write_test(workspace.spool / f"{name}.modes.json", workspace, day=ord(name))
-    serve()
-    until(lambda: counts(workspace) == {Stage.DONE: 1})
-    until(lambda: "a.modes.json is not taken in: KeyError" in why_turn_failed(workspace))
-
-
 def test_turn_streams_raise(
     workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -215,20 +115,6 @@ def test_turn_streams_raise(
     serve()
     until(lambda: counts(workspace) == {Stage.DONE: 1}, 60.0)
     assert "no stream" in why_turn_failed(workspace)
-
-
-def test_advance_delayed_recording_shows(
-    workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Why a recording waits that was taken in is shown, as why a file waits in the spool."""
-
-    def fail(*_: object, **__: object) -> None:
-        raise OSError(errno.EIO, "Input/output error")
-
-    monkeypatch.setattr(steps, "load_modes", fail)
-    write_test(workspace.spool / "a.modes.json", workspace)
-    serve()
-    until(lambda: "recording 1 waits: [Errno 5]" in why_turn_failed(workspace))
 
 
 def test_two_daemons_do_not_serve_one_workspace(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-import tracemalloc
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +14,7 @@ from shm.errors import BadInput
 from shm.pipeline import utc_now
 from shm.pipeline.intake import receive
 from shm.store import Outcome, Workspace
-from shm.store.queries.history import list_events
+from shm.store.journal import list_events
 from shm_daemon.mqtt import Broker as Address
 from shm_daemon.mqtt import Listener, messages
 from shm_daemon.spool import scan
@@ -119,17 +118,6 @@ def test_what_was_received_but_not_acknowledged_is_not_taken_twice(
 
 
 @pytest.mark.slow
-def test_what_came_while_the_daemon_was_down_is_taken_in(bridge: Workspace, broker: Broker) -> None:
-    with listening(bridge):
-        pass
-    broker.publish(f"{TOPIC}/meanwhile.csv", b"meanwhile")
-    with listening(bridge) as back:
-        until(lambda: back.waiting)
-        assert received(bridge) == [Outcome.NEW]
-        until(lambda: not back.waiting)
-
-
-@pytest.mark.slow
 def test_a_broker_that_is_killed_is_found_again(tmp_path: Path) -> None:
     with a_broker() as broker:
         workspace = a_bridge(tmp_path, broker)
@@ -165,30 +153,6 @@ def test_too_large_a_message_is_laid_in_the_quarantine_with_its_reason(
     with listening(bridge):
         time.sleep(0.5)
     assert not reason.exists()  # it was acknowledged
-
-
-def test_flood_waits_at_broker(tmp_path: Path, broker: Broker) -> None:
-    settings = {"mqtt_url": broker.url, "mqtt_max_bytes": 3_500_000}
-    workspace = make_workspace(tmp_path / "bridge", settings=settings)
-    names = sorted(f"hit{number:02d}.csv" for number in range(9))
-    with listening(workspace):
-        away = workspace.spool.rename(tmp_path / "away")
-        tracemalloc.start()
-        try:
-            for number, name in enumerate(names):
-                broker.publish(f"{TOPIC}/{name}", b"%02d" % number * 500_000)
-            time.sleep(1.0)  # all that will come have come
-            held_bytes = tracemalloc.get_traced_memory()[0]
-        finally:
-            tracemalloc.stop()
-        away.rename(workspace.spool)
-        outcomes: list[Outcome] = []
-        until(lambda: outcomes.extend(received(workspace)) or len(outcomes) >= len(names))
-    assert held_bytes < 6_000_000  # 9 MB were sent
-    assert outcomes == [Outcome.NEW] * len(names)
-    with listening(workspace) as again:
-        time.sleep(0.5)
-        assert (spooled(workspace), again.waiting) == ([], [])  # all are acknowledged
 
 
 @pytest.mark.slow

@@ -227,7 +227,7 @@ def _raise(
     drifts: tuple[Drift, ...] = (),
     change: Change | None = None,
 ) -> None:
-    from shm.store.outbox import raise_alert
+    from shm.store.alerts import raise_alert
 
     alert = Alert(
         f"hanger-{hanger}:{kind}", hanger, "h 12:00", NOW, message, drifts, (kind,), change

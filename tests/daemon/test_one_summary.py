@@ -20,7 +20,7 @@ from click.testing import CliRunner
 from shm.documents import alert_document, dump
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report, hanger_summaries
-from shm.pipeline.notification_plan import message_of
+from shm.pipeline.courier import message_of
 from shm.pipeline.reporting import hanger_report
 from shm.report.as_html import as_html
 from shm.report.as_pdf import as_pdf

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import count_stages
+from shm.store.recordings import count_stages
 from shm_daemon.__main__ import main
 from tests.helpers.daemons import quick_daemons, real_daemon
 from tests.helpers.waiting import until

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import json
-import logging
 import re
 import shutil
-import sqlite3
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 
-import httpx
 import pytest
 import yaml
 from click.testing import CliRunner
@@ -24,14 +20,13 @@ from shm.store import Workspace
 from shm.store.point_outbox import PointOutbox
 from shm_cli.main import cli
 from shm_daemon.doctor import examine
-from shm_daemon.publishing import Pace, Publisher, results_published
+from shm_daemon.publishing import results_published
 from tests.helpers.flows import ingest, threads
 from tests.helpers.listeners import Answer, Told, a_listener
 from tests.helpers.pages import ROOT
 from tests.helpers.quick_update import stand_in
 from tests.helpers.streams import a_reading, with_stream
 from tests.helpers.time_series import a_victoria_metrics, an_influxdb
-from tests.helpers.waiting import until
 from tests.helpers.workspaces import SLOW_LOSS, make_workspace, write_test
 
 SERIES = re.compile(r"(?:\\.|[^ \\])+")
@@ -195,28 +190,6 @@ def test_influxdb_wrong_database_and_token(bridge: Workspace, tmp_path: Path) ->
         assert "influx.token cannot be read" in doctor(workspace)[1]
 
 
-def test_influxdb_refuses_some_points(bridge: Workspace, tmp_path: Path, caplog) -> None:
-    with an_influxdb(tmp_path) as database:
-        database.influxql("CREATE DATABASE shm")
-        # In the shard of t4 the field is a text, as somebody else wrote it.
-        somebodys = 'shm_test,hanger=9 counts="yes" 1777636800000000000'
-        httpx.post(f"{database.url}/write?db=shm", content=somebodys).raise_for_status()
-        workspace = publishing(bridge, database.url)
-        with caplog.at_level(logging.WARNING):
-            publish(workspace)
-
-        assert "field type conflict" in caplog.text
-        assert "points were refused; the log says why" in status(workspace)
-        found = counts(database)
-        assert (found["shm_mode"], found["shm_hour"]) == (98, 1)
-        assert waiting(workspace) == 0
-
-        database.influxql("DROP MEASUREMENT shm_test")
-        publish(workspace)
-        assert "refused" not in status(workspace)
-        assert counts(database)["shm_test"] == 8
-
-
 @pytest.mark.parametrize("kind", ['database = "shm"', 'organisation = "city"\nbucket = "shm"'])
 def test_publish_to_victoria_metrics(bridge: Workspace, tmp_path: Path, kind: str) -> None:
     """It takes both versions of the protocol over HTTP."""
@@ -279,21 +252,6 @@ def test_dashboards_query_influxdb(bridge: Workspace, tmp_path: Path) -> None:
     assert empty == EMPTY
 
 
-def test_dashboards_query_victoria_metrics(bridge: Workspace, tmp_path: Path) -> None:
-    with a_victoria_metrics(tmp_path) as database:
-        publish(publishing(bridge, database.url))
-
-        boards = {name: queries("prometheus", name) for name in ("overview", "hanger", "sensors")}
-        empty = {
-            panel
-            for board in boards.values()
-            for panel, query in board.items()
-            if not database.promql(query)
-        }
-    # The page for Prometheus alone knows the streams.
-    assert empty == {*EMPTY, "Since the last sample A", "Lost of the last day A"}
-
-
 # ---------------------------------------------------------------- a server of our own
 
 
@@ -320,49 +278,6 @@ def server() -> Server:
 def workspace(bridge: Workspace, server: Server) -> Iterator[Workspace]:
     with a_listener(server) as listener:
         yield publishing(bridge, listener.url.removesuffix("/alerts"))
-
-
-@pytest.mark.parametrize("answer", [Answer(503, b"<html>"), Answer(302), Answer(cut=True)])
-def test_publish_after_failure(workspace: Workspace, server: Server, answer: Answer) -> None:
-    server.answer, server.takes = answer, False
-    publish(workspace)
-    n_points = waiting(workspace)
-    assert n_points > 100
-    assert f"{n_points} points wait" in status(workspace)
-
-    server.answer, server.takes = Answer(204), True
-    publish(workspace)
-    assert waiting(workspace) == 0
-    assert len(server.taken) >= n_points
-    assert set(server.taken.values()) == {1}
-
-
-@pytest.mark.parametrize(
-    ("kind", "header"),
-    [
-        ('database = "shm"', "Basic YW5uOnNlY3JldA=="),
-        ('organisation = "city"\nbucket = "shm"', "Token ann:secret"),
-    ],
-)
-def test_publish_sends_token(
-    bridge: Workspace, monkeypatch: pytest.MonkeyPatch, kind: str, header: str
-) -> None:
-    monkeypatch.setenv("INFLUX_TOKEN", "ann:secret")
-    with a_listener(lambda _: Answer(204)) as listener:
-        url = listener.url.removesuffix("/alerts")
-        publish(publishing(bridge, url, f'{kind}\ntoken_env = "INFLUX_TOKEN"'))
-    assert {told.headers["Authorization"] for told in listener.told} == {header}
-
-
-def test_doctor_warns_of_readable_token(bridge: Workspace) -> None:
-    token = bridge.folder / "influx.token"
-    token.write_text("secret")
-    token.chmod(0o644)
-    workspace = publishing(
-        bridge, "http://localhost:1", 'database = "a"\ntoken_file = "influx.token"'
-    )
-    found = examine(workspace.folder, utc_now())
-    assert "others can read influx.token" in [each.found for each in found]
 
 
 def test_publish_again_same_lines(workspace: Workspace, server: Server) -> None:
@@ -402,43 +317,3 @@ def test_publish_state_when_it_changes(workspace: Workspace, server: Server) -> 
         store.alerts.acknowledge(alert.id, "ann", "seen", utc_now())
     publish(workspace)
     assert len(states()) == 2
-
-
-def test_outbox_forgets_old_hours(workspace: Workspace, server: Server) -> None:
-    def hours(series: str) -> int:
-        with closing(sqlite3.connect(workspace.folder / "points.db")) as connection:
-            query = "SELECT count(*) FROM points WHERE key LIKE ?"
-            return int(connection.execute(query, (f"{series}%stream=h3 %",)).fetchone()[0])
-
-    with workspace.store() as store:
-        for day in range(1, 41):
-            store.streams.save_pooled(a_reading(24.0 * day), b"state")
-    publish(workspace)
-    assert sum(line.startswith("shm_hour") for line in server.taken) == 41
-    publish(workspace)
-    assert (hours("shm_hour"), hours("shm_mode")) == (15, 30)
-
-    with workspace.store() as store:
-        store.streams.save_pooled(a_reading(24.0 * 41), b"state")
-    publish(workspace)
-    assert sum(line.startswith("shm_hour") for line in server.taken) == 42
-    assert set(server.taken.values()) == {1}
-
-
-def test_running_daemon_goes_on(workspace: Workspace, server: Server) -> None:
-    server.answer, server.takes = Answer(500), False
-    with results_published(workspace, utc_now, pace=Pace(look_s=0.05, retry_s=0.05)):
-        until(lambda: waiting(workspace) > 100)
-        server.answer, server.takes = Answer(204), True
-        until(lambda: waiting(workspace) == 0)
-    assert set(server.taken.values()) == {1}
-
-
-def test_publisher_takes_description_over(bridge: Workspace, server: Server) -> None:
-    publisher = Publisher(bridge, utc_now)
-    publisher.turn()
-    with a_listener(server) as listener:
-        publisher.use(publishing(bridge, listener.url.removesuffix("/alerts")))
-        publisher.turn()
-    publisher.close()
-    assert server.taken

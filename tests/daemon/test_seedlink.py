@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import random
 import shutil
-import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -17,10 +14,9 @@ import pytest
 from pymseed import MS3Record, nslc2sourceid
 
 import shm_daemon
-from shm.errors import UsageError
 from shm.store import Workspace
-from shm.store.queries.streams import list_stream_events
 from shm.store.ring import Ring
+from shm.store.streams import list_stream_events
 from shm.values import FloatArray
 from shm_daemon.heartbeat import HEARTBEAT
 from shm_daemon.seedlink import Pace, streams_asked
@@ -190,15 +186,6 @@ def test_server_down_is_said_and_waited_for(bridge: Workspace) -> None:
             until(lambda: n_stored(workspace) >= full(counts, START + timedelta(seconds=112)), 30.0)
 
 
-def test_server_without_station_is_said(bridge: Workspace) -> None:
-    with a_seedlink_server([]) as server:
-        server.stations = ()
-        workspace = asking(bridge, server.port)
-        with asked(workspace):
-            until(lambda: events(workspace), 30.0)
-    assert "No stations accepted" in events(workspace)[0][1]
-
-
 def test_dead_channel_is_nan(bridge: Workspace) -> None:
     counts = samples(250)
     with a_seedlink_server(records_of(counts[0])) as server:
@@ -209,50 +196,6 @@ def test_dead_channel_is_nan(bridge: Workspace) -> None:
     found = stored(workspace)[:, :n_full]
     np.testing.assert_allclose(found[0], counts[0, :n_full] * COUNT, rtol=1e-6)
     assert np.isnan(found[1]).all()
-
-
-@pytest.mark.parametrize("jump", [timedelta(hours=5, minutes=1), timedelta(days=27_000)])
-def test_clock_that_jumps(bridge: Workspace, jump: timedelta) -> None:
-    counts = samples(250)
-    wrong = samples(130, seed=2)
-    records = interleaved(counts)
-    ahead = [
-        record
-        for pair in zip(
-            *(records_of(row, START + jump, code) for row, code in zip(wrong, CODES, strict=True)),
-            strict=True,
-        )
-        for record in pair
-    ]
-    half = len(records) // 4 * 2
-    with a_seedlink_server([*records[:half], *ahead, *records[half:]]) as server:
-        workspace = asking(bridge, server.port)
-        n_full = full(counts, END_OF_FULL)
-        with asked(workspace):
-            until(lambda: n_stored(workspace) >= n_full, 30.0)
-    found, true = stored(workspace)[:, :n_full], counts[:, :n_full] * COUNT
-    there = np.isfinite(found)
-    np.testing.assert_allclose(found[there], true[there], rtol=1e-6)
-    # Where the clock jumps one channel may be a record ahead: of the other's as much is lost.
-    assert np.count_nonzero(~there) < 2 * RATE
-    is_refused = any("which is to come" in detail for _, detail in events(workspace))
-    assert is_refused == (jump > timedelta(days=1))
-
-
-def test_late_record_does_no_harm(bridge: Workspace) -> None:
-    counts = samples(250)
-    records = records_of(counts[0])
-    late = records_of(counts[1], code="HN2")[:1]
-    with a_seedlink_server([*records, *late]) as server:
-        workspace = asking(bridge, server.port)
-        pace = Pace(retry_s=0.05, patience_s=60.0)
-        with asked(workspace, pace):
-            until(lambda: len(records) + 1 in server.sent, 30.0)
-            server.add(*records_of(samples(130)[0], START + timedelta(seconds=250)))
-            n_full = full(samples(400), START + timedelta(seconds=292))
-            until(lambda: n_stored(workspace) >= n_full, 30.0)
-    found = stored(workspace)[0, : counts.shape[1]]
-    np.testing.assert_allclose(found, counts[0] * COUNT, rtol=1e-6)
 
 
 def test_gap_of_server_is_a_gap(bridge: Workspace) -> None:
@@ -268,40 +211,6 @@ def test_gap_of_server_is_a_gap(bridge: Workspace) -> None:
 def _pieces(workspace: Workspace) -> Sequence[object]:
     ring = Ring(workspace.folder / "ring")
     return ring.read("h3", START - timedelta(hours=1), NOW + timedelta(hours=1))
-
-
-def test_garbage_is_said(bridge: Workspace) -> None:
-    random.seed(1)
-    with a_seedlink_server([random.randbytes(512)] * 3) as server:
-        workspace = asking(bridge, server.port)
-        with asked(workspace):
-            until(lambda: events(workspace), 30.0)
-    assert "miniSEED" in events(workspace)[0][1]
-
-
-def test_other_rate_is_refused(bridge: Workspace) -> None:
-    counts = samples(250)
-    with a_seedlink_server(interleaved(counts)) as server:
-        workspace = asking(bridge, server.port)
-        path = workspace.folder / "bridge.toml"
-        path.write_text(
-            path.read_text().replace("sampling_rate_hz = 100", "sampling_rate_hz = 200")
-        )
-        with asked(workspace.reopened()):
-            until(lambda: events(workspace), 30.0)
-    assert "has 100 Hz where bridge.toml says 200" in events(workspace)[0][1]
-
-
-def test_damaged_state_is_made_anew(bridge: Workspace) -> None:
-    counts = samples(130)
-    with a_seedlink_server(interleaved(counts)) as server:
-        workspace = asking(bridge, server.port)
-        (workspace.folder / "seedlink").mkdir()
-        state = workspace.folder / "seedlink" / "h3.json"
-        state.write_text('{"last": 3')
-        with asked(workspace):
-            until(lambda: n_stored(workspace) > 0, 30.0)
-        assert set(json.loads(state.read_text())["last"]) == {"XX_HGR3"}
 
 
 def test_daemon_takes_stream_over(bridge: Workspace) -> None:
@@ -320,10 +229,3 @@ def test_daemon_takes_stream_over(bridge: Workspace) -> None:
         shm_daemon.run(bridge, clock=clock, wakeup=wakeup, make_executor=threads)
         thread.join()
     assert n_stored(bridge) > 0
-
-
-def test_missing_extra_is_said(bridge: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    workspace = asking(bridge, 18000)
-    monkeypatch.setitem(sys.modules, "seedlink_client", None)
-    with pytest.raises(UsageError, match="seedlink"), asked(workspace):
-        pass

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from shm.store import Stage, Store, Workspace
-from shm.store.queries.recordings import count_stages
+from shm.store.recordings import count_stages
 from shm_daemon import Wakeup, run
 from tests.helpers import quick_update
 from tests.helpers.flows import threads

@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from shm.errors import UsageError
 from shm.resources import unit_file
 from shm.store import Workspace
 from shm_cli.main import cli
@@ -78,13 +77,6 @@ def test_what_confines_the_daemon_confines_all() -> None:
     assert all(confining <= other for other in others)
 
 
-def test_a_path_that_would_have_to_be_quoted_is_refused(tmp_path: Path) -> None:
-    odd = tmp_path / "my bridge\nExecStartPre=rm"
-    odd.mkdir()
-    with pytest.raises(UsageError, match="quoted"):
-        unit_text("shm.service", odd, Path("/opt/shm"), [])
-
-
 @pytest.fixture
 def systemd(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
     """Where systemd would listen."""
@@ -127,25 +119,6 @@ def test_the_daemon_says_that_it_is_ready_lives_and_ends(
         wakeup.stop()
         thread.join(120)
     assert "STOPPING=1" in hear_until(systemd, "STOPPING=1")
-
-
-def test_standing_by_counts_as_being_ready(tmp_path: Path, systemd: socket.socket) -> None:
-    workspace = make_workspace(tmp_path / "bridge")
-    wakeup = Wakeup()
-    with workspace.lock():
-        thread = threading.Thread(
-            target=run,
-            args=(workspace,),
-            kwargs={"wakeup": wakeup, "make_executor": threads, "standby": True},
-        )
-        thread.start()
-        try:
-            said = hear_until(systemd, "READY=1")
-            assert "WATCHDOG=1" in said
-            assert any(line.startswith("STATUS=standing by") for line in said)
-        finally:
-            wakeup.stop()
-            thread.join(120)
 
 
 def test_a_daemon_that_fails_says_that_it_ends(

@@ -20,8 +20,7 @@ pytest.importorskip("authlib", reason="single sign-on is untested: pip install '
 from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm.store.rows import Role
-from shm_daemon.doctor import examine
-from shm_daemon.doctor_checks import Level
+from shm_daemon.doctor import Level, examine
 from shm_daemon.web.access import COOKIE
 from shm_daemon.web.address import Address
 from shm_daemon.web.pages import signing_in
@@ -184,15 +183,6 @@ def test_a_sign_in_is_of_use_once_in_its_own_browser_and_soon(
     assert come(browser, late).status_code == 403
 
 
-def test_who_turns_back_or_brings_a_wrong_code_is_told(scene: Scene, browser: httpx.Client) -> None:
-    state = go(browser, scene)["state"]
-    refused = come(browser, {"state": state, "error": "access_denied"})
-    assert (refused.status_code, "(access_denied)" in refused.text) == (403, True)
-    state = go(browser, scene)["state"]
-    refused = come(browser, {"state": state, "code": "guessed"})
-    assert (refused.status_code, "does not confirm" in refused.text) == (403, True)
-
-
 def test_claims_may_come_beside_the_token_but_of_the_same_person(
     scene: Scene, browser: httpx.Client
 ) -> None:
@@ -244,18 +234,6 @@ def test_password_user_needs_the_password(scene: Scene, browser: httpx.Client) -
     assert come(browser, go(browser, scene)).status_code == 403
 
 
-def test_store_of_older_release_asks(tmp_path: Path) -> None:
-    with openid_providers.running() as provider:
-        workspace = described(tmp_path / "bridge", provider.issuer)
-        with workspace.store() as store:
-            store.people.add("ann@example.org", Role.ENGINEER, PASSWORD, utc_now())
-        warned = found(workspace)
-        with workspace.store() as store:
-            store.people.set_single_sign_on("ann@example.org", utc_now())
-        assert found(workspace)[0] is Level.OK
-    assert warned == (Level.WARNING, "all users have a password: it lets nobody in")
-
-
 def test_a_wrong_secret_is_told_to_the_engineer(scene: Scene, browser: httpx.Client) -> None:
     secret = scene.workspace.folder / "sign_on.secret"
     told = go(browser, scene)
@@ -294,10 +272,3 @@ def found(workspace: Workspace) -> tuple[Level, str]:
     """Return the last finding of the doctor about the provider."""
     of_it = [e for e in examine(workspace.folder, utc_now()) if e.check == "single sign-on"]
     return of_it[-1].level, of_it[-1].found
-
-
-def test_a_bridge_without_it_offers_none(workspace: Workspace) -> None:
-    with served(workspace) as site, site.client(Accept="text/html") as client:
-        assert "/sign-in/provider" not in client.get("/sign-in").text
-        assert client.get("/sign-in/provider").status_code == 403
-    assert not any(e.check == "single sign-on" for e in examine(workspace.folder, utc_now()))

@@ -19,8 +19,8 @@ from shm.errors import StoreError
 from shm.pipeline import utc_now
 from shm.read.chunk_document import chunk_document
 from shm.store import Workspace
-from shm.store.queries.streams import list_stream_events
 from shm.store.ring import Ring
+from shm.store.streams import list_stream_events
 from shm.values import Channel, Recording
 from shm.values.stream import Chunk
 from shm_daemon.mqtt import messages
@@ -294,23 +294,6 @@ def test_a_file_that_cannot_be_used_is_laid_out_with_its_reason(
     assert (bridge.quarantine.folder / name).exists()
     assert samples_of(bridge) == 9000
     assert [kind for kind, _ in events_of(bridge)] == ["refused"]
-
-
-def test_the_newest_file_is_left_while_it_may_be_written(tmp_path: Path) -> None:
-    settings = {"spool_stable_seconds": 0.05}
-    workspace = with_stream(make_workspace(tmp_path / "bridge", settings=settings))
-    folder = workspace.spool / "streams" / "h3"
-    keeper = StreamKeeper(workspace, utc_now)
-    a_file(folder, "0.csv", now() - HOUR)
-    time.sleep(0.02)
-    a_file(folder, "1.csv", now() - HOUR / 2)
-    assert keeper.turn() == 2
-    time.sleep(0.1)
-    assert keeper.turn() == 1
-    assert [path.name for path in folder.iterdir()] == ["1.csv"]
-    time.sleep(1.5)
-    assert keeper.turn() == 0
-    keeper.close()
 
 
 # ---------------------------------------------------------------- the daemon

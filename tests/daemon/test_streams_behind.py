@@ -1,9 +1,9 @@
-"""A ring that is too large, or a watch that is behind, is reported wherever somebody looks."""
+"""A watch that is behind is reported wherever somebody looks."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -18,12 +18,10 @@ from shm.values.stream import PERIOD, Window, WindowReading, period_start
 from shm_cli.main import run
 from shm_daemon.doctor import examine
 from shm_daemon.heartbeat import beat
-from shm_daemon.streams import StreamKeeper
 from tests.helpers.streams import MODES, a_chunk, with_stream
 from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace
 
-HOUR = timedelta(hours=1)
 SMALL_RING_BYTES = 10**6
 Faces = Callable[[Workspace], dict[str, str]]
 
@@ -53,14 +51,6 @@ def faces(capsys: pytest.CaptureFixture[str]) -> Faces:
     return read
 
 
-@pytest.fixture
-def keep(bridge: Workspace) -> Iterator[Callable[[], int]]:
-    """Let the daemon's keeper of the ring seal and sweep once."""
-    keeper = StreamKeeper(bridge, utc_now)
-    yield keeper.turn
-    keeper.close()
-
-
 def send_minutes(workspace: Workspace, start: datetime, minutes: int) -> None:
     """Send a chunk for each minute, as it is recorded."""
     for minute in range(minutes):
@@ -74,30 +64,6 @@ def save_windows(workspace: Workspace, start: datetime, count: int) -> None:
         for at in (start + number * PERIOD for number in range(count)):
             window = Window("h3", 3, at, PERIOD.total_seconds(), "wind", 0.01)
             store.streams.save_window(WindowReading(window, MODES, "tracked"))
-
-
-def hours_ago(hours: float) -> datetime:
-    return period_start(utc_now() - hours * HOUR, HOUR)
-
-
-def test_sweep_keeps_unread_samples(
-    bridge: Workspace, keep: Callable[[], int], faces: Faces
-) -> None:
-    """What is kept for good exceeds the limit; two read and two unread segments are beside it."""
-    start = hours_ago(75)
-    send_minutes(bridge, start, 70)
-    ring = ring_of(bridge)
-    ring.seal(utc_now())
-    ring.keep("h3", start, start + 3 * PERIOD - timedelta(minutes=1), "a heavy transport")
-    save_windows(bridge, start, 5)
-    keep()
-    left = {(each - start) // PERIOD for each in ring.periods("h3", start)}
-    assert {0, 1, 5, 6} <= left
-    found = faces(bridge)
-    for name, text in found.items():
-        assert "more than ring_bytes (0.001 GB)" in text, name
-    assert json.loads(found["health"])["status"] == "degraded"
-    assert "Raise ring_bytes in bridge.toml" in found["doctor"]
 
 
 @pytest.mark.parametrize(("read", "is_sealed"), [(2, True), (2, False), (0, True)])
@@ -119,14 +85,3 @@ def test_faces_name_unread_hours(
     ring_of(bridge).seal(utc_now() + PERIOD)
     with bridge.store() as store:
         assert stream_leads(bridge, store, utc_now()) == ()
-
-
-def test_faces_know_readings_after_restore(bridge: Workspace, faces: Faces) -> None:
-    """A backup leaves the ring out; the readings are there."""
-    start = period_start(utc_now(), PERIOD) - 15 * PERIOD
-    save_windows(bridge, start, 3)
-    found = faces(bridge)
-    last = start + 3 * PERIOD
-    for name, text in found.items():
-        assert "never sent" not in text, name
-        assert f"h3 (last sample {last:%Y-%m-%d %H:%M} UTC)" in text, name

@@ -19,7 +19,7 @@ from shm.documents import dump
 from shm.errors import UsageError
 from shm.modes_document import modes_document
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import count_stages
+from shm.store.recordings import count_stages
 from shm_daemon.web.address import Address
 from shm_daemon.web.serving import web_with_daemon
 from tests.helpers.brokers import a_broker

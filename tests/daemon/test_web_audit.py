@@ -11,8 +11,7 @@ import pytest
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.store import Scope, Workspace
-from shm.store.journal import Actor
-from shm.store.queries.history import list_changes
+from shm.store.journal import Actor, list_changes
 from shm.store.rows import Role
 from shm_cli.main import run
 from tests.daemon.test_web_people import PASSWORD, UPLOAD, sign_in

@@ -9,7 +9,7 @@ import httpx
 import pytest
 
 from shm.store import Workspace
-from shm.store.queries.hangers import find_latest_diagnosis
+from shm.store.watch import find_latest_diagnosis
 from shm_daemon.web.background_work import BackgroundWorker
 from tests.daemon.test_web_baseline import outcome
 from tests.daemon.test_web_people import add_a_user_of_each_role, sign_in

@@ -18,7 +18,7 @@ from shm.report.figures.hanger_trend import FIGURE
 from shm.report.figures.specification import Points
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.store import Workspace
-from shm.store.queries.history import list_changes
+from shm.store.journal import list_changes
 from shm.values.notes import NoteKind
 from shm_daemon.web.address import Address
 from tests.daemon.test_web_people import add_a_user_of_each_role, sign_in

@@ -17,7 +17,7 @@ from fastapi.routing import APIRoute
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Workspace
-from shm.store.queries.history import list_changes
+from shm.store.journal import list_changes
 from shm.store.rows import Role
 from shm.store.tables import users
 from shm_daemon.web.access import engineering, reading, signed_in_person, writing
@@ -139,9 +139,6 @@ def test_a_short_password_and_a_name_twice_are_refused(workspace: Workspace) -> 
         ("an\u200bna", "invisible"),
         ("anna\u2060", "invisible"),
         ("an\tna", "invisible"),
-        ("an\u3164na", "invisible"),
-        ("\u0430nna", "Cyrillic and Latin"),
-        ("Ann\u0391", "Greek and Latin"),
         ("\u00a0 ", "short text"),
     ],
 )

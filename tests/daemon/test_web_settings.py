@@ -10,7 +10,7 @@ import pytest
 
 from shm.pipeline import utc_now
 from shm.store import Workspace
-from shm.store.queries.history import list_changes
+from shm.store.journal import list_changes
 from shm_cli.main import run
 from shm_daemon.doctor import examine
 from tests.daemon.test_web_people import PASSWORD, add_a_user_of_each_role, sign_in

@@ -23,7 +23,7 @@ import pytest
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import list_recordings
+from shm.store.recordings import list_recordings
 from shm.values import Channel
 from shm_daemon.web.address import name_in
 from shm_daemon.web.address import test_json as document_of

@@ -11,7 +11,7 @@ import pytest
 
 from shm.read import sidecar_path
 from shm.store import Stage, Workspace
-from shm.store.queries.history import list_events
+from shm.store.journal import list_events
 from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace, write_test

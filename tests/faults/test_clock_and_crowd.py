@@ -9,13 +9,12 @@ from pathlib import Path
 import pytest
 
 from shm.store import Stage, Workspace
-from shm.store.queries.history import list_steps
-from shm.store.queries.recordings import count_stages
-from shm.store.queries.trends import list_history
-from shm_daemon import run
+from shm.store.journal import list_steps
+from shm.store.posteriors import list_history
+from shm.store.recordings import count_stages
 from shm_daemon.spool import FileStabilityTracker, scan
 from tests.helpers import quick_update
-from tests.helpers.flows import Clock, a_flow, receive_all, threads
+from tests.helpers.flows import Clock, a_flow, receive_all
 from tests.helpers.workspaces import make_workspace, write_test
 
 
@@ -55,16 +54,3 @@ def test_ten_thousand_files_are_seen_at_once_and_come_in_the_order_of_their_age(
     assert len(found) == 10_000
     assert found[0].name == "09999.csv"
     assert tracker.watching
-
-
-def test_a_spool_of_which_the_file_system_tells_nothing_is_scanned(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def silent(*_: object, **__: object) -> None:
-        raise OSError("no such thing on a network mount")
-
-    monkeypatch.setattr("watchdog.observers.api.BaseObserver.schedule", silent)
-    write_test(workspace.spool / "t0.modes.json", workspace)
-    run(workspace, once=True, make_executor=threads)
-    with workspace.store() as store:
-        assert count_stages(store)[Stage.DONE] == 1

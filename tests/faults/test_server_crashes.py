@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from shm.store import Stage, Workspace
-from shm.store.checking import check_archive, check_store
-from shm.store.queries.recordings import count_stages
+from shm.store.backups import check_archive, check_store
+from shm.store.recordings import count_stages
 from tests.helpers.contents import quiet
 from tests.helpers.daemons import quick_daemons, until_serving
 from tests.helpers.feeds import Feed, assert_all_done_once

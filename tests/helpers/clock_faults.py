@@ -11,7 +11,7 @@ import numpy as np
 
 from shm.documents import dump
 from shm.modes_document import modes_document
-from shm.store.queries.recordings import list_holds
+from shm.store.recordings import list_holds
 from shm.values import Hanger, ModalTest
 from tests.helpers.flows import Clock, a_flow, receive_all
 from tests.helpers.workspaces import START, make_workspace, modes_of, put

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shm.store import Store
-from shm.store.copying import TableContent, contents
+from shm.store.backups import TableContent, contents
 
 
 def quiet(_label: str, _fraction: float) -> None:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from shm.store import Stage, Workspace
-from shm.store.queries.history import list_events
-from shm.store.queries.recordings import list_recordings
-from shm.store.queries.trends import list_posteriors
+from shm.store.journal import list_events
+from shm.store.posteriors import list_posteriors
+from shm.store.recordings import list_recordings
 from tests.helpers.workspaces import put, write_test
 
 BAD_EVERY = 4

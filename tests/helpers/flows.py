@@ -11,7 +11,7 @@ from shm.bridge import Hook
 from shm.pipeline import Flow, Notifier
 from shm.settings import Settings
 from shm.store import Store, Workspace
-from shm.store.queries.trends import list_history
+from shm.store.posteriors import list_history
 from shm.values import Alert
 from tests.helpers.workspaces import START
 

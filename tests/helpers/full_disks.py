@@ -23,8 +23,8 @@ from types import SimpleNamespace
 
 from shm.errors import ShmError
 from shm.store import Workspace
-from shm.store.checking import check_archive, check_store
-from shm.store.queries.recordings import list_recordings
+from shm.store.backups import check_archive, check_store
+from shm.store.recordings import list_recordings
 from shm_daemon import Wakeup, loop
 from tests.helpers import quick_update
 from tests.helpers.contents import quiet

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from shm.store import Workspace
-from shm.store.checking import check_archive, check_store
+from shm.store.backups import check_archive, check_store
 from shm.store.tables import metadata
 from shm_daemon import Wakeup, loop
 from tests.helpers.contents import quiet

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from shm.store import Workspace
-from shm.store.queries.recordings import count_stages
+from shm.store.recordings import count_stages
 from tests.helpers.canonical import canonical
 from tests.helpers.daemons import quick_daemons, until_serving
 from tests.helpers.feeds import Feed, assert_all_done_once

@@ -15,9 +15,9 @@ from pathlib import Path
 import sqlalchemy as sa
 
 from shm.store import Stage, Workspace
-from shm.store.checking import check_archive, check_store
+from shm.store.backups import check_archive, check_store
 from shm.store.journal import is_step
-from shm.store.queries.recordings import list_recordings
+from shm.store.recordings import list_recordings
 from shm.store.tables import journal
 from tests.helpers.contents import quiet
 from tests.helpers.flows import ingest

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import count_stages
+from shm.store.recordings import count_stages
 from tests.helpers.clusters import a_cluster
 from tests.helpers.daemons import real_daemon
 from tests.helpers.feeds import Feed

@@ -13,7 +13,7 @@ from pathlib import Path
 from shm.pipeline import steps
 from shm.settings import Settings
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import count_stages
+from shm.store.recordings import count_stages
 from shm_daemon import Wakeup, run
 from shm_daemon.execution import Workers
 from tests.helpers import quick_update

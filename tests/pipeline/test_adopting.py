@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from shm.errors import BadInput, UsageError
 from shm.inference import UpdateOptions
 from shm.models import Model
 from shm.pipeline import adopting, steps
-from shm.pipeline.adopting import AdoptionRequest, GapWatch, adopt, gap_watch
-from shm.pipeline.reporting import hanger_report
-from shm.store import Adoption, Lineage, Store, StoredAdoption, Workspace
-from shm.store.queries.trends import list_history
+from shm.pipeline.adopting import AdoptionRequest, adopt, gap_watch
+from shm.store import Lineage, Store, StoredAdoption, Workspace
+from shm.store.posteriors import list_history
 from shm.values import ModalTest, Posterior, PredictedFrequency
 from tests.helpers import quick_update
 from tests.helpers.diagnoses import MASS, a_diagnosis
 from tests.helpers.flows import Postman, ingest
-from tests.helpers.workspaces import START, put, write_test
+from tests.helpers.workspaces import START, write_test
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 MASS_MODEL = "beam1+point_mass@everywhere"
@@ -118,69 +115,6 @@ def test_dropping_it_restores_class_and_baseline_for_the_next_test(begun: Worksp
         assert gap_watch(store, 3) is None
 
 
-def test_a_test_updated_before_the_adoption_is_watched_against_its_own_class(
-    begun: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    seen: list[tuple[str, str]] = []
-    watch = steps.watch_test
-
-    def note(baseline, tests, current, *others):  # type: ignore[no-untyped-def]
-        if current.tests == ("t2",) and not seen:
-            adopted(begun, "point_mass")
-        seen.append((baseline.posterior.model, current.model))
-        return watch(baseline, tests, current, *others)
-
-    monkeypatch.setattr(steps, "watch_test", note)
-    for day in (1, 2):
-        spool(begun, f"t{day + 1}", day=day)
-        ingest(begun)
-    assert seen == [("beam1", "beam1"), (MASS_MODEL, MASS_MODEL)]
-
-
-def test_the_gap_is_told_before_with_and_since_the_adoption(begun: Workspace) -> None:
-    adopted(begun, "point_mass")
-    with begun.store() as store:
-        watch = gap_watch(store, 3)
-        assert "2.00 % rms before adoption, 0.20 % with it, no test since." in str(watch)
-    spool(begun, "t2", day=1)
-    ingest(begun)
-    with begun.store() as store:
-        watch = gap_watch(store, 3)
-        assert watch is not None
-        assert watch.now_percent == pytest.approx(0.2)
-        assert not watch.has_grown
-        report = hanger_report(begun, store, 3, START)
-        assert report.gap_watch == str(watch)
-        assert report.baseline is not None
-        assert report.baseline.model == report.posterior.model == MASS_MODEL
-
-
-def test_the_gap_that_is_watched_is_that_of_the_class_adopted_last_and_in_force(
-    begun: Workspace,
-) -> None:
-    """Neither the gap of a test before the adoption is told nor that of a test in another class."""
-
-    def watched() -> tuple[str, float]:
-        with begun.store() as store:
-            watch = gap_watch(store, 3)
-        assert watch is not None
-        assert ("no test since" in str(watch)) is math.isnan(watch.now_percent)
-        return watch.adopted.adoption.model, watch.now_percent
-
-    adopted(begun, "point_mass")
-    second = adopted(begun, "bending_stiffness", at=["everywhere"])
-    assert watched() == (STIFFNESS, pytest.approx(math.nan, nan_ok=True))
-    spool(begun, "t2", day=1)
-    ingest(begun)
-    assert watched() == (STIFFNESS, pytest.approx(0.2))
-    with begun.store() as store:
-        store.posteriors.drop_adoption(second.id, "a rod after all", "engineer", START)
-    assert watched() == (MASS_MODEL, pytest.approx(math.nan, nan_ok=True))
-    spool(begun, "t3", day=2)
-    ingest(begun)
-    assert watched() == (MASS_MODEL, pytest.approx(0.2))
-
-
 def test_a_gap_that_opens_again_is_one_alert(
     begun: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -206,15 +140,6 @@ def test_a_gap_that_opens_again_is_one_alert(
     assert str(watch).endswith("1.00 % now, grown: diagnose it again.")
 
 
-def test_where_it_acts_must_be_said_where_no_diagnosis_tells(begun: Workspace) -> None:
-    with pytest.raises(UsageError, match=r"--at, one of deck_end, arch_end, both_ends") as caught:
-        adopted(begun, "effective_length")
-    assert "shm gap diagnose --hanger 3" in caught.value.remedy
-    made = adopted(begun, "effective_length", at=["deck end"])
-    assert made.adoption.model == "beam1+effective_length@deck_end"
-    assert (made.adoption.at, made.adoption.diagnosis_id) == ("deck end", None)
-
-
 def test_the_likeliest_place_and_the_baseline_come_from_the_diagnosis(begun: Workspace) -> None:
     ends = replace(MASS, effect="effective_length", at="arch end", parameters=())
     pair = replace(MASS, effect="sag + effective_length", at="everywhere, transverse + both ends")
@@ -228,21 +153,6 @@ def test_the_likeliest_place_and_the_baseline_come_from_the_diagnosis(begun: Wor
     assert both.adoption.model == "beam2+effective_length@both_ends+sag@everywhere.transverse"
 
 
-def _with_temperature(test: ModalTest, temperature_c: float) -> str:
-    from shm.documents import dump
-    from shm.modes_document import modes_document
-
-    return dump(modes_document([replace(test, temperature_c=temperature_c)]))
-
-
-def test_an_effect_of_the_temperature_needs_tests_with_temperatures(workspace: Workspace) -> None:
-    path = workspace.spool / "t1.modes.json"
-    put(path, _with_temperature(write_test(path, workspace), math.nan))
-    ingest(workspace)
-    with pytest.raises(BadInput, match="no test of hanger 3 has"):
-        adopted(workspace, "temperature_tension")
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("real_sampler")
 def test_adopting_with_the_real_sampler_closes_the_gap(
@@ -254,13 +164,3 @@ def test_adopting_with_the_real_sampler_closes_the_gap(
     made = adopted(begun, "bending_stiffness", at=["everywhere"])
     assert made.adoption.model == STIFFNESS
     assert made.adoption.gap_percent < 0.05
-
-
-def test_an_effect_that_comes_no_nearer_to_the_tests_is_doubtful() -> None:
-    clamp = Adoption(3, MASS_MODEL, "beam1", "point_mass", "everywhere", "", "", 0.3, 0.1)
-    nearer, no_nearer = (
-        str(GapWatch(StoredAdoption(1, replace(clamp, gap_percent=gap), START), math.nan, False))
-        for gap in (0.1, 0.3)
-    )
-    assert "Doubtful" not in nearer
-    assert no_nearer.startswith("Doubtful, the model comes no nearer to the tests: beam1 with")

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from shm.store import Stage, Workspace
-from shm.store.queries.hangers import list_selected_models
-from shm.store.queries.history import list_events
-from shm.store.queries.recordings import count_stages, list_recordings
+from shm.store.journal import list_events
+from shm.store.recordings import count_stages, list_recordings
+from shm.store.watch import list_selected_models
 from tests.helpers.flows import ingest
 from tests.helpers.workspaces import make_workspace, put, write_test
 

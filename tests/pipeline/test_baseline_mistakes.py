@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
@@ -15,14 +14,12 @@ from shm.documents import dump
 from shm.inference import UpdateOptions
 from shm.models import Model
 from shm.modes_document import modes_document
-from shm.pipeline import rebaselining, utc_now
+from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
-from shm.pipeline.rebaselining import Order, rebaseline
 from shm.pipeline.reporting import hanger_report
-from shm.report.hanger_sentences import summary
 from shm.report.hanger_status import Status
 from shm.store import Workspace
-from shm.values import ModalTest, Posterior
+from shm.values import ModalTest
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, ingest
 from tests.helpers.modelled_tests import misnamed
@@ -40,20 +37,6 @@ def spool(workspace: Workspace, number: int, change: Any = None, tension: float 
     test = change(test) if change else test
     put(workspace.spool / f"t{number}.modes.json", dump(modes_document([test])))
     return test
-
-
-def times(factor: float) -> Any:
-    """All frequencies of a test, as by a wrong clock."""
-
-    def changed(test: ModalTest) -> ModalTest:
-        return replace(
-            test,
-            modes=tuple(
-                replace(mode, frequency_hz=factor * mode.frequency_hz) for mode in test.modes
-            ),
-        )
-
-    return changed
 
 
 @pytest.fixture
@@ -102,54 +85,6 @@ def test_a_mistaken_mode_enters_neither_the_posterior_nor_the_watch_and_the_orig
     assert report.now.warnings == line.warnings == ()
     assert report.now.message == line.message
     assert "transverse 2" not in line.message.words
-
-
-def test_a_test_by_a_wrong_clock_is_left_out_and_the_hanger_is_not_quiet(
-    workspace: Workspace, updated_from: list[list[ModalTest]]
-) -> None:
-    for number in range(4):
-        spool(workspace, number, times(1.015) if number == 1 else None)
-    spool(workspace, 9)
-    ingest(workspace)
-
-    assert [test.id for test in updated_from[0]] == ["t0", "t2", "t3"]
-    with workspace.store() as store:
-        report = hanger_report(workspace, store, 3, Clock().now)
-        (line,) = hanger_summaries(workspace, store, utc_now())
-    assert summary(report).startswith("Hanger 3: its baseline is made without test t1.")
-    assert "test t1: all its frequencies" in report.lineage["left_out_of_the_baseline"]
-    assert line.warnings == report.now.warnings
-    assert report.status is line.status is Status.CHECK
-
-
-def test_a_new_baseline_is_checked_as_the_first_one_was(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def quick(
-        tests: Sequence[ModalTest],
-        model: Model,
-        options: UpdateOptions,
-        *_: Any,
-        warm_start: Posterior,
-    ) -> Posterior:
-        return quick_update.update(tests, model, options)
-
-    monkeypatch.setattr(rebaselining, "update", quick)
-    wrong = partial(misnamed, plane="longitudinal", order=3)
-    for number in range(8):
-        spool(workspace, number, wrong if number == 6 else None)
-    ingest(workspace)
-    order = Order(START + timedelta(days=3.5), "a new pin", "engineer")
-    with workspace.store() as store:
-        made = rebaseline(workspace, store, workspace.bridge.hangers[0], order, Clock().now)
-        again = store.watch.baseline(3)
-    check = made.posterior.baseline_check
-    assert check is not None
-    assert [(each.test, each.plane, each.order) for each in check.modes] == [
-        ("t6", "longitudinal", 3)
-    ]
-    assert again is not None
-    assert again.posterior.baseline_check == check
 
 
 def test_a_mode_that_three_tests_have_wrong_is_one_notice_and_an_open_warning(

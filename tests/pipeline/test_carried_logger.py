@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -14,7 +13,7 @@ from shm.pipeline.importing import Answers, keep_profile, look_into
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import list_holds, list_recordings
+from shm.store.recordings import list_holds, list_recordings
 from tests.helpers.flows import ingest
 from tests.helpers.workspaces import START, make_workspace
 
@@ -61,29 +60,3 @@ def test_modes_of_another_hanger_are_held_and_the_profile_is_named(workspace: Wo
     assert "fit hanger 4 rather than hanger 3" in doubt.state
     (profile,) = (workspace.folder / "loggers").iterdir()
     assert f"loggers/{profile.name} books all files of its logger to hanger 3" in doubt.why
-
-
-@pytest.mark.slow
-def test_a_profile_that_asks_each_time_books_no_file_by_itself(workspace: Workspace) -> None:
-    imported(workspace, record(workspace.folder / "first.csv", workspace, 3), each_time=True)
-    (profile,) = (workspace.folder / "loggers").iterdir()
-    kept = tomllib.loads(profile.read_text())
-    assert kept["roams"] is True
-    assert "hanger" not in kept
-    record(workspace.spool / "second.csv", workspace, 3)
-    record(workspace.spool / "hanger_04_third.csv", workspace, 4)
-    ingest(workspace)
-    with workspace.store() as store:
-        named, silent = sorted(list_recordings(store), key=lambda each: each.file.file_name)
-    assert (named.hanger, named.stage) == (4, Stage.DONE)
-    assert silent.stage is Stage.REFUSED
-    assert silent.reason is not None
-    assert "hanger" in f"{silent.reason['message']} {silent.reason['remedy']}"
-
-
-def test_who_writes_roams_into_a_profile_is_asked_from_then_on(workspace: Workspace) -> None:
-    imported(workspace, record(workspace.folder / "first.csv", workspace, 3))
-    (profile,) = (workspace.folder / "loggers").iterdir()
-    profile.write_text(f"roams = true\n{profile.read_text()}")
-    later = look_into(record(workspace.folder / "b.csv", workspace, 4), workspace, Answers())
-    assert [question.about for question in later.questions] == ["hanger"]

@@ -8,21 +8,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from shm.bridge import load_bridge
 from shm.documents import dump
 from shm.errors import BadInput
 from shm.modes_document import modes_document
-from shm.pipeline.controls import campaign_warnings, control_charts
+from shm.pipeline.controls import control_charts
 from shm.store import Workspace
-from shm.store.queries.hangers import find_latest_watches
-from shm.store.queries.trends import find_latest_trends, list_trend
-from shm.values import MonitoredHanger
+from shm.store.posteriors import list_trend
+from shm.store.watch import find_latest_watches
 from shm_cli.main import run
 from tests.helpers.taken_in import ingest_quickly
-from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace, modelled_test, put, write_test
 
 CONTROL = 90
@@ -96,17 +93,6 @@ def test_control_never_watched(workspace: Workspace) -> None:
     assert any(DOUBT in alert.message.partition(" Details: ")[0] for alert in alerts)
 
 
-def test_campaign_warnings_spare_sensors(workspace: Workspace) -> None:
-    hanger = workspace.bridge.hanger(3)
-    with workspace.store() as store:
-        charts = control_charts(workspace, store)
-        latest, _ = find_latest_trends(store, workspace.bridge.hangers).values()
-
-    assert len(campaign_warnings(charts, hanger, latest.time, 1.0)) == 1
-    assert not campaign_warnings(charts, hanger, latest.time, 0.1)
-    assert not campaign_warnings(charts, MonitoredHanger.of(hanger), latest.time, 1.0)
-
-
 def test_control_report_has_chart(
     workspace: Workspace, shown: Callable[..., dict[str, Any]], tmp_path: Path
 ) -> None:
@@ -120,19 +106,6 @@ def test_control_report_has_chart(
         assert run([*at, "report", *of, "--out", str(page)]) == 0
         assert "out of its limits" in page.read_text()
         assert 'id="control-title"' in page.read_text()
-
-
-def test_control_page_has_chart(workspace: Workspace) -> None:
-    with served(workspace) as site, site.client() as client:
-        assert isinstance(client, httpx.Client)
-        home, page = client.get("/").text, client.get(f"/hangers/{CONTROL}").text
-        assert f'href="/hangers/{CONTROL}"' in home
-        assert DOUBT in home
-        assert "out of its limits" in page
-        assert f"/api/hangers/{CONTROL}/figures/control" in page
-        figure = client.get(f"/api/hangers/{CONTROL}/figures/control")
-        assert figure.status_code == 200
-        assert client.get("/api/hangers/3/figures/control").status_code == 404
 
 
 def test_control_reading_is_the_known(tmp_path: Path) -> None:

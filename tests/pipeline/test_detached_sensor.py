@@ -15,8 +15,8 @@ from shm.pipeline.streaming import Streaming
 from shm.read.chunk_document import chunk_document
 from shm.simulate.ambient import streamed
 from shm.store import Store, Workspace
-from shm.store.queries.streams import find_last_window, list_stream_events, list_windows
 from shm.store.ring import ring_of
+from shm.store.streams import find_last_window, list_stream_events, list_windows
 from shm.values import PLANES, FloatArray, Mode, Plane
 from shm.values.stream import StreamEvent, WindowReading
 from tests.helpers.flows import Clock
@@ -127,25 +127,3 @@ def test_detached_stream_is_reported(both: Followed) -> None:
     assert OFF + HOUR <= first <= OFF + 9 * WINDOW
     assert {each.channel for each in lost(both)} == {""}
     assert both.while_off.state == "sees nothing"
-
-
-@pytest.mark.parametrize("name", ["transverse", "both"])
-@pytest.mark.parametrize("plane", PLANES)
-def test_read_window_keeps_numbers(name: str, plane: Plane, request: pytest.FixtureRequest) -> None:
-    """Afterwards each mode has the order and, to a thousandth, the frequency of before."""
-    found: Followed = request.getfixturevalue(name)
-    before: dict[int, list[float]] = {}
-    for mode in found.modes(plane, after=False):
-        before.setdefault(mode.order, []).append(mode.frequency_hz)
-    usual = {order: float(np.median(hz)) for order, hz in before.items()}
-    after = found.modes(plane, after=True)
-    assert {mode.order for mode in after} >= set(usual)
-    for mode in after:
-        assert mode.frequency_hz == pytest.approx(usual[mode.order], rel=1e-3)
-
-
-@pytest.mark.parametrize("name", ["transverse", "both"])
-def test_sound_hours_report_nothing(name: str, request: pytest.FixtureRequest) -> None:
-    found: Followed = request.getfixturevalue(name)
-    others = [each for each in found.events if each.kind != "late"]
-    assert not [each for each in others if each.start < OFF or each.start > BACK]

@@ -13,7 +13,6 @@ from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from datetime import timedelta
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +25,11 @@ from shm.modes_document import modes_document
 from shm.pipeline import Flow, steps
 from shm.read import Limits
 from shm.store import DeliveryState, Stage, Workspace
-from shm.store.archive import Quarantine
-from shm.store.queries.hangers import find_latest_watches
-from shm.store.queries.recordings import list_recordings
-from shm.store.queries.trends import list_history
-from shm.store.stored_tests import Tests
-from shm.values import AddedMass, ModalTest, Posterior
+from shm.store.posteriors import list_history
+from shm.store.recordings import list_recordings
+from shm.store.tests import Tests
+from shm.store.watch import find_latest_watches
+from shm.values import ModalTest, Posterior
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all, tension_kn
 from tests.helpers.taken_in import copied
@@ -73,29 +71,6 @@ def test_files_go_from_the_spool_through_all_stages(workspace: Workspace) -> Non
         assert drift.shift_sd > 0
         assert store.alerts.list_all() == ()
         assert store.watch.baseline(3) is not None
-
-
-def test_the_baseline_waits_for_a_file_that_is_slow_to_identify(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    load, others = steps.load_modes, threading.Semaphore(0)
-
-    def load_the_earliest_last(path: Path, limits: Limits) -> tuple[ModalTest, ...]:
-        if path.name.startswith("earliest"):
-            assert others.acquire(timeout=20)
-            time.sleep(0.1)
-        else:
-            others.release()
-        return load(path, limits)
-
-    monkeypatch.setattr(steps, "load_modes", load_the_earliest_last)
-    spool(workspace, "earliest", day=0)
-    spool(workspace, "later", day=1)
-    ingest(workspace, lanes=3)
-    with workspace.store() as store:
-        baseline = store.watch.baseline(3)
-        assert baseline is not None
-        assert baseline.posterior.tests == ("earliest",)
 
 
 def test_tests_are_watched_in_the_order_of_their_times(
@@ -351,18 +326,6 @@ class Killed(ThreadPoolExecutor):
         return fn()
 
 
-def test_healthy_files_whose_workers_are_killed_by_turns_are_done(workspace: Workspace) -> None:
-    """As 18 of 20 were refused, when an operator or the kernel killed each worker twice."""
-    names = [f"t{number}." for number in range(6)]
-    for day, name in enumerate(names):
-        spool(workspace, name.rstrip("."), day=day)
-    clock = Clock()
-    with Killed(5, names) as pool, a_flow(workspace, executor=pool, clock=clock) as flow:
-        receive_all(flow)
-        drain_patiently(flow, clock, most=1000)
-    assert set(stages(workspace).values()) == {Stage.DONE}
-
-
 def test_deaths_and_pauses_outlast_the_daemon(workspace: Workspace) -> None:
     """Each daemon lives for one kill; one that begins within the pause waits for its end."""
     spool(workspace, "bad")
@@ -380,45 +343,6 @@ def test_deaths_and_pauses_outlast_the_daemon(workspace: Workspace) -> None:
         clock.pass_by((pauses[-1] or 0.0) / 2)
     assert set(stages(workspace).values()) == {Stage.REFUSED}
     assert pauses == [2.0, 8.0, 32.0, 128.0, 512.0, None]
-
-
-def test_a_file_that_needs_more_memory_than_there_is_is_refused_and_says_so(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def grow(path: Path, limits: Limits) -> tuple[ModalTest, ...]:
-        raise MemoryError
-
-    monkeypatch.setattr(steps, "load_modes", grow)
-    spool(workspace, "t1")
-    clock = Clock()
-    with a_flow(workspace, clock=clock) as flow:
-        receive_all(flow)
-        assert sum(drain_patiently(flow, clock)) < 60
-        (refused,) = list_recordings(flow.store, Stage.REFUSED)
-    assert refused.reason is not None
-    assert "needs more memory than one step is given" in refused.reason["message"]
-
-
-def test_of_several_files_at_once_none_is_refused_for_a_death(tmp_path: Path) -> None:
-    workspace = make_workspace(tmp_path / "bridge", settings={"baseline_tests": 2})
-    for day in (1, 2):
-        spool(workspace, f"t{day}", day=day)
-
-    class Selecting(ThreadPoolExecutor):
-        def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Any:
-            if fn.args[0] is steps.select_model:
-                fn = partial(self._die)
-            return super().submit(fn, *args, **kwargs)
-
-        def _die(self) -> None:
-            raise BrokenProcessPool("a worker died")
-
-    clock = Clock()
-    with Selecting(1) as pool, a_flow(workspace, executor=pool, clock=clock) as flow:
-        receive_all(flow)
-        pauses = drain_patiently(flow, clock, most=8)
-    assert set(stages(workspace).values()) == {Stage.IDENTIFIED}
-    assert pauses[-1] > 3600
 
 
 def test_a_result_is_not_lost_while_the_store_is_busy(
@@ -454,7 +378,7 @@ def test_a_result_is_not_lost_while_the_store_is_busy(
     [
         ("shm.pipeline.work.judge", KeyError("tension")),
         ("shm.pipeline.work.reconciled", ValueError("The truth value of an array is ambiguous")),
-        ("shm.store.stored_posteriors.Posteriors.save", TypeError("not a number")),
+        ("shm.store.posteriors.Posteriors.save", TypeError("not a number")),
     ],
 )
 def test_advance_storing_raises(
@@ -479,91 +403,6 @@ def test_advance_storing_raises(
     assert repr(error) in reason["message"]
 
 
-@pytest.mark.parametrize(
-    ("table", "stage"), [("posteriors", Stage.RECEIVED), ("alerts", Stage.UPDATED)]
-)
-def test_advance_reads_no_json(tmp_path: Path, table: str, stage: Stage) -> None:
-    """A document that cannot be read stops its hanger, before or after a step, and no other."""
-    workspace = make_workspace(tmp_path / "bridge", hangers=(3, 4))
-    write_loss(workspace.spool, workspace)
-    ingest(workspace)
-    with a_flow(workspace, clock=(clock := Clock())) as flow:
-        with sqlite3.connect(workspace.database) as connection:
-            connection.execute(f"UPDATE {table} SET document = '{{'")
-        connection.close()
-        spool(workspace, "later", day=90)
-        receive_all(flow)
-        flow.drain()
-        write_test(workspace.spool / "other.modes.json", workspace, hanger=4)
-        receive_all(flow)
-        flow.drain()
-        clock.pass_by(61)
-        flow.drain()
-        found = stages(workspace)
-        assert (found["later.modes.json"], found["other.modes.json"]) == (stage, Stage.DONE)
-    assert list(workspace.quarantine.folder.iterdir()) == []
-
-
-def test_advance_refusing_raises(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file that can neither be stored nor refused keeps no other file from being done."""
-
-    def fail(*_: Any, **__: Any) -> None:
-        raise KeyError("tension")
-
-    spool(workspace, "t1", day=1)
-    ingest(workspace)
-    monkeypatch.setattr(steps, "load_modes", fail)
-    monkeypatch.setattr(Quarantine, "put", fail)
-    spool(workspace, "t2", day=2)
-    with a_flow(workspace, clock=(clock := Clock())) as flow:
-        receive_all(flow)
-        flow.drain()
-        monkeypatch.undo()
-        quick_update.stand_in(monkeypatch.setattr)
-        spool(workspace, "t3", day=3)
-        receive_all(flow)
-        flow.drain()
-        assert list(stages(workspace).values()) == [Stage.DONE, Stage.RECEIVED, Stage.DONE]
-        clock.pass_by(61)
-        flow.drain()
-    assert set(stages(workspace).values()) == {Stage.DONE}
-
-
-def test_advance_delivering_raises(untold: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An alert that no message can be made of keeps no file from being done."""
-
-    def fail(*_: Any) -> None:
-        raise ValueError("no message")
-
-    monkeypatch.setattr("shm.pipeline.courier.plan", fail)
-    spool(untold, "late", day=90)
-    with a_flow(untold, notifier=Postman()) as flow:
-        receive_all(flow)
-        for _ in range(50):
-            with pytest.raises(ValueError, match="no message"):
-                flow.advance()
-            if stages(untold)["late.modes.json"] is Stage.DONE:
-                return
-            time.sleep(0.1)
-    pytest.fail("the file still waits")
-
-
-def test_a_test_with_a_mass_beyond_the_hanger_is_refused_with_its_file(
-    workspace: Workspace,
-) -> None:
-    test = write_test(workspace.spool / "x.modes.json", workspace)
-    heavy = replace(test, id="heavy", added_mass=AddedMass(25.0, 13.6))
-    put(workspace.spool / "x.modes.json", dump(modes_document([test, heavy])))
-    spool(workspace, "good")
-    ingest(workspace)
-    assert stages(workspace) == {"good.modes.json": Stage.DONE, "x.modes.json": Stage.REFUSED}
-    with workspace.store() as store:
-        assert [test.test.id for test in store.tests.list_all()] == ["good"]
-        (refused,) = list_recordings(store, Stage.REFUSED)
-        assert refused.reason is not None
-        assert "heavy" in refused.reason["message"]
-
-
 def test_a_refused_test_does_not_stop_the_others_of_its_file(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -586,25 +425,6 @@ def test_a_refused_test_does_not_stop_the_others_of_its_file(
     with workspace.store() as store:
         assert list(tension_kn(store)) == ["first", "third"]
         assert [drift.test for drift in store.watch.list_drifts(3)] == ["third"]
-
-
-def test_tests_of_a_hanger_taken_out_of_the_description_wait(tmp_path: Path) -> None:
-    workspace = make_workspace(tmp_path / "bridge", hangers=(3, 4), settings={"baseline_tests": 2})
-    spool(workspace, "t1", hanger=4)
-    ingest(workspace)
-    without = replace(workspace.bridge, hangers=workspace.bridge.hangers[:1])
-    ingest(replace(workspace, bridge=without))
-    assert set(stages(workspace).values()) == {Stage.IDENTIFIED}
-
-
-def test_a_file_gone_from_the_archive_is_refused_all_the_same(workspace: Workspace) -> None:
-    spool(workspace, "t1")
-    with a_flow(workspace) as flow:
-        receipt = flow.receive(workspace.spool / "t1.modes.json")
-        assert receipt.recording.file.archived_as is not None
-        (workspace.archive.folder / receipt.recording.file.archived_as).unlink()
-        flow.drain()
-    assert set(stages(workspace).values()) == {Stage.REFUSED}
 
 
 def test_documents_that_cannot_be_read_stop_their_hanger_and_not_the_beginning(

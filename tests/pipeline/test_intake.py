@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from shm.errors import BadInput, ShmError
+from shm.errors import BadInput
 from shm.pipeline import intake
 from shm.pipeline.intake import receive
 from shm.store import Outcome, Receipt, Stage, Workspace
-from shm.store.queries.history import list_events
-from shm.store.queries.recordings import list_recordings
-from shm.store.stored_recordings import Recordings
+from shm.store.journal import list_events
+from shm.store.recordings import Recordings, list_recordings
 from tests.helpers.workspaces import START, put
 
 
@@ -47,15 +46,6 @@ def test_a_sidecar_goes_along(workspace: Workspace) -> None:
     assert files_in(workspace.spool) == []
     with workspace.archive.opened(file) as path:
         assert path.with_name("h3.toml").read_text() == "hanger = 3\n"
-
-
-def test_a_sidecar_that_another_file_needs_too_stays(workspace: Workspace) -> None:
-    for name in ("h3.csv", "h3.uff", "h3.toml"):
-        put(workspace.spool / name, name)
-    take(workspace, "h3.csv")
-    assert sorted(path.name for path in files_in(workspace.spool)) == ["h3.toml", "h3.uff"]
-    assert take(workspace, "h3.uff").recording.file.sidecar_as is not None
-    assert files_in(workspace.spool) == []
 
 
 def test_a_file_in_a_subfolder_keeps_it_in_its_name(workspace: Workspace) -> None:
@@ -131,13 +121,6 @@ def test_a_receipt_cut_short_between_the_two_removals_is_finished(
     assert files_in(workspace.spool) == []
 
 
-def test_a_file_that_vanishes_is_left_for_later(workspace: Workspace) -> None:
-    with pytest.raises((ShmError, FileNotFoundError)):
-        take(workspace, "gone.csv")
-    with workspace.store() as store:
-        assert list_recordings(store) == ()
-
-
 def test_a_file_swapped_for_a_link_after_the_scan_sends_nothing_in(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -148,51 +131,6 @@ def test_a_file_swapped_for_a_link_after_the_scan_sends_nothing_in(
         take(workspace, "h3.csv")
     assert secret.exists()
     assert files_in(workspace.archive.folder) == []
-
-
-def test_a_sidecar_swapped_for_a_link_after_the_look_sends_nothing_in(
-    workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    secret = tmp_path / "secret.toml"
-    secret.write_text("secret = 1\n")
-    put(workspace.spool / "h3.csv", "force,acc_1\n")
-    (workspace.spool / "h3.toml").symlink_to(secret)
-    with monkeypatch.context() as patched:
-        patched.setattr(intake, "_is_plain", lambda sidecar: True)
-        with pytest.raises(BadInput, match=r"h3\.toml: it is a link"):
-            take(workspace, "h3.csv")
-    assert files_in(workspace.archive.folder) == []
-    assert take(workspace, "h3.csv").recording.file.sidecar_as is None
-
-
-def test_a_subfolder_swapped_for_a_link_after_the_scan_sends_nothing_in(
-    workspace: Workspace, tmp_path: Path
-) -> None:
-    (tmp_path / "private").mkdir()
-    put(tmp_path / "private" / "h3.csv", "secret\n")
-    (workspace.spool / "logger").symlink_to(tmp_path / "private")
-    with pytest.raises(BadInput, match="leads out of the spool"):
-        take(workspace, "logger/h3.csv")
-    assert files_in(workspace.archive.folder) == []
-
-
-def test_the_spool_itself_may_be_a_link_to_another_disk(
-    workspace: Workspace, tmp_path: Path
-) -> None:
-    workspace.spool.rmdir()
-    (tmp_path / "disk").mkdir()
-    workspace.spool.symlink_to(tmp_path / "disk")
-    put(workspace.spool / "h3.csv", "force,acc_1\n")
-    assert take(workspace, "h3.csv").recording.file.file_name == "h3.csv"
-    assert files_in(tmp_path / "disk") == []
-
-
-def test_a_link_that_a_person_names_is_followed(workspace: Workspace, tmp_path: Path) -> None:
-    (tmp_path / "mine.csv").write_text("force,acc_1\n")
-    (tmp_path / "link.csv").symlink_to(tmp_path / "mine.csv")
-    with workspace.store() as store:
-        receipt = receive(tmp_path / "link.csv", workspace, store, START)
-    assert receipt.recording.file.file_name == "link.csv"
 
 
 def test_what_came_under_the_same_names_since_it_was_read_stays(

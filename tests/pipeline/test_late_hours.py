@@ -16,8 +16,8 @@ from shm.pipeline.lineage import discarded_of_baselines
 from shm.pipeline.stream_days import hand_on_day
 from shm.pipeline.streaming import Streaming
 from shm.store import Stage, Store, Workspace
-from shm.store.queries.streams import list_pooled, load_stream_watch
-from shm.store.queries.tests import list_baseline_tests
+from shm.store.streams import list_pooled, load_stream_watch
+from shm.store.tests import list_baseline_tests
 from shm.values import Mode
 from shm.values.stream import PooledReading
 from shm.watch.kept_state import from_bytes, to_bytes

@@ -5,7 +5,6 @@ from __future__ import annotations
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report.hanger_status import Status
 from shm.store import StoredAlert, Workspace
-from shm.values import CrossedLimit
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
 from tests.helpers.workspaces import write_test
 
@@ -70,13 +69,3 @@ def test_a_limit_that_is_changed_judges_at_once_and_what_a_person_resolved_stays
     _, two = after(workspace, upper=800e3)
     assert two.resolution is not None
     assert two.resolution.why == "the limit has been changed"
-
-
-def test_heed_limits_slightly_changed(workspace: Workspace) -> None:
-    """A limit that differs in its seventh digit is another limit."""
-    after(workspace, 1.0)
-    after(workspace, upper=650_000.1)
-    first, second = after(workspace, upper=650_000.4)
-    assert first.resolution is not None
-    assert first.resolution.why == "the limit has been changed"
-    assert second.alert.limit == CrossedLimit("above", 650_000.4)

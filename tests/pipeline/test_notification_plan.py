@@ -12,16 +12,13 @@ from pathlib import Path
 import pytest
 
 from shm.bridge import Hook
-from shm.errors import NothingThere, UsageError
-from shm.pipeline import Flow, utc_now
-from shm.pipeline.notification_plan import after_works, quiet_until, works_before
+from shm.errors import UsageError
+from shm.pipeline import Flow
+from shm.pipeline.courier import after_works, quiet_until, works_before
 from shm.store import IdentifiedTest, Lineage, Silence, Store, StoredTest, Workspace
-from shm.store.stored_alerts import silenced_until
 from shm.values import Alert, Selection
-from shm_cli.main import run
 from tests.helpers.flows import Clock, a_flow
 from tests.helpers.nouns import NOW, a_drift, a_file, a_posterior, a_test, a_watched_test
-from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
@@ -154,16 +151,6 @@ def test_fifty_hangers_that_move_alike_are_one_message_that_lists_all(
     assert states(bridge, "mail") == {"delivered"}
 
 
-def test_alike_alerts_that_keep_coming_wait_for_five_windows_at_most(
-    bridge: Workspace, clock: Clock, inbox: Inbox
-) -> None:
-    for hanger in HANGERS[:12]:
-        raise_on(bridge, clock, [hanger])
-        clock.pass_by(30.0)
-        look(bridge, clock, inbox)
-    assert len(inbox.of("mail")[0].alerts) >= 10
-
-
 def test_a_message_keeps_its_alerts_and_key_through_failures_and_lives(
     bridge: Workspace, clock: Clock, inbox: Inbox
 ) -> None:
@@ -254,26 +241,6 @@ def test_in_quiet_hours_what_is_urgent_goes_and_the_rest_goes_grouped_at_their_e
     assert [one.hanger for one in inbox.of("boss")[1].alerts] == [1, 2]
 
 
-def test_lists_status_and_page_say_until_when_a_delivery_waits(
-    bridge: Workspace, capsys: pytest.CaptureFixture[str]
-) -> None:
-    now = utc_now()
-    until = f"{now + timedelta(hours=2):%H:%M}"
-    quiet = _quiet(bridge, f"{now - timedelta(hours=1):%H:%M}-{until}", "UTC")
-    raise_on(quiet, Clock(now), [1])
-    for verb, said in (
-        ("alerts", f"mail: waits until {until} UTC"),
-        ("status", f"mail waits until {until} UTC: 1"),
-    ):
-        assert run(["--workspace", str(quiet.folder), verb]) == 0
-        assert said in " ".join(capsys.readouterr().out.split())
-    with served(quiet) as site, site.client() as client:
-        assert client.get("/alerts").text.count(f"waits until {until} UTC") == 1
-        mail, boss = client.get("/api/alerts").json()["alerts"][0]["deliveries"]
-    assert datetime.fromisoformat(mail["waits_until"]).strftime("%H:%M") == until
-    assert boss["waits_until"] is None
-
-
 # ---------------------------------------------------------------- silences
 
 
@@ -299,33 +266,6 @@ def test_what_is_acknowledged_or_resolved_in_a_silence_is_told_to_nobody(
     live(bridge, clock, inbox, 2 * HOUR, 300.0)
     assert inbox.had == []
     assert states(bridge, "mail") == states(bridge, "boss") == {"not needed"}
-
-
-def test_a_silence_that_is_ended_early_lets_its_messages_go(
-    bridge: Workspace, clock: Clock, inbox: Inbox
-) -> None:
-    made = _silence(bridge, clock, 7, 0.0, 9 * HOUR)
-    raise_on(bridge, clock, [7])
-    clock.pass_by(300.0)
-    with bridge.store() as store:
-        ended = store.silences.end(made.id, "Bob", clock())
-        assert (ended.until, ended.ended_who, ended.who) == (clock(), "Bob", "Ann")
-        assert store.silences.list_all() == (ended,)
-        with pytest.raises(UsageError, match="is over"):
-            store.silences.end(made.id, "Bob", clock())
-        with pytest.raises(NothingThere):
-            store.silences.end(99, "Bob", clock())
-    live(bridge, clock, inbox, 90.0, 30.0)
-    assert len(inbox.of("mail")) == 1
-
-
-def test_silences_one_after_the_other_are_one(bridge: Workspace, clock: Clock) -> None:
-    _silence(bridge, clock, 7, 0.0, 100.0)
-    _silence(bridge, clock, None, 50.0, 300.0)
-    with bridge.store() as store:
-        found = store.silences.list_all()
-    assert silenced_until(found, 7, clock()) == clock() + timedelta(seconds=300)
-    assert silenced_until(found, 8, clock()) is None
 
 
 # ---------------------------------------------------------------- resolutions
@@ -363,14 +303,3 @@ def test_the_first_alert_after_works_says_so_and_how_to_accept(clock: Clock) -> 
     assert works_before(alert, [works], [replace(alert, key="another")]) is None
     before = [replace(alert, key="another", time=period[0])]
     assert works_before(alert, [works], before) == works
-
-
-def test_a_clock_that_was_ahead_delays_no_message(
-    bridge: Workspace, clock: Clock, inbox: Inbox
-) -> None:
-    clock.pass_by(50 * HOUR)
-    raise_on(bridge, clock, [7])
-    clock.pass_by(-50 * HOUR)
-    look(bridge, clock, inbox)
-    live(bridge, clock, inbox, 120.0, 30.0)
-    assert len(inbox.of("mail")) == 1

@@ -9,9 +9,8 @@ import pytest
 from shm.errors import UsageError
 from shm.models import MODELS
 from shm.models.beam import Beam1
-from shm.pipeline.lineage import competing
 from shm.store import Stage, Workspace
-from shm.store.queries.recordings import count_stages
+from shm.store.recordings import count_stages
 from shm.values import Hanger
 from tests.helpers.flows import a_flow, ingest
 from tests.helpers.workspaces import make_workspace, write_test
@@ -69,23 +68,3 @@ def test_a_hanger_without_a_class_is_told_before_any_file_is_touched(tmp_path: P
         a_flow(workspace),
     ):
         pytest.fail("began")
-
-
-def test_a_description_that_the_selected_class_cannot_serve_is_not_taken_over(
-    tmp_path: Path,
-) -> None:
-    workspace = make_workspace(tmp_path / "b", settings={"models": "bare"})
-    write_test(workspace.spool / "t1.modes.json", workspace)
-    ingest(workspace)
-    changed = make_workspace(tmp_path / "other", settings={"models": "bare,beam1"})
-    (workspace.folder / "bridge.toml").write_bytes((changed.folder / "bridge.toml").read_bytes())
-    with a_flow(workspace) as flow, pytest.raises(UsageError, match="class bare does not apply"):
-        flow.use(with_turnbuckle(workspace))
-    assert workspace.bridge.hanger(3).turnbuckles == ()
-
-
-def test_a_hanger_admits_its_own_classes_only(tmp_path: Path) -> None:
-    made = make_workspace(tmp_path / "b", settings={"models": "bare,beam1,beam2"})
-    workspace = with_turnbuckle(made, models='models = ["bare", "beam2"]')
-    models = competing(workspace.bridge.hanger(3), workspace.settings, {})
-    assert [model.name for model in models] == ["beam2"]

@@ -11,7 +11,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report.hanger_status import HangerMessage, Status
 from shm.store import Workspace
-from shm.store.queries.recordings import find_recording
+from shm.store.recordings import find_recording
 from tests.helpers import quick_update
 from tests.helpers.flows import ingest
 from tests.helpers.taken_in import with_a_slow_loss

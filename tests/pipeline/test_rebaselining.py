@@ -8,16 +8,14 @@ from typing import Any
 
 import pytest
 
-from shm.errors import NothingThere
 from shm.inference import UpdateOptions
 from shm.models import Model
 from shm.pipeline import rebaselining
 from shm.pipeline.rebaselining import Order, changes_within, rebaseline
-from shm.store import Baseline, Stage, Workspace
-from shm.store.queries.recordings import count_stages
+from shm.store import Baseline, Workspace
 from shm.values import ModalTest, Posterior
 from tests.helpers import quick_update
-from tests.helpers.flows import Clock, a_flow, ingest, receive_all
+from tests.helpers.flows import ingest
 from tests.helpers.workspaces import START, write_test
 
 AT = START + timedelta(days=50)
@@ -90,25 +88,6 @@ def test_later_tests_are_compared_with_it_and_earlier_figures_stay(
     assert after[: len(before)] == before
     assert next(drift.shift_mean for drift in before if drift.test == "t32") < -0.08
     assert lately[0].shift_mean == pytest.approx(0, abs=0.01)
-
-
-def test_a_test_still_on_its_way_is_a_later_one(history: Workspace, hints: list[Posterior]) -> None:
-    spool(history, 36, 0.9)
-    with a_flow(history, clock=Clock()) as flow:
-        receive_all(flow)
-    with history.store() as store:
-        assert count_stages(store)[Stage.RECEIVED] == 1
-    assert anew(history, 31).posterior.tests == ("t31", "t32")
-
-
-@pytest.mark.parametrize("day", [32.5, 40])
-def test_without_a_test_as_young_as_that_nothing_is_done(
-    history: Workspace, hints: list[Posterior], day: float
-) -> None:
-    with pytest.raises(NothingThere, match="its latest is of 2026-06-02") as caught:
-        anew(history, day)
-    assert "--since" in caught.value.remedy
-    assert hints == []
 
 
 def test_a_baseline_over_a_called_change_is_known_as_such(

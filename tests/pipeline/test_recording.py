@@ -15,8 +15,8 @@ import pytest
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage
-from shm.store.queries.recordings import list_recordings
-from shm.store.queries.tests import load_frequency_response
+from shm.store.recordings import list_recordings
+from shm.store.tests import load_frequency_response
 from tests.helpers.flows import ingest
 from tests.helpers.slow import few_of
 from tests.helpers.workspaces import START, make_workspace

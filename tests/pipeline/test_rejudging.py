@@ -8,10 +8,9 @@ import pytest
 
 from shm.pipeline.watching import differences
 from shm.store import Stage, StoredAlert, Workspace
-from shm.store.queries.hangers import find_latest_watches
-from shm.store.queries.history import list_changes
-from shm.store.queries.recordings import count_stages
-from shm.store.queries.tests import list_waiting_tests
+from shm.store.recordings import count_stages
+from shm.store.tests import list_waiting_tests
+from shm.store.watch import find_latest_watches
 from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all
 from tests.helpers.workspaces import make_workspace, write_loss, write_slow_loss, write_test
 
@@ -58,36 +57,6 @@ def test_a_lower_threshold_raises_at_once_and_put_back_closes_it(
     again = changed(workspace, KEY, 0.05)
     standing = [each for each in again if not each.resolution and each.id not in before]
     assert len(standing) == 1
-
-
-@pytest.mark.slow
-def test_of_a_loss_that_is_not_beyond_any_more_the_change_is_left(workspace: Workspace) -> None:
-    write_slow_loss(workspace.spool, workspace)
-    ingest(workspace)
-    first, left = changed(workspace, KEY, 0.3)
-    assert first.resolution is not None
-    assert left.resolution is None
-    assert left.alert.kinds == ("slow drift",)
-    assert "threshold" not in left.alert.message.partition("Details")[0]
-    for value, kinds in ((0.05, ("beyond threshold", "slow drift")), (0.3, ("slow drift",))):
-        (one,) = (each for each in changed(workspace, KEY, value) if not each.resolution)
-        assert one.alert.kinds == kinds
-
-
-@pytest.mark.slow
-def test_an_alert_that_the_new_threshold_calls_too_is_raised_once(workspace: Workspace) -> None:
-    write_slow_loss(workspace.spool, workspace)
-    ingest(workspace)
-    for value in (0.04, 0.06, 0.03):
-        (one,) = changed(workspace, KEY, value)
-        assert one.resolution is None
-    (one,) = changed(workspace, "settings.false_call_years", 90.0)
-    with a_flow(workspace.reopened()) as flow:
-        (judged,) = find_latest_watches(flow.store).values()
-        assert judged.watched.change.limit_years == 90.0
-        changes = list_changes(flow.store)
-        told = [each for each in changes if each.action == "tests judged again"]
-    assert len(told) == 4
 
 
 def test_all_hangers_are_judged_again_new_tests_too_and_a_kill_loses_nothing(

@@ -6,9 +6,9 @@ import pytest
 
 from shm.pipeline import Flow
 from shm.store import Stage, Workspace
-from shm.store.queries.history import list_former_tests
-from shm.store.queries.recordings import count_stages, find_recording
-from shm.store.queries.trends import list_history
+from shm.store.journal import list_former_tests
+from shm.store.posteriors import list_history
+from shm.store.recordings import count_stages, find_recording
 from tests.helpers.comparing import assert_same
 from tests.helpers.flows import a_flow, ingest, tension_kn
 from tests.helpers.workspaces import write_loss

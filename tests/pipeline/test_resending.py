@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from shm.errors import NothingThere, UsageError
 from shm.store import DeliveryState, Workspace
 from shm_cli.main import run
 from tests.helpers.flows import Clock, Postman, a_flow, ingest
@@ -44,15 +43,6 @@ def test_what_was_given_up_waits_again_and_is_told_once(given_up: Workspace) -> 
         flow.drain()
     assert postman.told == [("mail", first.alert.key)]
     assert states(given_up) == [(DeliveryState.DELIVERED, 1), (DeliveryState.GIVEN_UP, 1)]
-
-
-def test_what_no_hook_was_given_up_for_is_not_sent_again(given_up: Workspace) -> None:
-    with given_up.store() as store:
-        store.alerts.resend(1, AT)
-        with pytest.raises(UsageError, match="alert 1 was given up by no hook"):
-            store.alerts.resend(1, AT)
-        with pytest.raises(NothingThere, match="no alert 9"):
-            store.alerts.resend(9, AT)
 
 
 def test_the_list_says_why_a_hook_was_not_told_and_the_command_sends_it_again(

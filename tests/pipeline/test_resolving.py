@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -13,13 +12,11 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.reconcile import SHM, Condition, reconcile
 from shm.report.hanger_status import Status
-from shm.store import Reconciled, StoredAlert, Workspace
-from shm.values import Alert
+from shm.store import StoredAlert, Workspace
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
-from tests.helpers.nouns import NOW, a_change, a_drift, an_alert
+from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.slow import few_of
-from tests.helpers.streams import a_reading
 from tests.helpers.workspaces import START, make_workspace, write_test
 
 
@@ -54,46 +51,6 @@ def test_a_tension_that_comes_back_resolves_its_alert(bridge: Workspace) -> None
         assert found.resolution.who == "shm"
 
 
-@pytest.mark.parametrize(("lost", "rings"), [(0.2, False), (0.1, True)])
-def test_a_loss_that_a_stream_has_told_rings_again_only_where_tests_show_more(
-    bridge: Workspace, *, lost: float, rings: bool
-) -> None:
-    postman = Postman()
-    take(bridge, postman, 0, 1.0)
-    at = START + timedelta(days=58, hours=12)
-    drift = replace(a_drift(), shift_mean=-lost, shift_sd=0.002)
-    told = Alert("hanger-3:stream", 3, "h3 hour", at, "It fell.", (drift,), ("sudden change",))
-    with bridge.store() as store:
-        store.streams.save_pooled(replace(a_reading(), start=at), None, Reconciled((told,)))
-    for day in (59, 60):
-        take(bridge, postman, day, 0.8)
-    assert bool(postman.told) is rings
-    if not rings:
-        with bridge.store() as store:
-            assert [each.alert.key for each in store.alerts.list_all()] == [told.key]
-
-
-def test_what_another_source_has_told_is_not_opened_again_and_what_begins_later_is() -> None:
-    alert = replace(an_alert(), kinds=("sudden change",), change=a_change())
-    of_test = StoredAlert(1, replace(alert, key="t", change=None), NOW, baseline_id=1)
-
-    def is_opened(alert: Alert, *, of_test_too: bool = False) -> bool:
-        own = replace(of_test, baseline_id=None) if of_test_too else of_test
-        return bool(reconcile([own], [Condition(alert, "holds")]).to_open)
-
-    assert not is_opened(alert)
-    later = a_change(began_after=NOW + timedelta(hours=1))
-    assert is_opened(replace(alert, change=later))
-    up = a_change(moved=(replace(a_change().moved[0], shift_mean=0.08),))
-    assert is_opened(replace(alert, change=up))
-    assert is_opened(replace(alert, kinds=("gap",)))
-    other_baseline = Condition(alert, "holds", baseline_id=2)
-    assert reconcile([of_test], [other_baseline]).to_open == (alert,)
-    # Of the same source the size does not count, but when it began.
-    began = replace(a_change(), began_by=NOW + timedelta(days=2))
-    assert is_opened(replace(alert, change=began), of_test_too=True)
-
-
 def test_the_same_conditions_again_change_nothing_and_one_that_is_over_closes_its_alert() -> None:
     told = StoredAlert(7, replace(an_alert("a"), kinds=("gap",)), NOW)
     holds = Condition(replace(an_alert("b"), kinds=("limit",)), "holds")
@@ -104,27 +61,6 @@ def test_the_same_conditions_again_change_nothing_and_one_that_is_over_closes_it
     assert (again.to_open, again.to_close) == ((), {7: "gone"})
     # A condition that comes back once its alert is closed is another alert.
     assert reconcile([told], [holds]).to_open == (holds.alert,)
-
-
-@pytest.mark.parametrize("days", few_of([[40], [20, 40]], 1))
-def test_a_loss_that_lasts_beyond_a_maintenance_window_is_told_once_at_the_first_test_after_it(
-    bridge: Workspace, days: Sequence[int]
-) -> None:
-    postman = Postman()
-    take(bridge, postman, 0, 1.0)
-    with bridge.store() as store:
-        period = START + timedelta(days=10), START + timedelta(days=50)
-        store.silences.make(3, period, "Ann", "new pin", START, is_maintenance=True)
-    for day in days:
-        take(bridge, postman, day, 0.8)
-    assert postman.told == []
-    for day in (60, 90, 120, 150):
-        take(bridge, postman, day, 0.8)
-    with bridge.store() as store:
-        (raised,) = (each.alert for each in store.alerts.list_all())
-    assert [key for _, key in postman.told] == [raised.key]
-    assert raised.test == "d60"
-    assert "Planned works lie in between (new pin)" in raised.message
 
 
 RAMP = (

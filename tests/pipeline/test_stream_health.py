@@ -14,19 +14,18 @@ from shm.pipeline.stream_health import (
     StreamHealth,
     blind_hangers,
     classify_stream,
-    compare_thermometers,
     evaluate_silent_streams,
     heard,
     note_blindness,
 )
 from shm.read.chunk_document import chunk_document
 from shm.report.hanger_status import Status
-from shm.store.queries.streams import list_stream_events
 from shm.store.ring import ring_of
+from shm.store.streams import list_stream_events
 from shm.values.stream import StreamEvent
 from tests.helpers.live_streams import send, with_live_streams
 from tests.helpers.nouns import NOW
-from tests.helpers.streams import MODES, STREAM, a_chunk, a_reading, a_window, with_stream
+from tests.helpers.streams import MODES, STREAM, a_chunk, a_window, with_stream
 from tests.helpers.workspaces import make_workspace
 
 HOUR = timedelta(hours=1)
@@ -148,22 +147,6 @@ def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(
         assert {each.resolution.why for each in store.alerts.list_all() if each.resolution} == {
             f"stream {name} sees its hanger again"
         }
-
-
-def test_a_thermometer_unlike_that_of_another_stream_is_noted(tmp_path: Path) -> None:
-    workspace = with_live_streams(make_workspace(tmp_path / "bridge", hangers=(3, 4)))
-    one, other = (stream.name for stream in workspace.bridge.streams)
-    with workspace.store() as store:
-        for hour in range(24):
-            for name, hanger, off_k in ((one, 3, 0.0), (other, 4, -8.0)):
-                reading = replace(a_reading(hour), stream=name, hanger=hanger)
-                store.streams.save_pooled(
-                    replace(reading, temperature_c=reading.temperature_c + off_k)
-                )
-        compare_thermometers(workspace, store, NOW + 24 * HOUR)
-        told = {each.stream: each.detail for each in list_stream_events(store, None, NOW)}
-    assert set(told) == {one, other}
-    assert told[other].startswith("temperature_c is -8.0 K off that of another stream over a day")
 
 
 def test_a_stream_of_noise_is_noted_by_its_windows_and_said_to_see_nothing(tmp_path: Path) -> None:

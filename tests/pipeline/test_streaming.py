@@ -20,9 +20,8 @@ from shm.pipeline.streaming import Streaming
 from shm.read.chunk_document import chunk_document
 from shm.simulate.ambient import streamed
 from shm.store import Store, Workspace
-from shm.store.queries.streams import list_pooled, list_windows, load_stream_watch
 from shm.store.ring import ring_of
-from shm.store.stored_streams import Streams
+from shm.store.streams import Streams, list_pooled, list_windows, load_stream_watch
 from shm.values.stream import PooledReading
 from shm.watch.kept_state import to_bytes
 from shm.watch.stream_reading import ModeTable

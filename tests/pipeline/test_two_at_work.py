@@ -13,8 +13,8 @@ import pytest
 
 from shm.pipeline import Flow, steps
 from shm.store import DeliveryState, Stage, Workspace
-from shm.store.queries.history import list_events, list_steps
-from shm.store.queries.recordings import list_recordings
+from shm.store.journal import list_events, list_steps
+from shm.store.recordings import list_recordings
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all, tension_kn
 from tests.helpers.workspaces import make_workspace, put, write_loss, write_test
 

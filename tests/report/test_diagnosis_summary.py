@@ -158,6 +158,8 @@ def test_a_measurement_that_hardly_tells_is_not_recommended() -> None:
     assert "No measurement that was considered would tell point mass from no gap" in said(
         replace(LED, next_measurements=(poor,))
     )
+    fair = replace(poor, expected_log_bayes_factor=1.2)
+    assert "measure next: two more modes" in said(replace(LED, next_measurements=(poor, fair)))
 
 
 @pytest.mark.parametrize(

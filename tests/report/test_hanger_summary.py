@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shm.pipeline.notification_plan import with_tension
+from shm.pipeline.courier import with_tension
 from shm.report.hanger_status import Status
 from shm.report.hanger_summary import (
     BASELINE_ALONE,

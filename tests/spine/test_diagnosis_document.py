@@ -53,7 +53,7 @@ def test_no_field_of_a_diagnosis_is_left_out() -> None:
 
 def test_outliers_and_95_percent_intervals_are_in_the_document() -> None:
     document = diagnosis_document(BLUNDER)
-    assert document["outliers"] == [asdict(BLUNDER.outliers[0])]
+    assert document["outliers"] == (asdict(BLUNDER.outliers[0]),)
     assert document["tension_n"]["after"]["q025"] == 687.9e3
     assert document["tension_n"]["after"]["q975"] == 716.8e3
 

@@ -94,6 +94,7 @@ def test_data_and_templates_are_in_the_wheel(unpacked: Path) -> None:
     )
     run(unpacked, code)
     names = {path.name for path in unpacked.rglob("*") if path.is_file()}
-    assert {"paper.html.j2", "report.css", "calibration.toml", "default.toml", "env.py"} <= names
+    assert {"paper.html.j2", "report.css", "calibration.toml", "default.toml"} <= names
+    assert {"assumptions.csv", "env.py"} <= names
     assert "py.typed" in names
     assert not any(name.endswith(".db") for name in names)

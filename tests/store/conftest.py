@@ -31,9 +31,13 @@ def server(request: pytest.FixtureRequest) -> Iterator[str]:
         yield url
 
 
-@pytest.fixture(params=["sqlite", "server"])
+@pytest.fixture(params=["sqlite", pytest.param("server", marks=pytest.mark.slow)])
 def location(request: pytest.FixtureRequest) -> str | Path:
-    """Where an empty store is, of either kind: what holds of one must hold of the other."""
+    """Where an empty store is, of either kind: what holds of one must hold of the other.
+
+    `make test` meets the server in `test_server.py`, in the daemon's `test_server_store.py` and in
+    the faults; all of these on a server run with the slow tests.
+    """
     found: str | Path = request.getfixturevalue(request.param)
     return found
 
@@ -63,15 +67,14 @@ def filled(store: Store) -> Store:
     return store
 
 
-@pytest.fixture(params=["file", "database"])
-def empty(
-    request: pytest.FixtureRequest, tmp_path: Path, postgresql: Databases
-) -> Iterator[str | Path]:
+@pytest.fixture(params=["file", pytest.param("database", marks=pytest.mark.slow)])
+def empty(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str | Path]:
     """Where a store of either kind may be made."""
     if request.param == "file":
         yield tmp_path / "empty.db"
     else:
-        with postgresql.database() as url:
+        databases: Databases = request.getfixturevalue("postgresql")
+        with databases.database() as url:
             yield url
 
 

@@ -126,18 +126,18 @@ def test_a_baseline_of_an_adopted_class_goes_when_the_adoption_is_dropped(
 def test_a_baseline_cut_short_leaves_nothing_behind(
     store: Store, watched: list[StoredTest], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from shm.store import stored_watch
+    from shm.store import watch
 
     held = rows(store)
     for verb in ("insert_posterior", "insert_baseline"):
-        keep = getattr(stored_watch, verb)
+        keep = getattr(watch, verb)
 
         def cut(*arguments, keep=keep):  # type: ignore[no-untyped-def]
             keep(*arguments)
             raise sqlite3.OperationalError("cut short")
 
         with monkeypatch.context() as patched:
-            patched.setattr(stored_watch, verb, cut)
+            patched.setattr(watch, verb, cut)
             with pytest.raises(sqlite3.OperationalError):
                 anew(store, watched[2:])
         assert rows(store) == held

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import multiprocessing
 import os
 import threading
@@ -43,23 +42,6 @@ def test_only_one_is_active_and_the_other_is_told_who(location: str | Path, tmp_
         assert lock.held()  # the try has not cost it
     with active(location, file, None):
         assert not lock.held()
-
-
-def test_who_gives_up_waiting_is_told_why(location: str | Path, tmp_path: Path) -> None:
-    told: list[StoreError] = []
-
-    def twice(error: StoreError) -> bool:
-        told.append(error)
-        return len(told) < 2
-
-    file = tmp_path / "shm.lock"
-    with (
-        active(location, file, None),
-        pytest.raises(StoreBusy, match="already ingests"),
-        active(location, file, twice),
-    ):
-        pytest.fail("two were active")
-    assert len(told) == 2
 
 
 def test_a_standby_takes_over_when_the_active_one_ends(
@@ -149,18 +131,6 @@ def test_holder_names_process(location: str | Path, tmp_path: Path) -> None:
         time.sleep(0.02)
 
 
-def test_active_excludes_older_version(sqlite: Path, tmp_path: Path) -> None:
-    """Processes of 1.0.0 lock by flock(2) alone: no two of either are active together."""
-    file = tmp_path / "shm.lock"
-    with file.open("a+") as older:
-        fcntl.flock(older, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        with pytest.raises(StoreBusy), active(sqlite, file, None):
-            pytest.fail("two were active")
-        fcntl.flock(older, fcntl.LOCK_UN)
-        with active(sqlite, file, None), pytest.raises(BlockingIOError):
-            fcntl.flock(older, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
 def test_who_loses_the_connection_is_no_longer_active(
     server: str, postgresql: Databases, tmp_path: Path
 ) -> None:
@@ -171,32 +141,6 @@ def test_who_loses_the_connection_is_no_longer_active(
         with active(server, file, None) as other:
             assert other.held()
             assert not lock.held()
-
-
-def test_who_is_cut_off_while_waiting_goes_on_waiting(
-    server: str, postgresql: Databases, tmp_path: Path
-) -> None:
-    told: list[StoreError] = []
-
-    def wait(error: StoreError) -> bool:
-        told.append(error)
-        if len(told) == 1:
-            assert postgresql.cut_connections(server) == 2
-        time.sleep(0.02)
-        return len(told) < 10
-
-    with active(server, tmp_path / "a", None), active(server, tmp_path / "b", wait) as lock:
-        assert lock.held()
-    assert {type(error) for error in told} <= {StoreBusy, StoreError}
-    assert type(told[1]) is StoreError
-
-
-def test_a_lock_that_cannot_be_made_is_told(sqlite: Path, tmp_path: Path) -> None:
-    with (
-        pytest.raises(StoreError, match=r"cannot be written .* Give this user write access"),
-        active(sqlite, tmp_path / "no such folder" / "shm.lock", None),
-    ):
-        pytest.fail("nobody can be active")
 
 
 def test_a_server_that_is_down_is_waited_for(tmp_path: Path) -> None:
@@ -214,23 +158,3 @@ def test_a_server_that_is_down_is_waited_for(tmp_path: Path) -> None:
         pytest.fail("nobody can be active")
     assert [error.retry_after_s for error in told] == [5.0, 5.0]
     assert not any(isinstance(error, StoreBusy) for error in told)
-
-
-def test_a_database_that_is_missing_is_not_waited_for(
-    postgresql: Databases, tmp_path: Path
-) -> None:
-    with (
-        pytest.raises(StoreError, match="createdb"),
-        active(postgresql.url("nowhere"), tmp_path / "shm.lock", patient()),
-    ):
-        pytest.fail("nobody can be active")
-
-
-def test_who_finds_the_lock_file_removed_is_no_longer_active(sqlite: Path, tmp_path: Path) -> None:
-    file = tmp_path / "shm.lock"
-    with active(sqlite, file, None) as lock:
-        file.unlink()
-        assert not lock.held()
-        with active(sqlite, file, None) as other:
-            assert other.held()
-            assert not lock.held()

@@ -10,9 +10,9 @@ import sqlalchemy as sa
 
 from shm.errors import StoreBusy
 from shm.store import Adoption, Baseline, IdentifiedTest, Lineage, Store, StoredAdoption
-from shm.store.queries.hangers import list_adoptions, list_selected_models
-from shm.store.queries.trends import list_history
+from shm.store.posteriors import list_history
 from shm.store.tables import adoptions, baselines, posteriors, selections
+from shm.store.watch import list_adoptions, list_selected_models
 from shm.values import Selection
 from tests.helpers.nouns import NOW, a_file, a_posterior, a_test
 
@@ -99,30 +99,19 @@ def test_an_adoption_cut_short_leaves_nothing_behind(
     filled: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As by a full disk or a kill between any two of its rows: all or nothing."""
-    from shm.store import stored_posteriors
+    from shm.store import posteriors
 
     held = rows(filled)
     for verb in ("insert_posterior", "insert_selection", "insert_baseline", "insert"):
-        keep = getattr(stored_posteriors, verb)
+        keep = getattr(posteriors, verb)
 
         def cut(*arguments, keep=keep):  # type: ignore[no-untyped-def]
             keep(*arguments)
             raise sqlite3.OperationalError("cut short")
 
         with monkeypatch.context() as patched:
-            patched.setattr(stored_posteriors, verb, cut)
+            patched.setattr(posteriors, verb, cut)
             with pytest.raises(sqlite3.OperationalError):
                 adopted(filled)
         assert rows(filled) == held
         assert list_selected_models(filled) == {3: "beam2"}
-
-
-def test_a_name_of_two_effects_with_ranges_fits(filled: Store) -> None:
-    place = "rotational_end_flexibility@deck_end.transverse"
-    long = f"beam1+{place}+temperature_tension@everywhere:reference_c=11.5:" + (
-        "tension_per_kelvin_n_k=-1091.11..-908.889"
-    )
-    PROBABILITIES[long] = 0.9
-    adopted(filled, long)
-    assert list_selected_models(filled) == {3: long}
-    assert selections.c.model.type.length > len(long)  # type: ignore[attr-defined]

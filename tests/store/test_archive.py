@@ -14,7 +14,7 @@ import pytest
 
 from shm.errors import BadInput, ShmError, StoreError
 from shm.store import Archive, Quarantine, ReceivedFile, archive
-from shm.store.archive import checksum, safe_name, suffix_of
+from shm.store.archive import checksum, safe_name
 
 REASON = {"message": "no sampling rate.", "remedy": "Give it.", "sha256": "0" * 64}
 
@@ -121,18 +121,6 @@ def test_a_kept_file_opens_under_the_name_it_came_with(kept_in: Archive, tmp_pat
     assert len(files_in(kept_in.folder)) == 2
 
 
-def test_a_file_opens_where_the_file_system_knows_no_links(
-    kept_in: Archive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(self: Path, target: Path) -> None:
-        raise PermissionError
-
-    kept = kept_in.keep(a_source(tmp_path))
-    monkeypatch.setattr(Path, "hardlink_to", refuse)
-    with kept_in.opened(ReceivedFile(kept.sha256, "h3.csv", 12, "e", kept.archived_as)) as path:
-        assert path.read_bytes() == b"force,acc_1\n"
-
-
 def test_a_file_that_is_gone_from_the_archive_is_told(kept_in: Archive) -> None:
     file = ReceivedFile("f" * 64, "h3.csv", 12, "entry", "ff/f.csv")
     assert not kept_in.holds(file)
@@ -150,23 +138,6 @@ def test_what_a_killed_process_left_is_swept(kept_in: Archive, tmp_path: Path) -
     assert files_in(kept_in.folder) == [Path(kept.archived_as)]
 
 
-def test_a_file_swept_while_it_is_read_is_tried_again(kept_in: Archive, tmp_path: Path) -> None:
-    """A process that begins to serve sweeps; the one before must not blame the file."""
-    kept = kept_in.keep(a_source(tmp_path))
-    file = ReceivedFile(kept.sha256, "h3.csv", kept.size_bytes, kept.entry, kept.archived_as)
-
-    def read_while_another_begins() -> None:
-        with kept_in.opened(file) as path:
-            kept_in.sweep()
-            path.read_bytes()
-
-    with pytest.raises(ShmError, match="another process serves") as caught:
-        read_while_another_begins()
-    assert caught.value.retry_after_s == 1.0
-    with pytest.raises(ZeroDivisionError), kept_in.opened(file):
-        raise ZeroDivisionError
-
-
 def test_a_link_is_followed_only_where_that_is_asked_for(kept_in: Archive, tmp_path: Path) -> None:
     link = tmp_path / "link.csv"
     link.symlink_to(a_source(tmp_path, "secret.csv"))
@@ -181,26 +152,6 @@ def test_a_named_pipe_is_refused_and_not_waited_for(kept_in: Archive, tmp_path: 
     os.mkfifo(tmp_path / "pipe.csv")
     with pytest.raises(BadInput, match=r"pipe\.csv: it is no file"):
         kept_in.keep(tmp_path / "pipe.csv")
-
-
-def test_a_name_given_to_a_link_while_it_is_read_is_noticed(
-    kept_in: Archive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    source, secret = a_source(tmp_path), a_source(tmp_path, "secret.csv", b"secret\n")
-    copy, copied = archive._copy_hashed, []
-
-    def swap_and_copy(reading: BinaryIO, target: Path, *more: Any) -> tuple[str, int]:
-        source.unlink()
-        source.symlink_to(secret)
-        sha256, size = copy(reading, target, *more)
-        copied.append(target.read_bytes())
-        return sha256, size
-
-    monkeypatch.setattr(archive, "_copy_hashed", swap_and_copy)
-    with pytest.raises(ShmError, match="changed while it was read"):
-        kept_in.keep(source)
-    assert copied == [b"force,acc_1\n"]
-    assert files_in(kept_in.folder) == []
 
 
 def test_a_refused_file_lies_with_its_reason_and_sidecar(
@@ -231,30 +182,6 @@ def test_another_refused_file_of_the_same_name_is_laid_beside_it(
     )
     assert (quarantine.folder / "h3.csv").read_bytes() == b"one"
     assert (quarantine.folder / other).read_bytes() == b"two"
-
-
-def test_the_archive_is_out_of_reach_of_edits_in_the_quarantine(
-    kept_in: Archive, quarantine: Quarantine, tmp_path: Path
-) -> None:
-    kept = kept_in.keep(a_source(tmp_path))
-    archived = kept_in.folder / kept.archived_as
-    target = quarantine.put(archived, "h3.csv", REASON, tmp_path / "none.toml")
-    target.write_bytes(b"edited")
-    assert archived.read_bytes() == b"force,acc_1\n"
-
-
-@pytest.mark.parametrize(
-    ("name", "suffix"),
-    [
-        ("h3.CSV", ".csv"),
-        ("h3.modes.json", ".modes.json"),
-        ("h3", ""),
-        ("h3.2026-05-01", ""),
-        ("h3.c/v", ""),
-    ],
-)
-def test_only_plain_endings_are_kept(name: str, suffix: str) -> None:
-    assert suffix_of(name) == suffix
 
 
 def test_names_that_no_database_or_file_system_holds_are_made_safe() -> None:
@@ -290,15 +217,6 @@ def test_a_rotten_file_is_refused_at_every_read_with_the_remedy(
         pass
     assert "into the spool again" in told.value.remedy
     assert not kept_in.holds_whole(file)
-
-
-def test_so_is_one_whose_sidecar_is_rotten(kept_in: Archive, tmp_path: Path) -> None:
-    sidecar, _ = rotten(kept_in, tmp_path)
-    kept = kept_in.keep(a_source(tmp_path, name="h4.csv", content=b"force\n"))
-    name = sidecar.relative_to(kept_in.folder).as_posix()
-    file = ReceivedFile(kept.sha256, "h4.csv", kept.size_bytes, "e", kept.archived_as, name)
-    with pytest.raises(StoreError, match=name), kept_in.opened(file):
-        pass
 
 
 def test_the_good_file_that_comes_again_heals_the_rotten_one(

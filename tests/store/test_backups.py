@@ -9,11 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from shm.errors import NothingThere, SchemaOutdated, StoreBusy, StoreError, UsageError
-from shm.store import Store, backups, database
-from shm.store.backups import back_up, restore
-from shm.store.checking import check_store
-from shm.store.queries.recordings import count_stages
+from shm.errors import NothingThere, SchemaOutdated, StoreError, UsageError
+from shm.store import Store, backups
+from shm.store.backups import back_up, check_store, restore
+from shm.store.recordings import count_stages
 from tests.helpers.contents import held, quiet
 from tests.helpers.nouns import NOW, a_file
 from tests.helpers.slow import few_of
@@ -110,21 +109,6 @@ def test_a_damaged_store_is_moved_aside_by_a_restore_that_may_replace(
     restored = restore(sqlite, file, kept, quiet, replace=True)
     assert (restored.tables, restored.kept) == (expected, kept)
     assert kept.read_bytes().startswith(b"rubbish")
-
-
-def test_a_store_in_use_is_not_moved_aside(
-    file_store: Store, sqlite: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    fill(file_store)
-    back_up(file_store, tmp_path / "backup.db", quiet)
-    monkeypatch.setattr(database, "BUSY_SECONDS", 0.05)
-    holder = sqlite3.connect(sqlite, isolation_level=None)
-    holder.execute("BEGIN IMMEDIATE")
-    with pytest.raises(StoreBusy):
-        restore(sqlite, tmp_path / "backup.db", tmp_path / "kept.db", quiet, replace=True)
-    holder.execute("ROLLBACK")
-    holder.close()
-    assert not (tmp_path / "kept.db").exists()
 
 
 def test_what_is_no_backup_is_not_restored(file_store: Store, sqlite: Path, tmp_path: Path) -> None:

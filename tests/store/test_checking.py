@@ -6,8 +6,7 @@ import pytest
 import sqlalchemy as sa
 
 from shm.store import Store
-from shm.store.checking import check_store
-from shm.store.copying import contents
+from shm.store.backups import check_store, contents
 from tests.store.make_released_database import fill
 
 

@@ -11,11 +11,10 @@ import sqlalchemy as sa
 from sqlalchemy.engine import RowMapping
 
 from shm.errors import StoreError, UsageError
-from shm.store import Store, copying
-from shm.store.backups import copy_store
-from shm.store.checking import check_store
-from shm.store.queries.recordings import list_recordings
-from shm.store.queries.trends import list_history
+from shm.store import Store, backups
+from shm.store.backups import check_store, copy_store
+from shm.store.posteriors import list_history
+from shm.store.recordings import list_recordings
 from shm.store.tables import posteriors
 from tests.helpers.contents import held, quiet
 from tests.helpers.nouns import NOW, a_file
@@ -54,36 +53,18 @@ def test_a_copy_that_differs_is_undone(
 ) -> None:
     fill(file_store)
     Store.create(empty).close()
-    written = copying._write
+    written = backups._write
 
     def altered(connection: sa.Connection, table: sa.Table, rows: Sequence[RowMapping]) -> None:
         written(connection, table, rows)
         if table is posteriors:
             connection.execute(sa.update(posteriors).values(log_evidence=0.5))
 
-    monkeypatch.setattr(copying, "_write", altered)
+    monkeypatch.setattr(backups, "_write", altered)
     with pytest.raises(StoreError, match="differs from the store in posteriors;"):
         copy_store(file_store, empty, quiet)
     with Store.open(empty) as copy:
         assert sum(each.rows for each in held(copy)) == 0
-
-
-def test_one_changed_digit_changes_the_checksum_of_its_table_alone(filled: Store) -> None:
-    before = held(filled)
-    with filled.writing() as connection:
-        connection.execute(
-            sa.update(posteriors)
-            .where(posteriors.c.id == 1)
-            .values(log_evidence=posteriors.c.log_evidence + 1e-12)
-        )
-    changed = [b.table for b, a in zip(before, held(filled), strict=True) if a != b]
-    assert changed == ["posteriors"]
-
-
-def test_a_sound_store_has_no_troubles(filled: Store) -> None:
-    checked = check_store(filled, quiet)
-    assert checked.troubles == ()
-    assert checked.tables == held(filled)
 
 
 def test_a_page_that_was_overwritten_is_found(file_store: Store, sqlite: Path) -> None:

@@ -11,8 +11,8 @@ import sqlalchemy as sa
 
 from shm.errors import StoreBusy, StoreError
 from shm.store import Stage, Store, database
-from shm.store.queries.hangers import list_selected_models
-from shm.store.queries.recordings import count_stages, list_recordings
+from shm.store.recordings import count_stages, list_recordings
+from shm.store.watch import list_selected_models
 from tests.helpers.nouns import NOW, a_file
 from tests.helpers.quick_stores import AS_SHIPPED
 

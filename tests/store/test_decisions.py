@@ -9,10 +9,10 @@ import pytest
 
 from shm.errors import UsageError
 from shm.store import Stage, Store
-from shm.store.queries.history import list_changes
-from shm.store.queries.judging import list_decisions
-from shm.store.queries.recordings import find_discard, list_holds
+from shm.store.journal import list_changes
+from shm.store.recordings import find_discard, list_holds
 from shm.store.rows import Decision
+from shm.store.tests import list_decisions
 from tests.helpers.nouns import NOW, a_watched_test
 
 DAY = timedelta(days=1)

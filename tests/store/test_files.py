@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from shm.store import IdentifiedTest, Judgement, Lineage, Outcome, Stage, Store
-from shm.store.queries.history import list_events, list_former_tests, list_steps
-from shm.store.queries.recordings import (
+from shm.store.journal import list_events, list_former_tests, list_steps
+from shm.store.recordings import (
     is_waiting,
     list_recordings,
 )

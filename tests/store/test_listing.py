@@ -21,14 +21,14 @@ from shm.store import (
     StoredTest,
     StoredWatch,
 )
-from shm.store.outbox import resolve
-from shm.store.queries.alerts import (
+from shm.store.alerts import (
     count_alerts,
     count_open_alerts,
     list_alert_page,
+    resolve,
 )
-from shm.store.queries.hangers import find_latest_watches, list_detected_changes, list_detections
-from shm.store.queries.tests import list_test_rows
+from shm.store.tests import list_test_rows
+from shm.store.watch import find_latest_watches
 from shm.values import Selection
 from tests.helpers.nouns import (
     NOW,
@@ -111,20 +111,6 @@ def test_the_latest_watches_are_those_of_each_hanger_in_few_questions(store: Sto
     assert sum("SELECT" in text for text in asked) == 3
 
 
-def test_a_watch_against_a_baseline_of_before_is_not_the_latest(file_store: Store) -> None:
-    baseline = with_baseline(file_store)
-    watched(file_store, baseline, 2)
-    record = ("engineer", "new pin", NOW + timedelta(days=2))
-    chosen = [file_store.tests.named(3, "t2")]
-    posterior = a_posterior("beam1", ("t2",))
-    file_store.watch.rebaseline(baseline, posterior, chosen, record, LINEAGE, NOW)
-    assert find_latest_watches(file_store) == {}
-    assert list_detections(file_store, 3, baseline_of(file_store).id) == ()
-    assert list_detected_changes(file_store) == {}
-    told = list_detections(file_store, 3, baseline.id)
-    assert [each.watched.test for each in told] == ["t2"]
-
-
 def test_a_resolved_alert_is_open_no_more_whoever_took_note(store: Store) -> None:
     raise_alerts(store)
     with store.engine.begin() as connection:
@@ -151,14 +137,3 @@ def raise_alerts(store: Store) -> None:
 
 def numbers(rows: tuple[StoredAlert, ...]) -> list[int]:
     return [row.id for row in rows]
-
-
-def test_acknowledged_alerts_stand_in_the_order_in_which_they_were(store: Store) -> None:
-    raise_alerts(store)
-    for days, alert in enumerate((4, 1, 5)):
-        store.alerts.acknowledge(alert, "engineer", "seen", NOW + timedelta(days=days))
-    assert numbers(list_alert_page(store, is_open=True)) == [6, 3, 2]
-    assert numbers(list_alert_page(store, 3, is_open=True, before=3)) == [2]
-    assert numbers(list_alert_page(store, is_open=False)) == [5, 1, 4]
-    assert numbers(list_alert_page(store, is_open=False, limit=1, before=5)) == [1]
-    assert numbers(list_alert_page(store, is_open=False, before=1)) == [4]

@@ -11,8 +11,8 @@ from PIL import Image
 
 from shm.errors import BadInput, NothingThere, ShmError, UsageError
 from shm.store import Store
+from shm.store.journal import list_changes
 from shm.store.notes import LARGEST_PHOTO_BYTES
-from shm.store.queries.history import list_changes
 from shm.values.notes import NoteKind
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)

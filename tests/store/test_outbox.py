@@ -9,8 +9,8 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import DeliveryState, Reconciled, Store
-from shm.store.queries.alerts import count_deliveries
-from shm.store.queries.history import list_steps
+from shm.store.alerts import count_deliveries
+from shm.store.journal import list_steps
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import a_reading
 

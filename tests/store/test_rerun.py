@@ -8,11 +8,10 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import Baseline, IdentifiedTest, Lineage, Stage, Store, StoredTest, WatchCheckpoint
-from shm.store.queries.history import list_events, list_former_tests
-from shm.store.queries.recordings import find_recording
-from shm.store.queries.tests import list_baseline_tests, list_waiting_tests
-from shm.store.queries.trends import list_history, list_posteriors
-from shm.store.queries.watching import find_watch_state
+from shm.store.journal import list_events, list_former_tests
+from shm.store.posteriors import list_history, list_posteriors
+from shm.store.recordings import find_recording
+from shm.store.tests import list_baseline_tests, list_waiting_tests
 from shm.values import Selection
 from tests.helpers.nouns import NOW, a_file, a_posterior, a_test, a_watched_test
 
@@ -105,15 +104,6 @@ def test_the_baseline_stays_when_its_own_test_is_identified_again(store: Store) 
     assert kept.id == baseline.id
     assert [test.id for test in list_baseline_tests(store, kept)] == [first.id]
     assert [posterior.seed for _, posterior in list_history(store, 3)] == [2]
-
-
-def test_what_the_watch_kept_is_dropped_with_a_test_that_is_done_again(store: Store) -> None:
-    baseline = with_baseline(store)
-    second = identified(store, 2)
-    watched(store, second, baseline)
-    assert find_watch_state(store, baseline) == WatchCheckpoint("a key", second.time, b"state")
-    store.recordings.rerun(second.recording_id, Stage.WATCHED, LATER)
-    assert find_watch_state(store, baseline) is None
 
 
 @pytest.mark.parametrize("stage", [Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED])

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from shm.store import IdentifiedTest, Judgement, Lineage, Stage, Store, StoredTest
+from shm.store import tests as judging
 from shm.store.blobs import unpack
-from shm.store.queries import judging
-from shm.store.queries.hangers import list_selected_models
-from shm.store.queries.judging import list_known_samples
-from shm.store.queries.tests import load_frequency_response
-from shm.store.queries.trends import list_history, list_posteriors
+from shm.store.posteriors import list_history, list_posteriors
+from shm.store.tests import list_known_samples, load_frequency_response
+from shm.store.watch import list_selected_models
 from shm.values import AddedMass, Fingerprint, Selection
 from tests.helpers.comparing import assert_same
 from tests.helpers.nouns import (
@@ -103,15 +102,6 @@ def test_the_most_probable_class_is_selected_and_its_posterior_the_baseline(stor
     assert_same(baseline.posterior, a_posterior("beam2"))
     assert store.tests.get(first.id).stage is Stage.WATCHED
     assert store.recordings.get(first.recording_id).stage is Stage.DONE
-
-
-def test_a_second_first_selection_is_not_kept(store: Store) -> None:
-    (first,) = identified(store, 1)
-    (second,) = identified(store, 2)
-    baseline_of_two_models(store, first)
-    baseline_of_two_models(store, second)
-    assert len(list_posteriors(store, 3)) == 1
-    assert store.tests.get(second.id).stage is Stage.IDENTIFIED
 
 
 def test_several_tests_may_make_one_baseline(store: Store) -> None:

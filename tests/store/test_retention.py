@@ -9,22 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from shm.documents import dump
-from shm.errors import NothingThere, StoreError
+from shm.errors import StoreError
 from shm.pipeline.intake import receive
 from shm.store import Archive, Store, StoredRecording, Workspace
-from shm.store.checking import archived_names, check_archive
-from shm.store.queries.upkeep import list_removed
+from shm.store.backups import archived_names, check_archive
 from shm.store.retention import (
     Retention,
     copy_archive,
-    empty_quarantine,
-    expendable,
     fetch,
-    refused_files,
     removable,
     remove,
 )
+from shm.store.upkeep import list_removed
 from tests.helpers.contents import quiet
 from tests.helpers.workspaces import make_workspace
 
@@ -146,34 +142,10 @@ def test_the_archive_itself_is_no_copy_of_it(
     assert found(workspace, store) == Retention((), {"no noted copy is whole": 1})
 
 
-def test_a_copy_that_vanishes_between_the_look_and_the_removal_saves_the_file(
-    workspace: Workspace, store: Store, copies: Archive
-) -> None:
-    old = take_in(workspace, store, "old")
-    back_up(workspace, store, copies)
-    removals = found(workspace, store).removals
-    (copies.folder / str(old.file.archived_as)).unlink()
-    assert remove(store, workspace.archive, removals, NOW) == 0
-    assert workspace.archive.holds(old.file)
-    assert list_removed(store) == {}
-
-
 def test_what_is_not_through_stays(workspace: Workspace, store: Store, copies: Archive) -> None:
     take_in(workspace, store, "waiting", through=False)
     back_up(workspace, store, copies)
     assert found(workspace, store) == Retention((), {"not through yet": 1})
-
-
-def test_a_sidecar_that_another_recording_needs_stays(
-    workspace: Workspace, store: Store, copies: Archive
-) -> None:
-    old = take_in(workspace, store, "old", sidecar="hanger = 3\n")
-    young = take_in(workspace, store, "young", at=NOW, sidecar="hanger = 3\n")
-    back_up(workspace, store, copies)
-    assert old.file.sidecar_as == young.file.sidecar_as
-    assert prune(workspace, store) == len("contents of old")
-    with workspace.archive.opened(young.file) as path:
-        assert path.with_suffix(".toml").read_text() == "hanger = 3\n"
 
 
 def test_what_was_removed_is_no_trouble_and_comes_back(
@@ -191,37 +163,3 @@ def test_what_was_removed_is_no_trouble_and_comes_back(
         assert path.read_text() == "contents of old"
         assert path.with_suffix(".toml").read_text() == "hanger = 3\n"
     assert check_archive(store, workspace.archive, quiet).removed == 0
-
-
-def test_fetching_says_where_copies_should_be(
-    workspace: Workspace, store: Store, copies: Archive
-) -> None:
-    old = take_in(workspace, store, "old")
-    with pytest.raises(NothingThere, match=r"no copy of old\.csv"):
-        fetch(store, workspace.archive, old)
-    back_up(workspace, store, copies)
-    (copies.folder / str(old.file.archived_as)).unlink()
-    with pytest.raises(StoreError, match=str(copies.folder)):
-        fetch(store, workspace.archive, old)
-
-
-def test_the_quarantine_gives_up_only_what_lies_elsewhere(
-    workspace: Workspace, store: Store, copies: Archive
-) -> None:
-    kept = take_in(workspace, store, "kept")
-    lost = take_in(workspace, store, "lost")
-    for recording in (kept, lost):
-        reason = {"sha256": recording.file.sha256, "time": OLD}
-        with workspace.archive.opened(recording.file) as path:
-            workspace.quarantine.put(path, path.name, reason, path.with_suffix(".toml"))
-    alien = workspace.quarantine.folder / "alien.csv"
-    alien.write_text("nobody took this in")
-    alien.with_name("alien.csv.reason.json").write_text(dump({"sha256": "0" * 64, "time": OLD}))
-    (workspace.archive.folder / str(lost.file.archived_as)).unlink()
-    old = refused_files(workspace.quarantine.folder, YEAR_AGO)
-    assert refused_files(workspace.quarantine.folder, OLD) == ()
-    going = expendable(store, workspace.archive, old)
-    assert [file.path.name for file in going] == ["kept.csv"]
-    empty_quarantine(going)
-    left = sorted(path.name for path in workspace.quarantine.folder.iterdir())
-    assert left == ["alien.csv", "alien.csv.reason.json", "lost.csv", "lost.csv.reason.json"]

@@ -5,26 +5,18 @@ from __future__ import annotations
 import re
 import sys
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
 
-from shm.errors import BadInput, SchemaOutdated, StoreBusy, StoreError
-from shm.store import Outcome, Stage, Store, Workspace, database
+from shm.errors import BadInput, StoreBusy, StoreError
+from shm.store import Outcome, Store, database
 from shm.store.database import make_engine, shown, url_of
-from shm.store.queries.recordings import count_stages, list_recordings
+from shm.store.recordings import list_recordings
 from tests.helpers.nouns import NOW, a_file
 from tests.helpers.postgres import Databases
 from tests.helpers.workspaces import make_workspace
-
-
-@pytest.fixture
-def unready(postgresql: Databases) -> Iterator[str]:
-    """A database without tables."""
-    with postgresql.database() as url:
-        yield url
 
 
 def test_the_same_file_received_by_many_at_once_is_entered_once(store: Store) -> None:
@@ -40,25 +32,6 @@ def test_the_same_file_received_by_many_at_once_is_entered_once(store: Store) ->
     for thread in threads:
         thread.join()
     assert sorted(outcomes) == sorted([Outcome.NEW] + 7 * [Outcome.DUPLICATE])
-
-
-def test_a_reader_sees_one_moment(store: Store) -> None:
-    count = sa.text("SELECT count(*) FROM recordings")
-    with store.reading() as connection:
-        assert connection.scalar(count) == 0
-        store.recordings.receive(a_file(1), NOW)
-        assert connection.scalar(count) == 0
-    assert count_stages(store)[Stage.RECEIVED] == 1
-
-
-def test_a_reader_cannot_write(server_store: Store) -> None:
-    """What a server says that is itself a standby, too."""
-    with (
-        pytest.raises(StoreError, match="cannot be written") as caught,
-        server_store.reading() as connection,
-    ):
-        connection.execute(sa.text("DELETE FROM journal"))
-    assert caught.value.retry_after_s == 60.0
 
 
 def test_a_writer_that_holds_on_keeps_others_waiting_and_then_busy(
@@ -105,48 +78,6 @@ def test_a_server_that_is_down_is_waited_for_and_its_password_not_told() -> None
     assert "hush" not in str(caught.value)
 
 
-def test_a_server_without_a_connection_to_spare_is_waited_for(postgresql: Databases) -> None:
-    postgresql.run("CREATE ROLE guest LOGIN CONNECTION LIMIT 0")
-    with pytest.raises(StoreError, match="no connection free") as caught:
-        Store.open(postgresql.url(user="guest"))
-    assert caught.value.retry_after_s == 5.0
-
-
-def test_who_may_not_write_is_told_so(server: str, postgresql: Databases) -> None:
-    postgresql.run("CREATE ROLE reader LOGIN")
-    name = str(url_of(server).database)
-    postgresql.run("GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader", server)
-    with Store.open(postgresql.url(name, user="reader")) as store:
-        assert list_recordings(store) == ()
-        with pytest.raises(StoreError, match="Give this user write access"):
-            store.recordings.receive(a_file(1), NOW)
-
-
-def test_waiting_does_not_make_a_user_or_a_database(postgresql: Databases) -> None:
-    for url in (postgresql.url("nowhere"), postgresql.url(user="nobody")):
-        with pytest.raises(StoreError) as caught:
-            Store.open(url)
-        assert caught.value.retry_after_s is None
-
-
-def test_a_database_without_tables_says_how_to_make_them(unready: str) -> None:
-    with pytest.raises(SchemaOutdated, match="shm db upgrade"):
-        Store.open(unready)
-    Store.upgrade(unready)
-    with Store.open(unready) as store:
-        assert list_recordings(store) == ()
-
-
-def test_an_upgrade_that_fails_on_a_server_leaves_nothing_half_done(
-    unready: str, postgresql: Databases
-) -> None:
-    postgresql.run("CREATE TABLE tests (id INTEGER)", unready)
-    with pytest.raises(StoreError):
-        Store.upgrade(unready)
-    tables = postgresql.run("SELECT tablename FROM pg_tables WHERE schemaname = 'public'", unready)
-    assert tables == [("tests",)]
-
-
 @pytest.mark.parametrize(
     "location",
     [
@@ -176,33 +107,12 @@ def test_an_address_is_shown_without_password_wherever_that_stands() -> None:
         assert told.endswith("@db.example.org/arch")
 
 
-def test_a_workspace_keeps_its_store_where_the_environment_says(
-    unready: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("SHM_STORE", unready.replace("postgres@", "postgres:hush@"))
-    workspace = make_workspace(tmp_path / "bridge")
-    assert not workspace.database.exists()
-    with workspace.lock() as lock, workspace.store() as store:
-        store.recordings.receive(a_file(1), NOW)
-        assert lock.held()
-    assert "hush" not in repr(workspace)
-    with Store.open(unready) as store:
-        assert len(list_recordings(store)) == 1
-
-
 def test_a_password_in_the_description_is_refused(tmp_path: Path) -> None:
     for url in ("postgresql://shm:hush@h/arch", "postgresql://shm@h/arch?password=hush"):
         with pytest.raises(BadInput, match="SHM_STORE") as caught:
             make_workspace(tmp_path / "bridge", settings={"store": url})
         assert "hush" not in str(caught.value)
         assert not (tmp_path / "bridge").exists()
-
-
-def test_a_store_may_be_a_file_elsewhere(tmp_path: Path) -> None:
-    make_workspace(tmp_path / "bridge", settings={"store": "../arch.db"})
-    assert (tmp_path / "arch.db").is_file()
-    with Workspace.open(tmp_path / "bridge").store() as store:
-        assert list_recordings(store) == ()
 
 
 def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from shm.errors import StoreError
 from shm.store import Reconciled, Store
-from shm.store.queries.streams import (
+from shm.store.streams import (
     StreamWatchCheckpoint,
     find_first_unpooled,
     list_pooled,

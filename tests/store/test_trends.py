@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from dataclasses import fields, replace
 from datetime import datetime
-from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
 
+import shm.store.posteriors as stored
 from shm.models import described, end_stiffness
 from shm.store import (
     Adoption,
@@ -21,11 +20,10 @@ from shm.store import (
     Store,
     StoredTest,
     TrendPoint,
-    trends,
 )
-from shm.store.queries.hangers import find_baseline_temperatures, list_baselines_in_force
-from shm.store.queries.trends import find_latest_trends, list_history, list_trend
+from shm.store.posteriors import find_latest_trends, list_history, list_trend
 from shm.store.tables import posteriors
+from shm.store.watch import find_baseline_temperatures, list_baselines_in_force
 from shm.values import Hanger, Limits, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
 from tests.helpers.hangers import HANGER_3
@@ -202,14 +200,14 @@ def test_only_what_is_not_kept_is_made_from_samples(
     assert file_store.posteriors.save_summaries(HANGER_3) == 0
     updated(file_store, 2, 0.95)
     made: list[tuple[str, ...]] = []
-    summarised = trends.summarised
+    summarised = stored.summarised
 
     def noted(posterior: Posterior, hanger: Hanger, selection: Selection | None) -> Numbers:
         made.append(posterior.tests)
         return summarised(posterior, hanger, selection)
 
     with monkeypatch.context() as patched:
-        patched.setattr(trends, "summarised", noted)
+        patched.setattr(stored, "summarised", noted)
         assert [point.test for point in list_trend(file_store, HANGER_3)] == ["t1", "t2"]
     assert made == [("t2",)]
     assert file_store.posteriors.save_summaries(HANGER_3) == 1
@@ -233,36 +231,3 @@ def test_the_tension_over_all_classes_follows_the_selected_one(file_store: Store
     assert list_trend(file_store, limited)[-1].averaged.probability_above_limit == pytest.approx(
         0.5, abs=0.02
     )
-
-
-def test_summaries_are_kept_some_at_a_time_and_what_was_kept_is_not_done_again(
-    file_store: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("shm.store.trends._AT_ONCE", 2)
-    begun(file_store)
-    for number in range(2, 7):
-        updated(file_store, number, 0.9)
-    heard: list[float] = []
-
-    def killed(fraction: float) -> None:
-        heard.append(fraction)
-        if len(heard) == 2:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        file_store.posteriors.save_summaries(HANGER_3, killed)
-    assert heard == pytest.approx([2 / 6, 4 / 6])
-    assert file_store.posteriors.save_summaries(HANGER_3) == 2
-
-
-def test_a_database_of_before_the_summaries_answers_the_same(tmp_path: Path) -> None:
-    path = tmp_path / "shm.db"
-    shutil.copyfile(Path(__file__).parent / "data" / "schema_0014.db", path)
-    Store.upgrade(path)
-    with Store.open(path) as store:
-        expected = from_history(store, HANGER_3)
-        assert len(expected) == 3
-        assert from_trend(store, HANGER_3) == expected
-        assert store.posteriors.save_summaries(HANGER_3) > 0
-        without_samples(store)
-        assert from_trend(store, HANGER_3) == expected

@@ -10,17 +10,16 @@ import pytest
 
 from shm.store import Store
 from shm.store.archive import Archive, Quarantine
-from shm.store.checking import (
+from shm.store.backups import (
     CheckedArchive,
     CheckedStore,
     check_archive,
     check_store,
-    of_no_recording,
     quick_troubles,
     unknown_files,
 )
-from shm.store.queries.recordings import list_recordings
-from shm.store.queries.upkeep import find_last_backup, find_newest_step
+from shm.store.recordings import list_recordings
+from shm.store.upkeep import find_last_backup, find_newest_step
 from tests.helpers.contents import quiet
 from tests.helpers.nouns import NOW, a_file
 
@@ -75,13 +74,6 @@ def test_an_archive_says_what_is_missing_changed_and_of_nobody(
     ]
     assert unknown_files(file_store, archive)[0] == "ab/ab12.csv"
     assert CheckedArchive(1, (), (), ()).removed == 0
-
-
-def test_files_of_no_recording_are_counted_and_the_first_is_named() -> None:
-    what, remedy = of_no_recording(["ab/1", "cd/2"])
-    assert what == "2 of the archive belong to no recording: ab/1 and others"
-    assert remedy.endswith("`shm ingest archive/ab/1`.")
-    assert of_no_recording(["ab/1"])[0] == "1 of the archive belong to no recording: ab/1"
 
 
 def test_a_refused_file_is_moved_with_its_reason_and_its_sidecar(tmp_path: Path) -> None:

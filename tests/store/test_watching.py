@@ -17,7 +17,7 @@ from shm.store import (
     StoredAlert,
     StoredTest,
 )
-from shm.store.queries.history import list_steps
+from shm.store.journal import list_steps
 from shm.values import Alert, Selection
 from tests.helpers.nouns import (
     NOW,

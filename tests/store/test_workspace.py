@@ -15,7 +15,7 @@ from shm.pipeline import utc_now
 from shm.resources import default_config
 from shm.settings import TABLE, load_settings
 from shm.store import Workspace
-from shm.store.queries.recordings import list_recordings
+from shm.store.recordings import list_recordings
 
 
 def test_a_new_workspace_has_everything_and_opens(tmp_path: Path) -> None:

@@ -52,6 +52,12 @@ def test_a_difference_that_is_only_stated_is_no_miss(rows) -> None:
     assert frequencies.cells(stated)[-1] == "stated"
 
 
+def test_time_of_a_mesh_stands_next_to_the_thesis_s(rows) -> None:
+    timed = replace(rows[0], seconds=1.23, thesis_time="4 to 125 s")
+    assert frequencies.timed_cells(timed)[-2:] == ("1.2 s", "4 to 125 s")
+    assert frequencies.timed_cells(rows[0])[-2:] == ("", "")
+
+
 def test_fixed_ends_that_beat_springs_are_a_miss() -> None:
     evidence = {"beam1": -20.0, "beam2": -20.5, "solid0": -30.0, "solid1": -17.0, "solid2": -16.0}
     chosen = [

@@ -63,12 +63,9 @@ STEP_H = 0.5  # of the weather
 START = datetime(2026, 5, 1, tzinfo=UTC)
 MACHINE_HZ = (8.33, 16.67, 25.0)  # 500, 1000 and 1500 turns a minute; overtones of it
 EVENTS = (
-    "none", "tension_step", "tension_ramp", "retensioned", "springs", "lamp", "clock",
-    "section_loss", "sensor_moved", "broken_wires", "damper",
+    "none", "tension_step", "tension_ramp", "springs", "lamp", "clock", "section_loss",
+    "sensor_moved",
 )  # fmt: skip
-DAMPER_HZ, DAMPER_CLAMP_SHARE = 12.0, 0.25  # Stockbridge: clamp, and messenger with its weights
-WIRES_TO_TENSION = 0.2  # a softer hanger attracts less load: share of the lost wires
-RETENSION_LOSS, RETENSION_DAYS = 0.1, 60.0  # of a new tension, as the joints settle
 
 
 # --------------------------------------------------------------------------------------- beam
@@ -439,15 +436,12 @@ class Event:
     kind          size
     tension_step  fraction of the tension, sign kept; neighbours carry the rest
     tension_ramp  fraction a year
-    retensioned   fraction; a tenth of it comes back within months
     springs       end stiffness becomes this fraction, at `end` ("deck", "arch", "both") and in
                   `plane` ("transverse", "longitudinal", "both")
     lamp          kg at `at_share` of the length
     clock         ALL hangers and operators: the time base reads 1 + size times every frequency
     section_loss  fraction of the area over `length_share` about `at_share`, tension kept
     sensor_moved  new place of the sensor as a share of the length, for this hanger
-    broken_wires  fraction of the wires: EI by as much, tension by a fifth of it
-    damper        kg of a Stockbridge damper at `at_share` (resonance 12 Hz)
     """
 
     kind: str = "none"
@@ -724,15 +718,11 @@ class World:
     def lasting(self, hanger: int, days: Array, event: Event, relaxation: float) -> Array:
         """Tension over that of the start: settlement, relaxation, event."""
         factor = 1 + (self.rates[hanger] - relaxation) * days / 365.25
-        if event.kind in ("tension_step", "tension_ramp", "retensioned", "broken_wires"):
-            since = np.clip(days - event.day, 0, None)
+        if event.kind in ("tension_step", "tension_ramp"):
             course = event.after(days).astype(float)
             if event.kind == "tension_ramp":
-                course = since / 365.25
-            elif event.kind == "retensioned":
-                course *= 1 - RETENSION_LOSS * (1 - np.exp(-since / RETENSION_DAYS))
-            size = -WIRES_TO_TENSION * event.size if event.kind == "broken_wires" else event.size
-            factor = factor * (1 + size * course * self.influence[hanger, event.hanger])
+                course = np.clip(days - event.day, 0, None) / 365.25
+            factor = factor * (1 + event.size * course * self.influence[hanger, event.hanger])
         return np.asarray(factor)
 
 
@@ -857,8 +847,6 @@ def _states(
             for e, end in enumerate(ENDS):
                 if event.end in (end, "both"):
                     springs[e] *= event.size
-        if changed and event.kind == "broken_wires":
-            factor *= 1 - event.size
         masses = []
         if not quiet and people[visit.operator].sensor_kg > 0:
             place = h.sensor_places_m[visit.operator]
@@ -867,8 +855,6 @@ def _states(
             masses.append((people[visit.operator].sensor_kg, place))
         if changed and event.kind == "lamp":
             masses.append((event.size, event.at_share * h.length_m))
-        if changed and event.kind == "damper":
-            masses.append((DAMPER_CLAMP_SHARE * event.size, event.at_share * h.length_m))
         states.append(State(
             visit.truth["tension_n"] if not quiet else visit.truth["partner_n"], float(factor),
             (springs[0], springs[1]), visit.truth["warmer_k"], tuple(masses),
@@ -881,7 +867,7 @@ def _marks(h: Hanger, event: Event, mine: bool) -> tuple[float, ...]:
     marks = list(h.sensor_places_m)
     if h.crossing:
         marks.append(h.crossing[1] * h.length_m)
-    if mine and event.kind in ("lamp", "damper"):
+    if mine and event.kind == "lamp":
         marks.append(event.at_share * h.length_m)
     if mine and event.kind == "sensor_moved":
         marks.append(event.size * h.length_m)
@@ -895,18 +881,16 @@ def reduced(h: Hanger, plane: str, event: Event, mine: bool, count: int) -> Redu
     t = h.tension_n
     states = [State(t, (low + high) / 2), State(0.8 * t, low, (0.3, 0.3))]
     states.append(State(1.2 * t, high, (1.3, 1.3)))
-    if mine and event.kind in ("tension_step", "tension_ramp", "retensioned", "broken_wires"):
+    if mine and event.kind in ("tension_step", "tension_ramp"):
         share = 1 + event.size * (2.0 if event.kind == "tension_ramp" else 1.0)
         states.append(State(float(np.clip(share, 0.2, 3.0)) * t, (low + high) / 2))
     if mine and event.kind == "section_loss":
         states.append(State(t, (low + high) / 2, lost=True))
         states.append(State(0.8 * t, low, (0.3, 0.3), lost=True))
-    if mine and event.kind in ("lamp", "damper"):
+    if mine and event.kind == "lamp":
         states.append(State(t, high, masses=((event.size, event.at_share * h.length_m),)))
     if mine and event.kind == "springs":
         states.append(State(t, high, (max(event.size, 1e-3),) * 2))
-    if mine and event.kind == "broken_wires":
-        states.append(State(t, low * (1 - event.size)))
     return Reduced(beam, states, count)
 
 
@@ -959,16 +943,6 @@ def true_frequencies(
             there = theirs.at(its * partner.length_m, shaped)
             squares.append((2 * np.pi * his) ** 2)
             ties.append((soft, np.concatenate((here, -there), axis=1)))
-        if mine and event.kind == "damper":
-            weight = (1 - DAMPER_CLAMP_SHARE) * event.size
-            since = np.array([[1.0 * (v.day >= event.day)] for v in visits])
-            here = own.at(event.at_share * h.length_m, shapes) * since
-            others = [np.zeros((len(visits), part.shape[1])) for part in squares[1:]]
-            free = -since / np.sqrt(weight)
-            squares.append(np.zeros((len(visits), 1)))
-            ties = [(k, np.concatenate((v, np.zeros_like(free)), axis=1)) for k, v in ties]
-            tie = np.concatenate((here, *others, free), axis=1)
-            ties.append((weight * (2 * np.pi * DAMPER_HZ) ** 2, tie))
         result = hz[:, :orders]
         if ties:
             result = _coupled(np.concatenate(squares, axis=1), ties, orders)
@@ -1118,8 +1092,6 @@ def _measure(
                 read *= 1 + n.scatter * relative * float(np.clip(errors[k, p, o], -12, 12))
                 believed = relative * person.optimism * np.exp(0.2 * n.operators * stated[k, p, o])
                 ratio = 0.004 * truth["amplitude"] ** 0.2 * np.exp(0.35 * damping[k, p, o])
-                if event.kind == "damper" and i == event.hanger and visit.day >= event.day:
-                    ratio *= 3
                 modes.append({
                     "plane": plane, "order": o + 1, "frequency_hz": float(read),
                     "frequency_sd_hz": float(table[k, p, o] * believed),

@@ -21,6 +21,8 @@ from tests.worlds.living_bridge import (
     truth,
 )
 
+pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
+
 START = datetime(2026, 5, 4, 9, tzinfo=UTC)
 QUIET = HourlyFlags(**{n: False for n in HourlyFlags.__dataclass_fields__ if n != "scatter"})
 

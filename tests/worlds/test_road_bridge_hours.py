@@ -17,6 +17,8 @@ from tests.worlds.road_bridge_hours import (
 from tests.worlds.road_bridge_seasons import bridge
 from tests.worlds.tensioned_bars import PLANES, Masses, Plane
 
+pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
+
 DAYS = 30 / 365.25
 AT = EPOCH + timedelta(days=15)
 

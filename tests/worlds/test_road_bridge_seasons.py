@@ -18,6 +18,8 @@ from tests.worlds.road_bridge_seasons import (
 )
 from tests.worlds.tensioned_bars import PLANES, Plane
 
+pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
+
 QUIET = Event()
 DAY = 540.0
 

@@ -8,6 +8,8 @@ from scipy.optimize import brentq
 
 from tests.worlds import struck_bar as world
 
+pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
+
 SHORT = world.Crew(
     hits=1, ring_s=1.5, noise_m_s2=0.0, noise_n=0.0, gain=0.0, place_m=0.0, turned_deg=0.0
 )

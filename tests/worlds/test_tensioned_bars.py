@@ -11,6 +11,8 @@ from scipy.special import jv, yv
 
 from tests.worlds.tensioned_bars import GRAVITY, PLANES, Bar, Plane, Stretch
 
+pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
+
 ROUND = Bar(
     length_m=8.0,
     modulus_pa=205e9,

@@ -16,7 +16,7 @@ differences of temperature between members make forces.  It is linear, therefore
 where T_ref is the tension at 10 deg C without traffic.  Any T_ref is in equilibrium (n hangers
 can be shortened by n amounts; arch and tie bend).  A hanger that loses tension alone (slip, creep,
 a turned nut) is one that got longer: its neighbours gain C_ji/C_ii times the loss, C being the
-tensions from unit elongations.  A lost hanger is one elongated until it carries nothing, always.
+tensions from unit elongations.
 
 Temperatures.  Air: season, weather of some days (AR(1)), day and night; sun from the sun's height
 at 50 deg north and a clearness of the day.  Each member is a first-order lag with a sun excess:
@@ -46,7 +46,7 @@ seed differ only by what was switched, and by the event.
 
 import math
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
@@ -66,14 +66,11 @@ KINDS = (
     "none",
     "tension_step",  # size: fraction of its tension at 10 deg C, e.g. -0.03
     "tension_ramp",  # size: fraction a year
-    "retensioned",  # size: fraction; the crew turned the nut: the joint sits anew as well
     "springs",  # size: factor on the spring constant, at `end`, in `planes`
     "lamp",  # size: kg, at `place`
     "section_loss",  # size: lost part of the area, around `place` over `extent`; tension kept
     "sensor_moved",  # size: kg of the new sensor, at `place`
     "clock",  # size: 0.002 reads all frequencies of all hangers 0.2 % high
-    "neighbour_swap",  # `hanger` and `other` exchanged in the records
-    "hanger_lost",  # no tests of it any more, the frame hands its load on
 )
 REFERENCE_C = 10.0
 GRAVITY = 9.81
@@ -156,7 +153,6 @@ class Event:
     extent: float = 0.1  # share of the length
     end: str = "deck"  # or arch, both
     planes: tuple[str, ...] = PLANES
-    other: int = 0  # of neighbour_swap; 0: the neighbour
 
     def __post_init__(self) -> None:
         if (
@@ -815,15 +811,6 @@ class HangerSeason:
     visits: list[dict[str, Any]]
     truth: dict[str, Any]
 
-    def document(self) -> dict[str, Any]:
-        """The visits as an exchange document."""
-        return {"schema": "shm.modes/1", "hanger": self.description["id"], "tests": self.visits}
-
-    def toml(self) -> str:
-        """The description as a [[hanger]] table."""
-        lines = [f"{key} = {value!r}" for key, value in self.description.items()]
-        return "\n".join(["[[hanger]]", *lines]) + "\n"
-
 
 @dataclass(frozen=True)
 class Season:
@@ -886,10 +873,10 @@ def _reference_tensions(
     b: Bridge,
     influences: list[_Influence],
     event: Event,
-    relaxation: float | Mapping[int, float],
+    relaxation: float,
     day: Array,
 ) -> Array:
-    """(round, hanger): tensions at 10 deg C without traffic; a lost hanger not yet taken out."""
+    """(round, hanger): tensions at 10 deg C without traffic."""
     built = np.array([h.tension_n for h in b.hangers])
     out = np.tile(built, (len(day), 1))
 
@@ -899,28 +886,11 @@ def _reference_tensions(
         mates = [g.number - 1 for g in b.hangers if g.side == h.side]
         out[:, mates] += np.outer(part * h.tension_n, c / c[h.index])
 
-    if isinstance(relaxation, Mapping):
-        for number, rate in relaxation.items():
-            alone(number, -rate * day / YEAR_D)
-    else:
-        out -= np.outer(relaxation * day / YEAR_D, built)
-    after = day >= event.day
-    if event.kind in ("tension_step", "retensioned"):
-        alone(event.hanger, event.size * after)
+    out -= np.outer(relaxation * day / YEAR_D, built)
+    if event.kind == "tension_step":
+        alone(event.hanger, event.size * (day >= event.day))
     elif event.kind == "tension_ramp":
         alone(event.hanger, event.size * np.maximum(day - event.day, 0) / YEAR_D)
-    return out
-
-
-def _without(
-    b: Bridge, influences: list[_Influence], number: int, tensions: Array, after: NDArray[np.bool_]
-) -> Array:
-    """Tensions (visit, hanger) with one hanger gone: elongated until it carries nothing."""
-    h = b.hangers[number - 1]
-    c = influences[h.side].longer[:, h.index]
-    mates = [g.number - 1 for g in b.hangers if g.side == h.side]
-    out = tensions.copy()
-    out[:, mates] -= np.outer(tensions[:, number - 1] * after, c / c[h.index])
     return out
 
 
@@ -929,14 +899,13 @@ def season(
     hangers: int = 20,
     years: float = 3.0,
     event: Event | None = None,
-    relaxation_per_year: float | Mapping[int, float] = 0.0,
+    relaxation_per_year: float = 0.0,
     nuisances: Nuisances | None = None,
 ) -> Season:
     """Return some years of hammer tests on all hangers of a bridge.
 
     `hangers` counts both sides (1 .. n of side 0, the rest of side 1, from the left).  A relaxation
-    of 0.01 takes 1 % of the built tension of all hangers a year (the tie takes what they leave);
-    a mapping names single hangers, whose neighbours then gain by the frame.
+    of 0.01 takes 1 % of the built tension of all hangers a year (the tie takes what they leave).
     """
     n, event = nuisances or Nuisances(), event or Event()
     b = bridge(seed, hangers, n)
@@ -948,23 +917,12 @@ def season(
     rounds = _rounds(seed, years, n)
     count = len(rounds.day)
     common = _common(seed, rounds, n)
-    swapped = {}
-    if event.kind == "neighbour_swap":
-        other = event.other or b.neighbour(event.hanger)
-        swapped = {event.hanger: other, other: event.hanger}
     # One batch of visits for each hanger in the records; who was really tested, visit by visit.
     plans = [_plan(seed, h, rounds, common, n) for h in b.hangers]
     for plan in plans:
         number = plan["hanger"]
         tested = np.full(count, number)
-        if number in swapped:
-            tested[plan["day"] >= event.day] = swapped[number]
         tested[plan["astray"]] = b.neighbour(number)
-        if event.kind == "hanger_lost":
-            after = plan["day"] >= event.day
-            tested[(tested == event.hanger) & after] = number
-            if number == event.hanger:
-                plan["done"] = plan["done"] & ~after
         plan["tested"] = tested
         plan |= _tensions(b, influences, sky, event, relaxation_per_year, plan)
     shape = (count, 2, SOLVED)
@@ -975,7 +933,7 @@ def season(
     share = float(_rng(seed, "mistaken").uniform(*n.mistaken))
     tones = np.sort(_rng(seed, "tones").uniform(4, 60, 4))  # pumps, fans, a crossing line
     first = datetime(2022, 1, 1, tzinfo=UTC) + timedelta(days=start)
-    concerned = _concerned(b, influences, event, swapped)
+    concerned = _concerned(b, influences, event)
     out = {
         h.number: _record(
             seed, h, plan, common, rounds, n, (share, tones, first), event, concerned[h.number]
@@ -1058,7 +1016,7 @@ def _tensions(
     influences: list[_Influence],
     sky: Weather,
     event: Event,
-    relaxation: float | Mapping[int, float],
+    relaxation: float,
     plan: dict[str, Any],
 ) -> dict[str, Any]:
     """Tensions of all hangers at the visits of one (the frame is one body), and temperatures."""
@@ -1086,10 +1044,6 @@ def _tensions(
         traffic[:, at] += (plan["van"] * lane)[:, None] * lines
         traffic[:, at] += np.outer(plan["cars"] * cars, i.line)
     total = reference + thermal + traffic
-    if event.kind == "hanger_lost":
-        after = day >= event.day
-        total = _without(b, influences, event.hanger, total, after)
-        reference = _without(b, influences, event.hanger, reference, after)
     return {
         "total": np.maximum(total, 1e3),  # a rod that goes slack hangs by its own weight
         "reference": reference,
@@ -1124,9 +1078,6 @@ def _solve(seed: int, h: Hanger, plans: list[dict[str, Any]], event: Event, n: N
                 for e, end in enumerate(ENDS):
                     if plane in event.planes and event.end in (end, "both"):
                         springs[after, p, e] *= event.size
-        elif event.kind == "retensioned" and n.seating_sd > 0:
-            anew = _rng(seed, "anew", h.number).uniform(0.85, 1.15, (2, 2))
-            springs[after] *= anew
         elif event.kind == "sensor_moved":
             scatter = at - h.sensor_at_m
             kg = np.where(after, event.size, kg)
@@ -1290,31 +1241,22 @@ def _record(
         "springs_nm_rad": h.springs.tolist(),
         "visits": rows,
         "mistaken": mistaken,
-        "wrong_hanger_tests": [r["test"] for r, astray in _astray(rows, plan) if astray],
     }
     return HangerSeason(dict(h.description), visits, truth)
 
 
-def _astray(rows: list[dict[str, Any]], plan: dict[str, Any]) -> list[tuple[dict[str, Any], bool]]:
-    strayed = {float(d) for d, a in zip(plan["day"], plan["astray"], strict=True) if a}
-    return [(row, row["day"] in strayed and row["tested_hanger"] != plan["hanger"]) for row in rows]
-
-
-def _concerned(
-    b: Bridge, influences: list[_Influence], event: Event, swapped: dict[int, int]
-) -> dict[int, str]:
+def _concerned(b: Bridge, influences: list[_Influence], event: Event) -> dict[int, str]:
     """Which hangers an event moves: "event", "frame" (tension by more than 0.1 %) or ""."""
     out = {h.number: "event" if event.kind == "clock" else "" for h in b.hangers}
     if event.kind == "none":
         return out
     own = b.hangers[event.hanger - 1]
-    part = -1.0 if event.kind == "hanger_lost" else event.size
-    if event.kind in ("tension_step", "tension_ramp", "retensioned", "hanger_lost"):
+    if event.kind in ("tension_step", "tension_ramp"):
         c = influences[own.side].longer[:, own.index]
         for h in (h for h in b.hangers if h.side == own.side):
-            change = part * own.tension_n * c[h.index] / c[own.index] / h.tension_n
+            change = event.size * own.tension_n * c[h.index] / c[own.index] / h.tension_n
             out[h.number] = "frame" if abs(change) > 1e-3 else ""
-    return out | dict.fromkeys((event.hanger, *swapped), "event")
+    return out | {event.hanger: "event"}
 
 
 def _mistake(

@@ -1,33 +1,30 @@
 """A hook that is a program of the owner's: it gets the alert as JSON on its standard input. No
-shell, a bare environment, a time limit; it is ended with every process that it began.
+shell, a bare environment, a time limit; it is ended with the processes of its session.
 """
 
 from __future__ import annotations
 
-import logging
 import os
 import selectors
 import shutil
+import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import IO
 
 from shm.bridge import CommandHook
 from shm.documents import dump
 from shm.values import Alert, printable
-from shm_daemon.hooks import reaper
 from shm_daemon.hooks.contract import SHOWN_CHARACTERS, DeliveryContext, HookFailed
 
 _PASSED_ON = ("PATH", "HOME", "LANG")
 
-log = logging.getLogger(__name__)
-
 
 class Processes:
-    """Runs programs in the workspace's folder, each with a process that ends all it began."""
+    """Runs programs in the workspace's folder, each in a session of its own."""
 
     def __init__(self, surroundings: DeliveryContext):
         self.surroundings = surroundings
@@ -41,30 +38,19 @@ class Processes:
     def run(self, command: Sequence[str], message: bytes, variables: Mapping[str, str]) -> str:
         """Run a program with ``message`` on its standard input; return the end of its stdout.
 
-        When it ends, or its time is over, every process that it began is ended. Raises HookFailed
-        with the end of what it wrote on stderr.
+        When it ends, or its time is over, the processes of its session are ended. Raises
+        HookFailed with the end of what it wrote on stderr.
         """
-        report, its_end = os.pipe()
-        with os.fdopen(report, "rb", buffering=0) as file:
-            try:
-                process = self._begin(command, variables, its_end)
-            finally:
-                os.close(its_end)
-            try:
-                answer, errors = exchange(process, message, self._timeout_s)
-            except subprocess.TimeoutExpired:
-                raise HookFailed(
-                    f"ended after {self._timeout_s:g} s.",
-                    remedy="Make it quicker, or raise hook_timeout_seconds.",
-                ) from None
-            finally:
-                self._end(process)
-            os.set_blocking(report, False)
-            trouble = (file.read() or b"").decode(errors="replace")
-        if trouble.startswith("cannot be run"):
-            raise HookFailed(f"{trouble}.", remedy="Check its path.")
-        if trouble:
-            log.warning("a hook has ended, but %s", trouble)
+        process = self._begin(command, variables)
+        try:
+            answer, errors = exchange(process, message, self._timeout_s)
+        except subprocess.TimeoutExpired:
+            raise HookFailed(
+                f"ended after {self._timeout_s:g} s.",
+                remedy="Make it quicker, or raise hook_timeout_seconds.",
+            ) from None
+        finally:
+            self._end(process)
         if process.returncode != 0:
             raise HookFailed(
                 f"exit code {process.returncode}: {_show_end(errors) or 'no message'}",
@@ -77,19 +63,17 @@ class Processes:
         with self._lock:
             self._closed = True
             for process in self._running:
-                process.terminate()
+                _kill_session(process)
 
     def _begin(
-        self, command: Sequence[str], variables: Mapping[str, str], report: int
+        self, command: Sequence[str], variables: Mapping[str, str]
     ) -> subprocess.Popen[bytes]:
-        # -I, -S: nothing of the environment or the folder is imported, and it begins quickly.
-        runner = [sys.executable, "-I", "-S", reaper.__file__, str(report), str(os.getpid())]
         with self._lock:
             if self._closed:
                 raise HookFailed("not begun: the daemon is ending.")
             try:
                 process = subprocess.Popen(  # noqa: S603 - the owner's own command, no shell
-                    [*runner, *command],
+                    command,
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.PIPE,
@@ -97,27 +81,25 @@ class Processes:
                     cwd=self.folder,
                     env={**self._environment, **variables},
                     start_new_session=True,
-                    pass_fds=(report,),
                 )
             except (OSError, ValueError) as error:
                 raise HookFailed(f"cannot be run: {error}.", remedy="Check its path.") from error
             self._running.add(process)
             return process
 
-    def _end(self, process: subprocess.Popen[bytes], grace_s: float = 15.0) -> None:
-        """End a program that has not ended by itself, with all processes that it began."""
-        process.terminate()
-        try:
-            process.wait(grace_s)
-        except subprocess.TimeoutExpired:
-            log.warning("the process that runs a hook did not end in %g s: killed", grace_s)
-            process.kill()
+    def _end(self, process: subprocess.Popen[bytes]) -> None:
         with self._lock:
+            _kill_session(process)
             self._running.discard(process)
         for stream in (process.stdin, process.stdout, process.stderr):
             if stream is not None:
                 stream.close()
         process.wait()
+
+
+def _kill_session(process: subprocess.Popen[bytes]) -> None:
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
 
 
 def exchange(
@@ -143,7 +125,7 @@ def exchange(
             if left_s <= 0:
                 raise subprocess.TimeoutExpired(process.args, timeout_s)
             ended = process.poll() is not None
-            # A process of another user's may live on and hold a stream open: look now and then.
+            # A process of another session may live on and hold a stream open: look now and then.
             ready = waiting.select(0 if ended else min(left_s, 0.5))
             if ended and not ready:
                 break

@@ -13,8 +13,8 @@ from shm.errors import ShmError
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report.formatting import counted, listed
 from shm.report.hanger_status import QUIET, Status, bridge_message
-from shm.store.queries.alerts import count_alerts
-from shm.store.queries.recordings import list_holds
+from shm.store.alerts import count_alerts
+from shm.store.recordings import list_holds
 from shm.values.messages import URGENCIES, Lead, Urgency
 from shm_daemon.web.health import notices, troubles
 from shm_daemon.web.site import Site

@@ -6,9 +6,8 @@ the elevation are in drawing units; upwards is less y.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cached_property
 
@@ -19,7 +18,7 @@ from shm.pipeline.bridge_reporting import hanger_shifts, hanger_summaries
 from shm.report import formatting
 from shm.report.hanger_status import BridgeMessage, Status, bridge_message
 from shm.report.hanger_summary import HangerSummary
-from shm.values import NAN, Hanger
+from shm.values import Hanger
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
 from shm_daemon.web.background_work import background_worker_of
@@ -122,13 +121,7 @@ def summarize_hangers(site: Site, now: datetime) -> BridgeGlance:
 def compared(request: Request, site: Site) -> Compared | None:
     """Return the changes over the bridge; None while they are computed."""
     order = tuple(hanger.id for hanger in site.workspace.bridge.hangers)
-    # One NaN, which equals itself, where a change of temperature is not known.
-    shifts = tuple(
-        shift if math.isfinite(shift.temperature_change_k)
-        else replace(shift, temperature_change_k=NAN)
-        for shift in hanger_shifts(site.store, order)
-    )  # fmt: skip
-    wanted = Comparison(shifts, order)
+    wanted = Comparison(hanger_shifts(site.store, order), order)
     if len(order) <= QUICKLY_COMPARED:
         return wanted.make()
     found: Compared | None = background_worker_of(request).get_or_start(wanted)

@@ -25,7 +25,7 @@ from shm.report import formatting
 from shm.report.as_html import ENVIRONMENT as OF_REPORTS
 from shm.report.as_html import environment
 from shm.report.figures.style import PALETTE
-from shm.store.queries.alerts import count_alerts
+from shm.store.alerts import count_alerts
 from shm_daemon.web.commands import set_reader, with_links, without_commands
 from shm_daemon.web.health import notices
 from shm_daemon.web.site import Site

@@ -26,13 +26,13 @@ from shm.store import (
     TrendPoint,
     Workspace,
 )
-from shm.store.queries.alerts import list_hanger_events
-from shm.store.queries.hangers import (
+from shm.store.alerts import list_hanger_events
+from shm.store.posteriors import list_trend
+from shm.store.tests import list_watched_tests
+from shm.store.watch import (
     list_baselines_in_force,
     list_detections,
 )
-from shm.store.queries.trends import list_trend
-from shm.store.queries.watching import list_watched_tests
 from shm.values import Hanger
 from shm.values.notes import Note
 from shm_daemon.web.access import AtSite

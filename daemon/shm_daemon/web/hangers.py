@@ -20,10 +20,10 @@ from shm.report.formatting import Interval
 from shm.report.states import StatesOverTime, called_words
 from shm.store import DeliveryState, StoredWatch, TestRow
 from shm.store import TrendPoint as StoredPoint
-from shm.store.queries.alerts import count_alerts, count_deliveries, list_hanger_events
-from shm.store.queries.recordings import count_stages
-from shm.store.queries.tests import count_tests, list_test_rows
-from shm.store.queries.trends import list_trend
+from shm.store.alerts import count_alerts, count_deliveries, list_hanger_events
+from shm.store.posteriors import list_trend
+from shm.store.recordings import count_stages
+from shm.store.tests import count_tests, list_test_rows
 from shm.values import Hanger
 from shm.values.rounding import ForceUnit, force_unit
 from shm_daemon.heartbeat import seconds_since_beat

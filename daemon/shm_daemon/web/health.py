@@ -14,11 +14,10 @@ from typing import Any
 
 from shm.errors import ShmError, sentence
 from shm.pipeline import utc_now
-from shm.pipeline.stream_health import backlog_leads, heard, leads_of, ring_leads, stream_leads
-from shm.store.queries.alerts import count_alerts
-from shm.store.queries.recordings import list_holds
-from shm.store.queries.tests import count_tests
-from shm.store.stored_alerts import describe_silence
+from shm.pipeline.stream_health import backlog_leads, heard, leads_of, stream_leads
+from shm.store.alerts import count_alerts, describe_silence
+from shm.store.recordings import list_holds
+from shm.store.tests import count_tests
 from shm.values.messages import Lead
 from shm_daemon.heartbeat import (
     NEARLY_FULL,
@@ -148,9 +147,8 @@ def _streams(site: Site) -> Sequence[Lead]:
 
 
 def _backlog(site: Site) -> Sequence[Lead]:
-    """Return what is not read of the streams, and that the ring is larger than described."""
-    found = heard(site.workspace, site.store, utc_now())
-    return [*backlog_leads(found), *ring_leads(site.workspace)]
+    """Return what is not read of the streams."""
+    return [*backlog_leads(heard(site.workspace, site.store, utc_now()))]
 
 
 def _store(site: Site) -> list[str]:

@@ -31,8 +31,8 @@ from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.publishing import HANGER, summary_fields
 from shm.pipeline.stream_state import StreamCondition, stream_states
 from shm.store import Workspace
-from shm.store.queries.alerts import count_alerts, count_deliveries
-from shm.store.queries.recordings import count_stages, find_oldest_waiting, list_stage_seconds
+from shm.store.alerts import count_alerts, count_deliveries
+from shm.store.recordings import count_stages, find_oldest_waiting, list_stage_seconds
 from shm.store.ring import ring_of
 from shm.store.rows import ON_THE_WAY
 from shm_daemon.heartbeat import seconds_since_beat

@@ -32,7 +32,7 @@ from shm.report.modal_test_report import conditions, dropped, hits, summary
 from shm.report.paper import Table
 from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
 from shm.store.archive import MODES_SUFFIX
-from shm.store.queries.tests import load_frequency_response
+from shm.store.tests import load_frequency_response
 from shm_daemon.web import with_plotly
 from shm_daemon.web.background_work import BackgroundWorker
 

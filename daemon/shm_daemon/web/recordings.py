@@ -22,8 +22,8 @@ from shm.pipeline import utc_now
 from shm.read.chunk_document import LARGEST_BYTES, refuse_long_chunk
 from shm.store import Stage, Store, StoredRecording
 from shm.store.archive import refuse_oversize
-from shm.store.queries.history import list_former_tests
-from shm.store.queries.recordings import find_by_checksum, find_discard
+from shm.store.journal import list_former_tests
+from shm.store.recordings import find_by_checksum, find_discard
 from shm_daemon.spool import Incoming, Landed, landing_name
 from shm_daemon.streams import take_chunks
 from shm_daemon.web.access import AtSite, Reader, Uploader

@@ -16,7 +16,7 @@ from typing import Any
 from shm.errors import BadInput, NothingThere, ShmError, StoreError
 from shm.store import Store, Workspace
 from shm.store.people import same_name
-from shm.store.queries.recordings import list_holds
+from shm.store.recordings import list_holds
 from shm.values import Hanger
 from shm_daemon.web.address import Address, network_of
 

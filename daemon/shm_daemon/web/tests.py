@@ -15,8 +15,8 @@ from shm.report import formatting
 from shm.report.paper import Table
 from shm.report.shared_tables import overall
 from shm.store import FormerPosterior, FormerTest, Step
-from shm.store.queries.history import list_former_tests, list_steps
-from shm.store.queries.tests import find_neighbours
+from shm.store.journal import list_former_tests, list_steps
+from shm.store.tests import find_neighbours
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import name_in
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of

@@ -6,13 +6,11 @@ the method of averaging (Nayfeh and Mook 1979, chapter 2),
 
     phase = phase_0 + 2 pi (f0 - f) t + 2 pi f0 c integral of g(A / A_hit) dt,
 
-linear in f0 - f and c. A drift turns the phase of the ring-down that begins at the fraction tau of
-the way from the first hit to the last by 2 pi f drift (tau - 1/2) t more. Phases and amplitudes A
-come from stretches of the ring-downs, in each of which the found poles and shapes are fitted to all
-channels by least squares. Laws g are friction
-(A), stretching (A^2) and joints that slip no further (A / (A + h)), averaged by how well they fit:
-where a ring-down ends before it is small, they differ in the limit of zero, and the interval
-widens.
+linear in f0 - f and c. Phases and amplitudes A come from stretches of the ring-downs, in
+each of which the found poles and shapes are fitted to all channels by least squares. Laws g are
+friction (A), stretching (A^2) and joints that slip no further (A / (A + h)), averaged by how well
+they fit: where a ring-down ends before it is small, they differ in the limit of zero, and the
+interval widens.
 """
 
 from __future__ import annotations
@@ -32,7 +30,6 @@ from shm.identify.estimation.courses import (
     course_of,
     phases_of,
 )
-from shm.identify.estimation.drift import hit_shares, with_drift
 from shm.identify.estimation.spread import are_sure, widening
 from shm.values import NAN, FloatArray
 from shm.values.modes import MOST_SLOPE, SURE_SDS
@@ -68,7 +65,7 @@ _WORST = 1e10  # technical: of the condition, so that six digits are left
 
 @dataclass(frozen=True)
 class _Fit:
-    """Hold what the phases of one mode give; of one hit, that of `drift` is not known.
+    """Hold what the phases of one mode give.
 
     `left` is the relative change of the frequency that is left where the ring-downs end.
     """
@@ -80,8 +77,6 @@ class _Fit:
     left: float
     misfit: float
     freedom: int
-    drift: float
-    drift_sd: float
 
 
 def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Finding:
@@ -95,8 +90,7 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
         course_of(decay, found.modes, measurement.sampling_rate_hz) for decay in measurement.decays
     ]
     leads_s = _leads_s(measurement)
-    shares = hit_shares([hit for hit in measurement.hits if hit.used])
-    fits = [_fits(mode, index, courses, leads_s, shares) for index, mode in enumerate(found.modes)]
+    fits = [_fits(mode, index, courses, leads_s) for index, mode in enumerate(found.modes)]
     slopes = np.array([(NAN, NAN) if fit is None else (fit.slope, fit.slope_sd) for fit in fits])
     sure = are_sure(*slopes.T)
     shifts = [
@@ -112,8 +106,7 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
         _unlike(_with_slope(mode, fit, bool(is_sure), expected, usual), index, courses, mode)
         for index, (mode, fit, is_sure) in enumerate(zip(found.modes, fits, sure, strict=True))
     )
-    drifts = [(fit.drift, fit.drift_sd) for fit in fits if fit is not None and fit.drift_sd > 0]
-    return with_drift(replace(found, modes=modes), drifts)
+    return replace(found, modes=modes)
 
 
 def _with_slope(
@@ -170,7 +163,6 @@ def _fits(
     index: int,
     courses: Sequence[RingDownCourse],
     leads_s: Sequence[float],
-    shares: FloatArray,
 ) -> _Fit | None:
     """Return the estimate averaged over the laws; None where too little of the phase is known."""
     decay = 2 * math.pi * mode.frequency_hz * mode.damping_ratio
@@ -182,9 +174,7 @@ def _fits(
     leads = np.array(leads_s)[at]
     starts = np.array([size[0] for *_, size in rows])
     at_hit = float(np.median(starts * np.exp(decay * leads)))
-    laws = [
-        _fit(mode, [_through(row, decay, law, at_hit) for row in rows], shares[at]) for law in LAWS
-    ]
+    laws = [_fit(mode, [_through(row, decay, law, at_hit) for row in rows]) for law in LAWS]
     fit = _averaged([law for law in laws if law is not None])
     if fit is None:
         return None
@@ -268,11 +258,8 @@ def _through(row: Row, decay: float, law: _Law, at_hit: float) -> _Grown:
     return time_s, phase, sd, grown[::_FINE], float(height[-1])
 
 
-def _fit(mode: FoundMode, rows: Sequence[_Grown], shares: FloatArray) -> _Fit | None:
-    """Fit a phase for each ring-down, and shift and slope for all, by weighted least squares.
-
-    The drift is what then best explains the rest.
-    """
+def _fit(mode: FoundMode, rows: Sequence[_Grown]) -> _Fit | None:
+    """Fit a phase for each ring-down, and shift and slope for all, by weighted least squares."""
     count, turns = len(rows), 2 * np.pi * mode.frequency_hz
     time_s, values, sds, grown = (np.concatenate([row[n] for row in rows]) for n in range(4))
     of_row = np.repeat(np.arange(count), [len(row[0]) for row in rows])
@@ -289,13 +276,9 @@ def _fit(mode: FoundMode, rows: Sequence[_Grown], shares: FloatArray) -> _Fit | 
     inverse = np.linalg.inv(square) / np.outer(scale, scale)
     solved = inverse @ (weighted.T @ (values * weight))
     left_over = values * weight - weighted @ solved
-    late = weight * turns * shares[of_row] * time_s
-    late = late - weighted @ (inverse @ (weighted.T @ late))
-    drift = float(late @ left_over / (late @ late)) if np.ptp(shares) > 0 else 0.0
-    steady = float(np.sum((left_over - drift * late) ** 2))
-    if steady > (_MAX_MISFIT * np.linalg.norm(weight)) ** 2:
-        return None
     misfit = float(left_over @ left_over)
+    if misfit > (_MAX_MISFIT * np.linalg.norm(weight)) ** 2:
+        return None
     chance = math.sqrt(max(1.0, misfit / freedom)) * OVERLAP
     by_hits = _by_ring_downs(weighted, left_over, inverse, rows)
     spread = np.fmax(np.sqrt(np.diag(inverse)) * chance * widening(freedom), by_hits)
@@ -308,10 +291,6 @@ def _fit(mode: FoundMode, rows: Sequence[_Grown], shares: FloatArray) -> _Fit | 
         left=slope * float(np.median([row[4] for row in rows])),
         misfit=misfit,
         freedom=freedom,
-        drift=drift,
-        drift_sd=OVERLAP * math.sqrt(max(1.0, steady / freedom) / (late @ late))
-        if np.ptp(shares) > 0
-        else NAN,
     )
 
 

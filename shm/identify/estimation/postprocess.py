@@ -16,7 +16,6 @@ import numpy as np
 from shm.identify.contract import Dropped, Finding, FoundMode, Measurement
 from shm.identify.estimation.amplitude_dependence import with_amplitude_dependence
 from shm.identify.estimation.shapes import modal_assurance
-from shm.identify.measuring.responses import recorded_window_rate
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
 
@@ -29,17 +28,7 @@ def postprocess(found: Finding, measurement: Measurement, options: IdentifyOptio
     Frequencies have their dependence on amplitude.
     """
     found = coherent_only(without_window(found, measurement), measurement, options)
-    return _unsure_of_damping(with_amplitude_dependence(found, measurement), measurement)
-
-
-def _unsure_of_damping(found: Finding, measurement: Measurement) -> Finding:
-    """Return the finding with an analyser's possible window as uncertainty of the damping."""
-    rate = recorded_window_rate(measurement)
-    modes = tuple(
-        replace(m, damping_sd=math.hypot(m.damping_sd, rate / (2 * math.pi * m.frequency_hz)))
-        for m in found.modes
-    )
-    return replace(found, modes=modes) if rate else found
+    return with_amplitude_dependence(found, measurement)
 
 
 def without_window(found: Finding, measurement: Measurement) -> Finding:

@@ -22,12 +22,6 @@ errors 8 times those around them."""
 _FIT_SAMPLES = 600
 _BLOCK = 16
 _AROUND = 25
-_FIRST = 0.3  # judgement: of the largest error; a jump is in all 128 predictions after it
-_MOST_LOST, _COMPARED = 256, 64  # judgement: of a prediction that noise does not spoil
-_AS_PREDICTED = 0.2
-"""Of the motion's energy after a jump, unexplained as later motion: 0.07 at most where 1 to 200
-samples were lost in 15 ring-downs; a knock of a tenth or all of a hit's strength left 0.4 and more,
-or nothing was better than no jump, in 18."""
 _RIDGE = 1e-9  # judgement: 90 dB below the signal, beneath the noise of recordings
 
 
@@ -43,28 +37,6 @@ def surprise(ring_downs: Sequence[FloatArray]) -> FloatArray:
         return np.full(len(ring_downs), np.nan)
     rule = prediction_rule(long_enough)
     return np.array([_worst(part, rule) for part in ring_downs])
-
-
-def is_cut_short(ring: FloatArray) -> bool:
-    """Return whether samples are lost at a jump of all channels, (channels, samples).
-
-    After it they continue as they would some samples later. After a knock they do not.
-    """
-    rules = [prediction_rule([row]) for row in ring]
-    errors = [
-        np.abs(np.convolve(row, rule, mode="valid")) for row, rule in zip(ring, rules, strict=True)
-    ]
-    firsts = [int(np.argmax(error > _FIRST * error.max())) for error in errors]
-    jump = int(np.median(firsts)) + _ORDER
-    after = ring[:, jump : jump + _COMPARED]
-    unlike = np.zeros(_MOST_LOST)
-    for row, rule, seen in zip(ring, rules, after, strict=True):
-        ahead = list(row[jump - _ORDER : jump])
-        for _ in range(_MOST_LOST + len(seen)):
-            ahead.append(-float(rule[:0:-1] @ ahead[-_ORDER:]))
-        later = sliding_window_view(np.array(ahead[_ORDER:]), len(seen))[:_MOST_LOST]
-        unlike += np.sum((later - seen) ** 2, axis=1) / np.sum(seen**2) / len(ring)
-    return bool(unlike[1:].min() < min(_AS_PREDICTED, unlike[0] / 2))
 
 
 def knocked_at(ring_downs: Sequence[FloatArray], number: int, limit: float) -> int:

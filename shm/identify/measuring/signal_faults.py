@@ -9,7 +9,7 @@ import numpy as np
 
 from shm.identify.measuring.band import RATE_OVER_BAND, thinned
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
-from shm.identify.measuring.prediction import is_cut_short, knocked_at, surprise
+from shm.identify.measuring.prediction import knocked_at, surprise
 from shm.identify.options import IdentifyOptions
 from shm.values import PLANES, BoolArray, Channel, FloatArray, Plane
 
@@ -24,8 +24,7 @@ COPY = "cable fault: a copy of another channel"
 DEAD = "its value never changes: dead sensor or cable"
 SILENT = "cable fault: less than a thousandth of the other channels"
 HITS_NOT_SHOWN = "cable fault: without the hits that the motion shows"
-LOST = "drop-out: samples are lost, the motion jumps to what it would be later"
-KNOCK = "disturbed: something other than the hammer struck"
+KNOCK = "disturbed: something other than the hammer struck, or samples are lost"
 OUTLIER = "outlier: its response is unlike that of the other hits"
 FEWEST_TO_COMPARE = 3
 """Of two that differ nobody can say which is right."""
@@ -76,10 +75,6 @@ def faults_of_channels(
     free, step = _thin(ring_downs, sampling_rate_hz, options)
     _add(faults, _wanders(free, faults, sampling_rate_hz / step))
     _add(faults, _surprises(free, faults, [channel.plane for channel in channels]))
-    for r, names in zip(ring_downs, faults, strict=True):
-        ring = r.accelerations[:, r.free + RINGING_SAMPLES : r.pulse.stop - RINGING_SAMPLES]
-        if KNOCK in names and is_cut_short(ring[[name == KNOCK for name in names]]):
-            names[:] = [LOST if name == KNOCK else name for name in names]
     return faults
 
 

@@ -1,4 +1,4 @@
-"""Check records without hits: unsteady, drowned in noise, or with unexplained peaks."""
+"""Check records without hits: unsteady, or drowned in noise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from shm.identify.contract import Measurement
 from shm.identify.measuring.ambient import LOUD, loudness
 from shm.identify.quality.table import Inspection, Reading, Row
 from shm.values import NAN, FloatArray, Recording
-from shm.values.rounding import listed
 
 _UNSTEADY, _STRETCH_S = 2.5, 5.0
 """Loudest stretch over the median: in 36 records of steady wind up to 2.0, in 11 of 12 with trucks
@@ -20,9 +19,7 @@ _LEAST_DB = 10.0
 """judgement: below, a mode's peak is hardly told from the chance of twenty spectra, 1 to 3 dB."""
 _AROUND = 0.15  # of a frequency, to either side: where the floor beside a peak is looked for
 _FLOOR = 0.2  # quantile of the spectrum there; neighbouring modes fill less than the rest
-_PROMINENCE_DB = 5.0  # judgement: five deviations of a mean of twenty spectra
 _SAME = 0.02  # judgement: half-power width of 1 % damping
-_MAX_NAMED = 4  # technical: of a sentence that can be read
 
 
 def _stationarity(inspection: Inspection) -> Reading | None:
@@ -48,17 +45,6 @@ def _signal_to_noise(inspection: Inspection) -> Reading | None:
     return Reading(float(np.median(heights)))
 
 
-def _peaks(inspection: Inspection) -> Reading | None:
-    """Return the peaks that are neither mode nor tone, and stronger than one that is."""
-    if not _ambient(inspection) or inspection.finding is None:
-        return None
-    known = [mode.frequency_hz for mode in inspection.finding.modes]
-    missed = sorted({hz for m in inspection.measurements for hz in _missed(m, known, inspection)})
-    named = listed([f"{hz:.3g} Hz" for hz in missed[:_MAX_NAMED]])
-    more = f" and {len(missed) - _MAX_NAMED} more" if len(missed) > _MAX_NAMED else ""
-    return Reading(len(missed), {"named": named + more})
-
-
 ROWS = (
     Row(
         "stationarity", _stationarity, _UNSTEADY, "",
@@ -72,12 +58,6 @@ ROWS = (
         "the modes' peaks stand {value:.0f} dB above the spectrum beside them",
         "Measure in more wind, with quieter sensors, or hit the hanger.",
         is_least=True,
-    ),
-    Row(
-        "missed peaks", _peaks, 0.0, "",
-        "every strong peak of the spectrum is a mode or a tone",
-        "no mode was proven at strong peaks of the spectrum: {named}",
-        "Measure longer, and look at the spectrum before using the modes.",
     ),
 )  # fmt: skip
 
@@ -118,26 +98,3 @@ def _height_db(frequency_hz: FloatArray, power: FloatArray, at_hz: float) -> flo
     floor = float(np.quantile(power[around], _FLOOR)) if around.any() else 0.0
     top = float(np.max(power[near], initial=0.0))
     return 10 * float(np.log10(top / floor)) if floor > 0 and top > 0 else NAN
-
-
-def _missed(
-    measurement: Measurement, known_hz: Sequence[float], inspection: Inspection
-) -> list[float]:
-    """Return frequencies of strong peaks without a mode."""
-    frequency_hz, power = _spectrum(measurement)
-    options = inspection.options
-    inside = (frequency_hz >= options.band_low_hz) & (frequency_hz <= options.band_high_hz)
-    level = 10 * np.log10(np.maximum(power, np.finfo(float).tiny))
-    least = [level[int(np.argmin(np.abs(frequency_hz - hz)))] for hz in known_hz]
-    strong = float(np.min(least)) if least else -np.inf
-    tops, _ = scipy.signal.find_peaks(level, prominence=_PROMINENCE_DB)
-    every = [*known_hz, *(tone.frequency_hz for tone in inspection.tones)]
-    return [
-        float(frequency_hz[top])
-        for top in tops
-        if inside[top]
-        and level[top] > strong
-        and not any(
-            abs(frequency_hz[top] - hz) < max(2 * frequency_hz[1], _SAME * hz) for hz in every
-        )
-    ]

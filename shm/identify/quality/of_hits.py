@@ -128,7 +128,11 @@ def _repeatability(inspection: Inspection) -> Reading | None:
     knocked = [hit for hit in hits_of(inspection) if hit.cut == KNOCK]
     if dropped or knocked:
         text = [f"left out as unlike the others: {places(inspection, dropped)}"] if dropped else []
-        text += [f"something else struck: {places(inspection, knocked)}"] if knocked else []
+        text += (
+            [f"something else struck, or samples are lost: {places(inspection, knocked)}"]
+            if knocked
+            else []
+        )
         return Reading(value, {}, "warning", found="; ".join(text))
     if not known:
         found = f"fewer than {FEWEST_TO_COMPARE} hits: nothing to compare"

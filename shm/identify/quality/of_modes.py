@@ -25,7 +25,7 @@ from shm.values import (
     QualityCheck,
 )
 from shm.values.modes import FIRST_ORDERS, SLOPE_OF_NOTE
-from shm.values.rounding import NINETY_PERCENT, listed
+from shm.values.rounding import listed
 
 # judgement: 0.2 of the response unexplained; sound tests have 0.92 and more: identify_limits.py
 _WARNING = 0.8
@@ -126,16 +126,6 @@ def _amplitude_dependence(inspection: Inspection) -> Reading | None:
     return Reading(abs(worst.amplitude_slope), words)
 
 
-def _drift(inspection: Inspection) -> Reading | None:
-    """Return the relative change from the first hit to the last that all frequencies share."""
-    seen = inspection.finding.drift if inspection.finding else None
-    if seen is None:
-        return None
-    side = "fall" if seen.change < 0 else "rise"
-    words = {"modes": seen.modes, "side": side, "half": NINETY_PERCENT * seen.sd}
-    return Reading(abs(seen.change), words, "warning" if seen.sure else "good")
-
-
 def _agreement(inspection: Inspection) -> Reading | None:
     """Return the largest difference of a common mode's frequency; modes that only one saw.
 
@@ -177,14 +167,6 @@ AMPLITUDE = Row(
     "{count} frequencies change with amplitude; right after a hit that of {hz:.2f} Hz is {side} by "
     "{value:.2%}: those of small amplitude are given",
     "Hit equally hard in every test; look for a joint that slips.",
-)  # fmt: skip
-DRIFT = Row(
-    "drift", _drift, SLOPE_OF_NOTE, "",
-    "{modes} frequencies do not move together from the first hit to the last",
-    "frequencies {side} by {value:.2%} (+/- {half:.2%}) from the first hit to the last, all in the "
-    "same ratio: the logger's clock drifts, or the tension changes with temperature or load",
-    "Let logger and sensors warm up and keep traffic off; check the clock against a tone of "
-    "known frequency.",
 )  # fmt: skip
 AGREEMENT = Row(
     "cross-check", _agreement, _LIMIT, "", _IN_COMMON, _IN_COMMON,

@@ -6,7 +6,6 @@ import numpy as np
 
 from shm.identify.contract import Hit, Measurement
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES
-from shm.identify.measuring.responses import recorded_window_rate
 from shm.identify.measuring.signal_faults import (
     CABLE,
     CLIPPED,
@@ -14,7 +13,6 @@ from shm.identify.measuring.signal_faults import (
     DEAD,
     FROZEN,
     HITS_NOT_SHOWN,
-    LOST,
     NOT_A_NUMBER,
     SILENT,
     WANDERS,
@@ -115,23 +113,12 @@ def _clipped_hits(
     return [bool(bad) for bad in found]
 
 
-def _recorded_window(inspection: Inspection) -> Reading | None:
-    """Return the rate of an analyser's exponential window; None where none is seen."""
-    rate = max((recorded_window_rate(m) for m in inspection.measurements), default=0.0)
-    return Reading(rate, {"seconds": 1 / rate}) if rate else None
-
-
 def _cable(inspection: Inspection) -> Reading | None:
     return fault_reading(inspection, (CABLE, COPY, DEAD, SILENT, WANDERS, HITS_NOT_SHOWN))
 
 
 def _drop_outs(inspection: Inspection) -> Reading | None:
-    """Refuse where most ring-downs have lost samples: the others' clock is not to be believed."""
-    lost, hits = hits_for(inspection, (LOST,)), hits_of(inspection)
-    if 2 * len(lost) > len(hits):
-        found = f"samples are lost in {len(lost)} of {len(hits)} ring-downs: no frequency is right"
-        return Reading(len(lost), verdict="refused", found=found)
-    return fault_reading(inspection, (NOT_A_NUMBER, FROZEN, LOST))
+    return fault_reading(inspection, (NOT_A_NUMBER, FROZEN))
 
 
 def _noise(inspection: Inspection) -> Reading | None:
@@ -172,12 +159,6 @@ UNITS = Row(
 CLIPPING = Row(
     "clipping", _clipping, 0.0, "", "no signal is clipped", "{faults}",
     "Set larger ranges of hammer and sensors in the logger, or hit more softly.",
-)  # fmt: skip
-WINDOW = Row(
-    "window", _recorded_window, 0.0, "1/s", "",
-    "the sensors' noise falls by {value:.2g}/s after each hit, as an exponential window of "
-    "{seconds:.2g} s makes it: damping ratios are too high by up to {value:.2g}/(2 pi f)",
-    "Switch off the analyser's exponential window, or export the time records without it.",
 )  # fmt: skip
 CABLES = Row(
     "cable", _cable, 0.0, "", "no channel jumps, wanders or is silent", "{faults}",

@@ -95,9 +95,7 @@ def join_set_ups(
     pools = [_pool(group, options.frequency_allowance) for group in accepted]
     apart = tuple(_as_seen(accepted, pools, number) for number in range(len(measurements)))
     points, modes = _over_all_points(measurements, pools, apart, accepted)
-    drifts = [finding.drift for finding in findings if finding.drift is not None]
-    drift = max(drifts, key=lambda each: (each.sure, abs(each.change)), default=None)
-    found = Finding(modes, tuple(dropped), poles, drift=drift)
+    found = Finding(modes, tuple(dropped), poles)
     return JoinedFinding(points, found, apart, (_note(measurements),))
 
 

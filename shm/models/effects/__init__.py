@@ -1,4 +1,4 @@
-"""The catalogue of physical effects; a new one is one file and one line in `EFFECTS`.
+"""The catalogue of physical effects; a new one is a class in `of_*.py` and a line of `_MEMBERS`.
 
 Packages from outside add theirs by the entry points `shm.effects` (`shm.models.plug_ins`).
 """

@@ -31,7 +31,7 @@ from skfem import (
 )
 
 from shm.models.solid.geometry import AXIAL, LATERAL, Edge, Geometry, Material, Support
-from shm.models.solid.reduction import AffineSystem, factorised, natural_modes
+from shm.models.solid.reduction import AffineSystem, factorised
 from shm.values import PLANES, BoolArray, FloatArray, IntArray, Plane
 
 # A cell's corners in the order of scikit-fem, as steps along the three axes of the grid.
@@ -77,46 +77,6 @@ def bending_plane(solid: Solid, support: Support, plane: Plane) -> AffineSystem:
         axis_deflection,
         axis_m,
     )
-
-
-def surface_of_mode(
-    geometry: Geometry, material: Material, support: Support, point: FloatArray, order: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return corners (facets, 4, 3) of the surface in m, and their motion in a transverse mode.
-
-    The largest motion is 1; the mode is that of `order` at a point of tension in N and log10 k.
-    """
-    solid = Solid.of(Mesh.of(geometry), material)
-    system = bending_plane(solid, support, "transverse")
-    found = natural_modes(system, float(point[0]), 10 ** point[1:], order)
-    moved = np.zeros(3 * solid.mesh.nodes)
-    moved[~_held(solid, support, 0).ravel()] = found.vectors[:, order - 1]
-    moved = moved.reshape(-1, 3) / np.linalg.norm(moved.reshape(-1, 3), axis=1).max()
-    facets = _outer_facets(solid.mesh)
-    near = solid.mesh.cells.doflocs[2] < geometry.length_m / (2 * order)
-    moved *= np.sign(moved[near, 0].sum())
-    corners, motion = solid.mesh.cells.doflocs.T[facets], moved[facets]
-    # The quarter's mirror images: across x = 0 the motion is antisymmetric, across y = 0 symmetric.
-    across_x, across_y = np.array([-1.0, 1, 1]), np.array([1.0, -1, 1])
-    corners = np.concatenate([corners, corners * across_x])
-    motion = np.concatenate([motion, -motion * across_x])
-    return (
-        np.concatenate([corners, corners * across_y]),
-        np.concatenate([motion, motion * across_y]),
-    )
-
-
-def _outer_facets(mesh: Mesh) -> IntArray:
-    """Nodes (facets, 4) of the quarter's outer surface, each facet's in their order around it."""
-    corners = mesh.cells.facets[:, mesh.cells.boundary_facets()].T
-    inside = mesh.on_plane(0)[corners].all(axis=1) | mesh.on_plane(1)[corners].all(axis=1)
-    around = []
-    for facet in corners[~inside]:
-        places = mesh.cells.doflocs[:, facet].T
-        centred = places - places.mean(axis=0)
-        flat = centred @ np.linalg.svd(centred)[2][:2].T
-        around.append(facet[np.argsort(np.arctan2(flat[:, 1], flat[:, 0]))])
-    return np.array(around)
 
 
 def _deflections(solid: Solid, free: BoolArray, axis: int) -> tuple[csr_array, FloatArray]:

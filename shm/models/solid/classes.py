@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from copy import copy
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -27,7 +26,6 @@ from shm.models.solid.geometry import (
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Plane
 
 _SPRING_BOUNDS = (5.0, 12.0)  # thesis 5.2
-_CELLS_A_WAVE = 12  # layout: a half wave of a drawn mode looks smooth
 _BLOCK = 500  # technical: matrices of some 10 MB at once
 
 # The two plates are alike but for a quarter turn. Seen from the arch end and with the planes
@@ -118,27 +116,6 @@ class SolidModel(Model):
             vectors = basis.projected.modes(self._points(theta, PLANES[index]), modes)
             found[:, index] = np.swapaxes(table @ vectors, 1, 2)
         return found
-
-    def surface(self, theta: FloatArray, plane: Plane, order: int) -> tuple[FloatArray, FloatArray]:
-        """Return corners (facets, 4, 3) of the surface in m, and their motion in a mode.
-
-        x is transverse, y longitudinal, z from the deck end; the largest motion is 1. By the full
-        model.
-        """
-        from shm.models.solid.assembly import surface_of_mode
-
-        asked = self.description()
-        fine = replace(asked.geometry.fineness, rod=_CELLS_A_WAVE * (order + 1))
-        geometry = replace(asked.geometry, fineness=fine)
-        point = self._points(theta[None], plane)[0]
-        corners, moved = surface_of_mode(geometry, asked.material, asked.support, point, order)
-        if plane == "longitudinal":
-            # Seen from the arch end and with the planes exchanged, the hanger is the same.
-            corners, moved = corners[..., [1, 0, 2]], moved[..., [1, 0, 2]]
-            corners[..., 2] = asked.geometry.length_m - corners[..., 2]
-            moved[..., 2] *= -1
-        corners[..., 2] += self._ends_m()[0]
-        return corners, moved
 
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         plate = self.hanger.plate

@@ -36,8 +36,8 @@ class FrequencyRow:
     """One column of a table: transverse frequencies of modes 1 to 6, ours and the printed ones.
 
     `limit_percent` is the mark that `difference_percent` has to keep; NaN where the difference is
-    only stated. `unknowns` and `seconds` are those of a mesh whose size is told, `spring_n_m` the
-    stiffness that varies; NaN elsewhere. `thesis_time` is that of the thesis's meshes.
+    only stated. `seconds` are those of a mesh whose size is told, NaN elsewhere; `thesis_time` is
+    that of the thesis's meshes.
     """
 
     table: str
@@ -48,8 +48,6 @@ class FrequencyRow:
     difference_percent: float
     limit_percent: float
     plane: Plane = "transverse"
-    spring_n_m: float = np.nan
-    unknowns: float = np.nan
     seconds: float = np.nan
     thesis_time: str = ""
 
@@ -138,7 +136,7 @@ def _springs(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
                 condition = f"k = {float(key[1:]):.0e} N/m{', y' * place}"
                 printed = tables[f"{name}{'_y' * place}"][key]
                 row = _row(table, name, condition, ours, printed, 1.5 if kept else np.nan)
-                yield replace(row, plane=plane, spring_n_m=value)
+                yield replace(row, plane=plane)
 
 
 def _meshes(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
@@ -153,7 +151,7 @@ def _meshes(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
             seconds = perf_counter() - began
             condition = f"our mesh of {unknowns} unknowns"
             row = _row(table, name, condition, ours, tables[name]["converged"], np.nan)
-            yield replace(row, unknowns=unknowns, seconds=seconds, thesis_time=thesis_time)
+            yield replace(row, seconds=seconds, thesis_time=thesis_time)
             began = perf_counter()
 
 

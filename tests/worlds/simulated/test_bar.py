@@ -15,6 +15,8 @@ from tests.worlds.simulated.bar.description import Bar, bar_of
 from tests.worlds.simulated.bar.modes import bar_modes
 from tests.worlds.simulated.elements import natural_frequencies
 
+pytestmark = pytest.mark.trial  # of the simulated world alone, not of the product
+
 PLACES = (1.56, 3.48, 5.4, 7.92)
 PINNED = HangerState(711e3, 0, 0, 0, 0)
 

@@ -14,6 +14,8 @@ from tests.helpers.planted_modes import planted_modes
 from tests.worlds.simulated.campaign import CampaignPlan, campaign, campaign_with_truth
 from tests.worlds.simulated.effects.base import TestConditions
 
+pytestmark = pytest.mark.trial  # of the simulated world alone, not of the product
+
 STATE = HangerState(711e3)
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
 EXACT = CampaignPlan(tension_spread=0.0, as_made=False)

@@ -16,6 +16,8 @@ from tests.worlds.simulated.disturbances.registry import DISTURBANCES
 from tests.worlds.simulated.elements import natural_frequencies
 from tests.worlds.simulated.hammer import SimulatedTest, simulated_test
 
+pytestmark = pytest.mark.trial  # of the simulated world alone, not of the product
+
 STATE = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
 PLAN = HammerPlan(hits=4, seconds_per_hit=5.0, acceleration_noise_m_s2=0.001)
 RATE = PLAN.sampling_rate_hz

@@ -16,6 +16,8 @@ from shm.simulate import HangerState
 from shm.values import FloatArray, Hanger
 from tests.worlds.simulated.elements import natural_frequencies, plane_modes
 
+pytestmark = pytest.mark.trial  # of the simulated world alone, not of the product
+
 MODES = 10
 
 

@@ -16,6 +16,8 @@ from tests.worlds.simulated.effects.registry import PLANTED, choices, drawn, ran
 from tests.worlds.simulated.elements import natural_frequencies, plane_modes
 from tests.worlds.simulated.planted import PlantedModes
 
+pytestmark = pytest.mark.trial  # of the simulated world alone, not of the product
+
 MODES = 8
 PLACES = (1.56, 3.48, 5.4, 7.92)
 CLAMPED = HangerState(711e3)

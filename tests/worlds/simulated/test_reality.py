@@ -16,6 +16,8 @@ from tests.worlds.simulated.effects.base import TestConditions
 from tests.worlds.simulated.effects.registry import LAWS, choices, drawn, ranges_of
 from tests.worlds.simulated.reality import Reality, sd_factors
 
+pytestmark = pytest.mark.trial  # of the simulated world alone, not of the product
+
 STATE = HangerState(711e3)
 PLACES = (1.56, 3.48, 5.4, 7.92)
 QUICK = CampaignPlan(

@@ -13,6 +13,8 @@ from shm.values import Hanger, Turnbuckle
 from tests.worlds.simulated.bar.description import pieces_of
 from tests.worlds.simulated.elements import natural_frequencies
 
+pytestmark = pytest.mark.trial  # of the simulated world alone, not of the product
+
 MIDDLE = Turnbuckle(x_m=6.0, length_m=0.5, mass_kg=400.0, bending_stiffness_n_m2=5e7)
 
 

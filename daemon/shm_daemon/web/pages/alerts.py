@@ -18,8 +18,7 @@ from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report import formatting
 from shm.report.hanger_status import HangerMessage
 from shm.store import Delivery, DeliveryState, News, Silence, StoredAlert
-from shm.store.queries.alerts import count_open_alerts, list_alert_page
-from shm.store.stored_alerts import describe_silence, silenced_until
+from shm.store.alerts import count_open_alerts, describe_silence, list_alert_page, silenced_until
 from shm.values.messages import Lead
 from shm_daemon.web.access import AtSite, Principal, Reader, Writer
 from shm_daemon.web.address import test_page

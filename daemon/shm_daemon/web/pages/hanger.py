@@ -27,7 +27,7 @@ from shm.report.hanger_tables import temperature_table
 from shm.report.paper import Table, filled
 from shm.report.states import called_words
 from shm.store import EventKind, Store, TrendPoint, Workspace
-from shm.store.queries.trends import find_latest_trends, list_trend
+from shm.store.posteriors import find_latest_trends, list_trend
 from shm.values import Hanger
 from shm.values.bar_description import describe_bar
 from shm_daemon.web.access import AtSite, Reader

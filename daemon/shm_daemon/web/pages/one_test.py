@@ -16,7 +16,7 @@ from shm.report.formatting import Interval
 from shm.report.modal_test_report import name
 from shm.report.paper import Table, filled
 from shm.report.shared_tables import headline, overall
-from shm.store.queries.tests import find_neighbours
+from shm.store.tests import find_neighbours
 from shm.values.rounding import force_unit
 from shm_daemon.web.access import Reader
 from shm_daemon.web.address import test_json, test_page

@@ -22,8 +22,8 @@ from shm.plausibility import refuse_impossible
 from shm.report import formatting
 from shm.report.paper import Table
 from shm.store import ENDED, DeliveryState, Workspace
-from shm.store.queries.alerts import count_deliveries
-from shm.store.queries.recordings import count_stages, find_latest_hold, find_oldest_waiting
+from shm.store.alerts import count_deliveries
+from shm.store.recordings import count_stages, find_latest_hold, find_oldest_waiting
 from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import duration_words, seconds_since_beat
 from shm_daemon.spool import scan

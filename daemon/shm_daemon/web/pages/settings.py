@@ -19,9 +19,9 @@ from shm.pipeline.watching import differences
 from shm.report import formatting
 from shm.settings import TABLE, Settings, load_settings
 from shm.store import Stage
-from shm.store.queries.hangers import find_latest_watches
-from shm.store.queries.tests import list_waiting_tests
 from shm.store.rows import ChangedSetting, said
+from shm.store.tests import list_waiting_tests
+from shm.store.watch import find_latest_watches
 from shm.values import Hanger
 from shm_daemon.hooks.trial import send_test_alert
 from shm_daemon.web.access import AtSite, Engineer

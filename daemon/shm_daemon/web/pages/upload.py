@@ -20,12 +20,17 @@ from starlette.concurrency import run_in_threadpool
 
 from shm.errors import BadInput, UsageError
 from shm.pipeline import utc_now
-from shm.pipeline.import_answers import (
+from shm.pipeline.importing import (
     ANSWERS_OF_TEST,
+    Answers,
+    Import,
+    Question,
     answer_to,
     import_document,
+    keep_profile,
+    look_into,
+    understand,
 )
-from shm.pipeline.importing import Answers, Import, Question, keep_profile, look_into, understand
 from shm.report import formatting
 from shm.store import Workspace
 from shm_daemon.spool import Incoming, Landed, landing_name

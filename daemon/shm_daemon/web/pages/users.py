@@ -10,7 +10,7 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.report import formatting
 from shm.report.paper import Table
-from shm.store.queries.history import list_changes
+from shm.store.journal import list_changes
 from shm.store.rows import Role
 from shm_daemon.web.access import AtSite, Engineer, with_passwords
 from shm_daemon.web.forms import Form, redirect_or_show_error

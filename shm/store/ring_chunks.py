@@ -1,4 +1,4 @@
-"""Compare a chunk with those that came before it, and join chunks to pieces without a gap.
+"""Compare chunks with those that came before them, note what is odd, and join them to pieces.
 
 Whatever stamps say to the millisecond. Where two chunks are of one time, the samples of the one
 that came first count, unless its clock was ahead.
@@ -7,24 +7,21 @@ that came first count, unless its clock was ahead.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
-from itertools import pairwise
-from statistics import median
 
 import numpy as np
 
-from shm.read.chunk_document import BY_TIME
+from shm.read.chunk_document import BY_TIME, numbered
 from shm.store.ring_days import Row
 from shm.values import NAN
-from shm.values.stream import PERIODS, Chunk, Piece
+from shm.values.stream import PERIOD, Chunk, Piece, StreamEvent, StreamEventKind, time_of
 
 _JITTER_S = 0.05  # judgement: of a logger's stamps; a radio clock or NTP is within 10 ms
 _DRIFT = 1e-3  # judgement: no crystal is further off; a long chunk differs by that from its stamps
 _AHEAD_US = 60_000_000  # judgement: of the server's clock, which may be off as well
 _OF_A_SAMPLE = 0.501  # derived: up to half a sample, and a stamp's microsecond, is the same sample
-_HOUR_US = PERIODS["hour"] // timedelta(microseconds=1)
 
 
 def slack_s(before: int, sequence: int, sampling_rate_hz: float, length_s: float) -> float:
@@ -78,66 +75,9 @@ def runs_on(before: Chunk, chunk: Chunk) -> bool:
     return is_next and before.start <= chunk.start
 
 
-def is_half(before: Chunk, chunk: Chunk) -> bool:
-    """Return True if two chunks have half of the shorter one's time in common.
-
-    Less is a correction of the clock by seconds.
-    """
-    common = min(before.end, chunk.end) - max(before.start, chunk.start)
-    return 2 * common >= min(before.end - before.start, chunk.end - chunk.start)
-
-
 def came_early(row: Row) -> bool:
     """Return True if a chunk came before it ends by its stamps: its clock was ahead."""
     return row.end_us - row.arrived_us > _AHEAD_US
-
-
-def find_hour_step(
-    rows: Iterable[Row],
-    chunk: Row,
-    known_us: Collection[int],
-    tolerance_us: int = 2_000_000,
-) -> tuple[int, list[Row]]:
-    """Find what a clock dated ahead by whole hours; return the hours, 0 of none, and the chunks.
-
-    In the order in which they came, samples must begin whole hours later than usual after those
-    before them, and end that much, give or take half of it, after those that came next begin; these
-    may be `chunk`, which contradicts them. Their true time must be free. `known_us` are when the
-    samples of former steps begin.
-    """
-    by_arrival = sorted(rows, key=lambda row: (row.arrived_us, row.sequence, row.start_us))
-    jumps = [after.start_us - before.end_us for before, after in pairwise(by_arrival)]
-    pauses = [each for each in jumps if tolerance_us < each < _HOUR_US - tolerance_us]
-    usual_us = median(pauses or [0])
-    for first, jump_us in reversed(list(enumerate(jumps, start=1))):
-        lengths_us = jump_us, jump_us - usual_us
-        hours = max(_whole_hours(length_us, tolerance_us) for length_us in lengths_us)
-        start_us, step_us = by_arrival[first].start_us, hours * _HOUR_US
-        if not hours or any(abs(start_us - each) < _HOUR_US for each in known_us):
-            continue
-        wrong, end_us = [by_arrival[first]], by_arrival[first].end_us
-        for following in (*by_arrival[first + 1 :], chunk):
-            if following.start_us < end_us - step_us / 2:
-                break
-            wrong.append(following)
-            end_us = max(end_us, following.end_us)
-        if following is wrong[-1] or abs(end_us - following.start_us - step_us) > step_us / 2:
-            continue
-        true_span = start_us - step_us, end_us - step_us
-        if not any(_is_within(row, true_span) for row in set(by_arrival) - set(wrong)):
-            return hours, wrong
-    return 0, []
-
-
-def _whole_hours(time_us: float, tolerance_us: int) -> int:
-    hours = round(time_us / _HOUR_US)
-    return hours if hours > 0 and abs(time_us - hours * _HOUR_US) <= tolerance_us else 0
-
-
-def _is_within(row: Row, span: tuple[int, int]) -> bool:
-    """Return True if half of a chunk's time is within a span."""
-    common_us = min(span[1], row.end_us) - max(span[0], row.start_us)
-    return 2 * common_us > row.end_us - row.start_us
 
 
 def join(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Piece, ...]:
@@ -214,3 +154,126 @@ def _cut(piece: Piece, start: datetime, end: datetime) -> Piece:
 def _place(samples: float) -> int:
     """Return the first sample from a time on; a microsecond of rounding is no sample."""
     return math.ceil(samples - 1e-3)
+
+
+GRACE = timedelta(seconds=30)  # judgement: how long what is sent at once may be on its way
+_FILE_LATE = timedelta(hours=25)  # judgement: a logger may roll its files once a day
+
+OVERLAP = "its time was there already"
+EARLY = (
+    "the clock was ahead: samples came before the time they are dated; those that came in time "
+    "count"
+)
+
+
+def list_events(
+    stream: str, last: Row | None, rows: Sequence[Row]
+) -> tuple[list[StreamEvent], Row | None]:
+    """Compare chunks, by time, with those before; return events and the last that counts."""
+    events: list[StreamEvent] = []
+    for row in (row for row in rows if not row.excluded):
+        if last is None or row.start_us >= last.start_us:
+            events += [] if last is None else _between(stream, last, row)
+            last = row
+        elif _is_next(last, row):
+            events.append(_stepped(stream, last, row))
+    for note in (_note_late, _note_overlap, _note_early, _note_missing, _note_loggers):
+        events += note(stream, rows)
+    return events, last
+
+
+def _between(stream: str, before: Row, row: Row) -> Iterator[StreamEvent]:
+    offset_s = _offset_s(before, row)
+    if abs(offset_s) <= _slack_s(before, row):
+        return
+    if _is_next(before, row):
+        yield _stepped(stream, before, row)
+    elif offset_s > 0:
+        samples = round(offset_s * row.sampling_rate_hz)
+        text = f"{samples} samples are missing before {numbered(row.sequence)}"
+        edges = time_of(before.end_us), time_of(row.start_us)
+        yield StreamEvent(stream, "gap", *edges, text)
+
+
+def _stepped(stream: str, before: Row, row: Row) -> StreamEvent:
+    offset_s = _offset_s(before, row)
+    text = f"the clock jumped by {offset_s:+.3f} s before chunk {row.sequence}, which is the next"
+    off_hours_s = abs(offset_s - 3600 * round(offset_s / 3600))
+    if abs(offset_s) > 1800 and off_hours_s <= _slack_s(before, row):
+        text += ": whole hours (daylight saving?)"
+    start, end = sorted((time_of(before.end_us), time_of(row.start_us)))
+    return StreamEvent(stream, "clock step", start, end, text)
+
+
+def _note_late(stream: str, rows: Sequence[Row]) -> Iterator[StreamEvent]:
+    own = (row for row in rows if row.excluded != EARLY)
+    late = [row for row in own if time_of(row.arrived_us) > time_of(row.end_us) + _due(row)]
+    if late:
+        delay_h = max(row.arrived_us - row.end_us for row in late) / 3.6e9
+        many = "1 chunk" if len(late) == 1 else f"{len(late)} chunks"
+        text = f"{many} came up to {delay_h:.1f} hours late, now in place"
+        yield _event(stream, "late", late, text)
+
+
+def _due(row: Row) -> timedelta:
+    return _FILE_LATE if row.sequence >= BY_TIME else PERIOD + GRACE
+
+
+def _note_overlap(stream: str, rows: Sequence[Row]) -> Iterator[StreamEvent]:
+    own = [row for row in rows if row.covered]
+    if own:
+        first, last = own[0].sequence, own[-1].sequence
+        whose = numbered(first)
+        if len(own) > 1:
+            named = f", {first} to {last}," if last < BY_TIME else " of files"
+            whose = f"{len(own)} chunks{named}"
+        text = (
+            f"{sum(row.covered for row in own)} samples of {whose} are of a time that was there "
+            "already: the first to come count, these are kept apart; see to the logger's clock"
+        )
+        yield _event(stream, "overlap", own, text)
+
+
+def _note_early(stream: str, rows: Sequence[Row]) -> Iterator[StreamEvent]:
+    own = [row for row in rows if row.excluded == EARLY]
+    if own:
+        yield _event(stream, "clock step", own, EARLY)
+
+
+def _note_missing(stream: str, rows: Sequence[Row]) -> Iterator[StreamEvent]:
+    """Yield an event for each channel of which the logger says that it lacks some values.
+
+    Of a channel without any the watch over the sensors says that it is dead.
+    """
+    own = [row for row in rows if not row.excluded]
+    counts = [[int(each) for each in row.missing.split()] for row in own if row.missing]
+    samples = sum(row.samples for row in own)
+    for number, missing in enumerate(map(sum, zip(*counts, strict=True))):
+        if 0 < missing < samples:
+            text = f"{missing} samples have no value (null or NaN)"
+            channel = own[0].channels.split()[number]
+            yield replace(_event(stream, "gap", own, text), channel=channel)
+
+
+def _note_loggers(stream: str, rows: Sequence[Row]) -> Iterator[StreamEvent]:
+    for row in (row for row in rows if row.event):
+        start = time_of(row.start_us)
+        yield StreamEvent(stream, "logger", start, start, row.event)
+
+
+def _is_next(before: Row, row: Row) -> bool:
+    return row.sequence == before.sequence + 1 and row.sequence < BY_TIME
+
+
+def _offset_s(before: Row, row: Row) -> float:
+    return (row.start_us - before.end_us) / 1e6
+
+
+def _slack_s(before: Row, row: Row) -> float:
+    numbers = before.sequence, row.sequence
+    return slack_s(*numbers, row.sampling_rate_hz, (before.end_us - before.start_us) / 1e6)
+
+
+def _event(stream: str, kind: StreamEventKind, rows: Sequence[Row], text: str) -> StreamEvent:
+    start, end = min(row.start_us for row in rows), max(row.end_us for row in rows)
+    return StreamEvent(stream, kind, time_of(start), time_of(end), text)

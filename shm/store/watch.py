@@ -1,9 +1,10 @@
-"""The watch: what it said after each test, against which baseline, and what it goes on from."""
+"""The watch: what it said after each test, against which baseline, and the state of each hanger."""
 
 from __future__ import annotations
 
+import logging
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from datetime import datetime
 from typing import Any
@@ -11,28 +12,52 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
+from shm.diagnosis_document import diagnosis_of
 from shm.documents import alert_document
 from shm.errors import StoreBusy
-from shm.store.blobs import watch_document, watch_in
+from shm.store.alerts import acknowledge, resolve, settle
+from shm.store.blobs import change_in, watch_document, watch_in
+from shm.store.columns import Number, loads, row_of, value_in
 from shm.store.database import Repository, insert
+from shm.store.disposition import rerun_watched
 from shm.store.files import all_at, is_current, move
 from shm.store.journal import note
-from shm.store.mapping import row_of, value_in
-from shm.store.outbox import acknowledge, resolve, settle
-from shm.store.rerun import rerun_watched
+from shm.store.posteriors import baselines_in_numbers
 from shm.store.rows import (
     Baseline,
+    BaselineGlance,
     Lineage,
     Reconciled,
     Stage,
+    StoredAdoption,
     StoredAlert,
+    StoredDiagnosis,
     StoredTest,
     StoredWatch,
     WatchCheckpoint,
 )
-from shm.store.selects import baseline_in_force, insert_baseline, insert_posterior, read_baseline
-from shm.store.tables import alerts, drifts, tests, watch_states, watches
-from shm.values import NAN, Alert, Drift, Posterior, WatchedTest
+from shm.store.selects import (
+    baseline_in_force,
+    baselines_now,
+    for_hangers,
+    insert_baseline,
+    insert_posterior,
+    read_baseline,
+    undone_selections,
+)
+from shm.store.tables import (
+    adoptions,
+    alerts,
+    baselines,
+    diagnoses,
+    drifts,
+    posterior_tests,
+    selections,
+    tests,
+    watch_states,
+    watches,
+)
+from shm.values import NAN, Alert, Change, Drift, Hanger, Posterior, WatchedTest
 
 
 class Watch(Repository):
@@ -232,3 +257,117 @@ def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
     found, level, called = watch_in(row.document)
     found = replace(found, test=row.test, time=row.time, drifts=tuple(shifts))
     return StoredWatch(row.id, row.hanger, row.baseline_id, found, level, called)
+
+
+log = logging.getLogger(__name__)
+
+
+def list_selected_models(store: Repository) -> dict[int, str]:
+    """Return the selected or adopted class of each hanger that has one."""
+    query = sa.select(selections.c.hanger, selections.c.model).order_by(selections.c.id)
+    held = query.where(selections.c.id.not_in(undone_selections))
+    return {row.hanger: row.model for row in store.rows(held)}
+
+
+def find_latest_diagnosis(store: Repository, hanger: int) -> StoredDiagnosis | None:
+    """Return the latest diagnosis of a hanger; None without one that this version reads."""
+    query = sa.select(diagnoses).where(diagnoses.c.hanger == hanger)
+    row = store.first(query.order_by(diagnoses.c.id.desc()).limit(1))
+    if row is None:
+        return None
+    try:
+        found = diagnosis_of(loads(row.document))
+    except (KeyError, TypeError, ValueError):
+        log.warning("the diagnosis of hanger %d is of a former version: make it again", hanger)
+        return None
+    return value_in(row, StoredDiagnosis, diagnosis=found)
+
+
+def list_adoptions(
+    store: Repository, hanger: int | None = None, *, undone: bool = False
+) -> tuple[StoredAdoption, ...]:
+    """List adoptions in force, of one hanger where named; with `undone` also the undone ones.
+
+    They stand as they were made: the last one in force of a hanger is the one that counts.
+    """
+    query = sa.select(adoptions).order_by(adoptions.c.id)
+    if hanger is not None:
+        query = query.where(adoptions.c.hanger == hanger)
+    if not undone:
+        query = query.where(adoptions.c.undone_at.is_(None))
+    return tuple(value_in(row, StoredAdoption) for row in store.rows(query))
+
+
+def list_baselines_in_force(
+    store: Repository, hangers: Iterable[Hanger]
+) -> dict[int, BaselineGlance]:
+    """Return the baseline in force of each hanger that has one, in numbers."""
+    with store.reading() as connection:
+        return baselines_in_numbers(connection, hangers)
+
+
+def find_baseline_temperatures(store: Repository) -> dict[int, float]:
+    """Return the mean temperature of the tests of each baseline in force; NaN where unknown."""
+    mean_c = sa.func.avg(tests.c.temperature_c, type_=Number)
+    query: sa.Select[Any] = (
+        sa.select(baselines.c.hanger, mean_c.label("mean_c"))
+        .join(posterior_tests, posterior_tests.c.posterior_id == baselines.c.posterior_id)
+        .join(tests, tests.c.id == posterior_tests.c.test_id)
+        .where(baselines.c.id.in_(baselines_now()))
+        .group_by(baselines.c.hanger)
+    )
+    return {row.hanger: row.mean_c for row in store.rows(query)}
+
+
+def find_latest_watches(
+    store: Repository, hangers: Sequence[Hanger] | None = None
+) -> dict[int, StoredWatch]:
+    """Return the watch of the latest test of each hanger (or these) against its baseline."""
+    held = baselines.alias()
+    latest = (
+        sa.select(watches.c.id)
+        .where(
+            watches.c.hanger == held.c.hanger,
+            watches.c.baseline_id == held.c.id,
+            is_current(watches),
+        )
+        .order_by(watches.c.time.desc(), watches.c.id.desc())
+        .limit(1)
+        .scalar_subquery()
+    )
+    ids = (
+        sa.select(latest)
+        .select_from(held)
+        .where(held.c.id.in_(baselines_now()), for_hangers(held.c.hanger, hangers))
+    )
+    found = [id_ for id_ in store.scalars(ids) if id_ is not None]
+    return {each.hanger: each for each in load_watches(store, found)}
+
+
+def list_detected_changes(
+    store: Repository, hangers: Sequence[Hanger] | None = None
+) -> dict[int, tuple[Change, ...]]:
+    """List the changes of each (or these) hanger from its baseline in force, by time."""
+    query = sa.select(watches).where(*_called(), for_hangers(watches.c.hanger, hangers))
+    found = defaultdict[int, list[Change]](list)
+    for row in store.rows(query.order_by(watches.c.time, watches.c.id)):
+        found[row.hanger].append(change_in(row.document))
+    return {hanger: tuple(changes) for hanger, changes in found.items()}
+
+
+def list_detections(store: Repository, hanger: int, baseline_id: int) -> tuple[StoredWatch, ...]:
+    """Return the watches that detected a change from a baseline, and the latest of it, by
+    time."""
+    against = sa.select(watches.c.id).where(
+        watches.c.hanger == hanger, watches.c.baseline_id == baseline_id, is_current(watches)
+    )
+    latest = against.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(1)
+    with store.reading() as connection:
+        ids = {*connection.scalars(against.where(watches.c.called)), connection.scalar(latest)}
+    return load_watches(store, [id_ for id_ in ids if id_ is not None])
+
+
+def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:
+    """Select watches that detected a change from the baseline in force, of all hangers or one."""
+    against = watches.c.baseline_id.in_(baselines_now(hanger))
+    return watches.c.called, against, is_current(watches)
