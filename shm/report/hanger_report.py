@@ -23,7 +23,7 @@ from shm.report.figures.hanger_temperature import FIGURE as TEMPERATURE
 from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.specification import drawn
 from shm.report.formatting import Interval
-from shm.report.hanger_sentences import advice, further, summary, why
+from shm.report.hanger_sentences import advice, fit, over_time, summary, why
 from shm.report.hanger_summary import BASELINE_ALONE, BASELINE_AND_CHANGE
 from shm.report.hanger_tables import control_table, temperature_documents
 from shm.report.open_warnings import dated_by_receipt
@@ -61,7 +61,7 @@ def hanger_paper(data: HangerReport) -> Paper:
             _trend_part(data),
             Section(
                 "Fit of the model",
-                paragraphs=[further(data)],
+                paragraphs=[fit(data)],
                 figures=lambda: drawn((FREQUENCIES,), data),
                 tables=[tables.frequencies(data)],
             ),
@@ -84,6 +84,7 @@ def _trend_part(data: HangerReport) -> Section:
     chart = data.now.control
     return Section(
         "Tension over time",
+        paragraphs=[words] if (words := over_time(data)) else (),
         figures=lambda: (*drawn((CONTROL,), chart), *drawn((TREND,), data)),
         tables=filled(
             *([control_table(chart)] if chart else []),
@@ -201,7 +202,7 @@ def _by_latest_test(data: HangerReport) -> tuple[Fact, ...]:
     alone = Interval.of_averaged(data.by_latest_test)
     value = formatting.with_half(alone, data.tension_unit)
     repeats = stated(data.by_latest_test, data.tension_unit).repeatability
-    scatter = f"; repeats within {repeats} (sd)" if repeats else ""
+    scatter = f"; repeatability {repeats} (sd)" if repeats else ""
     return (("Latest test alone", value, f"test {data.latest.id}; 90 % interval{scatter}"),)
 
 

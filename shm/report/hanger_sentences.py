@@ -42,12 +42,7 @@ def summary(data: HangerReport) -> str:
 
 def why(data: HangerReport) -> str:
     """Return every doubt; the numbers stand below, among the facts."""
-    return " ".join(_why(data))
-
-
-def _why(data: HangerReport) -> tuple[str, ...]:
-    undated = open_warnings.dated_by_receipt(data.now.undated)
-    return (*_doubts(data), *([undated] if undated else ()))
+    return _joined(*_doubts(data), open_warnings.dated_by_receipt(data.now.undated))
 
 
 def _doubts(data: HangerReport) -> tuple[str, ...]:
@@ -56,31 +51,30 @@ def _doubts(data: HangerReport) -> tuple[str, ...]:
 
 
 def details(data: HangerReport) -> str:
-    """Return why, and how sure: everything after state and action."""
-    return " ".join(_sentences(data))
+    """Return why, and how sure: everything after state, action and tension."""
+    neighbours = data.neighbours.sentence if data.neighbours else ""
+    undated = open_warnings.dated_by_receipt(data.now.undated)
+    return _joined(*_doubts(data), over_time(data), neighbours, fit(data), undated)
 
 
-def further(data: HangerReport) -> str:
-    """Return the details but for the doubts, which stand on page 1."""
-    before = _why(data)
-    return " ".join(each for each in _sentences(data) if each not in before)
-
-
-def _sentences(data: HangerReport) -> tuple[str, ...]:
-    found = (
-        *_doubts(data),
+def over_time(data: HangerReport) -> str:
+    """Return what follows from the change, how the tension creeps, what the period holds."""
+    return _joined(
         "Once the change is explained, set a new baseline (`shm drift rebaseline`)."
         if data.now.called
         else "",
         data.creep.words if data.creep else "",
         in_period(data),
-        data.neighbours.sentence if data.neighbours else "",
-        _model(data),
-        _outside(data),
-        *_further_advice(data),
-        open_warnings.dated_by_receipt(data.now.undated),
     )
-    return tuple(each for each in found if each)
+
+
+def fit(data: HangerReport) -> str:
+    """Return how the model class fits the latest test, and what to do to know more."""
+    return _joined(_model(data), _outside(data), *_further_advice(data))
+
+
+def _joined(*sentences: str) -> str:
+    return " ".join(each for each in sentences if each)
 
 
 def advice(data: HangerReport) -> tuple[str, ...]:

@@ -146,7 +146,7 @@ def test_priors_of_classes_may_be_stated(shm: Shm, modes_file: Path, hanger_file
 
 def test_the_tables_name_units_and_intervals(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
     updated = shm("update", modes_file, "--hanger-file", hanger_file, "--model", "beam1", *QUICK)
-    assert "tension in kN" in updated.out
+    assert re.search(r"Tension \d+ kN \(90 % credible interval", updated.out)
     assert "R-hat" in updated.out
     selected = shm("select", modes_file, "--hanger-file", hanger_file, "--models", "beam1", *QUICK)
     assert "tension, kN" in selected.out
@@ -190,8 +190,9 @@ def test_tensions_are_told_in_the_unit_that_fits_them(
     modes, hanger = _clamped_string(tmp_path, diameter_m, length_m, tension_n)
     updated = shm("update", modes, "--hanger-file", hanger, "--model", "beam1", *QUICK)
     assert updated.code == 0, updated.err
-    (row,) = [line for line in updated.out.splitlines() if f"tension in {unit}" in line]
-    mean, *rest = map(float, re.findall(r"[\d.]+", row.partition("in ")[0]))
+    stated = rf"Tension ([\d.]+) {unit} \(90 % credible interval ([\d.]+) to ([\d.]+) {unit}"
+    (found,) = re.findall(stated, " ".join(updated.out.split()))
+    mean, *rest = map(float, found)
     expected = tension_n / {"N": 1.0, "kN": 1e3, "MN": 1e6}[unit]
     assert mean == pytest.approx(expected, rel=0.05)
     assert min(rest) > 0

@@ -39,7 +39,6 @@ from shm_daemon.web.models import (
     MOST_ROWS,
     FigureDocument,
     HangerNumber,
-    Status,
     document,
     paged,
 )
@@ -114,11 +113,11 @@ _of_one = APIRouter(
 _SHIFT = ("quantity", "shift_mean", "shift_sd", "threshold", "probability")
 
 
-@_of_all.get("/status", response_model=Status, summary="What is held and what waits")
-def status(site: AtSite, _: Reader) -> Any:
+@_of_all.get("/status", summary="What is stored and what waits")
+def status(site: AtSite, _: Reader) -> JSONResponse:
     """Return counts of recordings, files, alerts and deliveries."""
     workspace, store = site.workspace, site.store
-    return {
+    found = {
         "bridge": workspace.bridge.name,
         "recordings": count_stages(store),
         "spool": len(scan(workspace.spool)),
@@ -127,6 +126,7 @@ def status(site: AtSite, _: Reader) -> Any:
         "waiting_deliveries": count_deliveries(store)[DeliveryState.WAITING],
         "daemon_seen_seconds_ago": seconds_since_beat(workspace),
     }
+    return document(found)
 
 
 @_of_all.get("/hangers", summary="The state of all hangers")

@@ -99,60 +99,6 @@ class Recordings(BaseModel):
     recordings: list[RecordingStatus]
 
 
-class DeliveryState(BaseModel):
-    """One alert on its way to one hook."""
-
-    hook: str
-    state: str
-    attempts: int
-    last_error: str = Field(description="Why the latest attempt failed; empty if none did.")
-    news: Literal["raised", "resolved"]
-    escalation: bool = Field(description="Only for alerts that nobody acknowledged in time.")
-    waits_until: datetime | None = Field(description="The end of its hook's quiet hours.")
-
-
-class Acknowledged(BaseModel):
-    """Acknowledgement of an alert: person, time and comment."""
-
-    who: str
-    why: str
-    at: datetime
-
-
-class AlertState(BaseModel):
-    """An alert; it is open while `acknowledged` and `resolved` are null."""
-
-    id: int
-    hanger: int
-    raised_at: datetime
-    test: str
-    test_at: datetime
-    kinds: list[str] = Field(description="The rules that raised it.")
-    message: str
-    state: str = Field(description="The first sentence of the message.")
-    action: str = Field(description="What the alert asks to do, and how soon.")
-    urgency: Literal["none", "next_test", "week", "today"]
-    acknowledged: Acknowledged | None
-    resolved: Acknowledged | None = Field(
-        description="How its condition ended; null while it holds."
-    )
-    silenced_until: datetime | None = Field(
-        description="Hooks are notified about this hanger again from then on; null if they are now."
-    )
-    deliveries: list[DeliveryState]
-
-
-class Alerts(BaseModel):
-    """Alerts as they were raised."""
-
-    alerts: list[AlertState]
-    next_before: int | None = Field(
-        default=None,
-        description="Ask for older ones with `before` of this; null where there are none, and "
-        "without `limit`.",
-    )
-
-
 class Acknowledge(BaseModel):
     """Comment of a person on an alert."""
 
@@ -164,18 +110,6 @@ class Acknowledge(BaseModel):
     resolved: bool = Field(
         default=False, description="Its cause is gone or explained; the hooks are notified."
     )
-
-
-class Status(BaseModel):
-    """Contents of the workspace, and files that wait."""
-
-    bridge: str
-    recordings: dict[str, int] = Field(description="How many are at each stage.")
-    spool: int
-    quarantine: int
-    open_alerts: int
-    waiting_deliveries: int
-    daemon_seen_seconds_ago: float | None
 
 
 class Health(BaseModel):
@@ -227,7 +161,7 @@ def plain(value: Any) -> Any:
 
 def _single(value: Any) -> Any:
     if isinstance(value, datetime):
-        return value.isoformat()
+        return value.isoformat().replace("+00:00", "Z")  # as `--json` has it
     if isinstance(value, np.datetime64):
         return str(value)
     if isinstance(value, np.generic):

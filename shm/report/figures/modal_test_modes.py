@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from shm.report.figures.modal_test_axes import (
     with_headroom,
 )
 from shm.report.formatting import NORMAL_90
-from shm.values import PLANES, BoolArray, FloatArray, Mode
+from shm.values import PLANES, BoolArray, Hanger, Mode
 
 # Layout: as many bins as a page has dots; a scale is never narrower than two orders.
 _BINS = 550
@@ -108,14 +107,6 @@ _NEAR = 0.4
 """A string misses the points by no more than this share of them where it is drawn."""
 
 
-@dataclass(frozen=True, eq=False)
-class Guide:
-    """A line through a shape: places (n,) from the deck end in m, values (n,)."""
-
-    x_m: FloatArray
-    value: FloatArray
-
-
 def shown_modes(sheet: ModalTestReport) -> list[Mode]:
     """Return modes with a shape, as many as there is room for."""
     return modes_with_shape(sheet)[:_MOST]
@@ -145,30 +136,26 @@ def panel_title(mode: Mode) -> str:
     return f"{mode.order}: {mode.frequency_hz:.4g} Hz"
 
 
-def guide_name(sheet: ModalTestReport) -> str:
-    """Return the name of the guides of a test for a legend."""
-    return "places joined" if sheet.hanger is None else "guide: taut string"
-
-
-def guide(sheet: ModalTestReport, mode: Mode) -> Guide | None:
+def _guide(hanger: Hanger | None, mode: Mode) -> list[spec.Mark]:
     """Return the shape of a taut string of the mode's order, scaled to the measurement.
 
-    None where it does not come close to the points; straight lines between them where the
-    hanger is not described.
+    Nothing where it does not come close to the points, or the hanger is not described.
     """
     known = [p for p in mode.shape if math.isfinite(p.x_m) and math.isfinite(p.value)]
-    pairs = sorted((p.x_m, p.value) for p in known)
-    x_m, value = np.array(pairs, dtype=np.float64).reshape(-1, 2).T
-    if sheet.hanger is None:
-        return Guide(x_m, value)
-    wave = mode.order * np.pi / sheet.hanger.length_m
+    x_m, value = (np.array([getattr(p, name) for p in known]) for name in ("x_m", "value"))
+    if hanger is None or len(known) < _LEAST_POINTS:
+        return []
+    wave = mode.order * np.pi / hanger.length_m
     string = np.sin(wave * x_m)
     size = float(string @ value) / max(float(string @ string), 1e-9)
     misses = float(np.linalg.norm(value - size * string))
-    if len(x_m) < _LEAST_POINTS or misses >= _NEAR * np.linalg.norm(value) or abs(size) >= ROOM:
-        return None
-    places = np.linspace(0, sheet.hanger.length_m, 12 * mode.order + 1)
-    return Guide(places, size * np.sin(wave * places))
+    if misses >= _NEAR * np.linalg.norm(value) or abs(size) >= ROOM:
+        return []
+    places = np.linspace(0, hanger.length_m, 12 * mode.order + 1)
+    name = "guide: taut string"
+    return [
+        spec.Line(x=places, y=size * np.sin(wave * places), colour="quiet", width=0.8, name=name)
+    ]
 
 
 # Layout: panels beside each other.
@@ -204,11 +191,7 @@ def _shape_panel(sheet: ModalTestReport, mode: Mode) -> spec.Panel:
     low, high = extent_m(sheet)
     margin = 0.03 * (high - low)
     ticks = (low, (low + high) / 2, high)
-    marks: list[spec.Mark] = [spec.Rule(at=0, width=0.5)]
-    if found := guide(sheet, mode):
-        marks.append(
-            spec.Line(x=found.x_m, y=found.value, colour="quiet", width=0.8, name=guide_name(sheet))
-        )
+    marks: list[spec.Mark] = [spec.Rule(at=0, width=0.5), *_guide(sheet.hanger, mode)]
     marks.append(
         spec.Points(
             x=x_m, y=value, low=value - half, high=value + half, size=3.8, name=mode.plane,
@@ -237,16 +220,16 @@ def _shape_panel(sheet: ModalTestReport, mode: Mode) -> spec.Panel:
 def _shapes_caption(shown: ResponseCurves) -> str:
     sheet = shown.sheet
     line = (
-        "The thin line is no measurement: it is the shape of a taut string of that order, brought "
+        " The thin line is no measurement: it is the shape of a taut string of that order, brought "
         "to the size of the measured points, and left out where it does not come near them."
         if sheet.hanger is not None
-        else "Thin lines only join the measured places."
+        else ""
     )
     some = formatting.some(len(shown_modes(sheet)), len(modes_with_shape(sheet)), "shapes")
     return (
         "Each panel is a mode: its order and frequency, its component in its own plane with the "
         "90 % interval where it is known, and that in the other plane as diamonds. The deck end "
-        f"is on the left. {line}{some}"
+        f"is on the left.{line}{some}"
     )
 
 

@@ -9,7 +9,7 @@ from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
-from fastapi.responses import RedirectResponse
+from fastapi.responses import JSONResponse, RedirectResponse
 
 from shm.bridge import Hook
 from shm.errors import BadInput
@@ -29,10 +29,9 @@ from shm_daemon.web.models import (
     LARGEST_NUMBER,
     MOST_ROWS,
     Acknowledge,
-    Alerts,
-    AlertState,
     Before,
     Row,
+    document,
     paged,
 )
 from shm_daemon.web.site import Site
@@ -96,12 +95,12 @@ def _some(
     documents, now = alert_documents(shown, site), _messages(shown, site)
     return [
         {
-            **document,
+            **found,
             "address": _address(each, site),
             "stream": _stream_of(each, site),
             "now": _now(each, now.get(each.alert.hanger)),
         }
-        for each, document in zip(shown, documents, strict=True)
+        for each, found in zip(shown, documents, strict=True)
     ], older
 
 
@@ -140,9 +139,7 @@ def _stream_of(stored: StoredAlert, site: Site) -> str | None:
     return name if hour and name in known else None
 
 
-@router.get(
-    "/api/alerts", response_model=Alerts, responses=answers(422), summary="Alerts that were raised"
-)
+@router.get("/api/alerts", responses=answers(422), summary="Alerts that were raised")
 def alerts(
     site: AtSite,
     _: Reader,
@@ -160,30 +157,31 @@ def alerts(
             ge=0, le=LARGEST_NUMBER, description="With `limit`: `next_before` of the answer before."
         ),
     ] = None,
-) -> Any:
-    """With their deliveries. Without `limit` all that were ever raised, the oldest first.
+) -> JSONResponse:
+    """Return them with their deliveries; without `limit` all that were ever raised, oldest first.
 
-    With `limit` page by page, the newest first: after years that is the quicker question.
+    With `limit` page by page, the newest first: after years that is the quicker question. One is
+    open while `acknowledged` and `resolved` are null; hooks hear of its hanger again from
+    `silenced_until` on.
     """
     is_open = True if open else None
     if limit is None:
         found = list_alert_page(site.store, hanger, is_open=is_open)[::-1]
-        return {"alerts": alert_documents(found, site), "next_before": None}
+        return document({"alerts": alert_documents(found, site), "next_before": None})
     rows = list_alert_page(site.store, hanger, is_open=is_open, limit=limit + 1, before=before)
     shown, older = paged(rows, limit)
-    return {"alerts": alert_documents(shown, site), "next_before": older}
+    return document({"alerts": alert_documents(shown, site), "next_before": older})
 
 
 @router.post(
     "/api/alerts/{alert_id}/acknowledgement",
-    response_model=AlertState,
     responses=answers(404, 409, 422),
     summary="Take note of an alert",
 )
-def acknowledge(site: AtSite, writer: Writer, alert_id: Row, comment: Acknowledge) -> Any:
+def acknowledge(site: AtSite, writer: Writer, alert_id: Row, comment: Acknowledge) -> JSONResponse:
     """Record that somebody has seen an alert, or with `resolved` that it has ended."""
     _note(site, writer, alert_id, comment.who, comment.why, comment.resolved)
-    return alert_documents([site.store.alerts.get(alert_id)], site)[0]
+    return document(alert_documents([site.store.alerts.get(alert_id)], site)[0])
 
 
 @router.post("/alerts/{alert_id}/acknowledgement", include_in_schema=False)

@@ -10,13 +10,12 @@ import math
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, Field
+from fastapi.responses import JSONResponse
 from starlette.concurrency import run_in_threadpool
 
 from shm.errors import BadInput, UsageError
@@ -39,7 +38,7 @@ from shm_daemon.web.access import AtSite, Reader, Uploader
 from shm_daemon.web.address import IMPORTS
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
-from shm_daemon.web.models import LARGEST_NUMBER, Row, plain
+from shm_daemon.web.models import LARGEST_NUMBER, Row, document
 from shm_daemon.web.recordings import PLAIN_BODY, receive_body
 from shm_daemon.web.site import held_documents
 
@@ -73,54 +72,8 @@ def outcome(request: Request, site: AtSite, _: Reader, recording: Row) -> Respon
 _MOST_ANSWERS = 4000  # technical: of an address, 64 kB at most when each character is escaped
 
 
-class ImportedColumn(BaseModel):
-    """A column of a file and what it is taken for; `least` and `largest` in N or m/s2."""
-
-    name: str
-    unit: str
-    quantity: Literal["force", "acceleration"] | None
-    plane: Literal["transverse", "longitudinal"] | None
-    x_m: float | None
-    least: float | None
-    largest: float | None
-    overloads: int
-    is_clipped: bool
-    hits: int | None
-    outline: list[float] = Field(description="Its largest value in parts of equal length, 0 to 1.")
-
-
-class ImportQuestion(BaseModel):
-    """A question to a person; `channel` is empty for the complete file."""
-
-    about: str
-    channel: str
-    text: str
-    option: str
-    choices: list[str] = Field(description="The usual answers; empty where there are none.")
-
-
-class ImportLook(BaseModel):
-    """A file as it is understood; `sha256` is null while questions are open or nothing was kept."""
-
-    format: str
-    fingerprint: str
-    hanger: int | None
-    time: datetime | None
-    temperature_c: float | None
-    operator: str
-    sampling_rate_hz: float | None
-    samples: int
-    columns: list[ImportedColumn]
-    questions: list[ImportQuestion]
-    of_test: list[ImportQuestion] = Field(description="What may stay open, of this file alone.")
-    problems: list[str]
-    remarks: list[str]
-    sha256: str | None
-
-
 @router.post(
     IMPORTS,
-    response_model=ImportLook,
     responses=answers(408, 409, 413, 415, 422),
     openapi_extra=PLAIN_BODY,
     summary="Import the first file of a logger",
@@ -140,11 +93,12 @@ async def import_file(
             " into.",
         ),
     ] = None,
-) -> Any:
+) -> JSONResponse:
     """Show what is understood of a file and ask for the rest; store nothing yet.
 
     With answers to all, they are kept as the profile of its logger, and the file goes to the
-    daemon as any other.
+    daemon as any other: `sha256` is null until then. `questions` are open, `of_test` may stay so;
+    the range of a column is in N or m/s2, its `outline` the largest values in equal parts, 0 to 1.
     """
     landing_name(name)
     workspace = site.workspace
@@ -152,15 +106,15 @@ async def import_file(
     try:
         await receive_body(request, file.write, workspace.settings.max_file_bytes)
         looked = await run_in_threadpool(_looked, file, landing_name(name), workspace, said)
-        if looked.sha256 is not None:
+        if looked["sha256"] is not None:
             journal = site.store.acting_as(writer.actor).journal
             await run_in_threadpool(journal.note, utc_now(), "recording uploaded", name)
-        return looked
+        return document(looked)
     finally:
         await run_in_threadpool(file.close)
 
 
-def _looked(file: Incoming, name: str, workspace: Workspace, text: str | None) -> ImportLook:
+def _looked(file: Incoming, name: str, workspace: Workspace, text: str | None) -> dict[str, Any]:
     if file.size_bytes == 0:
         raise BadInput("the body is empty.", remedy="Send the bytes of the file.")
     with TemporaryDirectory(prefix="shm-import-") as folder:
@@ -174,17 +128,16 @@ def _looked(file: Incoming, name: str, workspace: Workspace, text: str | None) -
         if found.is_ready:
             keep_profile(found, workspace, each_time=answers.each_time)
             landed = file.land(name, found.described)
-    document = import_document(found)
-    return ImportLook(**plain(document), sha256=landed.sha256 if landed else None)
+    return {**import_document(found), "sha256": landed.sha256 if landed else None}
 
 
 def _answers(body: str, found: Import) -> Answers:
     """Return the answers of a request; raises BadInput for what is none."""
     try:
-        document = json.loads(body)
+        said = json.loads(body)
     except (ValueError, RecursionError) as error:
         raise _misread(str(error)[:100]) from error
-    columns = document.get("columns", {}) if isinstance(document, dict) else None
+    columns = said.get("columns", {}) if isinstance(said, dict) else None
     if not isinstance(columns, dict) or not all(isinstance(t, dict) for t in columns.values()):
         raise _misread("it holds no answers")
     asked = {(q.channel, q.about): q for q in found.questions}
@@ -197,20 +150,20 @@ def _answers(body: str, found: Import) -> Answers:
             if question is None:
                 raise _misread(f"nothing was asked of {name[:60]!r}")
             tables.setdefault(name, {}).update(_answered(question, about, str(text), found))
-    hanger = document.get("hanger")
+    hanger = said.get("hanger")
     if hanger is not None and not (type(hanger) is int and 0 <= hanger <= LARGEST_NUMBER):
         raise _misread("hanger is no number of a hanger")
     answers = Answers(
         hanger,
-        _number(document, "sampling_rate_hz", least=0.0),
+        _number(said, "sampling_rate_hz", least=0.0),
         None,
-        _number(document, "temperature_c", least=-300.0),
+        _number(said, "temperature_c", least=-300.0),
         channels=tables,
-        each_time=document.get("each_time") is True,
+        each_time=said.get("each_time") is True,
     )
     for key, answer in ANSWERS_OF_TEST.items():
-        if key in document:
-            answers = _with(answer, answers, document[key])
+        if key in said:
+            answers = _with(answer, answers, said[key])
     return answers
 
 
@@ -228,8 +181,8 @@ def _answered(question: Question, about: str, text: str, found: Import) -> dict[
         raise BadInput(error.message, remedy=error.remedy) from error
 
 
-def _number(document: dict[str, Any], key: str, least: float) -> float:
-    value = document.get(key)
+def _number(said: dict[str, Any], key: str, least: float) -> float:
+    value = said.get(key)
     if value is None:
         return math.nan
     if isinstance(value, bool) or not isinstance(value, int | float) or not least < value < 1e9:
