@@ -94,11 +94,11 @@ def find_cause(
 
 
 def _are_exchanged(
-    moved: FloatArray, table: ModeTable, least: int = 3, within: float = 1.0, beyond: float = 4.0
+    moved: FloatArray, table: ModeTable, least: int = 3, within: float = 2.0, times: float = 4.0
 ) -> bool:
     """Return True if each mode lies where that of the other plane did, at any tension.
 
-    In the median `within` so many sds, where no tension brings it nearer than `beyond`.
+    In the median `within` so many sds, and so many `times` nearer than at any tension of its own.
     """
     place = {mode: index for index, mode in enumerate(table.modes)}
     other = [place.get((PLANES[plane == PLANES[0]], order), -1) for plane, order in table.modes]
@@ -110,7 +110,7 @@ def _are_exchanged(
     left = left - tension * np.median(left / tension)
     before = moved[both] - tension * np.median(moved[both] / tension)
     off, moved_by = (float(np.median(np.abs(each) / sd)) for each in (left, before))
-    return off < within and moved_by > beyond
+    return off < within and moved_by > times * max(off, 1.0)
 
 
 def _is_clock(moved: Sequence[Moved]) -> bool:
