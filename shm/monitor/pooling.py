@@ -64,11 +64,8 @@ def pooled(
     )
 
 
-def as_modal_test(reading: PooledReading, reference_level_m_s2: float = NAN) -> ModalTest:
-    """A pooled reading as a test like any other, in the middle of its period.
-
-    Its amplitude is the level over the reference level, unknown unless that is given.
-    """
+def as_modal_test(reading: PooledReading) -> ModalTest:
+    """Return a pooled reading as a test like any other, in the middle of its period."""
     length = PERIODS[reading.period]
     name = f"{reading.stream}-{reading.start:%Y-%m-%d}"
     if reading.period != "day":
@@ -79,7 +76,6 @@ def as_modal_test(reading: PooledReading, reference_level_m_s2: float = NAN) -> 
         hanger=reading.hanger,
         time=reading.start + length / 2,
         temperature_c=reading.temperature_c,
-        amplitude=reading.level_m_s2 / reference_level_m_s2,
     )
 
 

@@ -50,11 +50,6 @@ class Judged:
     reason: str = ""
 
 
-def cut(pieces: Sequence[Piece], stream: Stream, known: Sequence[Mode]) -> Window:
-    """Return the window of all `pieces`, which may have gaps between them."""
-    return judged(pieces, stream, known).window
-
-
 def judged(pieces: Sequence[Piece], stream: Stream, known: Sequence[Mode]) -> Judged:
     """Return the window of `pieces` and what of it is used."""
     if not pieces:

@@ -116,8 +116,9 @@ def _check_together(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
     wrong = [MistakenTest(test.id, each) for test, each in zip(tests, why, strict=True) if each]
     sound = np.array([not each for each in why])
     modes = [
-        MistakenMode(tests[n].id, *keys[at], math.exp(table[n, at]), math.exp(expected[n, at]))
-        for n, at in np.argwhere(off & sound[:, None])
+        MistakenMode(tests[n].id, plane, order, math.exp(table[n, at]), math.exp(expected[n, at]))
+        for n, at in np.argwhere(off & sound[:, None]).tolist()
+        for plane, order in [keys[at]]
     ]
     count, misfit = int(np.isfinite(table[sound]).sum()), ""
     if len(wrong) > MOST_MISTAKEN * len(tests):

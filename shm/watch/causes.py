@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -220,7 +220,6 @@ class Structure:
 
     layout: Layout
     directions: tuple[Direction, ...]
-    quantities: tuple[WatchedQuantity, ...]
     scattering: FloatArray
     stiffening: FloatArray
     scatter_variance: FloatArray
@@ -228,12 +227,6 @@ class Structure:
     wander: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))
     wander_years: float = 0.0
     thermal_laws: int = 1
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """All that may be told to have moved: the quantities, then the causes."""
-        causes = dict.fromkeys(each.name for each in self.directions if not each.members)
-        return (*(each.name for each in self.quantities), *causes)
 
 
 def structure_of(
@@ -272,7 +265,6 @@ def structure_of(
             n, len(steps), np.concatenate([np.ones(n), steps, per_kelvin, per_amplitude, last])
         ),
         directions=tuple(_directions(quantities, columns, sensors)),
-        quantities=tuple(quantities),
         scattering=np.hstack([gives * loosening, sensors, stiffer, np.ones((n, 1)), np.eye(n)]),
         stiffening=stiffer[:, 0] / _STIFFER,
         scatter_variance=scatter_sd**2,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
 
@@ -168,7 +168,6 @@ def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
     return Structure(
         layout=Layout(n, n, prior_sd),
         directions=tuple(directions),
-        quantities=(),
         scattering=ones[:, None],
         scatter_variance=np.append(np.full(n, _SCATTER_OF_A_MODE), _SCATTER) ** 2,
         scales=np.array(options.scatter_scales),
@@ -200,8 +199,7 @@ class FrequencyWatcher(Watcher):
     @cached_property
     def structure(self) -> Structure:
         """The hypotheses."""
-        found = structure_of_frequencies(len(self.quantities), self.options)
-        return replace(found, quantities=self.quantities)
+        return structure_of_frequencies(len(self.quantities), self.options)
 
     @cached_property
     def sums(self) -> StateSums:

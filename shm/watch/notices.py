@@ -60,7 +60,7 @@ def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
     """
     clear = [each for each in test.drifts if _deviations(each) > _CLEAR_DRIFT]
     lead = max(clear, key=_deviations, default=None)
-    kind, drifts = _CHECK, ()
+    kind, drifts = _CHECK, tuple[Drift, ...]()
     if lead is None or not hanger.is_modelled:
         message = (
             f"{against_baseline_words(test.change, hanger)} Either the baseline was disturbed, by "

@@ -46,26 +46,22 @@ class Seen:
     factors: FloatArray
     sds: FloatArray
 
-    def distance(self, one: int, other: int) -> tuple[float, int, float]:
-        """Return a difference's squared length, its modes, its covariance's log determinant."""
+    def distance(self, one: int, other: int) -> tuple[float, int]:
+        """Return a difference's squared length, and its modes."""
         both = np.isfinite(self.variances[one]) & np.isfinite(self.variances[other])
         if not both.any():
-            return 0.0, 0, 0.0
+            return 0.0, 0
         scatter = self.factors[both] * self.sds
         covariance = 2 * scatter @ scatter.T
         for doubt in (self.doubt[one][both], self.doubt[other][both]):
             covariance += doubt @ doubt.T
         covariance += np.diag((self.variances[one] + self.variances[other])[both])
         off = (self.values[one] - self.values[other])[both]
-        return (
-            float(off @ np.linalg.solve(covariance, off)),
-            int(both.sum()),
-            float(np.linalg.slogdet(covariance)[1]),
-        )
+        return float(off @ np.linalg.solve(covariance, off)), int(both.sum())
 
     def agree(self, one: int, other: int) -> bool:
         """Return True if two tests may be of one state."""
-        square, modes, _ = self.distance(one, other)
+        square, modes = self.distance(one, other)
         return modes > 0 and square < float(scipy.special.chdtri(modes, _SELDOM))
 
 
@@ -127,7 +123,7 @@ def outlier_probability(seen: Seen, known: BoolArray, test: int, prior: float) -
     odds = np.log(prior / (1 - prior))
     against = []
     for before in np.flatnonzero(known[:test])[-_BEFORE:]:
-        square, d, _ = seen.distance(test, int(before))
+        square, d = seen.distance(test, int(before))
         if d:
             wide = -(_TAIL + d) / 2 * np.log1p(square / _TAIL / _WIDER**2) - d * np.log(_WIDER)
             against.append(wide + square / 2)

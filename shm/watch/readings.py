@@ -324,6 +324,7 @@ def _patterns(
     return np.asarray(strength[chosen, None] * axes[chosen])
 
 
+# Of a frequency: what tests differ by beyond their errors, a logger's clock, a tenth of a kelvin.
 _FREQUENCY_ALLOWANCE = 1e-4
 
 # Mode by mode two tests of one state differ by more than is stated: the sensors' mass and place, a
@@ -342,21 +343,11 @@ class Reader:
 
     Made of the baseline's posterior and its tests, which may be of any conditions. Raises BadInput
     where these hold no mode. `reference_temperature_c` is their mean, NaN where none has one.
-    `frequency_allowance`, a fraction of a frequency, is what two tests
-    may differ by beyond their stated errors: a logger's clock, a tenth of a kelvin.
     """
 
-    def __init__(
-        self,
-        baseline: Posterior,
-        tests: Sequence[ModalTest],
-        hanger: Hanger,
-        *,
-        frequency_allowance: float = _FREQUENCY_ALLOWANCE,
-    ):
+    def __init__(self, baseline: Posterior, tests: Sequence[ModalTest], hanger: Hanger):
         self._model = class_of(baseline, hanger)
         self._base = base_point(baseline, self._model)
-        self._allowance = frequency_allowance
         usable = [test for test in tests if _is_described(test, self._model)]
         keys = {_key(mode) for test in usable for mode in test.regular_modes if _is_measured(mode)}
         if not keys:
@@ -524,7 +515,7 @@ class Reader:
             order=np.array([mode.order - 1 for mode in modes], dtype=int),
             own=its,
             log_frequency=np.log(frequency_hz) - self._residual[its] - variation,
-            variance=sd**2 + self._allowance**2,
+            variance=sd**2 + _FREQUENCY_ALLOWANCE**2,
         )
 
 

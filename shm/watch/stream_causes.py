@@ -93,8 +93,13 @@ def find_cause(
     return StreamCause(found, by_mode, planes.pop() if len(planes) == 1 else None)
 
 
-def _are_exchanged(moved: FloatArray, table: ModeTable, least: int = 3, sds: float = 3.0) -> bool:
-    """Return True if each mode lies where that of the other plane did, at any tension."""
+def _are_exchanged(
+    moved: FloatArray, table: ModeTable, least: int = 3, within: float = 2.0, times: float = 4.0
+) -> bool:
+    """Return True if each mode lies where that of the other plane did, at any tension.
+
+    In the median `within` so many sds, and so many `times` nearer than at any tension of its own.
+    """
     place = {mode: index for index, mode in enumerate(table.modes)}
     other = [place.get((PLANES[plane == PLANES[0]], order), -1) for plane, order in table.modes]
     both = np.isfinite(moved) & (np.array(other) >= 0)
@@ -104,7 +109,8 @@ def _are_exchanged(moved: FloatArray, table: ModeTable, least: int = 3, sds: flo
     tension, sd = table.tension[both], np.sqrt(table.spread[both] + _DAY_SD**2)
     left = left - tension * np.median(left / tension)
     before = moved[both] - tension * np.median(moved[both] / tension)
-    return bool(np.median(np.abs(left) / sd) < sds < np.median(np.abs(before) / sd))
+    off, moved_by = (float(np.median(np.abs(each) / sd)) for each in (left, before))
+    return off < within and moved_by > times * max(off, 1.0)
 
 
 def _is_clock(moved: Sequence[Moved]) -> bool:

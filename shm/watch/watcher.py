@@ -6,10 +6,9 @@ After a call the called change is part of what is known, and a further one is lo
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -29,6 +28,7 @@ from shm.values import (
 from shm.values.drift import ENOUGH_AGAINST
 from shm.watch.causes import Columns, DetectedChange, Structure, structure_of
 from shm.watch.change_point import Evidence, evidence_of, log_probability_of_called
+from shm.watch.kept_state import to_bytes
 from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of, years_between
 from shm.watch.persistence import bound_by_recurrence, outlier_probability, select_consistent_tests
 from shm.watch.posterior_summary import (
@@ -85,9 +85,9 @@ class Watcher:
 
     @cached_property
     def key(self) -> str:
-        """Names what a state rests on beside the readings: the rules, options and quantities."""
-        given = [_VERSION, asdict(self.options), [_fingerprint(each) for each in self.quantities]]
-        return hashlib.sha256(json.dumps(given).encode()).hexdigest()
+        """Return a digest of what a state rests on but the readings: rules, options, quantities."""
+        given = to_bytes((_VERSION, self.options, self.quantities))
+        return hashlib.sha256(given).hexdigest()
 
     @cached_property
     def structure(self) -> Structure:
@@ -384,10 +384,3 @@ def _called(state: WatchState, rows: IntArray) -> list[DetectedChange]:
             state.called.tolist(), state.called_precision, strict=True
         )
     ]
-
-
-def _fingerprint(quantity: WatchedQuantity) -> list[object]:
-    """All of a quantity, its table as a digest."""
-    table = np.array([quantity.coordinates, quantity.values]).tobytes()
-    plain = (getattr(quantity, name) for name in ("name", "baseline", "step_sd", "end", "plane"))
-    return [*plain, *quantity.parameters, hashlib.sha256(table).hexdigest()]

@@ -47,6 +47,7 @@ from shm.watch.watcher import Watch, Watcher, watched
 
 Condition = tuple[str, Way]
 """A quantity, and the way that it went."""
+_WAYS: tuple[Way, Way] = ("down", "up")
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its time or that of its receipt."""
 _BEYOND: AlertKind = "beyond threshold"
@@ -91,7 +92,7 @@ class AlertState:
         fading = {
             condition: self.fading.get(condition, test.time)
             for drift in test.drifts
-            for condition in ((drift.quantity, "up"), (drift.quantity, "down"))
+            for condition in ((drift.quantity, way) for way in _WAYS)
             if condition in self.beyond and self._looks_over(condition, drift, end)
         }
         ended = {each for each, since in fading.items() if test.time - since > OF_ONE_VISIT}

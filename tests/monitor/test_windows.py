@@ -7,7 +7,6 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
-from shm.monitor import cut
 from shm.monitor.windows import judged
 from shm.values import FloatArray
 from tests.helpers.ambient_stream import RATE_HZ, START, Motion, drawn, piece, stream, values
@@ -34,7 +33,7 @@ def _train(at_s: float, seconds: float) -> FloatArray:
 
 
 def test_wind_is_used_as_a_whole() -> None:
-    window = cut([piece(WIND)], stream(), MOTION.known())
+    window = judged([piece(WIND)], stream(), MOTION.known()).window
     assert window.kind == "wind"
     assert window.duration_s == pytest.approx(SECONDS)
     assert window.signal_to_noise_db > 10
@@ -62,7 +61,7 @@ def test_what_disturbs_a_part_is_set_apart_and_the_rest_is_used(
 
 def test_noise_of_the_sensors_alone_is_quiet() -> None:
     noise = 2e-3 * np.random.default_rng(5).normal(size=WIND.shape)
-    window = cut([piece(noise)], stream(), MOTION.known())
+    window = judged([piece(noise)], stream(), MOTION.known()).window
     assert window.kind == "quiet"
     assert window.signal_to_noise_db < 5
 
@@ -75,7 +74,7 @@ def test_a_gap_divides_a_window_and_takes_nothing_else() -> None:
     assert found.window.duration_s == pytest.approx(SECONDS + 30)
     assert found.window.temperature_c == 10.0
     longer = [piece(WIND[:, : half + 1]), piece(WIND[:, half:], later, -127.0)]
-    assert cut(longer, stream(), MOTION.known()).temperature_c == 10.0
+    assert judged(longer, stream(), MOTION.known()).window.temperature_c == 10.0
     assert [part.shape[1] for part in found.parts] == [half, half]
 
 
