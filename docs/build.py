@@ -28,14 +28,13 @@ from pathlib import Path
 import rich_click as click
 
 from docs import validation_page
+from docs.command_pages import effects_page, licences_page, settings_page
 from docs.filling import fill_in
 from docs.gap_page import hanger_3_table
 from docs.house import house
 from shm import api
 from shm.models.registry import MODELS
 from shm_cli.common import markdown
-from shm_cli.effects import effects_page
-from shm_cli.installation import licences_page, settings_page
 from shm_cli.main import VERBS, cli
 from tests.benchmarks.thesis import frequencies, selection, thesis_data
 from tests.benchmarks.validate import compared

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import math
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from shm.report.formatting import Interval
     from shm.report.paper import Table
     from shm.values import (
         Diagnosis,
@@ -46,14 +45,9 @@ def load_ipython_extension(shell: Any) -> None:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A value in words: a titled table, whose headings may be empty, and paragraphs under it.
+    """A value in words: a titled table of a report, with paragraphs above and under it."""
 
-    The paragraphs of `lead` stand above the table.
-    """
-
-    title: str
-    head: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
+    table: Table
     notes: tuple[str, ...] = ()
     lead: tuple[str, ...] = ()
 
@@ -69,8 +63,8 @@ class Sheet:
         lead, notes = (
             [textwrap.fill(each, width) for each in wording] for wording in (self.lead, self.notes)
         )
-        table = laid_out(replace(self._table, title=""), width).strip("\n")
-        return "\n".join([self.title, *lead, table, *notes])
+        table = laid_out(replace(self.table, title="", note=""), width).strip("\n")
+        return "\n".join([self.table.title, *lead, table, *notes])
 
     @property
     def html(self) -> str:
@@ -80,13 +74,13 @@ class Sheet:
             "".join(f"<p>{escape(each)}</p>" for each in wording)
             for wording in (self.lead, self.notes)
         )
-        return f"{lead}{table_html(self._table)}{notes}"
+        return f"{lead}{table_html(replace(self.table, note=''))}{notes}"
 
-    @property
-    def _table(self) -> Table:
-        from shm.report.paper import Table
 
-        return Table(self.title, self.head, tuple(self.rows))
+def _table(title: str, head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Table:
+    from shm.report.paper import Table
+
+    return Table(title, head, tuple(rows))
 
 
 def sheet(value: Any) -> Sheet:
@@ -108,7 +102,7 @@ def _hanger(hanger: Hanger) -> Sheet:
         ("bending stiffness", f"{formatting.rounded_tension(stiffness, force_unit(stiffness))} m²"),
         ("nominal tension", f"{unit.of(nominal_n):.{unit.decimals(nominal_n)}f} {unit.name}"),
     ]
-    return Sheet(formatting.hanger_name(hanger.id, hanger.name), ("", ""), rows)
+    return Sheet(_table(formatting.hanger_name(hanger.id, hanger.name), ("", ""), rows))
 
 
 def _modal_test(test: ModalTest) -> Sheet:
@@ -119,7 +113,7 @@ def _modal_test(test: ModalTest) -> Sheet:
     whose = "" if test.hanger is None else f" of hanger {test.hanger}"
     when = f"{formatting.moment(test.time)}, {formatting.temperature(test.temperature_c)}"
     title = f"Modal test {test.id}{whose}, {when}"
-    return Sheet(title, MODE_HEADINGS, [mode_row(mode) for mode in test.modes])
+    return Sheet(_table(title, MODE_HEADINGS, map(mode_row, test.modes)))
 
 
 def _recording(recording: Recording) -> Sheet:
@@ -147,7 +141,7 @@ def _recording(recording: Recording) -> Sheet:
         for channel in recording.channels
     ]
     head = ("channel", "quantity", "plane", "place", "largest value", "missing samples")
-    return Sheet(title, head, rows)
+    return Sheet(_table(title, head, rows))
 
 
 def _largest(values: FloatArray) -> float:
@@ -159,27 +153,17 @@ def _largest(values: FloatArray) -> float:
 
 
 def posterior_sheet(posterior: Posterior, limits: Limits | None = None) -> Sheet:
-    """Show tension and parameters: mean, 90 % interval, most probable value, meaning."""
+    """Show tension and parameters, each with its 90 % interval and what it is."""
+    from shm.report import formatting, shared_tables
     from shm.values.posterior import WITHOUT_MODEL
-
-    if posterior.model == WITHOUT_MODEL:
-        return _frequencies(posterior)
-    from shm.report import formatting
-    from shm.report.formatting import Interval
     from shm.values.rounding import force_unit
     from shm.values.stated_tension import averaged_now, stated
 
-    tension_n = Interval.of_samples(posterior.tension_n)
-    unit = force_unit(tension_n.mean)
-    best = dict(zip(posterior.names, posterior.most_probable, strict=True))
-    at_best = unit.of(best["theta_F"] * posterior.nominal_tension_n)
-    rows = [
-        _interval_row("tension", tension_n.in_unit(unit), at_best, f"tension in {unit.name}"),
-    ]
-    for name in posterior.names:
-        interval = Interval.of_samples(posterior.parameter(name))
-        rows.append(_interval_row(name, interval, best[name], formatting.meaning(posterior, name)))
-    head = ("", "mean", "90 % interval", "most probable", "what it is")
+    if posterior.model == WITHOUT_MODEL:
+        values = zip(posterior.names, posterior.most_probable, strict=True)
+        title = f"{_whose(posterior)}, measured frequencies without a model"
+        rows = ((name, f"{value:.3f}") for name, value in values)
+        return Sheet(_table(title, ("mode", "frequency in Hz"), rows))
     sampled = (
         f"{len(posterior.samples)} draws "
         f"({formatting.number(posterior.effective_sample_size, '.0f')} effective), log evidence "
@@ -188,46 +172,22 @@ def posterior_sheet(posterior: Posterior, limits: Limits | None = None) -> Sheet
     )
     title = f"{_whose(posterior)}, {formatting.model_class(posterior.model)}"
     averaged = averaged_now(posterior, limits=limits)
+    unit = force_unit(float(posterior.tension_n.mean()))
     lead = (*averaged.caveats, " ".join(stated(averaged, unit).sentences))
-    return Sheet(title, head, rows, (sampled,), lead)
-
-
-def _frequencies(posterior: Posterior) -> Sheet:
-    """Show the measured frequencies of a structure that has no model."""
-    values = zip(posterior.names, posterior.most_probable, strict=True)
-    rows = [(name, f"{value:.3f}") for name, value in values]
-    title = f"{_whose(posterior)}, measured frequencies without a model"
-    return Sheet(title, ("mode", "frequency in Hz"), rows)
+    return Sheet(replace(shared_tables.parameters(posterior), title=title), (sampled,), lead)
 
 
 def selection_sheet(selection: Selection, limits: Limits | None = None) -> Sheet:
     """Show the tension over all classes with its caveats, then what each class gives."""
-    from shm.report import formatting
-    from shm.report.formatting import Interval
+    from shm.report import shared_tables
     from shm.values.rounding import force_unit
     from shm.values.stated_tension import stated
 
-    tensions_n = [Interval.of_samples(each.tension_n) for each in selection.posteriors]
-    unit = force_unit(*(each.mean for each in tensions_n))
-    rows = []
-    for posterior, probability, tension_n in zip(
-        selection.posteriors, selection.probabilities, tensions_n, strict=True
-    ):
-        tension = tension_n.in_unit(unit)
-        rows.append(
-            (
-                formatting.model_class(posterior.model),
-                formatting.probability(probability),
-                f"{posterior.log_evidence:.2f} "
-                f"± {formatting.number(posterior.log_evidence_sd, '.2f')}",
-                formatting.mean(tension),
-                formatting.span(tension),
-            )
-        )
-    head = ("class", "probability", "log evidence", *formatting.tension_headings(unit))
+    unit = force_unit(*(float(each.tension_n.mean()) for each in selection.posteriors))
     averaged = selection.averaged_with(limits)
     lead = (*averaged.caveats, " ".join(stated(averaged, unit).sentences))
-    return Sheet(f"{_whose(selection.selected)}, model classes", head, rows, lead=lead)
+    title = f"{_whose(selection.selected)}, model classes"
+    return Sheet(replace(shared_tables.model_classes(selection), title=title), lead=lead)
 
 
 def _diagnosis(diagnosis: Diagnosis) -> Sheet:
@@ -252,7 +212,8 @@ def _diagnosis(diagnosis: Diagnosis) -> Sheet:
     title = f"Gap{whose} to {formatting.model_class(diagnosis.baseline)}"
     wording = (write_summary(diagnosis), write_details(diagnosis))
     paragraphs = [paragraph for paragraph in wording if paragraph]
-    return Sheet(title, ("cause", "probability"), rows, (*paragraphs, *diagnosis.remarks))
+    table = _table(title, ("cause", "probability"), rows)
+    return Sheet(table, (*paragraphs, *diagnosis.remarks))
 
 
 def _gap_check(check: GapCheck) -> Sheet:
@@ -261,7 +222,8 @@ def _gap_check(check: GapCheck) -> Sheet:
 
     whose = "" if check.hanger is None else f" of hanger {check.hanger}"
     title = f"What a diagnosis{whose} would find"
-    return Sheet(title, HEADINGS, rows(check), tuple(check_text(check)), (introduction(check),))
+    table = _table(title, HEADINGS, rows(check))
+    return Sheet(table, tuple(check_text(check)), (introduction(check),))
 
 
 def figure_png(figure: Figure) -> bytes:
@@ -273,18 +235,6 @@ def figure_png(figure: Figure) -> bytes:
 
 def _whose(posterior: Posterior) -> str:
     return "Posterior" if posterior.hanger is None else f"Hanger {posterior.hanger}"
-
-
-def _interval_row(name: str, interval: Interval, best: float, meaning: str) -> tuple[str, ...]:
-    from shm.report import formatting
-
-    return (
-        name,
-        formatting.mean(interval),
-        formatting.span(interval),
-        f"{best:.{formatting.decimals(interval.width)}f}",
-        meaning,
-    )
 
 
 _SHEETS: dict[str, Callable[[Any], Sheet]] = {

@@ -60,7 +60,7 @@ def adopt(
     request = AdoptionRequest(effects, at, baseline, why, who)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
-        with progress_bar("adopting") as progress:
+        with progress_bar() as progress:
             made = adopt_in_store(workspace, store, hanger, request, utc_now(), progress)
         watch = gap_watch(store, hanger_id)
     sentence = f"Hanger {hanger_id} has the model class {made.adoption.model} from now on."

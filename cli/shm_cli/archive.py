@@ -41,7 +41,7 @@ def prune(ctx: click.Context, keep_days: int, dry_run: bool) -> None:
     Example: shm archive prune --keep-days 400 --dry-run
     """
     with opened_store(ctx) as (workspace, store):
-        with progress_bar("comparing") as tell:
+        with progress_bar() as tell:
             before = utc_now() - timedelta(days=keep_days)
             found = removable(store, workspace.archive, before, tell)
         freed = found.size_bytes

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import rich_click as click
 from rich.progress import (
@@ -176,35 +176,16 @@ def show_doubts(
 
 
 @contextmanager
-def progress_bar(title: str) -> Iterator[Callable[[str, float], None]]:
-    """Yield a bar on stderr that takes a label and a fraction, and draws one line a label."""
-    with _fraction_bar() as bar:
-        tasks: dict[str, Any] = {}
+def progress_bar() -> Iterator[Callable[[str, float], None]]:
+    """Yield a bar on stderr for a job of many steps; takes the step and the total fraction.
 
-        def tell(label: str, fraction: float) -> None:
-            if label not in tasks:
-                tasks[label] = bar.add_task(f"{title} {label}", total=1.0)
-            bar.update(tasks[label], completed=fraction)
-
-        yield tell
-
-
-@contextmanager
-def advancing_bar() -> Iterator[Callable[[str, float], None]]:
-    """Yield one bar on stderr for a job of many steps; takes the step and the total fraction."""
-    with _fraction_bar() as bar:
-        task, done = bar.add_task("", total=1.0), 0.0
-
-        def tell(label: str, fraction: float) -> None:
-            nonlocal done
-            done = max(done, fraction)
-            bar.update(task, description=label.replace("_", " "), completed=done)
-
-        yield tell
-
-
-def _fraction_bar() -> Progress:
-    return _bar(TextColumn("{task.percentage:>3.0f} %"))
+    Where one step after another runs from 0 to 1, the bar does so again.
+    """
+    with _bar(TextColumn("{task.percentage:>3.0f} %")) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda label, fraction: bar.update(
+            task, description=label.replace("_", " "), completed=fraction
+        )
 
 
 def counting_bar() -> Progress:

@@ -100,7 +100,7 @@ def check(ctx: click.Context, with_archive: bool) -> None:
     Example: shm db check --archive
     """
     workspace = open_workspace(ctx)
-    with workspace.store() as store, progress_bar("checking") as tell:
+    with workspace.store() as store, progress_bar() as tell:
         checked, location = check_store(store, tell), store.location
         archive = check_archive(store, workspace.archive, tell) if with_archive else None
     findings = (*checked.findings, *(archive.findings if archive else ()))
@@ -163,7 +163,7 @@ def backup(
     if target.is_dir():
         file = target / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}" / "shm.db"
     copied, noted = None, 0
-    with workspace.store() as store, progress_bar("backup") as tell:
+    with workspace.store() as store, progress_bar() as tell:
         written = back_up(store, file, tell)
         if target.is_dir():
             workspace.copy_description(file.parent)
@@ -221,7 +221,7 @@ def restore_command(ctx: click.Context, file: Path, replace: bool, copies: Path 
     _refuse_no_backup(file)
     workspace = open_workspace(ctx)
     keep_as = workspace.folder / f"shm-before-restore-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.db"
-    with workspace.lock(), progress_bar("restore") as tell:
+    with workspace.lock(), progress_bar() as tell:
         restored = restore(workspace.location, file, keep_as, tell, replace=replace)
         copied = _fetch(workspace, copies)
     if flags.wants_json():
@@ -252,7 +252,7 @@ def copy(ctx: click.Context, target: str) -> None:
     """
     workspace = open_workspace(ctx)
     place = target if "://" in target else Path(target).resolve()
-    with workspace.lock(), workspace.store() as store, progress_bar("copy") as tell:
+    with workspace.lock(), workspace.store() as store, progress_bar() as tell:
         tables = copy_store(store, place, tell)
     if flags.wants_json():
         show(_document(tables, None))
@@ -276,7 +276,7 @@ def _refuse_no_backup(file: Path) -> None:
 def _fetch(workspace: Workspace, copies: Path | None) -> CopiedArchive | None:
     if copies is None:
         return None
-    with workspace.store() as store, progress_bar("restore") as tell:
+    with workspace.store() as store, progress_bar() as tell:
         return copy_archive(Archive(copies), workspace.archive, archived_names(store), tell)
 
 

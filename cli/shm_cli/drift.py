@@ -165,7 +165,7 @@ def rebaseline(
     order = Order(since, why, who, event)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
-        with progress_bar("updating") as progress:
+        with progress_bar() as progress:
             found = set_baseline(workspace, store, hanger, order, utc_now(), progress)
     if flags.wants_json():
         of_event = {"kind": kind, "alerts_explained": found.explained, "alerts_open": found.left}

@@ -1,4 +1,4 @@
-"""`shm gap effects`: the catalogue of effects, which is also the manual's page of them."""
+"""`shm gap effects`: the catalogue of effects."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from shm.models.effects import EFFECTS, Effect, Parameter, Survey
 from shm.values import PLANES
 from shm.values.parameter_names import is_logarithm
 from shm_cli import completion, example, flags
-from shm_cli.common import markdown, show, show_rows
+from shm_cli.common import show, show_rows
 from shm_cli.terminal import Terminal
 
 _HANGER = replace(load_hanger(example.HANGER_FILE), plate=None)
@@ -25,41 +25,8 @@ _HANGER = replace(load_hanger(example.HANGER_FILE), plate=None)
 _EVERYTHING = Survey(("t1", "t2"), PLANES, (1.2, 2.4, 3.6), True, (5.0, 20.0), (0.5, 1.0), ())
 _LEAST = Survey(("t1",), PLANES[:1], (), False, (), (), ())
 
-_OVERVIEW_HEADS = ("effect", "what it is", "shown by")
-_PARAMETER_HEADS = ("parameter", "unit", "from", "to", "prior", "vanishes at", "why")
-_HEAD = """# Catalogue of effects
-
-These are the physical effects that `shm gap diagnose` knows: what can make a hanger differ from
-the model of it, each a term of the general hanger model that vanishes at one value of its first
-parameter, its *size*.
-
-Priors are deliberately wide, because nobody knows the order of magnitude beforehand: most sizes are
-logarithmic, *either sign* means that the effect may raise or lower. Lengths, masses and stiffnesses
-are scaled by the hanger's own; the numbers below are those of
-[hanger 3](hangers.md#round-bar-with-end-plates). You know your bridge better: narrow any range in
-`bridge.toml`, see [hangers.md](hangers.md#ranges-of-effects).
-
-An effect that your measurements cannot show is not tried, and the diagnosis says why. One that they
-show but cannot tell from another is reported as a group with it; *easily taken for* lists what to
-think of then. What imitates what:
-
-- More mass along the hanger, less bending stiffness and a slow clock give the same frequencies and
-  shapes once the tension is free. A known mass clamped on for one test tells the mass from the
-  other two; no hammer test tells stiffness from clock: hold the logger against another clock.
-  Effective length and stiff end zones come near to them in frequencies; shapes separate them.
-- A stiff end spring k and a bar that is longer by EI/k are the same to first order, in frequencies
-  and in shapes; so are a short stiff zone and a bar that is shorter by about its length.
-- Changes of mass, stiffness or length below 1 to 2 % lie within what a bar as made differs from its
-  description (`[hanger.scatter]`) and are no gap.
-- Turned sensors show in shapes only; effects of temperature and level only in tests that vary them,
-  and only apart where the warm tests are not the hard ones too.
-- Joints that soften or lie askew pass for plain end flexibility where the level is not varied, or
-  the sensors see one plane only.
-- A small mass close to an end, an end that gives way sideways, and shear with rotary inertia all
-  lower the high orders alike.
-- Frequencies of a uniform hanger cannot tell its two ends apart: deck end and arch end, or a place
-  and its mirror image, need shapes or a known mass.
-"""
+OVERVIEW_HEADS = ("effect", "what it is", "shown by")
+PARAMETER_HEADS = ("parameter", "unit", "from", "to", "prior", "vanishes at", "why")
 
 
 @click.command()
@@ -84,13 +51,12 @@ def effects(name: str | None) -> None:
         show({"effects": [_document(effect) for effect in chosen]})
         return
     if name:
-        _print(f"## {name}\n\n{_what(chosen[0])}")
-        rows = _parameter_rows(list(_parameters(chosen[0]).values()))
-        _print_table(_PARAMETER_HEADS, rows)
-        _print(_facts(chosen[0]))
+        _print(f"## {name}\n\n{what(chosen[0])}")
+        rows = parameter_rows(list(parameters(chosen[0]).values()))
+        _print_table(PARAMETER_HEADS, rows)
+        _print(facts(chosen[0]))
     else:
-        _print(_HEAD)
-        _print_table(_OVERVIEW_HEADS, [(e.name, e.title.lower(), _shown_by(e)) for e in chosen])
+        _print_table(OVERVIEW_HEADS, [(e.name, e.title.lower(), shown_by(e)) for e in chosen])
 
 
 def _print(text: str) -> None:
@@ -107,7 +73,7 @@ def _document(effect: Effect) -> dict[str, object]:
     return {
         "effect": effect.name,
         "title": effect.title,
-        "what": _what(effect),
+        "what": what(effect),
         "shown_by": list(effect.seen_by),
         "imitated_by": list(effect.imitated_by),
         "places": [variant.at for variant in effect.variants(_HANGER, _EVERYTHING)],
@@ -120,39 +86,27 @@ def _document(effect: Effect) -> dict[str, object]:
                 "prior": _prior(each),
                 "why": each.reason,
             }
-            for each in _parameters(effect).values()
+            for each in parameters(effect).values()
         ],
         "source": effect.source,
     }
 
 
-def effects_page() -> str:
-    """Return the page of all effects in Markdown, in the order of the catalogue."""
-    rows = [(f"[`{e.name}`](#{e.name})", e.title.lower(), _shown_by(e)) for e in EFFECTS.values()]
-    parts = [_HEAD + "\n" + markdown(_OVERVIEW_HEADS, rows)]
-    return "\n\n".join(parts + [_section(effect) for effect in EFFECTS.values()]) + "\n"
-
-
-def _section(effect: Effect) -> str:
-    parameters = markdown(_PARAMETER_HEADS, _parameter_rows(list(_parameters(effect).values())))
-    return "\n\n".join([f"## {effect.name}", _what(effect), parameters, _facts(effect)])
-
-
-def _what(effect: Effect) -> str:
+def what(effect: Effect) -> str:
     return inspect.getdoc(type(effect)) or effect.title
 
 
-def _shown_by(effect: Effect) -> str:
+def shown_by(effect: Effect) -> str:
     return ", ".join(effect.seen_by)
 
 
-def _facts(effect: Effect) -> str:
+def facts(effect: Effect) -> str:
     """Return lines on an effect: place, evidence, imitators and source."""
     places = ", ".join(f"*{each.at}*" for each in effect.variants(_HANGER, _EVERYTHING))
     needs = effect.invisible(_HANGER, _LEAST)
     lines = [
         f"- Where: {places}.",
-        f"- Shown by: {_shown_by(effect)}." + (f" {needs}" if needs else ""),
+        f"- Shown by: {shown_by(effect)}." + (f" {needs}" if needs else ""),
         f"- Easily taken for: {', '.join(f'`{name}`' for name in effect.imitated_by)}.",
         f"- Source: {effect.source}",
     ]
@@ -161,7 +115,7 @@ def _facts(effect: Effect) -> str:
     return "\n".join(lines)
 
 
-def _parameters(effect: Effect) -> dict[str, Parameter]:
+def parameters(effect: Effect) -> dict[str, Parameter]:
     """Return the parameters of all its variants by name, on hanger 3."""
     return {
         parameter.name: parameter
@@ -170,7 +124,7 @@ def _parameters(effect: Effect) -> dict[str, Parameter]:
     }
 
 
-def _parameter_rows(parameters: Sequence[Parameter]) -> list[tuple[str, ...]]:
+def parameter_rows(parameters: Sequence[Parameter]) -> list[tuple[str, ...]]:
     """Return one row a parameter; equal ones of the other end or plane share it."""
     same_prior: dict[tuple[float, float, str], list[Parameter]] = {}
     for parameter in parameters:

@@ -172,14 +172,6 @@ log_file = click.option(
 )
 
 
-def tls(function: F) -> F:
-    """Add `--certificate PEM --key PEM` to a command that serves the web interface."""
-    texts = {"key": "The key of the certificate.", "certificate": "Serve HTTPS with this."}
-    for name, text in texts.items():
-        function = click.option(f"--{name}", type=FILE, metavar="PEM", help=text)(function)
-    return function
-
-
 def hanger(required: bool = False) -> Callable[[F], F]:
     """Add `--hanger N`: a hanger of the workspace, or one of several in --hanger-file."""
     return click.option(

@@ -37,12 +37,12 @@ from shm.values.bar_description import describe_bar, list_sensors
 from shm_cli import completion, flags
 from shm_cli.adopt import adopt, adopted, drop
 from shm_cli.common import (
-    advancing_bar,
     answer,
     drawing,
     one_hanger,
     open_workspace,
     opened_store,
+    progress_bar,
     readable_width,
     show_doubts,
     show_rows,
@@ -118,7 +118,7 @@ def plan(
     tests, hanger, remark = _measured(ctx, file, hanger_file, hanger_id, every=all_tests)
     bridge = load_bridge(hanger_file) if hanger_file is not None else open_workspace(ctx).bridge
     options = GapOptions(baseline, without, seed=seed)
-    with advancing_bar() as progress:
+    with progress_bar() as progress:
         diagnosis, attribution = examined(tests, hanger, options, progress)
     if remark:
         click.echo(remark, err=True)
@@ -262,7 +262,7 @@ def _of_workspace(
     """
     with opened_store(ctx) as (workspace, store):
         chosen = choose_tests(store, hanger, latest[0], every=latest[1])
-        with advancing_bar() as progress:
+        with progress_bar() as progress:
             found = diagnose_stored(store, chosen, hanger, options, utc_now(), progress)
         sensors = _stored_sensors(store, chosen)
     return DiagnosisSheet(found, hanger, workspace.bridge.name, sensors)
@@ -280,7 +280,7 @@ def _stored_sensors(store: Store, chosen: ChosenTests) -> tuple[ResponsePoint, .
 
 
 def _diagnosis(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) -> Diagnosis:
-    with advancing_bar() as progress:
+    with progress_bar() as progress:
         return diagnosed(tests, hanger, options, progress)
 
 
@@ -303,7 +303,7 @@ def _jointly(
     found = [tests_and_hanger(ctx, modes, of, None) for modes, of in _pairs(files)]
     for tests, hanger in found:
         show_doubts(tests, hanger)
-    with advancing_bar() as progress:
+    with progress_bar() as progress:
         named = [(hanger, tests) for tests, hanger in found]
         bars = tuple(describe_bar(hanger, _sensors(tests)) for tests, hanger in found)
         return BridgeDiagnosisSheet(diagnose_bridge(named, options, progress), bars=bars)
@@ -335,7 +335,7 @@ def _of_bridge(
                 f"cause takes {LEAST}.",
                 remedy="Take tests in with `shm ingest`.",
             )
-        with advancing_bar() as progress:
+        with progress_bar() as progress:
             named = [(hanger, chosen.tests) for hanger, chosen in stored.items()]
             found = diagnose_bridge(named, options, progress)
         each_alone = tuple(

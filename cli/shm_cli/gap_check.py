@@ -20,11 +20,11 @@ from shm.report.gap_check_report import HEADINGS, check_text, introduction, rows
 from shm.values import GapCheck, Hanger, ModalTest
 from shm_cli import completion, flags
 from shm_cli.common import (
-    advancing_bar,
     drawing,
     one_hanger,
     opened_store,
     paragraph,
+    progress_bar,
     show,
     show_rows,
     tests_and_hanger,
@@ -156,7 +156,7 @@ def _run(job: Check, processes: int) -> GapCheck:
     """Return what was found until the end or Ctrl-C."""
     done = []
     try:
-        with advancing_bar() as progress, _executor(min(processes, len(job.searches))) as executor:
+        with progress_bar() as progress, _executor(min(processes, len(job.searches))) as executor:
             for trials in job.run(progress, executor):
                 done.append(trials)
     except KeyboardInterrupt:

@@ -14,10 +14,10 @@ from shm.errors import NothingThere, UsageError
 from shm.resources import manual
 from shm.settings import TABLE, Setting
 from shm_cli import flags
-from shm_cli.assumed import assumptions_section, show_assumptions
-from shm_cli.common import answer, markdown, show, show_rows
+from shm_cli.assumed import show_assumptions
+from shm_cli.common import answer, show, show_rows
 
-_HEADS = ("setting", "default", "unit", "range", "meaning")
+SETTING_HEADS = ("setting", "default", "unit", "range", "meaning")
 
 
 @click.command("settings")
@@ -54,7 +54,7 @@ def settings_command(
     elif flags.wants_json():
         show({"settings": [_document(row) for row in TABLE]})
     else:
-        show_rows("", _HEADS, [(row.name, *_cells(row)) for row in TABLE])
+        show_rows("", SETTING_HEADS, [(row.name, *setting_cells(row)) for row in TABLE])
 
 
 @click.command("manual")
@@ -76,18 +76,7 @@ def manual_command() -> None:
     answer({"page": str(page)}, str(page))
 
 
-def settings_page() -> str:
-    """Return the manual's page of settings in Markdown, from the one table of settings."""
-    head = (
-        "# Settings\n\n"
-        "A value comes from the flag, else the environment (`workers` from `SHM_WORKERS`), else "
-        "`[settings]` of `bridge.toml`, else the default. `shm settings` says the same.\n\n"
-    )
-    rows = [(f"`{row.name}`", *_cells(row)) for row in TABLE]
-    return f"{head}{markdown(_HEADS, rows)}\n\n{assumptions_section()}"
-
-
-def _cells(row: Setting) -> tuple[str, ...]:
+def setting_cells(row: Setting) -> tuple[str, ...]:
     return str(row.default), row.unit, _range(row), row.help
 
 
@@ -145,18 +134,6 @@ def notices_command() -> None:
     else:
         heads = ("package", "version", "licence", "extra")
         show_rows("", heads, [(e.package, e.version, e.licence, e.extra) for e in found])
-
-
-def licences_page() -> str:
-    """Return the manual's page of licences in Markdown, of the packages that are installed."""
-    head = (
-        "# Licences\n\n"
-        "`shm` itself is under the MIT licence. These are the packages that it requires, with the "
-        "licence that each declares; those of an extra are needed for that extra alone. `shm "
-        "notices` says so of your installation, where the texts of the licences lie, too.\n\n"
-    )
-    rows = [(each.package, each.version, each.licence, each.extra) for each in notices()]
-    return head + markdown(("package", "version", "licence", "extra"), rows) + "\n"
 
 
 def notices() -> Sequence[Notice]:

@@ -75,7 +75,7 @@ def _swept(
 ) -> FloatArray:
     """Return frequencies in Hz, points by planes by modes."""
     theta = np.array([model.pack({**values, name: float(point)}) for point in points])
-    with progress_bar("solving") as progress:
+    with progress_bar() as progress:
         rows_hz = []
         for done, row in enumerate(theta, start=1):
             rows_hz.append(_solved(model, row, modes))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,7 +31,6 @@ print_unit_option = click.option(
 @click.option("--web", "with_web", is_flag=True, help="Serve the web interface too: see `shm web`.")
 @click.option("--host", default="127.0.0.1", help="Where --web listens.")
 @click.option("--port", type=click.IntRange(1, 65535), default=8400, help="Its port.")
-@flags.tls
 @click.option("--workers", type=click.IntRange(1, 64), help="Processes that identify and update.")
 @flags.log_file
 @print_unit_option
@@ -43,8 +42,6 @@ def daemon(
     with_web: bool,
     host: str,
     port: int,
-    certificate: Path | None,
-    key: Path | None,
     workers: int | None,
     log_file: Path | None,
     as_unit: bool,
@@ -61,22 +58,19 @@ def daemon(
     from shm_daemon.web.address import Address
     from shm_daemon.web.serving import web_with_daemon
 
-    tls = {"--certificate": certificate, "--key": key}
-    if not with_web and any(tls.values()):
-        raise UsageError("--certificate and --key are for --web.", remedy="Give --web as well.")
     workspace = replace(open_workspace(ctx, workers=workers), actor=None)
     if as_unit:
         words = [
             "daemon",
             *(["--standby"] if standby else []),
-            *(["--web", *serving_words(host, port, tls)] if with_web else []),
+            *(["--web", *serving_words(host, port)] if with_web else []),
             *(["--workers", str(workers)] if workers is not None else []),
         ]
         print_unit("shm.service", workspace.folder, words)
         return
     begin_logging(workspace.settings, log_file)
     address = Address(host, port) if with_web else None
-    with web_with_daemon(workspace, address, log_file, certificate, key):
+    with web_with_daemon(workspace, address, log_file):
         from shm_daemon.loop import run  # while the interface, which needs less, begins
 
         run(workspace, once=once, standby=standby)
@@ -85,7 +79,6 @@ def daemon(
 @click.command()
 @click.option("--host", default="127.0.0.1", help="The address to listen on.")
 @click.option("--port", type=click.IntRange(1, 65535), default=8400, help="The port.")
-@flags.tls
 @flags.log_file
 @print_unit_option
 @click.pass_context
@@ -93,8 +86,6 @@ def web(
     ctx: click.Context,
     host: str,
     port: int,
-    certificate: Path | None,
-    key: Path | None,
     log_file: Path | None,
     as_unit: bool,
 ) -> None:
@@ -114,15 +105,12 @@ def web(
 
     workspace, address = replace(open_workspace(ctx), actor=None), Address(host, port)
     if as_unit:
-        files = {"--certificate": certificate, "--key": key}
-        words = ["web", *serving_words(host, port, files)]
-        print_unit("shm-web.service", workspace.folder, words)
+        print_unit("shm-web.service", workspace.folder, ["web", *serving_words(host, port)])
         return
     begin_logging(workspace.settings, log_file)
-    page = address.page(certificate is not None)
-    line = f"The dashboard: {page}  (Ctrl+C ends it)"
+    line = f"The dashboard: {address.page()}  (Ctrl+C ends it)"
     with leaving():
-        serve(workspace, address, certificate, key, lambda: click.echo(line))
+        serve(workspace, address, lambda: click.echo(line))
 
 
 _HOMES = (Path("/home"), Path("/root"), Path("/run/user"))
@@ -143,10 +131,9 @@ def print_unit(name: str, workspace: Path, words: Sequence[str], *writes: Path) 
     click.echo(text, nl=False)
 
 
-def serving_words(host: str, port: int, files: Mapping[str, Path | None]) -> Sequence[str]:
-    """Return the address of the web interface as options with absolute paths."""
-    given = [str(word) for name, file in files.items() if file for word in (name, file.resolve())]
-    return ["--host", host, "--port", str(port), *given]
+def serving_words(host: str, port: int) -> Sequence[str]:
+    """Return the address of the web interface as options."""
+    return ["--host", host, "--port", str(port)]
 
 
 def unit_text(name: str, workspace: Path, prefix: Path, words: Sequence[str], *writes: Path) -> str:

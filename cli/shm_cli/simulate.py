@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -19,15 +18,15 @@ from shm.simulate import (
     AmbientPlan,
     HammerPlan,
     HangerState,
+    PlantedEffect,
     ambient_test,
     hammer_test,
     spread_places_m,
 )
 from shm.simulate.effects import plantable_effects
-from shm.values import Hanger, Recording
+from shm.values import AddedMass, Hanger, Recording
 from shm_cli import flags
-from shm_cli.common import answer, counting_bar, one_hanger, open_workspace
-from shm_cli.planting import Live, effect_of, mass_of, simulate_streams
+from shm_cli.common import answer, counting_bar, one_hanger
 
 _FIRST = datetime(2026, 1, 5, 10, tzinfo=UTC)  # any: the same call gives the same files
 _SUFFIXES = sorted(known.suffixes[0].lstrip(".") for known in FORMATS if known.write)
@@ -123,32 +122,6 @@ def _springs(function: flags.F) -> flags.F:
     metavar="KG:X[:RADIUS]",
     help="A known mass, clamped on at X m: a point, or a body with a RADIUS of gyration in m.",
 )
-@click.option(
-    "--stream",
-    "as_stream",
-    is_flag=True,
-    help="Permanent sensors instead: days of wind and traffic on every stream that bridge.toml "
-    "describes, sent into the workspace.",
-)
-@click.option(
-    "--days",
-    type=click.FloatRange(0.001, 3660),
-    default=1.0,
-    help="How long a stream.",
-)
-@click.option(
-    "--loss",
-    "losses",
-    multiple=True,
-    metavar="HANGER:PERCENT:DAY",
-    help="A sudden loss of tension in a stream, may be repeated.",
-)
-@click.option(
-    "--speed",
-    type=click.FloatRange(0),
-    default=0.0,
-    help="Seconds of a stream sent a second; 1 is real time, 0 as fast as it goes.",
-)
 @click.option("--tests", type=click.IntRange(1, 10_000), default=1)
 @click.option(
     "--temperature-c",
@@ -159,9 +132,7 @@ def _springs(function: flags.F) -> flags.F:
 )
 @click.option("--first", type=flags.Day(), help="Time of the first test; then weekly.")
 @click.option("--format", "form", type=click.Choice(_SUFFIXES), default="csv")
-@click.option(
-    "--out", type=flags.FOLDER, metavar="DIR", help="Where the files go; a stream needs none."
-)
+@click.option("--out", type=flags.FOLDER, metavar="DIR", required=True, help="Where the files go.")
 @flags.seed
 @flags.json
 @click.pass_context
@@ -169,14 +140,10 @@ def command(
     ctx: click.Context,
     hanger_id: int | None,
     hanger_file: Path | None,
-    as_stream: bool,
-    days: float,
-    losses: tuple[str, ...],
-    speed: float,
     tests: int,
     first: datetime | None,
     form: str,
-    out: Path | None,
+    out: Path,
     seed: int,
     **chosen: Unpack[Chosen],
 ) -> None:
@@ -187,14 +154,7 @@ def command(
 
     \b
     Example: shm simulate --hanger-file H.toml --k1 1e7 --k3 1e7 --out tests
-    Example: shm simulate --stream --days 3 --loss 7:2:2.5
     """
-    if as_stream:
-        live = Live(days, first, losses, speed, seed)
-        simulate_streams(open_workspace(ctx), live)
-        return
-    if out is None:
-        raise UsageError("no folder is named for the files.", remedy="Add --out DIR.")
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     _refuse_other_supports(hanger)
     start = first or _FIRST
@@ -208,10 +168,6 @@ def command(
             recording = replace(_recording(hanger, chosen, rng), source=name, time=time)
             write(recording, out / name)
             written.append(out / name)
-    _tell(written)
-
-
-def _tell(written: Sequence[Path]) -> None:
     files = [str(path) for path in written]
     answer({"files": files}, "\n".join(files))
 
@@ -260,7 +216,7 @@ def _hit(hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Gene
         state,
         plan,
         rng,
-        effects=[effect_of(text) for text in chosen["effects"]],
+        effects=[_effect(text) for text in chosen["effects"]],
         conditions=_conditions(chosen),
     )
 
@@ -268,7 +224,7 @@ def _hit(hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Gene
 def _conditions(chosen: Chosen) -> Conditions:
     """Return the conditions of a recording; an unknown temperature is the reference."""
     shift_k = chosen["temperature_c"] - chosen["reference_c"]
-    mass = mass_of(chosen["added_mass"])
+    mass = _mass(chosen["added_mass"])
     return Conditions("", 0.0 if math.isnan(shift_k) else shift_k, chosen["amplitude"], mass)
 
 
@@ -288,3 +244,36 @@ def _listened(
         acceleration_noise_m_s2=usual.acceleration_noise_m_s2 if noise is None else noise,
     )
     return ambient_test(hanger, state, plan, rng)
+
+
+def _effect(text: str) -> PlantedEffect:
+    """Read `NAME:AT:param=value,...`; raises UsageError where it is not that."""
+    name, _, rest = text.partition(":")
+    at, _, pairs = rest.partition(":")
+    try:
+        values = dict(_pair(pair) for pair in pairs.split(","))
+    except ValueError:
+        raise UsageError(
+            f"--effect {text!r} is not NAME:AT:param=value,...",
+            remedy="Write --effect 'point_mass:everywhere:mass_kg=12,x_m=3.4'.",
+        ) from None
+    return PlantedEffect(name, at, values)
+
+
+def _pair(text: str) -> tuple[str, float]:
+    name, value = text.split("=")
+    return name.strip(), float(value)
+
+
+def _mass(text: str | None) -> AddedMass | None:
+    """Read `KG:X` or `KG:X:RADIUS`; raises UsageError where it is neither."""
+    if text is None:
+        return None
+    try:
+        mass_kg, x_m, *radius_m = (float(part) for part in text.split(":", 2))
+    except ValueError:
+        raise UsageError(
+            f"--added-mass {text!r} is not KG:X or KG:X:RADIUS.",
+            remedy="Write --added-mass 25:3.6, or 25:3.6:0.08.",
+        ) from None
+    return AddedMass(mass_kg, x_m, *radius_m)

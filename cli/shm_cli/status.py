@@ -5,7 +5,6 @@ With --of ID, each stage that a recording or test has gone through, and every re
 
 from __future__ import annotations
 
-import math
 import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -17,14 +16,13 @@ from typing import TYPE_CHECKING, Any
 import rich_click as click
 
 from shm.documents import creep_document
-from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.controls import control_charts
 from shm.pipeline.courier import quiet_until
 from shm.pipeline.stream_health import stream_leads
 from shm.report.control_report import chart_document
-from shm.report.formatting import Interval, model_class, with_half
+from shm.report.formatting import Interval, with_half
 from shm.report.hanger_status import Status, bridge_message
 from shm.report.hanger_summary import HangerSummary
 from shm.report.open_warnings import dated_by_receipt
@@ -46,9 +44,9 @@ from shm.store.watch import (
     list_detections,
     list_selected_models,
 )
-from shm.values import Summary
+from shm.values import Hanger, Summary
 from shm.values.rounding import ForceUnit, force_unit, listed, rounded_percent
-from shm.watch.alert_text import frequency_words
+from shm.watch.alert_text import watch_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document
@@ -57,6 +55,9 @@ from shm_daemon.spool import scan, unsupported_entries
 
 if TYPE_CHECKING:
     from shm.store import FormerPosterior, FormerTest
+
+
+_HELD_SHOWN = 5  # layout: the rest by `shm ingest --held`
 
 
 @click.command()
@@ -85,8 +86,6 @@ def command(ctx: click.Context, which: str | None) -> None:
         click.echo(paragraph(f"changed on the page Settings: {text}"))
     for text in _actions(document["hangers"]):
         click.echo(paragraph(text))
-    for text, hangers in _not_applicable(document["hangers"]).items():
-        click.echo(paragraph(f"hanger{'s' if ',' in hangers else ''} {hangers}: {text}"))
     for row in document["hangers"]:
         if row["creep_per_year"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['creep_per_year']['words']}")
@@ -142,8 +141,9 @@ def _show(document: dict[str, Any]) -> None:
         click.echo(text)
     click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
     _show_hangers(document)
-    for text in _held_lines(document["held"]):
-        click.echo(text)
+    for each in document["held"][:_HELD_SHOWN]:
+        text = f"held, hanger {each['hanger']}: recording {each['recording']}: {each['message']}"
+        click.echo(paragraph(text))
 
 
 def _show_hangers(document: dict[str, Any]) -> None:
@@ -160,7 +160,7 @@ def _cells(row: Mapping[str, Any], unit: ForceUnit) -> tuple[str, ...]:
     latest, since, change = row["latest_test"], row["baseline_since"], row["change"]
     return (
         str(row["hanger"]),
-        Status[row["status"].upper()].value if row["status"] else "no test yet",
+        Status[row["status"].upper()].value if row["status"] else _untested(row),
         _tension(row, unit),
         rounded_percent(change["mean"], (change["high"] - change["low"]) / 2, "+")
         if change
@@ -171,6 +171,10 @@ def _cells(row: Mapping[str, Any], unit: ForceUnit) -> tuple[str, ...]:
         f"{since:%Y-%m-%d}" if since else "none yet",
         str(row["open_alerts"] or ""),
     )
+
+
+def _untested(row: Mapping[str, Any]) -> str:
+    return "no result yet" if row["tests"] else "no test yet"
 
 
 def _tension(row: Mapping[str, Any], unit: ForceUnit) -> str:
@@ -190,26 +194,6 @@ def _structure_line(row: Mapping[str, Any]) -> str:
     line += f", baseline since {since:%Y-%m-%d}" if since else ", no baseline yet"
     undated = dated_by_receipt(row["dated_by_receipt"])
     return f"{line}, {row['open_alerts']} open alerts. {row['said']} {undated}".rstrip()
-
-
-def _held_lines(held: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return for each hanger the number held, and the one whose modes show most."""
-    of_hangers: dict[int, list[Mapping[str, Any]]] = {}
-    for each in held:
-        of_hangers.setdefault(each["hanger"], []).append(each)
-    lines = []
-    for hanger, holds in sorted(of_hangers.items()):
-        leading = max(holds, key=_shift)
-        many = f"{len(holds)} recordings (`shm ingest --held`); " if len(holds) > 1 else ""
-        of_one = f"recording {leading['recording']}: {leading['message']}"
-        lines.append(paragraph(f"held, hanger {hanger}: {many}{of_one}"))
-    return lines
-
-
-def _shift(held: Mapping[str, Any]) -> float:
-    """Return the largest shift of tension that its tests imply; 0 where nothing is known."""
-    shifts = [abs(test["tension_shift"]) for test in held["tests"]]
-    return max((shift for shift in shifts if not math.isnan(shift)), default=0.0)
 
 
 def _gap(store: Store, hanger: int) -> dict[str, Any] | None:
@@ -245,16 +229,6 @@ def _actions(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         many = f"Baseline only, hangers {listed(list(hangers))}: {action}"
         found.append(many if len(hangers) > 1 else next(iter(hangers.values())))
     return found
-
-
-def _not_applicable(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Return why model classes do not apply, with the hangers of each reason."""
-    found: dict[str, list[str]] = {}
-    for row in rows:
-        for name, reason in row["not_applicable"].items():
-            text = f"{model_class(name)} does not apply: {reason}"
-            found.setdefault(text, []).append(str(row["hanger"]))
-    return {text: ", ".join(hangers) for text, hangers in found.items()}
 
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
@@ -335,7 +309,7 @@ def _structures(
                 "latest_test": found.time if found else None,
                 "baseline_since": min((test.time for test in of_baseline), default=None),
                 "open_alerts": open_alerts[each.id],
-                "said": frequency_words([one.watched for one in watched], each),
+                "said": watch_words([one.watched for one in watched], each),
                 "dated_by_receipt": list(undated.get(each.id, ())),
             }
         )
@@ -357,7 +331,7 @@ def _hangers(
         adopted = [each.adoption.model for each in list_adoptions(store, hanger.id)]
         gap = _gap(store, hanger.id) if adopted else None
         check = baseline.check if baseline else None
-        names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])
+        names, reasons = _applicable(hanger, [*workspace.settings.model_names, *adopted])
         rows.append(
             {
                 "hanger": hanger.id,
@@ -381,6 +355,15 @@ def _hangers(
             }
         )
     return rows
+
+
+def _applicable(hanger: Hanger, names: Sequence[str]) -> tuple[Sequence[str], dict[str, str]]:
+    """Return the competing model classes, and why others do not apply; for JSON alone."""
+    if not flags.wants_json():
+        return (), {}
+    from shm.models import applicable  # it opens all classes: a fifth of the command's time
+
+    return applicable(hanger, names)
 
 
 _OUT = (Decision.DISCARDED, Decision.WITHDRAWN)

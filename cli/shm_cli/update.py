@@ -135,7 +135,7 @@ def command(
     tests = tests_at(tests, level)
     doubts = show_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
-    with progress_bar("updating") as progress:
+    with progress_bar() as progress:
         chosen = build(model, hanger, priors)
         options = calibrated(options, calibrated_by, [chosen], progress)
         posterior = update(tests, chosen, options, progress)
@@ -236,7 +236,7 @@ def select_command(
     tests = tests_at(tests, level)
     doubts = show_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
-    with progress_bar("updating") as progress:
+    with progress_bar() as progress:
         options = calibrated(options, calibrated_by, chosen, progress)
         selection = select(tests, chosen, options, progress, stated)
     if flags.wants_json():

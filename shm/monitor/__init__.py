@@ -6,11 +6,11 @@ Pure functions of values; what runs them, and where their answers are kept, is a
 from __future__ import annotations
 
 from shm.monitor.pooling import as_modal_test, pooled
-from shm.monitor.sensor_health import find_lost_planes, offsets, sees_nothing, sensor_faults
+from shm.monitor.sensor_health import find_lost_planes, sees_nothing, sensor_faults
 from shm.monitor.tracking import read_window
 from shm.monitor.windows import cut
 
 __all__ = [
-    "as_modal_test", "cut", "find_lost_planes", "offsets", "pooled", "read_window", "sees_nothing",
+    "as_modal_test", "cut", "find_lost_planes", "pooled", "read_window", "sees_nothing",
     "sensor_faults",
 ]  # fmt: skip

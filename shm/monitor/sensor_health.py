@@ -1,9 +1,9 @@
-"""Faults of permanent sensors: dead, saturated, drifting, swapped with another, turned round."""
+"""Find faults of permanent sensors: dead, saturated, swapped, turned round, without modes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from itertools import combinations
@@ -24,9 +24,6 @@ from shm.values.stream import (
 
 _AT_FULL_SCALE, _CLIPPED = 0.99, 1e-3
 """judgement: of the full scale, and the share of samples beyond; 0.6 s of ten minutes."""
-_LEAST_EARLIER, _DRIFT = 6, 8.0
-"""judgement: an hour of windows, and a change of their median by so many usual deviations, which
-takes 8 normal ones: no chance of noise, and more than a day's temperature moves a sensor in it."""
 _HOUR = 6  # windows: a quiet quarter of an hour hides the modes of a sound sensor, too
 SEEN_BEFORE = timedelta(days=3)
 """What the windows without modes are compared with: as long as the watch learns."""
@@ -36,7 +33,6 @@ _FALLEN = 0.5
 sound one changes by 1 dB between -20 and +40 degrees (with the root of the absolute temperature),
 and hides the modes once the motion is as low; this is 6 dB."""
 _BLIND = timedelta(days=1)  # derived: each day has traffic and wind, whatever the level is
-_USUAL_SD = 1.4826  # of the median absolute deviation of normal numbers
 _LEAST_MODES = 3  # judgement: one mode or two agree with an exchange by chance
 _AS_KNOWN, _GAIN = 0.9, 0.15
 """judgement: share of the motion that is explained with the exchange, and how much less without."""
@@ -52,37 +48,18 @@ def broken_channels(pieces: Sequence[Piece], stream: Stream) -> dict[str, str]:
     return found
 
 
-def offsets(pieces: Sequence[Piece]) -> dict[str, float]:
-    """Median of each channel in m/s^2: what `sensor_faults` compares with that of later windows."""
-    names = {name for piece in pieces for name in piece.channels}
-    found = {}
-    for name in sorted(names):
-        known = _samples(pieces, name)
-        known = known[np.isfinite(known)]
-        if len(known):
-            found[name] = float(np.median(known))
-    return found
-
-
 def sensor_faults(
-    pieces: Sequence[Piece],
-    stream: Stream,
-    known: Sequence[Mode],
-    earlier: Sequence[Mapping[str, float]] = (),
+    pieces: Sequence[Piece], stream: Stream, known: Sequence[Mode]
 ) -> tuple[StreamEvent, ...]:
-    """Faults that a window shows; `earlier` are the `offsets` of windows before, oldest first."""
+    """Return the faults that a window shows."""
     if not pieces:
         return ()
     found: list[tuple[StreamEventKind, str, str]] = []
-    now = offsets(pieces)
     broken = set()
     for channel in stream.channels:
-        values = _samples(pieces, channel.name)
-        if fault := _fault(channel, values):
+        if fault := _fault(channel, _samples(pieces, channel.name)):
             found.append((fault[0], channel.name, fault[1]))
             broken.add(channel.name)
-        elif drift := _drift(channel.name, now, earlier, _measure_scatter(values)):
-            found.append(("drifting", channel.name, drift))
     usable = [channel for channel in stream.channels if channel.name not in broken]
     stretches = [
         stretch(part, piece.sampling_rate_hz)
@@ -312,33 +289,6 @@ def _fault(channel: StreamChannel, values: FloatArray) -> tuple[StreamEventKind,
         if share > _CLIPPED:
             return "saturated", f"{share:.1%} of its samples are at full scale"
     return None
-
-
-def _measure_scatter(values: FloatArray) -> float:
-    """Return the usual deviation of the finite samples from their median."""
-    known = values[np.isfinite(values)]
-    return _USUAL_SD * float(np.median(np.abs(known - np.median(known)))) if len(known) else 0.0
-
-
-def _drift(
-    name: str,
-    now: Mapping[str, float],
-    earlier: Sequence[Mapping[str, float]],
-    motion: float,
-) -> str:
-    """Describe a drift that no chance makes and that is more than the `motion` of the samples."""
-    before = np.array([each[name] for each in earlier if name in each])
-    if len(before) < _LEAST_EARLIER or name not in now:
-        return ""
-    usual = float(np.median(before))
-    scatter = _USUAL_SD * float(np.median(np.abs(before - usual)))
-    change = now[name] - usual
-    if abs(change) <= max(_DRIFT * scatter, motion) or scatter == 0:
-        return ""
-    return (
-        f"its offset is {now[name]:.3g} m/s^2, {change:+.2g} from its median before "
-        f"(usual scatter {scatter:.1g})"
-    )
 
 
 def _samples(pieces: Sequence[Piece], name: str) -> FloatArray:

@@ -41,9 +41,8 @@ from shm.store import (
 )
 from shm.store.alerts import count_open_alerts, describe_silence, silenced_until
 from shm.store.posteriors import find_latest_trends, list_trend
-from shm.store.tests import list_undated_names, load_frequency_response
+from shm.store.tests import count_tests, list_undated_names, load_frequency_response
 from shm.store.watch import (
-    find_baseline_temperatures,
     find_latest_watches,
     list_baselines_in_force,
     list_detected_changes,
@@ -172,6 +171,7 @@ class HangersNow:
         self.undated = list_undated_names(store)
         self.charts = control_charts(workspace, store)
         self._discarded = discarded_of_baselines(store)
+        self._tests = count_tests(store)
 
     def summary(self, hanger: Hanger) -> HangerSummary:
         """Return the state of a hanger, as every face shows it."""
@@ -199,6 +199,7 @@ class HangersNow:
             else blind,
             undated=self.undated.get(hanger.id, ()),
             control=control,
+            tests=self._tests[hanger.id].tests if hanger.id in self._tests else 0,
         )
 
     def _warnings(
@@ -293,12 +294,10 @@ def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]
     """The latest known shift of each hanger that has one, in their `order` along the bridge."""
     from shm.watch.neighbours import shifts_of
 
-    latest, before_c = find_latest_watches(store), find_baseline_temperatures(store)
+    latest = find_latest_watches(store)
     compared = [latest[hanger] for hanger in order if hanger in latest]
     drifts = {each.hanger: _known_drifts(store, each) for each in compared}
-    changes = {each.hanger: each.watched.temperature_c - before_c[each.hanger] for each in compared}
-    known = {hanger: change for hanger, change in changes.items() if math.isfinite(change)}
-    return shifts_of(drifts, order, temperature_changes_k=known)
+    return shifts_of(drifts, order)
 
 
 def _known_drifts(store: Store, latest: StoredWatch) -> Sequence[Drift]:

@@ -45,7 +45,7 @@ from shm.store.watch import list_detections
 from shm.values import Hanger, ResponsePoint, WatchedTest
 from shm.values.stated_tension import averaged_now
 from shm.watch import WatchOptions, watch_hanger
-from shm.watch.alert_text import frequency_words, watch_words
+from shm.watch.alert_text import watch_words
 
 log = logging.getLogger(__name__)
 
@@ -128,7 +128,7 @@ def structure_report(
         baseline_hz=dict(zip(levels.names, levels.samples[0].tolist(), strict=True))
         if levels
         else {},
-        statement=frequency_words(watched, structure),
+        statement=watch_words(watched, structure),
         drifts=watched[-1].drifts if watched else (),
         alerts=tuple(stored.alert for stored in alerts),
         open_alerts=count_open_alerts(store).get(number, 0),
@@ -175,7 +175,7 @@ def hanger_now(
         quality=latest.quality,
         diagnosis=latest_diagnosis(store, hanger),
         gap_watch=str(watch) if watch else "",
-        drift_watch=watch_words(watched),
+        drift_watch=watch_words(watched, hanger),
         creep=watched[-1].creep_per_year if watched else None,
         lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
         settings={**settings_words(workspace.settings), **_changed(store, hanger)},

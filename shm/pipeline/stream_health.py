@@ -17,7 +17,6 @@ from shm.store.ring import Ring, ring_of
 from shm.store.streams import (
     find_progress,
     list_latest_with_modes,
-    list_pooled,
     list_stream_events,
     list_window_starts,
     list_windows,
@@ -25,7 +24,7 @@ from shm.store.streams import (
 from shm.values import Alert, AlertKind
 from shm.values.messages import WEEK, Lead
 from shm.values.rounding import listed
-from shm.values.stream import PERIOD, PooledReading, Stream, StreamEvent
+from shm.values.stream import PERIOD, Stream, StreamEvent
 
 State = Literal[
     "live", "late", "silent", "never sent", "sensor at fault", "sees nothing", "clock ahead"
@@ -273,21 +272,3 @@ def note_blindness(store: Store, stream: Stream, start: datetime) -> None:
     event = sees_nothing(windows, reported)
     for each in [event] if event else find_lost_planes(windows, stream, reported):
         store.streams.save_event(each)
-
-
-_COMPARED = timedelta(days=1)  # the sun's round: it warms one side first
-
-
-def compare_thermometers(workspace: Workspace, store: Store, at: datetime) -> None:
-    """Notes which streams' thermometers differ from the others over the last day."""
-    streams = workspace.bridge.streams
-    if len(streams) < 2:
-        return
-    from shm.watch.stream_thermometer import disagreeing  # it computes
-
-    hours: dict[str, list[PooledReading]] = {stream.name: [] for stream in streams}
-    for hanger in dict.fromkeys(stream.hanger for stream in streams):
-        for each in list_pooled(store, hanger, "hour", at - _COMPARED, at):
-            hours.get(each.stream, []).append(each)
-    for event in disagreeing(hours):
-        store.streams.save_event(event)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
@@ -12,11 +12,11 @@ import scipy
 from shm.errors import NothingThere
 from shm.identify import IdentifyOptions
 from shm.identify.options import PASSED
-from shm.monitor import as_modal_test, offsets, pooled, read_window, sensor_faults
+from shm.monitor import as_modal_test, pooled, read_window, sensor_faults
 from shm.values import PLANES, Alert, Hanger, ModalTest, Mode, Plane, Posterior
 from shm.values.stream import Period, Piece, PooledReading, Stream, StreamEvent, WindowReading
 from shm.watch.notices import led_by
-from shm.watch.stream_watch import StreamOptions, watch_reading, windows_as_mounted, with_believed
+from shm.watch.stream_watch import StreamOptions, watch_reading, with_believed
 
 _LINES = 200  # technical: of a spectrogram, as many as a panel has pixels
 _LINES_S = 20.0  # technical: stretches that part modes 0.1 Hz apart
@@ -25,14 +25,13 @@ _FLOOR_DB = -200  # of a channel that is exactly 0
 
 @dataclass(frozen=True, eq=False)
 class WindowFound:
-    """The modes of a window, faults of sensors, and offsets for comparison by later windows.
+    """The modes of a window, and faults of sensors.
 
     `lacks_modes`: of some plane, half of the known modes or more were not found.
     """
 
     reading: WindowReading
     events: tuple[StreamEvent, ...]
-    offsets: Mapping[str, float]
     lacks_modes: bool = False
 
 
@@ -42,10 +41,9 @@ def read_stream_window(
     known: Sequence[Mode],
     hanger: Hanger,
     options: IdentifyOptions,
-    earlier: Sequence[Mapping[str, float]],
     is_confirmed: bool = True,
 ) -> WindowFound:
-    """Return the modes of ten minutes by the last `known` ones; `earlier` are the offsets before.
+    """Return the modes of ten minutes by the last `known` ones.
 
     Raises NothingThere where no sample counts, as where the clock was ahead.
     """
@@ -57,8 +55,7 @@ def read_stream_window(
     reading = read_window(pieces, stream, known, hanger, options, is_confirmed)
     return WindowFound(
         replace(reading, spectrum_db=spectrum_db(pieces)),
-        sensor_faults(pieces, stream, known, earlier),
-        offsets(pieces),
+        sensor_faults(pieces, stream, known),
         any(_lacks_modes(plane, known, reading) for plane in PLANES),
     )
 
@@ -115,15 +112,13 @@ def pool_stream(
     *,
     is_watched: bool = True,
 ) -> Pooled:
-    """The windows of a period as one; an hour goes on to the watch where it `is_watched`, a day
-    becomes a test, in the planes in which the watch has learnt its modes.
+    """Pool the windows of a period: an hour goes on to the watch where it `is_watched`, a day
+    becomes a test.
 
     An alert is led by that of `events` which was at the time of its change.
     """
     kept, warm = with_believed(kept, readings)
     readings, noticed = warm.windows, warm.events if period == "hour" else ()
-    if period != "hour":  # of an hour the watch tells whether its planes are exchanged
-        readings = windows_as_mounted(kept, readings)
     reading = pooled(readings, period, start)
     if reading is None:
         return Pooled(None, events=noticed)

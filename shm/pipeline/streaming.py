@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import bisect
 import logging
-from collections import defaultdict, deque
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
@@ -25,7 +25,6 @@ from shm.pipeline import Clock, utc_now
 from shm.pipeline.reconcile import Condition, is_same_event, reconcile
 from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day
 from shm.pipeline.stream_health import (
-    compare_thermometers,
     evaluate_silent_streams,
     lateness_limit,
     list_unread,
@@ -66,7 +65,6 @@ WINDOW = PERIOD  # what is sealed as one is read as one
 _KEPT_BEFORE_ALERT = timedelta(hours=24)
 """Of raw samples, for good: what changed within a day is told within a day."""
 _AGAIN = timedelta(minutes=1)  # judgement: a machine without memory or disk is given a minute
-_OFFSETS = 144  # windows of a day, with which a sensor's offset is compared
 _WHOLE = 0.98  # judgement: of ten minutes; a chunk that lacks seconds is not waited for
 _PATIENCE = timedelta(minutes=20)  # judgement: a logger that sends each quarter of an hour
 _HEED = timedelta(minutes=10)  # technical: silences are told by the day
@@ -109,9 +107,6 @@ class Streaming:
         self._changed: dict[str, datetime] = {}
         self._settled: dict[str, datetime] = {}
         self._not_before: dict[str, datetime] = {}
-        self._offsets: defaultdict[str, deque[Mapping[str, float]]] = defaultdict(
-            lambda: deque(maxlen=_OFFSETS)
-        )
         self._news: SimpleQueue[tuple[str, datetime]] = SimpleQueue()
         self._first, self._look_at, self._rest = 0, _EVER, RestOfDays(clock)
         self.use(workspace)
@@ -166,7 +161,6 @@ class Streaming:
         if (now := self.clock()) >= self._look_at:
             self._look_at = now + _HEED
             evaluate_silent_streams(self.workspace, self.store, now)
-            compare_thermometers(self.workspace, self.store, now)
         return bool(self._running)
 
     def _note(self, name: str, start: datetime) -> None:
@@ -272,14 +266,12 @@ class Streaming:
             last_modes(known),
             hanger,
             options,
-            tuple(self._offsets[stream.name]),
             any(each.how == "tracked" for each in known),
         )
         try:
             found: WindowFound = yield step
             for event in found.events:
                 self.store.streams.save_event(event)
-            self._offsets[stream.name].append(found.offsets)
             self._save(found.reading)
             if found.lacks_modes or not found.reading.modes:
                 note_blindness(self.store, stream, start)

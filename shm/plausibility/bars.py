@@ -1,21 +1,11 @@
-"""Check that a test is of its hanger: "right hanger?", "right sampling rate?".
+"""Check by Bayes' rule that a test is of its hanger: "right hanger?", "right sampling rate?".
 
-Bayes' rule over what may be behind the modes of a test that is filed under one hanger:
-
-- it is that hanger, as it was, or really changed (tension, end springs, a mass, anything);
-- it is another hanger of the bridge, or a bar that nobody has described;
-- the time base is wrong: all frequencies are multiplied alike, where tension moves low modes more;
-- the sensors' axes were exchanged, and with them the planes.
-
-Where a hanger has earlier tests they say where its modes lie: the shift of ln f (modes,) is normal
-about 0 with covariance S + J C J': J (modes, 8) is how the bar that fits those tests goes with
-tension, bending, four end springs, shear and the time base, C the variances of what may change, S
-what tests and the bar model err by. Where there are none the description says it, in the same form
-with its priors for C. Two candidates are compared by the modes of which both speak; one or two of
-these may be mistaken. All bars are fitted at once, by Gauss-Newton steps from three places.
-
-What cannot be told apart: twins (of one length and section) before the named one has a test of its
-own, and afterwards where their frequencies differ by no more than temperature moves them.
+It is that hanger, as it was or really changed; another hanger, or a bar that nobody described; the
+time base is wrong; or the planes are exchanged. The shift of ln f (modes,) since the hanger's
+earlier tests, or from its description, is normal about 0 with covariance S + J C J': J (modes, 8)
+is how the fitted bar goes with its parameters and the time base, C the variances of what may
+change, S what tests and the bar model err by. Two candidates are compared by the modes of which
+both speak. Twins cannot be told apart before the named one has a test of its own.
 """
 
 from __future__ import annotations

@@ -104,17 +104,6 @@ def _slopes(hanger: Hanger, modes: int) -> FloatArray:
     return np.asarray(np.log(above / below) / _STEP)
 
 
-def frequency_change(test: ModalTest, reference: Sequence[ModalTest]) -> float:
-    """By which fraction the lowest frequencies differ from the reference's; NaN: none shared.
-
-    Those of the lowest order that both have, which tells most of the tension.
-    """
-    change = _shared(test, reference)
-    lowest = min((order for _, order in change), default=0)
-    shift = [value for (_, order), value in change.items() if order == lowest]
-    return float(np.expm1(np.mean(shift))) if shift else NAN
-
-
 def _shared(test: ModalTest, reference: Sequence[ModalTest]) -> dict[tuple[str, int], float]:
     """The change of the log frequency of each mode that both have, from the reference's mean."""
     before: dict[tuple[str, int], list[float]] = {}
@@ -220,10 +209,7 @@ def _loss(candidate: Candidate, others: Sequence[float], counted: Sequence[float
     say = f"{held} held tests agree" if held > 1 else "one held test says so"
     if counting:
         say = f"{held + counting} tests agree, {held} of them held"
-    change = frequency_change(candidate.test, candidate.reference)
-    side = "below" if change < 0 else "above"
     return (
         f"Hanger {hanger.id} may have {moved} {100 * abs(shift):.0f} % of its tension: {say}. "
-        "Repeat the test today, with the logger's clock set. "
-        f"Its lowest frequencies are {100 * abs(change):.1f} % {side} the last ones."
+        "Repeat the test today, with the logger's clock set."
     )

@@ -1,22 +1,16 @@
 """Find copies of samples: one impact must not confirm itself under another name.
 
-The digest finds the same numbers again in whatever file; the shapes find them rescaled, rounded,
-in another order, or cut to a part.
-
-A shape is a stretch of one channel about a place that the samples near by choose: there the motion
-resembles a fixed chirp more than anywhere within a reach to either side. So a part that was cut out
-chooses the same places as the whole, but for those whose reach is cut, and a shape lies
-within its reach. The places with the widest reach are kept: they lie spread over the record, in
-strong and in weak motion alike. One impact rings much like another, but neither its fraction of a
-sample nor noise comes again; and all shapes of a copy are moved by the same number of samples.
+The digest finds the same numbers in whatever file; the shapes find them rescaled, rounded, in
+another order, or cut to a part. A shape is a stretch of one channel about a place where the motion
+resembles a fixed chirp more than anywhere within a reach to either side: a part chooses the same
+places as the whole. All shapes of a copy are moved by the same number of samples.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 import scipy
@@ -32,6 +26,7 @@ from shm.values import (
     KnownSamples,
     Recording,
 )
+from shm.values.rounding import listed
 
 _SAMPLES = 32
 """Of each shape, from its reach before its place up to its reach after it."""
@@ -69,10 +64,6 @@ _REPEATED = 1e-5
 """1 - correlation of two shapes in one channel, at which neither tells anything: a hum, or a mode
 that rings alone without noise, comes again in other tests, too."""
 
-_ALL = 0.995
-"""Share of the samples from which one recording is as good as wholly in the other: an export that
-begins a fraction of a second later loses less."""
-
 _MOST_NAMED = 3  # recordings in one message
 
 _WHY = "One impact counted twice would confirm itself."
@@ -100,99 +91,66 @@ def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerpr
     )
 
 
-@dataclass(frozen=True)
-class Common:
-    """The samples that two recordings have in common, as a share of those of each."""
-
-    of_own: float
-    of_other: float
-
-    @property
-    def own_is_whole(self) -> bool:
-        """The one is in the other, but for some samples at an end."""
-        return self.of_own >= _ALL
-
-    @property
-    def other_is_whole(self) -> bool:
-        return self.of_other >= _ALL
-
-    @property
-    def own_is_longer(self) -> bool:
-        return self.of_own < min(self.of_other, _ALL)
-
-
 def copied(candidate: Candidate) -> Doubt | None:
-    """The samples of another recording, wholly or in most channels; the same modes at one time.
+    """Doubt the samples of another recording, in most channels; the same modes at one time.
 
-    Of several recordings those that count are named first, and of these the one that has most of
-    it: a copy may have been copied.
+    Of several recordings those that count are named first, and of these the longest: a copy may
+    have been copied.
     """
     its = candidate.fingerprint
     if its is None:
         twin = next((t for t in candidate.same_time if t.modes == candidate.test.modes), None)
         return None if twin is None else _again(f"it holds the modes of test {twin.id} again")
-    found = [(each, shared(its, each.fingerprint)) for each in candidate.copies]
-    similar = [(known, common) for known, common in found if common is not None]
+    similar = [each for each in candidate.copies if shared(its, each.fingerprint)]
     if not similar:
         return None
-    similar.sort(key=lambda each: (not each[0].counts, -round(each[1].of_own, 2)))
-    known, common = similar[0]
-    if not common.own_is_longer:
-        return _again(_what_of(known, common, candidate.hanger.id))
-    shorter = [each for each in similar if each[1].own_is_longer and each[0].counts == known.counts]
-    reported = [_what_it_has(*each, candidate.hanger.id) for each in shorter[:_MOST_NAMED]]
-    more = len(shorter) - len(reported)
+    similar.sort(key=lambda each: (not each.counts, -_samples(each.fingerprint)))
+    known = similar[0]
+    longer, name = _samples(its) - _samples(known.fingerprint), _name(known, candidate.hanger.id)
+    if longer < 0:
+        return _again(f"it is a part of {name}, sent again")
+    if longer == 0:
+        return _again(f"it holds the samples of {name} again")
+    parts = [each for each in similar if each.counts == known.counts]
+    names = [_name(each, candidate.hanger.id) for each in parts[:_MOST_NAMED]]
+    more = len(parts) - len(names)
     return Doubt(
         "copy",
-        f"it holds {' and '.join(reported)}" + (f" and of {more} more recordings" if more else ""),
+        f"it holds {listed(names)}" + (f" and of {more} more recordings" if more else ""),
         "It is the longer one: usually discard the part and confirm the whole",
         _WHY,
-        instead_of=tuple(each.recording_id for each, _ in shorter),
+        instead_of=tuple(each.recording_id for each in parts),
     )
 
 
-def shared(own: Fingerprint, other: Fingerprint) -> Common | None:
-    """Return what two recordings have in common where one holds the other's impacts.
+def shared(own: Fingerprint, other: Fingerprint) -> bool:
+    """Return True if one recording holds the other's impacts.
 
     In at least half of the channels of the smaller one, lest a dead channel that always hums alike
-    condemns a test. None where it does not.
+    condemns a test.
     """
     if own.digest == other.digest:
-        return Common(1.0, 1.0)
+        return True
     if not len(own.marks) or not len(other.marks):
-        return None
+        return False
     here, there = _alike(own, other)
-    if not len(here):
-        return None
     shifts = own.marks[here, _PLACE] - other.marks[there, _PLACE]
-    pairs: dict[tuple[int, int], int] = {}
+    pairs: set[tuple[int, int]] = set()
     for shift in np.unique(shifts):
         by = shifts == shift
         if by.sum() >= _LEAST:
-            moved = _channels(own.marks[here[by]], other.marks[there[by]], own, other)
-            for pair, samples in moved.items():
-                pairs[pair] = max(samples, pairs.get(pair, 0))
+            pairs |= _channels(own.marks[here[by]], other.marks[there[by]], own, other)
     similar = min(len({pair[side] for pair in pairs}) for side in (0, 1))
-    if 2 * similar < min(len(np.unique(each.marks[:, 0])) for each in (own, other)):
-        return None
-    return Common(_share(pairs, _lengths(own.marks), 0), _share(pairs, _lengths(other.marks), 1))
+    return bool(pairs) and 2 * similar >= min(len(_lengths(each)) for each in (own, other))
 
 
-def _lengths(rows: IntArray) -> dict[int, int]:
+def _lengths(fingerprint: Fingerprint) -> dict[int, int]:
     """Return the number of samples of each channel, by the first two columns of the marks."""
-    return {int(channel): int(length) for channel, length in rows[:, :2]}
+    return dict(fingerprint.marks[:, :2].tolist())
 
 
-def _share(pairs: Mapping[tuple[int, int], int], samples: Mapping[int, int], side: int) -> float:
-    """Return how much of a recording, of so many samples a channel, lies in pairs that are copies.
-
-    A channel of the one may hold several of the other, as that of a whole its cuts.
-    """
-    common = Counter[int]()
-    for pair, length in pairs.items():
-        common[pair[side]] += length
-    found = sum(min(common[channel], length) for channel, length in samples.items())
-    return found / sum(samples.values())
+def _samples(fingerprint: Fingerprint) -> int:
+    return sum(_lengths(fingerprint).values())
 
 
 def _alike(own: Fingerprint, other: Fingerprint) -> tuple[IntArray, IntArray]:
@@ -208,13 +166,14 @@ def _alike(own: Fingerprint, other: Fingerprint) -> tuple[IntArray, IntArray]:
 
 def _channels(
     mine: IntArray, its: IntArray, own: Fingerprint, other: Fingerprint
-) -> dict[tuple[int, int], int]:
-    """The pairs of channels that are copies if one is moved as these marks are against each other:
-    most of the shapes that both should have, where both have samples, are the same. Of each how
-    many samples that are."""
+) -> set[tuple[int, int]]:
+    """Return the pairs of channels that are copies if one is moved as these marks are.
+
+    Most of the shapes that both should have, where both have samples, are the same.
+    """
     shift = int(mine[0, _PLACE] - its[0, _PLACE])
+    found = set()
     pairs = Counter(zip(mine[:, 0].tolist(), its[:, 0].tolist(), strict=True))
-    found: dict[tuple[int, int], int] = {}
     for (one, two), count in pairs.items():
         both = own.marks[own.marks[:, 0] == one], other.marks[other.marks[:, 0] == two].copy()
         both[1][:, _PLACE] += shift
@@ -225,7 +184,7 @@ def _channels(
             for marks in both
         ]
         if count >= _SHARE * min(int(each.sum()) for each in within):
-            found[one, two] = int(end - start)
+            found.add((one, two))
     return found
 
 
@@ -233,27 +192,7 @@ def _again(what: str) -> Doubt:
     return Doubt("copy", what, "Discard it, unless the other is the wrong one", _WHY)
 
 
-def _what_of(known: KnownSamples, common: Common, hanger: int) -> str:
-    """Return what of another recording is in one that has no more than that."""
-    name, share = _named(known, hanger), _percent(common.of_other)
-    if not common.own_is_whole:
-        return f"{_percent(common.of_own)} of its samples are in {name}, {share} of that one"
-    if common.other_is_whole:
-        return f"it holds the samples of {name} again"
-    return f"it is a part of {name}, {share} of that one, sent again"
-
-
-def _what_it_has(known: KnownSamples, common: Common, hanger: int) -> str:
-    """Return what of another recording is in one that has more."""
-    how_much = "all" if common.other_is_whole else _percent(common.of_other)
-    return f"{how_much} of {_named(known, hanger)}, {_percent(common.of_own)} of its own samples"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %"
-
-
-def _named(known: KnownSamples, hanger: int) -> str:
+def _name(known: KnownSamples, hanger: int) -> str:
     return known.name + ("" if known.hanger == hanger else f" of hanger {known.hanger}")
 
 

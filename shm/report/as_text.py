@@ -23,8 +23,6 @@ def as_brief_text(paper: Paper, width: int = WIDTH) -> str:
     """Return what fits a screen: state, action, reason, and the figures on top."""
     first = paper.parts[0]
     blocks = [*_underlined(paper.headline, "=", width), *_part(replace(first, tables=()), width)]
-    if first.facts:
-        blocks.append(laid_out(Table("", ("", "", ""), tuple(first.facts)), width).lstrip())
     blocks += [laid_out(in_terminal(table), width) for table in first.brief]
     return "\n".join([*blocks, *([_folded(paper.more, width)] if paper.more else []), ""])
 
@@ -45,6 +43,8 @@ def _part(part: Section, width: int) -> Iterator[str]:
             yield f"{_folded(paragraph, width)}\n"
     if part.remarks:
         yield "\n".join(_folded(each, width, "! ") for each in part.remarks) + "\n"
+    if part.facts:
+        yield laid_out(Table("", ("", "", ""), tuple(part.facts)), width).lstrip()
     for table in part.tables:
         shown = in_terminal(table)
         if shown.rows or shown.note:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from shm.report import formatting
@@ -50,7 +50,10 @@ def bars_table(bars: Sequence[BarDescription]) -> Table:
     labels = list(rows[0])
     common = {k: rows[0][k] for k in labels if len(rows) > 1 and len({r[k] for r in rows}) == 1}
     shown = [label for label in labels if label not in common]
-    wording = "; ".join(f"{label.lower()} {value}" for label, value in common.items())
+    if not shown:
+        return replace(bar_table(bars[0]), title=f"The bars as described, all {len(bars)} alike")
+    stated = {label: value for label, value in common.items() if value != NOT_STATED}
+    wording = "; ".join(f"{label.lower()} {value}" for label, value in stated.items())
     return Table(
         "The bars as described",
         ("hanger", *(label.lower() for label in shown)),

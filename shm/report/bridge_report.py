@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from shm.report import formatting
@@ -13,14 +13,12 @@ from shm.report.control_report import chart_document
 from shm.report.figures.along_the_bridge import SHIFTS, TENSIONS
 from shm.report.figures.control_chart import FIGURE as CONTROL
 from shm.report.figures.specification import Illustration, drawn
-from shm.report.formatting import Interval
 from shm.report.hanger_status import Status, control_lead
 from shm.report.hanger_summary import HangerSummary, PeriodSummary
 from shm.report.paper import CREDIBLE, Fact, Paper, Section, Table, appendices, filled
 from shm.report.shared_tables import lineage, settings
-from shm.report.shifts import _day, pattern_json, pattern_tables, shift_cells
+from shm.report.shifts import _day, pattern_json, pattern_tables
 from shm.report.states import period_json
-from shm.values import Drift
 from shm.values.messages import NEXT_TEST
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm.values.stated_tension import stated
@@ -41,7 +39,7 @@ def bridge_paper(data: BridgeReport) -> Paper:
                 summary=details(data),
                 facts=facts(data),
                 tables=filled(bars_table([line.bar for line in data.hangers])),
-                brief=[_glance(data)],
+                brief=filled(replace(_hangers(data), title="", note="")),
             ),
             Section("Along the bridge", figures=lambda: _figures(data)),
             *(_control_part(each) for each in data.controls),
@@ -70,24 +68,9 @@ def _control_part(chart: ControlChart) -> Section:
     )
 
 
-def _glance(data: BridgeReport) -> Table:
-    """Return each hanger's state, tension and change in few columns."""
-    unit = hangers_unit(data.hangers)
-    return Table(
-        "",
-        ("hanger", "state", f"tension, {unit.name}", "since the baseline", "open alerts"),
-        tuple(
-            (
-                str(line.hanger.id),
-                line.status.value if line.status else "no test",
-                _short_tension(line, unit),
-                rounded_percent(change.mean, change.width / 2, "+") if change else "",
-                str(line.open_alerts or ""),
-            )
-            for line in data.hangers
-            for change in (line.change,)
-        ),
-    )
+def _change(line: HangerSummary) -> str:
+    change = line.change
+    return rounded_percent(change.mean, change.width / 2, "+") if change else ""
 
 
 def _short_tension(line: HangerSummary, unit: ForceUnit) -> str:
@@ -127,7 +110,7 @@ def details(data: BridgeReport) -> str:
     """Return the reasons, and how sure they are."""
     pattern = data.pattern.sentence if data.pattern else data.why_no_pattern
     controls = (control_lead(each).words for each in data.controls)
-    sentences = (*controls, _extremes(data), _in_period(data), pattern, *advice(data)[1:])
+    sentences = (*controls, _in_period(data), pattern, *advice(data)[1:])
     return " ".join(sentence for sentence in sentences if sentence)
 
 
@@ -156,24 +139,6 @@ def named(lines: Sequence[HangerSummary]) -> str:
     return f"hanger {numbers}" if len(lines) == 1 else f"hangers {numbers}"
 
 
-def _extremes(data: BridgeReport) -> str:
-    """Return who carries most and least of the nominal tension."""
-    known = [line for line in data.hangers if line.is_determined]
-    shares = [(line, share) for line in known if (share := line.of_nominal) is not None]
-    if len(shares) < 2:
-        return ""
-    by_share = sorted(shares, key=lambda each: each[1].mean)
-    (least, low), (most, high) = by_share[0], by_share[-1]
-    return (
-        f"Hanger {most.hanger.id} carries most of its nominal tension: {_percent(high)}. Hanger "
-        f"{least.hanger.id} carries least: {_percent(low)}."
-    )
-
-
-def _percent(share: Interval) -> str:
-    return rounded_percent(share.mean / 100, share.width / 200)
-
-
 def _in_period(data: BridgeReport) -> str:
     if data.period is None:
         return ""
@@ -185,23 +150,7 @@ def _in_period(data: BridgeReport) -> str:
         f"In the period {data.period}: {tests} of {formatting.counted(len(tested), 'hanger')}, "
         f"{formatting.counted(alerts, 'alert')}"
     )
-    return f"{wording}{_most_moved(data)}."
-
-
-def _most_moved(data: BridgeReport) -> str:
-    """Return the hanger whose tension moved most from the period's first test of it to the last."""
-    moved = [
-        (line, line.course.change)
-        for line in data.hangers
-        if line.course and line.course.change is not None
-    ]
-    if not moved:
-        return "; no hanger was tested twice in it"
-    line, change = max(moved, key=lambda each: abs(each[1].mean))
-    return (
-        f"; the tension of hanger {line.hanger.id} moved most in it, by "
-        f"{formatting.signed_percent(change)}"
-    )
+    return f"{wording}."
 
 
 _NEXT_TO = {"repeatability": "repeatability", "above": "above limit", "slack": "slack"}
@@ -212,10 +161,8 @@ def tables(data: BridgeReport) -> tuple[Table, ...]:
     """Return all tables that this report can fill."""
     return filled(
         _hangers(data),
-        _since_baseline(data),
         _courses(data),
         *(pattern_tables(data.pattern) if data.pattern else ()),
-        _tests(data),
         _origin(data),
     )
 
@@ -228,13 +175,14 @@ def _hangers(data: BridgeReport) -> Table:
     return Table(
         "Hangers",
         (
-            "hanger", "state", f"tension, {unit.name} (90 %)", *(_NEXT_TO[name] for name in shown),
-            "% of nominal (90 %)", "open alerts", "latest test",
+            "hanger", "state", f"tension, {unit.name}", *(_NEXT_TO[name] for name in shown),
+            "since the baseline", "of nominal", "open alerts", "latest test",
         ),
         tuple(_hanger(*each, unit) for each in zip(data.hangers, cells, strict=True)),
-        note="With absolute 90 % intervals. Repeatability: the standard deviation between tests of "
-        "one state. Alert: beyond a threshold. Watch: a change was called, or a "
-        "shift beyond a threshold is likelier than not. More: shm report --hanger N.",
+        note="± is half the 90 % interval, of tensions absolute, of changes since the baseline at "
+        "equal temperature. Repeatability: the standard deviation between tests of one state. "
+        "Alert: beyond a threshold. Watch: a change was detected, or a shift beyond a threshold "
+        "is more probable than not. More: shm report --hanger N.",
     )  # fmt: skip
 
 
@@ -245,46 +193,20 @@ def _stated(line: HangerSummary, name: str, unit: ForceUnit) -> str:
 
 def _hanger(line: HangerSummary, besides: tuple[str, ...], unit: ForceUnit) -> tuple[str, ...]:
     name = f"{line.hanger.id} {line.hanger.name}".strip()
-    opened = str(line.open_alerts or "none")
+    opened = str(line.open_alerts or "")
     if line.latest is None or line.tension_n is None or line.status is None:
-        unknown = ["not known"] * (2 + len(besides))
-        return (name, "no test", *unknown, opened, "none")
+        return (name, "no test", *[""] * (3 + len(besides)), opened, "")
     share = line.of_nominal
     return (
         name,
         line.status.value,
-        formatting.with_span(line.tension_n.in_unit(unit)),
-        *(text or "not known" for text in besides),
-        formatting.with_span(share) if share else "no nominal",
+        _short_tension(line, unit),
+        *besides,
+        _change(line),
+        rounded_percent(share.mean / 100, share.width / 200) if share else "no nominal",
         opened,
         _day(line.latest.time),
     )
-
-
-def _since_baseline(data: BridgeReport) -> Table:
-    return Table(
-        "Since the baseline",
-        (
-            "hanger",
-            "shift of the tension",
-            "90 % interval",
-            "probability beyond threshold",
-            "called",
-        ),
-        tuple(
-            (str(line.hanger.id), *_shifted(line.drift), line.detected or "nothing")
-            for line in data.hangers
-            if line.drift
-        ),
-        note="Shift of the tension at the latest test, if there is any, without the effect of the "
-        "temperature; how probable it is that it lies beyond the hanger's threshold; "
-        "what was called since. Hangers that have nothing but their baseline are left out.",
-    )
-
-
-def _shifted(drift: Drift) -> Fact:
-    _, size, span, threshold, probability = shift_cells(drift)
-    return (size, span, f"{probability} ({threshold})")
 
 
 def _courses(data: BridgeReport) -> Table:
@@ -310,24 +232,6 @@ def _course(line: HangerSummary, course: PeriodSummary) -> tuple[str, ...]:
         str(course.tests or "none"),
         str(course.alerts or "none"),
         formatting.with_span(change.scaled(100), signed=True) if change else "fewer than two tests",
-    )
-
-
-def _tests(data: BridgeReport) -> Table:
-    return Table(
-        "Tests that these tensions come from",
-        ("hanger", "latest test", "taken", "model class"),
-        tuple(
-            (
-                str(line.hanger.id),
-                line.latest.name,
-                formatting.moment(line.latest.time),
-                formatting.model_class(line.latest.model),
-            )
-            for line in data.hangers
-            if line.latest
-        ),
-        note="Their files and checksums: shm report --hanger N.",
     )
 
 

@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 from shm.bridge.description import NO_LETTERHEAD, Letterhead
-from shm.models import end_stiffness
 from shm.report.formatting import Interval
 from shm.report.hanger_status import BridgeMessage, Status, bridge_message
 from shm.report.hanger_summary import HangerSummary, LatestTest
@@ -66,6 +65,8 @@ def trend_row(
     posterior: Posterior, test: ModalTest, hanger: Hanger, selection: Selection | None = None
 ) -> TrendRow:
     """Return the row of one test of `hanger`, its posterior averaged over the classes."""
+    from shm.models import end_stiffness  # it opens all classes; `shm status` has no trend
+
     return TrendRow(
         test=test.id,
         model=posterior.model,

@@ -31,7 +31,6 @@ from shm.report.diagnosis_wording import (
 from shm.report.figures.gap_causes import FIGURE as CAUSES
 from shm.report.figures.gap_map import FIGURE as GAP_MAP
 from shm.report.figures.specification import drawn
-from shm.report.formatting import Interval
 from shm.report.paper import (
     CREDIBLE,
     LEAST_PROBABILITY,
@@ -125,7 +124,7 @@ def answers(sheet: DiagnosisSheet) -> tuple[Table, ...]:
 
 def evidence(sheet: DiagnosisSheet) -> tuple[Table, ...]:
     """Return the tables of where the gap lies and what these data cannot show."""
-    return _made(sheet, (where, trends, places, invisible))
+    return _made(sheet, (where, places, invisible))
 
 
 def _made(
@@ -279,7 +278,7 @@ def next_measurements(sheet: DiagnosisSheet) -> Table:
     """Return the measurements that were considered, best first."""
     return Table(
         "What would tell, best first",
-        ("measurement", "tells", "from", "expected log Bayes factor"),
+        ("measurement", "separates", "from", "expected log Bayes factor"),
         tuple(
             (each.what, *map(formatting.quantity, each.separates), promise(each))
             for each in ranked_measurements(sheet.diagnosis)
@@ -324,32 +323,11 @@ def _share(value: float) -> str:
     return f"{100 * value:.0f} %" if math.isfinite(value) else "not known"
 
 
-def trends(sheet: DiagnosisSheet) -> Table:
-    """Return how the gap changes with each condition."""
-    found = [
-        (each, Interval.normal(each.slope_percent, each.slope_sd_percent))
-        for each in sheet.diagnosis.trends
-    ]
-    return Table(
-        "What the gap correlates with",
-        ("condition", "change over its range, %", "90 % interval, %", "share of the misfit"),
-        tuple(
-            (
-                each.condition,
-                formatting.number(each.slope_percent, "+z.2f"),
-                _range(slope.low, slope.high, "+z.2f"),
-                _share(each.share),
-            )
-            for each, slope in found
-        ),
-    )
-
-
 def places(sheet: DiagnosisSheet) -> Table:
     """Return where along the hanger a local cause of each kind would sit."""
     return Table(
         "Where along the hanger a local cause would sit",
-        ("were it", "at, m", "90 % interval, m", "share of the misfit explained"),
+        ("kind of cause", "at, m", "90 % interval, m", "share of the misfit explained"),
         tuple(
             (
                 formatting.quantity(each.kind),

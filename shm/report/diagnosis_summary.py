@@ -15,7 +15,6 @@ from shm.report.diagnosis_wording import (
     phrase,
     short_tension_words,
     tension_unit,
-    tension_words,
 )
 from shm.report.paper import Fact
 from shm.values import Diagnosis, GapVerdict, NextMeasurement, Outcome, TensionEstimate
@@ -271,11 +270,10 @@ def _give_tension(diagnosis: Diagnosis) -> Fact | None:
     if math.isnan(before_n.mean):
         return None
     unit = tension_unit(diagnosis)
-    alone = f"baseline alone {tension_words(before_n, unit)}"
+    before = short_tension_words(before_n, unit)
     if math.isnan(after_n.mean):
-        return ("Tension", formatting.rounded_tension(before_n.mean, unit), alone)
-    wording = f"{tension_words(after_n, unit)}; {alone}"
-    return ("Tension", formatting.rounded_tension(after_n.mean, unit), wording)
+        return ("Tension", before, "by the baseline alone")
+    return ("Tension", short_tension_words(after_n, unit), f"{AFTER}; baseline alone {before}")
 
 
 def _give_fit(verdict: GapVerdict) -> Fact | None:

@@ -91,9 +91,9 @@ def separate_estimates(cause: Cause, number: int) -> tuple[EffectEstimate, ...]:
     return tuple(e for e in cause.parameters if prefixed.get(e.name, this) == this)
 
 
-AFTER = "weighed over all that may be"
-"""What the tension after the diagnosis stands for: no gap, every cause and the unknown count by
-their probabilities."""
+AFTER = "averaged over all explanations"
+"""What the tension after the diagnosis is: no gap, every cause and the unknown count by their
+probabilities."""
 
 
 def tension_unit(diagnosis: Diagnosis) -> ForceUnit:

@@ -20,7 +20,7 @@ from shm.values import (
     stated_tension,
 )
 from shm.values.diagnosis import joined
-from shm.values.parameter_names import is_logarithm, quantity_name
+from shm.values.parameter_names import quantity_name
 from shm.values.rounding import ForceUnit, rounded, to_two_digits
 
 NORMAL_90 = 1.6448536269514722
@@ -98,12 +98,6 @@ class Interval:
             widths = [NORMAL_90 * self.repeatability_sd, NORMAL_90 * then.repeatability_sd]
         half = math.hypot(widths[0], ratio * widths[1]) / abs(then.mean)
         return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
-
-    def less(self, then: Interval) -> Interval:
-        """Return the difference from `then`, of two independent estimates: widths in squares."""
-        half = math.hypot(self.width, then.width) / 2
-        shift = self.mean - then.mean
-        return Interval(shift, shift - half, shift + half)
 
 
 _LONGEST_NAME = 24  # layout: what a column of a table holds
@@ -207,16 +201,6 @@ def signed_percent(fraction: Interval) -> str:
     return f"{mean(percent, signed=True)} % (90 % interval {span(percent, signed=True)} %)"
 
 
-def change(percent: float) -> str:
-    """Return `+3.1 %`; beyond a factor of 2 `a factor of 5 up` instead of +50368 %."""
-    ratio = 1 + percent / 100
-    if ratio <= 0:  # taken as linear far beyond where it is
-        return "more than a factor of 2 down"
-    if 0.5 <= ratio <= 2 or not math.isfinite(ratio):
-        return f"{number(percent, '+z.1f')} %"
-    return f"a factor of {plain(max(ratio, 1 / ratio), 2)} {'up' if ratio > 1 else 'down'}"
-
-
 def number(value: float, form: str, absent: str = "not known") -> str:
     """Return `value` in format `form`; the words `absent` where it is NaN."""
     return format(value, form) if math.isfinite(value) else absent
@@ -264,24 +248,21 @@ def quantity(name: str) -> str:
     return name.replace("_", " ")
 
 
-def meaning(posterior: Posterior, name: str, *, with_unit: bool = True) -> str:
-    """Return what a parameter is, with its unit unless that stands with its value.
+def meaning(posterior: Posterior, name: str) -> str:
+    """Return what a parameter is; its unit stands with its value.
 
     A parameter of an adopted effect has the name that the catalogue gives it.
     """
-    unit = posterior.unit(name)
-    called = quantity_name(name, unit)
     if name in _MEANINGS:
         return _MEANINGS[name]
+    unit = posterior.unit(name)
+    called = quantity_name(name, unit)
     if unit == "N m/rad" and called in _ROTATIONAL_SPRINGS:
         called = f"end stiffness {called} ({_ROTATIONAL_SPRINGS[called]})"
     elif unit == "N/m" and called in _FACE_SPRINGS:
-        called, unit = f"spring {called} ({_FACE_SPRINGS[called]})", "N/m per node"
+        called = f"spring {called} per node ({_FACE_SPRINGS[called]})"
     effect = name.rpartition(".")[0].replace("_", " ")
-    if not with_unit:
-        return f"{effect and effect + ': '}{called}"
-    logarithm = "log10 of " if is_logarithm(name) else ""
-    return f"{effect and effect + ': '}{logarithm}{called}{unit and ' in ' + unit}"
+    return f"{effect}: {called}" if effect else called
 
 
 def model_class(name: str) -> str:

@@ -87,8 +87,7 @@ def _trend_part(data: HangerReport) -> Section:
         figures=lambda: (*drawn((CONTROL,), chart), *drawn((TREND,), data)),
         tables=filled(
             *([control_table(chart)] if chart else []),
-            tables.results(data),
-            tables.period(data),
+            tables.changes(data),
             tables.neighbours(data),
         ),
     )
@@ -201,7 +200,9 @@ def _by_latest_test(data: HangerReport) -> tuple[Fact, ...]:
         return ()
     alone = Interval.of_averaged(data.by_latest_test)
     value = formatting.with_half(alone, data.tension_unit)
-    return (("Latest test alone", value, f"test {data.latest.id}; 90 % interval"),)
+    repeats = stated(data.by_latest_test, data.tension_unit).repeatability
+    scatter = f"; repeats within {repeats} (sd)" if repeats else ""
+    return (("Latest test alone", value, f"test {data.latest.id}; 90 % interval{scatter}"),)
 
 
 def _at_level(data: HangerReport) -> tuple[Fact, ...]:
@@ -259,7 +260,9 @@ def _since_baseline(data: HangerReport) -> Fact:
         return ("Since the baseline", "baseline only", "no later test to compare with")
     size = rounded_percent(change.mean, change.width / 2, "+")
     doubt = "" if data.now.is_found else "; no significant change"
-    return ("Since the baseline", size, f"90 % interval{doubt}")
+    before_n = data.baseline_tension_n
+    origin = f"; from {formatting.with_half(before_n, data.tension_unit)}" if before_n else ""
+    return ("Since the baseline", size, f"90 % interval{origin}{doubt}")
 
 
 REPORT_SCHEMA = "shm.report/1"

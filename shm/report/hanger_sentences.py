@@ -19,12 +19,12 @@ from shm.report.hanger_summary import (
 )
 from shm.values import PredictedFrequency
 from shm.values.posterior import MOST_R_HAT
-from shm.values.rounding import rounded_percent
 
 # Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
 # three names are what a sentence bears.
 _WORTH_DIAGNOSING_PERCENT = 0.5
 _MOST_NAMED = 3
+_LEAST_PERCENT = 0.01  # below what any test tells of a frequency
 _BASIS = {
     LATEST_TEST: "Its tension is {tension} by test {test}{day}.",
     BASELINE_TESTS: "Its tension is {tension} by its baseline, test {test}{day}.",
@@ -36,23 +36,18 @@ _BASIS = {
 
 
 def summary(data: HangerReport) -> str:
-    """Return state and action, then the details."""
-    return f"{data.now.message.words} {details(data)}"
+    """Return state, action and tension, then the details."""
+    return f"{data.now.message.words} {_tension(data)} {details(data)}"
 
 
 def why(data: HangerReport) -> str:
-    """Return every doubt, the tension and its change."""
+    """Return every doubt; the numbers stand below, among the facts."""
     return " ".join(_why(data))
 
 
 def _why(data: HangerReport) -> tuple[str, ...]:
     undated = open_warnings.dated_by_receipt(data.now.undated)
-    return (
-        *_doubts(data),
-        _tension(data),
-        _against_baseline(data),
-        *([undated] if undated else ()),
-    )
+    return (*_doubts(data), *([undated] if undated else ()))
 
 
 def _doubts(data: HangerReport) -> tuple[str, ...]:
@@ -66,7 +61,7 @@ def details(data: HangerReport) -> str:
 
 
 def further(data: HangerReport) -> str:
-    """Return the details without those of `why`."""
+    """Return the details but for the doubts, which stand on page 1."""
     before = _why(data)
     return " ".join(each for each in _sentences(data) if each not in before)
 
@@ -74,9 +69,6 @@ def further(data: HangerReport) -> str:
 def _sentences(data: HangerReport) -> tuple[str, ...]:
     found = (
         *_doubts(data),
-        _tension(data),
-        _against_baseline(data),
-        _unseen(data),
         "Once the change is explained, set a new baseline (`shm drift rebaseline`)."
         if data.now.called
         else "",
@@ -112,37 +104,6 @@ def _tension(data: HangerReport) -> str:
     return _BASIS[now.basis].format(tension=tension, test=data.latest.id, day=day)
 
 
-def _against_baseline(data: HangerReport) -> str:
-    change = data.now.change
-    if data.now.control is not None:
-        return ""
-    if data.baseline is None or data.baseline_tension_n is None:
-        return "No test was made since its baseline."
-    if change is None:
-        return "The change since the baseline is not known: its latest test does not show it."
-    size = rounded_percent(change.mean, change.width / 2, "+")
-    tests = formatting.counted_tests(data.baseline.tests)
-    statement = f"Since the baseline of {tests} it changed by {size}"
-    if not data.now.is_found:
-        statement = f"No significant change since the baseline ({size})"
-    later = [
-        each.time for each in data.now.standing if data.latest.time and each.time > data.latest.time
-    ]
-    if not later:
-        return f"{statement}."
-    return f"{statement}, by a test made before the alert of {max(later):%Y-%m-%d}."
-
-
-def _unseen(data: HangerReport) -> str:
-    """Return what keeps a shift of the tension from being seen."""
-    change, threshold = data.now.change, data.hanger.thresholds.tension_shift_fraction
-    if not data.drifts:
-        return ""
-    if change is not None and change.width / 2 > threshold:
-        return f"These tests could hardly show a change of tension of {100 * threshold:.3g} %."
-    return ""
-
-
 def in_period(data: HangerReport) -> str:
     """Return what the period of the report holds, and what changed in it against its start."""
     if data.period is None:
@@ -174,8 +135,9 @@ def _model(data: HangerReport) -> str:
     if _misses(data):
         off = f"{data.posterior.misfit_percent:.1f} % (root mean square)"
         return f"{_chosen(data)}. It misses {count} by {off}."
-    rms = formatting.plain(_rms_percent(data), 2)
-    return f"{_chosen(data)}. It predicts {count} to {rms} % (root mean square)."
+    rms = max(_rms_percent(data), _LEAST_PERCENT)
+    within = f"{'better than ' * (rms == _LEAST_PERCENT)}{formatting.plain(rms, 2)}"
+    return f"{_chosen(data)}. It predicts {count} to {within} % (root mean square)."
 
 
 def _rms_percent(data: HangerReport) -> float:
@@ -227,7 +189,7 @@ def _chosen(data: HangerReport) -> str:
     rivals = formatting.listed([each for each in names if each != model])
     if names[0] != model:
         return f"The model class is {model}, less probable than {names[0]}"
-    return f"The model class is {model}, the most probable (beside {rivals})"
+    return f"The model class is {model}, the most probable (compared with {rivals})"
 
 
 def _quality(data: HangerReport) -> str:

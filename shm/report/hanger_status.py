@@ -45,6 +45,10 @@ _LEADS: dict[str, tuple[str, str]] = {
         "No action is needed before the next planned test.",
     ),
     "untested": ("{name}: no test yet.", f"Test it {NEXT_TEST}."),
+    "waiting": (
+        "{name}: {tests}, no result yet.",
+        "No action is needed: the daemon is at work, or waits for more tests for a baseline.",
+    ),
     "in doubt": (
         "{name}: its tension is in doubt.",
         f"Check its description and the numbers of its modes {NEXT_TEST}.",
@@ -251,7 +255,9 @@ def hanger_message(known: HangerSummary) -> HangerMessage:
 
 def _decide(known: HangerSummary) -> tuple[Status | None, Lead]:
     if known.latest is None and not known.standing:
-        return None, _lead("untested", known.hanger)
+        if not known.tests:
+            return None, _lead("untested", known.hanger)
+        return None, _lead("waiting", known.hanger, tests=formatting.counted(known.tests, "test"))
     if known.control is not None and (latest := known.control.latest) is not None:
         return Status.CHECK if latest.is_out else Status.STEADY, control_lead(known.control)
     faults = known.tension.faults if known.tension else ()

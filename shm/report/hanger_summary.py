@@ -68,7 +68,8 @@ class HangerSummary:
     first, `open_alerts` how many nobody took note of; `notes` say what people did about them.
     `unwatched` says that nothing has looked at the hanger for too long; `undated` names the tests
     dated by their receipt; `sensors` are those of the latest test, or those that stay. `course`
-    is None without a period; `control` is the chart of a control hanger, None of any other.
+    is None without a period; `control` is the chart of a control hanger, None of any other. `tests`
+    counts the stored ones, also those without a result yet.
     """
 
     hanger: Hanger
@@ -87,6 +88,7 @@ class HangerSummary:
     sensors: tuple[ResponsePoint, ...] = ()
     course: PeriodSummary | None = None
     control: ControlChart | None = None
+    tests: int = 0
 
     @cached_property
     def message(self) -> HangerMessage:

@@ -16,11 +16,9 @@ from shm.report.bar_table import NOT_STATED
 from shm.report.contents import HangerReport, TrendRow
 from shm.report.control_report import limits, percent
 from shm.report.formatting import Interval
-from shm.report.hanger_summary import BASELINE_ALONE, BASELINE_AND_CHANGE
-from shm.report.paper import Table, fold_improbable
+from shm.report.paper import Table
 from shm.report.shared_tables import lineage, quality_table
 from shm.report.shifts import shift_cells, shift_table
-from shm.report.sizes import size_of
 from shm.report.states import StatesOverTime
 from shm.values import (
     PLANES,
@@ -28,7 +26,6 @@ from shm.values import (
     Alert,
     FloatArray,
     Mode,
-    Posterior,
     PredictedFrequency,
     TemperatureCoefficient,
     kind_of,
@@ -36,50 +33,25 @@ from shm.values import (
 from shm.values.messages import Lead
 from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import stated
-from shm.watch.alert_text import factor
 from shm.watch.control_chart import ControlChart
 
 
-def results(data: HangerReport) -> Table:
-    """Return the tensions with what each rests on, then the shifts since the baseline."""
-    unit = data.tension_unit
-    known = [("best estimate since the last change", data.averaged, data.now.basis)]
-    if data.now.basis in (BASELINE_AND_CHANGE, BASELINE_ALONE):
-        known.append(("by the latest test alone", data.by_latest_test, f"test {data.latest.id}"))
-    rows: list[tuple[str, ...]] = []
-    for what, averaged, basis in known:
-        words = stated(averaged, unit)
-        value = "not determined" if Interval.of_averaged(averaged).is_wide else words.tension
-        rows.append((f"tension, {what}", value, words.interval, basis, ""))
-    if (before := data.baseline_tension_n) is not None:
-        each = before.in_unit(unit)
-        mean, span = f"{formatting.mean(each)} {unit.name}", f"{formatting.span(each)} {unit.name}"
-        rows.append(("tension of the baseline", mean, span, _baseline_tests(data), ""))
-    if repeats := stated(data.by_latest_test, unit).repeatability:
-        rows.append(("repeatability of one test (sd)", repeats, "", "", ""))
-    if (nominal_n := data.hanger.nominal_tension_n) > 0:
-        nominal = f"{unit.of(nominal_n):.{unit.decimals(nominal_n)}f} {unit.name}"
-        rows.append(("nominal tension (as designed)", nominal, "", "given", ""))
-    for drift in data.drifts:
-        what, size, span, threshold, probability = shift_cells(drift)
-        rows.append((f"change of {what}", size, span, f"threshold {threshold}", probability))
+def changes(data: HangerReport) -> Table:
+    """Return the change of each quantity since the baseline, with its threshold."""
+    tests = f" of {formatting.counted_tests(data.baseline.tests)}" if data.baseline else ""
     return Table(
-        "Tension and changes",
-        ("quantity", "value", "90 % interval", "rests on", "probability beyond the threshold"),
-        tuple(rows),
-        note="Tensions are absolute. Changes since the baseline are at equal temperature, if "
-        f"anything changed at all. {data.drift_watch}".strip(),
+        f"Changes since the baseline{tests}",
+        ("quantity", "change", "90 % interval", "threshold", "probability beyond it"),
+        tuple(map(shift_cells, data.drifts)),
+        note=f"At equal temperature, if anything changed at all. {data.drift_watch}".strip(),
     )
-
-
-def _baseline_tests(data: HangerReport) -> str:
-    return formatting.counted_tests(data.baseline.tests) if data.baseline else ""
 
 
 def temperatures(data: HangerReport) -> Table:
     return temperature_table(data.states)
 
 
+_EXACT = 1e-5  # of a formula: far below what a frequency tells
 _NEXT_TO = 2  # hangers on either side, which take up most of a lost load
 _ROWS_SHOWN = 12  # layout: what a page holds
 _ALERTS_SHOWN = 5  # layout: a third of a page
@@ -173,50 +145,11 @@ def doubts(data: HangerReport) -> Table:
 
 
 def parameters(data: HangerReport) -> Table:
-    posterior = data.posterior
-    return Table(
-        f"Parameters of the model class {formatting.model_class(posterior.model)}",
-        ("parameter", "most probable to be, with 90 % interval", "symbol"),
-        tuple(_parameter_row(posterior, name) for name in posterior.names),
-        note="Ratios and fractions have no unit. Of end stiffnesses the value is the median.",
-    )
-
-
-def _parameter_row(posterior: Posterior, name: str) -> tuple[str, ...]:
-    interval = Interval.of_samples(posterior.parameter(name))
-    unit = posterior.unit(name)
-    value = size_of(name, "" if unit == "1" else unit, interval)
-    symbol = name.rpartition(".")[2].removeprefix("log10_")
-    return (formatting.meaning(posterior, name, with_unit=False), str(value), symbol)
+    return shared_tables.parameters(data.posterior)
 
 
 def models(data: HangerReport) -> Table:
-    chosen = data.selection
-    pairs = list(zip(chosen.posteriors, chosen.probabilities, strict=True)) if chosen else []
-    unit = force_unit(*(float(posterior.tension_n.mean()) for posterior, _ in pairs))
-    rows = [_model_row(posterior, share, unit) for posterior, share in pairs]
-    return Table(
-        "Model classes",
-        ("model", "probability", "log evidence", "its sd", *formatting.tension_headings(unit)),
-        fold_improbable(rows, [share for _, share in pairs], "classes"),
-        note=f"Compared on {formatting.counted_tests(pairs[0][0].tests)}. Before them all classes "
-        "were equally probable, clamped ones less so but with the thesis's priors. Evidence in "
-        "natural logarithms, with the standard deviation of its sampling."
-        if pairs
-        else "",
-    )
-
-
-def _model_row(posterior: Posterior, share: float, unit: ForceUnit) -> tuple[str, ...]:
-    tension = Interval.of_samples(posterior.tension_n).in_unit(unit)
-    return (
-        formatting.model_class(posterior.model),
-        formatting.probability(share),
-        f"{posterior.log_evidence:.2f}",
-        formatting.number(posterior.log_evidence_sd, ".2f"),
-        formatting.mean(tension),
-        formatting.span(tension),
-    )
+    return shared_tables.model_classes(data.selection)
 
 
 def practice(data: HangerReport) -> Table:
@@ -239,7 +172,7 @@ def practice(data: HangerReport) -> Table:
 
     for each in FORMULAS:
         found = [each.tension_n(measured.get((p, each.order), np.nan), *bar) for p in PLANES]
-        holds = f"{each.valid_from_xi:g}", f"{100 * each.worst_error:g} %"
+        holds = f"{each.valid_from_xi:g}", _error_cell(each.worst_error)
         add(f"{each.name}, mode {each.order}", found, each.ends, *holds, each.leaves_out)
     by_order = [{n: hz for (this, n), hz in measured.items() if this == plane} for plane in PLANES]
     fitted = [equal_springs.tension_n(this, *bar) for this in by_order]
@@ -254,7 +187,7 @@ def practice(data: HangerReport) -> Table:
     if not rows:
         return Table(title, (), ())
     ours = stated(data.by_latest_test, unit)
-    both = (ours.tension, ours.tension)
+    both = (ours.tension.removesuffix(f" {unit.name}"),) * 2
     rows.append(("ours, by all modes of the same test", *both, "as inferred", "", "", ""))
     planes = (f"{plane} ({unit.name})" for plane in PLANES)
     heads = ("formula", *planes, "ends", "from xi", "error", "leaves out")
@@ -268,63 +201,8 @@ def practice(data: HangerReport) -> Table:
     return Table(title, heads, tuple(rows), note)
 
 
-def period(data: HangerReport) -> Table:
-    """Return the comparison of the period's first and last test; empty where there are not two."""
-    if data.period is None or len(data.trend) < 2:
-        return Table("The period", (), ())
-    first, last = data.trend[0], data.trend[-1]
-    return Table(
-        f"In the period {data.period}",
-        ("what", "at its first test", "at its last test", "change (90 % interval)"),
-        (
-            ("test", first.test, last.test, formatting.counted(len(data.trend), "test")),
-            (
-                "time", formatting.moment(first.time), formatting.moment(last.time),
-                _days(first, last),
-            ),
-            (
-                "temperature", formatting.temperature(first.temperature_c),
-                formatting.temperature(last.temperature_c), _kelvins(first, last),
-            ),
-            _tension_course(first.tension_n, last.tension_n),
-            *(
-                _stiffness_course(name, first.stiffness[name], last.stiffness[name])
-                for name in last.stiffness
-                if name in first.stiffness
-            ),
-        ),
-        note="By these two tests alone, taken as independent of one another; the effect of the "
-        "temperature is in the change. The intervals of stiffness are of log10.",
-    )  # fmt: skip
-
-
-def _days(first: TrendRow, last: TrendRow) -> str:
-    if first.time is None or last.time is None:
-        return "not known"
-    return formatting.counted((last.time - first.time).days, "day")
-
-
-def _kelvins(first: TrendRow, last: TrendRow) -> str:
-    kelvins = formatting.number(last.temperature_c - first.temperature_c, "+z.1f")
-    return f"{kelvins} K" if kelvins != "not known" else kelvins
-
-
-def _tension_course(first: Interval, last: Interval) -> tuple[str, ...]:
-    change = last.since(first).scaled(100)
-    unit = force_unit(first.mean, last.mean)
-    both = (f"{formatting.with_span(each.in_unit(unit))} {unit.name}" for each in (first, last))
-    return ("tension", *both, f"{formatting.with_span(change, signed=True)} %")
-
-
-def _stiffness_course(name: str, first: Interval, last: Interval) -> tuple[str, ...]:
-    change = last.less(first)
-    mean, low, high = (factor(each) for each in (change.mean, change.low, change.high))
-    return (
-        f"{formatting.quantity(name)}, log10 of N m/rad",
-        formatting.with_span(first),
-        formatting.with_span(last),
-        f"{mean} times ({low} to {high} times)",
-    )
+def _error_cell(fraction: float) -> str:
+    return f"{100 * fraction:g} %" if fraction >= _EXACT else "exact"
 
 
 def history(data: HangerReport) -> Table:

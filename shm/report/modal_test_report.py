@@ -195,12 +195,13 @@ MODE_HEADINGS = (
 def mode_row(mode: Mode) -> tuple[str, ...]:
     """Return one mode under `MODE_HEADINGS`."""
     places = min(6, max(3, formatting.decimals(2 * mode.frequency_sd_hz)))
+    damping_places = min(4, max(2, formatting.decimals(200 * mode.damping_sd)))
     return (
         mode.plane,
         str(mode.order),
         f"{mode.frequency_hz:.{places}f}",
         formatting.plain(mode.frequency_sd_hz, 2),
-        formatting.number(100 * mode.damping_ratio, ".4f"),
+        formatting.number(100 * mode.damping_ratio, f".{damping_places}f"),
         formatting.plain(100 * mode.damping_sd, 2),
         formatting.plain(mode.acceleration_m_s2),
     )

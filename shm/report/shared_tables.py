@@ -9,10 +9,13 @@ import math
 from collections.abc import Mapping, Sequence
 
 from shm.report import formatting
-from shm.report.paper import Table
+from shm.report.formatting import Interval
+from shm.report.paper import Table, fold_improbable
+from shm.report.sizes import size_of
 from shm.settings import TABLE
-from shm.values import ModalTest, QualityCheck, Verdict
+from shm.values import ModalTest, Posterior, QualityCheck, Selection, Verdict
 from shm.values.modes import FIRST_ORDERS, NUMBERING
+from shm.values.rounding import force_unit
 
 SYMBOLS: dict[Verdict, str] = {"good": "✓", "warning": "!", "refused": "✗", "unknown": "?"}
 _GRAVEST: tuple[Verdict, ...] = ("refused", "warning", "unknown", "good")
@@ -110,6 +113,53 @@ def added_mass(test: ModalTest) -> str:
     radius_m = mass.radius_of_gyration_m
     size = "" if radius_m is None else f", radius of gyration {radius_m:g} m"
     return f"{mass.mass_kg:g} kg at {mass.x_m:g} m from the deck end{size}"
+
+
+def parameters(posterior: Posterior) -> Table:
+    """Return the parameters of a model class, each with its unit and 90 % interval."""
+    rows = []
+    for name in posterior.names:
+        interval = Interval.of_samples(posterior.parameter(name))
+        unit = posterior.unit(name)
+        value = size_of(name, "" if unit == "1" else unit, interval)
+        symbol = name.rpartition(".")[2].removeprefix("log10_")
+        rows.append((formatting.meaning(posterior, name), str(value), symbol))
+    return Table(
+        f"Parameters of the model class {formatting.model_class(posterior.model)}",
+        ("parameter", "value, with 90 % interval", "symbol"),
+        tuple(rows),
+        note="Ratios and fractions have no unit. Of end stiffnesses the value is the median.",
+    )
+
+
+def model_classes(selection: Selection | None) -> Table:
+    """Return the model classes with probability, evidence and tension; empty without any."""
+    posteriors = selection.posteriors if selection else ()
+    probabilities = selection.probabilities if selection else ()
+    tensions_n = [Interval.of_samples(each.tension_n) for each in posteriors]
+    unit = force_unit(*(each.mean for each in tensions_n))
+    rows = [
+        (
+            formatting.model_class(posterior.model),
+            formatting.probability(probability),
+            f"{posterior.log_evidence:.2f}",
+            formatting.number(posterior.log_evidence_sd, ".2f"),
+            formatting.mean(tension_n.in_unit(unit)),
+            formatting.span(tension_n.in_unit(unit)),
+        )
+        for posterior, probability, tension_n in zip(
+            posteriors, probabilities, tensions_n, strict=True
+        )
+    ]
+    compared_on = f"Compared on {formatting.counted_tests(posteriors[0].tests)}. " if rows else ""
+    return Table(
+        "Model classes",
+        ("class", "probability", "log evidence", "its sd", *formatting.tension_headings(unit)),
+        fold_improbable(rows, probabilities, "classes") if rows else (),
+        note=f"{compared_on}Before them all classes were equally probable, clamped ones less so "
+        "but with the thesis's priors. Evidence in natural logarithms, with the standard deviation "
+        "of its sampling.",
+    )
 
 
 def settings(known: Mapping[str, str]) -> Table:

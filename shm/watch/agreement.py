@@ -1,16 +1,10 @@
-"""Two tests that agree, whatever their clocks say and in whatever order they came.
+"""Report two tests that agree on a tension, whatever their clocks say and in whatever order.
 
 The watch counts visits: a change has had time to come only between two, and only tests dated
-before another speak for it there. A clock that hardly moves, or files that come in another order,
-would take the evidence away. So two tests next to each other, as they came in or as they are dated,
-that each read beyond the threshold to one side are told by themselves where one is none that the
-watch has counted, being held or of planned works; where the second is dated earlier; and where both
-are dated as of one visit, if they are further off than by any load that stands on the deck for it.
-Tests of two visits are the watch's to judge: it knows how often those of this hanger do so without
-a change.
-
-One blunder in a hundred tests (`WatchOptions.outlier_probability`) makes two in a row once in ten
-thousand, and few of these read beyond a threshold, to one side and alike.
+before another speak for it there. So two tests next to each other, as they came in or as they are
+dated, whose tensions are both beyond the threshold to one side are reported where the watch cannot
+judge them: one is held or of planned works; the second is dated earlier; or both are dated as of
+one visit and further off than by any load that stands on the deck for it.
 """
 
 from __future__ import annotations
@@ -27,7 +21,6 @@ from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, Watched
 from shm.values.drift import threshold_of
 from shm.watch.alert_text import alert_of, message_of_agreeing
 from shm.watch.options import WatchOptions
-from shm.watch.persistence import LARGE
 from shm.watch.posterior_summary import drift_of_normal
 from shm.watch.quantities import shift_of
 from shm.watch.readings import Reader
@@ -48,19 +41,21 @@ _MOST_SCATTER = 2.0
 _APART = timedelta(days=3)
 """Tests that far apart by their clocks are two visits."""
 
-_LEAST = 0.01
-"""Of a frequency, in the mean: decades of an end that is as good as clamped move nothing."""
-
 Way = Literal["up", "down"]
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A quantity by one test: coordinate, variance, and its effect on the mean log frequency."""
+    """A quantity by one test: coordinate and variance."""
 
     mean: float
     variance: float
-    moves: float
+
+    def agrees(self, other: Shown) -> bool:
+        """Return True if two are on one side of the baseline, and within their errors."""
+        apart = abs(self.mean - other.mean)
+        within = CLEAR * math.sqrt(self.variance + other.variance)
+        return self.mean * other.mean > 0 and apart < within
 
 
 def agreement(
@@ -71,71 +66,47 @@ def agreement(
     options: WatchOptions,
     told: Collection[tuple[str, Way]],
 ) -> Alert | None:
-    """Return the alert of a test that is the second to show a shift beyond its threshold.
+    """Return the alert of a test that is the second to show a tension beyond its threshold.
 
     None where it shows none, no test next to it agrees, the clocks say that it was a later visit,
     a test of a visit before shows the same, or the shift is `told` already.
     """
-    its = _shown(reader, newest[0], hanger, options)
-    if not any(its):
+    test, at = newest
+    tension = reader.quantities[0]
+    threshold = threshold_of(TENSION, hanger)
+
+    def show(test: ModalTest) -> Shown:
+        return read_alone(reader, test, options)[0]
+
+    def is_shown(shown: Shown) -> bool:
+        is_clear = abs(shown.mean) >= CLEAR * math.sqrt(shown.variance)
+        return is_clear and abs(shift_of(tension, shown.mean)) >= threshold
+
+    mine = show(test)
+    if not is_shown(mine) or (TENSION, way_of(mine.mean)) in told:
         return None
-    near = {tests[0].id: tests[0] for tests in (*beside.came, *beside.dated) if tests}
-    others = [(test, _shown(reader, test, hanger, options)) for test in near.values()]
-    known = _read_earlier_visits(reader, newest[0], beside, options)
-    for j, (quantity, mine) in enumerate(zip(reader.quantities, its, strict=True)):
-        if mine is None or (quantity.name, way_of(mine.mean)) in told:
-            continue
-        if any(_agree(mine, each[j]) for each in known):
-            continue
-        for other, shown in others:
-            same = shown[j]
-            if same and _agree(mine, same) and _is_unwatched(quantity, mine, newest, other, beside):
-                drift = _drift(quantity, newest, (mine, same), hanger)
-                what = f"two-tests-agree:{drift.quantity}-{way_of(drift.shift_mean)}"
-                is_held = other.id in beside.held
-                words = message_of_agreeing(
-                    drift, hanger, (other.id, newest[0].id), is_held=is_held
-                )
-                of_test = (newest[0].id, newest[1])
-                return alert_of(hanger, of_test, what, words, ("beyond threshold",), (drift,))
-    return None
-
-
-def _read_earlier_visits(
-    reader: Reader, newest: ModalTest, beside: Beside, options: WatchOptions
-) -> list[list[Shown]]:
-    """Return the readings of the last visits before the newest: these shifts are not new."""
+    unwatched = {*beside.held, *beside.of_works}
     earlier = {
-        test.id: test
-        for tests in (beside.came[0], beside.dated[0])
-        for test in tests
-        if _is_later(newest, test) and test.id not in {*beside.held, *beside.of_works}
+        each.id: each
+        for each in (*beside.came[0], *beside.dated[0])
+        if _is_later(test, each) and each.id not in unwatched
     }
-    return [read_alone(reader, test, options) for test in earlier.values()]
-
-
-def _is_unwatched(
-    quantity: WatchedQuantity,
-    shown: Shown,
-    newest: tuple[ModalTest, datetime],
-    other: ModalTest,
-    beside: Beside,
-) -> bool:
-    """Return True if the watch cannot judge two tests as two visits.
-
-    It has not counted the other one, or that is dated later; of one visit they must be further off
-    than by any load.
-    """
-    if other.id in {*beside.held, *beside.of_works} or _is_later(other, newest[0]):
-        return True
-    return _is_no_load(quantity, shown) and not _is_later(newest[0], other)
-
-
-def _is_no_load(quantity: WatchedQuantity, shown: Shown) -> bool:
-    """Return True if a quantity is further off than by any load that stands on the deck."""
-    if quantity.name == TENSION:
-        return bool(abs(shift_of(quantity, shown.mean)) > BY_A_LOAD)
-    return shown.moves > LARGE
+    if any(mine.agrees(show(each)) for each in earlier.values()):  # it is not new
+        return None
+    is_no_load = abs(shift_of(tension, mine.mean)) > BY_A_LOAD
+    near = {tests[0].id: tests[0] for tests in (*beside.came, *beside.dated) if tests}
+    for other in near.values():
+        of_one_visit = is_no_load and not _is_later(test, other)
+        if not (other.id in unwatched or _is_later(other, test) or of_one_visit):
+            continue
+        shown = show(other)
+        if is_shown(shown) and mine.agrees(shown):
+            drift = _drift(tension, newest, (mine, shown), hanger)
+            what = f"two-tests-agree:{drift.quantity}-{way_of(drift.shift_mean)}"
+            names, is_held = (other.id, test.id), other.id in beside.held
+            words = message_of_agreeing(drift, hanger, names, is_held=is_held)
+            return alert_of(hanger, (test.id, at), what, words, ("beyond threshold",), (drift,))
+    return None
 
 
 def _is_later(one: ModalTest, other: ModalTest) -> bool:
@@ -144,30 +115,15 @@ def _is_later(one: ModalTest, other: ModalTest) -> bool:
 
 
 def way_of(shift: float) -> Way:
-    """To which side a shift goes."""
+    """Return to which side a shift goes."""
     return "down" if shift < 0 else "up"
 
 
-def _agree(one: Shown, other: Shown) -> bool:
-    apart = abs(one.mean - other.mean)
-    return one.mean * other.mean > 0 and apart < CLEAR * math.sqrt(one.variance + other.variance)
-
-
-def _shown(
-    reader: Reader, test: ModalTest, hanger: Hanger, options: WatchOptions
-) -> list[Shown | None]:
-    """Return each quantity by a test; None where it is not clear, or below its threshold."""
-    found: list[Shown | None] = []
-    for quantity, each in zip(reader.quantities, read_alone(reader, test, options), strict=True):
-        is_beyond = abs(shift_of(quantity, each.mean)) >= threshold_of(quantity.name, hanger)
-        is_clear = abs(each.mean) >= CLEAR * math.sqrt(each.variance)
-        is_felt = each.moves >= _LEAST
-        found.append(each if is_beyond and is_clear and is_felt else None)
-    return found
-
-
 def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[Shown]:
-    """With all that makes tests of an unchanged hanger differ: errors, scatter, temperature."""
+    """Read each quantity with all that makes tests of an unchanged hanger differ.
+
+    These are errors, scatter, and the temperature.
+    """
     reading = reader.reading(test, datetime.max)
     pull = [1 / (_PULL_STEPS * each.step_sd) ** 2 for each in reader.quantities]
     covariance = np.linalg.inv(reading.information + np.diag(pull))
@@ -175,28 +131,15 @@ def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[S
     if not math.isfinite(kelvin):
         kelvin = options.unknown_temperature_sd_k
     found = []
-    slopes = np.zeros(len(reader.quantities))
-    if reading.modes is not None:
-        slopes = reading.modes.slopes[np.isfinite(reading.modes.variances)].mean(axis=0)
     for j, quantity in enumerate(reader.quantities):
-        scatter = _MOST_SCATTER * _scatter_of(quantity, options)
-        per_kelvin = (
-            options.tension_per_kelvin_sd
-            if quantity.name == TENSION
-            else options.spring_per_kelvin_sd_of_step * quantity.step_sd
-        )
-        of_both = 2 * scatter**2  # a baseline of one test scatters as much
+        scatter, per_kelvin = options.tension_scatter, options.tension_per_kelvin_sd
+        if quantity.name != TENSION:
+            scatter = options.spring_scatter_of_step * quantity.step_sd
+            per_kelvin = options.spring_per_kelvin_sd_of_step * quantity.step_sd
+        of_both = 2 * (_MOST_SCATTER * scatter) ** 2  # a baseline of one test scatters as much
         variance = float(covariance[j, j]) + of_both + (per_kelvin * kelvin) ** 2
-        mean = float(reading.mean[j])
-        found.append(Shown(mean, variance, abs(mean * float(slopes[j]))))
+        found.append(Shown(float(reading.mean[j]), variance))
     return found
-
-
-def _scatter_of(quantity: WatchedQuantity, options: WatchOptions) -> float:
-    """Return what a test of an unchanged hanger scatters by, in the coordinate."""
-    if quantity.name == TENSION:
-        return options.tension_scatter
-    return options.spring_scatter_of_step * quantity.step_sd
 
 
 def drifts_of(

@@ -1,12 +1,8 @@
-"""Causes of a change of a hanger's frequencies: the hypotheses of the diagnosis, over time.
+"""List the causes of a change of frequencies: the hypotheses of the diagnosis, over time.
 
 Tension and end stiffness move the frequencies as the model class says, where the hanger is now.
-Beside them stand what the catalogue of effects knows and a comparison with the baseline can show: a
-mass put on or taken off, section lost over a stretch, another bending stiffness, a clock that is
-off, sensors of other mass or in another place. Each as one column a place, by the general bar on
-the ends of the baseline. What none of these does is "unexplained": every mode by itself.
-
-The ways to change, the changes that were called, and what stands where in a test's columns.
+The other causes are one column a place, by the general bar on the ends of the baseline. What none
+of these does is "unexplained": every mode individually.
 """
 
 from __future__ import annotations

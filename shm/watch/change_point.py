@@ -1,18 +1,14 @@
-"""Has anything changed? Shiryaev-Roberts over all beginnings and causes, in closed form.
+"""Compute the Shiryaev-Roberts statistic over all beginnings and causes, in closed form.
 
 Each test is y = A a + H d + errors: `a` are the modes' own levels, how they go with temperature,
-excitation and slow creep, all unknown; `d` is a change, from some test on at once (a step) or ever
-further (a ramp). Given what tests scatter by, all is normal, and what every change has for it
-follows from sums over the tests: with V the covariance of `a` if nothing changes, J = sum H'WH -
-U'VU and v = sum H'Wy - U'V sum A'Wy, where U = sum A'WH over the tests since (the generalised
-likelihood ratio of Willsky and Jones 1976, here averaged over a prior). So hypotheses cost next to
-nothing, and late tests take their place.
+excitation and creep; `d` is a change, from some test on at once (a step) or ever further (a ramp).
+With V the covariance of `a` if nothing changes, what a change has for it follows from J = sum H'WH
+- U'VU and v = sum H'Wy - U'V sum A'Wy, where U = sum A'WH over the tests since (the generalised
+likelihood ratio of Willsky and Jones 1976, averaged over a prior).
 
-Each change has a mass in years: the time in which it may have begun times its Bayes factor to no
-change. Their sum is the Shiryaev-Roberts statistic. Under no change each mass stays the same on
-average, and all masses together are at most the time watched: a statistic of which that is true
-exceeds L years not before L years on average (Shiryaev 1963, Roberts 1966, Pollak 1985). Most runs
-show three quarters of that time: the masses of large changes have it from rare large values.
+The mass of a change, in years, is the time in which it may have begun times its Bayes factor to no
+change. A sum of masses exceeds L years not before L years on average (Shiryaev 1963, Roberts 1966,
+Pollak 1985).
 """
 
 from __future__ import annotations

@@ -1,12 +1,9 @@
-"""The watch of a structure without a model: its log frequencies, against its own first tests.
+"""Watch a structure without a model: its log frequencies, against its own first tests.
 
-No beam, no plane, no posterior. Each frequency is a quantity with its own coefficients of
-temperature, frost and excitation. All may move alike (mass, stiffness, a clock), one alone, or each
-by its own amount. The decision is that of the watch of a hanger (`change_point`).
-
-Ambient tests come daily, and most of what moves their frequencies goes on for weeks: moisture,
-ice in the joints, ballast. So tests of three days are pooled, each mode by its median, and all
-tests within 45 days are taken to share what wanders.
+Each frequency is a quantity with its own coefficients of temperature, frost and excitation. All may
+move alike (mass, stiffness, a clock), one alone, or each by its own amount; the decision is that of
+`change_point`. Tests of three days are pooled, each mode by its median, and all tests within 45
+days share what wanders: moisture, ice in the joints, ballast.
 """
 
 from __future__ import annotations

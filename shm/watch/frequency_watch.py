@@ -14,10 +14,11 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from shm.errors import BadInput
-from shm.values import NAN, WITHOUT_MODEL, Alert, Hanger, ModalTest, Posterior, Reading, WatchedTest
+from shm.values import WITHOUT_MODEL, Alert, Hanger, ModalTest, Posterior, Reading, WatchedTest
 from shm.watch.frequencies import POOLED_DAYS, FrequencyReader, FrequencyWatcher
 from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.options import WatchOptions
+from shm.watch.quantities import posterior_at
 from shm.watch.state_sums import WatchState
 from shm.watch.watching import AlertState, DatedTest, Newest, after, options_of
 
@@ -131,27 +132,12 @@ def measured_levels(tests: Sequence[ModalTest], seed: int) -> Posterior:
 
     The median frequency (Hz) of each mode, as two equal draws. Nothing is sampled.
     """
-    levels = FrequencyReader(tests).levels_hz
-    values = np.array([list(levels.values())] * 2)
-    return Posterior(
-        model=WITHOUT_MODEL,
-        hanger=tests[0].hanger,
-        names=tuple(levels),
-        units=("Hz",) * len(levels),
-        samples=values,
-        log_likelihood=np.zeros(2),
-        most_probable=values[0],
-        nominal_tension_n=NAN,
-        log_evidence=0.0,
-        log_evidence_sd=0.0,
-        effective_sample_size=NAN,
-        r_hat=NAN,
-        evaluations=0,
-        predicted=(),
-        tests=tuple(test.id for test in tests),
-        seed=seed,
-        seconds=0.0,
-        method="none",
+    levels, structure = FrequencyReader(tests).levels_hz, Hanger.without_model(tests[0].hanger or 0)
+    found = posterior_at(WITHOUT_MODEL, structure, levels)
+    values, units = np.repeat(found.samples, 2, axis=0), ("Hz",) * len(levels)
+    names, log_likelihood = tuple(test.id for test in tests), np.zeros(2)
+    return replace(
+        found, samples=values, log_likelihood=log_likelihood, units=units, tests=names, seed=seed
     )
 
 

@@ -1,9 +1,8 @@
 """Find mistaken modes of a test: another order, the other plane's, a machine's tone.
 
 Log frequencies lie about a linear function of a few coordinates, which have a normal prior, each
-with an error; or, seldom, anywhere. For a given set of mistaken modes all is normal, and its
-evidence has a closed form. Sets of up to two are compared exhaustively, since two can hide each
-other; larger ones grow from the best of these, one mode at a time.
+with an error; or, seldom, anywhere. Sets of up to two mistaken modes are compared exhaustively,
+since two can hide each other; larger ones grow from the best of these, one mode at a time.
 """
 
 from __future__ import annotations

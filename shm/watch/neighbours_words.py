@@ -1,4 +1,4 @@
-"""The pattern over the bridge in English: what most probably moved, by how much, what to do."""
+"""State the pattern over the bridge in English: what most probably moved, and what to do."""
 
 from __future__ import annotations
 
@@ -10,35 +10,38 @@ from shm.watch.neighbours import REACH, BridgePattern, HangerRow
 _SURE_WHICH = 0.8  # judgement: four to one
 
 
-def sentence_of(pattern: BridgePattern, alike_remedy: str, named_from: float) -> str:
-    """Return the likeliest explanation, or that none is clear."""
+def sentence_of(pattern: BridgePattern, named_from: float) -> str:
+    """Return the most probable explanation, or that none is clear."""
     best = pattern.explanations[0]
     largest = max(pattern.rows, key=lambda row: abs(row.shift_fraction))
-    suspects = [each for each in pattern.suspects if each.name == best.name]
-    moving = best.name in ("load redistribution", "load gain")
-    if best.probability < named_from or (moving and not suspects):
+    size = rounded_percent(
+        largest.shift_fraction, (largest.high_fraction - largest.low_fraction) / 2, "+"
+    )
+    if best.probability < named_from:
+        suspect = next((each for each in pattern.suspects if each.name == best.name), None)
         way = "from" if best.name == "load redistribution" else "of"
-        of = f" {way} {_hangers(suspects[0].hangers).lower()}" if suspects else ""
+        of = f" {way} {_hangers(suspect.hangers).lower()}" if suspect else ""
         return (
             "It is not clear yet whether load moved between hangers. Most probable is "
             f"{best.name}{of} (probability {best.probability:.2f}). The largest shift is "
-            f"{_percent(largest)}, of hanger {largest.hanger}."
+            f"{size}, of hanger {largest.hanger}."
         )
     if best.name == "no change":
         return (
-            f"No load has moved between hangers: the largest shift, {_percent(largest)} of hanger "
+            f"No load has moved between hangers: the largest shift, {size} of hanger "
             f"{largest.hanger}, is within the scatter."
         )
     if best.name == "common shift":
         size = rounded_percent(pattern.alike_fraction, NINETY_PERCENT * pattern.alike_sd, "+")
         return (
             f"All hangers shifted alike, by {size}. The probable cause is {pattern.alike_cause}, "
-            f"not the hangers. {alike_remedy[0].upper()}{alike_remedy[1:]}."
+            "not the hangers. Compare the loggers' clocks and sampling rates, check the "
+            "temperatures of the tests, and ask for new surfacing or works."
         )
-    return _moved(pattern) if moving else _each_by_itself(pattern)
+    return _individual(pattern) if best.name == "independent shifts" else _moved(pattern)
 
 
-def _each_by_itself(pattern: BridgePattern) -> str:
+def _individual(pattern: BridgePattern) -> str:
     moved = [row for row in pattern.rows if row.way != "unchanged"]
     if not moved:
         return (
@@ -55,10 +58,10 @@ def _each_by_itself(pattern: BridgePattern) -> str:
 
 
 def _moved(pattern: BridgePattern) -> str:
-    """Say who shed or gained load, how much of it the neighbours took up or gave, and any doubt."""
+    """State who shed or gained load, how much of it the neighbours took up or gave, any doubt."""
     name = pattern.explanations[0].name
     suspects = [each for each in pattern.suspects if each.name == name]
-    movers = [row for hanger in suspects[0].hangers for row in pattern.rows if row.hanger == hanger]
+    movers = [row for row in pattern.rows if row.hanger in suspects[0].hangers]
     lost, one = name == "load redistribution", len(movers) == 1
     whose = f"{_hangers(suspects[0].hangers).lower()} to {'its' if one else 'their'}"
     words = [f"Load has moved from {whose} neighbours."] if lost else []
@@ -109,19 +112,14 @@ def remarks_of(pattern: BridgePattern) -> tuple[str, ...]:
 
 
 def _way(row: HangerRow) -> str:
-    """`lost 34.1 ± 5.8 kN`."""
+    """Return `lost 34.1 ± 5.8 kN`."""
     verb = "lost" if row.shift_n < 0 else "gained"
     return f"{verb} {_force(abs(row.shift_n), (row.high_n - row.low_n) / 2)}"
 
 
 def _force(force_n: float, half_n: float, sign: str = "") -> str:
-    """`34.1 ± 5.8 kN`, rounded by its interval."""
     unit = force_unit(force_n, half_n)
     return f"{rounded(unit.of(force_n), unit.of(half_n), sign)} {unit.name}"
-
-
-def _percent(row: HangerRow) -> str:
-    return rounded_percent(row.shift_fraction, (row.high_fraction - row.low_fraction) / 2, "+")
 
 
 def _hangers(hangers: Sequence[int]) -> str:

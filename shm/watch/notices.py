@@ -1,13 +1,8 @@
-"""Notices: a baseline or tests that agree with no other, and modes that tests keep having wrong.
+"""Write notices: a baseline or tests that agree with no other, and modes that tests keep wrong.
 
-A baseline that agrees with none of the tests since: a change right after it, or a disturbed day. No
-test can tell which. One baseline in twelve has a vehicle next to the hanger, and hardly one change
-in a thousand comes right after it: what a load may do is a notice that states both. What no load
-does is an alert, since a loss in a notice is silent for as long as nobody looks.
-
-One slip of a test is left out and forgotten. The same mode wrong in three tests in a row is
-numbered wrongly each time, or the hanger has changed in a way that its model class does not know.
-Where more modes are off the baseline than can be misnamed, it is the tests that do not fit it.
+A baseline that agrees with none of the tests since: no test can tell a change right after it from a
+disturbed day. What a load may do is a notice, what no load does an alert. The same mode wrong in
+three tests in a row is numbered wrongly, or the hanger has changed as its class does not know.
 """
 
 from __future__ import annotations
@@ -34,7 +29,7 @@ from shm.values import (
 )
 from shm.values.drift import ENOUGH_FITS
 from shm.values.messages import WEEK
-from shm.values.rounding import force_unit, listed
+from shm.values.rounding import listed
 from shm.values.stream import StreamEvent
 from shm.watch.agreement import BY_A_LOAD
 from shm.watch.alert_text import (
@@ -65,11 +60,25 @@ def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
     """
     clear = [each for each in test.drifts if _deviations(each) > _CLEAR_DRIFT]
     lead = max(clear, key=_deviations, default=None)
-    message, kind = message_of_baseline(test, hanger), _CHECK
-    drifts: tuple[Drift, ...] = ()
-    if lead is not None:
-        if hanger.is_modelled:
-            message = _either_words(hanger, lead, test.change.against_baseline)
+    kind, drifts = _CHECK, ()
+    if lead is None or not hanger.is_modelled:
+        message = (
+            f"{against_baseline_words(test.change, hanger)} Either the baseline was disturbed, by "
+            "a load on the deck for one, or the hanger changed right after it; no test shows which."
+        )
+    else:
+        look = "inspect its anchorages and the rod"
+        if is_stiffness(lead.quantity):
+            look = "inspect both ends"
+        elif lead.shift_mean >= 0:
+            look = "compare the hangers beside it (`shm drift bridge`)"
+        message = (
+            f"Hanger {hanger.id}: either {quantity_words(lead.quantity)} {size_words(lead)} since "
+            f"its baseline, or the baseline was disturbed. Within a week, {look}, and find out "
+            "what was different on the day of the baseline. The last "
+            f"{test.change.against_baseline} tests agree with each other and not with it; no test "
+            "tells which. If it was disturbed, set another (`shm drift rebaseline`)."
+        )
         is_far = abs(lead.shift_mean) > max(BY_A_LOAD, lead.threshold)
         if lead.quantity == TENSION and lead.is_clearly_beyond and is_far:
             kind, drifts = "beyond threshold", (lead,)
@@ -80,76 +89,26 @@ def _deviations(drift: Drift) -> float:
     return abs(drift.shift_mean) / drift.shift_sd if drift.shift_sd > 0 else 0.0
 
 
-def _either_words(hanger: Hanger, lead: Drift, tests: int) -> str:
-    """Return both causes, what to do about either, how far it is and how many tests show it."""
-    look = "inspect its anchorages and the rod"
-    if is_stiffness(lead.quantity):
-        look = "inspect both ends"
-    elif lead.shift_mean >= 0:
-        look = "compare the hangers beside it (`shm drift bridge`)"
-    now = ""
-    if lead.quantity == TENSION:
-        unit = force_unit(lead.value, lead.baseline)
-        was, value = unit.with_unit(lead.baseline), unit.with_unit(lead.value)
-        now = f"Tension was {was} at the baseline, {value} since. "
-    return (
-        f"Hanger {hanger.id}: either {quantity_words(lead.quantity)} {size_words(lead)} since its "
-        f"baseline, or the baseline was disturbed. Within a week, {look}, and find out what was "
-        f"different on the day of the baseline. {now}The last {tests} tests agree with each other "
-        "and not with it; no test tells which. If it was disturbed, set another (`shm drift "
-        "rebaseline`)."
-    )
-
-
-def message_of_baseline(test: WatchedTest, hanger: Hanger) -> str:
-    """Return the message of a baseline that agrees with none of the tests since."""
-    return (
-        f"{against_baseline_words(test.change, hanger)} Either the baseline was disturbed, by a "
-        "load on the deck for one, or the hanger changed right after it; no test shows which."
-    )
-
-
 # ---------------------------------------------------------------- tests that agree with none
 
 
 def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
     """Return the message of a test that agrees with none before it, or of so many in a row."""
+    name = f"Hanger {hanger.id}"
+    action, what = f"{look_again(hanger)} {WEEK}", "the hanger"
     if not hanger.is_modelled:
-        return _odd_frequencies(test, hanger, in_a_row)
+        name, action = structure_words(hanger), f"Look at sensors and clock {WEEK}"
+        what = "the structure"
+    elif not hanger.has_sensors and in_a_row == 1:
+        action = f"Repeat it {WEEK}"
     state = f"{in_a_row} tests in a row agree neither with those before nor with each other"
+    counts = "Until tests agree again, its state rests on older ones."
     if in_a_row == 1:
         state = f"test {test.test} agrees with no test before it"
-    if hanger.has_sensors:  # the next day is another test by itself
-        return (
-            f"Hanger {hanger.id}: {state}. {look_again(hanger)} {WEEK}. Until tests agree again, "
-            "its state rests on older ones. A sensor may have moved or the order of a mode been "
-            "mistaken; or the hanger has changed."
-        )
-    if in_a_row == 1:
-        return (
-            f"Hanger {hanger.id}: {state}. Repeat it within "
-            "a week; it does not count until another test agrees with it. Another hanger may have "
-            "been hit, a sensor moved or the order of a mode mistaken; or the hanger has changed."
-        )
+        counts = "It does not count until another test agrees with it."
     return (
-        f"Hanger {hanger.id}: {state}. Repeat the hammer test within a week, with the same people "
-        "and sensors as at the baseline. Until then the state of this hanger rests on older tests."
-    )
-
-
-def _odd_frequencies(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
-    """Return the same of a structure that no model class describes."""
-    name = structure_words(hanger)
-    if in_a_row == 1:
-        return (
-            f"The frequencies of {name} in test {test.test} agree with no test before. Test again "
-            "within a week; this one does not count until another agrees with it. A mode may be "
-            "mistaken, a clock or a sensor wrong; or the structure has changed."
-        )
-    return (
-        f"The frequencies of {name} agreed {in_a_row} times in a row neither with those before nor "
-        "with each other. Look at sensors and clock within a week. Until then its state rests on "
-        "older tests."
+        f"{name}: {state}. {action}. {counts} The order of a mode may be mistaken, a sensor or a "
+        f"clock wrong, or another hanger measured; or {what} has changed."
     )
 
 

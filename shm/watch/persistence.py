@@ -1,20 +1,13 @@
-"""Tests that count, and changes that stay.
+"""Select tests that count, and bound the evidence of a change by whether it stays.
 
-A test counts where it agrees with what was before it or with a test next to it, before or after,
-and none of its modes strays: two tests agree by the modes that they share, and these may be without
-the one that is mistaken. So a blunder counts in nothing as long as it is alone, and what lasts
-counts from its second test on, however large it is. Nothing here asks which cause it is.
+A test counts where it agrees with what was before it or with a test next to it, and none of its
+modes strays. So a blunder counts in nothing as long as it is alone, and what lasts counts from its
+second test on.
 
-Does a change stay? Each test after it is asked whether tests before it did the same.
-
-The sums of `change_point` take tests to scatter normally. They do not: a van stands on the deck, a
-joint gives in the wind, for a day or two, and such days are many more than a normal law has. What
-seldom happens cannot be learnt from its variance, but counted: of the tests before a change, how
-many lay as far its way as those after it? If one in five did, three more prove little.
-
-So a change has no more evidence than the tests after it give as plain yes or no: each either shows
-the change or not, and shows it without one as often as the tests before did. Or it is those before
-that were odd, where they are few: a baseline of one test proves no change by itself.
+The sums of `change_point` take tests to scatter normally. They do not: vans and joints that give
+for a day are many more than a normal law has. So a change has no more evidence than the tests after
+it give as plain yes or no: each shows the change or not, and shows it without one as often as the
+tests before did. Or it is those before that were odd, where they are few.
 """
 
 from __future__ import annotations

@@ -1,18 +1,14 @@
-"""Watched quantities of a hanger, and coordinates that frequencies follow nearly linearly.
+"""Define what is watched of a hanger, in coordinates that frequencies follow nearly linearly.
 
-Base point of all is the baseline's most probable parameter set: the parameters of a posterior go
-together along curved valleys, in which a mean of each by itself need not lie. The tension that
-people see is the posterior's mean all the same, as on every sheet: only its ratio enters the model.
-
-What 0.3 decades do is taken at the base point or, where that is more, as the root mean square over
-the baseline's samples. An end that seems clamped may have its most probable stiffness anywhere in
-its upper range, where 0.3 decades do nothing; a change there would be ruled out before any data.
+Base point of all is the baseline's most probable parameter set; the tension that people see is the
+posterior's mean. What 0.3 decades do is taken at the base point or, where that is more, as the root
+mean square over the baseline's samples: an end that seems clamped may have any stiffness there.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -23,6 +19,7 @@ from shm.models import MODELS, AdoptedName, Model, class_of, is_adopted
 from shm.models.base import Conditions
 from shm.models.beam import Beam
 from shm.values import (
+    NAN,
     PLANES,
     TENSION,
     End,
@@ -138,6 +135,30 @@ def base_point(baseline: Posterior, model: Model) -> FloatArray:
             remedy="Set it anew: `shm drift rebaseline`.",
         )
     return np.array([known[name] for name in model.parameter_names])
+
+
+def posterior_at(model: str, hanger: Hanger, values: Mapping[str, float]) -> Posterior:
+    """Return one parameter set as a posterior; nothing is sampled."""
+    theta = np.array(list(values.values()))
+    return Posterior(
+        model=model,
+        hanger=hanger.id,
+        names=tuple(values),
+        samples=theta[None],
+        log_likelihood=np.zeros(1),
+        most_probable=theta,
+        nominal_tension_n=hanger.nominal_tension_n,
+        log_evidence=0.0,
+        log_evidence_sd=0.0,
+        effective_sample_size=NAN,
+        r_hat=NAN,
+        evaluations=0,
+        predicted=(),
+        tests=(),
+        seed=0,
+        seconds=0.0,
+        method="none",
+    )
 
 
 def value_at(quantity: WatchedQuantity, x: _X) -> _X:

@@ -1,29 +1,14 @@
 """Read the watched quantities from one test: Gauss-Newton of the model class, without a prior.
 
-The model's error, 0.1 to 1 % of a frequency, is the same in every test of a hanger, and so are the
-deviations of the bar as made. Each mode's own residual at the baseline is therefore taken off
-before anything is read, and what is left over are the errors of the identification.
+A reading is the likelihood linearised where it is largest (Bjoerck 1996, Numerical Methods for
+Least Squares Problems), of log frequencies less each mode's own residual at the baseline: the
+model's error and the deviations of the bar as made are the same in every test. A weak pull to the
+baseline chooses the place where the data do not; it has no part in mean and information. What
+softening steel does, 0.03 % of its modulus per kelvin, is taken off.
 
-A reading is the likelihood linearised where it is largest (Gauss and Newton; Bjoerck 1996,
-Numerical Methods for Least Squares Problems). A weak pull to the baseline chooses that place where
-the data do not; it has no part in the reading's mean and information.
-
-Steel softens as it warms, by 0.03 % of its modulus per kelvin: over the year a stiff hanger's
-frequencies swing by half a percent, as if its tension and its ends moved. What the modulus does is
-known and taken off, too, from the mean temperature of the baseline's tests on. Where a test has no
-temperature, the reading says what a kelvin has done to it.
-
-Springs that frequencies cannot tell apart move together: how unlike two springs are that are nearly
-alike shows in the square of the difference only, and no normal distribution could follow it. One
-of the two that moves alone is read as a move of both, and a part of it as tension: for a loss of
-30 % up to 0.5 % of it where the softer spring has 1e7 N m/rad and both planes are measured, more
-where it is softer still.
-
-Loosening: the baseline tells what the ends give together and hardly which of them gives how much: a
-fork plate or a turnbuckle stiffens what a pin softens, and an end that gives looks clamped. As it
-loosens, the modes go by how soft it is: all alike where it is stiff, the lower ones more where it
-is soft, nearly as they go with tension. Without this the rest would be read as tension: an end
-whose spring falls to a third as 3 to 6 % of it.
+Springs that frequencies cannot tell apart move together. One of the two that moves alone is read as
+a move of both, and a part of it as tension: for a loss of 30 % up to 0.5 % of it at 1e7 N m/rad. As
+an end loosens, the modes go by how soft it is, which the baseline hardly tells: `loosening_of`.
 """
 
 from __future__ import annotations

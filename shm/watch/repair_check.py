@@ -1,12 +1,7 @@
-"""Check that tests after works on a hanger show what was reported before to be put right.
+"""Check that tests after works show what was reported before to be put right.
 
-A person who says "repaired" may be wrong, or may give the day of a test from before the works. A
-new baseline would make the loss the normal state, and nobody would hear of it again.
-
-What a person did to a hanger, and which alerts that explains.
-
-A lamp explains frequencies that fell as by a mass from that day on; it does not explain lost
-tension. Works that put a hanger right explain alerts from before them, too.
+And which alerts an event explains: a lamp explains frequencies that fell as by a mass from that day
+on; works that put a hanger right explain alerts from before them, too.
 """
 
 from __future__ import annotations

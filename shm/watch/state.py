@@ -1,4 +1,4 @@
-"""Tension and end stiffness over time: local levels with the temperature as regressor.
+"""Estimate tension and end stiffness over time: local levels with the temperature as regressor.
 
 level_t = level_{t-1} + N(0, rate^2 dt), reading_t = level_t + coefficient (temperature_t -
 reference) + scatter + the reading's own error, of all quantities jointly (Harvey 1989, chapters 2
@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from datetime import datetime
 from typing import Any
 
@@ -55,15 +55,12 @@ class Band:
 class StateOptions:
     """Weak priors of the state over time; one to three tests leave them as they are.
 
-    `reference_temperature_c` is that of the baseline; NaN: the mean of the known ones. In units of
-    a quantity's `step_sd`: the level wanders by `rate_of_step` in a year, readings scatter by
-    `scatter_of_step` beyond their errors, the level lies within `jump_of_step` before the first
-    test and after a called change. The first two are medians of log-normal priors with the sds
-    `rate_log_sd`, `scatter_log_sd` of the natural logarithm. Temperature coefficients have mean 0
-    and the sds given, of the tension a fraction per kelvin, of a spring a share of its `step_sd`
-    per kelvin. A temperature that is not known lies `unknown_temperature_sd_k` off the reference
-    where fewer than five are known, else by the sd of those. The variance of an outlier's noise
-    grows by `largest_inflation` at most.
+    `reference_temperature_c` NaN is the mean of the known ones. In units of a quantity's `step_sd`:
+    the level wanders by `rate_of_step` in a year, readings scatter by `scatter_of_step` beyond
+    their errors (medians of log-normal priors), the level lies within `jump_of_step` before the
+    first test and after a called change. A temperature that is not known lies
+    `unknown_temperature_sd_k` off the reference where fewer than five are known, else by the sd of
+    those. The variance of an outlier's noise grows by `largest_inflation` at most.
     """
 
     reference_temperature_c: float = NAN
@@ -89,12 +86,9 @@ class StateHistory:
     """Levels of all watched quantities over the tests of a hanger, in the watch's coordinates.
 
     `filtered_mean` (n, q) and `filtered_covariance` (n, q, q) rest on the tests up to each, the
-    smoothed ones on all. Every level holds at `reference_temperature_c`: the swing with the
-    temperature is taken out. `coefficient_mean` and `coefficient_sd` (q,) are of the coordinates
-    per kelvin, `coefficient_prior_sd` is the sd before any test; `level_rate` (q,) is the sd by
-    which a level wanders in a year, `scatter` (q,) the sd from test to test beyond the readings'
-    own errors. Both are the most probable ones given the complete history, for the filtered levels
-    too.
+    smoothed ones on all, at `reference_temperature_c`. `coefficient_mean` and `coefficient_sd` (q,)
+    are of the coordinates per kelvin, `coefficient_prior_sd` is the sd before any test;
+    `level_rate` (q,) is the sd by which a level wanders in a year.
     """
 
     quantities: tuple[WatchedQuantity, ...]
@@ -108,11 +102,6 @@ class StateHistory:
     coefficient_sd: FloatArray
     coefficient_prior_sd: FloatArray
     level_rate: FloatArray
-    scatter: FloatArray
-
-    @property
-    def tests(self) -> tuple[str, ...]:
-        return tuple(reading.test for reading in self.readings)
 
     @property
     def times(self) -> tuple[datetime, ...]:
@@ -194,22 +183,17 @@ def states(
 
     `weights` (n,) are probabilities of being an outlier (None: no outliers; NaN: not known, taken
     as 0). At each of `changes` the level is set free just before the first reading at that time or
-    after it (see `set_free`). Raises NothingThere without readings, UsageError where they are
-    not in order or weights do not fit.
+    after it (see `set_free`). Raises NothingThere without readings.
     """
     chosen = options or StateOptions()
+    if not readings:
+        raise NothingThere("No test has a reading.", remedy="Ingest tests of this hanger first.")
     outlier = np.zeros(len(readings)) if weights is None else np.nan_to_num(weights, nan=0.0)
-    _check(readings, outlier)
     model = LocalLevels.of(readings, quantities, outlier, changes, chosen)
     z = model.fitted()
-    if model.unknown_k.any():  # what the other tests say of the coefficients tells how it matters
-        _, _, found, covariance = model.states(z)
-        square = found[-1] ** 2 + np.diag(covariance[-1])
-        model = replace(model, unknown_square=square[model.q :])
-        z = model.fitted()
     before, before_cov, after, after_cov = model.states(z)
     step, q = model.step, model.q
-    rate, scatter = model.rate_and_scatter(z)
+    rate, _ = model.rate_and_scatter(z)
     return StateHistory(
         quantities=tuple(quantities),
         readings=tuple(readings),
@@ -222,7 +206,6 @@ def states(
         coefficient_sd=step * np.sqrt(np.maximum(np.diag(after_cov[-1])[q:], 0)),
         coefficient_prior_sd=step * model.coefficient_sd,
         level_rate=step * rate,
-        scatter=step * scatter,
     )
 
 
@@ -241,20 +224,6 @@ def set_free(calls: Sequence[Change], readings: Sequence[Reading]) -> tuple[date
     return tuple(sorted(set(free)))
 
 
-def _check(readings: Sequence[Reading], outlier: FloatArray) -> None:
-    if not readings:
-        raise NothingThere("No test has a reading.", remedy="Ingest tests of this hanger first.")
-    # Technical: rounding of probabilities.
-    if outlier.shape != (len(readings),) or not np.all(np.abs(outlier - 0.5) <= 0.5 + 1e-9):
-        raise UsageError(
-            f"The outlier weights of {len(readings)} readings are not as many probabilities.",
-            remedy="Give one in 0 to 1 for each reading.",
-        )
-    times = [reading.time for reading in readings]
-    if times != sorted(times):
-        raise UsageError("The readings are not in the order of time.", remedy="Sort them first.")
-
-
 def _temperatures_c(readings: Sequence[Reading]) -> FloatArray:
     return np.array([reading.temperature_c for reading in readings], np.float64)
 
@@ -264,18 +233,17 @@ class LocalLevels:
     """The model of n tests of q quantities, in units of each one's `step` (q,).
 
     `mean` (n, q) and `information` (n, q, q) are the readings', `warmth_k` (n,) the temperature
-    above the reference, 0 where unknown, and `unknown_k` (n,) the sd of that; `unknown_square` (q,)
-    what a kelvin then does, squared. `inflation` (n,) is of the whole noise, for outliers, `years`
-    (n,) those to the test before, `jump` (n,) the variance of the level just before each test.
-    Parameters z (2 q,) are standard normal before any data: how many prior sds the logarithms of
-    the q rates, then of the q scatters, lie above their prior medians.
+    above the reference, 0 where unknown, and `unknown_k` (n,) the sd of that. `inflation` (n,) is
+    of the whole noise, for outliers, `years` (n,) those to the test before, `jump` (n,) the
+    variance of the level just before each test. Parameters z (2 q,) are standard normal before any
+    data: how many prior sds the logarithms of the q rates, then of the q scatters, lie above their
+    prior medians.
     """
 
     mean: FloatArray
     information: FloatArray
     warmth_k: FloatArray
     unknown_k: FloatArray
-    unknown_square: FloatArray
     inflation: FloatArray
     years: FloatArray
     jump: FloatArray
@@ -321,7 +289,6 @@ class LocalLevels:
             (information + np.swapaxes(information, 1, 2)) / 2,
             np.nan_to_num(temperature_c - reference_c),
             np.where(np.isfinite(temperature_c), 0.0, spread_k),
-            coefficient_sd**2,
             1 / np.clip(1 - outlier, 1 / options.largest_inflation, 1.0),
             np.diff(seconds, prepend=seconds[0]) / _SECONDS_A_YEAR,
             jump,
@@ -392,7 +359,7 @@ class LocalLevels:
             wandered = np.append(rate**2 * self.years[t] + self.jump[t], 0 * rate, axis=1)
             covariance = covariance + wandered[:, :, None] * np.eye(2 * self.q)
             sees = np.hstack([eye, self.warmth_k[t] * eye])
-            noise = scatter**2 + self.unknown_k[t] ** 2 * self.unknown_square
+            noise = scatter**2 + (self.unknown_k[t] * self.coefficient_sd) ** 2
             spread = sees @ covariance @ sees.T + self.inflation[t] * noise[:, :, None] * eye
             core = eye + information @ spread
             weight = np.linalg.solve(core, np.broadcast_to(information, core.shape))

@@ -1,10 +1,8 @@
-"""The state of the watch of one hanger, and the sums of its tests for the evidence.
+"""Keep the state of the watch of one hanger, and sum its tests for the evidence.
 
-By how much tests of one state differ, and along what: a joint that gives in the wind, wires that
-slip, sensors put elsewhere. What differs from test to test goes along a few known columns, each by
-an amount that is the hanger's own. It is learnt from the differences of tests that follow each
-other, which a lasting change touches once, by expectation and maximisation (Dempster, Laird and
-Rubin 1977), about a prior worth a few tests.
+What differs from test to test goes along a few known columns, each by an amount that is the
+hanger's own. It is learnt from the differences of tests that follow each other, by expectation and
+maximisation (Dempster, Laird and Rubin 1977), about a prior worth a few tests.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from shm.values import FloatArray, Hanger, ModalTest, Mode, Moved, Plane, Posterior
+from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode, Moved, Plane, Posterior
 from shm.watch.causes import SENSOR_MASS, TIMEBASE, UNEXPLAINED, structure_of
 from shm.watch.change_point import evidence_of, sums_of
 from shm.watch.options import WatchOptions
@@ -22,6 +22,8 @@ from shm.watch.state_sums import effects_of
 from shm.watch.stream_reading import ModeTable, baseline_of
 
 _DAY_SD = 3e-4  # of ln f: joints that slip by another level, each mode by its own. Judgement
+EXCHANGED = "exchanged planes"
+"""A cause that no hammer test has: the cables of the sensors are exchanged."""
 _NEVER = datetime(2000, 1, 1, tzinfo=UTC)  # technical: these readings need no time
 
 
@@ -43,7 +45,7 @@ class StreamCause:
     @property
     def is_measurement(self) -> bool:
         """Return True if it is none of the hanger, so that nobody need go there today."""
-        return self.name in (TIMEBASE, SENSOR_MASS)
+        return self.name in (TIMEBASE, SENSOR_MASS, EXCHANGED)
 
     @property
     def takes_hours(self) -> bool:
@@ -55,6 +57,8 @@ def find_cause(
     moved: FloatArray, table: ModeTable, baseline: Posterior | None, hanger: Hanger
 ) -> StreamCause:
     """Find the cause of mean log frequencies that `moved` (n,), NaN where that is not known."""
+    if _are_exchanged(moved, table):
+        return StreamCause((Moved(EXCHANGED, 1.0, np.nan, np.nan),), moved, None)
     known = np.isfinite(moved)
     nothing = StreamCause((Moved(UNEXPLAINED, 1.0, np.nan, np.nan),), moved, None)
     if not known.any():
@@ -87,6 +91,20 @@ def find_cause(
     planes = {each.plane for each in found if each.quantity in first}
     by_mode = np.full(len(moved), np.median(moved[known])) if _is_clock(found) else moved
     return StreamCause(found, by_mode, planes.pop() if len(planes) == 1 else None)
+
+
+def _are_exchanged(moved: FloatArray, table: ModeTable, least: int = 3, sds: float = 3.0) -> bool:
+    """Return True if each mode lies where that of the other plane did, at any tension."""
+    place = {mode: index for index, mode in enumerate(table.modes)}
+    other = [place.get((PLANES[plane == PLANES[0]], order), -1) for plane, order in table.modes]
+    both = np.isfinite(moved) & (np.array(other) >= 0)
+    if both.sum() < least:
+        return False
+    left = (moved - (table.level[other] - table.level))[both]
+    tension, sd = table.tension[both], np.sqrt(table.spread[both] + _DAY_SD**2)
+    left = left - tension * np.median(left / tension)
+    before = moved[both] - tension * np.median(moved[both] / tension)
+    return bool(np.median(np.abs(left) / sd) < sds < np.median(np.abs(before) / sd))
 
 
 def _is_clock(moved: Sequence[Moved]) -> bool:

@@ -1,10 +1,8 @@
-"""A pooled reading of a permanent sensor: how far the tension has moved, by each plane's modes.
+"""Read a pooled hour of a permanent sensor: how far the tension has moved, by each plane's modes.
 
 The change of each mode's log frequency over its sensitivity d ln f / d ln T is a change of tension;
-the modes of a plane together give it by robust weighted least squares, so that one that went astray
-(close planes exchanged, a peak of the deck) moves nothing. What a mode differs by from the others
-of its plane is learnt, for days: a reading that lacks a mode must not look like a step. What a
-complete plane differs by from the other is no mistake: it is the reading's contrast.
+the modes of a plane give it by robust weighted least squares. What a mode differs by from the
+others of its plane is learnt; what a complete plane differs by is the reading's contrast.
 
 Frequencies of a bar on springs are homogeneous of degree 1/2 in tension, bending stiffness and
 springs. So what a kelvin does by softening steel is -3e-4 (1/2 - d ln f / d ln T).
@@ -22,9 +20,9 @@ import numpy as np
 from shm.assumptions import DEFAULTS, Assumptions
 from shm.models import class_of
 from shm.models.tensioned_beam import frequencies_hz
-from shm.values import NAN, PLANES, BoolArray, FloatArray, Hanger, Mode, Posterior
+from shm.values import PLANES, BoolArray, FloatArray, Hanger, Mode, Posterior
 from shm.values.stream import PooledReading
-from shm.watch.quantities import MeasuredMode, base_point, log_frequencies
+from shm.watch.quantities import MeasuredMode, base_point, log_frequencies, posterior_at
 
 LEAST_SD = 3e-5
 """Of an hourly log frequency: 1 Hz is read to 1/30 mHz at best, and clocks wander by as much."""
@@ -74,30 +72,8 @@ def baseline_of(
     theta = np.array([tension_n[at, 0, of] / nominal_n, 1.0, *ends])
     factor = hanger.bending_stiffness_factor * float(shares[of])
     bar = replace(hanger, bending_stiffness_factor=factor, nominal_tension_n=nominal_n)
-    return _as_posterior(theta, bar), bar
-
-
-def _as_posterior(theta: FloatArray, hanger: Hanger) -> Posterior:
-    """Return one parameter set of class beam2 as a posterior."""
-    return Posterior(
-        model="beam2",
-        hanger=hanger.id,
-        names=("theta_F", "theta_L", "log10_k1", "log10_k2", "log10_k3", "log10_k4"),
-        samples=theta[None],
-        log_likelihood=np.zeros(1),
-        most_probable=theta,
-        nominal_tension_n=hanger.nominal_tension_n,
-        log_evidence=0.0,
-        log_evidence_sd=0.0,
-        effective_sample_size=NAN,
-        r_hat=NAN,
-        evaluations=0,
-        predicted=(),
-        tests=(),
-        seed=0,
-        seconds=0.0,
-        method="none",
-    )
+    names = ("theta_F", "theta_L", "log10_k1", "log10_k2", "log10_k3", "log10_k4")
+    return posterior_at("beam2", bar, dict(zip(names, theta.tolist(), strict=True))), bar
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,43 +123,6 @@ class ModeTable:
         moved = more.tension * [by_plane[mode.plane] for mode in new]
         level = np.append(self.level, more.level - moved)
         return replace(self, modes=(*self.modes, *more.modes), level=level, **parts)
-
-    def are_exchanged(
-        self,
-        modes: Sequence[Mode],
-        least: int = 3,
-        surely: float = 5.0,
-        elsewhere_sd: float = 0.01,
-    ) -> bool | None:
-        """Return whether each mode lies where that of the other plane does, at any tension.
-
-        None where the modes do not tell: fewer than `least`, log odds below `surely`, or where
-        modes anywhere within `elsewhere_sd` of ln f are more likely than either.
-        """
-        place = {mode: index for index, mode in enumerate(self.modes)}
-        its = [(mode.plane, mode.order) for mode in modes]
-        other = [(_other(mode).plane, mode.order) for mode in modes]
-        both = [n for n in range(len(modes)) if {its[n], other[n]} <= place.keys()]
-        if len(both) < least:
-            return None
-        here, there = ([place[keys[n]] for n in both] for keys in (its, other))
-        spread = np.maximum(np.maximum(self.spread[here], self.spread[there]), LEAST_SD**2)
-        if np.sum((self.level[here] - self.level[there]) ** 2 / spread) < 8 * surely:
-            return None  # chance alone would tell them exchanged in some hour
-        log_hz = _measured([modes[n] for n in both])[0]
-        straight, crossed = (self._weigh(log_hz, at) for at in (here, there))
-        neither = -len(both) * math.log(elsewhere_sd)
-        if max(straight, crossed) < neither or abs(crossed - straight) < surely:
-            return None
-        return crossed > straight
-
-    def _weigh(self, log_hz: FloatArray, at: Sequence[int]) -> float:
-        """Return the log likelihood of modes in these places of the table, at the best tension."""
-        slope, variance = self.tension[at], np.maximum(self.spread[at], LEAST_SD**2)
-        off = log_hz - self.level[at]
-        left = off - slope * _read_plane(off, variance, slope)[0]
-        tails = (_DEGREES + 1) * np.log1p(left**2 / (_DEGREES * variance))
-        return -float(np.sum(tails + np.log(variance))) / 2
 
     def softer(self, assumed: Assumptions) -> FloatArray:
         """Return by what ln f goes with a kelvin, as steel softens."""
@@ -253,15 +192,6 @@ def usable(reading: PooledReading) -> tuple[Mode, ...]:
         if is_measured and not mode.irregular and not np.isinf(mode.frequency_sd_hz):
             found.setdefault((mode.plane, mode.order), mode)
     return tuple(found.values())
-
-
-def exchanged(modes: Sequence[Mode]) -> tuple[Mode, ...]:
-    """Each as one of the other plane."""
-    return tuple(map(_other, modes))
-
-
-def _other(mode: Mode) -> Mode:
-    return replace(mode, plane=PLANES[PLANES[0] == mode.plane])
 
 
 def _measured(

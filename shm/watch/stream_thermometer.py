@@ -1,23 +1,18 @@
 """Judge a stream's thermometer by its values and how they move.
 
-A sensor at fault says what no bridge can be. One that came loose or was exchanged jumps, and would
-have the watch explain a jump of the tension that never was. It is believed again once it jumps
-back, or with a new baseline. One that stands still is believed again once it moves. While the watch
-learns, only what is impossible is not believed. A slow drift of a lone thermometer cannot be told;
-those of one bridge are compared with each other.
+One that jumps is believed again once it jumps back, or with a new baseline; one that stands still,
+once it moves. While the watch learns, only what is impossible is not believed.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
-import numpy as np
-
 from shm.values import COLDEST_C, NAN, WARMEST_C, outdoor_c
-from shm.values.stream import PERIODS, PooledReading, StreamEvent, Window, WindowReading
+from shm.values.stream import StreamEvent, Window, WindowReading
 
 FASTEST_K_PER_H = 57.0
 """Derived: of a rod of 20 mm, the thinnest hanger, that loses nothing of the 900 W/m2 of a high sun
@@ -26,10 +21,6 @@ _WINDOW = timedelta(minutes=10)  # the least time over which two values are comp
 _STILL_K, _STILL_S, _STILL_WINDOWS = 1e-3, 86400.0, 24
 """Judgement: no thermometer resolves less, and no sun's round leaves the air as it was from hour to
 hour; two days alike at noon are no wonder."""
-APART_K = 5.0
-"""Judgement: of the median over a day, in which the sun warms one side more for a few hours only;
-thermometers themselves are 0.5 to 1 K off."""
-_HOURS_COMPARED = 12  # judgement: half of a day
 
 
 @dataclass(frozen=True)
@@ -121,41 +112,6 @@ def _impossible(value_c: float) -> str:
         f"temperature_c is {value_c:g}, and nothing outdoors is below {COLDEST_C:g} or above "
         f"{WARMEST_C:g} °C: the temperature is not known. Check the thermometer, its cable and its "
         "unit, or send none."
-    )
-
-
-def disagreeing(hours: Mapping[str, Sequence[PooledReading]]) -> tuple[StreamEvent, ...]:
-    """Thermometers that differ from the others of their bridge, by each stream's `hours` of a day.
-
-    Of two none can be told to be right: both are named.
-    """
-    words = {
-        name: {each.start: each.temperature_c for each in its if math.isfinite(each.temperature_c)}
-        for name, its in hours.items()
-    }
-    starts = sorted({start for its in words.values() for start in its})
-    table = np.array([[its.get(start, NAN) for start in starts] for its in words.values()])
-    found = []
-    for row, name in enumerate(words):
-        others = table if len(table) > 2 else np.delete(table, row, axis=0)
-        shared = np.isfinite(table[row]) & (np.isfinite(table).sum(axis=0) > 1)
-        if shared.sum() < _HOURS_COMPARED:
-            continue
-        usual = np.nanmedian(others[:, shared], axis=0)
-        off_k = float(np.median(table[row, shared] - usual))
-        if abs(off_k) > APART_K:
-            last = starts[int(np.flatnonzero(shared)[-1])]
-            end = last + PERIODS["hour"]
-            detail = _apart(off_k, of_many=len(table) > 2)
-            found.append(StreamEvent(name, "thermometer", last, end, detail))
-    return tuple(found)
-
-
-def _apart(off_k: float, *, of_many: bool) -> str:
-    which = "the median of the bridge's thermometers" if of_many else "that of another stream"
-    return (
-        f"temperature_c is {off_k:+.1f} K off {which} over a day: what temperature does to the "
-        "tension is taken off wrongly. Compare them on site."
     )
 
 

@@ -1,14 +1,9 @@
-"""The watch of a permanent sensor: pooled readings of each hour, one after the other, for good.
+"""Watch a permanent sensor: pooled readings of each hour, one after the other.
 
 Each reading becomes a shift of the tension and a contrast of the planes (`stream_reading`), which
-the filters explain by what the conditions do and by wander, or by a change (`stream_filter`). A
-change of one plane alone is of its ends: its modes' levels take it up, the tension goes on by the
-other plane. The cause of a detected change is found among those of hammer tests (`stream_causes`).
-What is the measurement's is an event of the stream and rings nobody. All that the next reading
-needs is kept as bytes of a bounded size.
-
-The first days are the baseline: nothing is told in them. Later, what is not learnt yet, such as
-the winter's temperatures in the first summer, is unknown to the filters, and makes them careful.
+the filters explain by what the conditions do and by wander, or by a change (`stream_filter`). The
+cause of a detected change is found among those of hammer tests (`stream_causes`). What is the
+measurement's is an event of the stream and rings nobody. The first days are the baseline.
 """
 
 from __future__ import annotations
@@ -34,18 +29,23 @@ from shm.values import (
     Drift,
     FloatArray,
     Hanger,
-    Mode,
     Moved,
     Posterior,
     WatchedTest,
 )
 from shm.values.rounding import NINETY_PERCENT
-from shm.values.stream import PERIODS, PooledReading, StreamEvent, WindowReading
+from shm.values.stream import (
+    PERIODS,
+    PooledReading,
+    StreamEvent,
+    StreamEventKind,
+    WindowReading,
+)
 from shm.watch.causes import TIMEBASE
 from shm.watch.kept_state import from_bytes, to_bytes
-from shm.watch.stream_causes import StreamCause, find_cause
+from shm.watch.stream_causes import EXCHANGED, StreamCause, find_cause
 from shm.watch.stream_filter import CLIP, FAST, FEATURES, LEVEL, NOTHING, SLOW, Bank, Evidence
-from shm.watch.stream_reading import ModeTable, SeenReading, exchanged, planes_of, usable
+from shm.watch.stream_reading import ModeTable, SeenReading, planes_of, usable
 from shm.watch.stream_thermometer import Believed, Thermometer, believed
 from shm.watch.watching import AlertState, after
 
@@ -55,8 +55,6 @@ _LAGS_DAYS = np.array([2.0, 14.0, 240.0]) / HOURS_A_DAY
 # Judgement: by what an hour's temperature differs from ten days' mean, and that the errors of some
 # ten hours without a thermometer are one error: an hour counts for a third of what it would.
 _UNKNOWN_K, TOGETHER = 4.0, 3.0
-HOURS_EXCHANGED, _SURELY_EXCHANGED = 3, 8
-"""Judgement: until it is told, as mistaken modes look like it for an hour; and until it is over."""
 NO_CONDITIONS = np.zeros(0)
 """Of the contrast of the planes: what the weather does to one more than the other is its wander."""
 _RING = 24  # readings: a change is told within a day or is slow
@@ -99,9 +97,8 @@ class StreamState:
     of those before. Shifts count from `zero`, compensated ones from `compensated_zero`; a change
     that was told of the tension is `called`, of one plane `apart`. `contrast` are the filters of
     what one plane says more than the other, less what was `absorbed` into the modes' levels.
-    So many hours the planes were exchanged. `unknown_sd` of ln T is what an unknown temperature may
-    do, 0 where it is known. Up to `settled_day` readings are gone over again: no
-    alert ends before.
+    `unknown_sd` of ln T is what an unknown temperature may do, 0 where it is known. Up to
+    `settled_day` readings are gone over again: no alert ends before.
     """
 
     key: str
@@ -124,7 +121,6 @@ class StreamState:
     absorbed: float = 0.0
     told: AlertState = field(default_factory=AlertState)
     standing: tuple[str, ...] = ()
-    exchanged_hours: int = 0
     settled_day: float = 0.0
     unknown_sd: float = 0.0
     thermometer: Thermometer = field(default_factory=Thermometer)
@@ -159,17 +155,6 @@ def gone_back(earlier: bytes, newest: bytes) -> bytes:
     return to_bytes(replace(state, settled_day=settled, standing=standing))
 
 
-def as_mounted(state: StreamState, modes: tuple[Mode, ...]) -> tuple[StreamState, tuple[Mode, ...]]:
-    """The modes in the planes that were always theirs, where those of the sensors are exchanged."""
-    found = None if state.is_learning else state.table.are_exchanged(modes)
-    hours = state.exchanged_hours
-    if found or (found is None and hours >= HOURS_EXCHANGED):
-        hours = hours + 1 if hours < HOURS_EXCHANGED else _SURELY_EXCHANGED
-    elif found is not None:
-        hours = hours - 1 if hours > HOURS_EXCHANGED + 1 else 0
-    return replace(state, exchanged_hours=hours), exchanged(modes) if hours else modes
-
-
 def with_believed(
     kept: bytes | None, readings: Sequence[WindowReading]
 ) -> tuple[bytes | None, Believed]:
@@ -185,21 +170,6 @@ def with_believed(
         return None, believed(Thermometer(), readings, learning=True)
     found = believed(state.thermometer, readings, learning=state.is_learning)
     return to_bytes(replace(state, thermometer=found.thermometer)), found
-
-
-def windows_as_mounted(
-    kept: bytes | None, readings: Sequence[WindowReading]
-) -> Sequence[WindowReading]:
-    """The windows with each mode in the plane that was always its own, by what the watch knows."""
-    state = None if kept is None else from_bytes(StreamState, kept)
-    if state is None or state.is_learning:
-        return readings
-    return [
-        replace(each, modes=exchanged(each.modes))
-        if state.table.are_exchanged(each.modes)
-        else each
-        for each in readings
-    ]
 
 
 def warmth(state: StreamState) -> float:
@@ -264,15 +234,15 @@ def with_ring(
     return replace(state, ring=ring, ring_day=days, old=old)
 
 
-_VERSION = "stream-watch-1"
+_VERSION = "stream-watch-2"
 _MODEL_OFF = 0.2  # judgement: by what the part of bending in a sensitivity is known
-_EXCHANGED = (
-    "The modes of each plane lie where those of the other did: the planes are exchanged, "
-    "not the tension. Check the cables of the sensors."
-)
 _CLOCK = (
     "All frequencies moved by one same fraction, {size}: the time base, not the tension. Check the "
     "logger's clock and sampling rate."
+)
+_EXCHANGED = (
+    "The modes of each plane lie where those of the other did: the planes are exchanged, "
+    "not the tension. Check the cables of the sensors."
 )
 _SENSORS = (
     "Each mode moved by its own fraction: the sensors, not the tension. Check which sensors are "
@@ -381,7 +351,6 @@ class StreamWatch:
         state, conditions, extra = with_conditions(state, reading, day)
         bank = state.bank.advanced(day, condition_sd(self.hanger.assumptions))
         expected = bank.along(bank.design(conditions))[0]
-        state, modes = as_mounted(state, modes)
         contrast = state.contrast.advanced(day, NO_CONDITIONS)
         between = contrast.along(compensated(contrast))
         table = state.table.with_new(self.baseline, self.hanger, modes, expected, between[0])
@@ -425,9 +394,6 @@ class StreamWatch:
     ) -> tuple[StreamWatched, StreamState]:
         evidence, apart, is_apart = self._weigh(state)
         events: tuple[StreamEvent, ...] = ()
-        if state.exchanged_hours == HOURS_EXCHANGED:
-            began = end - timedelta(hours=HOURS_EXCHANGED)
-            events = (StreamEvent(reading.stream, "swapped", began, end, _EXCHANGED),)
         moved: tuple[Moved, ...] = ()
         if evidence.years > self._limit_years and evidence.material > 0.5:
             by_mode, since = _move_of_modes(state, evidence)
@@ -671,12 +637,16 @@ def _event(
     reading: PooledReading,
     end: datetime,
 ) -> StreamEvent:
-    is_clock = cause.name == TIMEBASE
     size = f"{100 * cause.by_mode[0]:+.2f} %"
+    kinds: dict[str, tuple[StreamEventKind, str]] = {
+        TIMEBASE: ("clock drift", _CLOCK.format(size=size)),
+        EXCHANGED: ("swapped", _EXCHANGED),
+    }
+    kind, detail = kinds.get(cause.name, ("drifting", _SENSORS))
     return StreamEvent(
         stream=reading.stream,
-        kind="clock drift" if is_clock else "drifting",
+        kind=kind,
         start=_at(state, evidence.after_day),
         end=end,
-        detail=_CLOCK.format(size=size) if is_clock else _SENSORS,
+        detail=detail,
     )

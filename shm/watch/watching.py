@@ -1,18 +1,10 @@
-"""The watch of one hanger as a whole: tests read, put through the sequential test, decided on.
+"""Watch one hanger as a whole: tests read, put through the sequential test, decided on.
 
-When an owner is told: from what the watch says after each test to at most one alert a test.
-
-Four rules. A change is called by the sequential test, whose rate of false calls is known: `sudden
-change` or `slow drift`. A quantity is `beyond threshold` once the probability of that reaches the
-level which the owner asked for. Two tests that agree are told whatever their clocks say, where
-neither of the former rules has (`agreement`). A test that agrees with none before it is a notice:
-repeat it; three of them in a row are an alert. A condition that stands is told once. It ends when
-its probability falls below half that level, and only then can it be told again, so that a
-probability which hovers about the level does not ring every week. A change that was called and then
-passes the threshold is told again, since the owner must now do something else. A mode that three
-tests in a row have wrong is a notice, once: its number may be.
-
-All is derived from the sequence of tests, so that the same tests give the same alerts.
+Each test calls for at most one alert: a change is called (`sudden change`, `slow drift`), a
+quantity is `beyond threshold`, two tests agree (`agreement`), a test agrees with none before it, or
+a mode is wrong three times in a row. A condition is reported once. It ends when its probability
+falls below half the level that the owner asked for, and only then can it be reported again. All is
+derived from the sequence of tests, so that the same tests give the same alerts.
 """
 
 from __future__ import annotations
@@ -30,6 +22,7 @@ from shm.values import (
     Drift,
     Hanger,
     ModalTest,
+    Moved,
     Plane,
     Posterior,
     Reading,
@@ -52,78 +45,75 @@ from shm.watch.readings import Reader
 from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watch, Watcher, watched
 
+Condition = tuple[str, Way]
+"""A quantity, and the way that it went."""
+DatedTest = tuple[ModalTest, datetime]
+"""A test, and its time or that of its receipt."""
+_BEYOND: AlertKind = "beyond threshold"
+_REPEAT: AlertKind = "repeat the test"
+_ODD = 0.9  # nine to one: a notice that is wrong costs a test
+_ODD_IN_A_ROW = 3  # tests that fit nothing: no longer bad luck
+
+
+def condition_of(each: Drift | Moved) -> Condition:
+    """Return the quantity and the way that it went."""
+    return each.quantity, way_of(each.shift_mean)
+
 
 @dataclass(frozen=True)
 class AlertState:
     """The conditions in force: when each quantity was reported beyond its threshold, and a call.
 
-    `called` are the changes that were called, told or not: after a call the sequential test speaks
-    of a further change, no longer of that one. `mistaken` are the modes that the last tests have
-    wrong, `noted` those of them that were told, `alone` whether it was told that the baseline
-    stands alone. `agreed` are those of `beyond` that two tests told which agree: to the watch they
-    were improbable all along. `fading` says since when those of `beyond` look over that must do so
-    on another day, too.
+    `called` are the changes that were called, reported or not: after a call the sequential test
+    speaks of a further change. `mistaken` are the modes that the last tests have wrong, `noted`
+    those of them that were reported, `alone` whether it was reported that the baseline stands
+    alone. `agreed` are those of `beyond` that two tests reported which agree: to the watch they
+    were improbable all along. `fading` states since when those of `beyond` look over that must do
+    so on another day, too.
     """
 
-    beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
+    beyond: Mapping[Condition, datetime] = field(default_factory=dict)
     call: datetime | None = None
     called: tuple[Change, ...] = ()
     odd: int = 0
     mistaken: tuple[RepeatedMistake, ...] = ()
     noted: frozenset[tuple[Plane, int]] = frozenset()
     alone: bool = False
-    agreed: frozenset[tuple[str, Way]] = frozenset()
-    fading: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
+    agreed: frozenset[Condition] = frozenset()
+    fading: Mapping[Condition, datetime] = field(default_factory=dict)
 
+    def still(self, test: WatchedTest, end: float) -> AlertState:
+        """Return what is in force at a test: all but what tests of two visits have below `end`.
 
-def still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
-    """Return what still stands at a test: all but what tests of two visits have below `end`.
-
-    A van that stands on the deck for a day ends nothing; neither do unknown shifts. What two tests
-    that agree have told was improbable to the watch all along: it ends once the shift has come
-    back, too.
-    """
-    over = {
-        (drift.quantity, way)
-        for drift in test.drifts
-        for way in ("up", "down")
-        if _probability(drift, way) < end
-        and not (
-            (drift.quantity, way) in told.agreed
-            and drift.may_be_beyond(-1.0 if way == "down" else 1.0)
+        A van that stands on the deck for a day ends nothing; neither do unknown shifts. What two
+        tests that agree have reported ends once the shift has come back, too.
+        """
+        fading = {
+            condition: self.fading.get(condition, test.time)
+            for drift in test.drifts
+            for condition in ((drift.quantity, "up"), (drift.quantity, "down"))
+            if condition in self.beyond and self._looks_over(condition, drift, end)
+        }
+        ended = {each for each, since in fading.items() if test.time - since > OF_ONE_VISIT}
+        in_force = replace(
+            self,
+            beyond={each: at for each, at in self.beyond.items() if each not in ended},
+            fading={each: since for each, since in fading.items() if each not in ended},
+            agreed=self.agreed - ended,
         )
-    }
-    fading = {each: told.fading.get(each, test.time) for each in told.beyond if each in over}
-    ended = {each for each, since in fading.items() if test.time - since > OF_ONE_VISIT}
-    beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
-    fading = {each: since for each, since in fading.items() if each in beyond}
-    agreed = told.agreed - ended
-    if test.change.probability < end:
-        return AlertState(beyond, odd=told.odd, alone=told.alone, agreed=agreed, fading=fading)
-    return replace(told, beyond=beyond, agreed=agreed, fading=fading)
+        if test.change.probability < end:
+            in_force = replace(in_force, call=None, called=(), mistaken=(), noted=frozenset())
+        return in_force
 
+    def _looks_over(self, condition: Condition, drift: Drift, end: float) -> bool:
+        probability = drift.probability * (condition == condition_of(drift))
+        side = -1.0 if condition[1] == "down" else 1.0
+        is_back = condition not in self.agreed or not drift.may_be_beyond(side)
+        return probability < end and is_back
 
-def _probability(drift: Drift, way: Way) -> float:
-    """That the shift is beyond its threshold in one way; nearly none is where it went the other."""
-    return drift.probability * (way_of(drift.shift_mean) == way)
-
-
-def with_beyond(told: AlertState, beyond: Sequence[Drift], at: datetime) -> AlertState:
-    """Return the state with shifts that were told at a test to be beyond their threshold."""
-    return replace(told, beyond={**told.beyond, **dict.fromkeys(conditions(beyond), at)})
-
-
-def conditions(drifts: Sequence[Drift]) -> frozenset[tuple[str, Way]]:
-    """Each quantity and the way that it went."""
-    return frozenset((each.quantity, way_of(each.shift_mean)) for each in drifts)
-
-
-DatedTest = tuple[ModalTest, datetime]
-"""A test, and its own time or that of its receipt."""
-_BEYOND: AlertKind = "beyond threshold"
-_REPEAT: AlertKind = "repeat the test"
-_ODD = 0.9  # nine to one: a notice that is wrong costs a test
-_ODD_IN_A_ROW = 3  # tests that fit nothing: no longer bad luck
+    def with_beyond(self, beyond: Sequence[Drift], at: datetime) -> AlertState:
+        """Return the state with shifts that were reported at a test to be beyond a threshold."""
+        return replace(self, beyond={**self.beyond, **dict.fromkeys(map(condition_of, beyond), at)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,9 +228,9 @@ def watch_newest(
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
         agreed = agreement(reader, later[-1], beside, hanger, options, reported.beyond)
         if agreed is not None:
-            two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
-            alert, reported = agreed, with_beyond(reported, agreed.drifts, agreed.time)
-            reported = replace(reported, agreed=reported.agreed | two_told)
+            alert, reported = agreed, reported.with_beyond(agreed.drifts, agreed.time)
+            both = reported.agreed.union(map(condition_of, agreed.drifts))
+            reported = replace(reported, agreed=both)
     return Newest(found, alert, to_bytes((state, reported)))
 
 
@@ -252,48 +242,45 @@ def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> Wa
 
 
 def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertState, Alert | None]:
-    """Return what stands after one more test, and the alert that it calls for, if any."""
+    """Return what is in force after one more test, and the alert that it calls for, if any."""
     level = hanger.thresholds.alert_probability
-    standing = still(told, test, hanger.thresholds.end_probability)
-    beyond, is_call = _news(standing, test, level)
-    call = test.time if is_call else standing.call
+    standing = told.still(test, hanger.thresholds.end_probability)
+    is_call = test.change.called and not _is_known(standing, test.change)
+    beyond = tuple(
+        drift
+        for drift in (test.published_drifts if is_call else test.drifts)
+        if drift.probability >= level and condition_of(drift) not in standing.beyond
+    )
     called = (*standing.called, test.change) if test.change.called else standing.called
-    odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
     change = test.change if is_call else _explaining(beyond, called, test.change)
     alert = _alert(beyond, is_call, change, test, hanger, standing)
-    alone = told.alone
-    since_baseline: tuple[Drift, ...] = ()
+    alone, since_baseline = told.alone, tuple[Drift, ...]()
     if alert is None and test.change.is_baseline_alone and not (alone or standing.beyond):
         alert, alone = alert_of_baseline(test, hanger), True
         since_baseline = alert.drifts
-    alert = alert or _of_odd(test, hanger, odd)
+    odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
+    if alert is None and odd in (1, _ODD_IN_A_ROW):
+        kind: AlertKind = _REPEAT if odd == 1 else "tests disagree"
+        words, key = message_of_odd(test, hanger, odd), kind.replace(" ", "-")
+        alert = alert_of(hanger, (test.test, test.time), key, words, (kind,))
     wrong = frozenset((each.plane, each.order) for each in test.mistaken if each.is_notable)
     noted = told.noted & wrong
     explained = any(each.moved and each.moved[0].quantity in CAUSES for each in called)
     if alert is None and not explained and (new := news_of(test.mistaken, noted)):
-        # It waits while there is worse to tell; a mass or lost section is why modes go astray.
+        # It waits while there is worse to report; a mass or lost section is why modes go astray.
         alert, noted = notice_of(test, hanger, new), wrong
     in_force = replace(
-        with_beyond(standing, (*beyond, *since_baseline), test.time),
-        call=call,
+        standing.with_beyond((*beyond, *since_baseline), test.time),
+        call=test.time if is_call else standing.call,
         called=called,
         odd=odd,
         mistaken=test.mistaken,
         noted=noted,
         alone=alone,
-        # Improbable to the watch, as what two tests tell: it ends once the shift has come back.
-        agreed=standing.agreed | conditions(since_baseline),
+        # Improbable to the watch, as what two tests report: it ends once the shift has come back.
+        agreed=standing.agreed.union(map(condition_of, since_baseline)),
     )
     return in_force, alert
-
-
-def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
-    """Of a test that fits nothing: a notice of the first, an alert of the third in a row."""
-    if in_a_row not in (1, _ODD_IN_A_ROW):
-        return None
-    kind: AlertKind = _REPEAT if in_a_row == 1 else "tests disagree"
-    words = message_of_odd(test, hanger, in_a_row)
-    return alert_of(hanger, (test.test, test.time), kind.replace(" ", "-"), words, (kind,))
 
 
 def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
@@ -308,44 +295,21 @@ def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ..
     return tuple(alerts)
 
 
-def _news(standing: AlertState, test: WatchedTest, level: float) -> tuple[tuple[Drift, ...], bool]:
-    """Return the shifts that are beyond their threshold by now, and if a change is called."""
-    call = test.change.called and not _is_known(standing, test.change)
-    drifts = test.published_drifts if call else test.drifts
-    beyond = tuple(
-        drift
-        for drift in drifts
-        if drift.probability >= level
-        and (drift.quantity, way_of(drift.shift_mean)) not in standing.beyond
-    )
-    return beyond, call
-
-
 def _is_known(standing: AlertState, change: Change) -> bool:
     """Return True if an alert that is in force has reported a called change already."""
-    reported = [] if standing.call is None else [standing.call]
-    named = _suspects(change)
-    reported += [at for (quantity, _), at in standing.beyond.items() if quantity in named]
+    named = {each.quantity for each in suspects(change)}
+    reported = [at for (quantity, _), at in standing.beyond.items() if quantity in named]
+    reported += [standing.call] if standing.call else []
     return any(change.began_by <= at for at in reported)
 
 
-def _suspects(change: Change) -> tuple[str, ...]:
-    """Return what may have changed: the likeliest quantity, those with it, then those like it."""
-    return tuple(each.quantity for each in suspects(change))
-
-
 def _explaining(beyond: Sequence[Drift], called: Sequence[Change], now: Change) -> Change | None:
-    """The last called change of the same way as a shift; None where none is known to explain it."""
+    """Return the last called change of the same way as a shift; None where none explains it."""
     if not called:
         return now if now.probability > 0.5 else None
-    shifts = {(drift.quantity, way_of(drift.shift_mean)) for drift in beyond}
+    shifts = set(map(condition_of, beyond))
     for change in reversed(called):
-        suspects = {
-            (moved.quantity, way_of(moved.shift_mean))
-            for moved in change.moved
-            if moved.quantity in _suspects(change)
-        }
-        if shifts & suspects:
+        if shifts & set(map(condition_of, suspects(change))):
             chances = now.probability, now.outlier_probability
             return replace(change, probability=chances[0], outlier_probability=chances[1])
     return None
@@ -365,6 +329,12 @@ def _alert(
         kinds.append("sudden change" if test.change.sudden >= 0.5 else "slow drift")
     if not kinds:
         return None
+    level = hanger.thresholds.alert_probability
+    still_beyond = [
+        replace(each, probability=max(each.probability, level))
+        for each in test.drifts
+        if condition_of(each) in standing.beyond.keys() - standing.agreed
+    ]
     words = message_of(
         test,
         hanger,
@@ -372,22 +342,13 @@ def _alert(
         beyond,
         is_call=is_call,
         is_further=is_call and bool(standing.called),
-        standing=_standing(test, standing, hanger),
+        standing=still_beyond,
     )
-    first = beyond[0] if beyond else test.change.moved[0] if test.change.moved else None
-    what = f"{first.quantity}-{way_of(first.shift_mean)}" if first else "unknown"
+    lead = beyond[0] if beyond else test.change.moved[0] if test.change.moved else None
+    what = "-".join(condition_of(lead)) if lead else "unknown"
     key = f"{'+'.join(kinds)}:{what}".replace(" ", "-")
+    names = [each.quantity for each in suspects(test.change)]
     by_name = {drift.quantity: drift for drift in test.drifts}
-    suspected = tuple(by_name[name] for name in _suspects(test.change) if name in by_name)
+    suspected = tuple(by_name[name] for name in names if name in by_name)
     of_test = test.test, test.time
     return alert_of(hanger, of_test, key, words, tuple(kinds), beyond or suspected, change)
-
-
-def _standing(test: WatchedTest, standing: AlertState, hanger: Hanger) -> list[Drift]:
-    """Return what was said to be beyond its threshold and still is: as sure as it was then."""
-    level = hanger.thresholds.alert_probability
-    return [
-        replace(each, probability=max(each.probability, level))
-        for each in test.drifts
-        if (each.quantity, way_of(each.shift_mean)) in standing.beyond.keys() - standing.agreed
-    ]

@@ -39,7 +39,7 @@ from docs.filling import fill_in, write_csv
 from shm.store import Workspace
 from shm_cli.common import markdown
 from shm_daemon.web.address import Address
-from shm_daemon.web.app import load_pages
+from shm_daemon.web.app import make_pages
 from shm_daemon.web.site import Description, Site
 from tests.benchmarks.dashboard_filling import (
     ENGINEER,
@@ -180,13 +180,10 @@ def _label(address: str, values: Mapping[str, str]) -> str:
 
 def routes_of(workspace: Workspace) -> list[APIRoute]:
     """All of the interface that is asked for with GET."""
-    pages = load_pages(Site(Description(workspace), Address()))
-    try:
-        routers = [getattr(each, "original_router", each) for each in pages.app.routes]  # type: ignore[attr-defined]
-        found = [route for each in routers for route in getattr(each, "routes", [each])]
-        return [each for each in found if isinstance(each, APIRoute) and "GET" in each.methods]
-    finally:
-        pages.close()
+    pages = make_pages(Site(Description(workspace), Address()))
+    routers = [getattr(each, "original_router", each) for each in pages.routes]
+    found = [route for each in routers for route in getattr(each, "routes", [each])]
+    return [each for each in found if isinstance(each, APIRoute) and "GET" in each.methods]
 
 
 def asked_for(routes: Iterable[APIRoute]) -> Iterator[str]:

@@ -48,7 +48,7 @@ from shm.values.stream import (  # noqa: E402
     WindowReading,
 )
 from shm.watch.kept_state import to_bytes  # noqa: E402
-from shm.watch.stream_reading import exchanged, usable  # noqa: E402
+from shm.watch.stream_reading import usable  # noqa: E402
 from shm.watch.stream_watch import (  # noqa: E402
     HOURS_A_DAY,
     TOGETHER,
@@ -236,8 +236,6 @@ def daily_shift(state: StreamState, hours: Sequence[PooledReading]) -> tuple[flo
     seen, between = [], state.contrast.along(compensated(state.contrast))
     for reading in hours:
         modes = usable(reading)
-        if state.table.are_exchanged(modes):
-            modes = exchanged(modes)
         known = [mode for mode in modes if (mode.plane, mode.order) in state.table.modes]
         if known:
             kelvin = float(np.nan_to_num(reading.temperature_c - state.reference[0]))

@@ -74,14 +74,14 @@ def test_the_table_ends_in_a_sentence_for_the_owner(arch: Workspace) -> None:
     assert "Load has moved from hanger 6 to its neighbours. Hanger 6 lost 35." in told
 
 
-def test_a_common_shift_is_told_with_the_change_of_temperature(tmp_path: Path) -> None:
+def test_a_common_shift_is_stated(tmp_path: Path) -> None:
     workspace = make_workspace(tmp_path / "bridge", hangers=HANGERS)
     with workspace.store() as store:
         for hanger in HANGERS:
             watch(store, hanger, -0.012)
     told = call(workspace).stdout
     assert "All hangers shifted alike, by -1." in told
-    assert "+20 K from their baselines" in told
+    assert "a temperature, a clock or a load" in told
 
 
 @pytest.mark.parametrize(

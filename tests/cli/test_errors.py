@@ -156,21 +156,8 @@ def test_nothing_goes_on_record_without_a_reason(shm: Shm, bridge: Workspace, li
     assert "it is empty" in ended.err
 
 
-@pytest.mark.parametrize(
-    ("options", "code"),
-    [(["--host", "192.0.2.1"], 2), (["--certificate", "no.pem"], 3), (["--key", "no.pem"], 2)],
-)
-def test_the_dashboard_is_not_announced_where_it_cannot_begin(
-    shm: Shm,
-    empty: Workspace,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    options: list[str],
-    code: int,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "no.pem").write_text("no certificate")
-    assert_told(shm("--workspace", empty.folder, "web", *options), {code})
+def test_the_dashboard_is_not_announced_where_it_cannot_begin(shm: Shm, empty: Workspace) -> None:
+    assert_told(shm("--workspace", empty.folder, "web", "--host", "192.0.2.1"), {2})
 
 
 def test_an_answer_that_finds_no_room_is_no_fault_of_shm(

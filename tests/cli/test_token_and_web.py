@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from shm.store import Workspace
 from tests.cli.conftest import Shm
 
@@ -31,22 +29,8 @@ def test_it_does_not_open_to_others_without_a_token(shm: Shm, empty: Workspace) 
         assert "shm token create" in refused.err
 
 
-def test_the_daemon_serves_https_as_the_web_interface_alone_does(
-    shm: Shm, empty: Workspace, tmp_path: Path
-) -> None:
-    """What a warning tells to give can be given; a file that is no certificate is refused."""
-    pem = tmp_path / "some.pem"
-    pem.write_text("no certificate")
-    for verb in (("web",), ("daemon", "--web")):
-        refused = shm("--workspace", empty.folder, *verb, "--certificate", pem, "--key", pem)
-        assert refused.code == 3
-        assert "no certificate with a key that fits" in refused.err
-        alone = shm("--workspace", empty.folder, *verb, "--key", pem)
-        assert alone.code == 2
-    without = shm("--workspace", empty.folder, "daemon", "--certificate", pem)
-    assert without.code == 2
-    assert "--web" in without.err
-    given = ("daemon", "--web", "--certificate", pem, "--key", pem, "--print-unit")
-    assert f"--certificate {pem} --key {pem}" in shm("--workspace", empty.folder, *given).out
-    web = shm("--workspace", empty.folder, "web", "--port", 8500, *given[2:]).out
-    assert f"ExecStart=/usr/bin/env shm web --host 127.0.0.1 --port 8500 --certificate {pem}" in web
+def test_unit_has_the_address(shm: Shm, empty: Workspace) -> None:
+    web = shm("--workspace", empty.folder, "web", "--port", 8500, "--print-unit").out
+    assert "ExecStart=/usr/bin/env shm web --host 127.0.0.1 --port 8500\n" in web
+    daemon = shm("--workspace", empty.folder, "daemon", "--web", "--print-unit").out
+    assert "shm daemon --web --host 127.0.0.1 --port 8400\n" in daemon

@@ -159,7 +159,6 @@ def compare_hangers() -> Any:
             shift_n=7e5 * fraction,
             shift_sd_n=2100.0,
             position_m=8.0 * n,
-            temperature_change_k=2.0 + 0.2 * n,
         )
         for n, fraction in enumerate(fractions, 1)
     ]

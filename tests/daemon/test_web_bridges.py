@@ -8,7 +8,7 @@ import os
 import re
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from datetime import timedelta
@@ -26,9 +26,9 @@ from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import HEARTBEAT, beat
 from shm_daemon.http_client import HttpClient
 from shm_daemon.web.address import SUMMARY, Address
-from shm_daemon.web.bridge_summary import BridgeRow, Summary
+from shm_daemon.web.bridge_summary import Summary
 from shm_daemon.web.commands import without_commands
-from shm_daemon.web.other_bridges import NotTold, OtherBridges, ask
+from shm_daemon.web.other_bridges import NotReached, OtherBridges, ask
 from tests.helpers.listeners import Answer, Listener, a_listener, a_silent_listener
 from tests.helpers.nouns import NOW
 from tests.helpers.taken_in import ingest_quickly
@@ -130,7 +130,7 @@ def test_a_bridge_is_said_in_the_words_of_its_own_home_page(
 ) -> None:
     token = (there.home.folder / "lost.token").read_text().strip()
     with httpx.Client(
-        headers={"Authorization": f"Bearer {token}"} if name == "Lost" else {}
+        headers={"Authorization": f"Bearer {token}"} if name == "Lost" else {}, timeout=120
     ) as own:
         state = own.get(f"{there.urls[name]}/api/bridge").json()
         home_page = words_of(own.get(f"{there.urls[name]}/").text)
@@ -177,7 +177,7 @@ def test_why_a_bridge_is_not_reached_is_said_with_what_to_do(there: Neighbourhoo
     for name, said, remedy in (
         (
             "Gone",
-            "the connection failed (Connection refused).",
+            "no connection: Connection refused.",
             "See today that its machine and shm web run there",
         ),
         ("Wrong", "it refuses the token of wrong.token.", "Write it into wrong.token."),
@@ -206,7 +206,7 @@ def test_the_command_and_the_doctor_say_the_same(
     served_rows = there.document()
     assert told["headline"] == served_rows["headline"]
     for mine, theirs in zip(told["bridges"], served_rows["bridges"], strict=True):
-        assert {**mine, "told_at": 0, "trouble": 0} == {**theirs, "told_at": 0, "trouble": 0}
+        assert {**mine, "asked_at": 0, "trouble": 0} == {**theirs, "asked_at": 0, "trouble": 0}
     assert run(["--workspace", str(there.home.folder), "bridges"]) == 0
     assert "Lost (Alert): Hanger 3: " in capsys.readouterr().out
     found: dict[str, list[Finding]] = {}
@@ -244,18 +244,18 @@ def asked(listener: Listener, folder: Path, timeout_s: float = 5.0, **more: str)
         (Answer(200, b'{"status": "green"}'), "Something else than shm", "Correct its address"),
         (Answer(200, b"[1]"), "Something else than shm", "Correct its address"),
         (Answer(404, b"not found"), "Something else than shm", "Correct its address"),
-        (Answer(200, b" " * 70_000), "more than 64 kB", "Correct its address"),
-        (Answer(404, b'{"message": "Not found"}'), "older than this one", "Upgrade it to"),
+        (Answer(200, b" " * 70_000), "Something else than shm", "Correct its address"),
+        (Answer(404, b'{"message": "Not found"}'), "It answers 404: Not found", "See today"),
         (Answer(200, b'{"version": "9.0", "status": "purple"}'), "Its shm 9.0 and this", "Upgrade"),
         (Answer(503, b'{"message": "Out.", "remedy": "Wait."}'), "It answers 503: Out.", "Wait."),
         (Answer(500, b'{"message": "a\\u001b[31m"}'), "It answers 500: a [31m", "See today"),
-        (Answer(cut=True), "The connection failed (", "See today"),
+        (Answer(cut=True), "No connection: ", "See today"),
     ],
 )  # fmt: skip
 def test_what_answers_instead_is_said(
     tmp_path: Path, answer: Answer, said: str, remedy: str
 ) -> None:
-    with a_listener(lambda _: answer) as listener, pytest.raises(NotTold) as caught:
+    with a_listener(lambda _: answer) as listener, pytest.raises(NotReached) as caught:
         asked(listener, tmp_path)
     assert said in caught.value.message
     assert remedy in caught.value.remedy
@@ -267,7 +267,7 @@ def test_nobody_else_is_asked_where_an_address_sends_elsewhere(tmp_path: Path) -
         away = Answer(302, b"", (("Location", elsewhere.url),))
         with (
             a_listener(lambda _: away) as listener,
-            pytest.raises(NotTold, match="sends elsewhere"),
+            pytest.raises(NotReached, match=r"Something else .*\(302\)"),
         ):
             asked(listener, tmp_path, token_file="t")
         assert elsewhere.told == []
@@ -279,7 +279,7 @@ def test_nobody_else_is_asked_where_an_address_sends_elsewhere(tmp_path: Path) -
 def test_a_slow_bridge_is_given_up(tmp_path: Path, drip: bytes) -> None:
     with (
         a_silent_listener(drip, 0.005) as url,
-        pytest.raises(NotTold, match=r"No answer within 0\.4 s"),
+        pytest.raises(NotReached, match=r"[Nn]o answer within 0\.4 s"),
     ):
         ask(OtherBridge("Severn", url.rstrip("/")), tmp_path, HttpClient(), 0.4)
 
@@ -288,7 +288,7 @@ def test_a_slow_bridge_is_given_up(tmp_path: Path, drip: bytes) -> None:
 def test_a_token_that_cannot_be_read_is_sent_to_nobody(tmp_path: Path, content: str | None) -> None:
     if content is not None:
         (tmp_path / "t").write_text(content)
-    with a_listener() as listener, pytest.raises(NotTold, match="cannot be read from t"):
+    with a_listener() as listener, pytest.raises(NotReached, match="cannot be read from t"):
         asked(listener, tmp_path, token_file="t")
     assert listener.told == []
 
@@ -297,65 +297,45 @@ def test_a_certificate_of_an_own_authority_is_trusted_once_it_is_named(
     workspace: Workspace, certificate: tuple[Path, Path], tmp_path: Path
 ) -> None:
     with served(workspace, certificate=certificate) as site:
-        with pytest.raises(NotTold, match=r"certificate is not trusted.*self-signed") as caught:
+        with pytest.raises(NotReached, match=r"self-signed") as caught:
             ask(OtherBridge("Severn", site.url), tmp_path, HttpClient())
         assert "certificate_file" in caught.value.remedy
         named = OtherBridge("Severn", site.url, certificate_file=str(certificate[0]))
         assert ask(named, tmp_path, HttpClient()).bridge == "Test bridge"
     gone = replace(named, certificate_file="gone.pem")
-    with pytest.raises(NotTold, match=r"no file gone\.pem"):
+    with pytest.raises(NotReached, match=r"no file gone\.pem"):
         ask(gone, tmp_path, HttpClient())
 
 
 # ---------------------------------------------------------------- how long a page takes
 
 
-def test_page_waits_for_no_silent_bridge(tmp_path: Path) -> None:
+def test_silent_bridges_are_given_up_together(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent, ExitStack() as stack:
         silent.settimeout(120)
         url = f"http://127.0.0.1:{silent.getsockname()[1]}"
         others = [OtherBridge(f"B{n}", url) for n in range(6)]
-        asking = OtherBridges(timeout_s=200.0, page_waits_s=0.2)
+        asking = OtherBridges(timeout_s=1.0)
         stack.callback(asking.close)
-        first = asking.rows(others, tmp_path)
+        found = asking.rows(others, tmp_path)
         for _ in others:  # all are asked though none has answered
             stack.enter_context(silent.accept()[0])
-    assert all("not reached: no answer within 0.2 s" in str(each.trouble) for each in first)
+    assert all("no answer within 1 s" in str(each.trouble).lower() for each in found)
 
 
-def test_silent_bridges_are_given_up(tmp_path: Path) -> None:
-    with a_silent_listener() as url:
-        others = [OtherBridge(f"B{n}", url.rstrip("/")) for n in range(6)]
-        asking = OtherBridges(timeout_s=1.0, page_waits_s=0.2)
-        later = _when(lambda: asking.rows(others, tmp_path), "within 1 s")
-        asking.close()
-    assert all("no answer within 1 s" in str(each.trouble) for each in later)
-
-
-def _when(rows: Callable[[], list[BridgeRow]], said: str) -> list[BridgeRow]:
-    for _ in range(2400):
-        found = rows()
-        if all(said in str(each.trouble) for each in found):
-            break
-        time.sleep(0.05)
-    return found
-
-
-def test_what_was_said_last_is_shown_with_its_age(tmp_path: Path) -> None:
+def test_bridge_is_asked_again_after_some_seconds(tmp_path: Path) -> None:
     clock, answers = [NOW], [Answer(200, dump(asdict(SAID)).encode())]
     with a_listener(lambda _: answers[0]) as listener:
         severn = OtherBridge("Severn", listener.url.removesuffix("/alerts"))
         asking = OtherBridges(clock=lambda: clock[0])
         (row,) = asking.rows([severn], tmp_path)
-        assert (row.summary, row.told_at, row.trouble) == (SAID, NOW, None)
+        assert (row.summary, row.asked_at, row.trouble) == (SAID, NOW, None)
         assert row.states == (("No change", "steady"),)
         answers[0] = Answer(cut=True)
         assert asking.rows([severn], tmp_path) == [row]  # just asked: it is not asked again
         clock[0] = NOW + timedelta(hours=3)
         (lost,) = asking.rows([severn], tmp_path)
-        assert (lost.summary, lost.told_at) == (SAID, NOW)
-        assert lost.trouble is not None
-        assert lost.trouble.state.startswith("Severn has not been reached for 3 h: ")
+        assert (lost.summary, lost.asked_at) == (None, clock[0])
         assert (lost.states, lost.urgency) == ((("Not reached", "alert"),), "today")
         asking.close()
     assert len(listener.told) == 2

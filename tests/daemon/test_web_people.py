@@ -22,7 +22,7 @@ from shm.store.rows import Role
 from shm.store.tables import users
 from shm_daemon.web.access import engineering, reading, signed_in_person, writing
 from shm_daemon.web.address import Address
-from shm_daemon.web.app import load_pages
+from shm_daemon.web.app import make_pages
 from shm_daemon.web.site import MOST_WRONG, Description, Site
 from tests.helpers.waiting import until
 from tests.helpers.web_servers import served
@@ -240,17 +240,14 @@ def test_many_sign_ins_leave_pages_free(
 def test_every_route_asks_who_it_is_and_what_changes_something_asks_for_an_operator(
     workspace: Workspace,
 ) -> None:
-    pages = load_pages(Site(Description(workspace), Address()))
-    try:
-        routers = [getattr(each, "original_router", each) for each in pages.app.routes]
-        found = [route for each in routers for route in getattr(each, "routes", [each])]
-        routes = [each for each in found if isinstance(each, APIRoute)]
-        assert len(routes) > 20
-        for route in routes:
-            if route.path in OPEN or route.path.startswith("/static"):
-                continue
-            asked = set(calls_of(route.dependant))
-            needed = reading if route.methods <= {"GET", "HEAD"} else writing
-            assert {needed, engineering, signed_in_person} & asked, route.path
-    finally:
-        pages.close()
+    pages = make_pages(Site(Description(workspace), Address()))
+    routers = [getattr(each, "original_router", each) for each in pages.routes]
+    found = [route for each in routers for route in getattr(each, "routes", [each])]
+    routes = [each for each in found if isinstance(each, APIRoute)]
+    assert len(routes) > 20
+    for route in routes:
+        if route.path in OPEN or route.path.startswith("/static"):
+            continue
+        asked = set(calls_of(route.dependant))
+        needed = reading if route.methods <= {"GET", "HEAD"} else writing
+        assert {needed, engineering, signed_in_person} & asked, route.path

@@ -91,7 +91,7 @@ def found_in(
         for order, own in enumerate(hz * (1 + 2e-4 * draw.normal(size=3)), 1)
     )
     window = Window(stream.name, hanger.id, start, 600.0, "wind", 0.02, temperature_c=temperature_c)
-    return WindowFound(WindowReading(window, modes, "tracked"), (), {})
+    return WindowFound(WindowReading(window, modes, "tracked"), ())
 
 
 def find_quickly(

@@ -47,7 +47,9 @@ def served(
     """
     with workspace.store() as store:
         tokens = [store.upkeep.create_token(scope, scope, utc_now()) for scope in Scope]
-    server = make_server(make_app(workspace, address), Address(port=0), *certificate or ())
+    server = make_server(make_app(workspace, address), Address(port=0))
+    if certificate:  # as a proxy before it would
+        server.config.ssl_certfile, server.config.ssl_keyfile = map(str, certificate)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         url = f"http{'s' if certificate else ''}://127.0.0.1:{listening.getsockname()[1]}"
         thread = threading.Thread(target=server.run, args=([listening],))

@@ -233,6 +233,34 @@ def test_one_test_of_a_campaign_is_taken_out_and_stays_out(workspace: Workspace)
         assert check_store(store, quiet).troubles == ()
 
 
+@pytest.mark.slow
+def test_the_whole_counts_in_place_of_its_part(workspace: Workspace) -> None:
+    """The whole that came after a part of it was called the copy, and could not count alone."""
+    whole = a_recording()
+    cut = [replace(c, values=c.values[: len(c.values) * 2 // 3]) for c in whole.channels]
+    write(replace(whole, channels=tuple(cut)), workspace.spool / "part.npz")
+    ingest(workspace)
+    write(whole, workspace.spool / "whole.npz")
+    ingest(workspace)
+    with a_flow(workspace) as flow:
+        (hold,) = list_holds(flow.store)
+        assert "it holds part.npz (recording 1)" in hold.message
+        assert (
+            "`shm ingest --discard 1 --why TEXT`, then `shm ingest --confirm 2 --why TEXT`"
+            in hold.message
+        )
+        assert ".." not in hold.message
+        flow.store.recordings.exclude(1, "Ann", "a part", flow.clock())
+        flow.store.recordings.accept(2, "Ann", "the whole", flow.clock())
+        flow.drain()
+        assert counted(flow.store) == ["whole"]
+        write(replace(whole, channels=tuple(cut[::-1])), workspace.spool / "again.npz")
+        receive_all(flow)
+        flow.drain()
+        (hold,) = list_holds(flow.store)
+        assert "a part of whole.npz (recording 2), sent again" in hold.message
+
+
 def test_the_other_tests_of_a_file_go_on(workspace: Workspace) -> None:
     tests = [
         replace(modelled_test(name, workspace.bridge.hanger(3)), time=time)

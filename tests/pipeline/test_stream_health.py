@@ -16,13 +16,16 @@ from shm.pipeline.stream_health import (
     classify_stream,
     evaluate_silent_streams,
     heard,
+    note_blindness,
 )
+from shm.read.chunk_document import chunk_document
 from shm.report.hanger_status import Status
 from shm.store.ring import ring_of
+from shm.store.streams import list_stream_events
 from shm.values.stream import StreamEvent
 from tests.helpers.live_streams import send, with_live_streams
 from tests.helpers.nouns import NOW
-from tests.helpers.streams import STREAM, a_window, with_stream
+from tests.helpers.streams import MODES, STREAM, a_chunk, a_window, with_stream
 from tests.helpers.workspaces import make_workspace
 
 HOUR = timedelta(hours=1)
@@ -144,3 +147,21 @@ def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(
         assert {each.resolution.why for each in store.alerts.list_all() if each.resolution} == {
             f"stream {name} sees its hanger again"
         }
+
+
+def test_a_stream_of_noise_is_noted_by_its_windows_and_said_to_see_nothing(tmp_path: Path) -> None:
+    workspace = with_stream(make_workspace(tmp_path / "bridge"))
+    with workspace.store() as store:
+        for n in range(42):
+            window = a_window(10 * n, MODES if n < 36 else ())
+            level = 0.012 if n < 36 else 1e-4
+            store.streams.save_window(
+                replace(window, window=replace(window.window, level_m_s2=level))
+            )
+        for n in (40, 41):
+            note_blindness(store, STREAM, a_window(10 * n).window.start)
+        (event,) = list_stream_events(store, "h3", NOW)
+        ring_of(workspace).append(chunk_document(a_chunk(0, event.end - timedelta(seconds=5))))
+        (found,) = heard(workspace, store, event.end)
+        assert found.state == "sees nothing"
+        assert blind_hangers([found])[3].state.endswith("is without any motion of it.")

@@ -115,4 +115,3 @@ def test_a_loss_is_a_loss_though_stiffer_ends_lift_the_high_modes() -> None:
     doubt = Doubt("clock ahead", "its time cannot be", "Set it", "Why.")
     said = notice_of(replace(PLAIN, test=test), [doubt], 1, [])
     assert "may have lost 6 % of its tension" in said
-    assert "Its lowest frequencies are 0.5 % above" in said

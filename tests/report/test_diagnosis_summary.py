@@ -51,7 +51,7 @@ def said(diagnosis: Diagnosis) -> str:
         (LED, "The gap is explained by point mass, probability 0.93; what is left is within the "
               "stated errors."),
         (LED, "The cause: a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7)."),
-        (LED, "Weighed over all that may be, the tension is 702 ± 12 kN."),
+        (LED, "Averaged over all explanations, the tension is 702 ± 12 kN."),
         (LED, "To tell point mass from section loss, measure next: known mass of 25 kg at 3.6 m."),
         (ALIKE, "Measure section, length and weight with calliper and tape first: several causes "
                 "fit alike"),

@@ -98,6 +98,12 @@ def with_tension(tension: Averaged | None = None, **changes: Any) -> HangerSumma
         ),
         ({"latest": None}, None, "no test yet.", "Test it at the next planned test."),
         (
+            {"latest": None, "tests": 5},
+            None,
+            "5 tests, no result yet.",
+            "No action is needed: the daemon is at work, or waits for more tests for a baseline.",
+        ),
+        (
             {"unwatched": UNWATCHED},
             "UNCLEAR",
             "not tested for 400 days.",

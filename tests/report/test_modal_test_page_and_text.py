@@ -69,7 +69,7 @@ def test_the_page_begins_with_how_far_it_can_be_used(
 def test_the_page_holds_every_number_that_a_person_checks(outlines: dict[str, Outline]) -> None:
     page = told(outlines["dropped"])
     for words in (
-        "transverse 1 5.8000 0.001 0.4000 0.02 0.4",
+        "transverse 1 5.8000 0.001 0.400 0.02 0.4",
         "harmonic 11.600 0.4000 twice the frequency of transverse 1",
         "tone 50.000 not known mains",
         "2 made.csv 4.500 950 no: double hit",

@@ -14,7 +14,6 @@ from shm.report.contents import HangerReport
 from shm.report.formatting import Interval
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_sentences import in_period, summary
-from shm.report.hanger_tables import period as period_table
 from shm.report.states import Period, period_since
 from tests.report.conftest import START
 
@@ -71,16 +70,6 @@ def test_the_summary_names_the_period_and_what_changed_in_it(recent: HangerRepor
 def test_a_period_with_one_test_says_that_nothing_can_be_compared(recent: HangerReport) -> None:
     one = replace(recent, trend=recent.trend[-1:])
     assert "with one test in it nothing in it can be compared" in in_period(one)
-    assert period_table(one).rows == ()
-
-
-def test_the_table_sets_the_end_beside_the_start(recent: HangerReport) -> None:
-    rows = {row[0]: row[1:] for row in period_table(recent).rows}
-    assert rows["test"] == ("t003", "t009", "7 tests")
-    assert rows["time"][2] == "84 days"
-    assert rows["tension"][1].startswith("651 (6")
-    assert rows["tension"][1].endswith(" kN")
-    assert rows["temperature"][2] == "+0.0 K"
 
 
 def test_every_form_names_the_period(recent: HangerReport) -> None:

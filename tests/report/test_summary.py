@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import timedelta
 
 import numpy as np
 import pytest
@@ -12,20 +11,12 @@ from shm.report.contents import HangerReport
 from shm.report.formatting import Interval
 from shm.report.hanger_sentences import advice, summary
 from shm.values import Drift, Hanger, Thresholds
-from tests.helpers.nouns import an_alert, averaged, with_now
+from tests.helpers.nouns import averaged, with_now
 from tests.report.diagnoses import LED
 
 
 def with_probability(data: HangerReport, probability: float) -> HangerReport:
     return with_now(data, drifts=(replace(data.drifts[0], probability=probability),))
-
-
-def test_an_alert_that_is_later_than_the_latest_test_is_told_apart(season: HangerReport) -> None:
-    assert season.latest.time is not None
-    for days, is_later in ((1, True), (-1, False)):
-        alert = replace(an_alert(), time=season.latest.time + timedelta(days=days))
-        told = summary(with_now(season, standing=(alert,)))
-        assert ("by a test made before the alert of" in told) is is_later
 
 
 def test_a_model_that_lost_the_selection_is_said_to_have_lost(season: HangerReport) -> None:
@@ -117,18 +108,6 @@ def test_a_hanger_whose_tension_is_hardly_known_is_not_said_to_stand_still(
     assert "do not determine" not in summary(still)
 
 
-def test_tests_that_could_not_show_a_shift_are_said_not_to_speak_against_it(
-    season: HangerReport,
-) -> None:
-    blind = with_now(season, drifts=(replace(season.drifts[0], shift_sd=0.04, probability=0.01),))
-    assert "could hardly show a change of tension of 5 %" in summary(blind)
-
-
-def test_a_shift_that_nobody_called_is_told_as_one_that_may_not_be(season: HangerReport) -> None:
-    assert "No significant change since the baseline (" in summary(with_probability(season, 0.1))
-    assert "No significant change" not in summary(season)
-
-
 def test_the_paragraph_reads_so_from_beginning_to_end(
     season: HangerReport, bare: HangerReport
 ) -> None:
@@ -138,17 +117,14 @@ def test_the_paragraph_reads_so_from_beginning_to_end(
         "Hanger 3: tension fell by 7.2 ± 2.0 %, beyond its threshold. Repeat the hammer test "
         "today and decide on traffic until then; if the loss stays, inspect its anchorages "
         "and the rod, and compare the hangers beside it (`shm drift bridge`). Its tension is "
-        "now 650 ± 19 kN. Since the baseline of test t000 it changed by -7.2 ± 2.0 %. The model "
-        "class is beam2, the most probable (beside beam1). It predicts 12 measured frequencies to "
-        "0.4 % (root mean square). To tell point mass from section loss, "
-        "measure next: known mass of 25 kg at 3.6 m."
+        "now 650 ± 19 kN. The model class is beam2, the most probable (compared with beam1). It "
+        "predicts 12 measured frequencies to 0.4 % (root mean square). To tell point mass from "
+        "section loss, measure next: known mass of 25 kg at 3.6 m."
     )
     assert summary(bare) == (
         "Hanger 3: tension 711 ± 14 kN, and no test after its baseline. Choose a warmer or colder "
         "day at the next planned test, so that the baseline covers temperature. Its tension is "
-        "711 ± 14 kN by test only. "
-        "No test was made since its baseline. The model class "
-        "is beam1. It predicts one measured frequency to 0.34 % (root mean square). Each lies "
-        "within its 90 % interval: the model explains what was measured. Record the "
-        "temperature with the next test: it moves the tension."
+        "711 ± 14 kN by test only. The model class is beam1. It predicts one measured frequency "
+        "to 0.34 % (root mean square). Each lies within its 90 % interval: the model explains "
+        "what was measured. Record the temperature with the next test: it moves the tension."
     )

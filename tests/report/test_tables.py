@@ -16,7 +16,7 @@ from shm.values import Mode, PredictedFrequency
 WHOLE = [
     "The bar as described",
     "Formulas of practice",
-    "Tension and changes",
+    "Changes since the baseline of test t000",
     "Frequencies",
     "Alerts, latest first",
     "Where these numbers come from",

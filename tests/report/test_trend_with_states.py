@@ -89,7 +89,7 @@ def test_the_state_stands_at_the_level_of_the_average_over_classes(report: Hange
 
 def test_an_excluded_test_stretches_no_axis_but_shows_at_its_edge(report: HangerReport) -> None:
     (axes,) = drawn(report).axes
-    (mark,) = [line for line in axes.lines if line.get_label() == "excluded test out of view"]
+    (mark,) = [line for line in axes.lines if line.get_label() == "excluded test"]
     assert np.asarray(mark.get_ydata()).tolist() == [axes.get_ylim()[1]]
     assert axes.get_ylim()[1] < 800
     assert "tests taken for blunders" in FIGURE.caption(report)

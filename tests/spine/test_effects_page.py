@@ -6,8 +6,8 @@ import json
 
 import pytest
 
+from docs.command_pages import effects_page
 from shm.models.effects import EFFECTS
-from shm_cli.effects import effects_page
 from shm_cli.main import run
 
 

@@ -223,4 +223,4 @@ def test_what_the_report_says_of_the_watch_keeps_to_the_same_words() -> None:
     for change in changes():
         quiet = replace(change, evidence_years=0.077)
         for each in (change, quiet):
-            assert not avoided.search(watch_words([watched(each, ())]))
+            assert not avoided.search(watch_words([watched(each, ())], HANGER_3))

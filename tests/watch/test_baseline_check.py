@@ -184,13 +184,6 @@ def test_a_test_with_a_wrong_clock_is_left_out_as_a_whole_and_said(percent: floa
     assert [test.id for test in check.accepted_tests(tests)] == ["t0", "t2", "t3", "t4"]
 
 
-def test_two_of_three_tests_that_have_a_mode_wrong_do_not_outvote_the_third() -> None:
-    tests = baseline(3)
-    tests[0] = misnamed(tests[0], "transverse", 2)
-    tests[2] = misnamed(tests[2], "transverse", 2)
-    assert told(tests) == [("t0", "transverse", 2), ("t2", "transverse", 2)]
-
-
 def test_a_mode_that_all_tests_number_wrongly_is_a_misfit_not_left_out() -> None:
     tests = [misnamed(each, "transverse", 3) for each in baseline(4)]
     check = check_baseline(tests, MODEL)

@@ -8,6 +8,7 @@ import pytest
 
 from shm.values import CreepRate
 from shm.watch.alert_text import watch_words
+from tests.helpers.hangers import HANGER_3
 from tests.helpers.synthetic_readings import History, watch_of
 
 RELAXES = History(tests=80, days_between=30.0, change_at=0, ramp=(-0.003,), outliers=0.0)
@@ -21,7 +22,7 @@ def test_a_hanger_that_relaxes_slowly_gets_a_rate_and_no_alarm() -> None:
     assert creep is not None
     assert creep.is_known
     assert creep.mean == pytest.approx(-0.003, abs=2 * creep.sd)
-    assert "Tension relaxes by 0." in watch_words(watch.tests)
+    assert "Tension relaxes by 0." in watch_words(watch.tests, HANGER_3)
 
 
 def test_a_few_tests_do_not_show_a_rate() -> None:

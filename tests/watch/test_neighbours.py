@@ -12,7 +12,6 @@ import pytest
 from shm.errors import NothingThere
 from shm.values import Drift, FloatArray
 from shm.watch.neighbours import (
-    Bridge,
     BridgePattern,
     HangerShift,
     NeighbourOptions,
@@ -71,18 +70,6 @@ def sure(shift_n: dict[int, float], **changes: object) -> list[HangerShift]:
         replace(HangerShift(i, i - 1, NOW, 700e3, shift_n.get(i, 0.0), 1.5e3), **changes)  # type: ignore[arg-type]
         for i in range(1, 13)
     ]
-
-
-# ---------------------------------------------------------------- the evidence
-
-
-@pytest.fixture(scope="module")
-def pair() -> Bridge:
-    shifts = [
-        HangerShift(1, 0, NOW, 700e3, -9e3, 2e3),
-        HangerShift(2, 1, NOW, 500e3, 5e3, 1.5e3),
-    ]
-    return Bridge.of(shifts, OPTIONS)
 
 
 # ---------------------------------------------------------------- simulated bridges
@@ -162,23 +149,6 @@ def test_a_loss_at_the_end_of_the_bridge_says_that_the_end_may_carry_a_part() ->
     assert "bridge's end" in pattern.remarks[1]
 
 
-@pytest.mark.parametrize(
-    ("change_k", "words"),
-    [
-        (0.4, "a clock or a load on the whole deck"),
-        (18.0, "All tests lie about +18 K from their baselines"),
-        (float("nan"), "a temperature or a clock"),
-    ],
-)
-def test_a_common_shift_is_put_down_to_what_the_temperatures_admit(
-    change_k: float, words: str
-) -> None:
-    shifts = sure(dict.fromkeys(range(1, 13), -12e3), temperature_change_k=change_k)
-    pattern = bridge_pattern(shifts)
-    assert named(pattern) == "common shift"
-    assert words in pattern.sentence
-
-
 # ---------------------------------------------------------------- which tests are compared
 
 
@@ -214,9 +184,7 @@ def test_shifts_are_the_latest_known_drifts_of_the_tension_in_their_order() -> N
         9: [drift(9, 1, 0.01), drift(9, 2, float("nan"))],
         5: [drift(5, 1, 0.1, "log10_k1")],
     }
-    found = shifts_of(drifts, (9, 7, 5, 4), temperature_changes_k={9: 3.0})
+    found = shifts_of(drifts, (9, 7, 5, 4))
     assert [(each.hanger, each.place) for each in found] == [(9, 0), (4, 3)]
     assert [each.shift_n for each in found] == pytest.approx([7e3, -21e3])
     assert [each.shift_sd_n for each in found] == pytest.approx([1.4e3, 1.4e3])
-    assert found[0].temperature_change_k == 3.0
-    assert np.isnan(found[1].temperature_change_k)

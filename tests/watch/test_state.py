@@ -165,12 +165,7 @@ def test_bands_are_in_newtons_and_in_decades() -> None:
 
 
 def test_what_cannot_be_used_is_refused() -> None:
-    readings = weekly(np.zeros(3))
     with pytest.raises(NothingThere):
         states([], [TENSION])
-    with pytest.raises(UsageError, match="order of time"):
-        states(readings[::-1], [TENSION])
-    with pytest.raises(UsageError, match="probabilities"):
-        states(readings, [TENSION], np.array([0.0, 2.0, 0.0]))
     with pytest.raises(UsageError, match="Watched: tension"):
-        states(readings, [TENSION]).filtered("log10_k9")
+        states(weekly(np.zeros(3)), [TENSION]).filtered("log10_k9")

@@ -12,7 +12,7 @@ import pytest
 from shm.pipeline.stream_steps import Pooled, pool_stream
 from shm.values import outdoor_c
 from shm.values.stream import PooledReading, Window, WindowReading
-from shm.watch.stream_thermometer import Believed, Thermometer, believed, disagreeing
+from shm.watch.stream_thermometer import Believed, Thermometer, believed
 from tests.watch.test_stream_watch import HANGER, START, from_hour, hours
 from tests.watch.test_stream_watch import watched as watch_readings
 
@@ -141,22 +141,3 @@ def test_one_that_stands_still_for_a_day_is_not_believed_until_it_moves() -> Non
     for day in range(20):  # a logger that sends a window at each noon
         seen = seen.after(20.0, start_s + 86400 * day)
     assert not seen.is_doubted(seen.seen_s)
-
-
-@pytest.mark.parametrize(
-    ("off_k", "told"),
-    [((0, 1, 6.5), {2}), ((0, 1, 5.5), set()), ((0, 6), {0, 1}), ((0, 4), set()), ((9,), set())],
-)
-def test_thermometers_of_a_bridge_that_differ_over_a_day_are_named(
-    off_k: Sequence[float], told: set[int]
-) -> None:
-    day = hours(24)
-    events = disagreeing(
-        {
-            str(n): [replace(each, temperature_c=each.temperature_c + own) for each in day]
-            for n, own in enumerate(off_k)
-        }
-    )
-    assert {int(event.stream) for event in events} == told
-    assert all(event.end == START + timedelta(days=1) for event in events)
-    assert not disagreeing({"a": day[:8], "b": [replace(e, temperature_c=50.0) for e in day[:8]]})

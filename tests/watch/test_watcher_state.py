@@ -83,13 +83,6 @@ def test_the_key_goes_with_options_and_quantities_but_not_with_thresholds() -> N
     assert stricter.key == WATCHER.key
 
 
-def test_an_older_test_is_refused() -> None:
-    given = readings(8)
-    state, _ = by_kept_states(given)
-    with pytest.raises(BadInput, match="later"):
-        WATCHER.after(state, given[3])
-
-
 def test_a_state_cut_short_is_refused() -> None:
     state, _ = WATCHER.begin(readings(4))
     content = to_bytes(state)

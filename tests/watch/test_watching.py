@@ -117,13 +117,3 @@ def test_going_on_test_by_test_from_what_was_kept_finds_the_same() -> None:
     assert at_once.test.change == whole.latest.change
     assert tuple(alerts) == alerts_of(whole.watch.tests, HANGER_3)
     assert len(alerts) == 1
-
-
-def test_under_another_limit_nothing_goes_on_from_what_was_kept() -> None:
-    later = _later(SOUND, SOUND)
-    found = _newest(later[:1])
-    assert found is not None
-    baseline, tests = _baseline()
-    own = replace(HANGER_3, thresholds=Thresholds(false_call_years=7.0))
-    gone = watch_newest(baseline, _dated(tests), later[1:], own, WatchOptions(), found.kept)
-    assert gone is None

@@ -1,6 +1,6 @@
 """Serve a workspace until standard input ends.
 
-`python -m shm_daemon.web WORKSPACE HOST PORT [--certificate PEM] [--key PEM] [--log-file LOG]`
+`python -m shm_daemon.web WORKSPACE HOST PORT [--log-file LOG]`
 """
 
 from __future__ import annotations
@@ -28,14 +28,12 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("workspace", type=Path)
     parser.add_argument("host")
     parser.add_argument("port", type=int)
-    for option in ("--certificate", "--key", "--log-file"):
-        parser.add_argument(option, type=Path)
+    parser.add_argument("--log-file", type=Path)
     wanted = parser.parse_args(arguments)
     try:
         workspace = Workspace.open(wanted.workspace)
         begin_logging(workspace.settings, wanted.log_file)
-        address = Address(wanted.host, wanted.port)
-        serve(workspace, address, wanted.certificate, wanted.key)
+        serve(workspace, Address(wanted.host, wanted.port))
     except ShmError as error:
         logging.getLogger("shm").error("%s", error)
         return error.exit_code

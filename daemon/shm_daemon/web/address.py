@@ -35,11 +35,11 @@ class Address:
         """Return True if only this machine can reach it."""
         return _is_loopback(self.host)
 
-    def page(self, is_https: bool = False) -> str:
+    def page(self) -> str:
         """Return the address to open in a browser; this machine's name if it listens everywhere."""
         host = _machine() if self.host in ("0.0.0.0", "::") else self.host  # noqa: S104
         named = f"[{host}]" if ":" in host else host
-        return f"http{'s' if is_https else ''}://{named}:{self.port}/"
+        return f"http://{named}:{self.port}/"
 
     def answers_to(self, host_header: str, names: tuple[str, ...]) -> bool:
         """Return True if a request with this `Host` is meant for us.

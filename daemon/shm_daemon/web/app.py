@@ -1,14 +1,14 @@
-"""Puts the web interface together.
-
-What the first visitor need not wait for: done beside, as soon as the interface begins.
-"""
+"""Put the web interface together."""
 
 from __future__ import annotations
 
 import gc
 import logging
+import threading
 from collections import Counter
+from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
 
 from fastapi import APIRouter, FastAPI, Request
 from fastapi.responses import JSONResponse
@@ -22,7 +22,6 @@ from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.bridge_view import summarize_hangers
 from shm_daemon.web.faults import answers, handle_faults
 from shm_daemon.web.metrics import Exposition
-from shm_daemon.web.middleware import Pages
 from shm_daemon.web.other_bridges import OtherBridges
 from shm_daemon.web.pages import (
     alerts,
@@ -72,9 +71,21 @@ _DESCRIPTION = (
 )
 
 
-def load_pages(site: Site) -> Pages:
+def make_pages(site: Site, *, warms_up: bool = False) -> FastAPI:
     """Return all of the interface: pages, API and metrics."""
     watching_site = site.twin()  # so that a scrape need not wait for the pages' connections
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        if warms_up:
+            threading.Thread(target=warm_up, args=(app,), daemon=True).start()
+        yield
+        app.state.background_worker.close()
+        app.state.other_bridges.close()
+        app.state.passwords.shutdown(wait=False, cancel_futures=True)
+        watching_site.close()
+        site.close()
+
     app = FastAPI(
         title="shm",
         version=shm.__version__,
@@ -82,6 +93,7 @@ def load_pages(site: Site) -> Pages:
         openapi_url=None,  # ours asks for a token where other pages do
         docs_url=None,  # its pages load scripts from elsewhere
         redoc_url=None,
+        lifespan=lifespan,
     )
     app.state.site = site
     app.state.background_worker = BackgroundWorker()
@@ -95,15 +107,7 @@ def load_pages(site: Site) -> Pages:
     for part in _PARTS:
         app.include_router(part.router, responses=answers(400, 401, 403, 503))
     app.include_router(_described)
-
-    def close() -> None:
-        app.state.background_worker.close()
-        app.state.other_bridges.close()
-        app.state.passwords.shutdown(wait=False, cancel_futures=True)
-        watching_site.close()
-        site.close()
-
-    return Pages(app, close, lambda: warm_up(app))
+    return app
 
 
 @_described.get("/openapi.json")

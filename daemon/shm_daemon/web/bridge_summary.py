@@ -74,14 +74,14 @@ def summary_of(site: Site, now: datetime) -> Summary:
 class BridgeRow:
     """A bridge of the list, and where its dashboard is.
 
-    `trouble` is why it cannot be asked now, None where it was asked just now; `summary` is what it
-    said when it could be last, at `told_at`; both are None where it never could.
+    `trouble` is why it could not be asked at `asked_at`, None where it answered; then `summary` is
+    what it said.
     """
 
     name: str
     address: str
     summary: Summary | None
-    told_at: datetime | None
+    asked_at: datetime
     trouble: Lead | None = None
 
     @property
@@ -92,7 +92,7 @@ class BridgeRow:
     @property
     def leads(self) -> tuple[Lead, ...]:
         """Return the notices before its lead: it is not reached, or its work is limited."""
-        if self.trouble or self.summary is None:
+        if self.summary is None:
             return (self.trouble,) if self.trouble else ()
         notices = self.summary.notices
         more = set(self.summary.troubles) - {each.state for each in notices}
@@ -105,24 +105,31 @@ class BridgeRow:
 
         What is not watched is never quiet, whatever its last tests said.
         """
-        status = (
-            Status[self.summary.status.upper()] if self.summary and self.summary.status else None
-        )
+        if self.summary is None:
+            return ((NOT_REACHED, "alert"),)
+        status = Status[self.summary.status.upper()] if self.summary.status else None
         status_word = ((status.value, status.name.lower()),) if status else ()
         if self.is_watched:
             return status_word
-        lost = (NOT_REACHED if self.trouble else STOPPED, "alert")
-        return (lost, *(status_word if status not in QUIET and not self.trouble else ()))
+        return ((STOPPED, "alert"), *(status_word if status not in QUIET else ()))
 
     @property
     def is_watched(self) -> bool:
-        """Return True if its summary is current and its work goes on; else it is never quiet."""
-        return not self.trouble and self.summary is not None and not self.summary.troubles
+        """Return True if it answered and its work goes on; else it is never quiet."""
+        return self.summary is not None and not self.summary.troubles
 
     @property
     def urgency(self) -> Urgency:
         """Of the whole row: a bridge that nobody watches wants somebody today."""
-        return "today" if not self.is_watched or self.summary is None else self.summary.urgency
+        return self.summary.urgency if self.summary and self.is_watched else "today"
+
+    @property
+    def group(self) -> str:
+        """Return what it needs in words, by which the list is grouped."""
+        if self.summary is None:
+            return NOT_REACHED
+        is_quiet = self.summary.urgency == "none"
+        return STOPPED if is_quiet and not self.is_watched else _GROUPS[self.summary.urgency]
 
 
 def site_rows(site: Site, now: datetime) -> tuple[BridgeRow, ...]:
@@ -137,7 +144,7 @@ def site_rows(site: Site, now: datetime) -> tuple[BridgeRow, ...]:
         return (BridgeRow(bridge.name, "/", summary_of(site, now), now),)
     except ShmError as error:
         lead = Lead(f"{bridge.name} cannot be read: {error.message}", error.remedy)
-        return (BridgeRow(bridge.name, "/", None, None, lead),)
+        return (BridgeRow(bridge.name, "/", None, now, lead),)
 
 
 def row_document(row: BridgeRow) -> dict[str, object]:
@@ -148,12 +155,18 @@ def row_document(row: BridgeRow) -> dict[str, object]:
         "states": [word for word, _ in row.states],
         "urgency": row.urgency,
         "trouble": row.trouble and asdict(row.trouble),
-        "told_at": row.told_at,
+        "asked_at": row.asked_at,
         "summary": row.summary and asdict(row.summary),
     }
 
 
 _ORDER = [status.name.lower() for status in Status]
+_GROUPS = {
+    "today": "Action today",
+    "week": "Action within a week",
+    "next_test": "Action at the next planned test",
+    "none": "No action before the next planned test",
+}
 
 
 def worst_first(rows: Sequence[BridgeRow]) -> tuple[BridgeRow, ...]:
@@ -167,25 +180,11 @@ def worst_first(rows: Sequence[BridgeRow]) -> tuple[BridgeRow, ...]:
     return tuple(sorted(rows, key=rank))
 
 
-_GROUPS = {
-    "today": "Action today",
-    "week": "Action within a week",
-    "next_test": "Action at the next planned test",
-    "none": "No action before the next planned test",
-}
-
-
 def groups(rows: Sequence[BridgeRow]) -> dict[str, tuple[BridgeRow, ...]]:
-    """Group bridges by the action they need, most urgent first; stopped ones may need more."""
-    found: dict[str, list[BridgeRow]] = {
-        title: [] for title in (_GROUPS["today"], NOT_REACHED, STOPPED, *_GROUPS.values())
-    }
-    for row in worst_first(rows):
-        if not row.is_watched:
-            found[row.states[0][0]].append(row)
-        if row.summary and not row.trouble and (row.is_watched or row.summary.urgency != "none"):
-            found[_GROUPS[row.summary.urgency]].append(row)
-    return {title: tuple(of) for title, of in found.items() if of}
+    """Group bridges by the action they need, most urgent first."""
+    titles = dict.fromkeys((_GROUPS["today"], NOT_REACHED, STOPPED, *_GROUPS.values()))
+    found = {title: tuple(e for e in worst_first(rows) if e.group == title) for title in titles}
+    return {title: of for title, of in found.items() if of}
 
 
 def headline(rows: Sequence[BridgeRow]) -> str:

@@ -1,16 +1,13 @@
-"""Summarize all hangers of a bridge, and lay out its elevation with their marks.
+"""Summarize all hangers of a bridge, and lay out its elevation, coloured by their states.
 
-All hangers in a handful of queries, and no samples: a page of 200 hangers must not wait.
-
-A class of shift has a colour and, for the colour-blind, a number of triangles: down for lost, up
-for gained. Lengths are in drawing units; upwards is less y.
+All hangers in a handful of queries, and no samples: a page of 200 hangers must not wait. Lengths of
+the elevation are in drawing units; upwards is less y.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cached_property
 
@@ -19,15 +16,15 @@ from fastapi import Request
 from shm.errors import NothingThere
 from shm.pipeline.bridge_reporting import hanger_shifts, hanger_summaries
 from shm.report import formatting
-from shm.report.hanger_status import BridgeMessage, bridge_message
+from shm.report.hanger_status import BridgeMessage, Status, bridge_message
 from shm.report.hanger_summary import HangerSummary
-from shm.store.tests import count_tests
-from shm.values import NAN, Hanger
+from shm.values import Hanger
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
 from shm_daemon.web.background_work import background_worker_of
 from shm_daemon.web.site import Site
 
+_UNTESTED = "untested"
 QUICKLY_COMPARED = 24
 """So many hangers are compared while a page waits."""
 
@@ -37,16 +34,20 @@ class HangerGlance:
     """One hanger as its bridge's report has it; `is_quiet`: it was not tested for long."""
 
     summary: HangerSummary
-    tests: int = 0
     is_quiet: bool = False
 
     @property
     def hanger(self) -> Hanger:
         return self.summary.hanger
 
+    @property
+    def tests(self) -> int:
+        return self.summary.tests
+
     def cells(self, unit: ForceUnit) -> tuple[str, str, str]:
         """Return tension, percent of nominal and shift in percent for a table; empty if unknown."""
-        summary, shift, tension = self.summary, self.summary.change, "no test yet"
+        summary, shift = self.summary, self.summary.change
+        tension = _untested(summary)
         is_known = summary.is_determined
         if summary.tension_n:
             known = formatting.with_half(summary.tension_n, unit).removesuffix(f" {unit.name}")
@@ -106,11 +107,10 @@ class Comparison:
 def summarize_hangers(site: Site, now: datetime) -> BridgeGlance:
     """Return the bridge as the store has it now."""
     workspace, store = site.workspace, site.store
-    tests, quiet_before = count_tests(store), now - timedelta(days=workspace.settings.quiet_days)
+    quiet_before = now - timedelta(days=workspace.settings.quiet_days)
     hangers = tuple(
         HangerGlance(
             summary,
-            tests[summary.hanger.id].tests if summary.hanger.id in tests else 0,
             summary.latest is not None and summary.latest.time < quiet_before,
         )
         for summary in hanger_summaries(workspace, store, now)
@@ -121,59 +121,30 @@ def summarize_hangers(site: Site, now: datetime) -> BridgeGlance:
 def compared(request: Request, site: Site) -> Compared | None:
     """Return the changes over the bridge; None while they are computed."""
     order = tuple(hanger.id for hanger in site.workspace.bridge.hangers)
-    # One NaN, which equals itself, where a change of temperature is not known.
-    shifts = tuple(
-        shift if math.isfinite(shift.temperature_change_k)
-        else replace(shift, temperature_change_k=NAN)
-        for shift in hanger_shifts(site.store, order)
-    )  # fmt: skip
-    wanted = Comparison(shifts, order)
+    wanted = Comparison(hanger_shifts(site.store, order), order)
     if len(order) <= QUICKLY_COMPARED:
         return wanted.make()
     found: Compared | None = background_worker_of(request).get_or_start(wanted)
     return found
 
 
-CLASSES = (
-    ("lost3", "lost more than 6 %"),
-    ("lost2", "lost 3 to 6 %"),
-    ("lost1", "lost 1 to 3 %"),
-    ("same", "within 1 %"),
-    ("gained1", "gained 1 to 3 %"),
-    ("gained2", "gained 3 to 6 %"),
-    ("gained3", "gained more than 6 %"),
-    ("unknown", "not known: no test since a baseline"),
-)
-"""The classes of shift from the baseline, each with its words."""
-# Judgement: 1 % is what one test tells by, and each class is about twice the one before.
-_LIMITS = (0.01, 0.03, 0.06)
-
 # Judgement: drawing units, of which a laptop's page has about 1100. Hangers are so far apart that
 # their numbers (every second, fifth ... where 30 units are too few) can be read.
 _MOST_STEP, _LEAST_STEP, _WIDEST = 34.0, 9.0, 1100.0
 _TALLEST, _TOP, _BELOW, _SIDE = 220.0, 48.0, 60.0, 36.0
 _BETWEEN_NUMBERS = 30.0
-_TRIANGLE = 10.0
-
-
-@dataclass(frozen=True)
-class Triangle:
-    """A mark over a hanger; hollow where the shift may as well be none."""
-
-    points: str
-    hollow: bool
 
 
 @dataclass(frozen=True)
 class HangerMark:
-    """A hanger as it is drawn, and what is said of it."""
+    """A hanger as it is drawn, and what is said of it; an `arrow` where a change was found."""
 
     id: int
     x: float
     top: float
-    kind: str
+    style: str
     words: str
-    triangles: tuple[Triangle, ...]
+    arrow: str
     number: bool
     open_alerts: int
     is_quiet: bool
@@ -210,15 +181,15 @@ def elevation(hangers: Sequence[HangerGlance]) -> Elevation:
     return Elevation(width, deck + _BELOW, deck, step, round(step / 4, 1), marks)
 
 
-def kind_of(glance: HangerGlance) -> str:
-    """Return the class of a hanger's shift; none for a test of the baseline itself."""
-    shift = glance.summary.change
-    if shift is None:
-        return "unknown"
-    size = sum(abs(shift.mean) >= limit for limit in _LIMITS)
-    if size == 0:
-        return "same"
-    return f"{'lost' if shift.mean < 0 else 'gained'}{size}"
+def _untested(summary: HangerSummary) -> str:
+    return "no result yet" if summary.tests else "no test yet"
+
+
+def legend(hangers: Sequence[HangerGlance]) -> list[tuple[str, str]]:
+    """Return style and word of each state that a hanger has, the worst first."""
+    found = {each.summary.status for each in hangers}
+    untested = [(_UNTESTED, "no result yet")] if None in found else []
+    return [(each.name.lower(), each.value) for each in Status if each in found] + untested
 
 
 def shift_words(glance: HangerGlance) -> str:
@@ -227,43 +198,27 @@ def shift_words(glance: HangerGlance) -> str:
     if summary.is_baseline and summary.baseline:
         return "is the baseline"
     if (shift := summary.change) is None:
-        return "no baseline yet" if summary.latest else "no test yet"
+        return "no baseline yet" if summary.latest else _untested(summary)
     return f"{rounded_percent(shift.mean, shift.width / 2, '+')} since the baseline"
 
 
-def triangles(kind: str, x: float, base: float, hollow: bool = False) -> tuple[Triangle, ...]:
-    """Return as many triangles as the class has, one over the other from `base` up."""
-    if kind in ("same", "unknown"):
-        return ()
-    count, down, half = int(kind[-1]), kind.startswith("lost"), _TRIANGLE / 2
-    found = []
-    for index in range(count):
-        low = base - index * (_TRIANGLE + 1)
-        flat, tip = (low - _TRIANGLE + 2, low) if down else (low, low - _TRIANGLE + 2)
-        points = f"{x - half:.1f},{flat:.1f} {x + half:.1f},{flat:.1f} {x:.1f},{tip:.1f}"
-        found.append(Triangle(points, hollow))
-    return tuple(found)
-
-
 def _mark(glance: HangerGlance, x: float, top: float, number: bool) -> HangerMark:
-    kind, summary = kind_of(glance), glance.summary
-    shift = summary.change
-    hollow = shift is not None and shift.low < 0 < shift.high
+    summary, change = glance.summary, glance.summary.change
     words = [
         formatting.hanger_name(glance.hanger.id, glance.hanger.name),
+        summary.status.value if summary.status else "",
         shift_words(glance),
+        f"last test {summary.latest.time:%Y-%m-%d}" if summary.latest else "",
+        formatting.counted(summary.open_alerts, "open alert") if summary.open_alerts else "",
     ]
-    if summary.latest:
-        words.append(f"last test {summary.latest.time:%Y-%m-%d}")
-    if summary.open_alerts:
-        words.append(formatting.counted(summary.open_alerts, "open alert"))
+    arrow = "" if change is None or not summary.is_found else "▼" if change.mean < 0 else "▲"
     return HangerMark(
         id=glance.hanger.id,
         x=round(x, 1),
         top=round(top, 1),
-        kind=kind,
-        words=", ".join(words),
-        triangles=triangles(kind, x, top - 8, hollow),
+        style=summary.status.name.lower() if summary.status else _UNTESTED,
+        words=", ".join(filter(None, words)),
+        arrow=arrow,
         number=number,
         open_alerts=summary.open_alerts,
         is_quiet=glance.is_quiet,
@@ -271,13 +226,13 @@ def _mark(glance: HangerGlance, x: float, top: float, number: bool) -> HangerMar
 
 
 def _numbered(hangers: Sequence[HangerGlance], places: Sequence[float]) -> set[int]:
-    """Return the hangers with room for their number: alerts first, then those that moved."""
+    """Return the hangers with room for their number: those that need action first."""
+    order = list(Status)
 
-    def urgency(index: int) -> tuple[bool, float]:
-        glance = hangers[index]
-        change = glance.summary.change
-        moved = abs(change.mean) if change and kind_of(glance)[-1] in "23" else 0.0
-        return glance.summary.open_alerts == 0, -moved
+    def urgency(index: int) -> tuple[bool, int]:
+        summary = hangers[index].summary
+        place = order.index(summary.status) if summary.status else len(order)
+        return summary.open_alerts == 0, place
 
     chosen: set[int] = set()
     for index in sorted(range(len(hangers)), key=urgency):

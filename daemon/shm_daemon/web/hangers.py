@@ -10,7 +10,6 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, Field
 
 from shm.documents import averaged_document
 from shm.errors import NothingThere
@@ -38,95 +37,13 @@ from shm_daemon.web.hanger_view import HangerView, View
 from shm_daemon.web.models import (
     LARGEST_NUMBER,
     MOST_ROWS,
-    AveragedTension,
     FigureDocument,
     HangerNumber,
-    Hangers,
-    HangerState,
-    Posterior,
     Status,
+    document,
     paged,
-    plain,
 )
 from shm_daemon.web.site import Site, described, quarantined
-
-
-class TrendPoint(BaseModel):
-    """One test; stiffness is log10 of N m/rad, by `transverse_end_stiffness` and the like."""
-
-    test: str
-    time: datetime
-    temperature_c: float | None
-    model: str
-    tension_n: Posterior = Field(description="By the class in force alone.")
-    averaged: AveragedTension = Field(description="What figures and tables show.")
-    stiffness: dict[str, Posterior]
-
-
-class TrendEvent(BaseModel):
-    """An event of the hanger other than a test."""
-
-    at: datetime
-    kind: str = Field(description="baseline, adopted, adoption undone, alert, acknowledged")
-    who: str
-    why: str
-
-
-class CalledChange(BaseModel):
-    """A change that was called, and when it began with 90 % probability."""
-
-    called_by: str = Field(description="The test after which it was called.")
-    began_after: datetime
-    began_by: datetime
-    words: str
-
-
-class StateOverTime(BaseModel):
-    """Estimate of one quantity from all tests so far: tension in N, stiffness log10 of its unit.
-
-    It holds at the reference temperature: the effect of the temperature is taken out.
-    """
-
-    quantity: str
-    reference_temperature_c: float | None
-    times: list[datetime]
-    q05: list[float | None]
-    q50: list[float | None]
-    q95: list[float | None]
-
-
-class HangerTrend(BaseModel):
-    """A hanger over time; `states` are null while they are worked out: ask again."""
-
-    hanger: int
-    points: list[TrendPoint]
-    events: list[TrendEvent]
-    changes: list[CalledChange]
-    states: list[StateOverTime] | None
-
-
-class TestState(BaseModel):
-    """One test; what updating finds is null before it has been through it."""
-
-    __test__ = False  # no test, though named so
-
-    id: int
-    test: str
-    time: datetime
-    stage: str
-    temperature_c: float | None
-    model: str | None
-    tension_n: Posterior | None = Field(description="By the class in force alone.")
-    averaged: AveragedTension | None = Field(description="What tables show.")
-    page: str = Field(description="The address of its page.")
-
-
-class HangerTests(BaseModel):
-    """Tests of a hanger, the newest first."""
-
-    hanger: int
-    tests: list[TestState]
-    next_before: int | None = Field(description="To go on with; null at the oldest test.")
 
 
 def tension_unit(points: Sequence[StoredPoint]) -> ForceUnit:
@@ -212,21 +129,25 @@ def status(site: AtSite, _: Reader) -> Any:
     }
 
 
-@_of_all.get("/hangers", response_model=Hangers, summary="The state of all hangers")
-def hangers(site: AtSite, _: Reader) -> Any:
-    """Tension with its interval, shifts and open alerts of each hanger."""
-    return {"hangers": _now(site, site.workspace.bridge.hangers)}
+@_of_all.get("/hangers", summary="The state of all hangers")
+def hangers(site: AtSite, _: Reader) -> JSONResponse:
+    """Return state, action and urgency of each hanger, its tensions, shifts and open alerts.
+
+    `averaged` is the best estimate since the last change over all model classes, `basis` what it
+    rests on, `change` that since the baseline as a fraction, `by_latest_test` and `tension_n` what
+    the latest test gives, over all classes and by the class in force. Null before the first test.
+    """
+    return document({"hangers": _now(site, site.workspace.bridge.hangers)})
 
 
 @_of_all.get(
     "/hangers/{hanger_id}",
-    response_model=HangerState,
     responses=answers(404, 422),
     summary="The state of one hanger",
 )
-def hanger(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Any:
-    """Tension with its interval, shifts and open alerts of one hanger."""
-    return _now(site, [described(site.workspace, hanger_id)])[0]
+def hanger(site: AtSite, _: Reader, hanger_id: HangerNumber) -> JSONResponse:
+    """Return of one hanger what `/api/hangers` has of all."""
+    return document(_now(site, [described(site.workspace, hanger_id)])[0])
 
 
 def _now(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
@@ -238,7 +159,7 @@ def _now(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
     return [
         {
             "hanger": hanger.id,
-            **plain(known.summary(hanger).document),
+            **{k: v for k, v in known.summary(hanger).document.items() if k != "reason"},
             "tests": tests[hanger.id].tests if hanger.id in tests else 0,
             "latest_test_at": tests[hanger.id].time if hanger.id in tests else None,
             "nominal_tension_n": hanger.nominal_tension_n,
@@ -263,39 +184,38 @@ def _watched(latest: StoredWatch | None) -> dict[str, Any]:
     drifts = latest.watched.published_drifts if latest else ()
     creep = latest.watched.creep_per_year if latest else None
     return {
-        "shifts": plain([{key: getattr(drift, key) for key in _SHIFT} for drift in drifts]),
+        "shifts": [{key: getattr(drift, key) for key in _SHIFT} for drift in drifts],
         "creep_per_year": {"mean": creep.mean, "sd": creep.sd}
         if creep and creep.is_known
         else None,
     }
 
 
-@_of_one.get("/trend", response_model=HangerTrend, summary="Tension and end stiffness over time")
+@_of_one.get("/trend", summary="Tension and end stiffness over time")
 def trend(
     _: Reader,
     view: View,
     since: Annotated[datetime | None, Query(description="ISO 8601; all tests without it.")] = None,
-) -> Any:
-    """Every test with its posterior in numbers, the oldest first, events and states over time."""
+) -> JSONResponse:
+    """Return every test with its posterior in numbers, oldest first, events and states over time.
+
+    Stiffness is log10 of N m/rad. `states` are temperature-compensated estimates from all tests so
+    far, null while they are worked out: ask again after `Retry-After`. `changes` began with 90 %
+    probability between `began_after` and `began_by`.
+    """
     points = view.trend if since is None else list_trend(view.store, view.hanger, since)
     events = list_hanger_events(view.store, view.hanger.id, since)
-    return JSONResponse(
-        plain(
-            {
-                "hanger": view.hanger.id,
-                "points": [_point(point) for point in points],
-                "events": [
-                    {"at": e.at, "kind": e.kind.value, "who": e.who, "why": e.why} for e in events
-                ],
-                "changes": [_change(call) for call in view.calls],
-                "states": None if view.states is None else _states(view.states),
-            }
-        ),
-        headers=_headers(view),
-    )
+    found = {
+        "hanger": view.hanger.id,
+        "points": [_point(point) for point in points],
+        "events": [{"at": e.at, "kind": e.kind.value, "who": e.who, "why": e.why} for e in events],
+        "changes": [_change(call) for call in view.calls],
+        "states": None if view.states is None else _states(view.states),
+    }
+    return document(found, _headers(view))
 
 
-@_of_one.get("/tests", response_model=HangerTests, summary="The tests of a hanger")
+@_of_one.get("/tests", summary="The tests of a hanger")
 def some_tests(
     _: Reader,
     view: View,
@@ -304,10 +224,14 @@ def some_tests(
         int | None,
         Query(ge=0, le=LARGEST_NUMBER, description="`next_before` of the answer before."),
     ] = None,
-) -> Any:
-    """Return the newest first; those before a test where `before` names its number."""
+) -> JSONResponse:
+    """Return the newest first; those before a test where `before` names its number.
+
+    `next_before` goes on, null at the oldest test; `page` is the address of a test's page.
+    """
     shown, older = paged(lines_before(view, limit + 1, before), limit)
-    return {"hanger": view.hanger.id, "tests": list(map(_test, shown)), "next_before": older}
+    tests = list(map(_test, shown))
+    return document({"hanger": view.hanger.id, "tests": tests, "next_before": older})
 
 
 @_of_one.get(
@@ -320,13 +244,13 @@ def figure(
 ) -> JSONResponse:
     """Return a plotly document with its caption; with `Retry-After` where it is not whole yet."""
     found = next((each for each in FIGURES if each.member.name == name), None)
-    document = found.document(view) if found else None
-    if found is None or document is None:
+    drawing = found.document(view) if found else None
+    if found is None or drawing is None:
         known = ", ".join(each.member.name for each in FIGURES if each.specify(view)) or "none"
         raise NothingThere(
             f"hanger {view.hanger.id} has no figure {name}.", remedy=f"Figures: {known}."
         )
-    made = JSONResponse(document)
+    made = JSONResponse(drawing)
     made.headers.update(_headers(view) if found.shows_states else {})
     return made
 
@@ -378,10 +302,10 @@ def _test(line: ModalTestRow) -> dict[str, Any]:
         "test": line.name,
         "time": line.row.time,
         "stage": line.row.stage.value,
-        "temperature_c": plain(point.temperature_c) if point else None,
+        "temperature_c": point.temperature_c if point else None,
         "model": point.model if point else None,
         "tension_n": vars(point.tension_n) if point else None,
-        "averaged": plain(averaged_document(point.averaged)) if point else None,
+        "averaged": averaged_document(point.averaged) if point else None,
         "page": line.address,
     }
 

@@ -1,7 +1,6 @@
 """Health: what stops the work, and what only limits it.
 
-`/health` answers for load balancers and service managers even while the pages are being loaded, so
-that nothing here may import what they need.
+`/health` answers load balancers and service managers.
 """
 
 from __future__ import annotations
@@ -48,50 +47,59 @@ def health_document(site: Site) -> tuple[int, dict[str, Any]]:
 
 def troubles(site: Site) -> list[str]:
     """Return the reasons why work has stopped; empty if all is well."""
-    return _found(site, _store, _folders, _disk, _daemon)
+    return _states(_found(site, _store, _folders, _full_disk, _daemon))
 
 
 def limits(site: Site) -> list[str]:
     """Return the reasons why work differs from its description; empty if all is well."""
-    return _found(site, _of_description, _of_strangers, _of_backlog, _of_disk)
+    return _states(_found(site, _description, _undescribed, _backlog, _nearly_full_disk))
 
 
 def attention(site: Site) -> list[str]:
     """Return what a person should look at although nothing fails."""
-    return _found(site, _held, _never_taken, _of_streams)
+    return _states(_found(site, _held, _never_taken, _streams))
 
 
 def notices(site: Site) -> list[Lead]:
-    """Return the notices at the top of every page: limits of the work, with their remedies.
+    """Return the notices at the top of every page: limits of the work, with their remedies."""
+    checks = (_last_turn, _nearly_full_disk, _description, _undescribed, _silences, _stream_leads)
+    return [each for each in _found(site, *checks) if isinstance(each, Lead)]
 
-    A page is shown whatever befalls this.
+
+def _states(found: Sequence[str | Lead]) -> list[str]:
+    return [each if isinstance(each, str) else each.state for each in found]
+
+
+def _found(site: Site, *checks: Callable[[Site], Sequence[str | Lead]]) -> list[str | Lead]:
+    """Return the findings of all checks; a check that fails does not stop the others.
+
+    One that the store fails says nothing: the check of the store does.
     """
-    try:
-        return [
-            *_of_daemon(site),
-            *_of_disk(site),
-            *_of_description(site),
-            *_of_strangers(site),
-            *_of_silences(site),
-            *_of_streams_and_ring(site),
-        ]
-    except Exception:
-        log.exception("the notices of a page cannot be made")
-        return []
+    found: list[str | Lead] = []
+    for check in checks:
+        try:
+            found += check(site)
+        except ShmError as error:
+            log.error("%s", error)
+        except Exception:
+            log.exception("a check of /health failed")
+            name = check.__name__.strip("_").replace("_", " ")
+            found.append(f"The check of the {name} failed; the log says more.")
+    return found
 
 
-def _of_daemon(site: Site) -> list[Lead]:
+def _last_turn(site: Site) -> list[Lead]:
     if silence := _silence(site):
         action = "Until it runs again (`shm daemon`), recordings wait and no alert is raised."
         return [Lead(silence, action)]
     failed = why_turn_failed(site.workspace).replace(f"{site.workspace.folder}{os.sep}", "")
     if not failed:
         return []
-    action = "What it names waits until that is mended; it is tried again each minute."
+    action = "What it names waits until that is fixed; it is tried again each minute."
     return [Lead(f"The daemon's last turn failed: {sentence(failed)}", action)]
 
 
-def _of_description(site: Site) -> list[Lead]:
+def _description(site: Site) -> list[Lead]:
     fault = site.fault
     if fault is None:
         return []
@@ -101,11 +109,9 @@ def _of_description(site: Site) -> list[Lead]:
     return [Lead(state, fault.remedy or "Correct the file; `shm doctor` looks at it again.")]
 
 
-def _of_strangers(site: Site) -> list[Lead]:
-    try:
-        tested = count_tests(site.store).keys()
-    except ShmError:
-        return []  # told as a trouble
+def _undescribed(site: Site) -> list[Lead]:
+    """Return that hangers with tests are not described."""
+    tested = count_tests(site.store).keys()
     missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.watched})
     if not missing:
         return []
@@ -118,12 +124,9 @@ def _of_strangers(site: Site) -> list[Lead]:
     ]
 
 
-def _of_silences(site: Site) -> list[Lead]:
-    try:
-        now = utc_now()
-        found = [each for each in site.store.silences.list_all() if each.is_in_force(now)]
-    except ShmError:
-        return []  # told as a trouble
+def _silences(site: Site) -> list[Lead]:
+    now = utc_now()
+    found = [each for each in site.store.silences.list_all() if each.is_in_force(now)]
     return [
         Lead(
             f"{text[0].upper()}{text[1:]}.",
@@ -135,40 +138,17 @@ def _of_silences(site: Site) -> list[Lead]:
     ]
 
 
-def _of_streams_and_ring(site: Site) -> Sequence[Lead]:
-    try:
-        return stream_leads(site.workspace, site.store, utc_now())
-    except ShmError:
-        return []  # told as a trouble
+def _stream_leads(site: Site) -> Sequence[Lead]:
+    return stream_leads(site.workspace, site.store, utc_now())
 
 
-def _of_streams(site: Site) -> Sequence[Lead]:
-    try:
-        return leads_of(heard(site.workspace, site.store, utc_now()))
-    except ShmError:
-        return []  # told as a trouble
+def _streams(site: Site) -> Sequence[Lead]:
+    return leads_of(heard(site.workspace, site.store, utc_now()))
 
 
-def _of_backlog(site: Site) -> Sequence[Lead]:
+def _backlog(site: Site) -> Sequence[Lead]:
     """Return what is not read of the streams."""
-    try:
-        found = heard(site.workspace, site.store, utc_now())
-    except ShmError:
-        return []  # told as a trouble
-    return [*backlog_leads(found)]
-
-
-def _found(site: Site, *checks: Callable[[Site], Sequence[str | Lead]]) -> list[str]:
-    """Return the findings of all checks; a check that fails does not stop the others."""
-    found = []
-    for check in checks:
-        try:
-            found += [each if isinstance(each, str) else each.state for each in check(site)]
-        except Exception:
-            log.exception("a check of /health failed")
-            name = check.__name__.removeprefix("_of").strip("_")
-            found.append(f"The check of the {name} failed; the log says more.")
-    return found
+    return [*backlog_leads(heard(site.workspace, site.store, utc_now()))]
 
 
 def _store(site: Site) -> list[str]:
@@ -191,7 +171,7 @@ def _folders(site: Site) -> list[str]:
     ]
 
 
-def _disk(site: Site, full_bytes: int = 32 << 20) -> list[str]:
+def _full_disk(site: Site, full_bytes: int = 32 << 20) -> list[str]:
     """Return that the disk is full: the largest chunk of a stream has no room on it.
 
     A daemon on a full disk cannot even write that its turn failed.
@@ -205,9 +185,9 @@ def _disk(site: Site, full_bytes: int = 32 << 20) -> list[str]:
     return [f"The disk is full: {free / 1e6:.0f} MB are free{waits}."]
 
 
-def _of_disk(site: Site) -> list[Lead]:
+def _nearly_full_disk(site: Site) -> list[Lead]:
     free = shutil.disk_usage(site.workspace.folder).free
-    if _disk(site) or free >= NEARLY_FULL * site.workspace.settings.min_free_bytes:
+    if _full_disk(site) or free >= NEARLY_FULL * site.workspace.settings.min_free_bytes:
         return []
     return [
         Lead(
@@ -238,10 +218,7 @@ def _daemon(site: Site) -> list[str]:
 
 
 def _held(site: Site) -> list[str]:
-    try:
-        holds = list_holds(site.store)
-    except ShmError:
-        return []  # told as a trouble
+    holds = list_holds(site.store)
     of_hangers: dict[int, list[int]] = {}
     for hold in holds:
         of_hangers.setdefault(hold.hanger, []).append(hold.recording_id)

@@ -239,7 +239,7 @@ def health(site: AtSite) -> Any:
 
     What works, though not as it is described now, is `degraded` and answers 200.
     """
-    status, document = health_document(site)  # `front` has answered already, where it stands before
+    status, document = health_document(site)
     return JSONResponse(document, status)
 
 

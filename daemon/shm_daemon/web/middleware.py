@@ -1,25 +1,18 @@
-"""Around every request: whose Host it names, which headers protect the answer, a line in the log.
+"""Wrap every request: whose Host it names, which headers protect the answer, a line in the log.
 
-Plain ASGI: what wraps requests the comfortable way would hold uploads in memory.
-
-What stands before the pages: answers `/health` by itself and sees that no caller takes it all.
-
-It is there within a second or two; the pages, with all that draws and computes, are loaded behind
-it, and whoever wants one of them waits so long. Where callers keep every place of the pages taken,
-uploads, sign-ins, `/metrics` and `/health` still have places of their own.
+Plain ASGI: what wraps requests the comfortable way would hold uploads in memory. `/health` is
+answered here, and no caller takes all places: where callers keep those of the pages taken, uploads,
+sign-ins, `/metrics` and `/health` still have places of their own.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
@@ -105,10 +98,7 @@ def is_https(scope: Scope) -> bool:
 HEALTH, METRICS = "/health", "/metrics"
 
 
-# Technical: within the 10 s that Prometheus waits by default; many times the few seconds that
-# loading takes; a few askings meanwhile.
-_LONGEST_CHECK_S = 5.0
-_LONGEST_LOADING_S = 120.0
+_LONGEST_CHECK_S = 5.0  # technical: within the 10 s that Prometheus waits by default
 _AGAIN_S = 5
 _LONGEST_BODY_BYTES = 65_536
 """Of what is no upload: a reason for an acknowledgement has 2,000 characters at most."""
@@ -129,57 +119,23 @@ passwords, which wait in line for a thread of their own.
 """
 
 
-@dataclass(frozen=True)
-class Pages:
-    """The pages behind the front: how they are loaded, warmed up and ended."""
-
-    app: ASGIApp
-    close: Callable[[], None]
-    warm_up: Callable[[], None]
-
-
 class LimitMiddleware:
-    """An ASGI app before another, which `load` makes beside: the ways in are open meanwhile."""
+    """Answer `/health`, and pass on as many requests of a kind at once as have a place."""
 
-    def __init__(self, site: Site, load: Callable[[], Pages], *, warms_up: bool = False):
-        # Of its own: the pages may keep all connections to the store busy.
-        self._site, self._load, self._warms_up = site.twin(), load, warms_up
-        self._pages: Pages | None = None
-        self._failed = False
+    def __init__(self, app: ASGIApp, site: Site):
+        self._app = app
+        self._site = site.twin()  # the pages may keep all connections to the store busy
         self._taken: Counter[Kind] = Counter()
         self._checking: asyncio.Task[tuple[int, dict[str, Any]]] | None = None
         self._checker = ThreadPoolExecutor(1, "health")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
-            await self._live(receive, send)
+            await self._app(scope, receive, send)
+            self._checker.shutdown(wait=False, cancel_futures=True)
+            self._site.close()
         elif scope["type"] == "http":
             await self._answer(scope, receive, send)
-
-    async def _live(self, receive: Receive, send: Send) -> None:
-        await receive()
-        loop, self._loaded = asyncio.get_running_loop(), asyncio.Event()
-        thread = threading.Thread(target=self._load_pages, args=(loop,), name="load", daemon=True)
-        thread.start()
-        await send({"type": "lifespan.startup.complete"})
-        await receive()
-        if self._pages is not None:
-            await loop.run_in_executor(None, self._pages.close)
-        self._checker.shutdown(wait=False, cancel_futures=True)
-        self._site.close()
-        await send({"type": "lifespan.shutdown.complete"})
-
-    def _load_pages(self, loop: asyncio.AbstractEventLoop) -> None:
-        # With no lower priority: a thread that the system lets wait would keep Python's lock.
-        try:
-            self._pages = self._load()
-        except Exception:
-            self._failed = True
-            log.exception("the pages cannot be loaded")
-        with suppress(RuntimeError):  # the loop has ended meanwhile
-            loop.call_soon_threadsafe(self._loaded.set)
-        if self._pages is not None and self._warms_up:
-            self._pages.warm_up()
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         path, method = scope["path"], scope["method"]
@@ -199,27 +155,14 @@ class LimitMiddleware:
                 return
             receive = whole
         if self._taken[kind] >= PLACES[kind]:
-            headers = f"Too many requests at once: all places of {kind} are taken."
-            await _fault(503, headers, "Try again in some seconds.")(scope, receive, send)
+            message = f"Too many requests at once: all places of {kind} are taken."
+            await _fault(503, message, "Try again in some seconds.")(scope, receive, send)
             return
         self._taken[kind] += 1
         try:
-            await self._pass_on(scope, receive, send)
+            await self._app(scope, receive, send)
         finally:
             self._taken[kind] -= 1
-
-    async def _pass_on(self, scope: Scope, receive: Receive, send: Send) -> None:
-        try:
-            async with asyncio.timeout(_LONGEST_LOADING_S):
-                await self._loaded.wait()
-        except TimeoutError:
-            log.warning("the pages are still being loaded")
-        if self._pages is None:
-            state = "failed to load" if self._failed else "are still being loaded"
-            refusal = _fault(503, f"The pages {state}.", "The log of the web interface says more.")
-            await refusal(scope, receive, send)
-            return
-        await self._pages.app(scope, receive, send)
 
     async def _health(self) -> tuple[int, dict[str, Any]]:
         """Return the state of health, shared by simultaneous callers, without a hung store."""
@@ -234,11 +177,7 @@ class LimitMiddleware:
 
     async def _check(self) -> tuple[int, dict[str, Any]]:
         loop = asyncio.get_running_loop()
-        status, document = await loop.run_in_executor(self._checker, health_document, self._site)
-        if self._failed:
-            reasons = ["The pages cannot be shown: they failed to load.", *document["reasons"]]
-            return 503, {"status": "failing", "reasons": reasons}
-        return status, document
+        return await loop.run_in_executor(self._checker, health_document, self._site)
 
 
 def is_upload(scope: Mapping[str, object]) -> bool:

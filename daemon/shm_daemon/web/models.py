@@ -1,4 +1,8 @@
-"""The documents that the interface answers with. Unknown numbers are null."""
+"""What addresses and bodies may hold, and the documents of what a program sends or waits for.
+
+Documents that are only read are dictionaries of the very values that report and `--json` show; each
+route says what is in them. Unknown numbers are null.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ from typing import Annotated, Any, Literal, Protocol, TypeVar
 
 import numpy as np
 from fastapi import Path, Query
+from fastapi.responses import JSONResponse
 from pydantic import AfterValidator, BaseModel, Field
 
 
@@ -92,86 +97,6 @@ class Recordings(BaseModel):
     """Recordings that were asked for."""
 
     recordings: list[RecordingStatus]
-
-
-class Posterior(BaseModel):
-    """A posterior in numbers; `q05` and `q95` bound 90 % of it."""
-
-    mean: float
-    sd: float
-    q05: float
-    q50: float
-    q95: float
-
-
-class Quantity(Posterior):
-    """A posterior in numbers, and where it is most probable."""
-
-    map: float
-
-
-class Shift(BaseModel):
-    """Shift of a quantity from its baseline: a fraction of the tension, decades of a spring."""
-
-    quantity: str
-    shift_mean: float | None
-    shift_sd: float | None
-    threshold: float | None
-    probability: float | None = Field(description="Probability of a shift beyond the threshold.")
-
-
-class AveragedTension(BaseModel):
-    """The tension over all model classes, each with its probability; its interval is absolute."""
-
-    tension_n: Posterior
-    repeatability_sd_n: float | None = Field(
-        description="Standard deviation for comparing two tests."
-    )
-    probability_above_limit: float | None = Field(description="Null where no limit is set.")
-    probability_slack: float | None = Field(description="Null where no limit is set.")
-    caveats: list[str] = Field(description="What limits its use.")
-
-
-class Creep(BaseModel):
-    """Creep rate of the tension: a fraction a year, below 0 if it relaxes."""
-
-    mean: float
-    sd: float
-
-
-class Message(BaseModel):
-    """The lead, the same on every surface; `status` is null if nothing is known."""
-
-    status: Literal["alert", "watch", "check", "unclear", "steady", "first"] | None
-    state: str = Field(description="The state, with its interval.")
-    action: str = Field(description="What to do, and how soon.")
-    urgency: Literal["none", "next_test", "week", "today"]
-    notes: list[str] = Field(description="Actions of people.")
-
-
-class HangerState(Message):
-    """State of a hanger after its latest test; null or empty before the first."""
-
-    hanger: int
-    tests: int
-    latest_test_at: datetime | None
-    model: str | None
-    nominal_tension_n: float
-    tension_n: Quantity | None = Field(description="By the latest test and class in force alone.")
-    averaged: AveragedTension | None = Field(description="Best estimate since the last change.")
-    basis: str = Field(description="What that estimate rests on.")
-    change: Bounded | None = Field(description="Of the tension since the baseline, a fraction.")
-    by_latest_test: AveragedTension | None = Field(description="By the latest test alone.")
-    baseline_set_at: datetime | None
-    shifts: list[Shift]
-    creep_per_year: Creep | None = Field(description="Null if the tests do not show it.")
-    open_alerts: int
-
-
-class Hangers(BaseModel):
-    """All hangers of the bridge."""
-
-    hangers: list[HangerState]
 
 
 class DeliveryState(BaseModel):
@@ -263,59 +188,6 @@ class Health(BaseModel):
     )
 
 
-class HeldRecording(BaseModel):
-    """A recording that counts in nothing until a person decides, and why."""
-
-    recording: int
-    file: str
-    hanger: int
-    held_at: datetime
-    message: str
-
-
-class RefusedFile(BaseModel):
-    """A file in the quarantine, and why it is there."""
-
-    file: str
-    message: str
-    remedy: str
-    at: datetime | None
-
-
-class Operation(BaseModel):
-    """Operation; `troubles` is empty if the work goes on."""
-
-    troubles: list[str]
-    daemon: str | None = Field(description="The active daemon; null if there is none.")
-    daemon_seen_seconds_ago: float | None
-    recordings: dict[str, int] = Field(description="How many are at each stage.")
-    spool: int
-    oldest_waiting_at: datetime | None
-    deliveries: dict[str, int]
-    held: list[HeldRecording]
-    quarantine: list[RefusedFile] = Field(description="The newest first, at most 100.")
-    quarantined: int
-    disk_free_bytes: int
-    disk_bytes: int
-    version: str
-    python: str
-
-
-class Finding(BaseModel):
-    """Result of one check of `shm doctor`."""
-
-    check: str
-    level: Literal["ok", "unknown", "warning", "fault"]
-    found: str
-    remedy: str
-
-
-class Examination(BaseModel):
-    """All checks of `shm doctor`."""
-
-    findings: list[Finding]
-
-
 class FigureDocument(BaseModel):
     """A figure as plotly draws it, with its words."""
 
@@ -331,47 +203,9 @@ class Underway(BaseModel):
     message: str
 
 
-class Bounded(BaseModel):
-    """A mean; `low` and `high` bound 90 %."""
-
-    mean: float
-    low: float
-    high: float
-
-
-class HangerAtAGlance(Message):
-    """One hanger as the page of the bridge shows it; null before its first test."""
-
-    hanger: int
-    name: str
-    length_m: float
-    nominal_tension_n: float
-    tests: int
-    latest_test: str | None
-    latest_test_at: datetime | None
-    model: str | None
-    tension_n: Bounded | None
-    shift: Bounded | None = Field(
-        description="Of the tension since the baseline, a fraction; null where there is no "
-        "baseline, or the latest test is of it."
-    )
-    called: str = Field(description="Changes called since the baseline; empty where none was.")
-    open_alerts: int
-    warnings: list[str] = Field(description="Faults of the baseline.")
-
-
-class BridgeState(Message):
-    """The whole bridge: its message is that of its most urgent hanger."""
-
-    bridge: str
-    hangers: list[HangerAtAGlance]
-
-
-class Moved(BaseModel):
-    """Changes over the bridge in words, and possible explanations."""
-
-    sentence: str
-    explanations: dict[str, float] = Field(description="The probability of each explanation.")
+def document(found: Mapping[str, Any], headers: Mapping[str, str] | None = None) -> JSONResponse:
+    """Return a document as the answer of a route."""
+    return JSONResponse(plain(found), headers=headers)
 
 
 def plain(value: Any) -> Any:

@@ -1,15 +1,11 @@
-"""Asks the dashboards of other bridges how they are: side by side, briefly, and never elsewhere.
-
-What a bridge said last is kept in memory, with its age, for when it cannot be asked.
-"""
+"""Ask the dashboards of other bridges how they are: side by side, briefly, and never elsewhere."""
 
 from __future__ import annotations
 
 import json
 import logging
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, replace
+from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta
 from pathlib import Path
 from threading import Lock
@@ -20,36 +16,42 @@ from shm.documents import ValidationError, value_of
 from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm.values.messages import Lead
-from shm_daemon.heartbeat import duration_words
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.http_client import HttpClient, NoAnswer
 from shm_daemon.web.address import SUMMARY
 from shm_daemon.web.bridge_summary import BridgeRow, Summary
 
 # Judgement: a page takes a second, over a poor line a few; who looks at a page waits no longer.
-LONGEST_S = 10.0
-_PAGE_WAITS_S = 4.0
+LONGEST_S, _PAGE_WAITS_S = 10.0, 4.0
 _FRESH_FOR = timedelta(seconds=15)
 """So often at most is a bridge asked: a wrong token is throttled from ten times a minute on."""
 _SIDE_BY_SIDE = 32  # technical: threads; each waits for the network
-_LARGEST_BYTES = 65_536  # technical: a summary has some 1,000, with every hanger's damage 20,000
+_LARGEST_BYTES = 65_536  # technical: a summary has some 1,000
 
 _LOOK = "See today that its machine and `shm web` run there, and that the address is right."
 _MAKE_ONE = "Make a token with `shm token create all-bridges --scope read` there"
 
-
 log = logging.getLogger(__name__)
 
 
-class NotTold(ShmError):
+class NotReached(ShmError):
     """A bridge did not say how it is."""
 
 
 def ask(
     bridge: OtherBridge, folder: Path, client: HttpClient, timeout_s: float = LONGEST_S
 ) -> Summary:
-    """Return the summary of another bridge; `folder` is that of our workspace. Raises NotTold."""
+    """Return the summary of another bridge; `folder` is that of our workspace.
+
+    Raises NotReached.
+    """
     headers = {"Accept": "application/json", "User-Agent": "shm", **_token(bridge, folder)}
+    trusted = folder / bridge.certificate_file if bridge.certificate_file else None
+    if trusted is not None and not trusted.is_file():
+        raise NotReached(
+            f"There is no file {bridge.certificate_file}.",
+            remedy="Put the certificate of its authority there, as a PEM file.",
+        )
     try:
         answer = client.send(
             "GET",
@@ -57,13 +59,14 @@ def ask(
             timeout_s,
             _LARGEST_BYTES,
             headers=headers,
-            verify=_certificate(bridge, folder),
+            verify=str(trusted) if trusted else True,
         )
     except NoAnswer as error:
-        raise _failure(error) from None
-    if answer.is_cut:
-        raise _no_shm(f"more than {_LARGEST_BYTES // 1024} kB")
-    return _judged(bridge, answer.status, answer.body)
+        remedy = _LOOK
+        if error.is_untrusted:
+            remedy = "Name the certificate of its authority in bridge.toml: certificate_file."
+        raise NotReached(f"No connection: {error.reason}.", remedy=remedy) from None
+    return _parse(bridge, answer.status, answer.body)
 
 
 def _token(bridge: OtherBridge, folder: Path) -> dict[str, str]:
@@ -74,39 +77,15 @@ def _token(bridge: OtherBridge, folder: Path) -> dict[str, str]:
     except (OSError, UnicodeDecodeError):
         token = ""
     if not token or not token.isprintable():
-        raise NotTold(
+        raise NotReached(
             f"Its token cannot be read from {bridge.token_file}.",
             remedy=f"{_MAKE_ONE}, and write it alone into that file, readable for this user.",
         )
     return {"Authorization": f"Bearer {token}"}
 
 
-def _certificate(bridge: OtherBridge, folder: Path) -> str | bool:
-    if not bridge.certificate_file:
-        return True
-    path = folder / bridge.certificate_file
-    if not path.is_file():
-        raise NotTold(
-            f"There is no file {bridge.certificate_file}.",
-            remedy="Put the certificate of its authority there, as a PEM file.",
-        )
-    return str(path)
-
-
-def _failure(error: NoAnswer) -> NotTold:
-    if error.is_late:
-        return NotTold(f"{error.reason.capitalize()}.", remedy=_LOOK)
-    if error.is_untrusted:
-        return NotTold(
-            f"Its certificate is not trusted ({error.reason}).",
-            remedy="Have it renewed or, where an authority of your own made it, name that "
-            "authority's certificate in bridge.toml: certificate_file.",
-        )
-    return NotTold(f"The connection failed ({error.reason}).", remedy=_LOOK)
-
-
-def _judged(bridge: OtherBridge, status: int, body: bytes) -> Summary:
-    """Return the summary of an answer; raises NotTold."""
+def _parse(bridge: OtherBridge, status: int, body: bytes) -> Summary:
+    """Return the summary of an answer; raises NotReached."""
     try:
         found = json.loads(body)
     except (ValueError, RecursionError):
@@ -117,126 +96,65 @@ def _judged(bridge: OtherBridge, status: int, body: bytes) -> Summary:
             return value_of(Summary, document)
         except ValidationError:
             theirs = one_line(str(document["version"]))[:20]
-            raise NotTold(
+            raise NotReached(
                 f"Its shm {theirs} and this {shm.__version__} do not understand each other.",
                 remedy="Upgrade the older of the two.",
             ) from None
-    if 300 <= status < 400:
-        remedy = "It is not followed: write the dashboard's own address into bridge.toml."
-        raise NotTold("Its address sends elsewhere.", remedy=remedy)
+    if status == 401 and document:
+        where = bridge.token_file or "a file, and name that in bridge.toml: token_file"
+        problem = f"It refuses the token of {where}" if bridge.token_file else "It asks for a token"
+        raise NotReached(f"{problem}.", remedy=f"{_MAKE_ONE}. Write it into {where}.")
     if status == 200 or "message" not in document:
-        raise _no_shm(f"{status}")
-    if status == 401:
-        problem, where = "It asks for a token", "a file, and name that in bridge.toml: token_file"
-        if bridge.token_file:
-            problem, where = f"It refuses the token of {bridge.token_file}", bridge.token_file
-        raise NotTold(f"{problem}.", remedy=f"{_MAKE_ONE}. Write it into {where}.")
-    if status == 404:
-        raise NotTold("Its shm is older than this one.", remedy=f"Upgrade it to {shm.__version__}.")
+        raise NotReached(
+            f"Something else than shm answers at its address ({status}).",
+            remedy="Correct its address in bridge.toml; another that it sends to is not asked.",
+        )
     problem, remedy = (one_line(str(document.get(key, ""))) for key in ("message", "remedy"))
-    raise NotTold(f"It answers {status}: {problem}", remedy=remedy or _LOOK)
-
-
-def _no_shm(answered: str) -> NotTold:
-    return NotTold(
-        f"Something else than shm answers at its address ({answered}).",
-        remedy="Correct its address in bridge.toml.",
-    )
-
-
-@dataclass(frozen=True)
-class _Known:
-    """State of another bridge; `failing_since` is None if it answered the last time."""
-
-    asked_at: datetime
-    summary: Summary | None = None
-    answered_at: datetime | None = None
-    failing_since: datetime | None = None
-    why: Lead | None = None
+    raise NotReached(f"It answers {status}: {problem}", remedy=remedy or _LOOK)
 
 
 class OtherBridges:
     """Latest summaries of other bridges. May be used from many threads."""
 
-    def __init__(
-        self,
-        timeout_s: float = LONGEST_S,
-        page_waits_s: float = _PAGE_WAITS_S,
-        clock: Callable[[], datetime] = utc_now,
-    ):
-        self._timeout_s, self._page_waits_s, self._clock = timeout_s, page_waits_s, clock
+    def __init__(self, timeout_s: float = _PAGE_WAITS_S, clock: Callable[[], datetime] = utc_now):
+        self._timeout_s, self._clock = timeout_s, clock
         self._client, self._lock = HttpClient(), Lock()
-        self._pool = ThreadPoolExecutor(_SIDE_BY_SIDE, "bridges")
-        self._known: dict[OtherBridge, _Known] = {}
-        self._asking: dict[OtherBridge, Future[None]] = {}
+        self._known: dict[OtherBridge, BridgeRow] = {}
 
     def rows(self, bridges: Sequence[OtherBridge], folder: Path) -> list[BridgeRow]:
-        """Return each bridge as it is now or, if it does not answer in time, as it was last."""
-        now = self._clock()
+        """Return each bridge as it is now; those that do not answer in time with the reason."""
         with self._lock:
-            for each in bridges:
-                known = self._known.get(each)
-                is_due = known is None or now - known.asked_at >= _FRESH_FOR
-                if is_due and each not in self._asking:
-                    self._asking[each] = self._pool.submit(self._note, each, folder, now)
-            asked = [self._asking[each] for each in bridges if each in self._asking]
-        wait(asked, self._page_waits_s)
-        with self._lock:
-            return [self._row(each, self._known.get(each), now) for each in bridges]
+            now = self._clock()
+            fresh = {k: row for k, row in self._known.items() if now - row.asked_at < _FRESH_FOR}
+            due = [each for each in dict.fromkeys(bridges) if each not in fresh]
+            if due:
+                with ThreadPoolExecutor(min(len(due), _SIDE_BY_SIDE), "bridges") as pool:
+                    asked = pool.map(lambda each: self._ask(each, folder, now), due)
+                    fresh |= zip(due, asked, strict=True)
+            self._known = fresh
+            return [fresh[each] for each in bridges]
 
     def close(self) -> None:
         """Break off what is being asked."""
         self._client.close()
-        self._pool.shutdown(wait=False, cancel_futures=True)
 
-    def _note(self, bridge: OtherBridge, folder: Path, now: datetime) -> None:
+    def _ask(self, bridge: OtherBridge, folder: Path, now: datetime) -> BridgeRow:
+        address = f"{bridge.address}/"
         try:
             summary = ask(bridge, folder, self._client, self._timeout_s)
-            found, why = _Known(now, summary, self._clock()), None
-        except NotTold as error:
-            found, why = _Known(now), Lead(error.message, error.remedy)
+            return BridgeRow(bridge.name, address, summary, now)
+        except NotReached as error:
+            why = Lead(error.message, error.remedy)
         except Exception:
             log.exception("%s cannot be asked", bridge.name)
-            found, why = _Known(now), Lead("An internal error.", "The log says more.")
-        with self._lock:
-            before = self._known.get(bridge)
-            if why is not None:
-                since = (before and before.failing_since) or now
-                found = replace(before or found, asked_at=now, failing_since=since, why=why)
-            self._known[bridge] = found
-            del self._asking[bridge]
-
-    def _row(self, bridge: OtherBridge, known: _Known | None, now: datetime) -> BridgeRow:
-        why = known.why if known else None
-        if why is None and bridge in self._asking:
-            why = Lead(
-                f"No answer within {self._page_waits_s:g} s.",
-                "It is still being asked: open this page again in some seconds.",
-            )
-        trouble = _lead(bridge, known, why, now) if why else None
-        answered_at = known.answered_at if known else None
-        return BridgeRow(
-            bridge.name,
-            f"{bridge.address}/",
-            known.summary if known else None,
-            answered_at,
-            trouble,
-        )
-
-
-def _lead(bridge: OtherBridge, known: _Known | None, why: Lead, now: datetime) -> Lead:
-    """Return the message that a bridge is not reached, since when and why."""
-    since = "is not reached"
-    if known and known.answered_at:
-        since = f"has not been reached for {duration_words(now - known.answered_at)}"
-    elif known and known.failing_since and now - known.failing_since > _FRESH_FOR:
-        since = f"has not been reached for at least {duration_words(now - known.failing_since)}"
-    return Lead(f"{bridge.name} {since}: {why.state[0].lower()}{why.state[1:]}", why.action)
+            why = Lead("An internal error.", "The log says more.")
+        state = f"{bridge.name} is not reached: {why.state[0].lower()}{why.state[1:]}"
+        return BridgeRow(bridge.name, address, None, now, Lead(state, why.action))
 
 
 def ask_all(bridges: Sequence[OtherBridge], folder: Path) -> list[BridgeRow]:
     """Return all bridges asked once, as long as each may take."""
-    asking = OtherBridges(page_waits_s=LONGEST_S + 1.0)
+    asking = OtherBridges(LONGEST_S)
     try:
         return asking.rows(bridges, folder)
     finally:

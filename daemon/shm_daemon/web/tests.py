@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Path, Query, Request
 from fastapi.responses import JSONResponse, Response
-from pydantic import BaseModel, Field
 
 from shm import modes_document
 from shm.errors import NothingThere
@@ -23,7 +22,7 @@ from shm_daemon.web.address import name_in
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
 from shm_daemon.web.modal_test_view import AT_WORK, FIGURES, ModalTestView
-from shm_daemon.web.models import FigureDocument, HangerNumber, Underway
+from shm_daemon.web.models import FigureDocument, HangerNumber, Underway, document
 from shm_daemon.web.site import described
 
 _AT_ONCE_S = 0.05  # what would be rounded to 0.0 s
@@ -113,105 +112,6 @@ def _after(at: datetime, then: datetime | None) -> str:
     return f"{formatting.plain(seconds / 3600)} h"
 
 
-class Check(BaseModel):
-    """One figure of the test's quality beside its limit."""
-
-    name: str
-    verdict: Literal["good", "warning", "refused", "unknown"]
-    value: float | None
-    limit: float | None
-    unit: str
-    found: str
-    remedy: str
-
-
-class RawFile(BaseModel):
-    """The raw file of a test."""
-
-    file_name: str
-    sha256: str
-    size_bytes: int
-    received_at: datetime
-    archived: bool = Field(description="Whether the raw file is still in the archive.")
-
-
-class LineageState(BaseModel):
-    """The lineage of a result."""
-
-    input_sha256: str
-    settings_sha256: str
-    version: str
-
-
-class StepState(BaseModel):
-    """A stage that the file, or the test, has reached."""
-
-    stage: str
-    at: datetime
-    version: str | None
-
-
-class Former(BaseModel):
-    """A result that a later run has replaced."""
-
-    what: Literal["identification", "posterior"]
-    model: str | None
-    made_at: datetime
-    superseded_at: datetime
-    lineage: LineageState
-
-
-class TestState(BaseModel):
-    """One test as it is stored."""
-
-    test: dict[str, Any] = Field(description="An entry of a modal-tests document (shm.modes/1).")
-    hanger: int
-    time: datetime = Field(description="The test's own or, where it has none, that of receipt.")
-    stage: str
-    verdict: Literal["good", "warning", "refused", "unknown"]
-    summary: str
-    quality: list[Check]
-    set_aside: list[dict[str, Any]]
-    notes: list[str]
-    responses: list[str] = Field(description="The points of the stored frequency response.")
-    file: RawFile
-    lineage: LineageState
-    steps: list[StepState]
-    superseded: list[Former]
-    previous: str | None = Field(description="The name of the hanger's test before this one.")
-    next: str | None
-    missing: str = Field(
-        description="Why there is no more than the store holds; empty where the raw file can be "
-        "identified once more."
-    )
-    figures: list[str] = Field(description="Names for `/figures/{name}`.")
-
-
-class HitState(BaseModel):
-    """One hit of the hammer; `record` counts from 0."""
-
-    record: int
-    start_s: float
-    peak_force_n: float
-    used: bool
-    reason: str = Field(description="Why it was dropped; empty where it was used.")
-
-
-class DroppedState(BaseModel):
-    """Other excluded data, with the reason."""
-
-    what: str
-    count: int
-    reason: str
-
-
-class Hits(BaseModel):
-    """The hits of a test and all that was left out."""
-
-    hits: list[HitState]
-    dropped: list[DroppedState]
-
-
 # Status as RFC 9110 defines it.
 _LATER: dict[int | str, dict[str, Any]] = {
     202: {"model": Underway, "description": "It is being worked out; `Retry-After` says how long."}
@@ -266,34 +166,41 @@ def figure(
 
 @router.get(
     _OF_TEST + "/hits",
-    response_model=Hits,
     responses=_LATER,
     summary="The hits of a test, and why one was dropped",
 )
-def hits(_: Reader, view: View) -> Any:
-    """Every hit, and what else was left out: the raw file is identified once more for it."""
+def hits(_: Reader, view: View) -> JSONResponse:
+    """Return every hit, and what else was left out: the raw file is identified once more for it.
+
+    `record` counts from 0; `reason` says why a hit was dropped, empty where it was used.
+    """
     whole = view.whole()
     if whole is None:
         return waiting()
     found = whole.sheet.identification
-    return {"hits": list(map(asdict, found.hits)), "dropped": list(map(asdict, found.dropped))}
+    hits, dropped = (list(map(asdict, each)) for each in (found.hits, found.dropped))
+    return document({"hits": hits, "dropped": dropped})
 
 
-@router.get(_OF_TEST, response_model=TestState, summary="One test as it is stored")
-def test(_: Reader, view: View) -> Any:
-    """Modes, quality, what was set aside, and where all that comes from."""
+@router.get(_OF_TEST, summary="One test as it is stored")
+def test(_: Reader, view: View) -> JSONResponse:
+    """Return modes (an entry of shm.modes/1), quality, what was excluded, and where it comes from.
+
+    `time` is that of receipt where the test has none; `figures` are names for `/figures/{name}`;
+    `missing` says why there is no more than the store holds.
+    """
     sheet, stored, file = view.as_stored, view.stored, view.recording.file
     before, after = find_neighbours(view.store, stored)
     response = sheet.identification.frequency_response
-    return {
+    found = {
         "test": modes_document.test_document(stored.test),
         "hanger": stored.hanger,
         "time": stored.time,
         "stage": stored.stage.value,
         "verdict": overall(stored.quality),
         "summary": view.summary,
-        "quality": [_known(asdict(check)) for check in stored.quality],
-        "set_aside": [_known(asdict(each)) for each in stored.set_aside],
+        "quality": [asdict(check) for check in stored.quality],
+        "set_aside": [asdict(each) for each in stored.set_aside],
         "notes": list(stored.notes),
         "responses": [point.name for point in response.points] if response else [],
         "file": {
@@ -320,13 +227,9 @@ def test(_: Reader, view: View) -> Any:
         "missing": view.missing,
         "figures": [each.name for each in view.figures()],
     }
+    return document(found)
 
 
 def waiting() -> JSONResponse:
     """Return the answer while something is worked out."""
     return JSONResponse({"message": AT_WORK}, 202, RETRY_AFTER)
-
-
-def _known(row: dict[str, Any]) -> dict[str, Any]:
-    """Return a row without NaN, which means unknown."""
-    return {key: None if value != value else value for key, value in row.items()}

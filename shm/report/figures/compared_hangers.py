@@ -70,7 +70,7 @@ def caption(courses: Sequence[TensionShifts]) -> str:
     """Explain what is seen."""
     return (
         "Tension of each test since the hanger's own baseline, with 90 % of what a repetition of "
-        "the test would scatter. The temperature is not compensated here, as it is in the table: "
+        "the test would scatter. The temperature is not compensated here: "
         "what all hangers do together is the weather, the deck's load or the logger's clock; what "
         "one does alone is its own."
         f"{thinned_words(max(len(course.times) for course in courses))}"

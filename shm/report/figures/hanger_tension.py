@@ -9,10 +9,6 @@ from shm.report.contents import HangerReport
 from shm.report.figures import specification as spec
 from shm.report.formatting import Interval
 
-_NEAR = 1.5
-"""How far from the samples a line may lie to be in view, in widths of the samples' range."""
-_MARGIN = 0.05
-
 
 def specify(data: HangerReport) -> spec.Specification:
     unit = data.tension_unit
@@ -28,7 +24,6 @@ def specify(data: HangerReport) -> spec.Specification:
         )
         for chosen, opacity, name in ((inside, 0.9, "90 % interval"), (~inside, 0.35, "outside it"))
     ]  # fmt: skip
-    low, high = _view(data)
     lines = [("nominal", "ink", "dot", unit.of(data.hanger.nominal_tension_n))]
     if data.baseline_tension_n is not None:
         before = data.baseline_tension_n.in_unit(unit)
@@ -36,33 +31,16 @@ def specify(data: HangerReport) -> spec.Specification:
         marks.append(
             spec.Span(low=before.low, high=before.high, axis="x", colour="green", opacity=0.15)
         )
-    beyond = []
-    for name, colour, dash, at in lines:
-        if low <= at <= high:
-            marks.append(spec.Rule(at=at, axis="x", colour=colour, dash=dash, name=name))  # type: ignore[arg-type]
-        else:
-            arrow = f"{name} {at:.4g} {unit.name}"
-            beyond.append(f"{arrow} \u2192" if at > high else f"\u2190 {arrow}")
+    marks += [
+        spec.Rule(at=at, axis="x", colour=colour, dash=dash, name=name)  # type: ignore[arg-type]
+        for name, colour, dash, at in lines
+    ]
     panel = spec.Panel(
         y=spec.Axis(label=f"probability density (1/{unit.name})"),
         marks=marks,
-        x=spec.Axis(label=f"tension ({unit.name})", range=(low, high)),
-        title="; ".join(beyond),
+        x=spec.Axis(label=f"tension ({unit.name})"),
     )
     return spec.stacked([panel], 3.4)
-
-
-def _view(data: HangerReport) -> tuple[float, float]:
-    """Return the samples' range and the lines near it: a sharp posterior must stay readable."""
-    unit = data.tension_unit
-    low, high = (float(f(data.compared.tension_n)) for f in (np.min, np.max))
-    lines = [data.hanger.nominal_tension_n]
-    if (before := data.baseline_tension_n) is not None:
-        lines += [before.low, before.high]
-    reach = _NEAR * (high - low)
-    seen = [low, high, *(each for each in lines if low - reach <= each <= high + reach)]
-    margin = _MARGIN * (max(seen) - min(seen))
-    return unit.of(min(seen) - margin), unit.of(max(seen) + margin)
 
 
 def _caption(data: HangerReport) -> str:
@@ -74,7 +52,7 @@ def _caption(data: HangerReport) -> str:
     )
     return (
         f"Tension by the latest test alone: {tension}. Dark bars lie in the 90 % interval. "
-        f"Dotted: nominal tension. {baseline} What lies out of view is named above."
+        f"Dotted: nominal tension. {baseline}"
     )
 
 

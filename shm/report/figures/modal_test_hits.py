@@ -1,7 +1,4 @@
-"""Draw the records of a test, what each hit left in them, and all hits superposed.
-
-Superposed are pulse and force spectrum.
-"""
+"""Draw all hits of a test laid over each other: pulse and force spectrum."""
 
 from __future__ import annotations
 
@@ -15,26 +12,16 @@ from shm.report import formatting
 from shm.report.contents import ModalTestReport
 from shm.report.figures import specification as spec
 from shm.report.figures.modal_test_axes import ResponseCurves, searched_range
-from shm.values import NAN, BoolArray, FloatArray
+from shm.values import FloatArray
 
 if TYPE_CHECKING:
     from shm.identify import Hit
 
-
-REACH_DB = -20.0
-LOWEST_DB = -40.0
-"""Below which no spectrum of a force is drawn."""
-CURVE_BINS = 300
-"""Into which a curve of a hit is thinned."""
-_MOST_SHOWN = 12
-_BEFORE_S, _AFTER_S = 0.006, 0.02
-_FILTER_SAMPLES = 16
-"""An anti-aliasing filter spreads a pulse over so many samples on either side."""
-_SECOND_STRIKE_S = 0.5
-_STRIKES = 0.05
-_TRANSFORM_S = 0.5
-_LEAD, _TAIL = 0.7, 3.0
-"""Room before and after a pulse in a figure, in widths of it."""
+REACH_DB, _LOWEST_DB = -20.0, -40.0  # a tenth of the force; where the panel ends
+_MOST_SHOWN, _BINS = 12, 300  # layout: hits, and spans into which a curve is thinned
+# Technical: before a pulse is rest; a second strike comes within half a second; 0.5 s give lines
+# every 2 Hz; a twentieth of the largest force is a strike.
+_BEFORE_S, _LONGEST_S, _STRIKE = 0.006, 0.5, 0.05
 _TINY = 1e-9  # stands for a level of 0 on an axis of dB
 
 
@@ -55,85 +42,55 @@ class HitRecord:
 
     @property
     def near_s(self) -> tuple[float, float]:
-        """From a little before the pulse to a little after the last strike."""
-        hit_at = self.force_n > _STRIKES * np.nanmax(self.force_n)
-        peak = int(np.nanargmax(self.force_n))
-        width = _run(hit_at[peak:]) + _run(hit_at[peak::-1])
-        step_s = float(self.time_s[1] - self.time_s[0])
-        last_s = float(self.time_s[np.flatnonzero(hit_at)[-1]])
-        return -_LEAD * width * step_s, max(_TAIL * width * step_s, 1.1 * last_s)
+        """Return from a little before the pulse to a little after its last strike."""
+        strikes = self.time_s[self.force_n > _STRIKE * np.nanmax(self.force_n)]
+        return -_BEFORE_S, float(np.max(strikes, initial=0.0)) + _BEFORE_S
 
     @property
     def reach_hz(self) -> float:
         """Return where the force first falls to a tenth of its largest; NaN where it never does."""
         top = int(np.argmax(self.spectrum_db))
         below = np.flatnonzero(self.spectrum_db[top:] < REACH_DB)
-        return float(self.spectrum_hz[top + below[0]]) if len(below) else NAN
-
-
-def hit_records(sheet: ModalTestReport) -> list[HitRecord]:
-    """Return every hit whose record is at hand, in the order of the hits."""
-    found = [_hit_record(sheet, number, hit) for number, hit in sheet.located_hits]
-    return [hit_record for hit_record in found if hit_record is not None]
+        return float(self.spectrum_hz[top + below[0]]) if len(below) else float("nan")
 
 
 def shown_hits(sheet: ModalTestReport) -> list[HitRecord]:
-    """Return all hits, or some of them with every dropped one first."""
-    dropped_first = sorted(hit_records(sheet), key=lambda hit_record: hit_record.hit.used)
-    return sorted(dropped_first[:_MOST_SHOWN], key=lambda hit_record: hit_record.number)
-
-
-def hit_name(hit_record: HitRecord) -> str:
-    """Return `hit 2, dropped: double hit`."""
-    reason = "" if hit_record.hit.used else f", dropped: {hit_record.hit.reason}"
-    return f"hit {hit_record.number}{reason}"
+    """Return all hits with a force, or some of them with every dropped one first."""
+    dropped_first = sorted(sheet.located_hits, key=lambda each: each[1].used)[:_MOST_SHOWN]
+    records = (_hit_record(sheet, number, hit) for number, hit in sorted(dropped_first))
+    return [record for record in records if record is not None]
 
 
 def _hit_record(sheet: ModalTestReport, number: int, hit: Hit) -> HitRecord | None:
+    """Return the pulse free of its offset, until shortly before the next hit, and its spectrum.
+
+    The spectrum is NaN, which is not drawn, where samples are missing.
+    """
     record = sheet.recordings[hit.record]
-    if (force := record.force) is None:
+    if record.force is None:
         return None
-    rate, stop = record.sampling_rate_hz, _stop(sheet, hit)
-    time_s, force_n = _pulse(force.values[:stop], hit, rate)
-    spectrum_hz, spectrum_db = _spectrum(force_n, rate)
-    return HitRecord(number, hit, time_s, force_n, spectrum_hz, spectrum_db)
-
-
-def _run(hit_at: BoolArray) -> int:
-    """Count how many of the first samples are true."""
-    return len(hit_at) if np.all(hit_at) else int(np.argmin(hit_at))
-
-
-def _stop(sheet: ModalTestReport, hit: Hit) -> int:
-    """Return the sample shortly before the next hit in the record, or where the record ends."""
-    record = sheet.recordings[hit.record]
-    margin = int(_BEFORE_S * record.sampling_rate_hz) + _FILTER_SAMPLES
+    rate = record.sampling_rate_hz
+    before = int(_BEFORE_S * rate)
     later = [h.start for h in sheet.hits if h.record == hit.record and h.start > hit.start]
-    stop = min([each - margin for each in later], default=record.samples)
-    return max(stop, hit.start + 2)
-
-
-def _pulse(force: FloatArray, hit: Hit, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Return the pulse free of its offset, long enough for a second strike to be in it."""
-    before = int(_BEFORE_S * rate) + _FILTER_SAMPLES
+    stop = min([each - before for each in later], default=record.samples)
     first = max(0, hit.start - before)
-    part = force[first : hit.start + int(_SECOND_STRIKE_S * rate)]
-    part = part - np.nanmedian(part)
-    if part[np.nanargmax(np.abs(part))] < 0:
-        part = -part
-    least = hit.start - first + int(_AFTER_S * rate) + _FILTER_SAMPLES
-    hit_at = np.flatnonzero(part > _STRIKES * np.nanmax(part))
-    last = max(least, int(1.1 * hit_at[-1])) if len(hit_at) else least
-    places = np.arange(min(last, len(part)))
-    return (first + places - hit.start) / rate, np.asarray(part[places])
-
-
-def _spectrum(force_n: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Return the pulse's spectrum; NaN, which is not drawn, where samples are missing."""
-    length = max(len(force_n), int(_TRANSFORM_S * rate))
-    size = np.abs(np.fft.rfft(force_n, n=length))
+    stop = max(min(stop, hit.start + int(_LONGEST_S * rate)), hit.start + 2)
+    force = record.force.values[first:stop]
+    force = force - np.nanmedian(force)
+    if force[np.nanargmax(np.abs(force))] < 0:
+        force = -force
+    length = max(len(force), int(_LONGEST_S * rate))
+    size = np.abs(np.fft.rfft(force, n=length))
     decibel = 20 * np.log10(np.maximum(size / max(float(size.max()), _TINY), _TINY))
-    return np.fft.rfftfreq(length, 1 / rate).astype(np.float64), np.asarray(decibel)
+    time_s = (first + np.arange(len(force)) - hit.start) / rate
+    line_hz = np.fft.rfftfreq(length, 1 / rate).astype(np.float64)
+    return HitRecord(number, hit, time_s, force, line_hz, np.asarray(decibel))
+
+
+def _name(hit_record: HitRecord) -> str:
+    """Return `hit 2, dropped: double hit`."""
+    reason = "" if hit_record.hit.used else f", dropped: {hit_record.hit.reason}"
+    return f"hit {hit_record.number}{reason}"
 
 
 _COLOURS = ("blue", "orange", "green", "purple")
@@ -151,7 +108,7 @@ def _draw(shown: ResponseCurves) -> spec.Specification | None:
 
 def _look(hit_record: HitRecord, place: int) -> dict[str, Any]:
     """Return colour, dashes and name of a hit: a dropped one is red."""
-    name = hit_name(hit_record)
+    name = _name(hit_record)
     if not hit_record.hit.used:
         dashes = _DROPPED_DASHES[place % len(_DROPPED_DASHES)]
         return {"name": name, "colour": "red", "dash": dashes, "width": 1.1}
@@ -163,7 +120,7 @@ def _look(hit_record: HitRecord, place: int) -> dict[str, Any]:
 def _pulses(hits: Sequence[HitRecord]) -> spec.Panel:
     lines = []
     for place, hit_record in enumerate(hits):
-        retained = spec.envelope_places(hit_record.force_n, CURVE_BINS)
+        retained = spec.envelope_places(hit_record.force_n, _BINS)
         lines.append(
             spec.Line(
                 x=1e3 * hit_record.time_s[retained], y=hit_record.force_n[retained],
@@ -189,9 +146,9 @@ def _force_spectra(shown: ResponseCurves, hits: Sequence[HitRecord]) -> spec.Pan
     lines = []
     for place, hit_record in enumerate(hits):
         # Far below the panel nothing is drawn, as lines to there would cross others outside it.
-        retained = (hit_record.spectrum_hz <= end) & (hit_record.spectrum_db > LOWEST_DB - 20)
+        retained = (hit_record.spectrum_hz <= end) & (hit_record.spectrum_db > _LOWEST_DB - 20)
         found = np.where(retained, hit_record.spectrum_db, np.nan)
-        places = spec.envelope_places(found, CURVE_BINS)
+        places = spec.envelope_places(found, _BINS)
         lines.append(
             spec.Line(
                 x=hit_record.spectrum_hz[places], y=found[places], hover="%{x:.1f} Hz: %{y:.3g} dB",
@@ -202,7 +159,7 @@ def _force_spectra(shown: ResponseCurves, hits: Sequence[HitRecord]) -> spec.Pan
     band = spec.Span(low=low, high=high, colour="green", opacity=0.10)
     what = "band" if shown.sheet.band_hz else "where modes were found"
     return spec.Panel(
-        y=spec.Axis(label="force, relative (dB)", range=(LOWEST_DB, 2)),
+        y=spec.Axis(label="force, relative (dB)", range=(_LOWEST_DB, 2)),
         marks=[*lines, level, band],
         x=spec.Axis(label="frequency (Hz)", range=(0, end)), title=f"shaded: {what}",
     )  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,100 +16,54 @@ from shm.values import Channel, FloatArray, Recording
 if TYPE_CHECKING:
     from shm.identify import Hit
 
-_MOST_NUMBERS = 40
-_LEAD = 0.012
-"""Room before the first record, as a share of all: a hit may begin with it."""
+# Layout: numbers of hits, channels drawn, bins of a curve; shares of the axis before the first
+# record, with which a hit may begin, and between two; where the marks of hits stand in the
+# uppermost panel, and the room above its curve.
+_MOST_NUMBERS, _MOST_CHANNELS, _BINS = 40, 4, 700
+_LEAD, _GAP_SHARE = 0.012, 0.015
 _MARKS_AT, _ROOM = 0.84, 0.35
-"""Where the marks of the hits stand in the uppermost panel, as a share of its height, and the room
-above the curve that is left to them, as a share of the curve's."""
-
-
-# Layout: channels drawn, and of these at most that are not sound.
-_MOST_CHANNELS, _MOST_FAULTY = 4, 2
-_BINS = 700
-_GAP_SHARE = 0.015
-"""Between two records, as a share of their whole length."""
 
 
 def shown_rows(sheet: ModalTestReport) -> list[int]:
-    """Return rows of accelerations to draw: some left out, then some of each plane in turn.
-
-    Of a plane the first, the last, and those between.
-    """
-    channels = sheet.recordings[0].accelerations
-    faults = sheet.channel_faults
-    faulty = [row for row, channel in enumerate(channels) if channel.name in faults]
-    sound = [row for row in range(len(channels)) if row not in faulty]
-    chosen = faulty[:_MOST_FAULTY]
-    chosen += _in_turn(channels, sound)[: max(1, _MOST_CHANNELS - len(chosen))]
-    return sorted(chosen)
+    """Return rows of accelerations to draw: half of them channels left out, where there are any."""
+    channels, faults = sheet.recordings[0].accelerations, sheet.channel_faults
+    rows = range(len(channels))
+    faulty = [row for row in rows if channels[row].name in faults][: _MOST_CHANNELS // 2]
+    sound = [row for row in rows if channels[row].name not in faults]
+    return sorted((faulty + sound)[:_MOST_CHANNELS])
 
 
-def _in_turn(channels: tuple[Channel, ...], rows: list[int]) -> list[int]:
-    planes = list(dict.fromkeys(channels[row].plane for row in rows))
-    queues = [_ends_first([r for r in rows if channels[r].plane == plane]) for plane in planes]
-    longest = max((len(queue) for queue in queues), default=0)
-    return [queue[turn] for turn in range(longest) for queue in queues if turn < len(queue)]
+def _offsets_s(sheet: ModalTestReport) -> list[float]:
+    """Return where each record begins on the common axis, and where the last ends, in s."""
+    durations = [record.duration_s for record in sheet.recordings]
+    gap = _GAP_SHARE * sum(durations) if len(durations) > 1 else 0.0
+    ends = np.cumsum([each + gap for each in durations])
+    return [0.0, *ends[:-1].tolist(), float(ends[-1]) - gap]
 
 
-def _ends_first(rows: list[int]) -> list[int]:
-    return [rows[0], *rows[:0:-1]] if rows else []
+def _hit_time_s(sheet: ModalTestReport, hit: Hit) -> float:
+    return _offsets_s(sheet)[hit.record] + hit.start_s
 
 
-def offsets_s(records: Sequence[Recording]) -> list[float]:
-    """Return where each record begins on the common axis, in s."""
-    whole = sum(record.duration_s for record in records)
-    gap = _GAP_SHARE * whole if len(records) > 1 else 0.0
-    ends = np.cumsum([record.duration_s + gap for record in records])
-    return [0.0, *ends[:-1].tolist()]
-
-
-def borders_s(records: Sequence[Recording]) -> list[float]:
-    """Return the middle of the gap between each two records on the common axis, in s."""
-    starts = offsets_s(records)
-    ends = [start + record.duration_s for start, record in zip(starts, records, strict=True)]
-    return [(end + start) / 2 for end, start in zip(ends[:-1], starts[1:], strict=True)]
-
-
-def hit_time_s(sheet: ModalTestReport, hit: Hit) -> float:
-    """Return the time of a hit on the common axis, in s."""
-    return offsets_s(sheet.recordings)[hit.record] + hit.start_s
-
-
-def channel_of(record: Recording, row: int | None) -> Channel | None:
+def _channel(record: Recording, row: int | None) -> Channel | None:
     """Return the force (`row` None) or the acceleration of that row; None where it has none."""
     if row is None:
         return record.force
     return record.accelerations[row] if row < len(record.accelerations) else None
 
 
-def thinned(records: Sequence[Recording], row: int | None) -> tuple[FloatArray, FloatArray]:
-    """Return time in s and values of one channel, thinned by their envelope; both (m,).
+def _joined(sheet: ModalTestReport, row: int | None) -> tuple[FloatArray, FloatArray]:
+    """Return time in s and values of one channel over all records, one after the other.
 
-    NaN where samples are, and between the records, so that a line drawn through them breaks.
+    Infinite between the records: a line breaks there, and no sample is missing.
     """
-    whole = sum(record.duration_s for record in records)
-    times, values = [], []
-    for offset, record in zip(offsets_s(records), records, strict=True):
-        channel = channel_of(record, row)
-        if channel is not None and len(channel.values):
-            bins = max(8, round(_BINS * record.duration_s / whole))
-            places = spec.envelope_places(channel.values, bins)
-            times += [offset + places / record.sampling_rate_hz, np.array([np.nan])]
-            values += [channel.values[places], np.array([np.nan])]
+    times, values = [np.empty(0)], [np.empty(0)]
+    for offset, record in zip(_offsets_s(sheet), sheet.recordings, strict=False):
+        if (channel := _channel(record, row)) is not None:
+            at = offset + np.arange(record.samples + 1) / record.sampling_rate_hz
+            times.append(at)
+            values.append(np.append(channel.values, np.inf))
     return np.concatenate(times), np.concatenate(values)
-
-
-def unknown_times_s(records: Sequence[Recording], row: int | None) -> FloatArray:
-    """Return the middle of each bin with samples that are NaN, on the common axis, in s."""
-    found: list[float] = []
-    for offset, record in zip(offsets_s(records), records, strict=True):
-        channel = channel_of(record, row)
-        if channel is not None:
-            bad = np.flatnonzero(np.isnan(channel.values))
-            width = max(1, record.samples * len(records) // _BINS)
-            found += (offset + np.unique(bad // width) * width / record.sampling_rate_hz).tolist()
-    return np.array(found)
 
 
 def _draw(shown: ResponseCurves) -> spec.Specification | None:
@@ -121,7 +74,7 @@ def _draw(shown: ResponseCurves) -> spec.Specification | None:
     if records[0].force is not None:
         rows = [None, *rows]
     panels = [_history(sheet, row, is_top=place == 0) for place, row in enumerate(rows)]
-    end_s = offsets_s(records)[-1] + records[-1].duration_s
+    end_s = _offsets_s(sheet)[-1]
     several = "" if len(records) == 1 else ", the records one after the other"
     across = spec.Axis(label=f"time{several} (s)", range=(-_LEAD * end_s, end_s))
     panels[-1] = replace(panels[-1], x=across)
@@ -129,9 +82,13 @@ def _draw(shown: ResponseCurves) -> spec.Specification | None:
 
 
 def _history(sheet: ModalTestReport, row: int | None, is_top: bool) -> spec.Panel:
-    records, channel = sheet.recordings, channel_of(sheet.recordings[0], row)
+    channel = _channel(sheet.recordings[0], row)
     assert channel is not None
-    time_s, values = thinned(records, row)
+    at_s, joined = _joined(sheet, row)
+    values = np.where(np.isfinite(joined), joined, np.nan)
+    places = spec.envelope_places(values, _BINS)
+    time_s, values = at_s[places], values[places]
+    unknown = np.flatnonzero(np.isnan(joined))
     colour = "ink" if row is None else spec.plane_colour(channel.plane)
     unit = "N" if row is None else "m/s²"
     marks: list[spec.Mark] = [
@@ -143,16 +100,18 @@ def _history(sheet: ModalTestReport, row: int | None, is_top: bool) -> spec.Pane
     if np.nanmax(np.abs(values), initial=0.0) > 0.5 * channel.full_scale:
         ends = (-channel.full_scale, channel.full_scale)
         marks += [spec.Rule(at=end, colour="red", width=0.8, dash="dash") for end in ends]
-    if len(unknown := unknown_times_s(records, row)):
+    if len(unknown):
+        width = max(1, len(joined) // _BINS)
+        shown = at_s[np.unique(unknown // width) * width]
         marks.append(
             spec.Points(
-                x=unknown, y=np.full(len(unknown), 0.04), in_shares=True, symbol="tick", size=5,
+                x=shown, y=np.full(len(shown), 0.04), in_shares=True, symbol="tick", size=5,
                 colour="red", name="not a number", hover="%{x:.3f} s",
             )
         )  # fmt: skip
     marks += [
-        spec.Rule(at=at_s, axis="x", colour="quiet", width=0.8, dash="dot")
-        for at_s in borders_s(records)
+        spec.Rule(at=start_s, axis="x", colour="quiet", width=0.8, dash="dot")
+        for start_s in _offsets_s(sheet)[1:-1]
     ]
     marks += _hit_marks(sheet) if is_top else _hit_lines(sheet)
     title, title_colour = _title(sheet, row)
@@ -173,7 +132,7 @@ def _range(values: FloatArray, row: int | None, room: float) -> tuple[float, flo
 
 def _title(sheet: ModalTestReport, row: int | None) -> tuple[str, str]:
     """Name, plane and place, and in red why the channel was left out."""
-    channels = [channel_of(record, row) for record in sheet.recordings]
+    channels = [_channel(record, row) for record in sheet.recordings]
     first = channels[0]
     assert first is not None
     there = {c.x_m for c in channels if c is not None and np.isfinite(c.x_m)}
@@ -187,7 +146,7 @@ def _title(sheet: ModalTestReport, row: int | None) -> tuple[str, str]:
 def _hit_lines(sheet: ModalTestReport) -> list[spec.Mark]:
     return [
         spec.Rule(
-            at=hit_time_s(sheet, hit), axis="x", colour="green" if hit.used else "red", width=0.7,
+            at=_hit_time_s(sheet, hit), axis="x", colour="green" if hit.used else "red", width=0.7,
             opacity=0.7, dash="solid" if hit.used else "dash",
         )
         for _, hit in sheet.located_hits
@@ -205,13 +164,13 @@ def _hit_marks(sheet: ModalTestReport) -> list[spec.Mark]:
         counted = formatting.counted(len(hits), "hit")
         found.append(
             spec.Points(
-                x=[hit_time_s(sheet, hit) for _, hit in hits], y=[_MARKS_AT] * len(hits),
+                x=[_hit_time_s(sheet, hit) for _, hit in hits], y=[_MARKS_AT] * len(hits),
                 in_shares=True, symbol="cross" if reason else "triangle down", size=5,
                 colour="red" if reason else "green",
                 name=f"{counted} dropped: {reason}" if reason else f"{counted} used",
                 labels=[str(number) for number, _ in hits] if len(located) <= _MOST_NUMBERS else (),
                 label_side="top",
-                texts=[_wording(number, hit, hit_time_s(sheet, hit)) for number, hit in hits],
+                texts=[_wording(number, hit, _hit_time_s(sheet, hit)) for number, hit in hits],
             )
         )  # fmt: skip
     return found

@@ -220,9 +220,10 @@ def limits(*values: Values, room: float = 0.08) -> tuple[float, float]:
 
 
 def log_axis(label: str, low: float, high: float) -> Axis:
-    """Return a logarithmic axis of few decades, numbered in full at 1, 2 and 5 of each."""
+    """Return a logarithmic axis, numbered at each decade; of up to two also at 2 and 5."""
+    steps = (1, 2, 5) if high < 200 * low else (1,)
     decades = range(math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 1)
-    ticks = [step * 10.0**decade for decade in decades for step in (1, 2, 5)]
+    ticks = [step * 10.0**decade for decade in decades for step in steps]
     shown = [tick for tick in ticks if low <= tick <= high]
     labels = [f"{tick:g}" for tick in shown]
     return Axis(label=label, range=(low, high), scale="log", ticks=shown, tick_labels=labels)

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from datetime import datetime
 from types import SimpleNamespace
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, Field
 
 from shm.pipeline import utc_now
 from shm.pipeline.controls import control_charts
 from shm.report import formatting
 from shm.report.contents import hangers_unit
+from shm.report.formatting import Interval
 from shm.report.hanger_status import control_lead
-from shm.values.messages import TODAY, WEEK, Lead, Urgency
+from shm.values.messages import TODAY, WEEK
 from shm.values.rounding import ForceUnit
 from shm_daemon.heartbeat import duration_words
 from shm_daemon.web.access import AtSite, Reader
@@ -33,18 +32,17 @@ from shm_daemon.web.bridge_summary import (
     worst_first,
 )
 from shm_daemon.web.bridge_view import (
-    CLASSES,
     QUICKLY_COMPARED,
     BridgeGlance,
     HangerGlance,
     compared,
     elevation,
+    legend,
     shift_words,
     summarize_hangers,
-    triangles,
 )
 from shm_daemon.web.frame import page
-from shm_daemon.web.models import BridgeState, Moved, Underway
+from shm_daemon.web.models import Underway, document
 from shm_daemon.web.other_bridges import OtherBridges
 from shm_daemon.web.site import Site, held_documents
 
@@ -69,7 +67,7 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
         facts=_facts(bridge, now),
         held=held_documents(site),
         drawing=elevation(bridge.hangers) if bridge.hangers else None,
-        legend=[(kind, text, triangles(kind, 16, 24)) for kind, text in CLASSES],
+        legend=legend(bridge.hangers),
         moved=found.sentence if found else None,
         unit=unit.name,
         warnings=[
@@ -95,33 +93,30 @@ def moved_fragment(request: Request, site: AtSite, _: Reader) -> Response:
     return page(request, "moved.html.j2", moved=found.sentence)
 
 
-@router.get("/api/bridge", response_model=BridgeState, summary="The whole bridge at a glance")
-def bridge(site: AtSite, _: Reader) -> Any:
-    """Each hanger's tension, against its baseline too."""
+@router.get("/api/bridge", summary="The whole bridge at a glance")
+def bridge(site: AtSite, _: Reader) -> JSONResponse:
+    """Return each hanger's state and tension; `shift` is since the baseline, a fraction.
+
+    Null before the first test; `shift` also where the latest test is the baseline's.
+    """
     found = summarize_hangers(site, utc_now())
-    return {
-        "bridge": found.name,
-        **found.message.document,
-        "hangers": [_glance_document(each) for each in found.hangers],
-    }
+    hangers = [_glance_document(each) for each in found.hangers]
+    return document({"bridge": found.name, **found.message.document, "hangers": hangers})
 
 
 @router.get(
     "/api/bridge/moved",
-    response_model=Moved,
     responses={202: {"model": Underway}},
     summary="What moved over the bridge",
 )
-def moved(request: Request, site: AtSite, _: Reader) -> Any:
+def moved(request: Request, site: AtSite, _: Reader) -> JSONResponse:
     """Return the hangers compared with each other; 202 while that is being worked out."""
     found = compared(request, site)
     if found is None:
         return _underway()
     explanations = found.pattern.explanations if found.pattern else ()
-    return {
-        "sentence": found.sentence,
-        "explanations": {each.name: each.probability for each in explanations},
-    }
+    probabilities = {each.name: each.probability for each in explanations}
+    return document({"sentence": found.sentence, "explanations": probabilities})
 
 
 def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
@@ -174,40 +169,25 @@ def _glance_document(each: HangerGlance) -> dict[str, Any]:
         "name": hanger.name,
         "length_m": hanger.length_m,
         "nominal_tension_n": hanger.nominal_tension_n,
-        **summary.message.document,
+        **{k: v for k, v in summary.message.document.items() if k != "reason"},
         "tests": each.tests,
         "latest_test": latest and latest.name,
         "latest_test_at": latest and latest.time,
         "model": latest and (latest.model or None),
-        "tension_n": summary.tension_n and asdict(summary.tension_n),
-        "shift": summary.change and asdict(summary.change),
+        "tension_n": summary.tension_n and _bounded(summary.tension_n),
+        "shift": summary.change and _bounded(summary.change),
         "called": summary.detected,
         "open_alerts": summary.open_alerts,
         "warnings": list(summary.warnings),
     }
 
 
+def _bounded(interval: Interval) -> dict[str, float]:
+    return {"mean": interval.mean, "low": interval.low, "high": interval.high}
+
+
 def _underway() -> JSONResponse:
     return JSONResponse({"message": _COMPARING}, 202, RETRY_AFTER)
-
-
-class BridgeInList(BaseModel):
-    """A bridge, and what it said of itself when it could be asked last."""
-
-    name: str
-    address: str
-    states: list[str] = Field(description="In a word or two; empty before the first test.")
-    urgency: Urgency = Field(description="`today` too where nobody watches it.")
-    trouble: Lead | None = Field(description="Why it cannot be asked now; null where it was.")
-    told_at: datetime | None
-    summary: Summary | None = Field(description="Null where it could never be asked.")
-
-
-class Bridges(BaseModel):
-    """This bridge and the others, the worst first."""
-
-    headline: str
-    bridges: list[BridgeInList]
 
 
 @router.get("/bridges", include_in_schema=False)
@@ -222,13 +202,11 @@ def bridges_page(request: Request, site: AtSite, _: Reader) -> Response:
     )
 
 
-@router.get(
-    "/api/bridges", response_model=Bridges, summary="This bridge and the others that it knows"
-)
-def bridges(request: Request, site: AtSite, _: Reader) -> Any:
+@router.get("/api/bridges", summary="This bridge and the others that it knows")
+def bridges(request: Request, site: AtSite, _: Reader) -> JSONResponse:
     """As `shm bridges --json` has them; what others said is at most some seconds old."""
     rows = _bridges(request, site)
-    return {"headline": headline(rows), "bridges": [row_document(each) for each in rows]}
+    return document({"headline": headline(rows), "bridges": [*map(row_document, rows)]})
 
 
 @router.get(SUMMARY, response_model=Summary, summary="This bridge in a line")
@@ -247,7 +225,7 @@ def _bridges(request: Request, site: Site) -> tuple[BridgeRow, ...]:
 def _words_of(row: BridgeRow, now: datetime) -> str:
     """Return the small print below the lead of a bridge."""
     found = row.summary
-    if found is None or row.told_at is None:
+    if found is None:
         return ""
     latest = (
         f"last test {duration_words(now - found.latest_test_at)} ago"

@@ -14,17 +14,14 @@ from shm.errors import BadInput, NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report import formatting
-from shm.report.contents import hangers_unit
 from shm.report.figures.compared_hangers import MOST, TensionShifts, alt, caption, specify
 from shm.report.formatting import Interval
 from shm.report.hanger_summary import HangerSummary
-from shm.report.paper import Table
 from shm.store.posteriors import list_trend
 from shm.store.watch import list_baselines_in_force
 from shm.values import Hanger
 from shm_daemon.web import with_plotly
 from shm_daemon.web.access import AtSite, Reader
-from shm_daemon.web.bridge_view import HangerGlance
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import LARGEST_NUMBER, FigureDocument
@@ -67,7 +64,6 @@ def compare_page(
         most=MOST,
         since=day,
         address=f"/api/compare/figure?{urlencode(asked)}" if _is_there(rows, day) else "",
-        table=_table(rows) if rows else None,
     )  # fmt: skip
 
 
@@ -140,22 +136,3 @@ def _courses(site: Site, chosen: Sequence[Hanger], since: date | None) -> list[T
                 )
             )
     return found
-
-
-def _table(lines: Sequence[HangerSummary]) -> Table:
-    unit = hangers_unit(lines)
-    return Table(
-        "Each hanger now",
-        ("hanger", "state", f"tension, {unit.name}", "of nominal, %", "since the baseline, %",
-         "length", "last test"),
-        tuple(
-            (
-                formatting.hanger_name(line.hanger.id, line.hanger.name),
-                line.status.value if line.status else "",
-                *HangerGlance(line).cells(unit),
-                f"{line.hanger.length_m:g} m",
-                f"{line.latest.time:%Y-%m-%d}" if line.latest else "",
-            )
-            for line in lines
-        ),
-    )  # fmt: skip

@@ -53,7 +53,7 @@ _EVENTS = {
     EventKind.ACKNOWLEDGED: "alert acknowledged",
 }
 _TABLES = {
-    "numbers": (hanger_tables.results, hanger_tables.frequencies),
+    "numbers": (hanger_tables.changes, hanger_tables.frequencies),
     "model": (hanger_tables.models, hanger_tables.parameters),
     "tests": (hanger_tables.quality, hanger_tables.conditions),
 }

@@ -32,7 +32,7 @@ from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.forms import Form, reason_in, time_in
 from shm_daemon.web.frame import page
 from shm_daemon.web.health import troubles
-from shm_daemon.web.models import Before, Examination, Operation, Row, Underway
+from shm_daemon.web.models import Before, Row, Underway, document
 from shm_daemon.web.site import Site, held_documents, quarantined
 
 router = APIRouter(tags=["operation"])
@@ -128,22 +128,26 @@ def examination_fragment(request: Request, site: AtSite, _: Reader) -> Response:
     return page(request, "examination.html.j2", examination=found)
 
 
-@router.get("/api/operation", response_model=Operation, summary="Whether the work flows")
-def operation(site: AtSite, _: Reader) -> Any:
-    """Daemon, queue, quarantine, disk and versions."""
-    return _operation(site)
+@router.get("/api/operation", summary="Whether the work goes on")
+def operation(site: AtSite, _: Reader) -> JSONResponse:
+    """Return daemon, queue, held and refused files, disk and versions.
+
+    `troubles` is empty if the work goes on; `quarantine` has the newest 100.
+    """
+    return document(_operation(site))
 
 
 @router.get(
     "/api/operation/examination",
-    response_model=Examination,
     responses={202: {"model": Underway}},
     summary="All checks of `shm doctor`",
 )
-def examination(request: Request, site: AtSite, _: Reader) -> Any:
+def examination(request: Request, site: AtSite, _: Reader) -> JSONResponse:
     """Made anew every five minutes at most; 202 while it is being made."""
     found = _examined(request, site)
-    return _underway() if found is None else {"findings": [asdict(each) for each in found]}
+    if found is None:
+        return _underway()
+    return document({"findings": [asdict(each) for each in found]})
 
 
 def _operation(site: Site) -> dict[str, Any]:
