@@ -26,7 +26,6 @@ from shm.values import (
     Alert,
     Averaged,
     CreepRate,
-    Drift,
     FloatArray,
     Limits,
     Posterior,
@@ -281,12 +280,7 @@ def averaged_document(averaged: Averaged) -> dict[str, Any]:
     return {**asdict(averaged), "caveats": list(averaged.caveats)}
 
 
-# ---------------------------------------------------------------- drift
-
-
-def drift_document(drift: Drift) -> dict[str, Any]:
-    """Return one row of `shm drift --json`."""
-    return asdict(drift)
+# ---------------------------------------------------------------- watch
 
 
 def creep_document(creep: CreepRate | None) -> dict[str, Any] | None:

@@ -8,13 +8,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rich_click as click
 
-from shm.documents import drift_document
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import latest_drifts, stored_pattern
@@ -68,7 +68,7 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
             remedy="Take in more tests: the first ones of a hanger form its baseline.",
         )
     if flags.wants_json():
-        document: dict[str, object] = {"drifts": [drift_document(drift) for drift in shown]}
+        document: dict[str, object] = {"drifts": [asdict(drift) for drift in shown]}
         if hanger_id is not None:
             document["temperature_coefficients"] = temperature_documents(states)
         show(document)

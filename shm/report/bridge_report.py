@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-from shm.documents import drift_document
 from shm.report import formatting
 from shm.report.bar_table import bar_document, bars_table
 from shm.report.contents import BridgeReport, hangers_unit
@@ -265,7 +264,7 @@ def bridge_json(data: BridgeReport) -> dict[str, Any]:
                 "warnings": list(line.warnings),
                 "latest": line.latest and line.latest.time,
                 "tension_n": asdict(line.tension_n) if line.tension_n else None,
-                "drift": drift_document(line.drift) if line.drift else None,
+                "drift": asdict(line.drift) if line.drift else None,
                 "test": line.latest and line.latest.name,
                 "model": line.latest and (line.latest.model or None),
                 "called": line.detected,

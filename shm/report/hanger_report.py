@@ -7,7 +7,7 @@ from datetime import datetime
 from typing import Any
 
 from shm import documents, modes_document
-from shm.documents import alert_document, drift_document
+from shm.documents import alert_document
 from shm.report import formatting
 from shm.report import hanger_tables as tables
 from shm.report.assumed import assumptions_line, assumptions_table, with_assumptions
@@ -291,7 +291,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         **data.now.numbers,
         "by_latest_test": documents.averaged_document(data.by_latest_test),
         "trend": [asdict(row) for row in data.trend],
-        "drifts": [documents.drift_document(drift) for drift in data.drifts],
+        "drifts": [asdict(drift) for drift in data.drifts],
         "alerts": [documents.alert_document(alert) for alert in data.alerts],
         "acknowledged": dict(data.acknowledged),
         "frequency_response": _response(data.frequency_response),
@@ -422,7 +422,7 @@ def structure_json(data: StructureReport) -> dict[str, Any]:
         "baseline_since": data.baseline_since,
         "baseline_hz": data.baseline_hz,
         "said": data.statement,
-        "drifts": [drift_document(each) for each in data.drifts],
+        "drifts": [asdict(each) for each in data.drifts],
         "alerts": [alert_document(each) for each in data.alerts],
         "open_alerts": data.open_alerts,
         "dated_by_receipt": list(data.undated),

@@ -8,13 +8,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from shm.documents import alert_document, drift_document, dump
+from shm.documents import alert_document, dump
 from shm.modes_document import load_modes
 from shm.report.shifts import pattern_json
 from shm.store.blobs import watch_document
@@ -121,8 +122,8 @@ def document(tests: Sequence[WatchedTest], alerts: Sequence[Alert]) -> Any:
     return read_back(
         {
             "watch": watch_document(last),
-            "drifts": [drift_document(each) for each in last.drifts],
-            "reported": [drift_document(each) for each in last.published_drifts],
+            "drifts": [asdict(each) for each in last.drifts],
+            "reported": [asdict(each) for each in last.published_drifts],
             "called": [each.test for each in tests if each.change.called],
             "alerts": [alert_document(each) for each in alerts],
         }

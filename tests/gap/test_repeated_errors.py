@@ -194,3 +194,9 @@ def test_an_unstated_radius_of_a_known_mass_is_an_error_of_its_test() -> None:
     count = len(own)
     with_load = unstated.repeated.loads[:count] @ unstated.repeated.loads[:count].T
     np.testing.assert_allclose(unstated.repeated.frequency, with_load)
+
+
+def test_section_varies_in_fewer_ways_where_its_reach_is_longer() -> None:
+    """Each way is one more freedom: a rolled bar that is alike over metres has hardly any."""
+    counts = [section_ways(12.0, 0.001, reach_m).shape[1] for reach_m in (0.5, 2.0, 8.0)]
+    assert counts[0] > counts[1] > counts[2] >= 1
