@@ -34,9 +34,7 @@ from shm.identify.measuring.setups import (
 )
 from shm.identify.mode_ordering.placement import STATE_PLANES, Placement, place_modes
 from shm.identify.options import AUTO_CROSS_CHECK, NO_CROSS_CHECK, IdentifyOptions
-from shm.identify.quality import Inspection, assess, refusal, tones
-from shm.identify.quality.of_modes import first_orders
-from shm.identify.quality.of_sensors import directions, sensor_gain, sensor_places
+from shm.identify.quality import CHECKS_OF_NUMBERED, Inspection, assess, refusal, tones
 from shm.identify.setup_merging.calm_part import (
     LEFT_OUT,
     late_part_level,
@@ -128,9 +126,10 @@ def identify(
     look = partial(_looked_at, measurements, found.finding, options)
     placement = place_modes(found.finding.modes, found.points, hanger, steady, look)
     second = _cross_check(measurements, options, hanger)
-    quality = assess(Inspection(recordings, measurements, options, steady, found.finding, second))
-    if turned := directions(found.finding.modes, found.points):
-        quality = (*quality, turned)
+    inspection = Inspection(
+        recordings, measurements, options, steady, found.finding, second, found.points, found.apart
+    )
+    quality = assess(inspection)
     if refused := refusal(quality, records[0].source):
         raise refused
     calm = None if placement.modes else _once_calm(measurements, options, hanger, steady)
@@ -163,7 +162,7 @@ def identify(
         poles=found.finding.poles,
         notes=(*placement.notes, *noted, *_notes_of_hits(measurements)),
         window_time_constant_s=measurements[0].window_time_constant_s,
-        quality=(*quality, *_of_placed(measurements, found, placement, hanger, options)),
+        quality=(*quality, *_of_placed(inspection, placement, hanger)),
         set_aside=placement.foreign_modes,
         fit=fitted(measurements, found.apart, options) if level_left == 1 else None,
         each_hit=modes_of_each_hit(measurements, found.apart, placement.modes),
@@ -187,20 +186,14 @@ def _looked_at(
 
 
 def _of_placed(
-    measurements: Sequence[Measurement],
-    found: JoinedFinding,
-    placement: Placement,
-    hanger: Hanger | None,
-    options: IdentifyOptions,
-) -> list[QualityCheck]:
+    inspection: Inspection, placement: Placement, hanger: Hanger | None
+) -> tuple[QualityCheck, ...]:
     """Return the quality checks of numbered modes, their numbers and the sensors."""
-    checks = [placement.check]
-    if hanger and hanger.as_hanger and placement.modes:
-        if any(point.plane for point in found.points):  # else no plane can lack a mode
-            checks.append(first_orders(placement.modes, hanger, options.band_low_hz))
-        checks.append(sensor_gain(measurements, found.apart, placement.modes, hanger))
-        checks.append(sensor_places(placement.modes, hanger))
-    return [check for check in checks if check is not None]
+    checks = (placement.check,) if placement.check else ()
+    if not (hanger and hanger.as_hanger and placement.modes):
+        return checks
+    numbered = replace(inspection, modes=placement.modes, hanger=hanger)
+    return checks + assess(numbered, CHECKS_OF_NUMBERED)
 
 
 def _once_calm(

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from shm.identify import Identification, IdentifyOptions, identify
+from shm.identify.contract import FoundMode
+from shm.identify.estimation.courses import course_of
 from shm.values import Channel, Recording
 
 RATE_HZ, SLOT_S, HITS = 512.0, 6.0, 4
@@ -23,7 +25,7 @@ def _recording(slope: float, half: float = math.inf) -> Recording:
     """Return the change goes with A, or where `half` is finite with (1 + half) A / (A + half)."""
     rng = np.random.default_rng(5)
     slot, before = int(SLOT_S * RATE_HZ), int(0.4 * RATE_HZ)
-    motion = 1e-3 * rng.standard_normal((2, before + HITS * slot))
+    motion = 5e-4 * rng.standard_normal((2, before + HITS * slot))
     force = 0.1 * rng.standard_normal(before + HITS * slot)
     for hit in range(HITS):
         begin = hit * slot + before
@@ -80,3 +82,15 @@ def test_a_linear_hanger_has_no_slope_and_no_warning() -> None:
         assert abs(mode.amplitude_slope) < 1e-5
     (check,) = [check for check in found.quality if check.name == "amplitude"]
     assert check.verdict == "good"
+
+
+def test_course_noise_of_another_frequency() -> None:
+    """What rings at 60 Hz and is no known mode leaves a mode of 9 Hz as sure as it was."""
+    shape, rng = np.array(SHAPES[0]), np.random.default_rng(3)
+    t = np.arange(int(SLOT_S * RATE_HZ)) / RATE_HZ
+    ring = np.outer(shape, np.exp(-0.17 * t) * np.sin(2 * np.pi * 9.0 * t))
+    ring += 0.01 * rng.standard_normal(ring.shape)
+    loud = ring + 3.0 * np.outer([0.4, 1.0], np.sin(2 * np.pi * 60.0 * t))
+    mode = FoundMode(9.0, 0.001, 0.003, 1e-4, shape, np.zeros(2))
+    alone, beside = (course_of(decay, [mode], RATE_HZ).sd[:, 0] for decay in (ring, loud))
+    np.testing.assert_allclose(beside, alone, rtol=0.2)

@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shm.identify import IdentifyOptions
 from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.bars import Description, log_factor
 from shm.identify.mode_ordering.placement import place_modes
-from shm.identify.quality.of_modes import first_orders
-from shm.values import PLANES, Plane, ResponsePoint
+from shm.identify.quality import Inspection
+from shm.identify.quality.of_modes import LOWEST
+from shm.values import PLANES, Plane, QualityCheck, ResponsePoint
 from tests.helpers.beam_shapes import mode_shape
 from tests.helpers.hangers import HANGER_3
 
@@ -92,9 +94,16 @@ def test_a_first_order_below_the_band_is_not_missed() -> None:
     placement = place_modes(SURE[1:], POINTS, HANGER, look=lambda _: ([], []))
     lowest, next_hz = (mode(PLANES[0], order).frequency_hz for order in (1, 2))
     lost = min(PLANES, key=lambda plane: mode(plane, 1).frequency_hz)
-    told = first_orders(placement.modes, HANGER, 0.8 * lowest)
+
+    def check(low_hz: float) -> QualityCheck | None:
+        options = IdentifyOptions(band_low_hz=low_hz)
+        return LOWEST.check(
+            Inspection([], [], options, points=POINTS, modes=placement.modes, hanger=HANGER)
+        )
+
+    told = check(0.8 * lowest)
     assert told is not None
     assert (told.verdict, told.found) == ("warning", f"{lost} order 1 not found")
-    fine = first_orders(placement.modes, HANGER, (lowest + next_hz) / 2)
+    fine = check((lowest + next_hz) / 2)
     assert fine is not None
     assert fine.verdict == "good"

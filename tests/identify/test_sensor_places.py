@@ -9,8 +9,9 @@ import pytest
 
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.identify.contract import FoundMode
-from shm.identify.quality.of_sensors import directions, sensor_places
+from shm.identify.contract import Finding, FoundMode, Poles
+from shm.identify.quality import Inspection
+from shm.identify.quality.of_sensors import DIRECTIONS, PLACES
 from shm.simulate import HammerPlan, HangerState
 from shm.values import NAN, PLANES, Mode, QualityCheck, Recording, ResponsePoint, ShapePoint
 from tests.helpers.beam_shapes import mode_shape
@@ -102,15 +103,15 @@ def shapes_at(places_m: list[float], gains: list[float], said_m: list[float]) ->
     ]  # fmt: skip
 
 
-PLACES = [1.2, 2.0, 3.1]
+PLACES_M = [1.2, 2.0, 3.1]
 
 
 @pytest.mark.parametrize(
     ("true_m", "gains", "found"),
     [
-        (PLACES, [1, 1, 1], "are those of the described"),
-        (PLACES, [0.4, 1, 1], "the sensor at 1.2 m reads 2.5 times too little"),
-        (PLACES, [1, 1, -1], "the sensor at 3.1 m reads 1 times too much with the wrong sign"),
+        (PLACES_M, [1, 1, 1], "are those of the described"),
+        (PLACES_M, [0.4, 1, 1], "the sensor at 1.2 m reads 2.5 times too little"),
+        (PLACES_M, [1, 1, -1], "the sensor at 3.1 m reads 1 times too much with the wrong sign"),
         ([1.6, 2.0, 3.1], [1, 1, 1], "the sensor said to be at 1.2 m is at 1.6 m"),
         ([3.1, 2.0, 1.2], [1, 1, 1], "no one sensor explains it"),
     ],
@@ -118,7 +119,8 @@ PLACES = [1.2, 2.0, 3.1]
 def test_one_gain_or_place_that_is_wrong_is_named(
     true_m: list[float], gains: list[float], found: str
 ) -> None:
-    check = sensor_places(shapes_at(true_m, gains, PLACES), HANGER)
+    modes = shapes_at(true_m, gains, PLACES_M)
+    check = PLACES.check(Inspection([], [], IdentifyOptions(), modes=modes, hanger=HANGER))
     assert check is not None
     assert found in check.found
     assert check.verdict == ("good" if "are those" in found else "warning")
@@ -135,6 +137,10 @@ def turned(degrees: float, amplitude: float = 1.0) -> list[FoundMode]:
 
 @pytest.mark.parametrize(("degrees", "verdict"), [(3, "good"), (-30, "warning"), (88, "refused")])
 def test_the_angle_between_places_decides(degrees: float, verdict: str) -> None:
-    check = directions(turned(degrees), TWO_PLACES)
+    none = np.empty(0)
+    finding = Finding(tuple(turned(degrees)), (), Poles(none, none, none, none.astype(bool)))
+    check = DIRECTIONS.check(
+        Inspection([], [], IdentifyOptions(), finding=finding, points=TWO_PLACES)
+    )
     assert check is not None
     assert (check.verdict, check.value) == (verdict, pytest.approx(abs(degrees)))

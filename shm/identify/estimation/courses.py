@@ -64,8 +64,7 @@ def course_of(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> 
     flat = parts.transpose(1, 0, 2).reshape(parts.shape[1], -1)
     solved = flat @ columns.T @ inverse  # (stretches, 2 modes)
     rest = flat - solved @ columns
-    freedom = max(1, flat.shape[1] - len(columns))
-    noise = np.sum(rest**2, axis=1) / freedom
+    noise = _noise(rest.reshape(len(flat), -1, length), min(len(columns), rest.shape[1] - 1))
     variance = np.diag(inverse)
     half = len(modes)
     motion = solved[:, :half] + 1j * solved[:, half:]
@@ -78,6 +77,17 @@ def course_of(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> 
     turned = np.exp(-np.outer(begin_s, poles))
     middle_s = begin_s + length / (2 * rate_hz)
     return RingDownCourse(middle_s, motion * turned, sd * np.abs(turned))
+
+
+def _noise(rest: FloatArray, columns: int) -> FloatArray:
+    """Return the noise in each stretch, (stretches,): the median line of what is left there.
+
+    `rest` is (stretches, channels, samples) without `columns` that were fitted, which empty as many
+    lines. The mean would take a mode that is not fitted well for noise of all the others.
+    """
+    samples = rest.shape[-1]
+    power = np.mean(np.abs(np.fft.rfft(rest, axis=-1)) ** 2, axis=1) / samples
+    return np.asarray(np.quantile(power, (1 + columns / rest[0].size) / 2, axis=1))
 
 
 def _leaks(modes: Sequence[FoundMode]) -> FloatArray:

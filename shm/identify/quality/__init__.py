@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.errors import NotIdentifiable
-from shm.identify.quality import of_ambient, of_hits, of_modes, of_signals
+from shm.identify.quality import of_ambient, of_hits, of_modes, of_sensors, of_signals
 from shm.identify.quality import tones as of_tones
 from shm.identify.quality.table import Inspection, Row
 from shm.identify.quality.tones import tones
 from shm.values import QualityCheck
 
-__all__ = ["CHECKS", "Inspection", "Row", "assess", "refusal", "tones"]
+__all__ = ["CHECKS", "CHECKS_OF_NUMBERED", "Inspection", "Row", "assess", "refusal", "tones"]
 
 CHECKS: tuple[Row, ...] = (
     of_hits.HITS,
@@ -33,12 +33,15 @@ CHECKS: tuple[Row, ...] = (
     of_tones.ROW,
     of_hits.REPEATABILITY,
     of_modes.AGREEMENT,
+    of_sensors.DIRECTIONS,
 )
+CHECKS_OF_NUMBERED: tuple[Row, ...] = (of_modes.LOWEST, of_sensors.GAIN, of_sensors.PLACES)
+"""Of modes that have orders, on a described bar."""
 
 
-def assess(inspection: Inspection) -> tuple[QualityCheck, ...]:
-    """Return the figures of all checks that apply, in the order of `CHECKS`."""
-    found = [row.check(inspection) for row in CHECKS]
+def assess(inspection: Inspection, rows: Sequence[Row] = CHECKS) -> tuple[QualityCheck, ...]:
+    """Return the figures of all checks that apply, in the order of `rows`."""
+    found = [row.check(inspection) for row in rows]
     return tuple(figure for figure in found if figure is not None)
 
 

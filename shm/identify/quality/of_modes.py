@@ -22,7 +22,6 @@ from shm.values import (
     Hanger,
     Mode,
     Plane,
-    QualityCheck,
 )
 from shm.values.modes import FIRST_ORDERS, SLOPE_OF_NOTE
 from shm.values.rounding import listed
@@ -188,27 +187,18 @@ def _alone(who: str, frequency_hz: FloatArray, common: list[int]) -> str:
     return f"; {who} identifier alone saw {names}" if len(alone) else ""
 
 
-def first_orders(modes: Sequence[Mode], hanger: Hanger, low_hz: float) -> QualityCheck | None:
-    """Return the check for modes of the described hanger below the first one found in a plane.
-
-    Only modes above `low_hz` count.
-    """
+def _first_orders(inspection: Inspection) -> Reading | None:
+    """Return how many modes of the described hanger are missing below the first of a plane."""
+    modes, hanger, low_hz = inspection.modes, inspection.hanger, inspection.options.band_low_hz
+    if hanger is None or not modes or not any(point.plane for point in inspection.points):
+        return None  # without a stated plane none can lack a mode
     lost = {plane: _below_first(modes, plane, hanger, low_hz) for plane in PLANES}
-    if not modes:
-        return None
     names = [
         f"{plane} order {listed([str(order) for order in orders])}"
         for plane, orders in lost.items()
         if orders
     ]
-    if not names:
-        found = "no mode is missing below the first one of a plane"
-        return QualityCheck(FIRST_ORDERS, "good", 0.0, 0.0, "", found)
-    count = sum(len(orders) for orders in lost.values())
-    return QualityCheck(
-        FIRST_ORDERS, "warning", float(count), 0.0, "", f"{listed(names)} not found",
-        "Hit nearer to the middle with a softer tip, and record longer.",
-    )  # fmt: skip
+    return Reading(sum(map(len, lost.values())), {"names": listed(names)})
 
 
 def _below_first(modes: Sequence[Mode], plane: Plane, hanger: Hanger, low_hz: float) -> list[int]:
@@ -221,3 +211,9 @@ def _below_first(modes: Sequence[Mode], plane: Plane, hanger: Hanger, low_hz: fl
     log_hz = log_factor(Description.of(hanger).log_xi, half_fixed, orders.astype(float))
     expected_hz = first.frequency_hz * np.exp(log_hz - log_hz[-1])
     return [int(order) for order in orders[:-1][expected_hz[:-1] >= low_hz]]
+
+
+LOWEST = Row(
+    FIRST_ORDERS, _first_orders, 0.0, "", "no mode is missing below the first one of a plane",
+    "{names} not found", "Hit nearer to the middle with a softer tip, and record longer.",
+)  # fmt: skip

@@ -17,6 +17,7 @@ import numpy as np
 
 from shm.identify.contract import FoundMode, Measurement
 from shm.identify.mode_ordering.bars import HIGHEST_ORDER, described_shapes
+from shm.identify.quality.table import Inspection, Reading, Row
 from shm.identify.setup_merging.modal_participation import ringing
 from shm.values import (
     NAN,
@@ -26,9 +27,6 @@ from shm.values import (
     IntArray,
     Mode,
     Plane,
-    QualityCheck,
-    ResponsePoint,
-    Verdict,
 )
 
 LARGEST_FACTOR = 2.0
@@ -50,7 +48,7 @@ _EXPLAINED = 0.2  # judgement: of the misfit, what one wrong sensor may leave of
 _LEAST_MOVE_M, _LEAST_FACTOR = 0.25, 1.3  # judgement: less moves no order and no tension
 _NEARLY = 2.0  # judgement: another place explains it nearly as well
 _FACTORS = np.concatenate([np.geomspace(1 / 30, 30, 103), -np.geomspace(1 / 30, 30, 103)])
-_PLACES = np.linspace(0.005, 0.995, 199)
+_TRIED = np.linspace(0.005, 0.995, 199)
 
 
 @dataclass(frozen=True)
@@ -62,47 +60,35 @@ class _Wrong:
     text: str
 
 
-def sensor_gain(
-    measurements: Sequence[Measurement],
-    found: Sequence[Sequence[FoundMode]],
-    modes: Sequence[Mode],
-    hanger: Hanger,
-) -> QualityCheck | None:
-    """Return the check of motion per force over that of the described mass; None if unknown.
+def _gain(inspection: Inspection) -> Reading | None:
+    """Return the motion per force over that of the described mass, the median over the hits.
 
-    `found` are the modes of each set-up, `modes` those with an order. Of frequencies that
-    change much with amplitude the residues are too small. Not checked where no hammer's
-    position is stated.
+    Of frequencies that change much with amplitude the residues are too small. Not checked where
+    no hammer's position is stated.
     """
+    modes, hanger, measurements = inspection.modes, inspection.hanger, inspection.measurements
     hammers = [measurement.hammer for measurement in measurements if measurement.driven]
     if hammers and not any(hammer and np.isfinite(hammer.x_m) for hammer in hammers):
-        return QualityCheck(
-            "gain", "unknown", NAN, LARGEST_FACTOR, "",
-            "not checked: the hammer's place is not stated",
-            "State where the hammer hits: `x_m` of the force, in m from the deck end.",
-        )  # fmt: skip
-    if any(m.depends_on_amplitude and abs(m.amplitude_slope) > _LARGEST_SLOPE for m in modes):
+        found = "not checked: the hammer's place is not stated"
+        remedy = "State where the hammer hits: `x_m` of the force, in m from the deck end."
+        return Reading(NAN, verdict="unknown", found=found, remedy=remedy)
+    if hanger is None or any(
+        m.depends_on_amplitude and abs(m.amplitude_slope) > _LARGEST_SLOPE for m in modes
+    ):
         return None
     factors = [
         factor
-        for measurement, modes_of in zip(measurements, found, strict=True)
+        for measurement, modes_of in zip(measurements, inspection.apart, strict=True)
         if measurement.driven and modes_of
         for factor in _factors(measurement, modes_of, modes, hanger)
     ]
     if not factors:
         return None
     value = float(np.median(factors))
-    times, side = max(value, 1 / value), "more" if value > 1 else "less"
-    if times < LARGEST_FACTOR:
-        text = f"the response agrees with the described mass (ratio {value:.2f})"
-        return QualityCheck("gain", "good", value, LARGEST_FACTOR, "", text)
-    text = f"the hanger moves {times:.2g} times {side} than its described mass allows"
+    times = max(value, 1 / value)
     cause = ", as accelerations in g do under the name m/s2" if 7 < 1 / value < 14 else ""
-    return QualityCheck(
-        "gain", "warning", value, LARGEST_FACTOR, "", text + cause,
-        "Check unit and sensitivity of hammer and accelerometers, the hammer's place, and the "
-        "described section and length.",
-    )  # fmt: skip
+    words = {"times": times, "side": "more" if value > 1 else "less", "cause": cause}
+    return Reading(value, words, "good" if times < LARGEST_FACTOR else "warning")
 
 
 def _factors(
@@ -160,23 +146,21 @@ def _ratio(
     return np.asarray(best)
 
 
-def sensor_places(modes: Sequence[Mode], hanger: Hanger) -> QualityCheck | None:
-    """Return the check of whether one sensor's factor or position spoils the shapes.
+def _places(inspection: Inspection) -> Reading | None:
+    """Return the misfit of shapes that one sensor's factor or position may explain.
 
     None where shapes do not tell, as those of a bar with turnbuckles, which bend otherwise by
     as much as a wrong position does.
     """
-    if hanger.turnbuckles:
+    hanger = inspection.hanger
+    if hanger is None or hanger.turnbuckles:
         return None
-    results = [
-        found
-        for plane in PLANES
-        if (found := _in_plane([m for m in modes if m.plane == plane], plane, hanger)) is not None
-    ]
-    return max(results, key=lambda check: (check.verdict != "good", check.value), default=None)
+    of_planes = [[m for m in inspection.modes if m.plane == plane] for plane in PLANES]
+    results = [found for modes in of_planes if (found := _in_plane(modes, hanger)) is not None]
+    return max(results, key=lambda reading: reading.value, default=None)
 
 
-def _in_plane(modes: Sequence[Mode], plane: Plane, hanger: Hanger) -> QualityCheck | None:
+def _in_plane(modes: Sequence[Mode], hanger: Hanger) -> Reading | None:
     modes = [mode for mode in modes if mode.order <= HIGHEST_ORDER]
     values = np.array([[point.value for point in mode.shape] for mode in modes])
     if len(modes) < _LEAST_MODES or values.shape[1] < _LEAST_PLACES:
@@ -188,24 +172,19 @@ def _in_plane(modes: Sequence[Mode], plane: Plane, hanger: Hanger) -> QualityChe
     orders = np.array([mode.order for mode in modes])
     misfit, typical, wrong = _explained(values[:, seen], places_m, orders, hanger)
     best = min(wrong, key=lambda each: each.misfit)
-    if misfit < LARGEST_MISFIT:
-        text = "the sensors' shapes are those of the described hanger"
-        return QualityCheck("places", "good", misfit, LARGEST_MISFIT, "", text)
     in_most = typical >= _TYPICAL * LARGEST_MISFIT
-    if not in_most or not best.is_large or best.misfit > _EXPLAINED * misfit:
-        text = "the shapes are not those of the described hanger, and no one sensor explains it"
-        remedy = (
-            "Compare the sensors' places with the sheet: two may be exchanged, or one 0.2 m off."
+    one_explains = in_most and best.is_large and best.misfit <= _EXPLAINED * misfit
+    if misfit >= LARGEST_MISFIT and not one_explains:
+        return Reading(
+            misfit,
+            verdict="warning" if in_most and misfit > _SURELY_OFF else "unknown",
+            found="the shapes are not those of the described hanger, and no one sensor explains it",
+            remedy="Compare the sensors' places with the sheet: two may be exchanged, or one 0.2 m "
+            "off.",
         )
-        verdict: Verdict = "warning" if in_most and misfit > _SURELY_OFF else "unknown"
-        return QualityCheck("places", verdict, misfit, LARGEST_MISFIT, "", text, remedy)
     candidates = [each for each in wrong if each.misfit < _NEARLY * best.misfit]
     text = " or ".join(each.text for each in sorted(candidates, key=lambda each: each.misfit)[:3])
-    return QualityCheck(
-        "places", "warning", misfit, LARGEST_MISFIT, "",
-        f"{len(modes)} {plane} modes fit the described hanger if {text}",
-        "Check place, unit, sensitivity and sign of that sensor.",
-    )  # fmt: skip
+    return Reading(misfit, {"count": len(modes), "plane": modes[0].plane, "cause": text})
 
 
 def _explained(
@@ -215,7 +194,7 @@ def _explained(
 
     The fix is by its factor or its position.
     """
-    every = np.concatenate([places_m, _PLACES * hanger.length_m])
+    every = np.concatenate([places_m, _TRIED * hanger.length_m])
     shapes = described_shapes(every, orders, hanger)
     at_places, elsewhere = shapes[:, :, : len(places_m)], shapes[:, :, len(places_m) :]
     wrong = []
@@ -224,7 +203,7 @@ def _explained(
         scaled[:, :, n] *= _FACTORS[:, np.newaxis]
         left = np.min([_misfits(scaled, shape).mean(axis=-1) for shape in at_places], axis=0)
         wrong.append(_mended_by_factor(float(left.min()), x_m, _FACTORS[int(np.argmin(left))]))
-        moved = np.repeat(at_places[np.newaxis], len(_PLACES), axis=0)
+        moved = np.repeat(at_places[np.newaxis], len(_TRIED), axis=0)
         moved[:, :, :, n] = elsewhere.transpose(2, 0, 1)
         left = _misfits(values, moved).mean(axis=-1).min(axis=1)
         there_m = float(every[len(places_m) + int(np.argmin(left))])
@@ -259,10 +238,15 @@ _SHARE_SEEN = 0.25  # judgement, of the largest motion: nearer to a node the dir
 _MODES_SEEN = 3  # a median that one mode cannot make
 
 
-def directions(modes: Sequence[FoundMode], points: Sequence[ResponsePoint]) -> QualityCheck | None:
-    """Compare places pair by pair; None where fewer than two have axes in both planes."""
+def _directions(inspection: Inspection) -> Reading | None:
+    """Return the largest angle between places with axes in both planes; None below two such."""
+    modes = inspection.finding.modes if inspection.finding else ()
     rows = [
-        {p.x_m: row for row, p in enumerate(points) if p.plane == plane and not math.isnan(p.x_m)}
+        {
+            p.x_m: row
+            for row, p in enumerate(inspection.points)
+            if p.plane == plane and not math.isnan(p.x_m)
+        }
         for plane in PLANES
     ]
     biaxial = {x_m: (rows[0][x_m], rows[1][x_m]) for x_m in rows[0].keys() & rows[1].keys()}
@@ -274,15 +258,11 @@ def directions(modes: Sequence[FoundMode], points: Sequence[ResponsePoint]) -> Q
     if not apart:
         return None
     worst, one, other = max(apart)
-    about = f"the sensors at {one:g} m and {other:g} m see the modes move {worst:.0f} degrees apart"
-    verdict: Verdict = "good"
-    remedy = ""
-    if worst > LARGEST_DEGREES:
-        verdict, remedy = "warning", "Align both sensors with the planes of the bridge."
+    words = {"one": one, "other": other}
     if worst > _EXCHANGED_DEGREES:
-        verdict = "refused"
         remedy = "The planes of one of them are exchanged: correct its axes or its description."
-    return QualityCheck("directions", verdict, worst, LARGEST_DEGREES, "degrees", about, remedy)
+        return Reading(worst, words, "refused", remedy=remedy)
+    return Reading(worst, words)
 
 
 def _apart(modes: Sequence[FoundMode], one: tuple[int, int], other: tuple[int, int]) -> float:
@@ -297,3 +277,23 @@ def _apart(modes: Sequence[FoundMode], one: tuple[int, int], other: tuple[int, i
     if len(cosines) < _MODES_SEEN:
         return math.nan
     return math.degrees(math.acos(float(np.median(cosines))))
+
+
+_SEE_APART = "the sensors at {one:g} m and {other:g} m see the modes move {value:.0f} degrees apart"
+GAIN = Row(
+    "gain", _gain, LARGEST_FACTOR, "",
+    "the response agrees with the described mass (ratio {value:.2f})",
+    "the hanger moves {times:.2g} times {side} than its described mass allows{cause}",
+    "Check unit and sensitivity of hammer and accelerometers, the hammer's place, and the "
+    "described section and length.",
+)  # fmt: skip
+PLACES = Row(
+    "places", _places, LARGEST_MISFIT, "",
+    "the sensors' shapes are those of the described hanger",
+    "{count} {plane} modes fit the described hanger if {cause}",
+    "Check place, unit, sensitivity and sign of that sensor.",
+)  # fmt: skip
+DIRECTIONS = Row(
+    "directions", _directions, LARGEST_DEGREES, "degrees", _SEE_APART, _SEE_APART,
+    "Align both sensors with the planes of the bridge.",
+)  # fmt: skip

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from shm.identify.contract import Finding, Hit, Measurement, Tone
+from shm.identify.contract import Finding, FoundMode, Hit, Measurement, Tone
 from shm.identify.options import IdentifyOptions
-from shm.values import NAN, QualityCheck, Recording, Verdict
+from shm.values import NAN, Hanger, Mode, QualityCheck, Recording, ResponsePoint, Verdict
 from shm.values.rounding import listed
 
 _MAX_NAMED = 4  # technical: of a sentence that can be read
@@ -18,11 +18,13 @@ _MAX_NAMED = 4  # technical: of a sentence that can be read
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """A test before its modes are numbered.
+    """A test, before and after its modes are numbered.
 
     `records` are the time records, none where frequency responses were given; `measurements` one a
     set-up; `tones` ring steadily in them; `finding` is what the identifier found, None where it has
-    not run yet; `cross_check` what a second identifier found, None where none was asked.
+    not run yet, over `points`; `cross_check` what a second identifier found, None where none was
+    asked. Once modes are numbered, `apart` are those of each set-up, `modes` those with an order,
+    and `hanger` is the described bar.
     """
 
     records: Sequence[Recording]
@@ -31,6 +33,10 @@ class Inspection:
     tones: Sequence[Tone] = ()
     finding: Finding | None = None
     cross_check: Finding | None = None
+    points: Sequence[ResponsePoint] = ()
+    apart: Sequence[Sequence[FoundMode]] = ()
+    modes: Sequence[Mode] = ()
+    hanger: Hanger | None = None
 
 
 def hits_of(inspection: Inspection) -> list[Hit]:
