@@ -110,7 +110,7 @@ def _lists(table: Table, width: int) -> list[str]:
 def _widths(table: Table, width: int) -> list[int]:
     """Return the width of each column; empty where they do not fit."""
     columns = list(zip(table.headings, *table.rows, strict=True))
-    widths = [max(len(cell) for cell in column) for column in columns]
+    widths = [max(1, *map(len, column)) for column in columns]
     room = width - len(_GAP) * (len(widths) - 1)
     for longest in (_LONGEST_NAME, _LEAST):
         least = [max(_longest_word(cell, longest) for cell in column) for column in columns]
