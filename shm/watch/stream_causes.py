@@ -23,7 +23,7 @@ from shm.watch.stream_reading import ModeTable, baseline_of
 
 _DAY_SD = 3e-4  # of ln f: joints that slip by another level, each mode by its own. Judgement
 EXCHANGED = "exchanged planes"
-"""A cause that no hammer test has: the cables of the sensors are exchanged."""
+"""A cause that no hammer test has: the cables of the sensors are exchanged. Record 0002."""
 _NEVER = datetime(2000, 1, 1, tzinfo=UTC)  # technical: these readings need no time
 
 
@@ -45,7 +45,7 @@ class StreamCause:
     @property
     def is_measurement(self) -> bool:
         """Return True if it is none of the hanger, so that nobody need go there today."""
-        return self.name in (TIMEBASE, SENSOR_MASS, EXCHANGED)
+        return self.name in (TIMEBASE, SENSOR_MASS)
 
     @property
     def takes_hours(self) -> bool:
@@ -57,8 +57,6 @@ def find_cause(
     moved: FloatArray, table: ModeTable, baseline: Posterior | None, hanger: Hanger
 ) -> StreamCause:
     """Find the cause of mean log frequencies that `moved` (n,), NaN where that is not known."""
-    if _are_exchanged(moved, table):
-        return StreamCause((Moved(EXCHANGED, 1.0, np.nan, np.nan),), moved, None)
     known = np.isfinite(moved)
     nothing = StreamCause((Moved(UNEXPLAINED, 1.0, np.nan, np.nan),), moved, None)
     if not known.any():
@@ -93,24 +91,28 @@ def find_cause(
     return StreamCause(found, by_mode, planes.pop() if len(planes) == 1 else None)
 
 
-def _are_exchanged(
-    moved: FloatArray, table: ModeTable, least: int = 3, within: float = 2.0, times: float = 4.0
-) -> bool:
-    """Return True if each mode lies where that of the other plane did, at any tension.
+def find_exchange(
+    off: FloatArray, table: ModeTable, least: int = 3, within: float = 2.0, times: float = 4.0
+) -> StreamCause | None:
+    """Return exchanged planes as the cause, if each mode lies where that of the other plane does.
 
-    In the median `within` so many sds, and so many `times` nearer than at any tension of its own.
+    `off` (n,) are changes of ln f. In the median they are `within` so many sds of that, and so many
+    `times` nearer than at any tension of their own.
     """
     place = {mode: index for index, mode in enumerate(table.modes)}
     other = [place.get((PLANES[plane == PLANES[0]], order), -1) for plane, order in table.modes]
-    both = np.isfinite(moved) & (np.array(other) >= 0)
+    crossed = np.where(np.array(other) >= 0, table.level[other] - table.level, np.nan)
+    both = np.isfinite(off + crossed)
     if both.sum() < least:
-        return False
-    left = (moved - (table.level[other] - table.level))[both]
+        return None
     tension, sd = table.tension[both], np.sqrt(table.spread[both] + _DAY_SD**2)
-    left = left - tension * np.median(left / tension)
-    before = moved[both] - tension * np.median(moved[both] / tension)
-    off, moved_by = (float(np.median(np.abs(each) / sd)) for each in (left, before))
-    return off < within and moved_by > times * max(off, 1.0)
+    left, before = (
+        float(np.median(np.abs(each - tension * np.median(each / tension)) / sd))
+        for each in ((off - crossed)[both], off[both])
+    )
+    if not left < within or not before > times * max(left, 1.0):
+        return None
+    return StreamCause((Moved(EXCHANGED, 1.0, np.nan, np.nan),), crossed, None)
 
 
 def _is_clock(moved: Sequence[Moved]) -> bool:

@@ -43,7 +43,7 @@ from shm.values.stream import (
 )
 from shm.watch.causes import TIMEBASE
 from shm.watch.kept_state import from_bytes, to_bytes
-from shm.watch.stream_causes import EXCHANGED, StreamCause, find_cause
+from shm.watch.stream_causes import EXCHANGED, StreamCause, find_cause, find_exchange
 from shm.watch.stream_filter import CLIP, FAST, FEATURES, LEVEL, NOTHING, SLOW, Bank, Evidence
 from shm.watch.stream_reading import ModeTable, SeenReading, planes_of, usable
 from shm.watch.stream_thermometer import Believed, Thermometer, believed
@@ -55,6 +55,7 @@ _LAGS_DAYS = np.array([2.0, 14.0, 240.0]) / HOURS_A_DAY
 # Judgement: by what an hour's temperature differs from ten days' mean, and that the errors of some
 # ten hours without a thermometer are one error: an hour counts for a third of what it would.
 _UNKNOWN_K, TOGETHER = 4.0, 3.0
+HOURS_EXCHANGED = 3  # judgement: until it is reported, as mistaken modes look like it for an hour
 NO_CONDITIONS = np.zeros(0)
 """Of the contrast of the planes: what the weather does to one more than the other is its wander."""
 _RING = 24  # readings: a change is told within a day or is slow
@@ -97,8 +98,9 @@ class StreamState:
     of those before. Shifts count from `zero`, compensated ones from `compensated_zero`; a change
     that was told of the tension is `called`, of one plane `apart`. `contrast` are the filters of
     what one plane says more than the other, less what was `absorbed` into the modes' levels.
-    `unknown_sd` of ln T is what an unknown temperature may do, 0 where it is known. Up to
-    `settled_day` readings are gone over again: no alert ends before.
+    The planes have looked exchanged for `exchanged_hours`. `unknown_sd` of ln T is what an unknown
+    temperature may do, 0 where it is known. Up to `settled_day` readings are gone over again: no
+    alert ends before.
     """
 
     key: str
@@ -121,6 +123,7 @@ class StreamState:
     absorbed: float = 0.0
     told: AlertState = field(default_factory=AlertState)
     standing: tuple[str, ...] = ()
+    exchanged_hours: int = 0
     settled_day: float = 0.0
     unknown_sd: float = 0.0
     thermometer: Thermometer = field(default_factory=Thermometer)
@@ -392,8 +395,15 @@ class StreamWatch:
         end: datetime,
         unlike: float,
     ) -> tuple[StreamWatched, StreamState]:
-        evidence, apart, is_apart = self._weigh(state)
         events: tuple[StreamEvent, ...] = ()
+        exchange = find_exchange(seen.off, state.table)
+        state = replace(state, exchanged_hours=state.exchanged_hours + 1 if exchange else 0)
+        if exchange and state.exchanged_hours == HOURS_EXCHANGED:
+            events = (_event(exchange, state, NOTHING, reading, end),)
+            state = _absorb_fault(state, exchange)
+        evidence, apart, is_apart = self._weigh(state)
+        if exchange and not events:  # it is not known yet: no change is reported meanwhile
+            evidence = NOTHING
         moved: tuple[Moved, ...] = ()
         if evidence.years > self._limit_years and evidence.material > 0.5:
             by_mode, since = _move_of_modes(state, evidence)
