@@ -278,8 +278,8 @@ class Posterior(Displayable):
         if self.reading_off_sd > CONTRADICTS_FROM_SD:
             found.append(
                 "The tension that was read contradicts the frequencies, by "
-                f"{self.reading_off_sd:.0f} standard deviations: this answer lies between the two. "
-                f"Check the reading, its unit, and the description. {_DO_NOT_USE}"
+                f"{self.reading_off_sd:.0f} standard deviations. Check the reading, its unit, and "
+                f"the description. {_DO_NOT_USE}"
             )
         if self.description_off_sd > CONTRADICTS_FROM_SD:
             found.append(
