@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -22,7 +23,9 @@ from shm.gap.repeated_errors import (
 from shm.gap.sampling import Sampling
 from shm.inference.described import DescribedCoordinates
 from shm.inference.likelihood import Likelihood
+from shm.inference.options import silent
 from shm.inference.posterior import Peak
+from shm.inference.problem import Problem
 from shm.inference.systematic_errors import (
     Ends,
     errors_of_sensors,
@@ -74,9 +77,9 @@ class GapProblem:
         wave_n_m = model.wave_stiffness_n_m_rad((1 + order.max()) / 2)
         known = self.hanger.scatter.tension
         # Of readings only differences between tests count (see `shm.gap.observations`).
-        unread = [replace(test, tension_read_n=NAN, tension_read_sd_n=NAN) for test in tests]
+        self._is_part = described is not None
         self.described = described or DescribedCoordinates(
-            model, unread, wave_n_m, known_tension_sd=known
+            model, _without_readings(tests), wave_n_m, known_tension_sd=known
         )
         self._linear = self.described.always_linear
         self.sampling: Sampling | None = None
@@ -86,6 +89,15 @@ class GapProblem:
         self._likelihoods: dict[tuple[Effects, bool], Likelihood] = {}
         self._thermometers: dict[Effects, FloatArray] = {}
         self._scaling = ShapeScaling.measured(observations)
+
+    def as_update(self) -> Problem | None:
+        """Return the update of the same hanger by the same tests; None where that is another one.
+
+        It is where some frequencies are left out, and where the tension is known.
+        """
+        if self._is_part or math.isfinite(self.hanger.scatter.tension):
+            return None
+        return Problem.of(_without_readings(self.tests), self.model, silent)
 
     # ------------------------------------------------ what the posterior of a hypothesis asks for
 
@@ -447,6 +459,10 @@ class GapProblem:
         conditions = [design.conditions[test] for test in tests]
         orders, shapes = int(design.frequency_order.max()), len(design.shape_mode) > 0
         return zip(tests, composed.modes_of_tests(theta, conditions, orders, shapes), strict=True)
+
+
+def _without_readings(tests: Sequence[ModalTest]) -> list[ModalTest]:
+    return [replace(test, tension_read_n=NAN, tension_read_sd_n=NAN) for test in tests]
 
 
 def of_each_test(design: Design, change: FloatArray) -> FloatArray:

@@ -31,9 +31,10 @@ from shm.gap.sampling import MOST_ROUNDS, Sampling, approximate
 from shm.gap.scan import scan, scan_pair
 from shm.inference.coordinates import log_normal
 from shm.inference.linear import Linear
-from shm.inference.mixture import normalised
+from shm.inference.mixture import effective, normalised, systematic
 from shm.inference.options import Progress, silent
 from shm.inference.posterior import Peak, find_peaks, laplace
+from shm.inference.sampling import sample
 from shm.models.effects import EFFECTS
 from shm.values import ENOUGH_EFFECTIVE, FloatArray, Leads
 from shm.values.leading import MIN_NO_GAP_PROBABILITY, find_leading_cause
@@ -52,6 +53,7 @@ _MOST_SCANNED, _MOST_PAIRS = 12, 8
 OF_THE_ANSWER = 0.1
 """Probability that may rest on hypotheses which were not sampled."""
 _MOST_SAMPLED = 5  # numerical: places of one cause are seldom more
+_OF_UPDATE = 1500  # numerical: draws of an update, a third of which are effective
 _ROUGHLY = 40, 8  # numerical: effective draws and rounds that tell the classes' evidence apart
 
 
@@ -268,8 +270,30 @@ def fit_alone(problem: GapProblem, rng: np.random.Generator, draws: int = 1000) 
     if problem.alone is None:
         sampling = sample_alone(problem, rng)
         sampling.run(ENOUGH_EFFECTIVE, MOST_ROUNDS)
-        problem.alone = sampling.fit(draws)
+        problem.alone = _with_draws_of_update(problem, sampling.fit(draws), rng)
     return problem.alone
+
+
+def _with_draws_of_update(problem: GapProblem, fit: Fit, rng: np.random.Generator) -> Fit:
+    """Return the fit of the hanger alone with the draws that an update has of it.
+
+    They follow valleys that sampling about the peaks does not; what differs between both densities
+    weights them. The fit stays where too few count.
+    """
+    update = problem.as_update()
+    if update is None:
+        return fit
+    update.settle(fit.z)
+    starts = update.fold(np.array([peak.z for peak in fit.peaks]))
+    found = sample(update, find_peaks(update.rough, starts), _OF_UPDATE, rng)
+    z = problem.described.places(update.coordinates.finished(found.points.z, rng))
+    log = Target(problem, ALONE).log(z) - update.log_posterior(found.points)
+    weights = normalised(np.where(np.isfinite(log), log, -np.inf))
+    count = found.effective_sample_size * effective(weights) / len(weights)
+    if not count >= ENOUGH_EFFECTIVE:
+        return fit
+    rows = systematic(weights, len(fit.draws), rng)
+    return replace(fit, draws=z[rng.permutation(rows)], effective=count)
 
 
 def sample_alone(problem: GapProblem, rng: np.random.Generator) -> Sampling:
