@@ -98,6 +98,9 @@ def _prometheus(series: Series, window: str) -> str:
     labels += ['hanger=~"$hanger"'] if series.of_hanger else []
     name = f"{series.measurement}_{series.field}"
     found = f"last_over_time({name}{{{','.join(labels)}}}[{window}])"
+    if series.counted:  # of one time VictoriaMetrics keeps both values, 1 and the later 0
+        counts = f"min_over_time({series.measurement}_counts[{window}]) == 1"
+        found += f" and on (bridge, hanger, test) {counts}"
     return f"max by ({', '.join(series.tags)}) ({found})"
 
 

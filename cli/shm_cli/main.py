@@ -90,7 +90,7 @@ GROUPS: dict[str, dict[str, Verb]] = {
     },
     "Upkeep": {
         "db": Verb("shm_cli.db", "Upgrade, check, back up, restore or copy the store."),
-        "archive": Verb("shm_cli.archive", "Limit the size of the archive and the quarantine."),
+        "archive": Verb("shm_cli.archive", "Limit the size of the archive."),
         "settings": Verb(
             "shm_cli.installation", "List every setting with default and range.", "settings_command"
         ),

@@ -21,12 +21,16 @@ from shm.errors import ShmError
 from shm.pipeline import Clock
 from shm.pipeline.publishing import Progress, queue_results
 from shm.store import Store, Workspace
-from shm.store.point_outbox import PointOutbox
+from shm.store.point_outbox import PointOutbox, WaitingPoint
 from shm_daemon.background import repeated
 from shm_daemon.hooks.contract import SHOWN_CHARACTERS, one_line, read_secret
 from shm_daemon.http_client import HttpClient, NoAnswer
 
-_POINTS_REFUSED = (HTTPStatus.BAD_REQUEST, HTTPStatus.UNPROCESSABLE_ENTITY)
+_POINTS_REFUSED = (
+    HTTPStatus.BAD_REQUEST,
+    HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+    HTTPStatus.UNPROCESSABLE_ENTITY,
+)
 
 log = logging.getLogger(__name__)
 
@@ -45,7 +49,7 @@ class NotTaken(ShmError):
 
 
 class PointsRefused(ShmError):
-    """A database understood and refused some of the points, and says why."""
+    """A database refused at least one of the points, and says why; others it may have stored."""
 
 
 def token_of(publication: Publication, workspace: Workspace, environment: Mapping[str, str]) -> str:
@@ -74,7 +78,7 @@ def post(
     except NoAnswer as error:
         remedy = "See that it runs, and that url is right."
         raise NotTaken(f"{publication.url}: {error.reason}.", remedy=remedy) from None
-    if not 200 <= answer.status < 300:
+    if answer.status != HTTPStatus.NO_CONTENT:
         raise _refusal(publication, answer.status, answer.body)
 
 
@@ -90,6 +94,9 @@ def _refusal(publication: Publication, status: int, words: bytes) -> ShmError:
         403: f"Let its token write to {place}.",
         404: f"Create {place} there, or correct its name in [[publish]].",
     }.get(status, "See its log.")
+    if 200 <= status < 300:
+        said = "not the 204 by which a database says that it has stored the points"
+        remedy = "See that url is the database itself, and not a login page or proxy."
     if 300 <= status < 400:
         remedy = "It is not followed: write the address that it sends to into [[publish]]."
     kind = PointsRefused if status in _POINTS_REFUSED else NotTaken
@@ -131,18 +138,13 @@ class Publisher:
     def _deliver(self, publication: Publication) -> None:
         """Post all that waits; note and log why where it is not taken."""
         name, before = publication.name, self._outbox.state(publication.name).why
-        timeout_s = self._workspace.settings.hook_timeout_seconds
         try:
             token = token_of(publication, self._workspace, os.environ)
             while waiting := self._outbox.list_waiting(name, self.pace.at_once):
-                lines = [each.line for each in waiting]
-                try:
-                    post(publication, token, lines, self._client, timeout_s)
-                except PointsRefused as error:  # it has taken the others
-                    log.warning("publish %s: %s", name, error)
-                    self._outbox.mark(waiting, "refused")
-                else:
-                    self._outbox.mark(waiting, "taken")
+                refusals = self._post_in_parts(publication, token, waiting)
+                if refusals:
+                    found = f"{len(refusals)} of {len(waiting)} points were refused"
+                    log.warning("publish %s: %s, the first: %s", name, found, refusals[0])
         except NotTaken as error:
             why = f"{error.message} {error.remedy}"
             self._retry_at[name] = time.monotonic() + self.pace.retry_s
@@ -151,6 +153,23 @@ class Publisher:
         if why != before and not self._client.closed:
             self._outbox.note_failure(name, why, self._clock())
             log.warning("publish %s: %s", name, why) if why else log.info("publish %s: works", name)
+
+    def _post_in_parts(
+        self, publication: Publication, token: str, points: Sequence[WaitingPoint]
+    ) -> list[PointsRefused]:
+        """Post points, halved while some are refused; return the refusal of each that is left."""
+        timeout_s = self._workspace.settings.hook_timeout_seconds
+        try:
+            post(publication, token, [each.line for each in points], self._client, timeout_s)
+        except PointsRefused as error:
+            if len(points) > 1:
+                half = len(points) // 2
+                first = self._post_in_parts(publication, token, points[:half])
+                return first + self._post_in_parts(publication, token, points[half:])
+            self._outbox.mark(points, "refused")
+            return [error]
+        self._outbox.mark(points, "taken")
+        return []
 
     def close(self) -> None:
         if self._store is not None:

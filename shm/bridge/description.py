@@ -273,7 +273,8 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
     others = tuple(other_bridge_of(each, path) for each in _tables(document, "other_bridge", path))
     _refuse_doubles([other.name for other in others], "other_bridge name", path)
     publications = tuple(publication_of(each, path) for each in _tables(document, "publish", path))
-    _refuse_doubles([each.name for each in publications], "publish name", path)
+    own_name = 'Give each [[publish]] a name of its own: name = "city".'
+    _refuse_doubles([each.name for each in publications], "publish name", path, own_name)
     controls = tuple(each for each in hangers if isinstance(each, ControlHanger))
     hangers = tuple(each for each in hangers if not each.is_control)
     described = {each.id: each for each in hangers}
@@ -358,10 +359,12 @@ def _tables(document: Mapping[str, Any], name: str, path: Path) -> list[dict[str
     return tables
 
 
-def _refuse_doubles(keys: list[Any], what: str, path: Path) -> None:
+def _refuse_doubles(
+    keys: list[Any], what: str, path: Path, remedy: str = "Keep one of them."
+) -> None:
     for key in keys:
         if keys.count(key) > 1:
-            raise BadInput(f"{what} {key} is given twice.", file=path, remedy="Keep one of them.")
+            raise BadInput(f"{what} {key} is given twice.", file=path, remedy=remedy)
 
 
 def _built(values: dict[str, Any], path: Path) -> date | None:

@@ -56,11 +56,13 @@ def _feed(table: Table, n_channels: int) -> SeedLinkFeed:
     )
     assert server is not None
     each = f"one for each of the {n_channels} [[stream.channel]] tables, in their order"
+    codes = [f'"XX_HGR3_00_HN{number}"' for number in range(1, n_channels + 1)]
+    worth = ["2.4e-6"] * n_channels
     ids = table.value(
         "channels",
         tuple[str, ...],
         f"is not {each}",
-        'Write network, station, location and code: channels = ["XX_HGR3_00_HN1"].',
+        f"Write network, station, location and code: channels = [{', '.join(codes)}].",
         holds=lambda found: len(found) == n_channels and all(map(_SEED_ID.fullmatch, found)),
     )
     if len(set(ids)) < len(ids):
@@ -68,8 +70,8 @@ def _feed(table: Table, n_channels: int) -> SeedLinkFeed:
     calibrations = table.value(
         "calibration",
         tuple[float, ...],
-        f"is not {each}",
-        "Give what a count of each is worth in m/s2: calibration = [2.4e-6].",
+        f"is not {each}, and none 0",
+        f"Give what a count of each is worth in m/s2: calibration = [{', '.join(worth)}].",
         holds=lambda found: len(found) == n_channels and all(found),
     )
     parts = tuple(tuple(text.split("_")) for text in ids)

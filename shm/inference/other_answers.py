@@ -18,6 +18,7 @@ from shm.inference.posterior import climb
 from shm.inference.priors import TensionReading
 from shm.inference.problem import Problem
 from shm.values import NAN, FloatArray
+from shm.values.posterior import NO_TENSION_PERCENT
 
 _AS_WELL = 1.0
 """A fit that is worse by less in its log likelihood is as good (judgement)."""
@@ -114,10 +115,20 @@ def _tension_of_other_orders_n(
         starts[:, coordinates.ends_at] = np.array(_STARTS)[:, None]  # type: ignore[union-attr]
         ends, _ = climb(other, starts, steps=_STEPS)
         fits = _fits(other, ends)
-        theta_f = float(coordinates.theta(ends[[fits.argmax()]])[0, 0])
+        end = ends[[fits.argmax()]]
+        theta_f = float(coordinates.theta(end)[0, 0])
+        if misfit_percent(other, other.predict(end)) > NO_TENSION_PERCENT:
+            continue
         if fits.max() > fit - _AS_WELL and abs(math.log(theta_f)) < nearest:
             nearest, found = abs(math.log(theta_f)), theta_f * nominal_n
     return found
+
+
+def misfit_percent(problem: Problem, predicted: FloatArray) -> float:
+    """Return by how much mean predictions (n, data) miss the frequencies, root mean square."""
+    found = problem.measured.explained(predicted).mean(axis=0)
+    off = found / problem.measured.frequency_hz[: len(found)] - 1
+    return float(100 * np.sqrt(np.mean(off**2)))
 
 
 def reading_off_sd(log_tension: FloatArray, reading: TensionReading, nominal_n: float) -> float:

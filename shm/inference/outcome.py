@@ -13,7 +13,7 @@ import scipy
 from shm.inference.described import DescribedCoordinates
 from shm.inference.field import FieldLikelihood
 from shm.inference.options import UpdateOptions
-from shm.inference.other_answers import Outcome, other_answers
+from shm.inference.other_answers import Outcome, misfit_percent, other_answers
 from shm.inference.posterior import DIFFERENCE, climb
 from shm.inference.problem import Problem
 from shm.inference.sampling import Sampled
@@ -97,7 +97,7 @@ def assembled(
         priors=model.priors,
         repeatability_sd_n=repeatability_sd_n(problem, outcome),
         at_bounds=_at_bounds(problem, samples),
-        misfit_percent=_misfit_percent(problem, outcome.predicted),
+        misfit_percent=misfit_percent(problem, outcome.predicted),
         log_occam=log_occam,
     )
 
@@ -157,13 +157,6 @@ def _at_bounds(problem: Problem, samples: FloatArray) -> tuple[str, ...]:
         names = prior.names
     outermost = np.maximum(np.mean(shares < _EDGE, axis=0), np.mean(shares > 1 - _EDGE, axis=0))
     return tuple(n for n, share in zip(names, outermost, strict=True) if share > _MANY * _EDGE)
-
-
-def _misfit_percent(problem: Problem, predicted: FloatArray) -> float:
-    """Root mean square of mean predictions over measured frequencies less 1, in per cent."""
-    found = problem.measured.explained(predicted).mean(axis=0)
-    off = found / problem.measured.frequency_hz[: len(found)] - 1
-    return float(100 * np.sqrt(np.mean(off**2)))
 
 
 def _highest_in_box(problem: Problem, best: FloatArray) -> FloatArray:

@@ -67,9 +67,6 @@ def reading_sd_n(test: ModalTest, assumed: Assumptions = DEFAULTS) -> float:
     return test.tension_read_sd_n if known else unstated_n
 
 
-_GROSS_READING_SD = 2.0  # of the logarithm. Judgement: kgf and N are a factor of 10 apart
-
-
 def errors_of_reading(
     usual_sd: float, assumed: Assumptions = DEFAULTS
 ) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -78,7 +75,8 @@ def errors_of_reading(
     The usual one, and that of a gross error: another unit, another hanger, a slip of the pen.
     """
     share = assumed.gross_error_share.value
-    return (usual_sd, math.log1p(-share)), (_GROSS_READING_SD, math.log(share))
+    gross_sd = assumed.gross_reading_log_sd.value
+    return (usual_sd, math.log1p(-share)), (gross_sd, math.log(share))
 
 
 class Deviations:

@@ -185,6 +185,8 @@ def format_of(path: Path) -> Format:
     claimed = _format_of_suffix(_unpacked_name(path), recognised)
     if claimed is None or (is_gzipped(path) and not claimed.may_be_gzipped):
         raise refuse_unreadable_suffix(path, _suffixes(), recognised)
+    if claimed is sep005.FORMAT and sep005.is_json(head):
+        return claimed  # its reader says what else the file is
     refuse_unless_readable(path, head, claimed, recognised)
     return claimed
 

@@ -24,6 +24,7 @@ from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.specification import drawn
 from shm.report.formatting import Interval
 from shm.report.hanger_sentences import advice, fit, over_time, summary, why
+from shm.report.hanger_status import UNDETERMINED
 from shm.report.hanger_summary import BASELINE_ALONE, BASELINE_AND_CHANGE
 from shm.report.hanger_tables import control_table, temperature_documents
 from shm.report.open_warnings import dated_by_receipt
@@ -191,7 +192,8 @@ def _tension(data: HangerReport) -> Fact:
     words = stated(data.averaged, data.tension_unit)
     doubt = "" if data.averaged.is_usable else "do not use it; "
     if not data.now.is_determined:
-        return ("Tension", "not determined", f"{doubt}90 % interval {words.interval}")
+        beside = f"{UNDETERMINED}; {doubt}90 % interval {words.interval}"
+        return ("Tension", "not determined", beside)
     value = formatting.with_half(data.tension_n, data.tension_unit)
     return ("Tension", value, f"{doubt}90 % interval; from {data.now.basis}")
 

@@ -55,7 +55,9 @@ class OutboxState:
         """Return what is behind and why, for a person; empty where nothing is."""
         since = f" since {self.oldest_at:%Y-%m-%d %H:%M} UTC" if self.oldest_at else ""
         parts = [f"{self.waiting} points wait{since}"] if self.waiting else []
-        parts += [f"{self.refused} points were refused; the log says why"] if self.refused else []
+        if self.refused:
+            again = "sent again when the daemon begins or bridge.toml changes"
+            parts.append(f"{self.refused} points were refused: the log says why; they are {again}")
         return f"{'; '.join(parts)}. {self.why}".strip() if parts else ""
 
 

@@ -89,14 +89,14 @@ def show_table(wanted: str, seed: int, as_json: bool) -> None:
     hanger = load_hanger(HANGER_FILE)
     title = f"table {wanted} of the thesis"
     if wanted in thesis_tables.TABLES:
-        with progress_bar("validating") as progress:
+        with progress_bar() as progress:
             shown = thesis_tables.TABLES[wanted](hanger, seed, progress)
         if as_json:
             print_json(shown.document)
         else:
             show_rows(title, shown.heads, shown.cells)
         return
-    with progress_bar("validating") as progress:
+    with progress_bar() as progress:
         rows = frequencies.compared(hanger, progress, wanted)
     if as_json:
         print_json([asdict(row) for row in rows])
@@ -109,7 +109,7 @@ def show_table(wanted: str, seed: int, as_json: bool) -> None:
 
 
 def show_formulas(seed: int, as_json: bool) -> None:
-    with progress_bar("validating") as progress:
+    with progress_bar() as progress:
         rows = formulas.compared(load_hanger(HANGER_FILE), seed, progress)
     if as_json:
         print_json([asdict(row) for row in rows])
@@ -136,7 +136,7 @@ def show_update(given: argparse.Namespace) -> None:
     options = UpdateOptions(samples=given.samples, seed=given.seed)
     documents: list[dict[str, Any]] = []
     errors: list[tuple[str, ...]] = []
-    with progress_bar("validating") as progress:
+    with progress_bar() as progress:
         for name in given.classes.split(","):
             model = build(name, hanger, THESIS)
             if given.sigma:
@@ -177,7 +177,7 @@ def compared(
 ) -> tuple[list[frequencies.FrequencyRow], list[selection.SelectionRow]]:
     """Return all rows of both parts."""
     hanger = load_hanger(HANGER_FILE)
-    with progress_bar("validating") as progress:
+    with progress_bar() as progress:
         tables = frequencies.compared(hanger, progress)
         return tables, selection.compared(hanger, seed, progress)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -88,7 +89,8 @@ def test_what_a_stream_differs_by_from_hammer_tests_is_said_where_both_exist(
         store.streams.save_pooled(hour)
     (row,) = shm("--workspace", workspace.folder, "stream", "--json").document["streams"]
     assert row["hammer_tests"] == 1
-    assert -0.01 < row["ambient_bias"] < -row["ambient_bias_sd"] < 0  # it is shrunk towards 0
+    assert row["ambient_bias"] == pytest.approx(math.log(0.99), abs=1e-6)
+    assert row["ambient_bias"] < -row["ambient_bias_sd"] < 0
     assert "differ from those of hammer" in shm("--workspace", workspace.folder, "stream").out
 
 

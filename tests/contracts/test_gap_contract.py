@@ -124,11 +124,7 @@ def test_golden_files_hold_what_was_planted() -> None:
     (shared,) = found["bridge"]["causes"]
     assert (shared["effect"], shared["family"]) == ("bending_stiffness", [3, 4])
     assert shared["size"]["q05"] < -0.2 < shared["size"]["q95"]
-    assert [step["kind"] for step in found["plan"]["steps"]] == [
-        "known mass",
-        "other plane",
-        "sensors",
-    ]
+    assert [step["kind"] for step in found["plan"]["steps"]] == ["known mass"]
 
 
 @pytest.mark.parametrize("name", [*calls.SINGLE, "bridge", "line"])
@@ -180,7 +176,7 @@ def test_an_adopted_cause_has_its_name() -> None:
     when, lineage = datetime(2026, 5, 1, tzinfo=UTC), Lineage("", "", "")
     stored = StoredDiagnosis(1, 3, diagnosis, when, lineage)
     name = adopted_name(("point_mass",), (), "", shm.load_hanger(ROD), stored, ())
-    assert str(name) == "beam1+point_mass@everywhere:x_m=3.37038..3.42641"
+    assert str(name) == "beam1+point_mass@everywhere:x_m=3.3705..3.42551"
 
 
 # ---------------------------------------------------------------- names and signatures

@@ -259,14 +259,23 @@ def test_dashboards_query_influxdb(bridge: Workspace, tmp_path: Path) -> None:
 
 
 class Server:
-    """Takes lines, or not, as it is told; notes those that it took."""
+    """Takes lines, or not, as it is told; notes those that it took.
+
+    It refuses, with `refusal`, requests of more than `max_lines` or with a line of `bad`; of the
+    latter it takes the other lines if it is `partial`, as InfluxDB does.
+    """
 
     def __init__(self) -> None:
         self.taken: Counter[str] = Counter()
         self.answer, self.takes = Answer(204), True
+        self.bad, self.refusal, self.partial, self.max_lines = "?", Answer(400), False, 10**6
 
     def __call__(self, told: Told) -> Answer:
         lines = told.body.decode().splitlines()
+        good = [line for line in lines if not line.startswith(self.bad)]
+        if len(lines) > self.max_lines or len(good) < len(lines):
+            self.taken.update(good if self.partial else ())
+            return self.refusal
         if self.takes:
             self.taken.update(lines)
         return self.answer
@@ -332,8 +341,11 @@ def test_influxdb_refuses_some_points(bridge: Workspace, tmp_path: Path, caplog)
         with caplog.at_level(logging.WARNING):
             publish(workspace)
 
-        assert "field type conflict" in caplog.text
-        assert "points were refused; the log says why" in status(workspace)
+        refused = re.search(r"(\d+) of \d+ points were refused.*field type conflict", caplog.text)
+        assert refused
+        assert f"{refused[1]} points were refused: the log says why" in status(workspace)
+        stored = len(database.influxql("SELECT * FROM shm_test WHERE hanger != '9'"))
+        assert stored + int(refused[1]) == 8
         found = counts(database)
         assert (found["shm_mode"], found["shm_hour"]) == (98, 1)
         assert waiting(workspace) == 0
@@ -341,7 +353,7 @@ def test_influxdb_refuses_some_points(bridge: Workspace, tmp_path: Path, caplog)
         database.influxql("DROP MEASUREMENT shm_test")
         publish(workspace)
         assert "refused" not in status(workspace)
-        assert counts(database)["shm_test"] == 8
+        assert counts(database)["shm_test"] == int(refused[1])  # those alone are sent again
 
 
 def test_dashboards_query_victoria_metrics(bridge: Workspace, tmp_path: Path) -> None:
@@ -355,11 +367,22 @@ def test_dashboards_query_victoria_metrics(bridge: Workspace, tmp_path: Path) ->
             for panel, query in board.items()
             if not database.promql(query)
         }
-    # The page for Prometheus alone knows the streams.
-    assert empty == {*EMPTY, "Since the last sample A", "Lost of the last day A"}
+        # The page for Prometheus alone knows the streams.
+        assert empty == {*EMPTY, "Since the last sample A", "Lost of the last day A"}
+
+        only_test = ["--workspace", str(bridge.folder), "ingest", "--discard", "four", "--why", "x"]
+        assert CliRunner().invoke(cli, only_test).exit_code == 0
+        by_test = boards["hanger"]["Tension by each test alone A"]
+        before = {str(each["metric"]) for each in database.promql(by_test)}
+        publish(bridge.reopened())
+        after = {str(each["metric"]) for each in database.promql(by_test)}
+    assert before - after == {"{'hanger': '4'}"}
 
 
-@pytest.mark.parametrize("answer", [Answer(503, b"<html>"), Answer(302), Answer(cut=True)])
+@pytest.mark.parametrize(
+    "answer",
+    [Answer(503, b"<html>"), Answer(200, b"<html>login"), Answer(302), Answer(cut=True)],
+)
 def test_publish_after_failure(workspace: Workspace, server: Server, answer: Answer) -> None:
     server.answer, server.takes = answer, False
     publish(workspace)
@@ -371,6 +394,37 @@ def test_publish_after_failure(workspace: Workspace, server: Server, answer: Ans
     publish(workspace)
     assert waiting(workspace) == 0
     assert len(server.taken) >= n_points
+    assert set(server.taken.values()) == {1}
+
+
+@pytest.mark.parametrize("partial", [False, True])
+def test_publish_refuses_only_bad_lines(
+    workspace: Workspace, server: Server, caplog: pytest.LogCaptureFixture, partial: bool
+) -> None:
+    server.bad, server.partial = "shm_hour", partial
+    server.refusal = Answer(400, b'{"error": "partial write: dropped=1"}')
+    with caplog.at_level(logging.WARNING):
+        publish(workspace)
+
+    assert re.search(r"publish influx: 1 of \d\d\d points were refused.*dropped=1", caplog.text)
+    assert "1 points were refused" in status(workspace)
+    assert "sent again when the daemon begins" in status(workspace)
+    assert waiting(workspace) == 0
+    assert Counter(line.split(",")[0] for line in server.taken)["shm_mode"] == 98
+
+    server.bad = "?"
+    publish(workspace)
+    assert "refused" not in status(workspace)
+    assert any(line.startswith("shm_hour") for line in server.taken)
+
+
+def test_publish_in_smaller_parts(workspace: Workspace, server: Server) -> None:
+    server.max_lines, server.refusal = 10, Answer(413)
+    publish(workspace)
+
+    assert waiting(workspace) == 0
+    assert "refused" not in status(workspace)
+    assert len(server.taken) > 100
     assert set(server.taken.values()) == {1}
 
 

@@ -48,6 +48,9 @@ class ToyProblem:
     def repeated(self) -> Repeated:
         return Repeated.none(self.observations.design)
 
+    def repeated_with(self, effects: object) -> Repeated:
+        return self.repeated
+
     def left(self, fit: Fit) -> FloatArray:
         return (self.observations.value - fit.predicted)[: self.design.frequencies]
 

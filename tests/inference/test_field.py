@@ -173,7 +173,8 @@ def test_a_reading_of_the_tension_is_one_more_datum() -> None:
         whole = np.column_stack([frequencies, [tension_n]])
         away = np.log(tension_n / 700e3)
         usual, wide = (
-            np.exp(-((away / sd) ** 2) / 2) / (sd * 700e3 * np.sqrt(2 * np.pi)) for sd in (0.02, 2)
+            np.exp(-((away / sd) ** 2) / 2) / (sd * 700e3 * np.sqrt(2 * np.pi))
+            for sd in (0.02, DEFAULTS.gross_reading_log_sd.value)
         )
         expected = np.log((1 - gross) * usual + gross * wide)
         gain = read.marginal(whole)[0] - bare.marginal(frequencies)[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
@@ -418,13 +419,52 @@ def test_channels_of_other_programs_come_in_and_go_out() -> None:
         ({"unit_str": "mm"}, "no channel holds an acceleration"),
         ({"fs": 100.0}, "every 0.01 s"),
         ({"start_timestamp": "2026-05-15"}, "begin at different times"),
+        ({"time": 2 * np.arange(400) / RATE}, f"{RATE:g}, but the times in the data give"),
+        ({"time": np.arange(399) / RATE}, "400 values, its time 399"),
+        ({"name": "a"}, "channel a: two channels have this name"),
+        ({"hanger": 4}, r"different hanger \(3, 4\)"),
     ],
 )
 def test_channels_that_cannot_be_a_recording_are_refused(
     change: dict[str, Any], words: str
 ) -> None:
     sound = {"data": ACC, "name": "a", "unit_str": "g", "fs": RATE, "start_timestamp": "2026-05-14"}
+    sound["hanger"] = 3
     several = "no channel" not in words
     with pytest.raises(BadInput, match=words) as refusal:
         shm.from_sep005([sound] * several + [{**sound, "name": "b", **change}])
     assert refusal.value.remedy
+
+
+def test_sep005_times_of_channels_agree() -> None:
+    times = np.arange(400) / RATE
+    one = {"data": ACC, "name": "a", "unit_str": "g", "time": times}
+    found = shm.from_sep005([one, {**one, "name": "b"}])
+    assert found.sampling_rate_hz == pytest.approx(RATE)
+    with pytest.raises(BadInput, match="time of b differs"):
+        shm.from_sep005([one, {**one, "name": "b", "time": 2 * times}])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('{"schema": "shm.modes/1"}', "a document of the kind shm.modes/1.*NAME.modes.json"),
+        ('{"type": "FeatureCollection"}', "JSON, but no list of channels"),
+        ("[]", "an empty list"),
+        ("[[1, 2], [3, 4]]", "a channel is no dictionary"),
+        ('[{"data": [0.1, -NaN]}]', "line 1: it is no sound JSON.*null"),
+        ("force,acc_1\n1,2\n", "the content is CSV"),
+    ],
+)
+def test_json_that_is_no_recording(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(BadInput, match=words):
+        read(written(tmp_path, text, "a.json"))
+
+
+def test_sep005_file_with_gaps(tmp_path: Path) -> None:
+    values = [float("nan"), None, *map(float, ACC[2:])]
+    channel = {"name": "acc_1", "unit_str": "m/s2", "fs": RATE, "hanger": 3, "data": values}
+    for document in ([channel], channel):
+        found = read(written(tmp_path, json.dumps(document), "a.json"))
+        assert isinstance(found, Recording)
+        assert np.isnan(found.channels[0].values).sum() == 2

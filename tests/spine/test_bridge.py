@@ -202,6 +202,15 @@ def test_doubles_are_refused(tmp_path: Path) -> None:
         load_bridge(written(tmp_path, ROUND + ROUND))
 
 
+def test_several_publish_tables_need_names(tmp_path: Path) -> None:
+    table = '[[publish]]\nkind = "influx"\nurl = "http://localhost:8086"\ndatabase = "shm"\n'
+    with pytest.raises(BadInput, match="publish name influx is given twice") as refusal:
+        load_bridge(written(tmp_path, ROUND + table + table))
+    assert 'name = "city"' in refusal.value.remedy
+    named = load_bridge(written(tmp_path, f'{ROUND}{table}{table}name = "city"\n'))
+    assert [each.name for each in named.publications] == ["influx", "city"]
+
+
 @pytest.mark.parametrize("hook", ["name = 'x'", "command = ['x']", "name='x'\ncommand='rm -rf'"])
 def test_a_hook_needs_a_name_and_an_argument_list(tmp_path: Path, hook: str) -> None:
     with pytest.raises(BadInput, match="hook"):

@@ -139,3 +139,13 @@ def test_stream_of_seedlink(tmp_path: Path) -> None:
 def test_stream_of_seedlink_refuses(tmp_path: Path, was: str, becomes: str, said: str) -> None:
     with pytest.raises(BadInput, match=said):
         bridge(tmp_path, FEED.replace(was, becomes))
+
+
+def test_stream_of_seedlink_remedy_fits_channels(tmp_path: Path) -> None:
+    second = '[[stream.channel]]\nname = "second"\nplane = "transverse"\nx_m = 1.0\n'
+    ids = '["XX_HGR3__HN1", "XX_HGR3__HN2"]'
+    text = FEED.replace('["XX_HGR3__HN1"]', ids) + "\n" + second
+    with pytest.raises(BadInput, match="one for each of the 2") as refusal:
+        bridge(tmp_path, text)
+    assert "calibration = [2.4e-6, 2.4e-6]" in refusal.value.remedy
+    assert bridge(tmp_path, text.replace("[2e-6]", "[2e-6, 2e-6]")).streams

@@ -42,8 +42,11 @@ class Processes:
         HookFailed with the end of what it wrote on stderr.
         """
         process = self._begin(command, variables)
+        latest = time.monotonic() + self._timeout_s
         try:
             answer, errors = exchange(process, message, self._timeout_s)
+            # Its streams end before it does: killed in between, it would have no exit code.
+            process.wait(max(latest - time.monotonic(), 0.0))
         except subprocess.TimeoutExpired:
             raise HookFailed(
                 f"ended after {self._timeout_s:g} s.",
