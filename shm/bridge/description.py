@@ -325,7 +325,8 @@ def _parse(path: Path) -> dict[str, Any]:
         raise BadInput(
             f"no such file in {path.parent}.",
             file=path,
-            remedy="Make a workspace with `shm init`, or name one with --workspace.",
+            remedy="Make a workspace with `shm init`, name one with --workspace, or describe the "
+            "hanger of a file alone with --hanger-file H.toml.",
         ) from None
     except OSError as error:
         raise BadInput(

@@ -23,6 +23,7 @@ from shm.inference.priors import (
     Deviations,
     Ends,
     TensionPrior,
+    errors_of_reading,
     reading_of,
 )
 from shm.inference.shapes import swaps_of
@@ -146,9 +147,14 @@ class DescribedCoordinates:
         along = along / size
         nominal = math.log(self._hanger.nominal_tension_n) + self._mean_mass
         off = math.log(self._reading.tension_n) - nominal - log_tension - n @ self._row_mass
+        usual, gross = (
+            log_share + scipy.stats.norm.logpdf(off + size * (n @ along), scale=sd)
+            for sd, log_share in errors_of_reading(self.reading_sd, self._hanger.assumptions)
+        )
+        is_usual = rng.random(len(n)) < scipy.special.expit(usual - gross)
         off = off - self._reading.sd * rng.standard_normal(len(n))
         # Matheron's rule: the prior draw moved by what the noisy reading misses it by.
-        gain = size / (size**2 + self._reading.sd**2)
+        gain = is_usual * size / (size**2 + self._reading.sd**2)
         return np.asarray(n + (gain * off)[:, None] * along)
 
     @property

@@ -6,7 +6,7 @@
 - What physics says of errors that tests share (`shm.inference.systematic_errors`): a mean and loads
   U. The covariance is phi^2 S + tau^2 R + U U' with S = diag(s^2).
 - A measured tension errs by its own standard deviation and by what frequencies do not see of the
-  bar's mass and length.
+  bar's mass and length; or, seldom, by anything.
 
 Mode shapes have their own errors (`shm.inference.shapes`).
 
@@ -32,6 +32,7 @@ from shm.inference.noise import (
     grid_model_errors,
     grid_sd_factors,
 )
+from shm.inference.priors import errors_of_reading
 from shm.inference.shapes import SHAPES, MeasuredShapes
 from shm.inference.systematic_errors import (
     errors_of_sensors,
@@ -219,17 +220,26 @@ class FieldLikelihood(MeasuredFrequencies):
         independent[part, part] = np.diag(self.identification_error[part] ** 2)
         together[part, part] = self._together
         always[part, part] = self._loads @ self._loads.T
-        if self.has_reading:
-            always[-1, -1] = self.identification_error[-1] ** 2
+        reading = np.zeros_like(always)
+        reading[-1:, -1:] = 1.0
         return [
             NoiseNode(
-                Covariance.of_frequencies(phi**2 * independent + tau**2 * together + always),
-                float(self._constant + share + log_phi),
+                Covariance.of_frequencies(
+                    phi**2 * independent + tau**2 * together + always + sd**2 * reading
+                ),
+                float(self._constant + share + log_phi + log_gross),
                 float(tau),
             )
             for tau, share in zip(*self.sigma_grid(step_in_sd), strict=True)
             for phi, log_phi in zip(self._phi, self._log_phi, strict=True)
+            for sd, log_gross in self._errors_of_reading()
         ]
+
+    def _errors_of_reading(self) -> Sequence[tuple[float, float]]:
+        """Return the sds that a reading may have, each with the log of its probability."""
+        if not self.has_reading:
+            return [(0.0, 0.0)]
+        return errors_of_reading(float(self.identification_error[-1]), self._assumed)
 
     @cached_property
     def likelihood(self) -> Likelihood:

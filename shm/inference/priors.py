@@ -67,6 +67,20 @@ def reading_sd_n(test: ModalTest, assumed: Assumptions = DEFAULTS) -> float:
     return test.tension_read_sd_n if known else unstated_n
 
 
+_GROSS_READING_SD = 2.0  # of the logarithm. Judgement: kgf and N are a factor of 10 apart
+
+
+def errors_of_reading(
+    usual_sd: float, assumed: Assumptions = DEFAULTS
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the sds of the logarithm of a reading, each with the log of its probability.
+
+    The usual one, and that of a gross error: another unit, another hanger, a slip of the pen.
+    """
+    share = assumed.gross_error_share.value
+    return (usual_sd, math.log1p(-share)), (_GROSS_READING_SD, math.log(share))
+
+
 class Deviations:
     """Normal prior of the deviations d = mean + factor n, n standard normal: `names` (k,).
 

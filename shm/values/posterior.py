@@ -114,6 +114,7 @@ WITHOUT_MODEL = "frequencies"
 
 _DO_NOT_USE, _SAMPLER_FAILED = "Do not use this tension.", "The sampler failed"
 _ENDS_DECIDE, _ORDERS_DECIDE = "The ends decide", "The orders decide"
+_MISSES = "misses the measured frequencies"
 _INCLINATION_DECIDES, _SAMPLED_BY_EMCEE = "The inclination decides", "Sampled by emcee"
 COUNTED_ONCE, LEFT_OUT = "Counted once", "Left out"
 OTHER_UNIT = "The frequencies look given in"
@@ -121,6 +122,7 @@ _NO_FAULTS = (_ENDS_DECIDE, _INCLINATION_DECIDES, _SAMPLED_BY_EMCEE, COUNTED_ONC
 _MESSAGES_GIVEN_ONCE = (
     _ENDS_DECIDE,
     _ORDERS_DECIDE,
+    _MISSES,
     "The description does not fit",
     "The tension that was read contradicts the frequencies",
 )
@@ -273,27 +275,27 @@ class Posterior(Displayable):
                 f"At the bound of its prior: {names}. The interval is cut off there. Check the "
                 f"description, its units and the orders of the modes.{string}"
             )
+        if math.isfinite(self.tension_of_other_orders_n):
+            other_n = self.tension_of_other_orders_n
+            found.append(
+                f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit "
+                f"{'as well' if self.fits else 'at least as well'}, with a tension of "
+                f"{force_unit(other_n).with_unit(other_n)}, nearer to the nominal one. "
+                "Find the first mode of each plane."
+            )
         if not self.fits:
             found.append(self._tell_misfit("" if cut_off else string))
         if self.reading_off_sd > CONTRADICTS_FROM_SD:
             found.append(
                 "The tension that was read contradicts the frequencies, by "
-                f"{self.reading_off_sd:.0f} standard deviations: this answer lies between the two. "
-                f"Check the reading, its unit, and the description. {_DO_NOT_USE}"
+                f"{self.reading_off_sd:.0f} standard deviations. Check the reading, its unit, and "
+                f"the description. {_DO_NOT_USE}"
             )
         if self.description_off_sd > CONTRADICTS_FROM_SD:
             found.append(
                 "The description does not fit: its section, density, modulus and length would be "
                 f"off by {self.description_off_sd:.0f} of their standard deviations. Check "
                 "diameter, length and material; `shm gap diagnose` says which would fit."
-            )
-        no_tension = self.misfit_percent > NO_TENSION_PERCENT
-        if math.isfinite(self.tension_of_other_orders_n) and not no_tension:
-            other_n = self.tension_of_other_orders_n
-            found.append(
-                f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit as well, with a "
-                f"tension of {force_unit(other_n).with_unit(other_n)}, nearer to the nominal one. "
-                "Find the first mode of each plane."
             )
         found += [each for each in self.remarks if not each.startswith(_NO_FAULTS)]
         return tuple(found)
@@ -307,8 +309,8 @@ class Posterior(Displayable):
         """Return by how much the frequencies are missed; `string` is said where that is far."""
         by_far = f" {_DO_NOT_USE}{string}" if self.misfit_percent > NO_TENSION_PERCENT else ""
         return (
-            f"{self.model} misses the measured frequencies by {self.misfit_percent:.1f} % (root "
-            "mean square): the description or the model class does not fit this hanger. Check the "
+            f"{self.model} {_MISSES} by {self.misfit_percent:.1f} % (root mean square): the "
+            "description or the model class does not fit this hanger. Check the "
             f"orders of the modes and the description; `shm gap diagnose` finds the cause.{by_far}"
         )
 
@@ -480,5 +482,5 @@ def _distinct(caveats: Sequence[str]) -> tuple[str, ...]:
     found: dict[str, str] = {}
     for each in caveats:
         head = each.partition(":")[0].partition(", by ")[0]
-        found.setdefault(head if head in _MESSAGES_GIVEN_ONCE else each, each)
+        found.setdefault(next((m for m in _MESSAGES_GIVEN_ONCE if m in head), each), each)
     return tuple(found.values())

@@ -184,7 +184,8 @@ def _fit_tests(
             slopes = bar.slopes(x, its)[seen]
             rest = (table[n] - level)[seen] - bar.predict(x[None], its)[0][seen] + slopes @ x
             by_state.append((rest, slopes, variance[n, seen]))
-        if clock := _find_clock_error(by_state[0], by_state[1], spread):
+        about_state, about_median = by_state
+        if clock := _find_clock_error(about_state, about_median, spread):
             why[n] = (
                 "all its frequencies are off the other tests' alike, by "
                 f"{100 * math.expm1(clock):+.1f} %: another hanger, or a wrong clock"

@@ -395,14 +395,9 @@ class StreamWatch:
         end: datetime,
         unlike: float,
     ) -> tuple[StreamWatched, StreamState]:
-        events: tuple[StreamEvent, ...] = ()
-        exchange = find_exchange(seen.off, state.table)
-        state = replace(state, exchanged_hours=state.exchanged_hours + 1 if exchange else 0)
-        if exchange and state.exchanged_hours == HOURS_EXCHANGED:
-            events = (_event(exchange, state, NOTHING, reading, end),)
-            state = _absorb_fault(state, exchange)
+        state, events = _with_exchange(state, seen, reading, end)
         evidence, apart, is_apart = self._weigh(state)
-        if exchange and not events:  # it is not known yet: no change is reported meanwhile
+        if state.exchanged_hours and not events:  # not known yet: no change is reported meanwhile
             evidence = NOTHING
         moved: tuple[Moved, ...] = ()
         if evidence.years > self._limit_years and evidence.material > 0.5:
@@ -625,6 +620,17 @@ def _absorb_plane(
         absorbed=state.absorbed + size,
         ring=ring,
     )
+
+
+def _with_exchange(
+    state: StreamState, seen: SeenReading, reading: PooledReading, end: datetime
+) -> tuple[StreamState, tuple[StreamEvent, ...]]:
+    """Count the hours that the planes look exchanged; after a few it is an event."""
+    exchange = find_exchange(seen.off, state.table)
+    state = replace(state, exchanged_hours=state.exchanged_hours + 1 if exchange else 0)
+    if exchange is None or state.exchanged_hours < HOURS_EXCHANGED:
+        return state, ()
+    return _absorb_fault(state, exchange), (_event(exchange, state, NOTHING, reading, end),)
 
 
 def _absorb_fault(state: StreamState, cause: StreamCause) -> StreamState:

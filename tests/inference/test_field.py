@@ -163,15 +163,19 @@ def test_the_errors_drawn_have_the_posterior_of_the_joint_likelihood() -> None:
 
 
 def test_a_reading_of_the_tension_is_one_more_datum() -> None:
-    """A normal error of its logarithm, apart from all errors of frequencies."""
+    """A normal error of its logarithm, or a gross one, apart from all errors of frequencies."""
     test = everything()
     bare = FieldLikelihood([test], MODEL)
     read = FieldLikelihood([test], MODEL, (700e3, 0.02))
     frequencies = bare.predict(MODEL, THETA)
-    for tension_n in (690e3, 720e3):
+    gross = DEFAULTS.gross_error_share.value
+    for tension_n in (690e3, 720e3, 7e6):
         whole = np.column_stack([frequencies, [tension_n]])
-        away = np.log(tension_n / 700e3) / 0.02
-        expected = -(away**2) / 2 - np.log(0.02 * 700e3 * np.sqrt(2 * np.pi))
+        away = np.log(tension_n / 700e3)
+        usual, wide = (
+            np.exp(-((away / sd) ** 2) / 2) / (sd * 700e3 * np.sqrt(2 * np.pi)) for sd in (0.02, 2)
+        )
+        expected = np.log((1 - gross) * usual + gross * wide)
         gain = read.marginal(whole)[0] - bare.marginal(frequencies)[0]
         assert gain == pytest.approx(expected, abs=1e-9)
 
