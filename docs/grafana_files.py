@@ -36,7 +36,7 @@ class Series:
 
     measurement: str
     field: str
-    tags: tuple[str, ...] = ("hanger",)
+    tags: tuple[str, ...] = ("bridge", "hanger")
     name: str = ""
     of_hanger: bool = False
     counted: bool = False
@@ -221,19 +221,17 @@ def hanger(source: Source) -> dashboard.Dashboard:
     board = _begun(source, "hanger", "hanger")
 
     def of(measurement: str, column: str, *tags: str, **more: Any) -> Series:
-        return Series(measurement, column, ("hanger", *tags), of_hanger=True, **more)
+        return Series(measurement, column, ("bridge", "hanger", *tags), of_hanger=True, **more)
 
     state = of("shm_hanger", "state_level")
     shown = board.panel(_stat(), "State", "none", [state], latest=True)
     shown.mappings(_levels(STATES, _COLOURS))
-    now = [
-        of("shm_hanger", f"tension{end}_n", name=f"{{{{hanger}}}} {word}") for end, word in _ENDS
-    ]
+    now = [of("shm_hanger", f"tension{end}_n", name=f"{_HANGER} {word}") for end, word in _ENDS]
     board.panel(_stat(), "Tension, 90 % interval", "forcenewton", now, latest=True)
     title = "Tension: best estimate, 90 % interval"
     board.panel(_lines(), title, "forcenewton", now, latest=False)
     tests = [
-        of("shm_test", f"tension{end}_n", name=f"{{{{hanger}}}} {word}", counted=True)
+        of("shm_test", f"tension{end}_n", name=f"{_HANGER} {word}", counted=True)
         for end, word in _ENDS
     ]
     title = "Tension by each test alone"
@@ -258,7 +256,7 @@ def sensors(source: Source) -> dashboard.Dashboard:
     board = _begun(source, "sensors", "permanent sensors")
 
     def of(name: str) -> Series:
-        return Series("shm_hour", name, ("hanger", "stream"), of_hanger=True)
+        return Series("shm_hour", name, ("bridge", "hanger", "stream"), of_hanger=True)
 
     for title, unit, name in (
         ("Tension since the beginning", "percentunit", "tension_shift"),
@@ -275,6 +273,7 @@ def sensors(source: Source) -> dashboard.Dashboard:
     return board.built
 
 
+_HANGER = "{{bridge}} {{hanger}}"
 _POINTS = texts.GraphDrawStyle.POINTS
 _ENDS = (("", "mean"), ("_low", "from"), ("_high", "to"))
 _OF_STREAM = (
