@@ -53,7 +53,6 @@ _MOST_SCANNED, _MOST_PAIRS = 12, 8
 OF_THE_ANSWER = 0.1
 """Probability that may rest on hypotheses which were not sampled."""
 _MOST_SAMPLED = 5  # numerical: places of one cause are seldom more
-_OF_UPDATE = 1500  # numerical: draws of an update, a third of which are effective
 _ROUGHLY = 40, 8  # numerical: effective draws and rounds that tell the classes' evidence apart
 
 
@@ -285,7 +284,7 @@ def _with_draws_of_update(problem: GapProblem, fit: Fit, rng: np.random.Generato
         return fit
     update.settle(fit.z)
     starts = update.fold(np.array([peak.z for peak in fit.peaks]))
-    found = sample(update, find_peaks(update.rough, starts), _OF_UPDATE, rng)
+    found = sample(update, find_peaks(update.rough, starts), 3 * len(fit.draws) // 2, rng)
     z = problem.described.places(update.coordinates.finished(found.points.z, rng))
     log = Target(problem, ALONE).log(z) - update.log_posterior(found.points)
     weights = normalised(np.where(np.isfinite(log), log, -np.inf))

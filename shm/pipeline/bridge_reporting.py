@@ -155,7 +155,7 @@ class HangersNow:
         self, workspace: Workspace, store: Store, hangers: Sequence[Hanger], now: datetime
     ):
         self.workspace, self.now = workspace, now
-        self.latest = find_latest_trends(store, hangers, prefer_finished=True)
+        self.latest = find_latest_trends(store, hangers)
         # Those of neighbours too: one may stand out.
         self.baselines = list_baselines_in_force(store, workspace.bridge.hangers)
         self.watches = find_latest_watches(store, hangers)

@@ -558,21 +558,15 @@ def list_trend(
     return load_points(store, chosen, [hanger])
 
 
-def find_latest_trends(
-    store: Repository, hangers: Iterable[Hanger], *, prefer_finished: bool = False
-) -> dict[int, TrendPoint]:
-    """Return the latest point of the trend of each hanger that has one.
-
-    With `prefer_finished` a test that the watch has yet to look at comes after all others.
-    """
+def find_latest_trends(store: Repository, hangers: Iterable[Hanger]) -> dict[int, TrendPoint]:
+    """Return the latest point of the trend of each hanger that has one."""
     known = list(hangers)
-    in_work = [tests.c.stage == Stage.UPDATED] if prefer_finished else []
     one = [tests.c.hanger == each.id for each in known] if len(known) == 1 else []
     of_hangers = sa.select(tests.c.hanger).where(is_current(tests), *one).distinct().subquery()
     latest = (
         _shown_tests()
         .where(tests.c.hanger == of_hangers.c.hanger, tests.c.id.in_(_of_shown(tests.c.id)))
-        .order_by(*in_work, tests.c.time.desc(), tests.c.id.desc())
+        .order_by(tests.c.time.desc(), tests.c.id.desc())
         .limit(1)
         .correlate(of_hangers)
     )

@@ -275,7 +275,9 @@ class Posterior(Displayable):
                 f"At the bound of its prior: {names}. The interval is cut off there. Check the "
                 f"description, its units and the orders of the modes.{string}"
             )
-        if math.isfinite(self.tension_of_other_orders_n):
+        in_other_unit = any(each.startswith(OTHER_UNIT) for each in self.remarks)
+        says_nothing = in_other_unit and self.misfit_percent > NO_TENSION_PERCENT
+        if math.isfinite(self.tension_of_other_orders_n) and not says_nothing:
             other_n = self.tension_of_other_orders_n
             found.append(
                 f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit "

@@ -12,7 +12,6 @@ from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.report.hanger_status import HangerMessage, Status
 from shm.store import Workspace
 from shm.store.recordings import find_recording
-from shm.store.rows import Stage
 from tests.helpers import quick_update
 from tests.helpers.flows import ingest
 from tests.helpers.taken_in import with_a_slow_loss
@@ -44,22 +43,6 @@ def test_a_test_of_a_maintenance_window_leaves_the_hanger_unknown(
     assert found.status is Status.CHECK
     assert found.lead.state.endswith("in a maintenance window and is compared with nothing.")
     assert found.urgency == "week"
-
-
-def test_a_test_in_work_is_not_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    quick_update.stand_in(monkeypatch.setattr)
-    workspace = make_workspace(tmp_path / "bridge")
-    write_test(workspace.spool / "t0.modes.json", workspace)
-    ingest(workspace)
-    before = message(workspace)
-    assert before.status is Status.FIRST
-    write_test(workspace.spool / "t1.modes.json", workspace, day=10)
-    ingest(workspace)
-    assert message(workspace).status is not Status.FIRST
-    with workspace.store() as store:  # as between its update and its watch
-        recording, _ = find_recording(store, "t1")
-        store.recordings.rerun(recording, Stage.WATCHED, utc_now(), "t1")
-    assert message(workspace) == before
 
 
 def test_the_alert_of_a_discarded_test_ends(tmp_path: Path) -> None:
