@@ -275,16 +275,7 @@ class Posterior(Displayable):
                 f"At the bound of its prior: {names}. The interval is cut off there. Check the "
                 f"description, its units and the orders of the modes.{string}"
             )
-        in_other_unit = any(each.startswith(OTHER_UNIT) for each in self.remarks)
-        says_nothing = in_other_unit and self.misfit_percent > NO_TENSION_PERCENT
-        if math.isfinite(self.tension_of_other_orders_n) and not says_nothing:
-            other_n = self.tension_of_other_orders_n
-            found.append(
-                f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit "
-                f"{'as well' if self.fits else 'at least as well'}, with a tension of "
-                f"{force_unit(other_n).with_unit(other_n)}, nearer to the nominal one. "
-                "Find the first mode of each plane."
-            )
+        found += self._other_orders
         if not self.fits:
             found.append(self._tell_misfit("" if cut_off else string))
         if self.reading_off_sd > CONTRADICTS_FROM_SD:
@@ -301,6 +292,20 @@ class Posterior(Displayable):
             )
         found += [each for each in self.remarks if not each.startswith(_NO_FAULTS)]
         return tuple(found)
+
+    @property
+    def _other_orders(self) -> tuple[str, ...]:
+        """Return that other orders fit as well; nothing of frequencies in another unit."""
+        other_n = self.tension_of_other_orders_n
+        in_other_unit = any(each.startswith(OTHER_UNIT) for each in self.remarks)
+        if math.isnan(other_n) or (in_other_unit and self.misfit_percent > NO_TENSION_PERCENT):
+            return ()
+        return (
+            f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit "
+            f"{'as well' if self.fits else 'at least as well'}, with a tension of "
+            f"{force_unit(other_n).with_unit(other_n)}, nearer to the nominal one. "
+            "Find the first mode of each plane.",
+        )
 
     @property
     def fits(self) -> bool:
