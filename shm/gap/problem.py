@@ -76,8 +76,8 @@ class GapProblem:
         order = observations.design.frequency_order
         wave_n_m = model.wave_stiffness_n_m_rad((1 + order.max()) / 2)
         known = self.hanger.scatter.tension
-        # Of readings only differences between tests count (see `shm.gap.observations`).
         self._is_part = described is not None
+        # Of readings only differences between tests count (see `shm.gap.observations`).
         self.described = described or DescribedCoordinates(
             model, _without_readings(tests), wave_n_m, known_tension_sd=known
         )
@@ -135,10 +135,12 @@ class GapProblem:
     def settle_temperatures(self, hypothesis: Hypothesis, z: FloatArray) -> bool:
         """Take from z (d,) what an error of the steel's temperature in each test does by effects.
 
-        Return False where no effect of the hypothesis follows the temperature.
+        Return False where no effect of the hypothesis follows the temperature, or it was taken.
         """
         effects, design = hypothesis.effects, self.design
-        if not any("temperature" in EFFECTS[name].follows for name, _ in effects):
+        if effects in self._thermometers or not any(
+            "temperature" in EFFECTS[name].follows for name, _ in effects
+        ):
             return False
         moved = tuple(
             replace(each, temperature_shift_k=each.temperature_shift_k + each.temperature_sd_k)
@@ -462,6 +464,7 @@ class GapProblem:
 
 
 def _without_readings(tests: Sequence[ModalTest]) -> list[ModalTest]:
+    """Return the tests without the tensions that were read in them."""
     return [replace(test, tension_read_n=NAN, tension_read_sd_n=NAN) for test in tests]
 
 

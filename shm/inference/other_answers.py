@@ -18,7 +18,7 @@ from shm.inference.posterior import climb
 from shm.inference.priors import TensionReading
 from shm.inference.problem import Problem
 from shm.values import NAN, FloatArray
-from shm.values.posterior import MOST_MISFIT_PERCENT, NO_TENSION_PERCENT
+from shm.values.posterior import NO_TENSION_PERCENT
 
 _AS_WELL = 1.0
 """A fit that is worse by less in its log likelihood is as good (judgement)."""
@@ -105,8 +105,6 @@ def _tension_of_other_orders_n(
     theta = coordinates.theta(best[None])
     middle = float(np.mean([mode.order for mode in problem.measured.modes]))
     nearest, found = abs(math.log(float(np.median(ratio)))), NAN
-    misses = misfit_percent(problem, problem.predict(best[None])) > NO_TENSION_PERCENT
-    most_percent = MOST_MISFIT_PERCENT if misses else NO_TENSION_PERCENT
     for by in (1, -1):
         other = problem.rough.renumbered(by, theta[0])
         if other is None:
@@ -119,7 +117,7 @@ def _tension_of_other_orders_n(
         fits = _fits(other, ends)
         end = ends[[fits.argmax()]]
         theta_f = float(coordinates.theta(end)[0, 0])
-        if misfit_percent(other, other.predict(end)) > most_percent:
+        if misfit_percent(other, other.predict(end)) > NO_TENSION_PERCENT:
             continue
         if fits.max() > fit - _AS_WELL and abs(math.log(theta_f)) < nearest:
             nearest, found = abs(math.log(theta_f)), theta_f * nominal_n

@@ -301,9 +301,8 @@ class Posterior(Displayable):
         if math.isnan(other_n) or (in_other_unit and self.misfit_percent > NO_TENSION_PERCENT):
             return ()
         return (
-            f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit "
-            f"{'as well' if self.fits else 'at least as well'}, with a tension of "
-            f"{force_unit(other_n).with_unit(other_n)}, nearer to the nominal one. "
+            f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit as well or better, with "
+            f"a tension of {force_unit(other_n).with_unit(other_n)}, nearer to the nominal one. "
             "Find the first mode of each plane.",
         )
 

@@ -1,4 +1,4 @@
-"""What addresses and bodies may hold, and the documents of what a program sends or waits for.
+"""Define what addresses and bodies may hold, and the documents that a program sends or waits for.
 
 Documents that are only read are dictionaries of the very values that report and `--json` show; each
 route says what is in them. Unknown numbers are null.
