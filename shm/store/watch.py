@@ -17,7 +17,7 @@ from shm.documents import alert_document
 from shm.errors import StoreBusy
 from shm.store.alerts import acknowledge, resolve, settle
 from shm.store.blobs import change_in, watch_document, watch_in
-from shm.store.columns import Number, loads, row_of, value_in
+from shm.store.columns import loads, row_of, value_in
 from shm.store.database import Repository, insert
 from shm.store.disposition import rerun_watched
 from shm.store.files import all_at, is_current, move
@@ -51,7 +51,6 @@ from shm.store.tables import (
     baselines,
     diagnoses,
     drifts,
-    posterior_tests,
     selections,
     tests,
     watch_states,
@@ -304,19 +303,6 @@ def list_baselines_in_force(
     """Return the baseline in force of each hanger that has one, in numbers."""
     with store.reading() as connection:
         return baselines_in_numbers(connection, hangers)
-
-
-def find_baseline_temperatures(store: Repository) -> dict[int, float]:
-    """Return the mean temperature of the tests of each baseline in force; NaN where unknown."""
-    mean_c = sa.func.avg(tests.c.temperature_c, type_=Number)
-    query: sa.Select[Any] = (
-        sa.select(baselines.c.hanger, mean_c.label("mean_c"))
-        .join(posterior_tests, posterior_tests.c.posterior_id == baselines.c.posterior_id)
-        .join(tests, tests.c.id == posterior_tests.c.test_id)
-        .where(baselines.c.id.in_(baselines_now()))
-        .group_by(baselines.c.hanger)
-    )
-    return {row.hanger: row.mean_c for row in store.rows(query)}
 
 
 def find_latest_watches(

@@ -23,7 +23,7 @@ from shm.store import (
 )
 from shm.store.posteriors import find_latest_trends, list_history, list_trend
 from shm.store.tables import posteriors
-from shm.store.watch import find_baseline_temperatures, list_baselines_in_force
+from shm.store.watch import list_baselines_in_force
 from shm.values import Hanger, Limits, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
 from tests.helpers.hangers import HANGER_3
@@ -189,7 +189,6 @@ def test_the_baselines_in_force_are_those_of_each_hanger(
         assert (glance.since, glance.tests) == (baseline.since, baseline.posterior.tests)
         assert glance.temperature_c == 11.5
         assert glance.tension_n == Summary.of(baseline.posterior.tension_n)
-    assert find_baseline_temperatures(file_store) == {3: 11.5, 4: 11.5}
 
 
 def test_only_what_is_not_kept_is_made_from_samples(
