@@ -92,12 +92,18 @@ def find_cause(
 
 
 def find_exchange(
-    off: FloatArray, table: ModeTable, least: int = 3, within: float = 2.0, times: float = 4.0
+    off: FloatArray,
+    table: ModeTable,
+    least: int = 3,
+    within: float = 2.0,
+    surely: float = 5.0,
+    far: float = 5.0,
 ) -> StreamCause | None:
     """Return exchanged planes as the cause, if each mode lies where that of the other plane does.
 
-    `off` (n,) are changes of ln f. In the median they are `within` so many sds of that, and so many
-    `times` nearer than at any tension of their own.
+    `off` (n,) are changes of ln f. In the median they are `within` so many sds of that, at the best
+    tension, and all together likelier than where they were by log odds of `surely`. No mode counts
+    for more than `far` sds.
     """
     place = {mode: index for index, mode in enumerate(table.modes)}
     other = [place.get((PLANES[plane == PLANES[0]], order), -1) for plane, order in table.modes]
@@ -105,12 +111,13 @@ def find_exchange(
     both = np.isfinite(off + crossed)
     if both.sum() < least:
         return None
-    tension, sd = table.tension[both], np.sqrt(table.spread[both] + _DAY_SD**2)
+    tension, sd = table.tension[both], np.sqrt(table.spread[both])
     left, before = (
-        float(np.median(np.abs(each - tension * np.median(each / tension)) / sd))
+        np.abs(each - tension * np.median(each / tension)) / sd
         for each in ((off - crossed)[both], off[both])
     )
-    if not left < within or not before > times * max(left, 1.0):
+    odds = float(np.sum(before.clip(max=far) ** 2 - left.clip(max=far) ** 2)) / 2
+    if not np.median(left) < within or not odds > surely:
         return None
     return StreamCause((Moved(EXCHANGED, 1.0, np.nan, np.nan),), crossed, None)
 
