@@ -24,9 +24,9 @@ from shm.inference.coordinates import log_normal
 from shm.inference.likelihood import Likelihood
 from shm.inference.linear import Linear
 from shm.inference.mixture import (
+    Drawn,
     Normal,
     Pool,
-    Rows,
     TMixture,
     normalised,
     systematic,
@@ -84,13 +84,12 @@ _HOW = SamplingOptions()
 
 
 @dataclass(frozen=True, eq=False)
-class _Draws(Rows):
+class _Draws(Drawn):
     """Points z (n, d), their linear parameters at their best, by the likeliest error `node` (n,).
 
     `residual` (n, data) is that with the linear parameters as they go along with the others.
     """
 
-    z: FloatArray
     node: IntArray
     residual: FloatArray
 
@@ -364,14 +363,14 @@ class Sampling:
         """Return Kish's effective number of draws."""
         if not len(self.target.other):
             return np.inf
-        return self._pool.effective if self._rounds else 0.0
+        return self._pool.weighted.effective_sample_size if self._rounds else 0.0
 
     @property
     def log_evidence(self) -> tuple[float, float]:
         """Return the log evidence and its standard error."""
         if len(self.target.other):
-            log_evidence = self._pool.log_evidence + self._lobes.log_beyond
-            return log_evidence, self._pool.log_evidence_sd
+            found = self._pool.weighted
+            return found.log_evidence + self._lobes.log_beyond, found.log_evidence_sd
         return float(self._collapsed.settle(np.empty((1, 0)))[1][0]), 0.0
 
     def run(self, enough: float, most_rounds: int) -> None:
@@ -403,8 +402,7 @@ class Sampling:
             point, _ = self._collapsed.settle(np.empty((1, 0)))
             chosen = point.take(np.zeros(draws, dtype=np.int64))
         else:
-            rows = systematic(normalised(self._pool.log_weights), draws, self.rng)
-            chosen = self._pool.batch.take(rows)
+            chosen = self._pool.weighted.resampled(draws, self.rng)
         found = self.rng.permutation(self._collapsed.scatter(chosen, self.rng))
         if len(self._lobes.peaks) > 1:
             found = self._lobes.spread(found, self.rng)

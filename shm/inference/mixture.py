@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Self, TypeVar
+from typing import Generic, Self, TypeVar
 
 import numpy as np
 import scipy
@@ -23,6 +23,8 @@ _INFLATION = 1.5
 
 _REGULAR = 1e-12  # a width of 1e-6, a hundredth of the sharpest valley's
 _NO_SHARE = 1e-3  # of the weight: too few draws to fit a part to
+
+_BATCHES = 4  # Gelman and Rubin's few chains: a quarter of the draws each
 
 P = TypeVar("P")
 
@@ -160,44 +162,76 @@ def _fitted(z: FloatArray, owned: FloatArray, pulled: FloatArray, former: Normal
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Hold what is known of n points: arrays, or other rows, with one row for each.
-
-    A field that is a number is that of all points.
-    """
+    """Hold what is known of n points: arrays with one row for each."""
 
     def take(self, rows: BoolArray | IntArray) -> Self:
         """Return some of the points, by index or choice."""
-        return self._mapped(
-            lambda field: field.take(rows) if isinstance(field, Rows) else field[rows]
-        )
+        return type(self)(*(field[rows] for field in vars(self).values()))
 
     def joined(self, other: Self) -> Self:
         """Return these points and then the others."""
-        return self._mapped(
-            lambda field, its: (
-                field.joined(its) if isinstance(field, Rows) else np.concatenate([field, its])
-            ),
-            other,
-        )
-
-    def where(self, chosen: BoolArray, other: Self) -> Self:
-        """Return these points where `chosen` (n,), elsewhere the `other` ones."""
-
-        def either(field: Any, its: Any) -> Any:
-            if isinstance(field, Rows):
-                return field.where(chosen, its)
-            return np.where(chosen.reshape(-1, *[1] * (np.ndim(field) - 1)), field, its)
-
-        return self._mapped(either, other)
-
-    def _mapped(self, act: Callable[..., Any], *others: Self) -> Self:
-        columns = zip(*(vars(each).values() for each in (self, *others)), strict=True)
-        return type(self)(
-            *(first if np.isscalar(first) else act(first, *rest) for first, *rest in columns)
-        )
+        both = zip(vars(self).values(), vars(other).values(), strict=True)
+        return type(self)(*(np.concatenate(each) for each in both))
 
 
-B = TypeVar("B", bound=Rows)
+@dataclass(frozen=True, eq=False)
+class Drawn(Rows):
+    """Points `z` (n, d)."""
+
+    z: FloatArray
+
+
+B = TypeVar("B", bound=Drawn)
+
+
+@dataclass(frozen=True, eq=False)
+class Weighted(Generic[B]):
+    """Weighted draws with log weights (n,), of `draws` that were made."""
+
+    points: B
+    log_weights: FloatArray
+    draws: int
+
+    @property
+    def log_evidence(self) -> float:
+        """log of the mean weight."""
+        return float(scipy.special.logsumexp(self.log_weights) - np.log(self.draws))
+
+    @property
+    def log_evidence_sd(self) -> float:
+        """Standard error of `log_evidence`."""
+        return evidence_error(self.log_weights, self.draws)
+
+    @property
+    def effective_sample_size(self) -> float:
+        """Kish's effective number of draws."""
+        return effective(normalised(self.log_weights))
+
+    @property
+    def r_hat(self) -> float:
+        """Potential scale reduction (Gelman and Rubin 1992) of independent batches, the worst.
+
+        Each batch estimates mean and variance of every parameter by its own weights.
+        """
+        moments = [self._moments(slice(batch, None, _BATCHES)) for batch in range(_BATCHES)]
+        means, variances = np.swapaxes(moments, 0, 1)
+        return float(np.sqrt(1 + means.var(axis=0, ddof=1) / variances.mean(axis=0)).max())
+
+    def _moments(self, part: slice) -> tuple[FloatArray, FloatArray]:
+        weights = normalised(self.log_weights[part])[:, None]
+        z = self.points.z[part]
+        mean = (weights * z).sum(axis=0)
+        return mean, (weights * (z - mean) ** 2).sum(axis=0) + np.finfo(float).tiny
+
+    def resampled(self, n: int, rng: np.random.Generator) -> B:
+        """Return `n` equally weighted points."""
+        return self.points.take(systematic(normalised(self.log_weights), n, rng))
+
+    def spread(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """Return `n` different points (n, d) where most of the weight is, more evenly weighted."""
+        weights = tempered(self.log_weights, n / 2)
+        lots = np.log(weights + np.finfo(float).tiny) + rng.gumbel(size=len(weights))
+        return np.asarray(self.points.z[np.argsort(-lots)[:n]])
 
 
 class Pool(Generic[P, B]):
@@ -225,32 +259,15 @@ class Pool(Generic[P, B]):
         return np.asarray(self._log_target - self._log_drawn + np.log(self.draws))
 
     @property
-    def effective(self) -> float:
-        """Kish's effective number of draws."""
-        return effective(normalised(self.log_weights))
-
-    @property
-    def log_evidence(self) -> float:
-        """Log of the target's integral."""
-        return float(scipy.special.logsumexp(self.log_weights) - np.log(self.draws))
-
-    @property
-    def log_evidence_sd(self) -> float:
-        """Return its standard error."""
-        return evidence_error(self.log_weights, self.draws)
+    def weighted(self) -> Weighted[B]:
+        """Return all draws with their weights."""
+        return Weighted(self.batch, self.log_weights, self.draws)
 
     def add(self, proposal: P, draws: int, batch: B, log_target: FloatArray) -> None:
         """Add those kept of so many draws of a proposal, with the target's log density."""
-        self._append([(proposal, draws)], batch, log_target)
-
-    def absorb(self, other: Pool[P, B]) -> None:
-        """Add the draws of another pool of the same target."""
-        self._append(other._proposals, other.batch, other._log_target)
-
-    def _append(self, proposals: list[tuple[P, int]], batch: B, log_target: FloatArray) -> None:
-        first = not self._proposals
-        old = np.empty(0) if first else self._drawn(proposals, self.batch)
-        self._proposals = [*self._proposals, *proposals]
+        first, added = not self._proposals, [(proposal, draws)]
+        old = np.empty(0) if first else self._drawn(added, self.batch)
+        self._proposals += added
         new = self._drawn(self._proposals, batch)
         self._log_drawn = np.append(np.logaddexp(self._log_drawn, old), new)
         self._log_target = np.append(self._log_target, log_target)

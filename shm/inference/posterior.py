@@ -14,7 +14,7 @@ import scipy
 
 from shm.inference.coordinates import log_normal
 from shm.inference.likelihood import Likelihood
-from shm.inference.mixture import Rows
+from shm.inference.mixture import Drawn
 from shm.values import BoolArray, FloatArray, IntArray
 
 # Numerical: a climb's steps, the longest in a coordinate, and the gain in log posterior that is
@@ -30,10 +30,9 @@ proposals, which weights correct, and is as exact as a first-order repeatability
 
 
 @dataclass(frozen=True, eq=False)
-class Points(Rows):
-    """Points `z` (n, d) with their predictions `predicted` (n, data)."""
+class Points(Drawn):
+    """Points with their predictions `predicted` (n, data)."""
 
-    z: FloatArray
     predicted: FloatArray
 
 

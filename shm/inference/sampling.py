@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.inference.chain import run_chain
-from shm.inference.importance import Weighted, weigh
+from shm.inference.importance import weigh
 from shm.inference.likelihood import Covariance, Likelihood
-from shm.inference.mixture import effective, normalised, systematic
+from shm.inference.mixture import Weighted, effective, normalised, systematic
 from shm.inference.options import EMCEE, IMPORTANCE
 from shm.inference.posterior import Density, Peak, Points, climb
-from shm.inference.valley import Proposal, Valley, valleys_through
+from shm.inference.valley import Draws, Proposal, Valley, valleys_through
 from shm.values import ENOUGH_EFFECTIVE, FloatArray, IntArray
 
 
@@ -152,7 +152,11 @@ def draw_along(
 
 
 def _continue(
-    density: Density, weighted: Weighted, points: FloatArray, samples: int, rng: np.random.Generator
+    density: Density,
+    weighted: Weighted[Draws],
+    points: FloatArray,
+    samples: int,
+    rng: np.random.Generator,
 ) -> tuple[Points, float, float]:
     """Return equal draws by emcee, how many of them are effective, and R-hat.
 

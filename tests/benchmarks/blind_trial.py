@@ -191,14 +191,15 @@ def guard(sealed: str) -> None:
     sys.addaudithook(refuse)
 
 
-def diagnose_hanger(folder: Path, without: Sequence[str]) -> dict[str, Any]:
+def diagnose_hanger(folder: Path, without: Sequence[str], seed: int = 1) -> dict[str, Any]:
     """Diagnose a hanger as its owner would: its two files, all options left alone."""
     hanger = shm.load_hanger(folder / "hanger.toml")
     tests = shm.load_modes(folder / "case.modes.json")
     started = time.process_time()
     answer: dict[str, Any] = {"without": list(without)}
     try:
-        answer["diagnosis"] = diagnosis_document(shm.diagnose(tests, hanger, without=without))
+        found = shm.diagnose(tests, hanger, without=without, seed=seed)
+        answer["diagnosis"] = diagnosis_document(found)
     except shm.ShmError as error:
         answer["refused"] = str(error)
     return answer | {"processor_s": time.process_time() - started}

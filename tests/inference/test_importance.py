@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 
 from shm.inference import UpdateOptions, sampling, update
 from shm.inference.chain import run_chain
-from shm.inference.importance import Weighted
+from shm.inference.mixture import Weighted
 from shm.inference.options import EMCEE, silent
 from shm.inference.posterior import Points
 from shm.inference.problem import Problem
@@ -22,7 +22,7 @@ TESTS = [modal_test(TABLES["1.1"])]
 BEAM1 = build("beam1", HANGER_3, THESIS)
 
 
-def weighted(log_weights: FloatArray, seed: int = 1) -> Weighted:
+def weighted(log_weights: FloatArray, seed: int = 1) -> Weighted[Draws]:
     z = np.random.default_rng(seed).standard_normal((len(log_weights), 1))
     return Weighted(Draws(z, z, z, z), log_weights, len(z))
 

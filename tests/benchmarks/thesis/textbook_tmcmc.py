@@ -18,8 +18,7 @@ import numpy as np
 
 from shm.errors import UsageError
 from shm.inference import Progress, UpdateOptions
-from shm.inference.importance import Weighted
-from shm.inference.mixture import Normal, Rows, normalised
+from shm.inference.mixture import Normal, Rows, Weighted, normalised
 from shm.inference.options import silent
 from shm.inference.other_answers import Outcome
 from shm.inference.outcome import assembled
@@ -40,6 +39,13 @@ class _Particles(Rows):
     theta: FloatArray
     predicted: FloatArray
     log_likelihood: FloatArray
+
+    def where(self, chosen: BoolArray, other: _Particles) -> _Particles:
+        """Return these where `chosen` (n,), elsewhere the `other` ones."""
+        both = zip(vars(self).values(), vars(other).values(), strict=True)
+        return _Particles(
+            *(np.where(chosen if a.ndim == 1 else chosen[:, None], a, b) for a, b in both)
+        )
 
 
 def update_textbook(
