@@ -45,7 +45,7 @@ class Numerics:
     gauss_newton: int = 5
     chords: int = 3
     longest_step: float = 0.7
-    near_enough: float = 0.2
+    near_enough: float = 0.5
     far: float = 1.0
     neighbours: int = 3
     away: float = 10.0

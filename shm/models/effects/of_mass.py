@@ -44,9 +44,9 @@ class DistributedMass(Effect):
         "mass_change",
         "fraction",
         0.002,
-        0.3,
+        1.0,
         0.0,
-        "0.2 to 30 % of the mass: from a coat of paint to a grouted pipe or glaze ice; things "
+        "0.2 to 100 % of the mass: from a coat of paint to a grouted pipe or thick ice; things "
         "are put on hangers, not taken off.",
         spread="logarithmic",
     )
