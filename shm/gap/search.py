@@ -277,12 +277,16 @@ def _with_draws_of_update(problem: GapProblem, fit: Fit, rng: np.random.Generato
     """Return the fit of the hanger alone with the draws that an update has of it.
 
     They follow valleys that sampling about the peaks does not; what differs between both densities
-    weights them. The fit stays where too few count.
+    weights them. The fit stays where too few count, and where the hanger alone misses by more than
+    models do: there an update widens, and a diagnosis looks for the cause.
     """
     update = problem.as_update()
     if update is None:
         return fit
     update.settle(fit.z)
+    error = update.measured.most_likely_sigma(update.predict(fit.z[None]))
+    if error[0] > problem.hanger.assumptions.model_error.upper:
+        return fit
     starts = update.fold(np.array([peak.z for peak in fit.peaks]))
     found = sample(update, find_peaks(update.rough, starts), 3 * len(fit.draws) // 2, rng)
     z = problem.described.places(update.coordinates.finished(found.points.z, rng))
