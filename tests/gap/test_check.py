@@ -137,12 +137,16 @@ def test_the_smallest_size_is_found(
     assert found.false_gaps == 0
     assert len(found.sound) == 2
     assert (effect.name, effect.unit) == ("mass_change", "fraction")
-    # Half of the mass change is that of the frequencies: 0.7, 2.3 and 7 % at these sizes.
-    np.testing.assert_allclose(effect.sizes, 0.002 * 150 ** (np.arange(1, 8, 2) / 8))
-    assert [(trial.step, trial.outcome) for trial in effect.trials] == [(2, "alone"), (1, "no gap")]
-    assert effect.size == effect.sizes[2]
+    # Half of the mass change is that of the frequencies: 0.2, 1, 5 and 17 % at these sizes.
+    np.testing.assert_allclose(effect.sizes, 0.002 * 500 ** (np.arange(1, 8, 2) / 8))
+    assert [(trial.step, trial.outcome) for trial in effect.trials] == [
+        (2, "alone"),
+        (1, "alone"),
+        (0, "no gap"),
+    ]
+    assert effect.size == effect.sizes[1]
     assert rows(found) == [
-        ("distributed mass", "4.6 % or more", "", "4.6 % or more", "1.3 %: not visible")
+        ("distributed mass", "2.1 % or more", "", "2.1 % or more", "0.43 %: not visible")
     ]
 
 
@@ -180,7 +184,7 @@ def test_a_refused_twin_is_not_found(
     monkeypatch.setattr(module, "diagnose", refuse)
     found = check_gap(tests, PLAIN, replace(MASS, sound=0))
     assert {trial.outcome for trial in found.effects[0].trials} == {"refused"}
-    assert rows(found)[0][4] == "16 %: refused: nothing fits"
+    assert rows(found)[0][4] == "46 %: refused: nothing fits"
 
 
 def test_a_gap_in_a_sound_twin_is_counted(
