@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from shm.inference.chain import run_chain
 from shm.inference.importance import weigh
@@ -34,7 +35,7 @@ class Numerics:
     effective, it begins again from `again` points where the weight is, `attempts` times in all.
     `enough` draws are effective for each sample to keep, `fewest_effective` in all: fewer repeat
     draws, more cost in proportion. Of a chain `candidates` times as many draws as are kept are
-    weighted.
+    weighted. Errors with less than the `least_part` of the probability are passed over.
     """
 
     along: int = 160
@@ -50,6 +51,7 @@ class Numerics:
     enough: float = 0.35
     candidates: int = 2
     fewest_effective: float = 1.5 * ENOUGH_EFFECTIVE
+    least_part: float = 1e-4
 
 
 _SET = Numerics()
@@ -86,8 +88,7 @@ def sample(
     points, nearest = draw_along(rough, peaks, rng, centres)
     on_progress(0.4)
     for attempt in range(_SET.attempts):
-        best = points[[int(rough.log(points).argmax())]]
-        whitening = most_likely_error(rough, best).whitening
+        whitening = mean_whitening(rough, points)
         valleys = [Valley(rough, points, whitening)]
         if attempt == 0:
             valleys = valleys_through(rough, points, nearest, whitening)
@@ -113,6 +114,25 @@ def sample(
         r_hat,
         method,
     )
+
+
+def mean_whitening(density: Density, z: FloatArray) -> FloatArray:
+    """Return the matrix (data, data) that makes residuals about points z (n, d) of variance 1.
+
+    It is a root of the mean precision, over the possible errors as they are likely at the points:
+    where a tail of the posterior rests on larger errors, the best point's alone lead beside it.
+    """
+    residual = density.residual(z)
+    known = np.isfinite(residual).all(axis=1)
+    likelihood = density.likelihood
+    share = scipy.special.softmax(likelihood.by_node(residual[known]), axis=1).mean(axis=0)
+    roots = (
+        np.sqrt(part) * node.covariance.whitening
+        for part, node in zip(share, likelihood.nodes, strict=True)
+        if part > _SET.least_part
+    )
+    precision = sum((root.T @ root for root in roots), np.zeros(2 * residual.shape[1:]))
+    return np.asarray(np.linalg.cholesky(precision).T)
 
 
 def most_likely_error(density: Density, z: FloatArray) -> Covariance:
