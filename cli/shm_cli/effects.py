@@ -110,8 +110,6 @@ def facts(effect: Effect) -> str:
         f"- Easily taken for: {', '.join(f'`{name}`' for name in effect.imitated_by)}.",
         f"- Source: {effect.source}",
     ]
-    if effect.other_laws:
-        lines.append(f"- A real one may follow another law: {'; '.join(effect.other_laws)}.")
     return "\n".join(lines)
 
 

@@ -125,32 +125,6 @@ def test_a_turned_sensor_sees_a_mode_under_its_angle() -> None:
     assert np.sign(seen[1, 1]) == -np.sign(straight[1, 0])
 
 
-@pytest.mark.parametrize(
-    ("name", "values"),
-    [
-        ("section_loss", (0.1, 5.0, 1.0)),
-        ("stiff_end_zones", (0.2, 3.0)),
-        ("point_mass", (5.0, 4.0)),
-        ("support_motion", (4000.0, 60.0)),
-    ],
-)
-def test_another_law_of_an_effect_does_nearly_the_same(
-    name: str, values: tuple[float, ...]
-) -> None:
-    """It changes frequencies by some percent of what the effect itself changes."""
-    own = physical(name, place_of(name), values)
-    variant = replace(place(name, place_of(name)), law=1)
-    other = EFFECTS[name].act(physical(), np.array([values]), Case(ROD, variant, Conditions("t1")))
-    bare, by_own, by_other = (solved(each).frequency_hz[0] for each in (physical(), own, other))
-    apart = np.abs(by_other - by_own).max() / np.abs(by_own - bare).max()
-    assert 1e-3 < apart < 0.3
-
-
-def place_of(name: str) -> str:
-    ends = {"stiff_end_zones": "both ends", "support_motion": "deck end, transverse"}
-    return ends.get(name, "everywhere")
-
-
 @pytest.mark.parametrize("change_m", [-0.9, 0.6])
 def test_another_length_takes_its_fitting_along(change_m: float) -> None:
     """Compare with a bar that was described with that length, fittings and all."""

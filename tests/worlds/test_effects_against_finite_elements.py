@@ -139,16 +139,10 @@ def both(
     *effects: PlantedEffect,
     baseline: str = "beam1",
     springs: tuple[float, ...] = (),
-    law: int = 0,
     made: Deviations = DEVIATIONS,
 ) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
-    """Frequencies, shapes and damping that the joints add: general model, finite elements.
-
-    With a `law` the general model's effects follow that other law, and the simulator its own.
-    """
-    acting = [
-        (each.name, replace(variant_of(each.name, each.at, hanger), law=law)) for each in effects
-    ]
+    """Frequencies, shapes and damping that the joints add: general model, finite elements."""
+    acting = [(each.name, variant_of(each.name, each.at, hanger)) for each in effects]
     model = HangerWithEffects(plain(baseline, hanger), acting, PLACES)
     tension = 1.05 * hanger.nominal_tension_n
     section, density, length, modulus = (getattr(made, name) for name in GLOBAL)
@@ -159,9 +153,7 @@ def both(
     k1, k2, k3, k4 = (10.0**k for k in springs) if springs else (math.inf,) * 4
     state = HangerState(tension, k1, k2, k3, k4, damping_ratio=0.0)
     conditions = TestConditions(test, shift, level, mass)
-    truth = planted_modes(
-        hanger, state, effects, conditions, MODES, PLACES, deviations=made, own_laws=law > 0
-    )
+    truth = planted_modes(hanger, state, effects, conditions, MODES, PLACES, deviations=made)
     return (
         (found.frequency_hz[0], found.shape[0], found.damping_ratio[0]),
         (truth.frequency_hz, truth.shape, truth.damping_ratio),
@@ -219,41 +211,6 @@ def test_a_strong_effect_is_the_same_by_both(hanger: Hanger, name: str) -> None:
     effect = planted(hanger, name, at, STRONG.get(name), share=0.9)
     frequency, shape = STRONG_TOLERANCE.get(name, (1e-5, 1e-3))
     assert_alike(*both(hanger, effect), frequency=frequency, shape=shape)
-
-
-@pytest.mark.parametrize("values", [VALUES, STRONG])
-@pytest.mark.parametrize("springs", [(), (6.8, 7.3, 7.1, 6.6)])
-def test_a_bar_that_sags_as_it_bends_is_the_same_by_both(
-    hanger: Hanger, values: dict[str, dict[str, float]], springs: tuple[float, ...]
-) -> None:
-    sag = planted(hanger, "sag", "everywhere, longitudinal", values["sag"])
-    baseline = "beam2" if springs else "beam1"
-    assert_alike(
-        *both(hanger, sag, baseline=baseline, springs=springs, law=1), frequency=1e-5, shape=1e-3
-    )
-
-
-def test_a_bar_sags_as_it_bends_between_ends_that_give_way(hanger: Hanger) -> None:
-    at, springs = "deck end, longitudinal", "translational_end_flexibility"
-    sag = planted(hanger, "sag", "everywhere, longitudinal", VALUES["sag"])
-    way = planted(hanger, springs, at, VALUES[springs])
-    assert_alike(*both(hanger, sag, way, law=1), frequency=1e-5, shape=1e-3)
-
-
-def test_a_light_support_carries_a_bar_that_sags_as_it_bends_like_a_spring(hanger: Hanger) -> None:
-    stiffness_n_m, mass_kg = 1e8, 0.1
-    support_hz = math.sqrt(stiffness_n_m / mass_kg) / (2 * math.pi)
-
-    def frequencies_hz(name: str, *values: float) -> FloatArray:
-        sag = replace(variant_of("sag", "everywhere, longitudinal", hanger), law=1)
-        way = variant_of(name, "deck end, longitudinal", hanger)
-        model = HangerWithEffects(plain("beam1", hanger), [("sag", sag), (name, way)], PLACES)
-        theta = np.array([[1.05, 1, 0, 0, 0, VALUES["sag"]["sag_parameter"], *values]])
-        return model.modes(theta, Conditions(), MODES).frequency_hz
-
-    spring = frequencies_hz("translational_end_flexibility", math.log10(stiffness_n_m))
-    support = frequencies_hz("support_motion", mass_kg, support_hz)
-    np.testing.assert_allclose(support, spring, rtol=1e-4)
 
 
 def test_end_springs_of_the_baseline_are_those_of_the_state(hanger: Hanger) -> None:

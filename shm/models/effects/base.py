@@ -8,7 +8,6 @@ What the size of an effect is measured against in a given hanger, and the priors
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
@@ -17,11 +16,6 @@ import numpy as np
 from shm.models.base import Conditions, Model
 from shm.models.hanger.physical import PhysicalHanger, Zone
 from shm.values import NAN, PLANES, AddedMass, FloatArray, Hanger, Plane
-
-GRADUAL = (0.6, 1.0, 1.4)
-"""Reaches of three steps that stand for one gradual edge."""
-STEEP = (0.8, 1.0, 1.2)
-"""Half as gradual."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +38,7 @@ class Variant:
 
     `at` says it in words; `key` in a word that may stand in the name of a model class. `places_m`
     are those of the sensors where the effect acts at each of them. With `isotropic` one value
-    serves all its planes. `law` counts the effect's `other_laws` from 1; 0 is its own.
+    serves all its planes.
     """
 
     at: str = "everywhere"
@@ -54,7 +48,6 @@ class Variant:
     test: str = ""
     places_m: tuple[float, ...] = ()
     isotropic: bool = False
-    law: int = 0
 
     @property
     def key(self) -> str:
@@ -143,9 +136,8 @@ class Effect:
     conditions of a test that it depends on; where it `dissipates`, damping rises with the level.
     `of_the_hanger` is False for an effect of the measurement, which other sensors would not have;
     `of_readings` is True if it is in readings of the tension alone, which no recording holds.
-    `other_laws` says in words by which other laws, about as likely as its own, the same parameters
-    may act. `over_time` is None of an effect that the watch does not look for. `localised_as` is
-    what one is called that a diagnosis looks for at each place along the hanger.
+    `over_time` is None of an effect that the watch does not look for. `localised_as` is what one is
+    called that a diagnosis looks for at each place along the hanger.
 
     An effect that says no more than that the description is wrong is also named in
     `DESCRIPTION_EFFECTS` (shm/values/verdict.py).
@@ -162,7 +154,6 @@ class Effect:
     dissipates: ClassVar[bool] = False
     of_the_hanger: ClassVar[bool] = True
     of_readings: ClassVar[bool] = False
-    other_laws: ClassVar[tuple[str, ...]] = ()
     over_time: ClassVar[OverTime | None] = None
     localised_as: ClassVar[str] = ""
 
@@ -257,26 +248,15 @@ def place_along(hanger: Hanger) -> Parameter:
     )
 
 
-def nested_zones(
+def zone_about(
     middle_m: FloatArray,
     extent_m: FloatArray,
-    reaches: Sequence[float],
     stiffness_factor: FloatArray,
     mass_factor: FloatArray,
-) -> tuple[Zone, ...]:
-    """Return a stretch that begins and ends in steps: zones about one middle, one for each reach.
-
-    Arrays (draws,); where zones overlap their factors multiply.
-    """
-    return tuple(
-        Zone(
-            start_m=middle_m - reach * extent_m / 2,
-            end_m=middle_m + reach * extent_m / 2,
-            stiffness_factor=stiffness_factor,
-            mass_factor=mass_factor,
-        )
-        for reach in reaches
-    )
+) -> Zone:
+    """Return a stretch about its middle; arrays (draws,)."""
+    half_m = extent_m / 2
+    return Zone(middle_m - half_m, middle_m + half_m, stiffness_factor, mass_factor)
 
 
 _MIDDLE_ORDER = 4  # of the seven or so orders that a hammer test finds

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from shm.models.effects import base
-from shm.models.effects.base import GRADUAL, Case, Effect, Parameter, Survey, Variant
-from shm.models.hanger.physical import PhysicalHanger, SupportMode, Zone
+from shm.models.effects.base import Case, Effect, Parameter, Survey, Variant
+from shm.models.hanger.physical import PhysicalHanger, Zone
 from shm.values import NAN, PLANES, FloatArray, Hanger
 
 
@@ -207,10 +207,6 @@ class StiffEndZones(Effect):
         "shear_and_rotary_inertia",
         "section_size",
     )
-    other_laws = (
-        "the stiffness falls gradually, as in a socket that tapers",
-        "the compliance rises gradually, as in a socket that is cut to a cone",
-    )
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return base.ends_and_planes(survey)
@@ -242,33 +238,14 @@ class StiffEndZones(Effect):
         deck_m, arch_m = bar.deck_end_m, bar.arch_end_m
         reach_m, ratio = values.T
         same = np.ones_like(ratio)
-        zones = []
-        for step, times in _steps(ratio, case.variant.law):
-            factor = np.ones((len(ratio), len(PLANES)))
-            factor[:, list(case.variant.planes)] = times[:, None]
-            both = (
-                Zone(deck_m, deck_m + step * reach_m, factor, same),
-                Zone(arch_m - step * reach_m, arch_m, factor, same),
-            )
-            zones += [both[end] for end in case.variant.ends]
+        factor = np.ones((len(ratio), len(PLANES)))
+        factor[:, list(case.variant.planes)] = ratio[:, None]
+        both = (
+            Zone(deck_m, deck_m + reach_m, factor, same),
+            Zone(arch_m - reach_m, arch_m, factor, same),
+        )
+        zones = (both[end] for end in case.variant.ends)
         return replace(bar, zones=(*bar.zones, *zones))
-
-
-def _steps(ratio: FloatArray, law: int) -> list[tuple[float, FloatArray]]:
-    """Return the reaches of steps one in another, each with the factor by which it stiffens."""
-    if law == 0:
-        return [(1.0, ratio)]
-    if law == 1:
-        return [(reach, ratio ** (1 / len(GRADUAL))) for reach in GRADUAL]
-    left = 1 / ratio + (1 - 1 / ratio) * np.array([[0.0], [0.25], [0.75], [1.0]])
-    return list(zip(GRADUAL, left[1:] / left[:-1], strict=True))
-
-
-_FASTER = (1.6, 2.0, 2.5, 3.2, 4.0, 5.0)
-"""A beam's second mode lies at 2.8 (clamped) to 4 times (pinned) the first; with several spans, or
-where a deck turns, lower."""
-_HEAVIER = 4.0
-"""A second mode deflects less than the first where the hanger is fixed: more mass goes with it."""
 
 
 class SupportMotion(Effect):
@@ -277,9 +254,6 @@ class SupportMotion(Effect):
     A cross beam or the deck with a frequency near one of the hanger's shifts that mode, down where
     the support's frequency is the higher one, up where it is the lower one. The support's own modes
     are not counted among the hanger's.
-
-    A support is a structure: where the hanger is fixed it deflects by the sum of its modes, and one
-    of them may lie near another of the hanger's.
     """
 
     name = "support_motion"
@@ -294,10 +268,6 @@ class SupportMotion(Effect):
     )
     seen_by = ("frequencies near the support's own", "the other plane", "shapes near the ends")
     imitated_by = ("intermediate_support", "sag", "translational_end_flexibility")
-    other_laws = tuple(
-        f"with a second mode at {faster:g} times the frequency, {_HEAVIER:g} times as heavy"
-        for faster in _FASTER
-    )
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         return "" if hanger.supports.ends("clamped", "pinned") else "Nothing holds either end."
@@ -332,27 +302,8 @@ class SupportMotion(Effect):
     def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         mass_kg, frequency_hz = values.T
         where = (slice(None), case.variant.ends[0], case.variant.planes[0])
-        first = _mode(bar, where, mass_kg, frequency_hz)
-        bar = replace(
-            bar,
-            translational_compliance_m_n=bar.translational_compliance_m_n + first.compliance_m_n,
-            support_mass_kg=bar.support_mass_kg + first.mass_kg,
-        )
-        if not case.variant.law:
-            return bar
-        faster = _FASTER[case.variant.law - 1]
-        further = _mode(bar, where, _HEAVIER * mass_kg, faster * frequency_hz)
-        return replace(bar, support_modes=(*bar.support_modes, further))
-
-
-def _mode(
-    physical: PhysicalHanger,
-    where: tuple[slice, int, int],
-    mass_kg: FloatArray,
-    frequency_hz: FloatArray,
-) -> SupportMode:
-    """Return a mode at one end in one plane; none where the mass is infinite."""
-    compliance, moving = np.zeros((2, *physical.support_mass_kg.shape))
-    compliance[where] = 1 / (mass_kg * (2 * np.pi * frequency_hz) ** 2)
-    moving[where] = np.where(np.isinf(mass_kg), 0.0, mass_kg)
-    return SupportMode(compliance, moving)
+        compliance_m_n = bar.translational_compliance_m_n.copy()
+        compliance_m_n[where] += 1 / (mass_kg * (2 * np.pi * frequency_hz) ** 2)
+        moving_kg = bar.support_mass_kg.copy()
+        moving_kg[where] += np.where(np.isinf(mass_kg), 0.0, mass_kg)
+        return replace(bar, translational_compliance_m_n=compliance_m_n, support_mass_kg=moving_kg)

@@ -8,8 +8,6 @@ import numpy as np
 
 from shm.models.effects import base
 from shm.models.effects.base import (
-    GRADUAL,
-    STEEP,
     Case,
     Effect,
     OverTime,
@@ -81,7 +79,6 @@ class UnknownPointMass(Effect):
         "sensor_mass",
         "partial_mass",
     )
-    other_laws = ("it turns with the bar, with a radius of gyration of 0.1 m",)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         hanger_kg = base.mass_kg(hanger)
@@ -98,11 +95,7 @@ class UnknownPointMass(Effect):
 
     def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         mass_kg, x_m = values.T
-        if not case.variant.law:
-            return replace(bar, masses=(*bar.masses, PointMass(x_m, mass_kg)))
-        gyration_m = case.hanger.assumptions.clamp_gyration_m.value
-        halves = [PointMass(x_m + side * gyration_m, mass_kg / 2) for side in (-1, 1)]
-        return replace(bar, masses=(*bar.masses, *halves))
+        return replace(bar, masses=(*bar.masses, PointMass(x_m, mass_kg)))
 
 
 class PartialMass(Effect):
@@ -120,10 +113,6 @@ class PartialMass(Effect):
     )
     seen_by = ("frequencies of many orders", "shapes")
     imitated_by = ("distributed_mass", "point_mass", "section_loss", "intermediate_support")
-    other_laws = (
-        "the mass begins and ends gradually, over three fifths of its extent at each end",
-        "the mass begins and ends gradually, over three tenths of its extent at each end",
-    )
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         size = Parameter(
@@ -148,10 +137,8 @@ class PartialMass(Effect):
 
     def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         change, middle_m, extent_m = values.T
-        reaches = {1: GRADUAL, 2: STEEP}.get(case.variant.law, (1.0,))
-        put_on = (1 + change) ** (1 / len(reaches))
-        zones = base.nested_zones(middle_m, extent_m, reaches, np.ones_like(change), put_on)
-        return replace(bar, zones=bar.zones + zones)
+        zone = base.zone_about(middle_m, extent_m, np.ones_like(change), 1 + change)
+        return replace(bar, zones=(*bar.zones, zone))
 
 
 class SensorMass(Effect):

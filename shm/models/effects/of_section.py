@@ -9,8 +9,6 @@ import numpy as np
 
 from shm.models.effects import base
 from shm.models.effects.base import (
-    GRADUAL,
-    STEEP,
     Case,
     Effect,
     OverTime,
@@ -137,11 +135,6 @@ class SectionLoss(Effect):
     )
     seen_by = ("frequencies of many orders", "shapes")
     imitated_by = ("intermediate_support", "point_mass", "stiff_end_zones", "partial_mass")
-    other_laws = (
-        "the loss begins and ends gradually, over three fifths of its extent at each end",
-        "pits reach into the section: the stiffness falls as the area, not as its square",
-        "the loss begins and ends gradually, over three tenths of its extent at each end",
-    )
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         size = Parameter(
@@ -167,11 +160,8 @@ class SectionLoss(Effect):
 
     def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         loss, middle_m, extent_m = values.T
-        reaches = {1: GRADUAL, 3: STEEP}.get(case.variant.law, (1.0,))
-        power = 1 if case.variant.law == 2 else 2
-        left = (1 - loss) ** (1 / len(reaches))
-        zones = base.nested_zones(middle_m, extent_m, reaches, left**power, left)
-        return replace(bar, zones=bar.zones + zones)
+        zone = base.zone_about(middle_m, extent_m, (1 - loss) ** 2, 1 - loss)
+        return replace(bar, zones=(*bar.zones, zone))
 
 
 class ShearAndRotaryInertia(Effect):

@@ -15,10 +15,6 @@ from shm.values import FloatArray, Hanger
 _LEAST_RANGE_K = 1.0
 _LEAST_RATIO = 1.2
 
-# Powers of other laws of the level, which `other_laws` words: what a diagnosis owes to the law.
-_DYING = 1.5
-_SLIP = 0.5
-
 # Judgement: bolted joints lose a few per cent to tens of them. A diagnosis uses only that it rises.
 _LOSS_AT_REFERENCE_LEVEL = 0.1
 
@@ -90,7 +86,6 @@ class GeometricHardening(Effect):
     )
     seen_by = ("tests at different levels",)
     imitated_by = ("temperature_tension", "timebase")
-    other_laws = ("the swing dies away the faster the wider it is: the power of the level is 1.5",)
     follows = ("amplitude",)
     size = Parameter(
         "hardening",
@@ -109,8 +104,7 @@ class GeometricHardening(Effect):
         return missing_levels(survey)
 
     def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
-        power = _DYING if case.variant.law else 2.0
-        factor = 1 + values[:, 0] * case.conditions.amplitude**power
+        factor = 1 + values[:, 0] * case.conditions.amplitude**2
         return replace(bar, tension_n=bar.tension_n * factor)
 
 
@@ -131,7 +125,6 @@ class JointSoftening(Effect):
     source = "Gaul and Nitsche (2001), The role of friction in mechanical joints."
     seen_by = ("tests at different levels",)
     imitated_by = ("rotational_end_flexibility", "skewed_principal_axes")
-    other_laws = ("the compliance grows with the square root of the level",)
     follows = ("amplitude",)
     dissipates = True
 
@@ -148,8 +141,7 @@ class JointSoftening(Effect):
 
     def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         ends = list(case.variant.ends)
-        power = _SLIP if case.variant.law else 1.0
-        joint = case.conditions.amplitude**power * 10.0 ** -values[:, 0]
+        joint = case.conditions.amplitude * 10.0 ** -values[:, 0]
         compliance = bar.rotational_compliance_rad_n_m.copy()
         compliance[:, ends] += joint[:, None, None, None] * np.eye(2)
         loss = bar.joint_loss_factor.copy()
@@ -183,7 +175,6 @@ class Sag(Effect):
     source = "Irvine and Caughey (1974), The linear theory of free vibrations of a suspended cable."
     seen_by = ("frequency of the first order", "the other plane")
     imitated_by = ("intermediate_support", "support_motion")
-    other_laws = ("it sags as its bending and its ends let it, not as a string",)
     size = Parameter(
         "sag_parameter",
         "lambda^2",
@@ -206,8 +197,7 @@ class Sag(Effect):
     def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         parameter = bar.sag_parameter.copy()
         parameter[:, list(case.variant.planes)] += values[:, :1]
-        as_it_bends = bar.sags_as_it_bends or case.variant.law == 1
-        return replace(bar, sag_parameter=parameter, sags_as_it_bends=as_it_bends)
+        return replace(bar, sag_parameter=parameter)
 
 
 def missing_levels(survey: Survey) -> str:

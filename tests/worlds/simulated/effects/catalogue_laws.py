@@ -31,7 +31,7 @@ def stiffness(bar: Bar, values: Values, scene: Scene) -> Bar:
 
 
 def heaviness_ranges(hanger: Hanger, where: Where) -> dict[str, Range]:
-    return {"mass_change": Range(0.002, 0.3, 0.0, logarithmic=True)}
+    return {"mass_change": Range(0.002, 1.0, 0.0, logarithmic=True)}
 
 
 def heaviness(bar: Bar, values: Values, scene: Scene) -> Bar:
