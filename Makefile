@@ -8,7 +8,7 @@
 #   make wheel      dist/shm-VERSION-py3-none-any.whl, with the manual
 #   make image      the container's image, shm:VERSION, by podman or docker
 #   make bench      the slow tests and every benchmark: build/bench/table.md
-#   make ablation   ROOM=watch, identify or inference: what a room loses without each mechanism
+#   make ablation   ROOM=watch, identify, inference or gap: what a room loses without each mechanism
 #   make lock       the pinned requirement files
 #   make clean      remove the environment and all that was built
 # Single parts of the tests and benchmarks: make -C tests/benchmarks NAME, listed there.
