@@ -50,6 +50,7 @@ SHORT = {
     "durations": "--repeats 1",
     "evidence": "--seeds 2 --textbook-seeds 2", "full_disk": "--files 1 --every 40",
     "fuzz_readers": "--files 200 --flow 5 --processes 1", "gap_calibration": "--cases 1 --jobs 1",
+    "gap_ablation": "--hangers 2 --only whole",
     "gap_dynamics": "--cases 1 --seed 300", "gap_family": "--families 1 --sound 0 --hangers 2",
     "identify_ablation": "--kinds softening --seeds 3:4",
     "identify_limits": "--sound 2 --faulty 1", "identify_seconds": "--runs 1",
