@@ -14,7 +14,6 @@ import pytest
 
 from shm.models import MODELS, AsMade
 from shm.models.effects import EFFECTS, Conditions, Survey, Variant
-from shm.models.hanger_with_effects import HangerWithEffects
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import PLANES, AddedMass, FloatArray, Hanger, Turnbuckle
 from tests.helpers.planted_modes import planted_modes
@@ -149,7 +148,7 @@ def both(
     acting = [
         (each.name, replace(variant_of(each.name, each.at, hanger), law=law)) for each in effects
     ]
-    model = HangerWithEffects(plain(baseline, hanger), acting, PLACES)
+    model = plain(baseline, hanger).with_effects(acting, PLACES)
     tension = 1.05 * hanger.nominal_tension_n
     section, density, length, modulus = (getattr(made, name) for name in GLOBAL)
     own = [value for each in effects for value in each.values.values()]
@@ -247,7 +246,7 @@ def test_a_light_support_carries_a_bar_that_sags_as_it_bends_like_a_spring(hange
     def frequencies_hz(name: str, *values: float) -> FloatArray:
         sag = replace(variant_of("sag", "everywhere, longitudinal", hanger), law=1)
         way = variant_of(name, "deck end, longitudinal", hanger)
-        model = HangerWithEffects(plain("beam1", hanger), [("sag", sag), (name, way)], PLACES)
+        model = plain("beam1", hanger).with_effects([("sag", sag), (name, way)], PLACES)
         theta = np.array([[1.05, 1, 0, 0, 0, VALUES["sag"]["sag_parameter"], *values]])
         return model.modes(theta, Conditions(), MODES).frequency_hz
 
