@@ -35,11 +35,10 @@ from shm.inference.systematic_errors import (
     mean_of_ends,
 )
 from shm.models import AsMade
-from shm.models.as_made import BENDING
 from shm.models.beam import Beam3
 from shm.models.effects import EFFECTS, Conditions, Variant, parameters_of
 from shm.models.hanger import HangerModes
-from shm.models.hanger_with_effects import HangerWithEffects
+from shm.models.hanger_model import BENDING
 from shm.values import NAN, BoolArray, FloatArray, IntArray, ModalTest
 
 Effects = tuple[tuple[str, Variant], ...]
@@ -85,7 +84,7 @@ class GapProblem:
         self.sampling: Sampling | None = None
         self.alone: Fit | None = None
         self.rivals: list[tuple[float, GapProblem]] = []
-        self._hangers: dict[Effects, HangerWithEffects] = {}
+        self._hangers: dict[Effects, AsMade] = {}
         self._likelihoods: dict[tuple[Effects, bool], Likelihood] = {}
         self._thermometers: dict[Effects, FloatArray] = {}
         self._scaling = ShapeScaling.measured(observations)
@@ -414,9 +413,9 @@ class GapProblem:
     def design(self) -> Design:
         return self.observations.design
 
-    def _hanger_with(self, effects: Effects) -> HangerWithEffects:
+    def _hanger_with(self, effects: Effects) -> AsMade:
         if effects not in self._hangers:
-            self._hangers[effects] = HangerWithEffects(self.model, effects, self.design.places_m)
+            self._hangers[effects] = self.model.with_effects(effects, self.design.places_m)
         return self._hangers[effects]
 
     def _predicted(
@@ -456,7 +455,7 @@ class GapProblem:
         if design.places_m == self.design.places_m:
             composed = self._hanger_with(effects)
         else:
-            composed = HangerWithEffects(self.model, effects, design.places_m)
+            composed = self.model.with_effects(effects, design.places_m)
         tests = [int(test) for test in np.unique(design.frequency_test)]
         conditions = [design.conditions[test] for test in tests]
         orders, shapes = int(design.frequency_order.max()), len(design.shape_mode) > 0

@@ -21,8 +21,8 @@ from shm.gap.data_checks import usable
 from shm.gap.problem import GapProblem
 from shm.gap.search import fit_alone, invisible
 from shm.models import AS_DESCRIBED
-from shm.models.as_made import TENSION
 from shm.models.effects import EFFECTS, Variant, check_effect_priors
+from shm.models.hanger_model import TENSION
 from shm.values import (
     NAN,
     PLANES,

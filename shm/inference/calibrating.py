@@ -20,7 +20,7 @@ from shm.inference.options import Progress, UpdateOptions
 from shm.inference.priors import Calibration, calibration_of
 from shm.inference.updating import select
 from shm.models import DESCRIPTION, Model
-from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION
+from shm.models.hanger_model import BENDING, DENSITY, LENGTH, MODULUS, SECTION
 from shm.values import Hanger, ModalTest, Posterior
 
 _SHARE_WITHIN_A_FAMILY = 1 / 3  # judgement: one bar of a delivery from another, to one delivery

@@ -1,6 +1,6 @@
 """The sampler's space for the bar as made: what frequencies see, and what they never tell.
 
-Of the parameters of `shm.models.as_made` frequencies see the apparent tension a = T/(mu l^2) and a
+Of the parameters of a hanger's model frequencies see the apparent tension a = T/(mu l^2) and a
 few combinations of the deviations: c = sqrt(e/mu)/l^2 always, the area where the class shears, the
 mass per length where a known mass was clamped on. Only these are sampled. What is left of the
 deviations, and ends and terms of planes that were not measured, is drawn from the prior afterwards,
@@ -27,7 +27,9 @@ from shm.inference.priors import (
     reading_of,
 )
 from shm.inference.shapes import swaps_of
-from shm.models.as_made import (
+from shm.models import AsMade
+from shm.models.beam import Beam, Beam3
+from shm.models.hanger_model import (
     BENDING,
     DENSITY,
     LENGTH,
@@ -35,9 +37,7 @@ from shm.models.as_made import (
     SECTION,
     SHEAR,
     TENSION,
-    AsMade,
 )
-from shm.models.beam import Beam, Beam3
 from shm.values import PLANES, FloatArray, IntArray, ModalTest, Plane, Prior
 
 # c = sqrt(e/mu)/l^2 with e ~ modulus section^2 and mu ~ density section.

@@ -43,7 +43,7 @@ from shm.inference.systematic_errors import (
     mean_of_ends,
 )
 from shm.models import AsMade, Model
-from shm.models.as_made import TENSION
+from shm.models.hanger_model import TENSION
 from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
 
 

@@ -18,7 +18,7 @@ from shm.inference.posterior import DIFFERENCE, climb
 from shm.inference.problem import Problem
 from shm.inference.sampling import Sampled
 from shm.inference.shares_of_variance import with_shares
-from shm.models.as_made import TENSION
+from shm.models.hanger_model import TENSION
 from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency
 
 SIGMA = "sigma"

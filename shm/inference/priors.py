@@ -15,7 +15,8 @@ import scipy
 
 from shm.assumptions import DEFAULTS, Assumption, Assumptions
 from shm.inference.coordinates import exchange, fold_pairs, log_folded, split_pairs
-from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION, AsMade
+from shm.models import AsMade
+from shm.models.hanger_model import BENDING, DENSITY, LENGTH, MODULUS, SECTION
 from shm.values import FloatArray, Hanger, ModalTest
 
 DEVIATIONS = (SECTION, DENSITY, MODULUS)

@@ -12,13 +12,21 @@ from shlex import quote
 import numpy as np
 
 from shm.errors import UsageError, suggest
-from shm.models.adopted import Adopted, AdoptedAsMade, AdoptedName, is_adopted, with_parameters
+from shm.models.adopted import (
+    Adopted,
+    AdoptedName,
+    AdoptedOfThesis,
+    is_adopted,
+    with_parameters,
+)
 from shm.models.adopted import unfit as adopted_unfit
-from shm.models.as_made import AsMade
 from shm.models.base import DESCRIPTION, PRIORS, THESIS, Model, held_otherwise
+from shm.models.hanger_model import HangerModel
 from shm.models.registry import MODELS
 from shm.values import PLANES, FloatArray, Hanger, Posterior
 
+AsMade = HangerModel
+"""The name of the hanger's model in version 1.0."""
 AS_DESCRIBED = "beam1"
 """The class that takes the ends as they are described, whatever holds them."""
 
@@ -64,9 +72,9 @@ def described(name: str, hanger: Hanger, priors: str = THESIS) -> Model:
         raise UsageError(f"unknown priors {priors!r}.", remedy=f"Known: {', '.join(PRIORS)}.")
     _refuse_unknown(name, hanger)
     if is_adopted(name):
-        return AdoptedAsMade(name, hanger) if priors == DESCRIPTION else Adopted(name, hanger)
+        return Adopted(name, hanger) if priors == DESCRIPTION else AdoptedOfThesis(name, hanger)
     model = MODELS[name](hanger)
-    return AsMade(model) if priors == DESCRIPTION else model.of_the_thesis()
+    return HangerModel(model) if priors == DESCRIPTION else model.of_the_thesis()
 
 
 def class_of(posterior: Posterior, hanger: Hanger) -> Model:
@@ -139,6 +147,7 @@ __all__ = [
     "THESIS",
     "AdoptedName",
     "AsMade",
+    "HangerModel",
     "Model",
     "applicable",
     "build",

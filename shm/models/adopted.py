@@ -1,11 +1,8 @@
-"""Adopted model classes: a baseline with effects of the catalogue, as `shm gap adopt` makes them.
+"""Name hangers with effects that their owner adopted, as `shm gap adopt` makes them.
 
-Parameters are the baseline's as made and the effects' own. Those of effects have uniform priors: a
-logarithmic size is uniform in its log10, and one of either sign is uniform in the value itself,
-because a logarithm has no zero to cross and a sign that is set once could not follow a hanger that
-changes.
-
-Names of adopted model classes: a baseline and the effects that a hanger's owner made part of it.
+Parameters of adopted effects have uniform priors: a logarithmic size is uniform in its log10, and
+one of either sign is uniform in the value itself, because a logarithm has no zero to cross and a
+sign that is set once could not follow a hanger that changes. Their names:
 
     beam1+point_mass@everywhere
     beam1+rotational_end_flexibility@deck_end.transverse+bending_stiffness@everywhere
@@ -25,11 +22,9 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 
 from shm.errors import BadInput, UsageError, suggest
-from shm.models.as_made import BENDING, LENGTH, SHEAR, TENSION, AsMade
 from shm.models.base import DESCRIPTION, THESIS, Conditions, Model
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey, Variant
-from shm.models.hanger import PhysicalHanger
-from shm.models.hanger_with_effects import HangerWithEffects
+from shm.models.hanger_model import BENDING, LENGTH, SHEAR, TENSION, HangerModel
 from shm.models.registry import MODELS
 from shm.values import NAN, PLANES, FloatArray, Hanger, ModalTest
 
@@ -43,19 +38,49 @@ _REFERENCE = "reference_c"
 _REMEDY = "Write BASELINE+EFFECT@WHERE, such as beam1+point_mass@everywhere."
 
 
-class _WithEffects(Model):
-    """The methods of a class with effects, in terms of its hanger with effects."""
+class Adopted(HangerModel):
+    """The hanger of one adopted name, with the priors of its description.
 
-    expensive = True
-    adopted: AdoptedHanger
+    Its parameters are the baseline's, then the effects', in the coordinates of their priors. Its
+    tension is that at the reference temperature and at rest, where an effect changes it.
+    """
 
-    def values(self, theta: FloatArray) -> FloatArray:
-        """Return parameter sets of the hanger with effects from those of the class."""
-        raise TypeError(f"{type(self).__name__} does not say what its parameters stand for.")
+    def __init__(self, name: str, hanger: Hanger, with_terms: bool = True):
+        made = checked(name, hanger)
+        super().__init__(MODELS[made.baseline](hanger), with_terms)
+        self._take([(each.effect, variant_of(each, hanger)) for each in made.effects], ())
+        acting = " and ".join(f"{effect} ({at.at})" for effect, at in self.effects)
+        self.title = f"{self.title}, with {acting}"
+        self.baseline, self.name, self.swaps = made.baseline, name, ()
+        self.reference_c = next((e.reference_c for e in made.effects if _follows(e)), math.nan)
+        own = {parameter_name(each): each for each in self.effect_parameters}
+        effect_bounds = {key: bounds_of(each) for key, each in own.items()}
+        for effect in made.effects:
+            for key, both in effect.ranges.items():
+                effect_bounds[key if key in own else f"{effect.effect}.{key}"] = both
+        bounds = dict(self.bounds)
+        if math.isfinite(known := hanger.scatter.tension):  # weighed
+            bounds[TENSION] = (1 - known, 1 + known)
+        self.bounds = bounds | effect_bounds
+        self.units = {**self.units, **{key: each.unit for key, each in own.items()}}
+
+    def _plain(self, theta: FloatArray) -> FloatArray:
+        logarithmic = [in_log(each) for each in self.effect_parameters]
+        plain = theta.copy()
+        columns = theta.shape[1] - len(logarithmic) + np.flatnonzero(logarithmic)
+        plain[:, columns] = 10.0 ** theta[:, columns]
+        return plain
 
     def conditions(self, test: ModalTest) -> Conditions:
         """Return its added mass, and its temperature and level where an effect follows them."""
-        return self.adopted.conditions(test)
+        followed = {each for name, _ in self.effects for each in EFFECTS[name].follows}
+        warm, hard = "temperature" in followed, "amplitude" in followed
+        amplitude = test.frequencies_amplitude
+        return Conditions(
+            temperature_shift_k=test.temperature_c - self.reference_c if warm else 0.0,
+            amplitude=amplitude if hard and math.isfinite(amplitude) else 1.0,
+            added_mass=test.added_mass,
+        )
 
     def refuse(self, test: ModalTest) -> None:
         """Raise BadInput as any class, and where an effect follows a temperature not given."""
@@ -66,79 +91,23 @@ class _WithEffects(Model):
                 remedy="Give temperature_c, or drop the adoption with `shm gap drop`.",
             )
 
-    def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
-        return self.frequencies_at(theta, modes, Conditions())
 
-    def frequencies_at(self, theta: FloatArray, modes: int, conditions: Conditions) -> FloatArray:
-        found = self.adopted.bar.modes(self.values(theta), conditions, modes, shapes=False)
-        return found.frequency_hz
-
-    def shapes(self, theta: FloatArray, modes: int, x_m: FloatArray) -> FloatArray:
-        bar = self.adopted.with_sensors(tuple(map(float, x_m)))
-        seen = bar.modes(self.values(theta), Conditions(), modes).shape
-        return np.stack([seen[:, axis, :, :, axis] for axis in range(len(PLANES))], axis=1)
-
-    @property
-    def has_shapes(self) -> bool:
-        return True
-
-    def physical(self, theta: FloatArray, sensors: int = 0) -> PhysicalHanger:
-        """Return the hangers of `theta` with their effects, at rest and at the reference."""
-        return self.adopted.with_sensors((0.0,) * sensors).physical(
-            self.values(theta), Conditions()
-        )
-
-    def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the ends' own springs and those of the effects, each (n, planes)."""
-        compliance = np.einsum("nepp->nep", self.physical(theta).rotational_compliance_rad_n_m)
-        with np.errstate(divide="ignore"):
-            springs = 1 / compliance
-        return springs[:, 0], springs[:, 1]
-
-
-class AdoptedAsMade(_WithEffects, AsMade):
-    """The class of one adopted name, with the priors of the hanger's description.
-
-    Its parameters are the baseline's as made, then the effects'. Its tension is that at the
-    reference temperature and at rest, where an effect changes it.
-    """
-
-    has_slopes = False
-
-    def __init__(self, name: str, hanger: Hanger):
-        self.adopted = AdoptedHanger.of(name, hanger)
-        AsMade.__init__(self, self.adopted.baseline_class)
-        self.name, self.title, self.swaps = name, self.adopted.title, ()
-        parameters = self.adopted.effect_parameters
-        bounds = dict(self.bounds)
-        if math.isfinite(known := hanger.scatter.tension):  # weighed
-            bounds[TENSION] = (1 - known, 1 + known)
-        self.effect_names = tuple(parameters)
-        self.bounds = bounds | self.adopted.effect_bounds
-        self.units = {
-            **self.units,
-            **{each: parameter.unit for each, parameter in parameters.items()},
-        }
-
-    def values(self, theta: FloatArray) -> FloatArray:
-        return self.adopted.in_plain_values(theta)
-
-
-class Adopted(_WithEffects):
+class AdoptedOfThesis(Model):
     """The class of one adopted name with uniform priors: that of the thesis, or as shm 1.0 had it.
 
-    Parameters are the baseline's at the described length, logarithms of the deviations of section,
-    density, length and modulus, each in the standard deviation of the hanger's scatter, and the
-    effects'. The bar has neither own weight nor stiff fittings.
+    Parameters are the baseline's at the described length, the deviations of section, density,
+    length and modulus within sqrt(3) standard deviations of the hanger's scatter, and the effects'.
+    The bar has neither own weight nor stiff fittings.
     """
+
+    expensive = True
 
     def __init__(self, name: str, hanger: Hanger, priors: str = THESIS):
         super().__init__(hanger)
-        self.priors = priors
-        self.adopted = AdoptedHanger.of(name, hanger, with_terms=False)
-        self.name, self.title = name, self.adopted.title
-        baseline = MODELS[self.adopted.baseline]
-        known = self.adopted.bar.model.bounds if priors == DESCRIPTION else baseline.bounds
+        self.priors, self.bar = priors, Adopted(name, hanger, with_terms=False)
+        self.name, self.title = name, self.bar.title
+        baseline = MODELS[self.bar.baseline]
+        known = self.bar.bounds if priors == DESCRIPTION else baseline.bounds
         left_out = {LENGTH} if hanger.nominal_tension_n else {LENGTH, TENSION}
         bounds = {key: known[key] for key in baseline.bounds if key not in left_out}
         weighed = hanger.scatter.tension
@@ -147,88 +116,49 @@ class Adopted(_WithEffects):
         sds = asdict(hanger.scatter)
         halves = {each: _HALF_WIDTH_IN_SD * sds[each] for each in _DEVIATIONS}
         bounds |= {each: (-half, half) for each, half in halves.items() if half}
-        parameters = self.adopted.effect_parameters
-        self.units = {**baseline.units, **{each: of.unit for each, of in parameters.items()}}
-        self.bounds = bounds | self.adopted.effect_bounds
+        self.bounds = bounds | {key: self.bar.bounds[key] for key in self.bar.effect_names}
+        self.units = {
+            **baseline.units,
+            **{each: self.bar.units[each] for each in self.bar.effect_names},
+        }
 
-    def values(self, theta: FloatArray) -> FloatArray:
+    def _of_bar(self, theta: FloatArray) -> FloatArray:
+        """Return the same parameter sets as those of the bar."""
         given = dict(zip(self.parameter_names, theta.T, strict=True))
         one = np.ones(len(theta))
         given[LENGTH] = np.exp(given.get(_DEVIATIONS[2], 0 * one))
         given[BENDING] = self.hanger.bending_stiffness_factor * one
         usual = {TENSION: one, SHEAR: one}
-        names = (*self.adopted.bar.model.parameter_names, *self.adopted.effect_parameters)
-        columns = [given.get(name, usual.get(name, 0 * one)) for name in names]
-        return self.adopted.in_plain_values(np.column_stack(columns))
-
-
-@dataclass(frozen=True, eq=False)
-class AdoptedHanger:
-    """The hanger of an adopted name: `bar` with its effects, and their names in the class.
-
-    `effect_bounds` are limits of uniform priors, in the class's coordinates.
-    """
-
-    baseline: str
-    bar: HangerWithEffects
-    reference_c: float
-    effect_parameters: dict[str, Parameter]
-    effect_bounds: dict[str, tuple[float, float]]
-
-    @classmethod
-    def of(cls, name: str, hanger: Hanger, with_terms: bool = True) -> AdoptedHanger:
-        """Return the hanger of a name; raises UsageError where it names what is not there."""
-        made = checked(name, hanger)
-        model = AsMade(MODELS[made.baseline](hanger), with_terms)
-        effects = [(each.effect, variant_of(each, hanger)) for each in made.effects]
-        bar = HangerWithEffects(model, effects)
-        parameters = {parameter_name(each): each for each in bar.effect_parameters}
-        bounds = {key: bounds_of(each) for key, each in parameters.items()}
-        for effect in made.effects:
-            for parameter, both in effect.ranges.items():
-                bounds[parameter if parameter in bounds else f"{effect.effect}.{parameter}"] = both
-        reference_c = next((e.reference_c for e in made.effects if _follows(e)), math.nan)
-        return cls(made.baseline, bar, reference_c, parameters, bounds)
-
-    @property
-    def baseline_class(self) -> Model:
-        return self.bar.model.model
-
-    @property
-    def title(self) -> str:
-        acting = " and ".join(f"{name} ({variant.at})" for name, variant in self.bar.effects)
-        return f"{MODELS[self.baseline].title}, with {acting}"
-
-    def with_sensors(self, places_m: tuple[float, ...]) -> HangerWithEffects:
-        return HangerWithEffects(self.bar.model, self.bar.effects, places_m)
-
-    def in_plain_values(self, theta: FloatArray) -> FloatArray:
-        """Return `theta` with the effects' values where it has their logarithms."""
-        logarithmic = [in_log(each) for each in self.effect_parameters.values()]
-        plain = theta.copy()
-        columns = theta.shape[1] - len(logarithmic) + np.flatnonzero(logarithmic)
-        plain[:, columns] = 10.0 ** theta[:, columns]
-        return plain
+        names = self.bar.parameter_names
+        return np.column_stack([given.get(name, usual.get(name, 0 * one)) for name in names])
 
     def conditions(self, test: ModalTest) -> Conditions:
-        """Return the conditions of a test that the effects follow, and its added mass."""
-        followed = {each for name, _ in self.bar.effects for each in EFFECTS[name].follows}
-        warm, hard = "temperature" in followed, "amplitude" in followed
-        amplitude = test.frequencies_amplitude
-        return Conditions(
-            temperature_shift_k=test.temperature_c - self.reference_c if warm else 0.0,
-            amplitude=amplitude if hard and math.isfinite(amplitude) else 1.0,
-            added_mass=test.added_mass,
-        )
+        return self.bar.conditions(test)
+
+    def refuse(self, test: ModalTest) -> None:
+        """Raise BadInput as the bar does."""
+        self.bar.refuse(test)
+
+    def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
+        return self.bar.frequencies_hz(self._of_bar(theta), modes)
+
+    def frequencies_at(self, theta: FloatArray, modes: int, conditions: Conditions) -> FloatArray:
+        return self.bar.frequencies_at(self._of_bar(theta), modes, conditions)
+
+    def shapes(self, theta: FloatArray, modes: int, x_m: FloatArray) -> FloatArray:
+        return self.bar.shapes(self._of_bar(theta), modes, x_m)
+
+    def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return self.bar.springs_n_m_rad(self._of_bar(theta))
 
 
 def with_parameters(name: str, hanger: Hanger, names: Sequence[str], priors: str) -> Model:
     """Return the class of an adopted name that has the parameters `names`.
 
-    Posteriors of shm 1.0, and those with the priors of the thesis, are of `Adopted`.
+    Posteriors of shm 1.0, and those with the priors of the thesis, are of `AdoptedOfThesis`.
     """
     as_made = LENGTH in names
-    return AdoptedAsMade(name, hanger) if as_made else Adopted(name, hanger, priors)
+    return Adopted(name, hanger) if as_made else AdoptedOfThesis(name, hanger, priors)
 
 
 def unfit(name: str, hanger: Hanger) -> str:

@@ -25,7 +25,7 @@ _MOST_ORDER, LEAST_MODES = 20, 3
 """Two frequencies fit any bar, by its tension and its ends."""
 
 _PARAMETERS, _SPRINGS, _SHARE = 7, slice(2, 6), 6
-"""ln of the tension ratio, ln c (shm.models.as_made), log10 k L/EI of springs k1 to k4, and shear
+"""ln of the tension ratio, ln c (`HangerModel`), log10 k L/EI of springs k1 to k4, and shear
 over that of a solid section."""
 _LIMITS = np.array([(-7, 4), (-3, 3), *[(-2.5, 4)] * 4, (0.01, 3)]).T
 """Technical: of the parameters in a fit."""

@@ -1,4 +1,4 @@
-"""Compare the first-order correction for fittings with exact zones (`shm/models/reduced_bar.py`).
+"""Compare the first-order correction for fittings with exact zones of the general model.
 
 python tests/benchmarks/fittings.py
 
@@ -12,19 +12,20 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-from scipy.linalg import eigh
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from shm.models import tensioned_beam  # noqa: E402
-from shm.models.bar_elements import bar_elements  # noqa: E402
 from shm.models.end_effects import EndWaves  # noqa: E402
+from shm.models.hanger import PhysicalHanger, Zone, solve  # noqa: E402
+from shm.values import Hanger  # noqa: E402
 
 MODES = 6
 CLAMPED = 1e6
@@ -32,15 +33,11 @@ CLAMPED = 1e6
 
 def exact(xi: float, share: float, stiffer: float, spring: float) -> np.ndarray:
     """Return the frequencies (MODES,) of a bar of unit length, mass and EI with stiff zones."""
-    elements = bar_elements([(0.0, share), (1 - share, 1.0)], xi, MODES, False)
-    factors = np.array([1.0, stiffer, stiffer])[:, None, None]
-    stiffness = (factors * elements.bending).sum(axis=0) + xi**2 * elements.tension
-    for rotation in elements.end_rotation:
-        stiffness = stiffness + spring * np.outer(rotation, rotation)
-    mass = elements.mass.sum(axis=0)
-    # Of the inverse the lowest modes are the largest values: stiff springs round nothing away.
-    inverse = eigh(mass, stiffness, eigvals_only=True)[::-1][:MODES]
-    return np.asarray(inverse**-0.5 / (2 * np.pi))
+    one, springs = np.ones(1), np.full((1, 2), spring)
+    zones = [Zone(a * one, b * one, stiffer * one, one) for a, b in ((0, share), (1 - share, 1))]
+    bar = PhysicalHanger.clamped(Hanger(1, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0), xi**2 * one)
+    bar = replace(bar.on_springs((springs, springs)), zones=tuple(zones))
+    return np.asarray(solve(bar, MODES, np.empty(0), shapes=False).frequency_hz[0, 0])
 
 
 def first_order(xi: float, share: float, stiffer: float, spring: float) -> np.ndarray:

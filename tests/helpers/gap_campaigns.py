@@ -18,9 +18,8 @@ from shm.gap.search import fit_alone
 from shm.inference.linear import Linear
 from shm.inference.posterior import find_peaks
 from shm.models import MODELS, AsMade
-from shm.models.as_made import DENSITY, LENGTH, MODULUS, SECTION, TENSION
+from shm.models.hanger_model import DENSITY, LENGTH, MODULUS, SECTION, TENSION
 from shm.models.effects import Conditions, Variant
-from shm.models.hanger_with_effects import HangerWithEffects
 from shm.values import (
     ENOUGH_EFFECTIVE,
     NAN,
@@ -59,7 +58,7 @@ def campaign(
     """
     rng = np.random.default_rng(seed)
     model = AsMade(MODELS["beam1"](HANGER))
-    hanger = HangerWithEffects(model, effects, PLACES_M)
+    hanger = model.with_effects(effects, PLACES_M)
     section, density, length, modulus = 0.005 * rng.standard_normal(4)
     made = {TENSION: tension, LENGTH: 1 + length, SECTION: section, DENSITY: density}
     made |= {MODULUS: modulus, **{name: model.usual(name) for name in model.terms}}

@@ -23,7 +23,7 @@ DEVIATIONS = {"theta_L": 1.004, "section": 0.02, "density": -0.006, "modulus": 0
 @pytest.fixture(autouse=True)
 def _weightless(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the bar's own weight out: the classes of the thesis have none."""
-    monkeypatch.setattr("shm.models.bar_of_terms.GRAVITY_M_S2", 0.0)
+    monkeypatch.setattr("shm.models.hanger_model.GRAVITY_M_S2", 0.0)
 
 
 def as_made(name: str, hanger: Hanger) -> AsMade:

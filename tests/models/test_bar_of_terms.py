@@ -20,9 +20,10 @@ from shm.inference.options import silent
 from shm.inference.posterior import DIFFERENCE
 from shm.inference.problem import Problem
 from shm.models import AsMade, build, described
-from shm.models.as_made import FITTING_STIFFNESS, Term, terms_of
-from shm.models.bar_of_terms import GRAVITY_M_S2, bar_of_terms
 from shm.models.base import Conditions
+from shm.models.hanger import solve
+from shm.models.hanger_model import GRAVITY_M_S2
+from shm.models.terms import FITTING_STIFFNESS, Term, terms_of
 from shm.values import PLANES, AddedMass, FloatArray, Hanger, ModalTest, Mode, Turnbuckle
 from tests.worlds.eight_kinds import Member, Zone, natural_frequencies_hz
 
@@ -174,20 +175,17 @@ def test_a_bar_that_shears_has_its_frequencies_whatever_its_section(bar: Hanger)
     model = as_made("beam3", hanger)
     sections = hanger.scatter.section * np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
     theta = np.vstack([usual_set(model, section=each) for each in sections])
-    of = bar_of_terms(hanger, model.fittings_m, True, MODES)
-    terms = of.terms(model._values(theta))
-    found, exact = of._bar.frequencies(terms), of._bar.full_frequencies(terms)
-    np.testing.assert_allclose(found, exact, rtol=1e-5)
+    exact = solve(model.physical(theta), MODES, np.empty(0), shapes=False).frequency_hz
+    np.testing.assert_allclose(model.frequencies_hz(theta, MODES), exact, rtol=1e-5)
 
 
 @pytest.mark.parametrize("bar", [ROD, TUBE, STRAND], ids=["rod", "tube", "strand"])
 def test_a_rough_bar_has_nearly_the_same_frequencies(bar: Hanger) -> None:
     model = as_made("beam3", replace(bar, fittings_m=(0.3, 0.3)))
-    of = bar_of_terms(model.hanger, model.fittings_m, True, MODES)
-    terms = of._snapshots(0)
-    off = of.rough._bar.frequencies(terms) / of._bar.frequencies(terms) - 1
+    bars, fine = model.snapshots(), model._reduced(MODES)
+    off = fine.rough.frequencies_hz(bars) / fine.frequencies_hz(bars) - 1
     assert 0 < np.median(np.abs(off)) < 1e-4
-    assert len(of.rough._bar.basis.T) < 0.8 * len(of._bar.basis.T)
+    assert len(fine.rough.basis.T) < 0.8 * len(fine.basis.T)
 
 
 @pytest.mark.parametrize("lambda_squared", [2.0, 40.0])

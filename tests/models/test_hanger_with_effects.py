@@ -10,7 +10,6 @@ import pytest
 from shm.inference.described import DescribedCoordinates
 from shm.models import AsMade, build
 from shm.models.effects import Conditions, Variant
-from shm.models.hanger_with_effects import HangerWithEffects
 from shm.values import AddedMass, FloatArray, Hanger, Turnbuckle
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.slow import few_of
@@ -40,9 +39,9 @@ def drawn(model: AsMade, *effects: float) -> FloatArray:
 @pytest.mark.parametrize("name", ["beam1", "beam2", "beam3"])
 def test_modes_without_effects_are_the_class_own(name: str, hanger: Hanger) -> None:
     model = as_made(name, hanger)
-    bare = HangerWithEffects(model, [], PLACES)
+    bare = model.with_effects([], PLACES)
     theta = drawn(model)
-    assert bare.names == model.parameter_names
+    assert bare.parameter_names == model.parameter_names
     found = bare.modes(theta, PLAIN, 6)
     np.testing.assert_allclose(found.frequency_hz, model.frequencies_hz(theta, 6), rtol=2e-4)
     if not model.length_is_open:
@@ -57,7 +56,7 @@ def test_modes_without_effects_are_the_class_own(name: str, hanger: Hanger) -> N
 @pytest.mark.parametrize("name", few_of(["s1", "s2"], 1))
 def test_modes_of_solid_have_the_class_frequencies(name: str) -> None:
     model = as_made(name, HANGER_3)
-    bare = HangerWithEffects(model, [("point_mass", Variant())], PLACES)
+    bare = model.with_effects([("point_mass", Variant())], PLACES)
     theta = drawn(model, 0.0, 3.0)
     found = bare.modes(theta, PLAIN, 4)
     own = model.frequencies_hz(theta[:, :-2], 4)
@@ -69,11 +68,11 @@ def test_modes_of_solid_have_the_class_frequencies(name: str) -> None:
 
 def test_point_mass_is_what_a_known_mass_is() -> None:
     model = as_made("beam2", ROD)
-    with_effect = HangerWithEffects(model, [("point_mass", Variant())], PLACES)
+    with_effect = model.with_effects([("point_mass", Variant())], PLACES)
     assert [each.name for each in with_effect.effect_parameters] == ["mass_kg", "x_m"]
     one = with_effect.modes(drawn(model, 25.0, 3.6), PLAIN, 6)
     known = Conditions("t2", added_mass=AddedMass(25.0, 3.6, 0.0))
-    other = HangerWithEffects(model, [], PLACES).modes(drawn(model), known, 6)
+    other = model.with_effects([], PLACES).modes(drawn(model), known, 6)
     np.testing.assert_allclose(one.frequency_hz, other.frequency_hz, rtol=1e-12)
     np.testing.assert_allclose(one.shape, other.shape, atol=1e-9)
     own = model.frequencies_at(drawn(model), 6, known)
@@ -82,7 +81,7 @@ def test_point_mass_is_what_a_known_mass_is() -> None:
 
 def test_like_tests_are_solved_once() -> None:
     model = as_made("beam1", ROD)
-    warm = HangerWithEffects(model, [("temperature_tension", Variant())], PLACES)
+    warm = model.with_effects([("temperature_tension", Variant())], PLACES)
     theta = drawn(model, -200.0)
     cold, same, hot = warm.modes_of_tests(
         theta, [Conditions("a"), Conditions("b"), Conditions("c", temperature_shift_k=20.0)], 5
@@ -101,7 +100,7 @@ def test_like_tests_are_solved_once() -> None:
 def test_sag_follows_the_tension_of_a_test() -> None:
     leaning = replace(ROD, inclination_deg=30.0, nominal_tension_n=50e3)
     model = as_made("beam2", leaning)
-    bare = HangerWithEffects(model, [])
+    bare = model.with_effects([])
     theta = drawn(model)
     theta[:, 0] = np.linspace(0.6, 1.5, SETS)
     theta[:, model.parameter_names.index("sag_shape")] = 0.5

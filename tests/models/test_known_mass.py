@@ -12,7 +12,6 @@ from shm.assumptions import DEFAULTS
 from shm.models import MODELS, THESIS, AsMade, build
 from shm.models.base import Conditions
 from shm.models.hanger import PhysicalHanger, solve
-from shm.models.hanger_with_effects import HangerWithEffects
 from shm.simulate.effects import plant_effects
 from shm.values import AddedMass, FloatArray, Hanger
 
@@ -50,7 +49,7 @@ def general(mass: AddedMass) -> FloatArray:
     """Solve the general model, as the diagnosis has it but for the terms."""
     model = AsMade(MODELS["beam1"](ROD), with_terms=False)
     theta = np.array([[1.0, 1.0, 0.0, 0.0, 0.0]])
-    hanger = HangerWithEffects(model, ())
+    hanger = model.with_effects(())
     return hanger.modes(theta, Conditions(added_mass=mass), MODES, False).frequency_hz[0, 0]
 
 

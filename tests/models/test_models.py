@@ -59,7 +59,7 @@ def test_more_tension_raises_every_frequency(model, theta) -> None:
 
 
 def test_a_swap_changes_no_frequency(model, theta, monkeypatch) -> None:
-    monkeypatch.setattr("shm.models.bar_of_terms.GRAVITY_M_S2", 0.0)
+    monkeypatch.setattr("shm.models.hanger_model.GRAVITY_M_S2", 0.0)
     for one, other in model.swaps:
         swapped = theta.copy()
         columns = [model.parameter_names.index(name) for name in (one, other)]

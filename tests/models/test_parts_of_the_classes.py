@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.models import MODELS, THESIS, build
-from shm.models.as_made import AsMade
+from shm.models import MODELS, THESIS, AsMade, build
 from shm.values import FloatArray
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import frequencies_hz

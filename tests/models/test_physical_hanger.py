@@ -103,7 +103,7 @@ def test_physical_on_supports() -> None:
 def test_physical_of_solid_has_plates_and_deviations() -> None:
     model = as_made("s2", HANGER_3)
     theta = drawn(model)
-    bar = model.physical(theta, sensors=3)
+    bar = model.with_effects((), (1.0, 2.0, 3.0)).physical(theta)
     stiffness, mass, length = model.stiffness_mass_length(theta)
     assert bar.sensor_turn_rad.shape == (SETS, 3)
     np.testing.assert_allclose(bar.deck_end_m, 1.0915)

@@ -13,7 +13,6 @@ from shm.inference.described import DescribedCoordinates
 from shm.models import MODELS, AsMade, applicable, build, check_baseline
 from shm.models.effects import EFFECTS, Conditions, Survey, parameters_of
 from shm.models.hanger import PhysicalHanger, solve
-from shm.models.hanger_with_effects import HangerWithEffects
 from shm.values import PLANES, FloatArray, Hanger, Supports
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import EI, LENGTH, MASS, NOWHERE, TENSION
@@ -85,7 +84,7 @@ def test_every_effect_that_may_act_gives_finite_frequencies(
     if EFFECTS[name].invisible(hanger, EVERYTHING):
         return
     for variant in EFFECTS[name].variants(hanger, EVERYTHING):
-        acted_on = HangerWithEffects(beam_1(hanger), [(name, variant)], (6.0,))
+        acted_on = beam_1(hanger).with_effects([(name, variant)], (6.0,))
         middle = [[each.value(np.array(0.4)) for each in parameters_of(name, hanger, variant)]]
         theta = np.hstack([middle_of(hanger, [0.0]), middle])
         modes = acted_on.modes(theta, Conditions("t1"), 4)

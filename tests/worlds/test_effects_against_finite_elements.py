@@ -14,7 +14,6 @@ import pytest
 
 from shm.models import MODELS, AsMade
 from shm.models.effects import EFFECTS, Conditions, Survey, Variant
-from shm.models.hanger_with_effects import HangerWithEffects
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import PLANES, AddedMass, FloatArray, Hanger, Turnbuckle
 from tests.helpers.planted_modes import planted_modes
@@ -143,7 +142,7 @@ def both(
 ) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
     """Frequencies, shapes and damping that the joints add: general model, finite elements."""
     acting = [(each.name, variant_of(each.name, each.at, hanger)) for each in effects]
-    model = HangerWithEffects(plain(baseline, hanger), acting, PLACES)
+    model = plain(baseline, hanger).with_effects(acting, PLACES)
     tension = 1.05 * hanger.nominal_tension_n
     section, density, length, modulus = (getattr(made, name) for name in GLOBAL)
     own = [value for each in effects for value in each.values.values()]

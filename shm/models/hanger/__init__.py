@@ -11,4 +11,5 @@ from shm.models.hanger.physical import (
     SupportMode,
     Zone,
 )
+from shm.models.hanger.reduced import Modes, ReducedBar
 from shm.models.hanger.solution import NormalModes, normal_modes, solve

@@ -5,7 +5,7 @@ Where along the bar something happens, as fractions of its length, and the bar t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -21,20 +21,13 @@ from shm.models.hanger.functions import (
     normalised,
     polynomials,
     shear_strains,
+    tents,
 )
 from shm.models.hanger.physical import PhysicalHanger, PointMass, Zone
 from shm.values import FloatArray, IntArray
 
 _RIDGE = 1e-10
 """Added to the bending energy of kinks, so that two at one place do no harm."""
-
-
-@dataclass(frozen=True)
-class Counts:
-    """Count the polynomials and the functions of shear strain (0: none)."""
-
-    polynomials: int
-    shear: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +48,89 @@ class Spans:
         apart = np.ptp(self.start, axis=0).max(), np.ptp(self.length, axis=0).max()
         return bool(max(apart) < _AT_END)
 
+    @property
+    def first(self) -> Spans:
+        """Return those of the first row."""
+        factors = self.stiffness_factor[:, :1], self.mass_factor[:1]
+        return Spans(self.start[:1], self.length[:1], *factors)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Hold what functions do at points, (functions, rows, points) each.
+
+    `w` is the axis's deflection, `slope` its derivative, `curvature` that of the section's
+    rotation, which is the slope without the shear `strain`.
+    """
+
+    w: FloatArray
+    slope: FloatArray
+    curvature: FloatArray
+    strain: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Functions:
+    """The trial functions of bars (rows).
+
+    Four Hermite cubics, `smooth` polynomials and kinks, each times `factor` (kinks, rows); of a bar
+    that shears those of shear strain as well: one for each end, one for each place where the shear
+    force jumps, then some that deflect nothing, `strains` polynomials less the two of the ends and
+    one for each kink.
+    """
+
+    smooth: int
+    strains: int
+    kinks: Kinks
+    factor: FloatArray
+
+    @property
+    def still(self) -> int:
+        """Return the number of functions, the last ones, that deflect nothing."""
+        return self.strains - SHEAR_ENDS + self.kinks.places.shape[1] if self.strains else 0
+
+    @property
+    def kinked(self) -> slice:
+        return slice(HERMITE + self.smooth, HERMITE + self.smooth + self.kinks.count)
+
+    def at(self, x: FloatArray, kinked: Table | None = None) -> Motion:
+        """Return the motion of all functions at `x` (rows, points); `kinked` is that of kinks."""
+        table = Table.joined(hermite(x), polynomials(x, self.smooth))
+        if self.kinks.count:
+            kinked = self.kinks.table(x) if kinked is None else kinked
+            table = Table.joined(table, kinked.scaled(self.factor))
+        if not self.strains:
+            return Motion(table.w, table.slope, table.curvature, np.zeros_like(table.w))
+        strain, change = shear_strains(x, self.strains)
+        # The first two strain an end, whose section stays as it is while the bar's axis turns.
+        ends = Table(*(each[DECK_SLOPE:HERMITE:2] for each in vars(table).values()))
+        # Where the shear force jumps the axis has a kink, the section none.
+        tent, jump = tents(x, self.kinks.jumps)
+        tops, rising = tents(x, self.kinks.places)
+        still = np.zeros((self.still, *x.shape))
+        changing = np.concatenate([change[:SHEAR_ENDS], 0 * tent, change[SHEAR_ENDS:], rising])
+        bent = np.concatenate([ends.curvature, 0 * tent, still]) - changing
+        return Motion(
+            np.concatenate([table.w, ends.w, tent, still]),
+            np.concatenate([table.slope, ends.slope, jump, still]),
+            np.concatenate([table.curvature, bent]),
+            np.concatenate([0 * table.w, strain[:SHEAR_ENDS], jump, strain[SHEAR_ENDS:], tops]),
+        )
+
+    def ridge(self) -> FloatArray:
+        """Return what makes nearly dependent functions definite (rows, functions), in bending."""
+        sizes = [np.ones((HERMITE + self.smooth, 1)), self.factor]
+        if self.strains:
+            heights = (tents(each, each)[0] for each in (self.kinks.jumps, self.kinks.places))
+            jumps, tops = (np.diagonal(each, axis1=0, axis2=2).T for each in heights)
+            ones = np.ones((SHEAR_ENDS, 1)), np.ones((self.strains - SHEAR_ENDS, 1))
+            sizes += [ones[0], jumps, ones[1], tops]
+        rows = max(each.shape[1] for each in sizes)
+        size = np.concatenate([np.broadcast_to(each, (len(each), rows)) for each in sizes])
+        found = np.where(size > 0, _RIDGE, 1.0)
+        found[[*range(HERMITE + self.smooth)]] = 0.0
+        return found.T
+
 
 @dataclass(frozen=True, eq=False)
 class Bar:
@@ -63,10 +139,10 @@ class Bar:
     Of curvature, deflection's slope, deflection, shear strain, and the rotation of the section;
     `gradient` is that of a tension x - 1/2, which grows along the bar; rotation goes with mass;
     `bending` goes by plane: (rows or 1, planes or 1, functions, functions).
-    `area` (rows or 1, functions) is the integral of the deflection. The functions: four Hermite
-    cubics, polynomials, kinks, shear strains.
+    `area` (rows or 1, functions) is the integral of the deflection.
     """
 
+    functions: Functions
     bending: FloatArray
     tension: FloatArray
     gradient: FloatArray
@@ -74,74 +150,49 @@ class Bar:
     shear: FloatArray
     rotation: FloatArray
     area: FloatArray
-    counts: Counts
-    kinks: Kinks | None = None
-    kink_factor: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
-
-    @property
-    def hats(self) -> int:
-        """Return the number of functions, the last ones, of shear strain that deflect nothing."""
-        return max(self.counts.shear - SHEAR_ENDS, 0)
 
     def deflections(self, x: FloatArray) -> FloatArray:
-        """Return the deflections (rows, points, functions but hats) at `x` (rows, points)."""
-        return self._with_sheared(self._at(x).w)
+        """Return the deflections (rows, points, functions that deflect) at `x` (rows, points)."""
+        return self._deflecting(self.functions.at(x).w)
 
     def slopes(self, x: FloatArray) -> FloatArray:
         """Return the slopes of the axis, likewise."""
-        return self._with_sheared(self._at(x).slope)
+        return self._deflecting(self.functions.at(x).slope)
 
-    def _at(self, x: FloatArray) -> Table:
-        smooth = Table.joined(hermite(x), polynomials(x, self.counts.polynomials))
-        if self.kinks is None:
-            return smooth
-        return Table.joined(smooth, self.kinks.table(x).scaled(self.kink_factor))
-
-    def _with_sheared(self, values: FloatArray) -> FloatArray:
-        if self.counts.shear:
-            values = np.concatenate([values, _sheared(values, SHEAR_ENDS)])
-        return values.transpose(1, 2, 0)
+    def _deflecting(self, values: FloatArray) -> FloatArray:
+        return values[: len(values) - self.functions.still].transpose(1, 2, 0)
 
 
-@lru_cache(maxsize=64)
-def uniform_bar(counts: Counts) -> Bar:
-    """One row that stands for all: the bar without zones and kinks."""
-    points, weights = _gauss(counts.polynomials + HERMITE)
-    x = points[None]
-    table = Table.joined(hermite(x), polynomials(x, counts.polynomials))
-    return _bar(x, table, weights[None], weights[None, None], weights[None], counts)
-
-
-def broken_bar(counts: Counts, spans: Spans, kinks: Kinks) -> Bar:
-    """Return bars with zones, and functions with kinks."""
-    if spans.are_equal and np.ptp(kinks.places, axis=0).max(initial=0.0) < _AT_END:
-        return _bar_of_pieces(counts, spans, kinks)
-    x, weight, which = _composite(spans, counts.polynomials + HERMITE)
+def _bar_of_rows(functions: Functions, spans: Spans) -> Bar:
+    """Return bars that have their breaks anywhere."""
+    x, weight, which = _composite(spans, functions.smooth + HERMITE)
     stiff = weight * np.take_along_axis(spans.stiffness_factor, which[None], axis=2)
     heavy = weight * np.take_along_axis(spans.mass_factor, which, axis=1)
-    smooth = Table.joined(hermite(x), polynomials(x, counts.polynomials))
-    if not kinks.count:
-        return _bar(x, smooth, weight, stiff, heavy, counts)
-    bent = kinks.table(x)
-    factor = normalised(bent.curvature, weight)
-    bar = _bar(x, Table.joined(smooth, bent.scaled(factor)), weight, stiff, heavy, counts)
-    first = HERMITE + counts.polynomials
-    kinked = np.arange(first, first + kinks.count)
-    bar.bending[:, :, kinked, kinked] += np.where(factor > 0, _RIDGE, 1.0).T[:, None]
-    return Bar(**{**vars(bar), "kinks": kinks, "kink_factor": factor})
+    kinked = None
+    if functions.kinks.count:
+        kinked = functions.kinks.table(x)
+        functions = replace(functions, factor=normalised(kinked.curvature, weight))
+    bar = _bar(functions, functions.at(x, kinked), x, weight, stiff, heavy)
+    diagonal = np.arange(bar.bending.shape[-1])
+    bar.bending[:, :, diagonal, diagonal] += functions.ridge()[:, None]
+    return bar
 
 
-def _bar_of_pieces(counts: Counts, spans: Spans, kinks: Kinks) -> Bar:
+def _bar_of_pieces(functions: Functions, spans: Spans) -> Bar:
     """Return bars whose stretches are alike, put together from those of each stretch.
 
-    So most of the work is done once. Kinks take the next of a few rates of decay.
+    So most of the work is done once. Kinks take the next of a few rates of decay. Where all bars
+    are the same there is one row, which stands for all.
     """
-    level = np.round(np.log(kinks.decay.clip(1.0, _MOST_DECAY)) / _DECAY_STEP).astype(int)
-    level = level if kinks.count else 0 * level
+    kinks = functions.kinks
+    level = _decay_levels(kinks)
     levels, which = np.unique(level, return_inverse=True)
-    places = tuple(kinks.forces[0].tolist()), tuple(kinks.steps[0].tolist())
-    start, length = tuple(spans.start[0].tolist()), tuple(spans.length[0].tolist())
-    pieces = [_pieces(counts, start, length, *places, int(each)) for each in levels]
+    pieces = [bar_pieces(functions.smooth, functions.strains, *_places(spans, kinks), int(each))
+              for each in levels]  # fmt: skip
+    factors = (*spans.stiffness_factor, spans.mass_factor)
+    if len(levels) == 1 and all(np.all(each == each[:1]) for each in factors):
+        which, level = which[:1], level[:1]
+        spans, kinks = spans.first, kinks.first
 
     def each_row(name: str) -> FloatArray:
         found = [getattr(piece, name) for piece in pieces]
@@ -156,33 +207,43 @@ def _bar_of_pieces(counts: Counts, spans: Spans, kinks: Kinks) -> Bar:
             found[of] = (factor[of] @ flat).reshape(len(of), size, size)
         return found
 
-    bending = [summed("bending", plane) for plane in spans.stiffness_factor]
-    first = HERMITE + counts.polynomials
-    kinked = np.arange(first, first + kinks.count)
+    bending = np.stack([summed("bending", plane) for plane in spans.stiffness_factor], axis=1)
     factor = each_row("kink_factor")
-    for plane in bending:
-        plane[:, kinked, kinked] += np.where(factor > 0, _RIDGE, 1.0)
+    factor = factor.T if len(factor) > 1 else np.repeat(factor.T, len(which), axis=1)
     rate = np.exp(_DECAY_STEP * level) if kinks.count else kinks.decay
+    functions = replace(functions, kinks=replace(kinks, decay=rate), factor=factor)
+    diagonal = np.arange(bending.shape[-1])
+    bending[:, :, diagonal, diagonal] += functions.ridge()[:, None]
     return Bar(
-        np.stack(bending, axis=1),
+        functions,
+        bending,
         each_row("tension"),
         each_row("gradient"),
         summed("mass", spans.mass_factor),
         each_row("shear"),
-        summed("rotation", spans.mass_factor) if counts.shear else each_row("tension"),
+        summed("rotation", spans.mass_factor) if functions.strains else each_row("tension"),
         each_row("area"),
-        counts,
-        Kinks(kinks.forces, kinks.steps, rate) if kinks.count else None,
-        factor.T if len(factor) > 1 else np.repeat(factor.T, len(which), axis=1),
     )
 
 
+def _decay_levels(kinks: Kinks) -> IntArray:
+    level = np.round(np.log(kinks.decay.clip(1.0, _MOST_DECAY)) / _DECAY_STEP).astype(int)
+    return np.asarray(level if kinks.count else 0 * level)
+
+
+def _places(spans: Spans, kinks: Kinks) -> tuple[tuple[float, ...], ...]:
+    """Return where the first row's stretches begin, their lengths, its forces, steps and jumps."""
+    rows = (spans.start[0], spans.length[0], kinks.forces[0], kinks.steps[0], kinks.jumps[0])
+    return tuple(tuple(each.tolist()) for each in rows)
+
+
 @dataclass(frozen=True, eq=False)
-class _Pieces:
+class Pieces:
     """Energies of the stretches of one bar.
 
     `bending`, `mass` and `rotation` are (stretches, functions, functions), the others those of the
-    whole bar with one row; `kink_factor` (1, kinks).
+    whole bar with one row; `kink_factor` (1, kinks). `curvature` (points, functions) of each
+    stretch is weighted so that its square is the energy of bending; `middle` is its middle.
     """
 
     bending: FloatArray
@@ -193,36 +254,41 @@ class _Pieces:
     shear: FloatArray
     area: FloatArray
     kink_factor: FloatArray
+    curvature: tuple[FloatArray, ...]
+    middle: tuple[float, ...]
 
 
 @lru_cache(maxsize=128)
-def _pieces(
-    counts: Counts,
+def bar_pieces(
+    smooth: int,
+    strains: int,
     start: tuple[float, ...],
     length: tuple[float, ...],
     forces: tuple[float, ...],
     steps: tuple[float, ...],
+    jumps: tuple[float, ...],
     level: int,
-) -> _Pieces:
+) -> Pieces:
     """Return the energies of stretches that begin at `start`, with a decay of kinks by `level`."""
     count = len(start)
     one = np.ones((1, count))
     spans = Spans(np.array([start]), np.array([length]), one[None], one)
-    x, weight, which = _composite(spans, counts.polynomials + HERMITE)
-    table = Table.joined(hermite(x), polynomials(x, counts.polynomials))
-    kinks = Kinks(np.array([forces]), np.array([steps]), np.array([np.exp(_DECAY_STEP * level)]))
-    factor = np.empty((0, 1))
-    if kinks.count:
-        bent = kinks.table(x)
-        factor = normalised(bent.curvature, weight)
-        table = Table.joined(table, bent.scaled(factor))
-    whole = _bar(x, table, weight, weight[None], weight, counts)
-    parts = []
+    x, weight, which = _composite(spans, smooth + HERMITE)
+    rate = np.array([np.exp(_DECAY_STEP * level)])
+    kinks = Kinks(np.array([forces]), np.array([steps]), np.array([jumps]), rate)
+    kinked = kinks.table(x) if kinks.count else None
+    factor = np.empty((0, 1)) if kinked is None else normalised(kinked.curvature, weight)
+    functions = Functions(smooth, strains, kinks, factor)
+    motion = functions.at(x, kinked)
+    whole = _bar(functions, motion, x, weight, weight[None], weight)
+    parts, curvature = [], []
     for stretch in range(count):
         rows = np.flatnonzero(which[0] == stretch)
+        of_rows = Motion(*(each[..., rows] for each in vars(motion).values()))
         weights = weight[:, rows]
-        parts.append(_bar(x[:, rows], table.part(rows), weights, weights[None], weights, counts))
-    return _Pieces(
+        parts.append(_bar(functions, of_rows, x[:, rows], weights, weights[None], weights))
+        curvature.append((of_rows.curvature[:, 0] * np.sqrt(weights)).T)
+    return Pieces(
         np.concatenate([each.bending[:, 0] for each in parts]),
         np.concatenate([each.mass for each in parts]),
         np.concatenate([each.rotation for each in parts]),
@@ -231,48 +297,29 @@ def _pieces(
         whole.shear,
         whole.area,
         factor.T,
+        tuple(curvature),
+        tuple(a + b / 2 for a, b in zip(start, length, strict=True)),
     )
 
 
 def _bar(
+    functions: Functions,
+    motion: Motion,
     x: FloatArray,
-    table: Table,
     weight: FloatArray,
     stiff: FloatArray,
     heavy: FloatArray,
-    counts: Counts,
 ) -> Bar:
-    w, slope, bend, rotation = table.w, table.slope, table.curvature, table.slope
-    shear = np.zeros((1, 1, 1))
-    if counts.shear:
-        strain, change = shear_strains(x, counts.shear)
-        none = np.zeros_like(w)
-        w = np.concatenate([w, _sheared(w, counts.shear)])
-        slope = np.concatenate([slope, _sheared(slope, counts.shear)])
-        bend = np.concatenate([bend, _sheared(bend, counts.shear) - change])
-        strain = np.concatenate([none, strain])
-        rotation = slope - strain
-        shear = _energy(strain, weight)
     return Bar(
-        np.stack([_energy(bend, plane) for plane in stiff], axis=1),
-        _energy(slope, weight),
-        _energy(slope, weight * (x - 0.5)),
-        _energy(w, heavy),
-        shear,
-        _energy(rotation, heavy),
-        np.einsum("fnq,nq->nf", w, weight),
-        counts,
+        functions,
+        np.stack([_energy(motion.curvature, plane) for plane in stiff], axis=1),
+        _energy(motion.slope, weight),
+        _energy(motion.slope, weight * (x - 0.5)),
+        _energy(motion.w, heavy),
+        _energy(motion.strain, weight) if functions.strains else np.zeros((1, 1, 1)),
+        _energy(motion.slope - motion.strain, heavy),
+        np.einsum("fnq,nq->nf", motion.w, weight),
     )
-
-
-def _sheared(field_: FloatArray, count: int) -> FloatArray:
-    """Return the deflection that goes with the shear strains.
-
-    The first two strain an end, whose section stays as it is while the bar's axis turns.
-    """
-    follows = np.zeros((count, *field_.shape[1:]))
-    follows[:SHEAR_ENDS] = field_[DECK_SLOPE:HERMITE:2]
-    return follows
 
 
 def _energy(values: FloatArray, weight: FloatArray) -> FloatArray:
@@ -318,6 +365,7 @@ _DECAY_STEP = 0.25  # numerical: of the logarithm of the rate of a kink's decay
 # those of a uniform bar need none more.
 _SHEAR_MORE = 2
 _ZONES_MORE = 2
+_MANY_MORE = 10
 
 _MOST_DECAY = 1000.0  # technical: at most 70 functions; stiffer in tension a bar is a string
 
@@ -354,16 +402,40 @@ def bar_of(physical: PhysicalHanger, modes: int) -> Bar:
 
     `modes` frequencies of each plane are to be right.
     """
+    functions, edges = _functions(physical, modes, _ZONES_MORE if physical.zones else 0)
+    spans, places = _spans(physical, edges, functions.kinks), functions.kinks.places
+    if spans.are_equal and np.ptp(places, axis=0).max(initial=0.0) < _AT_END:
+        return _bar_of_pieces(functions, spans)
+    return _bar_of_rows(functions, spans)
+
+
+def bar_pieces_of(physical: PhysicalHanger, modes: int) -> tuple[Bar, Pieces]:
+    """Return one bar for hangers with breaks at the same places, and the energies of its parts.
+
+    It has the decay of kinks of a middling tension, and more functions than `bar_of` takes.
+    """
+    functions, edges = _functions(physical, modes, _MANY_MORE)
+    spans = _spans(physical, edges, functions.kinks).first
+    decay = np.median(functions.kinks.decay, keepdims=True)
+    functions = replace(functions, kinks=replace(functions.kinks.first, decay=decay))
+    one = np.ones_like(spans.mass_factor)
+    spans = replace(spans, stiffness_factor=one[None], mass_factor=one)
+    bar = _bar_of_pieces(functions, spans)
+    level = int(_decay_levels(functions.kinks)[0])
+    places = _places(spans, functions.kinks)
+    return bar, bar_pieces(functions.smooth, functions.strains, *places, level)
+
+
+def _functions(physical: PhysicalHanger, modes: int, more: int) -> tuple[Functions, FloatArray]:
+    """Return the functions that bars take, and where their section changes (n, edges)."""
     decay = np.sqrt(np.maximum(stiffness_ratio(physical).max(axis=1), 0.0))
     boundary_layers = int(2.2 * np.sqrt(min(decay.max(initial=0.0), _MOST_DECAY))) + 1
-    polynomials = max(2 * modes + 4, boundary_layers) + (_ZONES_MORE if physical.zones else 0)
-    shear = polynomials + _SHEAR_MORE if np.any(physical.shear_compliance_1_n > 0) else 0
-    counts = Counts(polynomials, shear)
-    edges = _edges(physical)
-    kinks = Kinks(_forces(physical), _inside(edges), decay)
-    if not kinks.count and not physical.zones:
-        return uniform_bar(counts)
-    return broken_bar(counts, _spans(physical, edges, kinks), kinks)
+    smooth = max(2 * modes + 4, boundary_layers) + more
+    strains = smooth + _SHEAR_MORE if np.any(physical.shear_compliance_1_n > 0) else 0
+    edges, forces = _edges(physical), _forces(physical)
+    turning = edges[:, 2 * len(physical.zones) :]
+    kinks = Kinks(forces, _inside(edges), np.hstack([forces, _inside(turning)]), decay)
+    return Functions(smooth, strains, kinks, np.empty((0, len(decay)))), edges
 
 
 def _edges(physical: PhysicalHanger) -> FloatArray:

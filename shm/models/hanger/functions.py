@@ -117,20 +117,41 @@ def _legendre(x: FloatArray, count: int) -> FloatArray:
     return p
 
 
+def tents(x: FloatArray, places: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return tents with their tops at `places` (rows, places), and their slopes at `x`.
+
+    Both are (places, rows, points); slopes have a mean square of 1. One at an end vanishes.
+    """
+    at = places.T[..., None]
+    size = np.sqrt(at * (1 - at))
+    scale = np.where(size > _NOTHING, 1 / np.where(size > _NOTHING, size, 1.0), 0.0)
+    left = x < at
+    return (
+        np.asarray(np.where(left, x * (1 - at), (1 - x) * at) * scale),
+        np.asarray(np.where(left, 1 - at, -at) * scale),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Kinks:
     """Places (rows, places) from 0 to 1 of point forces and of steps, and the `decay` (rows,).
 
-    A place at an end makes functions that vanish.
+    The shear force jumps at `jumps`. A place at an end makes functions that vanish.
     """
 
     forces: FloatArray
     steps: FloatArray
+    jumps: FloatArray
     decay: FloatArray
 
     @property
     def places(self) -> FloatArray:
         return np.concatenate([self.forces, self.steps], axis=1)
+
+    @property
+    def first(self) -> Kinks:
+        """Return those of the first row."""
+        return Kinks(self.forces[:1], self.steps[:1], self.jumps[:1], self.decay[:1])
 
     @property
     def count(self) -> int:

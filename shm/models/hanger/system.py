@@ -110,6 +110,13 @@ def bending_unit(physical: PhysicalHanger, power: int) -> FloatArray:
     return np.asarray(physical.bending_stiffness_n_m2 / physical.length_m[:, None] ** power)
 
 
+def rotary_ratio(physical: PhysicalHanger) -> FloatArray:
+    """I/(A L^2) (n,)."""
+    return np.asarray(
+        physical.rotary_inertia_kg_m / (physical.mass_per_length_kg_m * physical.length_m**2)
+    )
+
+
 def are_coupled(physical: PhysicalHanger) -> bool:
     """Return True where a deflection in one plane bends any of the hangers in the other."""
     compliance = physical.rotational_compliance_rad_n_m
@@ -168,8 +175,8 @@ def system(physical: PhysicalHanger, bar: Bar) -> System:
     turning = turning / bending_unit(physical, 1)[:, None]
     for end in range(2):
         stiffness[:, :, SLOPES[end], SLOPES[end]] += turning[:, end]
-    if bar.hats:
-        stiffness, mass = _condensed(stiffness, mass, bar.hats)
+    if bar.functions.still:
+        stiffness, mass = _condensed(stiffness, mass, bar.functions.still)
     first, free = _find_free(physical, stiffness.shape[-1])
     stiffness, mass = _window(stiffness, first, free), _window(mass, first, free)
     found = find_oscillators(physical, free)
@@ -218,7 +225,7 @@ def _stiffness(physical: PhysicalHanger, bar: Bar) -> FloatArray:
     total = bar.bending + ratio[..., None, None] * bar.tension[:, None]
     if np.any(physical.tension_gradient_n):
         total += gradient_ratio(physical)[..., None, None] * bar.gradient[:, None]
-    if bar.counts.shear:
+    if bar.functions.strains:
         flexibility = physical.shear_compliance_1_n[:, None] * bending_unit(physical, 2)
         rigid = 1 / np.maximum(flexibility, 1 / _RIGID_IN_SHEAR)
         total += rigid[..., None, None] * bar.shear[:, None]
@@ -256,8 +263,7 @@ def _mass(physical: PhysicalHanger, bar: Bar) -> FloatArray:
     bar_kg = physical.mass_per_length_kg_m * physical.length_m
     total = bar.mass
     if np.any(physical.rotary_inertia_kg_m):
-        rotary = physical.rotary_inertia_kg_m / (bar_kg * physical.length_m)
-        total = total + rotary[:, None, None] * bar.rotation
+        total = total + rotary_ratio(physical)[:, None, None] * bar.rotation
     if physical.masses:
         x_m = np.stack([each.x_m for each in physical.masses], axis=1)
         share = np.stack([each.mass_kg for each in physical.masses], axis=1) / bar_kg[:, None]

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from shm.models.solid.reduction import AffineSystem
 
 # To be raised whenever the same description gives another basis than before.
-_VERSION = 2
+_VERSION = 3
 _BATCH_OF_MODES = 6
 _CELLS_A_MODE = 6
 
@@ -98,10 +98,10 @@ def transverse_basis(
 def _make(
     description: Description, key: str, modes: int, progress: Callable[[float], None]
 ) -> Reduction:
-    from shm.models.solid.reduction import Box, reduce
+    from shm.models.solid.reduction import reduce
 
-    box = Box(np.array(description.lower), np.array(description.upper))
-    reduction = reduce(description.system("transverse", modes), box, modes, progress)
+    box = np.array(description.lower), np.array(description.upper)
+    reduction = reduce(description.system("transverse", modes), *box, modes, progress)
     save(key, reduction)
     return reduction
 
