@@ -14,6 +14,8 @@ from shm.models import tensioned_beam
 from shm.models.hanger import PhysicalHanger, PointMass, ReducedBar, Zone, solve
 from shm.values import FloatArray, Hanger
 
+SLENDERNESS = (0.5, 3.0, 20.0, 150.0)
+ENDS = ((0.0, 0.0), (0.3, 40.0), (0.0, 1e6), (1e6, 1e6))
 MODES = 8
 ZONES = [(0.0, 0.03), (0.95, 1.0), (0.3, 0.36)]
 UNIT = Hanger(1, 1.0, 1.0, 1e4, 1.0, 1.0, 1.0)
@@ -98,6 +100,43 @@ def test_gradient_is_felt_to_second_order() -> None:
     np.testing.assert_allclose(rising, level, rtol=(60 / 400) ** 2)
     exact = solve(up, 4, np.empty(0), shapes=False).frequency_hz[0]
     np.testing.assert_allclose(rising, exact, rtol=1e-4)
+
+
+def on_springs(xi: float, ends: tuple[float, float]) -> PhysicalHanger:
+    """Return one bar of slenderness xi, on springs alike in both planes."""
+    with np.errstate(divide="ignore"):
+        return bars(np.array([xi**2]), np.repeat([[ends]], 2, axis=1).swapaxes(1, 2))
+
+
+@pytest.mark.parametrize("xi", SLENDERNESS)
+@pytest.mark.parametrize("ends", ENDS)
+def test_a_bar_on_springs_has_the_frequencies_of_its_closed_form(
+    xi: float, ends: tuple[float, float]
+) -> None:
+    physical = on_springs(xi, ends)
+    expected = tensioned_beam.frequencies_hz(*map(np.array, (1.0, xi**2, 1.0, 1.0, *ends)), MODES)
+    found = solve(physical, MODES, np.empty(0), shapes=False).frequency_hz[0, 0]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    of_basis = by_all_functions(ReducedBar(physical, MODES), physical)[0, 0]
+    np.testing.assert_allclose(of_basis, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("xi", SLENDERNESS)
+@pytest.mark.parametrize("ends", ENDS)
+@pytest.mark.parametrize("gyration", [0.002, 0.01])
+def test_a_bar_that_shears_has_the_frequencies_of_its_closed_form(
+    xi: float, ends: tuple[float, float], gyration: float
+) -> None:
+    """Take a third of E A as shear stiffness, about that of steel."""
+    compliance, inertia = np.array([3 * gyration**2]), np.array([gyration**2])
+    physical = replace(
+        on_springs(xi, ends), shear_compliance_1_n=compliance, rotary_inertia_kg_m=inertia
+    )
+    bar = map(np.array, (1.0, xi**2, 1.0, 1.0, *ends))
+    section = map(np.array, (3 * gyration**2, gyration))
+    expected = tensioned_beam.frequencies_hz(*bar, MODES, *section)
+    found = by_all_functions(ReducedBar(physical, MODES), physical)[0, 0]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("spring", [1e6, 1e12])
