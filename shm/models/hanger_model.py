@@ -543,7 +543,7 @@ def _are_equal(one: PhysicalHanger, other: PhysicalHanger) -> bool:
 
 
 def _numbers(physical: PhysicalHanger) -> list[FloatArray]:
-    parts = [*physical.zones, *physical.masses, *physical.springs, *physical.support_modes]
+    parts = [*physical.zones, *physical.masses, *physical.springs]
     parts += physical.mode_laws
     values = [getattr(physical, each.name) for each in fields(physical)]
     arrays = [value for value in values if isinstance(value, np.ndarray)]

@@ -87,7 +87,6 @@ def felt(physical: PhysicalHanger) -> dict[str, np.ndarray]:
         ],
         "mass": [mass for mass in physical.masses if np.any(mass.mass_kg != 0)],
         "spring": [spring for spring in physical.springs if np.any(spring.stiffness_n_m != 0)],
-        "support": [mode for mode in physical.support_modes if np.any(mode.compliance_m_n)],
     }
     for kind, members in parts.items():
         for number, member in enumerate(members):

@@ -8,7 +8,6 @@ from shm.models.hanger.physical import (
     ModeLaw,
     PhysicalHanger,
     PointMass,
-    SupportMode,
     Zone,
 )
 from shm.models.hanger.reduced import Modes, ReducedBar

@@ -50,20 +50,6 @@ class LateralSpring:
 
 
 @dataclass(frozen=True, eq=False)
-class SupportMode:
-    """One more mode of what holds the ends: a mass on a spring; fields are (n, ends, planes).
-
-    A structure deflects where a hanger is fixed to it by the sum of its modes: its compliance there
-    is the sum of 1/(m (w_own^2 - w^2)) over them, each with its modal mass for a deflection of 1
-    (Clough and Penzien 1993, Dynamics of Structures, chapter 12). `compliance_m_n` is
-    1/(m w_own^2), 0 for none. Without mass it is the flexibility that modes far above leave.
-    """
-
-    compliance_m_n: FloatArray
-    mass_kg: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
 class ModeLaw:
     """A change of the frequencies whose mechanism nobody knows, only its law.
 
@@ -89,11 +75,10 @@ class PhysicalHanger:
     `tension_gradient_n` more than the deck end. `bending_stiffness_n_m2` is (n, planes),
     `rotational_compliance_rad_n_m` (n, ends, planes, planes), symmetric, 0 for clamped,
     `translational_compliance_m_n` (n, ends, planes), 0 for held, infinite for free;
-    `support_mass_kg` (n, ends, planes) moves with an end that is not held: together they are a
-    support's first mode. The deflections of its `support_modes` add to it.
+    `support_mass_kg` (n, ends, planes) moves with an end that is not held.
     `shear_compliance_1_n` (n,) is 1/(kappa G A), 0 for a bar that does not shear;
     `rotary_inertia_kg_m` (n,) is rho I. `sag_parameter` (n, planes) is Irvine's lambda squared,
-    of a string's parabola unless the bar `sags_as_it_bends`. `joint_loss_factor` (n, ends) is that
+    of a string's parabola. `joint_loss_factor` (n, ends) is that
     of the end springs. `clock_factor` (n,) multiplies the frequencies that the logger reports;
     `sensor_turn_rad` (n, places) is the angle by which each sensor is turned about the hanger's
     axis, from the transverse axis to the longitudinal one. `mode_laws` change the frequencies.
@@ -117,9 +102,7 @@ class PhysicalHanger:
     zones: tuple[Zone, ...] = ()
     masses: tuple[PointMass, ...] = ()
     springs: tuple[LateralSpring, ...] = ()
-    support_modes: tuple[SupportMode, ...] = ()
     mode_laws: tuple[ModeLaw, ...] = ()
-    sags_as_it_bends: bool = False
 
     @classmethod
     def clamped(cls, hanger: Hanger, tension_n: FloatArray, sensors: int = 0) -> PhysicalHanger:
@@ -177,9 +160,7 @@ class PhysicalHanger:
     @property
     def gives_way(self) -> BoolArray:
         """Return True for ends (ends,) that are not held in all the hangers and planes."""
-        compliances = [each.compliance_m_n for each in self.support_modes]
-        moving = [np.any(c, axis=(0, 2)) for c in (self.translational_compliance_m_n, *compliances)]
-        return np.asarray(np.any(moving, axis=0))
+        return np.asarray(np.any(self.translational_compliance_m_n, axis=(0, 2)))
 
     @property
     def length_m(self) -> FloatArray:

@@ -16,7 +16,7 @@ import numpy as np
 
 from shm.models.hanger.bar import Bar, along, bar_of, by_plane, gradient_ratio, stiffness_ratio
 from shm.models.hanger.functions import SLOPES
-from shm.models.hanger.physical import HangerModes, LateralSpring, PhysicalHanger, SupportMode
+from shm.models.hanger.physical import HangerModes, LateralSpring, PhysicalHanger
 from shm.models.hanger.system import Oscillator, System, are_coupled, rotational_n_m_rad, system
 from shm.values import PLANES, BoolArray, FloatArray, IntArray
 
@@ -134,11 +134,6 @@ def are_planes_equal(physical: PhysicalHanger) -> bool:
         physical.support_mass_kg,
         physical.sag_parameter,
         *(spring.stiffness_n_m for spring in physical.springs),
-        *(
-            field
-            for mode in physical.support_modes
-            for field in (mode.compliance_m_n, mode.mass_kg)
-        ),
         *(by_plane(zone) for zone in physical.zones),
     ]
     equal = all(np.array_equal(pair[..., 0], pair[..., -1]) for pair in pairs)
@@ -160,10 +155,6 @@ def one_plane(physical: PhysicalHanger) -> PhysicalHanger:
         springs=tuple(
             LateralSpring(each.x_m, each.stiffness_n_m[:, :1], each.loss_factor)
             for each in physical.springs
-        ),
-        support_modes=tuple(
-            SupportMode(each.compliance_m_n[..., :1], each.mass_kg[..., :1])
-            for each in physical.support_modes
         ),
     )
 
@@ -361,9 +352,7 @@ def _least_factors(physical: PhysicalHanger) -> tuple[FloatArray, FloatArray]:
 
 def _ends_move(physical: PhysicalHanger) -> BoolArray:
     """Return a mask (n, planes) of the hangers that any end lets deflect."""
-    modes = (each.compliance_m_n for each in physical.support_modes)
-    compliances = [physical.translational_compliance_m_n, *modes]
-    return np.asarray(np.any([np.any(each > 0, axis=1) for each in compliances], axis=0))
+    return np.asarray(np.any(physical.translational_compliance_m_n > 0, axis=1))
 
 
 def _without_supports(
@@ -377,7 +366,7 @@ def _without_supports(
     if axes is not None:
         for oscillator in oscillators:
             mass = oscillator.mass.reshape(*axes.shape[:2], 1)
-            out = _largest_out(out, mass * oscillator.deflection(axes) ** 2)
+            out = _largest_out(out, mass * axes[:, :, oscillator.at] ** 2)
     return found.without(out) if out.any() else found
 
 

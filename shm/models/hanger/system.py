@@ -4,21 +4,17 @@ Lengths are in L, stiffness in EI/L of the plane, masses in m L^3: an eigenvalue
 omega^2 EI/(m L^4).
 
 What holds a bar's ends (stiffness from compliance), gives way and swings.
-
-An end deflects by the sum of its support's modes. The further ones are unknowns of their own, so
-that the first one's deflection is the end's without theirs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from shm.models.hanger.bar import Bar, along, gradient_ratio, stiffness_ratio
 from shm.models.hanger.functions import DEFLECTIONS, HERMITE, SLOPES
-from shm.models.hanger.physical import PhysicalHanger, SupportMode
+from shm.models.hanger.physical import PhysicalHanger
 from shm.values import FloatArray, IntArray
 
 _HELD = 1e-13
@@ -29,56 +25,30 @@ _HELD_TURNED = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Oscillator:
-    """One mode of the support at an end: a mass on a spring, without units, both (n, planes).
+    """The support at an end: a mass on a spring, without units, both (n, planes).
 
-    It deflects by the sum of the unknowns `at`, each with its `sign`.
+    It deflects by the unknown `at`.
     """
 
     stiffness: FloatArray
     mass: FloatArray
-    at: IntArray
-    sign: FloatArray
-
-    def deflection(self, vectors: FloatArray) -> FloatArray:
-        """Of vectors (rows, axes, unknowns, modes): (rows, axes, modes)."""
-        return np.asarray((vectors[:, :, self.at] * self.sign[:, None]).sum(axis=2))
+    at: int
 
 
 def find_oscillators(physical: PhysicalHanger, free: IntArray) -> tuple[Oscillator, ...]:
-    """Return those of ends whose deflections are among the functions `free`; first modes first.
-
-    The unknowns of further modes follow the free functions'.
-    """
-    firsts: list[Oscillator] = []
-    others: list[Oscillator] = []
-    for end in np.flatnonzero(physical.gives_way):
-        deflection = int(np.flatnonzero(free == DEFLECTIONS[end])[0])
-        first, *further = _at_end(physical, int(end), deflection, len(free) + len(others))
-        firsts.append(first)
-        others += further
-    return (*firsts, *others)
+    """Return those of ends whose deflections are among the functions `free`."""
+    return tuple(
+        _build_oscillator(physical, int(end), int(np.flatnonzero(free == DEFLECTIONS[end])[0]))
+        for end in np.flatnonzero(physical.gives_way)
+    )
 
 
-def _at_end(
-    physical: PhysicalHanger, end: int, deflection: int, unknown: int
-) -> Iterator[Oscillator]:
-    """Return the first mode, then the further ones, whose own unknowns begin with `unknown`."""
-    first = SupportMode(physical.translational_compliance_m_n, physical.support_mass_kg)
-    further = [each for each in physical.support_modes if np.any(each.compliance_m_n[:, end])]
-    unknowns = np.arange(unknown, unknown + len(further))
-    alone = np.where(np.arange(1 + len(unknowns)) == 0, 1.0, -1.0)
-    yield _build_oscillator(physical, first, end, np.array([deflection, *unknowns]), alone)
-    for each, at in zip(further, unknowns, strict=True):
-        yield _build_oscillator(physical, each, end, np.array([at]), np.ones(1))
-
-
-def _build_oscillator(
-    physical: PhysicalHanger, mode: SupportMode, end: int, at: IntArray, sign: FloatArray
-) -> Oscillator:
-    spring_n_m = translational_n_m(physical, mode.compliance_m_n)[:, end]
-    mass_kg = np.where(mode.compliance_m_n > 0, mode.mass_kg, 0.0)[:, end]
+def _build_oscillator(physical: PhysicalHanger, end: int, at: int) -> Oscillator:
+    compliance_m_n = physical.translational_compliance_m_n
+    spring_n_m = translational_n_m(physical, compliance_m_n)[:, end]
+    mass_kg = np.where(compliance_m_n > 0, physical.support_mass_kg, 0.0)[:, end]
     bar_kg = (physical.mass_per_length_kg_m * physical.length_m)[:, None]
-    return Oscillator(spring_n_m / bending_unit(physical, 3), mass_kg / bar_kg, at, sign)
+    return Oscillator(spring_n_m / bending_unit(physical, 3), mass_kg / bar_kg, at)
 
 
 def add_oscillators(
@@ -88,20 +58,12 @@ def add_oscillators(
 
     The bar's stiffness may be overwritten.
     """
-    more = (
-        max((int(oscillator.at[-1]) + 1 for oscillator in found), default=0) - stiffness.shape[-1]
-    )
-    if more > 0:
-        around = [(0, 0), (0, 0), (0, more), (0, more)]
-        stiffness, mass = np.pad(stiffness, around), np.pad(mass, around)
     if any(np.any(oscillator.mass) for oscillator in found):
         mass = np.broadcast_to(mass, stiffness.shape).copy()
     for oscillator in found:
-        square = (..., oscillator.at[:, None], oscillator.at)
-        signs = np.outer(oscillator.sign, oscillator.sign)
-        stiffness[square] += oscillator.stiffness[..., None, None] * signs
+        stiffness[..., oscillator.at, oscillator.at] += oscillator.stiffness
         if np.any(oscillator.mass):
-            mass[square] += oscillator.mass[..., None, None] * signs
+            mass[..., oscillator.at, oscillator.at] += oscillator.mass
     return stiffness, mass
 
 
@@ -182,7 +144,7 @@ def system(physical: PhysicalHanger, bar: Bar) -> System:
     found = find_oscillators(physical, free)
     stiffness, mass = add_oscillators(stiffness, mass, found)
     if np.any(physical.sag_parameter):
-        stiffness = stiffness + _sag(physical, bar, stiffness, free)
+        stiffness = stiffness + _sag(physical, bar, free)
     return System(stiffness, mass, free, found)
 
 
@@ -236,23 +198,13 @@ def _stiffness(physical: PhysicalHanger, bar: Bar) -> FloatArray:
     return np.asarray(total)
 
 
-def _sag(physical: PhysicalHanger, bar: Bar, stiffness: FloatArray, free: IntArray) -> FloatArray:
+def _sag(physical: PhysicalHanger, bar: Bar, free: IntArray) -> FloatArray:
     """Return the stiffness that sag adds (n, planes, unknowns, unknowns).
 
-    A motion w stretches it by the integral of y' w', y the curve at rest: a string's parabola or,
-    where it sags as it bends, the bar's own under its weight, as large as makes a motion by that
-    very curve stretch both alike (Irvine 1981, 2.4 and 3.3). Stretching stiffens under compression
-    as under tension.
+    A motion w stretches it by the integral of y' w', y a string's parabola (Irvine 1981, 2.4).
+    Stretching stiffens under compression as under tension.
     """
-    pull = np.zeros(stiffness.shape[:3])
-    pull[..., : len(free)] = bar.area[:, None, free]
-    if physical.sags_as_it_bends:
-        rest, slope = np.linalg.solve(stiffness, pull[..., None])[..., 0], np.zeros_like(pull)
-        slope[..., : len(free)] = np.einsum(
-            "npj,nij->npi", rest[..., : len(free)], bar.tension[:, free[:, None], free]
-        )
-        scale = (pull * rest).sum(axis=-1) / (slope * rest).sum(axis=-1)
-        pull = scale[..., None] * slope
+    pull = bar.area[:, None, free]
     dyad = pull[..., :, None] * pull[..., None, :]
     stretch = np.abs(stiffness_ratio(physical)) * physical.sag_parameter
     return np.asarray(stretch[..., None, None] * dyad)
