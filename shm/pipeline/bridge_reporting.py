@@ -171,7 +171,7 @@ class HangersNow:
         self.undated = list_undated_names(store)
         self.charts = control_charts(workspace, store)
         self._discarded = discarded_of_baselines(store)
-        self._tests = count_tests(store)
+        self.tests = count_tests(store)
 
     def summary(self, hanger: Hanger) -> HangerSummary:
         """Return the state of a hanger, as every face shows it."""
@@ -199,7 +199,7 @@ class HangersNow:
             else blind,
             undated=self.undated.get(hanger.id, ()),
             control=control,
-            tests=self._tests[hanger.id].tests if hanger.id in self._tests else 0,
+            tests=self.tests[hanger.id].tests if hanger.id in self.tests else 0,
         )
 
     def _warnings(
