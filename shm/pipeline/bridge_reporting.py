@@ -46,7 +46,6 @@ from shm.store.watch import (
     find_latest_watches,
     list_baselines_in_force,
     list_detected_changes,
-    list_detections,
 )
 from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest
 from shm.values.bar_description import list_sensors
@@ -267,16 +266,6 @@ def pattern_or_why(workspace: Workspace, store: Store) -> tuple[BridgePattern | 
         return stored_pattern(store, [hanger.id for hanger in workspace.bridge.hangers]), ""
     except NothingThere as reason:
         return None, f"Over the bridge nothing can be compared: {reason.message}"
-
-
-def latest_drifts(store: Store, hanger: int) -> tuple[Drift, ...]:
-    """The shifts of a hanger's latest test from the baseline in force.
-
-    None where no test has been compared with it, as after the hanger was given a new one.
-    """
-    baseline = store.watch.baseline(hanger)
-    told = list_detections(store, baseline.hanger, baseline.id) if baseline else ()
-    return told[-1].watched.published_drifts if told else ()
 
 
 def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
