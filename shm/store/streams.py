@@ -42,7 +42,6 @@ HOURS_KEPT = timedelta(days=800)
 
 _DAYS_BACK = 10
 """States of the watch, a day apart: twice the default of `late_hours`. Judgement."""
-_READINGS_HELD = 1024  # technical: each window asks for the 36 before it; some 10 kB each
 _NO_CHANGE = Reconciled()
 _T = TypeVar("_T", WindowReading, PooledReading)
 
@@ -347,7 +346,7 @@ def _values(store: Repository, query: sa.Select[Any], kind: type[_T]) -> tuple[_
     return tuple(_reading(kind, row.document) for row in store.rows(query))
 
 
-@lru_cache(_READINGS_HELD)
+@lru_cache(1024)  # technical: each window asks for the 36 before it; some 10 kB each
 def _reading(kind: type[_T], text: str) -> _T:
     """Return a reading from its document, types unchecked: there are thousands at once."""
     document: dict[str, Any] = json.loads(text)
