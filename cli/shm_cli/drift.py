@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
@@ -17,15 +17,13 @@ import rich_click as click
 
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
-from shm.pipeline.bridge_reporting import latest_drifts, stored_pattern
-from shm.pipeline.rebaselining import Order, set_baseline
-from shm.pipeline.reporting import hanger_states
-from shm.report.figures.along_the_bridge import bridge_illustration
+from shm.pipeline.bridge_reporting import stored_pattern
 from shm.report.hanger_tables import temperature_documents, temperature_table
 from shm.report.shifts import pattern_json, pattern_tables, shift_cells
 from shm.report.states import NOTHING_WATCHED
-from shm.store import Baseline
-from shm.values import Drift
+from shm.store import Baseline, BaselineGlance
+from shm.store.watch import find_latest_watches, list_baselines_in_force
+from shm.values import Drift, Hanger
 from shm.watch.repair_check import EVENT_KINDS
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, progress_bar, show, show_rows, show_texts
@@ -49,19 +47,21 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
     """
     if ctx.invoked_subcommand is not None:
         return
-    states, hangers = NOTHING_WATCHED, []
+    states, rebaselined = NOTHING_WATCHED, list[BaselineGlance]()
     with opened_store(ctx) as (workspace, store):
-        hangers = [each.id for each in workspace.bridge.hangers]
+        hangers: Sequence[Hanger] = workspace.bridge.hangers
         if hanger_id is not None:
-            hanger = workspace.bridge.hanger(hanger_id)
-            hangers = [hanger_id]
-            states = hanger_states(workspace, store, hanger, store.watch.baseline(hanger_id))
-        shown = (
-            store.watch.list_drifts(hanger_id)
-            if all_tests
-            else [drift for each in hangers for drift in latest_drifts(store, each)]
-        )
-        rebaselined = [] if all_tests else _without_a_test(store, hangers)
+            from shm.pipeline.reporting import hanger_states  # it loads the engine
+
+            hangers = [workspace.bridge.hanger(hanger_id)]
+            states = hanger_states(workspace, store, hangers[0], store.watch.baseline(hanger_id))
+        if all_tests:
+            shown: Sequence[Drift] = store.watch.list_drifts(hanger_id)
+        else:
+            latest = find_latest_watches(store, hangers)
+            watched = [latest[each.id].watched for each in hangers if each.id in latest]
+            shown = [drift for each in watched for drift in each.published_drifts]
+            rebaselined = _without_a_test(store, hangers, {each.hanger for each in shown})
     if not shown and not rebaselined:
         raise NothingThere(
             "no test has been compared with a baseline yet.",
@@ -110,6 +110,8 @@ def bridge(ctx: click.Context, figure: Path | None) -> None:
     with opened_store(ctx) as (workspace, store):
         pattern = stored_pattern(store, [hanger.id for hanger in workspace.bridge.hangers])
     if figure is not None:
+        from shm.report.figures.along_the_bridge import bridge_illustration
+
         figure.write_bytes(bridge_illustration(pattern).png())
         click.echo(f"Wrote {figure}.", err=True)
     if flags.wants_json():
@@ -161,6 +163,8 @@ def rebaseline(
     Example: shm drift rebaseline --hanger 3 --since 2026-05-01 --why "pin replaced"
     Example: shm drift rebaseline --hanger 7 --since 2026-05-03 --kind retensioned --why "to 640 kN"
     """
+    from shm.pipeline.rebaselining import Order, set_baseline  # it loads the engine
+
     event = EVENT_KINDS[kind] if kind else None
     order = Order(since, why, who, event)
     with opened_store(ctx) as (workspace, store):
@@ -200,15 +204,15 @@ def _document(made: Baseline) -> dict[str, object]:
 
 
 if TYPE_CHECKING:
-    from shm.store import Baseline, Store
+    from shm.store import Store
 
 
-def _without_a_test(store: Store, hangers: Sequence[int]) -> list[Baseline]:
+def _without_a_test(
+    store: Store, hangers: Sequence[Hanger], compared: Collection[int]
+) -> list[BaselineGlance]:
     """Return baselines set by a person with which no test has been compared yet."""
-    baselines = [store.watch.baseline(hanger) for hanger in hangers]
-    return [
-        each for each in baselines if each and each.since and not latest_drifts(store, each.hanger)
-    ]
+    baselines = list_baselines_in_force(store, hangers)
+    return [each for id_, each in baselines.items() if each.since and id_ not in compared]
 
 
 def _show(drifts: Sequence[Drift]) -> None:

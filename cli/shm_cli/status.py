@@ -17,8 +17,7 @@ import rich_click as click
 
 from shm.documents import creep_document
 from shm.pipeline import utc_now
-from shm.pipeline.bridge_reporting import hanger_summaries
-from shm.pipeline.controls import control_charts
+from shm.pipeline.bridge_reporting import HangersNow
 from shm.pipeline.courier import quiet_until
 from shm.pipeline.stream_health import stream_leads
 from shm.report.control_report import chart_document
@@ -27,7 +26,7 @@ from shm.report.hanger_status import Status, bridge_message
 from shm.report.hanger_summary import HangerSummary
 from shm.report.open_warnings import dated_by_receipt
 from shm.store import ENDED, Decision, DeliveryState, Store, Workspace
-from shm.store.alerts import count_deliveries, count_open_alerts, describe_silence
+from shm.store.alerts import count_deliveries, describe_silence
 from shm.store.journal import list_events, list_former_tests, list_steps
 from shm.store.point_outbox import PointOutbox
 from shm.store.recordings import (
@@ -36,11 +35,9 @@ from shm.store.recordings import (
     find_recording,
     list_holds,
 )
-from shm.store.tests import count_tests, list_baseline_tests, list_undated_names
+from shm.store.tests import list_baseline_tests
 from shm.store.watch import (
-    find_latest_watches,
     list_adoptions,
-    list_baselines_in_force,
     list_detections,
     list_selected_models,
 )
@@ -233,11 +230,12 @@ def _actions(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
     alerts, deliveries = store.alerts.list_all(), count_deliveries(store)
-    open_at = Counter(count_open_alerts(store))
     counts = count_stages(store)
     ended = sum(counts[stage] for stage in ENDED)
     held, now = list_holds(store), utc_now()
-    lines = {each.hanger.id: each for each in hanger_summaries(workspace, store, now)}
+    state = HangersNow(workspace, store, workspace.bridge.hangers, now)
+    open_at = Counter(state.open_alerts)
+    lines = {each.id: state.summary(each) for each in workspace.bridge.hangers}
     of_hangers = Counter(hold.hanger for hold in held)
     message = bridge_message({id_: each.message for id_, each in lines.items()})
     return {
@@ -269,10 +267,10 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
         "changed_settings": [str(each) for each in store.settings.list_current().values()],
-        "controls": [chart_document(each) for each in control_charts(workspace, store)],
-        "structures": _structures(workspace, store, open_at),
+        "controls": [chart_document(each) for each in state.charts],
+        "structures": _structures(workspace, store, state),
         "message": {**message.document, "others": message.others},
-        "hangers": _hangers(workspace, store, lines, open_at, of_hangers),
+        "hangers": _hangers(workspace, store, state, lines, of_hangers),
     }
 
 
@@ -292,13 +290,11 @@ def _daemon(workspace: Workspace) -> dict[str, Any]:
     return {"active": workspace.holder(), "seen_at": seen_at, "failed": failed}
 
 
-def _structures(
-    workspace: Workspace, store: Store, open_alerts: Mapping[int, int]
-) -> list[dict[str, Any]]:
+def _structures(workspace: Workspace, store: Store, state: HangersNow) -> list[dict[str, Any]]:
     """Show structures without a model, of which only frequencies are watched."""
-    latest, rows, undated = count_tests(store), [], list_undated_names(store)
+    rows = []
     for each in workspace.bridge.structures:
-        found, baseline = latest.get(each.id), store.watch.baseline(each.id)
+        found, baseline = state.tests.get(each.id), store.watch.baseline(each.id)
         of_baseline = list_baseline_tests(store, baseline) if baseline else ()
         watched = list_detections(store, baseline.hanger, baseline.id) if baseline else ()
         rows.append(
@@ -308,9 +304,9 @@ def _structures(
                 "tests": found.tests if found else 0,
                 "latest_test": found.time if found else None,
                 "baseline_since": min((test.time for test in of_baseline), default=None),
-                "open_alerts": open_alerts[each.id],
+                "open_alerts": state.open_alerts.get(each.id, 0),
                 "said": watch_words([one.watched for one in watched], each),
-                "dated_by_receipt": list(undated.get(each.id, ())),
+                "dated_by_receipt": list(state.undated.get(each.id, ())),
             }
         )
     return rows
@@ -319,16 +315,15 @@ def _structures(
 def _hangers(
     workspace: Workspace,
     store: Store,
+    state: HangersNow,
     lines: Mapping[int, HangerSummary],
-    open_alerts: Mapping[int, int],
     held: Mapping[int, int],
 ) -> list[dict[str, Any]]:
-    models, latest, rows = list_selected_models(store), count_tests(store), []
-    baselines = list_baselines_in_force(store, workspace.bridge.hangers)
-    watches = find_latest_watches(store)
+    models, rows, adoptions = list_selected_models(store), [], list_adoptions(store)
     for hanger in workspace.bridge.hangers:
-        found, baseline = latest.get(hanger.id), baselines.get(hanger.id)
-        adopted = [each.adoption.model for each in list_adoptions(store, hanger.id)]
+        found, baseline = state.tests.get(hanger.id), state.baselines.get(hanger.id)
+        watch = state.watches.get(hanger.id)
+        adopted = [a.adoption.model for a in adoptions if a.adoption.hanger == hanger.id]
         gap = _gap(store, hanger.id) if adopted else None
         check = baseline.check if baseline else None
         names, reasons = _applicable(hanger, [*workspace.settings.model_names, *adopted])
@@ -343,10 +338,8 @@ def _hangers(
                 "not_applicable": reasons,
                 "baseline_set_at": baseline.set_at if baseline else None,
                 "baseline_since": baseline.begins_at if baseline else None,
-                "creep_per_year": creep_document(
-                    watches[hanger.id].watched.creep_per_year if hanger.id in watches else None
-                ),
-                "open_alerts": open_alerts[hanger.id],
+                "creep_per_year": creep_document(watch.watched.creep_per_year if watch else None),
+                "open_alerts": state.open_alerts.get(hanger.id, 0),
                 "held": held[hanger.id],
                 "warnings": list(lines[hanger.id].warnings),
                 "dated_by_receipt": list(lines[hanger.id].undated),

@@ -46,7 +46,6 @@ from shm.store.watch import (
     find_latest_watches,
     list_baselines_in_force,
     list_detected_changes,
-    list_detections,
 )
 from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest
 from shm.values.bar_description import list_sensors
@@ -171,7 +170,7 @@ class HangersNow:
         self.undated = list_undated_names(store)
         self.charts = control_charts(workspace, store)
         self._discarded = discarded_of_baselines(store)
-        self._tests = count_tests(store)
+        self.tests = count_tests(store)
 
     def summary(self, hanger: Hanger) -> HangerSummary:
         """Return the state of a hanger, as every face shows it."""
@@ -199,7 +198,7 @@ class HangersNow:
             else blind,
             undated=self.undated.get(hanger.id, ()),
             control=control,
-            tests=self._tests[hanger.id].tests if hanger.id in self._tests else 0,
+            tests=self.tests[hanger.id].tests if hanger.id in self.tests else 0,
         )
 
     def _warnings(
@@ -267,16 +266,6 @@ def pattern_or_why(workspace: Workspace, store: Store) -> tuple[BridgePattern | 
         return stored_pattern(store, [hanger.id for hanger in workspace.bridge.hangers]), ""
     except NothingThere as reason:
         return None, f"Over the bridge nothing can be compared: {reason.message}"
-
-
-def latest_drifts(store: Store, hanger: int) -> tuple[Drift, ...]:
-    """The shifts of a hanger's latest test from the baseline in force.
-
-    None where no test has been compared with it, as after the hanger was given a new one.
-    """
-    baseline = store.watch.baseline(hanger)
-    told = list_detections(store, baseline.hanger, baseline.id) if baseline else ()
-    return told[-1].watched.published_drifts if told else ()
 
 
 def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:

@@ -19,7 +19,7 @@ from importlib.metadata import version
 from typing import Any
 
 from shm.assumptions import DEFAULTS, number_text
-from shm.documents import dump
+from shm.documents import compact
 from shm.models import Model, build, competing_names
 from shm.pipeline.reconcile import SHM
 from shm.read import Limits
@@ -215,7 +215,7 @@ def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:
             stated = {**default, **stated}
         if stated is not MISSING:
             document[each.name] = stated
-    plain: dict[str, Any] = json.loads(dump(document))
+    plain: dict[str, Any] = json.loads(compact(document))
     return plain
 
 
@@ -226,15 +226,21 @@ def _assumed(described: object) -> object:
     """
     if not isinstance(described, Mapping):
         return described
-    numbers = {name: number_text(row) for name, row in DEFAULTS.items()}
+    numbers = _default_numbers()
     for row in described.get("overridden", ()):
         if row["name"] in numbers:
             stated = {key: row[key] for key in ("value", "sd", "lower", "upper")}
             known: dict[str, Any] = {
                 key: math.nan if each is None else each for key, each in stated.items()
             }
-            numbers[row["name"]] = number_text(replace(DEFAULTS[row["name"]], **known))
+            stated_now = number_text(replace(DEFAULTS[row["name"]], **known))
+            numbers = {**numbers, row["name"]: stated_now}
     return numbers
+
+
+@cache
+def _default_numbers() -> Mapping[str, str]:
+    return {name: number_text(row) for name, row in DEFAULTS.items()}
 
 
 def _changes(before: Mapping[str, Any], now: Mapping[str, Any], within: str = "") -> Iterator[str]:

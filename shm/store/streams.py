@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import fields
 from datetime import datetime, timedelta
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import sqlalchemy as sa
@@ -123,17 +124,28 @@ class Streams(Repository):
 
 def _document(reading: WindowReading | PooledReading) -> str:
     """A reading without what is not known or as usual: modes have many such."""
-    document = asdict(reading)
-    document["modes"] = [_told(mode, Mode) for mode in document["modes"]]
+    document = _plain(reading)
+    if isinstance(reading, WindowReading):
+        document["window"] = _plain(reading.window)
+    document["modes"] = [_brief(mode) for mode in reading.modes]
     return compact(document)
 
 
-def _told(values: dict[str, Any], kind: type[Mode | ShapePoint]) -> dict[str, Any]:
-    usual = {field.name: field.default for field in fields(kind)}
-    document = {name: value for name, value in values.items() if not _is_usual(value, usual[name])}
+def _plain(value: WindowReading | PooledReading | Window) -> dict[str, Any]:
+    return {field.name: getattr(value, field.name) for field in fields(value)}
+
+
+def _brief(value: Mode | ShapePoint) -> dict[str, Any]:
+    stated = ((name, getattr(value, name), usual) for name, usual in _USUAL[type(value)].items())
+    document = {name: each for name, each, usual in stated if not _is_usual(each, usual)}
     if "shape" in document:
-        document["shape"] = [_told(point, ShapePoint) for point in document["shape"]]
+        document["shape"] = [_brief(point) for point in document["shape"]]
     return document
+
+
+_USUAL = {
+    kind: {field.name: field.default for field in fields(kind)} for kind in (Mode, ShapePoint)
+}
 
 
 def _is_usual(value: Any, usual: Any) -> bool:
@@ -331,11 +343,13 @@ def find_progress(store: Repository, stream: str) -> datetime | None:
 
 
 def _values(store: Repository, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:
-    return tuple(_reading(kind, json.loads(row.document)) for row in store.rows(query))
+    return tuple(_reading(kind, row.document) for row in store.rows(query))
 
 
-def _reading(kind: type[_T], document: dict[str, Any]) -> _T:
+@lru_cache(1024)  # technical: each window asks for the 36 before it; some 10 kB each
+def _reading(kind: type[_T], text: str) -> _T:
     """Return a reading from its document, types unchecked: there are thousands at once."""
+    document: dict[str, Any] = json.loads(text)
     if kind is WindowReading:
         document["window"] = Window(**_known(document["window"]))
         document["spectrum_db"] = tuple(document["spectrum_db"])
