@@ -87,16 +87,18 @@ def sample(
     rough = density.rough
     points, nearest = draw_along(rough, peaks, rng, centres)
     on_progress(0.4)
+    best = points[[int(rough.log(points).argmax())]]
+    likeliest = most_likely_error(rough, best).whitening
+    valleys = valleys_through(rough, points, nearest, likeliest)
     for attempt in range(_SET.attempts):
-        whitening = mean_whitening(rough, points)
-        valleys = [Valley(rough, points, whitening)]
-        if attempt == 0:
-            valleys = valleys_through(rough, points, nearest, whitening)
+        if attempt:
+            valleys = [Valley(rough, points, mean_whitening(rough, points))]
         first = Proposal.through(valleys, points, _SET.clusters, rng)
         final = weigh(density, first, wanted, rng)
         if final.effective_sample_size > _SET.poor * wanted:
             break
-        # The posterior is elsewhere than it seemed: start again from where the weight is.
+        # The posterior is elsewhere than it seemed: start again from where the weight is, by the
+        # errors that are likely there.
         points = final.spread(_SET.again, rng)
     on_progress(0.8)
     enough = final.effective_sample_size >= min(ENOUGH_EFFECTIVE, samples)
@@ -120,7 +122,7 @@ def mean_whitening(density: Density, z: FloatArray) -> FloatArray:
     """Return the matrix (data, data) that makes residuals about points z (n, d) of variance 1.
 
     It is a root of the mean precision, over the possible errors as they are likely at the points:
-    where a tail of the posterior rests on larger errors, the best point's alone lead beside it.
+    where a tail of the posterior rests on larger errors, the best point's lead beside it.
     """
     residual = density.residual(z)
     known = np.isfinite(residual).all(axis=1)
