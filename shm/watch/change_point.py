@@ -252,13 +252,6 @@ def evidence_of(
     )  # fmt: skip
 
 
-def log_probability_of_called(
-    sums: Sums, years: FloatArray, layout: Layout, called: Sequence[DetectedChange]
-) -> float:
-    """Of all tests, if nothing changed beyond what was `called`, over all scatters."""
-    return _total(_NullSums.of(sums, years, layout, called).fitted()[2])
-
-
 @dataclass(frozen=True, eq=False)
 class _NullSums:
     """Sums of tests (T, K, ...) by the columns of the null (p), called changes among them.

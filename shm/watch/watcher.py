@@ -27,7 +27,7 @@ from shm.values import (
 )
 from shm.values.drift import ENOUGH_AGAINST
 from shm.watch.causes import Columns, DetectedChange, Structure, structure_of
-from shm.watch.change_point import Evidence, evidence_of, log_probability_of_called
+from shm.watch.change_point import Evidence, evidence_of
 from shm.watch.kept_state import to_bytes
 from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of, years_between
 from shm.watch.persistence import bound_by_recurrence, outlier_probability, select_consistent_tests
@@ -40,10 +40,9 @@ from shm.watch.posterior_summary import (
 from shm.watch.state_sums import StateSums, WatchState, begun_of, size_of
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 14
+_VERSION = 15
 # Technical: what a test says goes nearly in proportion to its weight.
 _MOST_REPEATS, _NEARLY = 6, 0.5
-_CLEARLY_NATS = 3.0  # 20 to 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +143,7 @@ class Watcher:
                 f"The watch was given test {reading.test} after one that is later.",
                 remedy="Sort the tests by time.",
             )
-        state = self._reclassify_last_change(self._with(state, reading))
-        state, evidence = self._limit_last_visit(state)
+        state, evidence = self._limit_last_visit(self._with(state, reading))
         if not state.counted[-1]:
             evidence = self._evidence(state, _counting(state))
         evidence, causes, against = self._apply_recurrence_bound(state, evidence)
@@ -298,23 +296,6 @@ class Watcher:
         )
         later = replace(later, counted=counts)
         return replace(later, scatter_variance=self.sums.scatter(later))
-
-    def _reclassify_last_change(self, state: WatchState) -> WatchState:
-        """Reclassify the last called change as a step or a ramp, as the tests since make clear.
-
-        At the call a ramp has hardly begun: frozen as a step, all that comes later would be new.
-        """
-        if not len(state.called):
-            return state
-        other = replace(state, called=state.called.copy())
-        other.called[-1, 2] = 1 - other.called[-1, 2]
-        rows = _counting(state)
-        sums, years = self.sums.sums(state, rows), state.years[rows]
-        as_it_is, otherwise = (
-            log_probability_of_called(sums, years, self.structure.layout, _called(each, rows))
-            for each in (state, other)
-        )
-        return other if otherwise - as_it_is > _CLEARLY_NATS else state
 
     def _evidence(self, state: WatchState, rows: IntArray) -> Evidence:
         """Of the tests `rows`."""

@@ -107,7 +107,6 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
     "two tests that agree": [(watch_worlds, "agreement", give(None))],
     "learnt scatter": [(StateSums, "scatter", lambda self, _: self.structure.scatter_variance)],
     "four scales of scatter": [with_options(scatter_scales=(1.0,))],
-    "step or ramp judged again": [(Watcher, "_reclassify_last_change", lambda _, state: state)],
     "the likeliest scatter": [
         (Evidence, "log_evidence", property(lambda self: min(self.log_statistic, self.log_most)))
     ],
