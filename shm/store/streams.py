@@ -343,18 +343,19 @@ def find_progress(store: Repository, stream: str) -> datetime | None:
 
 
 def _values(store: Repository, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:
-    return tuple(_reading(kind, row.document) for row in store.rows(query))
+    of_window = kind is WindowReading
+    return tuple(_reading(row.document, of_window=of_window) for row in store.rows(query))
 
 
 @lru_cache(1024)  # technical: each window asks for the 36 before it; some 10 kB each
-def _reading(kind: type[_T], text: str) -> _T:
+def _reading(text: str, *, of_window: bool) -> Any:
     """Return a reading from its document, types unchecked: there are thousands at once."""
     document: dict[str, Any] = json.loads(text)
-    if kind is WindowReading:
+    if of_window:
         document["window"] = Window(**_known(document["window"]))
         document["spectrum_db"] = tuple(document["spectrum_db"])
     document["modes"] = tuple(map(_mode, document["modes"]))
-    return kind(**_known(document))
+    return (WindowReading if of_window else PooledReading)(**_known(document))
 
 
 def _known(values: dict[str, Any]) -> dict[str, Any]:

@@ -18,8 +18,8 @@ from shm.gap.search import fit_alone
 from shm.inference.linear import Linear
 from shm.inference.posterior import find_peaks
 from shm.models import MODELS, AsMade
-from shm.models.hanger_model import DENSITY, LENGTH, MODULUS, SECTION, TENSION
 from shm.models.effects import Conditions, Variant
+from shm.models.hanger_model import DENSITY, LENGTH, MODULUS, SECTION, TENSION
 from shm.values import (
     ENOUGH_EFFECTIVE,
     NAN,
