@@ -34,7 +34,7 @@ def test_check_prints_a_table(shm: Shm, call: list[object]) -> None:
     assert ended.code == 0, ended.err
     assert "About 6 diagnoses of 5 to 30 s each, 1 at a time" in ended.err
     said = " ".join(ended.out.split())
-    assert "distributed mass 4.6 % or more 4.6 % or more 1.3 %: not visible" in said
+    assert "distributed mass 9.7 % or more 9.7 % or more 2.1 %: not visible" in said
     assert "timebase (all tests) not found 2.4 %: taken for distributed mass" in said
     assert "a gap is claimed in 0 of 1" in said
 
