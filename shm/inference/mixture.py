@@ -194,17 +194,17 @@ class Weighted(Generic[B]):
 
     @property
     def log_evidence(self) -> float:
-        """log of the mean weight."""
+        """Return the log of the mean weight."""
         return float(scipy.special.logsumexp(self.log_weights) - np.log(self.draws))
 
     @property
     def log_evidence_sd(self) -> float:
-        """Standard error of `log_evidence`."""
+        """Return the standard error of `log_evidence`."""
         return evidence_error(self.log_weights, self.draws)
 
     @property
     def effective_sample_size(self) -> float:
-        """Kish's effective number of draws."""
+        """Return Kish's effective number of draws."""
         return effective(normalised(self.log_weights))
 
     @property

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
 from shm.inference.chain import run_chain
 from shm.inference.importance import weigh
@@ -35,7 +34,7 @@ class Numerics:
     effective, it begins again from `again` points where the weight is, `attempts` times in all.
     `enough` draws are effective for each sample to keep, `fewest_effective` in all: fewer repeat
     draws, more cost in proportion. Of a chain `candidates` times as many draws as are kept are
-    weighted. Errors with less than the `least_part` of the probability are passed over.
+    weighted.
     """
 
     along: int = 160
@@ -51,7 +50,6 @@ class Numerics:
     enough: float = 0.35
     candidates: int = 2
     fewest_effective: float = 1.5 * ENOUGH_EFFECTIVE
-    least_part: float = 1e-4
 
 
 _SET = Numerics()
@@ -87,18 +85,17 @@ def sample(
     rough = density.rough
     points, nearest = draw_along(rough, peaks, rng, centres)
     on_progress(0.4)
-    best = points[[int(rough.log(points).argmax())]]
-    likeliest = most_likely_error(rough, best).whitening
-    valleys = valleys_through(rough, points, nearest, likeliest)
     for attempt in range(_SET.attempts):
-        if attempt:
-            valleys = [Valley(rough, points, mean_whitening(rough, points))]
+        best = points[[int(rough.log(points).argmax())]]
+        whitening = most_likely_error(rough, best).whitening
+        valleys = [Valley(rough, points, whitening)]
+        if attempt == 0:
+            valleys = valleys_through(rough, points, nearest, whitening)
         first = Proposal.through(valleys, points, _SET.clusters, rng)
         final = weigh(density, first, wanted, rng)
         if final.effective_sample_size > _SET.poor * wanted:
             break
-        # The posterior is elsewhere than it seemed: start again from where the weight is, by the
-        # errors that are likely there.
+        # The posterior is elsewhere than it seemed: start again from where the weight is.
         points = final.spread(_SET.again, rng)
     on_progress(0.8)
     enough = final.effective_sample_size >= min(ENOUGH_EFFECTIVE, samples)
@@ -116,25 +113,6 @@ def sample(
         r_hat,
         method,
     )
-
-
-def mean_whitening(density: Density, z: FloatArray) -> FloatArray:
-    """Return the matrix (data, data) that makes residuals about points z (n, d) of variance 1.
-
-    It is a root of the mean precision, over the possible errors as they are likely at the points:
-    where a tail of the posterior rests on larger errors, the best point's lead beside it.
-    """
-    residual = density.residual(z)
-    known = np.isfinite(residual).all(axis=1)
-    likelihood = density.likelihood
-    share = scipy.special.softmax(likelihood.by_node(residual[known]), axis=1).mean(axis=0)
-    roots = (
-        np.sqrt(part) * node.covariance.whitening
-        for part, node in zip(share, likelihood.nodes, strict=True)
-        if part > _SET.least_part
-    )
-    precision = sum((root.T @ root for root in roots), np.zeros(2 * residual.shape[1:]))
-    return np.asarray(np.linalg.cholesky(precision).T)
 
 
 def most_likely_error(density: Density, z: FloatArray) -> Covariance:

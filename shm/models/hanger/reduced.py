@@ -101,7 +101,7 @@ class ReducedBar:
         functions, energy = self._functions
         basis = functions[:, energy > left_out]
         basis = basis @ self._full.projected(basis).diagonalised(self._usual)
-        self.basis, self._matrices = basis, self._full.projected(basis).noted(self._usual)
+        self.basis, self._matrices = basis, self._full.projected(basis).mark_diagonal(self._usual)
 
     @cached_property
     def rough(self) -> ReducedBar:
@@ -287,8 +287,8 @@ class _Matrices:
         felt = vectors[:, size > _OFF_DIAGONAL**2 * max(float(size[-1]), np.finfo(float).tiny)]
         return np.asarray(np.linalg.qr(np.hstack([felt, np.eye(len(spread))]))[0])
 
-    def noted(self, usual: Factors) -> _Matrices:
-        """Return the same, with the note whether masses like `usual` are diagonal."""
+    def mark_diagonal(self, usual: Factors) -> _Matrices:
+        """Return the same, marked as diagonal where masses like `usual` are."""
         mass = _sum(usual.mass[0], self.mass)
         size = np.sqrt(np.einsum("nii->ni", mass))
         off_diagonal = np.abs(mass / size[:, :, None] / size[:, None, :] - np.eye(mass.shape[1]))
