@@ -249,7 +249,7 @@ class StiffEndZones(Effect):
 
 
 class SupportMotion(Effect):
-    """What holds the hanger vibrates itself, as a mass on a spring, and drags the end along.
+    """The support vibrates itself, as a mass on a spring, and drags the end along.
 
     A cross beam or the deck with a frequency near one of the hanger's shifts that mode, down where
     the support's frequency is the higher one, up where it is the lower one. The support's own modes
