@@ -29,7 +29,7 @@ def views_from_peaks(problem: Problem, fit: Fit) -> tuple[Fit, ...]:
     target, found = Target(problem, fit.hypothesis), [fit]
     for peak in fit.peaks[1:]:
         if peak.log_evidence > best - _NOTABLE_WITHIN:
-            residual, slopes = target.view(peak.z)
+            residual, slopes = (each[0] for each in target.look(peak.z[None]))
             predicted = problem.value - residual
             found.append(replace(fit, z=peak.z, predicted=predicted, slopes=slopes))
     return tuple(found)

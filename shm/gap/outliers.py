@@ -200,7 +200,7 @@ def _log_evidence(problem: GapProblem, tried: ScoredHypothesis) -> float:
 def _around(
     problem: GapProblem, hypothesis: Hypothesis, z: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    residual, slopes = Target(problem, hypothesis).view(z)
+    residual, slopes = (each[0] for each in Target(problem, hypothesis).look(z[None]))
     return problem.value - residual, slopes
 
 

@@ -103,7 +103,7 @@ class _Collapsed:
     def __init__(self, target: Target, peaks: Sequence[Peak]):
         peaks = _choose_near_best(peaks)
         self.target, self.dimension = target, len(target.other)
-        self.residual, self.slopes = target.view(peaks[0].z)
+        self.residual, self.slopes = (each[0] for each in target.look(peaks[0].z[None]))
         self.linear = Linear(target.likelihood, self.slopes[:, target.linear])
         self._peaks = np.array([peak.z for peak in peaks])
         self._normals = [_normal_of(peak, target.other) for peak in peaks]

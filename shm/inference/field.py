@@ -43,6 +43,7 @@ from shm.inference.systematic_errors import (
     mean_of_ends,
 )
 from shm.models import AsMade, Model
+from shm.models.hanger.reduced import Modes
 from shm.models.hanger_model import TENSION
 from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
 
@@ -112,12 +113,19 @@ class FieldLikelihood(MeasuredFrequencies):
         of shapes.
         """
         if isinstance(model, AsMade) and model.has_slopes and self.has_equal_conditions:
-            modes = model.modes_at(theta, self._modes, self._places_m)
-            bare, shapes = modes.frequency[:, self._plane, self._order], modes.deflection
-            misfits = self.shapes.misfits_of(shapes)
-        else:
-            bare = predicted_hz(model, theta, self._conditions, self._plane, self._order)
-            misfits = self.shapes.misfits(model, theta)
+            return self._predicted(model, theta, model.modes_at(theta, self._modes, self._places_m))
+        bare = predicted_hz(model, theta, self._conditions, self._plane, self._order)
+        return self._with_ends(model, theta, bare, self.shapes.misfits(model, theta))
+
+    def _predicted(self, model: AsMade, theta: FloatArray, modes: Modes) -> FloatArray:
+        """Return predictions (n, data) by modes that are known."""
+        bare = modes.frequency[:, self._plane, self._order]
+        return self._with_ends(model, theta, bare, self.shapes.misfits_of(modes.deflection))
+
+    def _with_ends(
+        self, model: Model, theta: FloatArray, bare: FloatArray, misfits: FloatArray
+    ) -> FloatArray:
+        """Return predictions (n, data) by frequencies between ends that neither move nor weigh."""
         ends = model.end_waves(theta, bare, self._plane)
         found = bare * np.exp(mean_of_ends(ends, model.stiff_ends_m, self._assumed))
         read = theta[:, [self._tension] * self.has_reading] * model.hanger.nominal_tension_n
@@ -128,10 +136,12 @@ class FieldLikelihood(MeasuredFrequencies):
         """Return True where no test has conditions that change the bar."""
         return len(set(self._conditions)) == 1 and self._conditions[0].added_mass is None
 
-    def changes(self, model: AsMade, theta: FloatArray, others: Sequence[FloatArray]) -> FloatArray:
-        """Return changes (n, data, others) of misfits to near parameter sets.
+    def changes(
+        self, model: AsMade, theta: FloatArray, others: Sequence[FloatArray]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return predictions (n, data), and changes (n, data, others) of misfits to near ones.
 
-        To first order, and those of supports and sensors left out.
+        These to first order, and those of supports and sensors left out.
         """
         found, near = model.modes_near(theta, others, self._modes, self._places_m)
         here, column = self.shapes.misfits_of(found.deflection), [self._tension] * self.has_reading
@@ -142,7 +152,9 @@ class FieldLikelihood(MeasuredFrequencies):
                 read = other[:, column] / theta[:, column]
                 moved = self.shapes.misfits_of(modes.deflection) - here
                 changes.append(np.hstack([np.log(np.hstack([ratio, read])), moved]))
-        return np.stack(changes, axis=2)
+        predicted = self._predicted(model, theta, found)
+        none = np.empty((*predicted.shape, 0))
+        return predicted, np.stack(changes, axis=2) if changes else none
 
     def renumbered(self, by: int, model: Model, theta: FloatArray) -> FieldLikelihood:
         """Return the same with all orders higher `by` 1, or -1, settled at `theta` (d,)."""

@@ -111,10 +111,12 @@ class Density(ABC):
         """Return the same at z (n, d)."""
         return self.log_posterior(self.evaluate(z))
 
-    def slopes(self, z: FloatArray, directions: FloatArray | None = None) -> FloatArray:
-        """Return derivatives (n, data, k) of the prediction at z (n, d).
+    def look(
+        self, z: FloatArray, directions: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the residual (n, data) at z (n, d), and slopes (n, data, k) of the prediction.
 
-        They are along the columns of `directions` (d, k), or by all coordinates.
+        They are derivatives along the columns of `directions` (d, k), or by all coordinates.
         """
         ways = np.eye(z.shape[1]) if directions is None else directions
         n, k = len(z), ways.shape[1]
@@ -125,15 +127,15 @@ class Density(ABC):
         there = residual[n:].reshape(n, k, -1)
         found = (residual[:n, None] - there) / step[:, :, None]
         found = np.where(np.abs(found) < _STEEPEST, found, 0.0)
-        return np.asarray(np.swapaxes(found, 1, 2))
+        return residual[:n], np.asarray(np.swapaxes(found, 1, 2))
+
+    def slopes(self, z: FloatArray, directions: FloatArray | None = None) -> FloatArray:
+        """Return these slopes alone."""
+        return self.look(z, directions)[1]
 
     def follow(self, z: FloatArray, before: FloatArray, slopes: FloatArray) -> FloatArray:
         """Return derivatives (n, data, d) at z (n, d), of where those at `before` are `slopes`."""
         return self.slopes(z)
-
-    def view(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the residual (data,) and the prediction's slopes (data, d) at z (d,)."""
-        return self.residual(z[None])[0], self.slopes(z[None])[0]
 
     # ------------------------------------------------ symmetries
 
@@ -160,7 +162,7 @@ def find_peaks(density: Density, starts: FloatArray, hopeless: float = -np.inf) 
     z, log = density.fold(z[finite]), log[finite]
     if not len(z):
         return []
-    slopes, residual = density.slopes(z), density.residual(z)
+    residual, slopes = density.look(z)
     curvature, _ = _curvature(density.likelihood, residual, slopes, z)
     found: list[Peak] = []
     for row in np.argsort(-log, kind="stable"):
@@ -190,17 +192,17 @@ def climb(
     centre = np.zeros_like(starts) if centre is None else centre
     noise = np.zeros((len(starts), 1)) if noise is None else noise
 
-    def view(z: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-        residual = density.residual(z) + noise[rows]
-        return residual, by.log(residual) + log_normal(z - centre[rows])
+    def log_at(z: FloatArray, rows: IntArray, residual: FloatArray) -> FloatArray:
+        return np.asarray(by.log(residual) + log_normal(z - centre[rows]))
 
     z = starts.copy()
     going: IntArray = np.arange(len(starts))
-    residual, log = view(z, going)
+    residual, slopes = density.look(z)
+    residual = residual + noise
+    log = log_at(z, going, residual)
     damping = np.full(len(z), 1e-2)
     hessian = np.empty((len(z), z.shape[1], z.shape[1]))
     gradient, moved = np.empty_like(z), going
-    slopes = density.slopes(z)
     for taken in range(steps):
         if len(moved):
             away = z[moved] - centre[moved]
@@ -213,7 +215,8 @@ def climb(
         hoped = (pull * np.linalg.solve(curvature, pull))[..., 0].sum(axis=1)
         step /= np.maximum(np.abs(step).max(axis=1, keepdims=True) / _LONGEST, 1.0)
         tried = np.clip(z[going] + step, -_FARTHEST, _FARTHEST)
-        there, log_there = view(tried, going)
+        there = density.residual(tried) + noise[going]
+        log_there = log_at(tried, going, there)
         gain = log_there - log[going]
         better = gain > 0
         moved, before = going[better], z.copy()

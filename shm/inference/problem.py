@@ -134,11 +134,18 @@ class Problem(Density):
     def connect(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
         return self.coordinates.connect(z, rng)
 
-    def slopes(self, z: FloatArray, directions: FloatArray | None = None) -> FloatArray:
+    def look(
+        self, z: FloatArray, directions: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         if not self._has_slopes:
-            return super().slopes(z, directions)
+            return super().look(z, directions)
         steps = DIFFERENCE * (np.eye(z.shape[1]) if directions is None else directions.T)
-        return self._near(z, steps) / DIFFERENCE
+        self.evaluations += len(z)
+        theta = self.coordinates.theta(z)
+        others = [self.coordinates.theta(z + step) for step in steps]
+        model, likelihood = cast(AsMade, self.model), cast(FieldLikelihood, self.measured)
+        predicted, changes = likelihood.changes(model, theta, others)
+        return self.residual_of(predicted), np.nan_to_num(changes) / DIFFERENCE
 
     @property
     def largest_error(self) -> float:
@@ -153,16 +160,6 @@ class Problem(Density):
         return (
             slopes and isinstance(likelihood, FieldLikelihood) and likelihood.has_equal_conditions
         )
-
-    def _near(self, z: FloatArray, steps: FloatArray) -> FloatArray:
-        """Return changes (m, measurements, steps) of the misfit by `steps` (k, d) from `z`."""
-        if not len(steps):
-            return np.empty((len(z), len(self.value), 0))
-        self.evaluations += len(z)
-        theta = self.coordinates.theta(z)
-        others = [self.coordinates.theta(z + step) for step in steps]
-        model, likelihood = cast(AsMade, self.model), cast(FieldLikelihood, self.measured)
-        return np.nan_to_num(likelihood.changes(model, theta, others))
 
 
 _NO_MODE = 10.0  # of ln f: beyond any data

@@ -150,11 +150,13 @@ class Valley:
         for again in range(_SET.gauss_newton):
             if not len(rows):
                 break
+            residual = None
             if again:
-                across = self._whitening @ self._density.slopes(z[rows], self._determined)
+                residual, across = self._density.look(z[rows], self._determined)
+                across = self._whitening @ across
                 factor[rows] = np.linalg.cholesky(_precision(across))
             begun = z[rows]
-            size = self._descend(z, rows, across, factor[rows])
+            size = self._descend(z, rows, across, factor[rows], residual)
             moved = np.einsum("nhg,nh->ng", factor[rows], (z[rows] - begun) @ self._determined)
             # Slopes of a point that was far from the optimum are not those there.
             if again:
@@ -162,11 +164,17 @@ class Valley:
         return z, factor
 
     def _descend(
-        self, z: FloatArray, rows: IntArray, across: FloatArray, factor: FloatArray
+        self,
+        z: FloatArray,
+        rows: IntArray,
+        across: FloatArray,
+        factor: FloatArray,
+        residual: FloatArray | None,
     ) -> FloatArray:
         """Move some rows of `z` to the optimum by steps with the same slopes `across`.
 
-        Returns the size (rows,) of the last step in standard deviations.
+        Returns the size (rows,) of the last step in standard deviations. The `residual` where they
+        begin is computed unless it is known.
         """
         size = np.full(len(rows), np.inf)
         for _ in range(_SET.chords):
@@ -174,8 +182,8 @@ class Valley:
             if not len(going):
                 break
             active = rows[going]
-            misfit = -self._density.residual(z[active])
-            none = _SET.no_mode
+            misfit = -(self._density.residual(z[active]) if residual is None else residual)
+            none, residual = _SET.no_mode, None
             misfit = np.nan_to_num(misfit, nan=none, posinf=none, neginf=-none)
             misfit = misfit @ self._whitening.T
             gradient = np.einsum("nfg,nf->ng", across[going], misfit) + z[active] @ self._determined

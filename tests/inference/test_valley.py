@@ -35,6 +35,11 @@ class BentProblem:
         rows[:, 0, 0], rows[:, 0, 1] = 1.0, -1.4 * z[:, 1]
         return rows if directions is None else rows @ directions
 
+    def look(
+        self, z: FloatArray, directions: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        return self.residual(z), self.slopes(z, directions)
+
     @staticmethod
     def predict(z: FloatArray) -> FloatArray:
         return bend(z)[:, :1]

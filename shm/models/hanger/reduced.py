@@ -372,9 +372,20 @@ class _Matrices:
             scale = 1 / np.sqrt(diagonal.clip(min=_ROUNDING))
             whitened = stiffness * scale[:, :, None] * scale[:, None, :]
             return whitened, lambda vectors: vectors * scale[:, :, None]
-        inverse = np.linalg.inv(np.linalg.cholesky(_sum(heavy, self.mass)))
+        inverse = _inverted(np.asarray(np.linalg.cholesky(_sum(heavy, self.mass)), dtype=float))
         across = inverse.swapaxes(1, 2)
         return inverse @ stiffness @ across, lambda vectors: across @ vectors
+
+
+def _inverted(lower: FloatArray) -> FloatArray:
+    """Return the inverses of lower triangles (n, d, d), by substitution: a third of the time."""
+    found = np.zeros_like(lower)
+    pivot = 1 / np.einsum("nii->ni", lower)
+    for row in range(lower.shape[1]):
+        found[:, row, row] = pivot[:, row]
+        above = np.einsum("nk,nkj->nj", lower[:, row, :row], found[:, :row, :row])
+        found[:, row, :row] = -pivot[:, row, None] * above
+    return found
 
 
 _RIDGE = 1e-12  # numerical: of two nearly equal kinks
