@@ -37,9 +37,9 @@ FILE = Path(__file__).with_name("calibration.toml")
 
 
 class Share(NamedTuple):
-    """Probabilities that an effect's own law is off by so much, and that of something unknown."""
+    """Probabilities that a known effect's law is off by so much, and that of something unknown."""
 
-    own: float
+    known: float
     unknown: float
 
 
@@ -65,7 +65,7 @@ def read_calibration(file: Path = FILE) -> Calibration:
         mimics_one=mimic["one_effect"],
         mimics_two=mimic["two_effects"],
         exact=Share(**law["exact"]),
-        off_by={each["fraction"]: Share(each["own"], each["unknown"]) for each in law["off"]},
+        off_by={each["fraction"]: Share(each["known"], each["unknown"]) for each in law["off"]},
     )
 
 

@@ -277,16 +277,16 @@ def _residuals(problem: GapProblem, fit: Fit, folds: BoolArray) -> FloatArray:
     design, residual = problem.observations.design, problem.observations.value - fit.predicted
     left = np.full(folds.shape, NAN)
     for fold, out in enumerate(folds):
-        kept, shapes = np.flatnonzero(~out), np.flatnonzero(~out[design.shape_mode])
-        rows = np.concatenate([kept, design.frequencies + shapes])
-        errors = Likelihood.of(fit.noise.part(kept, shapes), fit.model_error)
+        others, shapes = np.flatnonzero(~out), np.flatnonzero(~out[design.shape_mode])
+        rows = np.concatenate([others, design.frequencies + shapes])
+        errors = Likelihood.of(fit.noise.part(others, shapes), fit.model_error)
         _, step, *_ = errors.linear(fit.slopes[rows], residual[rows], fit.z)
         rest = (residual - fit.slopes @ step)[: design.frequencies]
-        # What repeats in all frequencies is known by those that are kept.
+        # What repeats in all frequencies is known by the others.
         repeated = problem.repeated_with(fit.hypothesis.effects).frequency
-        across = repeated[np.ix_(out, kept)]
-        covariance = fit.noise.frequency[np.ix_(kept, kept)]
-        left[fold, out] = rest[out] - across @ np.linalg.solve(covariance, rest[kept])
+        across = repeated[np.ix_(out, others)]
+        covariance = fit.noise.frequency[np.ix_(others, others)]
+        left[fold, out] = rest[out] - across @ np.linalg.solve(covariance, rest[others])
     return left
 
 

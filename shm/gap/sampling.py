@@ -2,17 +2,14 @@
 
 Parameters in which the data are nearly linear are integrated out in closed form at each draw, so
 that only the others are sampled: from t distributions fitted to what is known of the posterior,
-with a share of the prior so that no weight is unbounded (Hesterberg 1995; Cappe et al. 2008). Of
-their draws only some are solved, by chance as a quadratic surrogate of the posterior has it, which
-costs no solution of the model: the chance is known, so that weights stay exact. All draws count,
-each against the mixture of all proposals (Cornuet et al. 2012).
+with a share of the prior so that no weight is unbounded (Hesterberg 1995; Cappe et al. 2008). All
+draws count, each against the mixture of all proposals (Cornuet et al. 2012).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import scipy
@@ -21,7 +18,6 @@ from shm.gap.contract import Fit, Method
 from shm.gap.posterior import SETTLED, Target
 from shm.inference.chain import run_chain
 from shm.inference.coordinates import log_normal
-from shm.inference.likelihood import Likelihood
 from shm.inference.linear import Linear
 from shm.inference.mixture import (
     Drawn,
@@ -49,13 +45,9 @@ class SamplingOptions:
     A `round` of draws comes from a mixture of at most `parts` t distributions, fitted to a
     `population` drawn again, `draws_a_part` at least; with shares of the `prior` (more of it
     `prior_at_first`) and of the `first` mixture, which has peaks at several `widths`, those within
-    `far_below` of the best log density (peaks `lobes_apart` standard deviations away are other
-    lobes), and `without` of it where the posterior without the last effects is, by
-    `clusters_without` parts. Of `wide_every` rounds one or two do without a surrogate; of the
-    others' `candidates` a round is kept, each with a chance of `least_chance` or more, found by
-    `halvings`. The surrogate's fit has a `least_weight` for all points and a `ridge`, and leaves
-    out errors of a smaller share than `least_of_errors`. Linear parameters are followed
-    `most_settled` times at most.
+    `far_below` of the best log density, and `without` of it where the posterior without the last
+    effects is, by `clusters_without` parts. Linear parameters are followed `most_settled` times at
+    most.
     """
 
     round: int = 150
@@ -67,16 +59,8 @@ class SamplingOptions:
     first: float = 0.2
     widths: tuple[float, ...] = (1.0, 2.0)
     far_below: float = 10.0
-    lobes_apart: float = 8.0
     without: float = 0.4
     clusters_without: int = 3
-    wide_every: int = 4
-    candidates: int = 3000
-    least_chance: float = 0.01
-    halvings: int = 30
-    least_weight: float = 1e-2
-    ridge: float = 1e-6
-    least_of_errors: float = 1e-2
     most_settled: int = 4
 
 
@@ -85,13 +69,9 @@ _HOW = SamplingOptions()
 
 @dataclass(frozen=True, eq=False)
 class _Draws(Drawn):
-    """Points z (n, d), their linear parameters at their best, by the likeliest error `node` (n,).
-
-    `residual` (n, data) is that with the linear parameters as they go along with the others.
-    """
+    """Points z (n, d) with linear parameters at their best, by the likeliest error `node` (n,)."""
 
     node: IntArray
-    residual: FloatArray
 
 
 class _Collapsed:
@@ -153,17 +133,7 @@ class _Collapsed:
             moved[far] = start[far] + step
             far = far[(change > SETTLED).any(axis=1)]
         z[:, columns] = moved
-        return _Draws(z, node, residual), np.asarray(log + log_normal(w))
-
-    def log_target(self, w: FloatArray, residual: FloatArray, linear: Linear) -> FloatArray:
-        """Return the log of the target density (n,) by residuals and errors that are known."""
-        z = self.along(w)
-        return linear.marginal(residual, z[:, self.target.linear])[0] + log_normal(w)
-
-    def with_errors(self, nodes: IntArray) -> Linear:
-        """Return the linear parameters where errors are one of these `nodes`."""
-        chosen = [self.target.likelihood.nodes[each] for each in nodes]
-        return Linear(Likelihood(chosen), self.slopes[:, self.target.linear])
+        return _Draws(z, node), np.asarray(log + log_normal(w))
 
     def scatter(self, draws: _Draws, rng: np.random.Generator) -> FloatArray:
         """Return the points (n, d) with their linear parameters drawn about their best."""
@@ -183,24 +153,13 @@ class _Collapsed:
         return np.where(np.isfinite(found), found, -np.inf)
 
 
-class _Proposal(Protocol):
-    def draw(self, rng: np.random.Generator) -> tuple[FloatArray, int]:
-        """Return draws (n, o) that are to be solved, and of how many."""
-
-    def log_density(self, w: FloatArray) -> FloatArray:
-        """Return the log density (n,) at w (n, o)."""
-
-
-class _Wide:
+class _Proposal:
     """A mixture of t distributions with a share of the prior."""
 
     def __init__(self, mixture: TMixture, of_prior: float):
         self.mixture, self.of_prior = mixture, of_prior
 
-    def draw(self, rng: np.random.Generator) -> tuple[FloatArray, int]:
-        return self.mixture_draws(_HOW.round, rng), _HOW.round
-
-    def mixture_draws(self, n: int, rng: np.random.Generator) -> FloatArray:
+    def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Return draws (n, o)."""
         w = self.mixture.draw(n, rng)
         prior: BoolArray = rng.random(n) < self.of_prior
@@ -210,107 +169,6 @@ class _Wide:
     def log_density(self, w: FloatArray) -> FloatArray:
         log_mixture = np.log1p(-self.of_prior) + self.mixture.log_density(w)
         return np.asarray(np.logaddexp(log_mixture, np.log(self.of_prior) + log_normal(w)))
-
-
-class _Surrogate:
-    """The posterior by a quadratic fit of the residuals at points already solved.
-
-    Of draws of a `wide` proposal those are kept that it finds likely, each by a chance. What the
-    fit is off by, weights of exact solutions correct.
-    """
-
-    def __init__(
-        self,
-        collapsed: _Collapsed,
-        known: _Draws,
-        weights: FloatArray,
-        wide: _Wide,
-        rng: np.random.Generator,
-    ):
-        self._collapsed, self._wide = collapsed, wide
-        other = collapsed.target.other
-        w, weights = known.z[:, other], weights + _HOW.least_weight / len(weights)
-        self._centre = np.average(w, axis=0, weights=weights)
-        self._scale = np.sqrt(np.average((w - self._centre) ** 2, axis=0, weights=weights)) + 1e-6
-        usable = np.isfinite(known.residual).all(axis=1)
-        root = np.sqrt(weights[usable])[:, None]
-        columns = root * self._features(w[usable])
-        gram = columns.T @ columns
-        ridge = _HOW.ridge * np.trace(gram) / len(gram) * np.eye(len(gram))
-        self._fit = np.linalg.solve(gram + ridge, columns.T @ (root * known.residual[usable]))
-        of_node = np.bincount(known.node, weights) / weights.sum()
-        self._linear = collapsed.with_errors(np.flatnonzero(of_node > _HOW.least_of_errors))
-        self._log_scale = 0.0
-        self._log_scale = self._scaled(rng)
-
-    def draw(self, rng: np.random.Generator) -> tuple[FloatArray, int]:
-        w = self._wide.mixture_draws(_HOW.candidates, rng)
-        return np.asarray(w[np.log(rng.random(len(w))) < self._log_acceptance(w)]), len(w)
-
-    def log_density(self, w: FloatArray) -> FloatArray:
-        return np.asarray(self._wide.log_density(w) + self._log_acceptance(w))
-
-    def _log_acceptance(self, w: FloatArray) -> FloatArray:
-        """Return the log of the chance (n,) that a candidate is kept."""
-        log = self._log_scale + self._log(w) - self._wide.log_density(w)
-        return np.nan_to_num(log, nan=-np.inf).clip(np.log(_HOW.least_chance), 0.0)
-
-    def _scaled(self, rng: np.random.Generator) -> float:
-        """Return the log scale of chances by which a round of draws is kept."""
-        w = self._wide.mixture_draws(_HOW.candidates, rng)
-        log = np.sort(np.nan_to_num(self._log(w) - self._wide.log_density(w), nan=-np.inf))
-        low, high = -log[-1] - 50.0, -log[-1] + 50.0
-        for _ in range(_HOW.halvings):
-            middle = (low + high) / 2
-            accepted = np.exp((middle + log).clip(np.log(_HOW.least_chance), 0.0)).sum()
-            low, high = (low, middle) if accepted > _HOW.round else (middle, high)
-        return float(low)
-
-    def _log(self, w: FloatArray) -> FloatArray:
-        return self._collapsed.log_target(w, self._features(w) @ self._fit, self._linear)
-
-    def _features(self, w: FloatArray) -> FloatArray:
-        """Return one, the places and their products (n, features)."""
-        u = (w - self._centre) / self._scale
-        one, other = np.triu_indices(u.shape[1])
-        return np.hstack([np.ones((len(u), 1)), u, u[:, one] * u[:, other]])
-
-
-class _Lobes:
-    """Hold the parts of a posterior that lie apart, each with its peak, the best first.
-
-    A place and its mirror image are two. They are alike but for size and shape, so that draws of
-    the best one, and its share, tell those of the others by normal distributions on the peaks.
-    """
-
-    def __init__(self, target: Target, peaks: Sequence[Peak]):
-        self.peaks: list[Peak] = []
-        self._normals: list[Normal] = []
-        for peak in _choose_near_best(peaks):
-            normal = _normal_of(peak, target.other)
-            if all(_measure_distance(normal, each) > _HOW.lobes_apart for each in self._normals):
-                self.peaks.append(peak)
-                self._normals.append(normal)
-        self._log = np.array([peak.log_evidence for peak in self.peaks])
-
-    @property
-    def log_beyond(self) -> float:
-        """Return the log of the whole evidence over that of the best lobe."""
-        return float(scipy.special.logsumexp(self._log - self._log[0]))
-
-    def nearest(self, w: FloatArray) -> IntArray:
-        """Return the lobe (n,) that others w (n, o) are nearest to, from 0."""
-        return _find_nearest(self._normals, w)
-
-    def spread(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Return draws z (n, d) of the best lobe with their share of them moved to each other."""
-        moved, of = z.copy(), rng.choice(len(self.peaks), len(z), p=normalised(self._log))
-        best = self.peaks[0]
-        for index, peak in enumerate(self.peaks[1:], start=1):
-            here, there = (np.linalg.cholesky(each.covariance) for each in (best, peak))
-            white = np.linalg.solve(here, (z[of == index] - best.z).T)
-            moved[of == index] = peak.z + (there @ white).T
-        return moved
 
 
 def _normal_of(peak: Peak, columns: IntArray) -> Normal:
@@ -324,18 +182,10 @@ def _find_nearest(normals: Sequence[Normal], w: FloatArray) -> IntArray:
     return np.asarray(np.argmin(square, axis=0))
 
 
-def _measure_distance(one: Normal, other: Normal) -> float:
-    """Return the distance of two centres in standard deviations, the shorter of both views."""
-    return min(
-        float(np.linalg.norm(one.whiten(other.mean))), float(np.linalg.norm(other.whiten(one.mean)))
-    )
-
-
 class Sampling:
     """Importance sampling of a hypothesis about `peaks`, the best first, that can be gone on with.
 
-    It is looked for also where a fit `without` its last effects has its draws. Of lobes that lie
-    apart the best one is sampled.
+    It is looked for also where a fit `without` its last effects has its draws.
     """
 
     def __init__(
@@ -346,17 +196,14 @@ class Sampling:
         without: Fit | None = None,
     ):
         self.target, self.peaks, self.rng = target, tuple(peaks), rng
-        self._lobes = _Lobes(target, peaks)
-        about = self._lobes.nearest(np.array([peak.z[target.other] for peak in peaks])) == 0
-        near = [peak for peak, is_near in zip(peaks, about, strict=True) if is_near]
-        self._collapsed = _Collapsed(target, near)
+        self._collapsed = _Collapsed(target, peaks)
         self._pool: Pool[_Proposal, _Draws] = Pool(
             lambda proposal, batch: proposal.log_density(batch.z[:, target.other])
         )
         self._rounds = 0
         if len(target.other):
-            self._first = _parts(target, near, without, rng)
-            self._proposal: _Proposal = _Wide(self._first, _HOW.prior_at_first)
+            self._first = _parts(target, peaks, without, rng)
+            self._proposal = _Proposal(self._first, _HOW.prior_at_first)
 
     @property
     def effective(self) -> float:
@@ -370,7 +217,7 @@ class Sampling:
         """Return the log evidence and its standard error."""
         if len(self.target.other):
             found = self._pool.weighted
-            return found.log_evidence + self._lobes.log_beyond, found.log_evidence_sd
+            return found.log_evidence, found.log_evidence_sd
         return float(self._collapsed.settle(np.empty((1, 0)))[1][0]), 0.0
 
     def run(self, enough: float, most_rounds: int) -> None:
@@ -380,10 +227,9 @@ class Sampling:
 
     def _draw(self) -> None:
         other = self.target.other
-        w, drawn = self._proposal.draw(self.rng)
+        w = self._proposal.draw(_HOW.round, self.rng)
         batch, log = self._collapsed.settle(w)
-        log = np.where(self._lobes.nearest(w) == 0, log, -np.inf)
-        self._pool.add(self._proposal, drawn, batch, log)
+        self._pool.add(self._proposal, batch, log)
         self._rounds += 1
         weights = tempered(self._pool.log_weights, 6 * len(other), 0.7, 1e-3)
         known = self._pool.batch.z[:, other]
@@ -392,9 +238,7 @@ class Sampling:
         if len(np.unique(likely, axis=0)) > _HOW.draws_a_part * _HOW.parts:
             clusters = TMixture.of(likely, _HOW.parts, self.rng)
         refitted = clusters.refitted(known, weights)
-        self._proposal = wide = _Wide(refitted.mixed(self._first, _HOW.first), _HOW.prior)
-        if self._rounds % _HOW.wide_every > 1:
-            self._proposal = _Surrogate(self._collapsed, self._pool.batch, weights, wide, self.rng)
+        self._proposal = _Proposal(refitted.mixed(self._first, _HOW.first), _HOW.prior)
 
     def fit(self, draws: int) -> Fit:
         """Return the fit with so many equal draws."""
@@ -404,8 +248,6 @@ class Sampling:
         else:
             chosen = self._pool.weighted.resampled(draws, self.rng)
         found = self.rng.permutation(self._collapsed.scatter(chosen, self.rng))
-        if len(self._lobes.peaks) > 1:
-            found = self._lobes.spread(found, self.rng)
         return _fit(self._collapsed, self.peaks, found, self.log_evidence, self.effective)
 
     def fit_by_chain(self, draws: int) -> Fit:

@@ -81,4 +81,4 @@ def _draw(
 ) -> None:
     """Add a batch of `n` draws to the pool."""
     draws = proposal.draw(density, n, rng)
-    pool.add(proposal, n, draws, density.log_posterior(draws))
+    pool.add(proposal, draws, density.log_posterior(draws))

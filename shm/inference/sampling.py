@@ -169,5 +169,5 @@ def _continue(
     chosen = chain[rng.choice(len(chain), count, replace=len(chain) < count)]
     exact = density.evaluate(chosen)
     weights = normalised(density.log_posterior(exact) - density.rough.log(chosen))
-    kept = rng.permutation(systematic(weights, samples, rng))
-    return exact.take(kept), size * effective(weights) / count, r_hat
+    rows = rng.permutation(systematic(weights, samples, rng))
+    return exact.take(rows), size * effective(weights) / count, r_hat

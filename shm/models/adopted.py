@@ -53,16 +53,16 @@ class Adopted(HangerModel):
         self.title = f"{self.title}, with {acting}"
         self.baseline, self.name, self.swaps = made.baseline, name, ()
         self.reference_c = next((e.reference_c for e in made.effects if _follows(e)), math.nan)
-        own = {parameter_name(each): each for each in self.effect_parameters}
-        effect_bounds = {key: bounds_of(each) for key, each in own.items()}
+        by_name = {parameter_name(each): each for each in self.effect_parameters}
+        effect_bounds = {key: bounds_of(each) for key, each in by_name.items()}
         for effect in made.effects:
             for key, both in effect.ranges.items():
-                effect_bounds[key if key in own else f"{effect.effect}.{key}"] = both
+                effect_bounds[key if key in by_name else f"{effect.effect}.{key}"] = both
         bounds = dict(self.bounds)
         if math.isfinite(known := hanger.scatter.tension):  # weighed
             bounds[TENSION] = (1 - known, 1 + known)
         self.bounds = bounds | effect_bounds
-        self.units = {**self.units, **{key: each.unit for key, each in own.items()}}
+        self.units = {**self.units, **{key: each.unit for key, each in by_name.items()}}
 
     def _plain(self, theta: FloatArray) -> FloatArray:
         logarithmic = [in_log(each) for each in self.effect_parameters]

@@ -230,11 +230,11 @@ class Model:
     def refuse(self, test: ModalTest) -> None:
         """Raise BadInput where this class cannot describe the conditions of `test`."""
         mass, length_m = test.added_mass, self.hanger.length_m
-        own_kg = self.hanger.mass_per_length_kg_m * length_m
-        if mass is not None and mass.mass_kg > own_kg:
+        hanger_kg = self.hanger.mass_per_length_kg_m * length_m
+        if mass is not None and mass.mass_kg > hanger_kg:
             raise BadInput(
                 f"test {test.id} has a known mass of {mass.mass_kg:g} kg, more than hanger "
-                f"{self.hanger.id} itself ({own_kg:.3g} kg).",
+                f"{self.hanger.id} itself ({hanger_kg:.3g} kg).",
                 remedy="Give mass_kg in kg, or check length and section of the hanger.",
             )
         if mass is not None and not 0 <= mass.x_m <= length_m:

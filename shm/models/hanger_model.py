@@ -197,8 +197,8 @@ class HangerModel(Model):
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the class's springs; with effects, what these leave of them."""
         if not self.effects:
-            own = [self._column(theta, name) for name in self.model.parameter_names]
-            return self.model.springs_n_m_rad(np.column_stack(own))
+            columns = [self._column(theta, name) for name in self.model.parameter_names]
+            return self.model.springs_n_m_rad(np.column_stack(columns))
         compliance = np.einsum("nepp->nep", self.physical(theta).rotational_compliance_rad_n_m)
         with np.errstate(divide="ignore"):
             springs = 1 / compliance
@@ -314,8 +314,8 @@ class HangerModel(Model):
         key = theta[:, : len(self._columns)].tobytes()
         if self._last is None or self._last[:2] != (key, modes):
             general = solve(self._made(theta), modes, np.empty(0), shapes=False)
-            own = self.with_effects(()).frequencies_hz(theta, modes)
-            self._last = key, modes, own / general.frequency_hz
+            quick = self.with_effects(()).frequencies_hz(theta, modes)
+            self._last = key, modes, quick / general.frequency_hz
         return self._last[2]
 
     # ------------------------------------------------ the bar
@@ -353,8 +353,8 @@ class HangerModel(Model):
         )
         bar = replace(bar, zones=(*self._fittings(bar, theta), *self._turnbuckles(bar, theta)))
         if not held:
-            own = [self._column(theta, name) for name in self.model.parameter_names]
-            bar = bar.on_springs(self.model.springs_n_m_rad(np.column_stack(own)))
+            columns = [self._column(theta, name) for name in self.model.parameter_names]
+            bar = bar.on_springs(self.model.springs_n_m_rad(np.column_stack(columns)))
         if self._shears:
             bar = self._sheared(bar, theta)
         return self._weighed(bar, theta) if self.has_terms else bar

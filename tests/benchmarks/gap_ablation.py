@@ -1,7 +1,7 @@
 """The gap diagnosis without each of its mechanisms, on hangers that others wrote.
 
 python tests/benchmarks/gap_ablation.py --hangers 24 --seed 41
-python tests/benchmarks/gap_ablation.py --only "no surrogate" "no lobes"
+python tests/benchmarks/gap_ablation.py --only "no mirrored places" "exact thermometers"
 
 The hangers are those of a blind trial with that seed (`blind_trial.py`), the truth in hand. Each
 row leaves out one mechanism: how many answers are right, how many causes are named first and in
@@ -38,13 +38,6 @@ from tests.benchmarks.blind_trial import diagnose_hanger, make_hanger, plan_hang
 Patches = Sequence[Any]
 
 
-def one_peak(lobes: Any, target: Any, peaks: Sequence[Any]) -> None:
-    """Make lobes of which the best peak is the only one."""
-    lobes.peaks = list(peaks[:1])
-    lobes._normals = [sampling._normal_of(peaks[0], target.other)]
-    lobes._log = np.array([peaks[0].log_evidence])
-
-
 def unchanged(observations: Any) -> Any:
     """Return standard deviations as they are stated."""
     return observations.sd
@@ -53,8 +46,6 @@ def unchanged(observations: Any) -> Any:
 VARIANTS: dict[str, Callable[[], Patches]] = {
     "whole": lambda: [],
     "whole, other seed": lambda: [],
-    "no surrogate": lambda: [patch.object(sampling, "_HOW", replace(sampling._HOW, wide_every=1))],
-    "no lobes": lambda: [patch.object(sampling._Lobes, "__init__", one_peak)],
     "no draws of an update": lambda: [
         patch.object(search, "_with_draws_of_update", lambda _, fit, rng: fit)
     ],

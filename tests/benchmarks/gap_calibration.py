@@ -158,7 +158,7 @@ def text(told: Calibration, about: Mapping[str, object]) -> str:
     """Return the data file: that of today with other values, and `about` their trial."""
     values = FILE.read_text(encoding="utf-8").partition("[provenance]")
     of_laws = "\n".join(
-        f"    {{ fraction = {f:g}, own = {each.own:.4g}, unknown = {each.unknown:.4g} }},"
+        f"    {{ fraction = {f:g}, known = {each.known:.4g}, unknown = {each.unknown:.4g} }},"
         for f, each in told.off_by.items()
     )
     return f"""{values[0]}[provenance]
@@ -175,10 +175,10 @@ command = "{about["command"]}"
 one_effect = {told.mimics_one:.4g}
 two_effects = {told.mimics_two:.4g}
 
-# How often an effect's law is off, by which fraction of what the effect does: `own` of effects that
-# were planted, `unknown` of what passed for an effect and was another one, which had been left out.
+# How often an effect's law is off, by which fraction of what the effect does: `known` of effects
+# that were planted, `unknown` of what passed for one and was another, which had been left out.
 [law]
-exact = {{ own = {told.exact.own:.4g}, unknown = {told.exact.unknown:.4g} }}
+exact = {{ known = {told.exact.known:.4g}, unknown = {told.exact.unknown:.4g} }}
 off = [
 {of_laws}
 ]

@@ -60,7 +60,7 @@ def test_calibrated_reads_back(tmp_path: Path) -> None:
     lessons = [Lesson(f"c{k}", own, k % 3, own) for k in range(12)]
     read = _read_back(lessons, tmp_path)
     assert read.mimics_one == pytest.approx(1 / 3, rel=1e-3)
-    assert read.exact.own == read.exact.unknown != CALIBRATION.exact.own
+    assert read.exact.known == read.exact.unknown != CALIBRATION.exact.known
 
 
 def _read_back(lessons: list[Lesson], folder: Path) -> Calibration:

@@ -53,7 +53,7 @@ def test_allow_for_laws_no_shift_no_gain() -> None:
 @pytest.mark.parametrize(("effect", "own_laws"), CASES)
 def test_gain_at_least_log_exact(effect: str, own_laws: bool) -> None:
     found, *_ = _by_laws(effect, own_laws)
-    assert found.gain >= np.log(CALIBRATION.exact.own)
+    assert found.gain >= np.log(CALIBRATION.exact.known)
     assert found.mimic >= np.log(CALIBRATION.exact.unknown)
 
 

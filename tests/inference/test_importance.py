@@ -24,7 +24,7 @@ BEAM1 = build("beam1", HANGER_3, THESIS)
 
 def weighted(log_weights: FloatArray, seed: int = 1) -> Weighted[Draws]:
     z = np.random.default_rng(seed).standard_normal((len(log_weights), 1))
-    return Weighted(Draws(z, z, z, z), log_weights, len(z))
+    return Weighted(Draws(z, z, z, z), log_weights)
 
 
 def test_figures_of_weights_are_those_of_their_definition() -> None:
@@ -79,7 +79,7 @@ def test_emcee_continues_where_too_few_draws_are_effective(
         draws = proposal.draw(density, 500, rng)
         log_weights = density.log_posterior(draws)
         log_weights[log_weights.argmax()] += 30
-        return Weighted(draws, log_weights, 500)
+        return Weighted(draws, log_weights)
 
     monkeypatch.setattr(sampling, "weigh", poor)
     found = update(TESTS, BEAM1, UpdateOptions(1000, seed=5))

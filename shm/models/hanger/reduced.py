@@ -27,7 +27,7 @@ from shm.models.hanger.bar import (
 )
 from shm.models.hanger.functions import DEFLECTIONS, SLOPES
 from shm.models.hanger.physical import PhysicalHanger
-from shm.models.hanger.system import bending_unit, rotary_ratio, rotational_n_m_rad
+from shm.models.hanger.system import bending_unit, invert_root, rotary_ratio, rotational_n_m_rad
 from shm.values import FloatArray, IntArray
 
 STIFFEST = 1e6
@@ -134,7 +134,7 @@ class ReducedBar:
         return Modes.joined([each[0] for each in found]), near
 
     def _deflections(self, x: FloatArray) -> FloatArray:
-        return _padded(self._bar.deflections(x[None])[0], self._full.kept)
+        return _padded(self._bar.deflections(x[None])[0], self._full.free)
 
     def _factors(self, physical: PhysicalHanger) -> Factors:
         """Return the numbers by which the terms of each hanger are multiplied."""
@@ -179,25 +179,25 @@ def _covered(usual: PhysicalHanger, pieces: Pieces) -> dict[tuple[int, ...], lis
     return found
 
 
-def _padded(values: FloatArray, kept: IntArray) -> FloatArray:
-    """Return values (points, functions that deflect) of the functions that are kept."""
-    whole = np.zeros((len(values), int(kept[-1]) + 1))
+def _padded(values: FloatArray, free: IntArray) -> FloatArray:
+    """Return values (points, functions that deflect) of the free functions."""
+    whole = np.zeros((len(values), int(free[-1]) + 1))
     whole[:, : values.shape[1]] = values
-    return whole[:, kept]
+    return whole[:, free]
 
 
 @dataclass(frozen=True, eq=False)
 class _Matrices:
     """Matrices (terms, d, d) of stiffness and mass, in the order of `Factors`.
 
-    `curvature` (points, d) of each group of stretches gives its bending; `kept` are the functions
+    `curvature` (points, d) of each group of stretches gives its bending; `free` are the functions
     that the ends let move.
     """
 
     stiffness: FloatArray
     mass: FloatArray
     curvature: tuple[FloatArray, ...]
-    kept: IntArray
+    free: IntArray
     diagonal_mass: bool = False
 
     @classmethod
@@ -209,7 +209,7 @@ class _Matrices:
         usual: PhysicalHanger,
     ) -> _Matrices:
         count = pieces.tension.shape[-1]
-        kept = np.setdiff1d(np.arange(count), DEFLECTIONS)
+        free = np.setdiff1d(np.arange(count), DEFLECTIONS)
         springs = np.zeros((2, count, count))
         springs[[0, 1], SLOPES, SLOPES] = 1.0
         area = pieces.area[0]
@@ -231,14 +231,14 @@ class _Matrices:
                 energy = energy + np.outer(turned, turned)
             mass.append(energy)
         curvature = tuple(
-            np.vstack([pieces.curvature[each] for each in group])[:, kept] for group in groups
+            np.vstack([pieces.curvature[each] for each in group])[:, free] for group in groups
         )
-        square = np.ix_(kept, kept)
+        square = np.ix_(free, free)
         return cls(
             np.array([each[square] for each in stiffness]),
             np.array([each[square] for each in mass]),
             curvature,
-            kept,
+            free,
         )
 
     def span(self, usual: Factors, modes: int) -> tuple[FloatArray, FloatArray]:
@@ -372,20 +372,9 @@ class _Matrices:
             scale = 1 / np.sqrt(diagonal.clip(min=_ROUNDING))
             whitened = stiffness * scale[:, :, None] * scale[:, None, :]
             return whitened, lambda vectors: vectors * scale[:, :, None]
-        inverse = _inverted(np.asarray(np.linalg.cholesky(_sum(heavy, self.mass)), dtype=float))
+        inverse = invert_root(_sum(heavy, self.mass))
         across = inverse.swapaxes(1, 2)
         return inverse @ stiffness @ across, lambda vectors: across @ vectors
-
-
-def _inverted(lower: FloatArray) -> FloatArray:
-    """Return the inverses of lower triangles (n, d, d), by substitution: a third of the time."""
-    found = np.zeros_like(lower)
-    pivot = 1 / np.einsum("nii->ni", lower)
-    for row in range(lower.shape[1]):
-        found[:, row, row] = pivot[:, row]
-        above = np.einsum("nk,nkj->nj", lower[:, row, :row], found[:, :row, :row])
-        found[:, row, :row] = -pivot[:, row, None] * above
-    return found
 
 
 _RIDGE = 1e-12  # numerical: of two nearly equal kinks

@@ -17,7 +17,14 @@ import numpy as np
 from shm.models.hanger.bar import Bar, along, bar_of, by_plane, gradient_ratio, stiffness_ratio
 from shm.models.hanger.functions import SLOPES
 from shm.models.hanger.physical import HangerModes, LateralSpring, PhysicalHanger
-from shm.models.hanger.system import Oscillator, System, are_coupled, rotational_n_m_rad, system
+from shm.models.hanger.system import (
+    Oscillator,
+    System,
+    are_coupled,
+    invert_root,
+    rotational_n_m_rad,
+    system,
+)
 from shm.values import PLANES, BoolArray, FloatArray, IntArray
 
 _PLANES = len(PLANES)
@@ -459,7 +466,7 @@ def spectrum(
         # At least a tenth of what cancels in the diagonal is left there.
         rounding = 10 * len(unknowns) * np.finfo(float).eps
         held[:, unknowns, unknowns] *= np.where(shift > 0, 1 + rounding, 1.0)[:, None]
-    inverse = np.linalg.inv(np.linalg.cholesky(held))
+    inverse = invert_root(held)
     transposed = inverse.transpose(0, 2, 1)
     reduced = inverse @ mass @ transposed
     if not with_vectors:

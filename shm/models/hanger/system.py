@@ -235,3 +235,18 @@ def _added(total: FloatArray, term: FloatArray) -> FloatArray:
     missing = total.shape[-1] - term.shape[-1]
     around = [(0, 0)] * (term.ndim - 2) + [(0, missing)] * 2
     return np.asarray(total + np.pad(term, around) if missing else total + term)
+
+
+def invert_root(matrices: FloatArray) -> FloatArray:
+    """Return the inverses (n, d, d) of Cholesky's factors of definite matrices (n, d, d).
+
+    By substitution, which takes half of the time of a general inverse.
+    """
+    lower = np.asarray(np.linalg.cholesky(matrices), dtype=float)
+    found = np.zeros_like(lower)
+    pivot = 1 / np.einsum("nii->ni", lower)
+    for row in range(lower.shape[1]):
+        found[:, row, row] = pivot[:, row]
+        above = np.einsum("nk,nkj->nj", lower[:, row, :row], found[:, :row, :row])
+        found[:, row, :row] = -pivot[:, row, None] * above
+    return found

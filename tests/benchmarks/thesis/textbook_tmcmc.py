@@ -154,7 +154,7 @@ def _outcome(
     """The last population in random order; the distinct particles count as effective."""
     n = len(population.theta)
     population = population.take(rng.permutation(n))
-    equal = Weighted(Points(population.theta, population.predicted), np.zeros(n), n)
+    equal = Weighted(Points(population.theta, population.predicted), np.zeros(n))
     distinct = float(len(np.unique(population.theta, axis=0)))
     return Outcome(
         population.theta,
