@@ -20,6 +20,6 @@ def test_edges_that_nearly_coincide(apart_m: float, shear_compliance_1_n: float)
     bar = replace(bar, shear_compliance_1_n=shear_compliance_1_n * one)
     start_m, end_m = 0 * one, 0.25 * one
     fitting = Zone(start_m, end_m, 3 * one, 1.7 * one)
-    stiff = Zone(start_m, end_m + [0.0, apart_m], 5 * one, one)
+    stiff = Zone(start_m, end_m + np.array([0.0, apart_m]), 5 * one, one)
     same, near = frequencies_hz(replace(bar, zones=(fitting, stiff)), 6)
     np.testing.assert_allclose(near, same, rtol=apart_m + 1e-9)
