@@ -119,8 +119,10 @@ def check_for_update(
         [mode.frequency_hz for mode in modes], [mode.order for mode in modes], model.hanger
     )
     stated = [mode.frequency_sd_hz / mode.frequency_hz for mode in modes if not is_bare(mode)]
+    zero = sum(mode.frequency_sd_hz == 0 for mode in modes)
+    doubt = f"A standard deviation of 0 counts as not stated ({zero} of {len(modes)} frequencies)."
     return checked.tests, {
-        "remarks": checked.remarks,
+        "remarks": (*checked.remarks, *([doubt] if zero else [])),
         "taut_string_tension_n": string_n,
         "stated_error_percent": 100 * math.hypot(*stated) / math.sqrt(len(stated) or NAN),
     }

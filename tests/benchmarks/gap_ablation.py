@@ -19,6 +19,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -28,7 +29,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from shm.gap import baseline, diagnose, noise, outliers, problem, sampling, search
+from shm.gap import baseline, noise, outliers, problem, sampling, search
 from shm.gap.probabilities import ByLaws
 from shm.values import Outcome
 from shm.values.posterior import ENOUGH_EFFECTIVE
@@ -36,6 +37,7 @@ from tests.benchmarks.blind_scores import SURE, Row
 from tests.benchmarks.blind_trial import diagnose_hanger, make_hanger, plan_hangers
 
 Patches = Sequence[Any]
+DIAGNOSE = import_module("shm.gap.diagnose")  # the package has a function of this name
 
 
 def unchanged(observations: Any) -> Any:
@@ -74,7 +76,7 @@ VARIANTS: dict[str, Callable[[], Patches]] = {
         patch.object(problem.GapProblem, "settle_temperatures", lambda of, hypothesis, z: False)
     ],
     "no richer class afterwards": lambda: [
-        patch.object(diagnose, "find_richer", lambda of, hypothesis: None)
+        patch.object(DIAGNOSE, "find_richer", lambda of, hypothesis: None)
     ],
     "no gross errors": lambda: [patch.object(outliers, "_find_gross_error", lambda found: None)],
     "laws hold": lambda: [
