@@ -34,7 +34,7 @@ from shm.inference.linear import Linear
 from shm.inference.mixture import effective, normalised, systematic
 from shm.inference.options import Progress, silent
 from shm.inference.posterior import Peak, find_peaks, laplace
-from shm.inference.sampling import sample
+from shm.inference.sampling import weigh_along
 from shm.models.effects import EFFECTS
 from shm.values import ENOUGH_EFFECTIVE, FloatArray, Leads
 from shm.values.leading import MIN_NO_GAP_PROBABILITY, find_leading_cause
@@ -288,9 +288,11 @@ def _with_draws_of_update(problem: GapProblem, fit: Fit, rng: np.random.Generato
     if error[0] > problem.hanger.assumptions.model_error.upper:
         return fit
     starts = update.fold(np.array([peak.z for peak in fit.peaks]))
-    found = sample(update, find_peaks(update.rough, starts), 3 * len(fit.draws) // 2, rng)
-    z = problem.described.places(update.coordinates.finished(found.points.z, rng))
-    log = Target(problem, ALONE).log(z) - update.log_posterior(found.points)
+    samples = 3 * len(fit.draws) // 2
+    found = weigh_along(update, find_peaks(update.rough, starts), samples, rng)[0]
+    points = found.resampled(samples, rng)
+    z = problem.described.places(update.coordinates.finished(points.z, rng))
+    log = Target(problem, ALONE).log(z) - update.log_posterior(points)
     weights = normalised(np.where(np.isfinite(log), log, -np.inf))
     count = found.effective_sample_size * effective(weights) / len(weights)
     if not count >= ENOUGH_EFFECTIVE:

@@ -81,22 +81,7 @@ def sample(
     Where fewer than 200 are effective, emcee continues. Points along the valley begin at draws of
     the prior, or at `centres` (n, d).
     """
-    wanted = max(_SET.enough * samples, _SET.fewest_effective)
-    rough = density.rough
-    points, nearest = draw_along(rough, peaks, rng, centres)
-    on_progress(0.4)
-    for attempt in range(_SET.attempts):
-        best = points[[int(rough.log(points).argmax())]]
-        whitening = most_likely_error(rough, best).whitening
-        valleys = [Valley(rough, points, whitening)]
-        if attempt == 0:
-            valleys = valleys_through(rough, points, nearest, whitening)
-        first = Proposal.through(valleys, points, _SET.clusters, rng)
-        final = weigh(density, first, wanted, rng)
-        if final.effective_sample_size > _SET.poor * wanted:
-            break
-        # The posterior is elsewhere than it seemed: start again from where the weight is.
-        points = final.spread(_SET.again, rng)
+    final, points = weigh_along(density, peaks, samples, rng, centres, on_progress)
     on_progress(0.8)
     enough = final.effective_sample_size >= min(ENOUGH_EFFECTIVE, samples)
     if enough and sampler != EMCEE:
@@ -113,6 +98,36 @@ def sample(
         r_hat,
         method,
     )
+
+
+def weigh_along(
+    density: Density,
+    peaks: Sequence[Peak],
+    samples: int,
+    rng: np.random.Generator,
+    centres: FloatArray | None = None,
+    on_progress: Callable[[float], None] = lambda done: None,
+) -> tuple[Weighted[Draws], FloatArray]:
+    """Return weighted draws, enough for so many samples where it can be, and points (n, d) along
+    the valleys that led to them.
+    """
+    wanted = max(_SET.enough * samples, _SET.fewest_effective)
+    rough = density.rough
+    points, nearest = draw_along(rough, peaks, rng, centres)
+    on_progress(0.4)
+    for attempt in range(_SET.attempts):
+        best = points[[int(rough.log(points).argmax())]]
+        whitening = most_likely_error(rough, best).whitening
+        valleys = [Valley(rough, points, whitening)]
+        if attempt == 0:
+            valleys = valleys_through(rough, points, nearest, whitening)
+        first = Proposal.through(valleys, points, _SET.clusters, rng)
+        final = weigh(density, first, wanted, rng)
+        if final.effective_sample_size > _SET.poor * wanted:
+            break
+        # The posterior is elsewhere than it seemed: start again from where the weight is.
+        points = final.spread(_SET.again, rng)
+    return final, points
 
 
 def most_likely_error(density: Density, z: FloatArray) -> Covariance:
