@@ -153,9 +153,7 @@ def assert_forms_spoken(paper: Paper, document: object) -> None:
 
 
 @pytest.mark.parametrize("kind", [*KINDS, "bare"])
-def test_hanger_of_any_kind_is_told_in_numbers_and_words(
-    kind: str, season: HangerReport, bare: HangerReport
-) -> None:
+def test_hanger_of_any_kind_is_spoken(kind: str, season: HangerReport, bare: HangerReport) -> None:
     data = bare if kind == "bare" else KINDS[kind](season)
     if kind in DRAWN:
         assert_forms_spoken(hanger_paper(data), hanger_json(data))
@@ -165,7 +163,7 @@ def test_hanger_of_any_kind_is_told_in_numbers_and_words(
 
 
 @pytest.mark.parametrize("with_period", [False, True])
-def test_a_bridge_is_told_in_numbers_and_words(season: HangerReport, with_period: bool) -> None:
+def test_bridge_is_spoken(season: HangerReport, with_period: bool) -> None:
     drift = replace(season.drifts[0], shift_mean=NAN, shift_sd=NAN, probability=NAN)
     tension = Interval(650e3, 640e3, 660e3)
     course = PeriodSummary(2, 1, Interval(-0.07, -0.08, -0.06)) if with_period else None
@@ -186,7 +184,7 @@ def test_a_bridge_is_told_in_numbers_and_words(season: HangerReport, with_period
 
 
 @pytest.mark.parametrize("kind", ["refused", "given responses", "one sensor", "ambient"])
-def test_test_of_any_kind_is_told_in_numbers_and_words(kind: str) -> None:
+def test_test_of_any_kind_is_spoken(kind: str) -> None:
     sheet = SHEETS[kind]()
     assert_forms_spoken(modal_test_paper(sheet), modal_test_json(sheet))
     assert ("Do not use" in pdf_words(modal_test_paper(sheet))) == (kind == "refused")

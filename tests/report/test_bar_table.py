@@ -117,9 +117,7 @@ def missing(text: str) -> list[str]:
 
 
 @every_report
-def test_pdf_and_page_describe_the_bar_first(
-    make: Made, season: HangerReport, unpainted: None
-) -> None:
+def test_forms_describe_bar_first(make: Made, season: HangerReport, unpainted: None) -> None:
     """On page 1 of the PDF, and before the figures of the page."""
     paper = make(season)[0]
     first = Pdf.parse(as_pdf(paper)).pages[0]
@@ -176,9 +174,7 @@ def test_rows_name_what_was_described_and_no_more() -> None:
          "transverse at 2.5 m; longitudinal at 1 m"),
     ],
 )  # fmt: skip
-def test_sensors_are_told_by_plane_and_place(
-    sensors: tuple[ResponsePoint, ...], words: str
-) -> None:
+def test_sensors_by_plane_and_place(sensors: tuple[ResponsePoint, ...], words: str) -> None:
     assert dict(bar_rows(BarDescription(3, sensors=sensors)))["Sensors"] == words
 
 

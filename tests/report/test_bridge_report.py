@@ -78,9 +78,7 @@ def test_without_a_pattern_the_hangers_are_told_and_why(report: BridgeReport) ->
     assert document["hangers"][8]["tension_n"] is None
 
 
-def test_a_hanger_whose_change_is_called_tells_of_those_beside_it(
-    season: HangerReport, pattern: BridgePattern
-) -> None:
+def test_changed_hanger_tells_of_neighbours(season: HangerReport, pattern: BridgePattern) -> None:
     called = replace(with_now(season, called=(a_change(),)), neighbours=pattern)
     table = neighbours(called)
     assert [row[0] for row in table.rows] == ["1", "2", "3", "4", "5"]
@@ -89,9 +87,7 @@ def test_a_hanger_whose_change_is_called_tells_of_those_beside_it(
     assert neighbours(season).rows == ()
 
 
-def test_a_hanger_whose_tension_is_hardly_known_is_to_be_tested_for_more_modes(
-    report: BridgeReport,
-) -> None:
+def test_undetermined_tension_asks_for_modes(report: BridgeReport) -> None:
     first, *rest = report.hangers
     wide = a_summary(first.hanger, Status.STEADY, Interval(700e3, 400e3, 1900e3))
     told = text_words(bridge_paper(replace(report, hangers=(wide, *rest))))

@@ -52,9 +52,7 @@ def _lines(name: str, *texts: str) -> Iterator[str]:
     yield ""
 
 
-def test_the_words_beside_every_figure_are_those_that_were_agreed(
-    season: HangerReport, bare: HangerReport
-) -> None:
+def test_captions_are_as_agreed(season: HangerReport, bare: HangerReport) -> None:
     assert written(season, bare) == KEPT.read_text(encoding="utf-8")
 
 

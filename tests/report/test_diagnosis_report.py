@@ -181,9 +181,7 @@ def test_a_mean_outside_its_interval_is_not_told() -> None:
         (EffectEstimate("mass_kg", "kg", NAN, NAN, NAN, NAN), "of unknown size kg"),
     ],
 )
-def test_sizes_have_the_digits_that_their_intervals_deserve(
-    estimate: EffectEstimate, words: str
-) -> None:
+def test_sizes_have_digits_of_intervals(estimate: EffectEstimate, words: str) -> None:
     assert str(size(estimate)) == words
 
 
@@ -195,9 +193,7 @@ def test_sizes_have_the_digits_that_their_intervals_deserve(
         (0.02, -0.05, 0.09, "+0.02 m (-0.05 to +0.09) longer"),
     ],
 )
-def test_directions_are_said_in_words_where_they_are_sure(
-    mean: float, q05: float, q95: float, words: str
-) -> None:
+def test_sure_directions_are_words(mean: float, q05: float, q95: float, words: str) -> None:
     length = EffectEstimate("length_change_m", "m", mean, 0.02, q05, q95)
     cause = make_cause("effective_length", 0.9, "deck end", parameters=(length,))
     assert phrase(cause) == f"an effective length {words} than described at the deck end"
@@ -214,9 +210,7 @@ def estimates(effect: str, at: str) -> Cause:
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_every_effect_of_the_catalogue_is_put_in_words_with_its_size_at_every_place(
-    effect: str,
-) -> None:
+def test_every_effect_has_words_and_size(effect: str) -> None:
     for variant in EFFECTS[effect].variants(HANGER, RICH):
         told = phrase(estimates(effect, variant.at))
         assert not told.startswith(formatting.quantity(effect) + " at")
@@ -279,9 +273,7 @@ def test_tables_keep_no_gap_and_lead_with_an_excluded_frequency() -> None:
     assert rows.index(marked) < rows.index(others[0])
 
 
-def test_report_holds_the_latest_diagnosis_or_says_how_to_make_one(
-    bare: HangerReport, unpainted: None
-) -> None:
+def test_report_holds_diagnosis_or_command(bare: HangerReport, unpainted: None) -> None:
     paper = hanger_paper(bare)
     for written in (page_words(paper), text_words(paper)):
         assert "shm gap diagnose --hanger 3" in written

@@ -118,9 +118,7 @@ def test_drawing_is_repeatable_and_changes_no_setting(season: HangerReport) -> N
     assert dict(mpl.rcParams) == before
 
 
-def test_trend_has_levels_alerts_and_counts_undated_tests(
-    figures: Figures, season: HangerReport
-) -> None:
+def test_trend_has_levels_and_alerts(figures: Figures, season: HangerReport) -> None:
     assert season.baseline_tension_n is not None
     (axes,) = figures["season"]["trend"].figure.axes
     named = [line for line in axes.lines if line.get_label() in ("baseline", "threshold")]
@@ -267,9 +265,7 @@ def test_an_excluded_test_stretches_no_axis_but_shows_at_its_edge(watched: Hange
     assert with_states(sound).axes[0].get_ylim()[1] > 800
 
 
-def test_words_over_changes_overlap_neither_each_other_nor_the_legend(
-    watched: HangerReport,
-) -> None:
+def test_words_over_changes_do_not_overlap(watched: HangerReport) -> None:
     figure = with_states(watched)
     texts = [text for text in figure.axes[0].texts if text.get_text()]
     boxes = [text.get_window_extent() for text in texts] + [figure.legends[0].get_window_extent()]

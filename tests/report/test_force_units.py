@@ -55,9 +55,7 @@ NOTHING = re.compile(r"(?<![\d.])0\.0*(?!\d)")
         (0.0, "N", "0 N", 1),
     ],
 )
-def test_force_has_the_unit_of_its_size(
-    force_n: float, unit: str, told: str, decimals: int
-) -> None:
+def test_force_unit_of_size(force_n: float, unit: str, told: str, decimals: int) -> None:
     found = force_unit(force_n)
     assert found.name == unit
     assert found.with_unit(force_n) == told
@@ -92,9 +90,7 @@ def of_size(season: HangerReport, tension_n: float) -> HangerReport:
 
 
 @pytest.mark.parametrize(("tension_n", "unit"), few_of(SIZES, 1), ids=NAMES)
-def test_a_report_tells_every_tension_in_that_unit(
-    season: HangerReport, tension_n: float, unit: str
-) -> None:
+def test_report_tells_tensions_in_unit(season: HangerReport, tension_n: float, unit: str) -> None:
     data = of_size(season, tension_n)
     for told in (text_words(hanger_paper(data)), DRAWING.sub("", as_html(hanger_paper(data)))):
         found = WITH_UNIT.findall(told)
@@ -108,9 +104,7 @@ def test_a_report_tells_every_tension_in_that_unit(
 
 
 @pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
-def test_figures_are_labelled_in_that_unit(
-    season: HangerReport, tension_n: float, unit: str
-) -> None:
+def test_figures_are_in_unit(season: HangerReport, tension_n: float, unit: str) -> None:
     (item,) = drawn((TREND,), of_size(season, tension_n))
     (trend,) = item.figure.axes
     assert trend.get_ylabel() == f"tension ({unit})"
@@ -121,9 +115,7 @@ def test_figures_are_labelled_in_that_unit(
 
 
 @pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
-def test_a_bridge_has_one_unit_for_its_tensions_and_their_shifts(
-    hanger: Hanger, tension_n: float, unit: str
-) -> None:
+def test_bridge_has_one_unit(hanger: Hanger, tension_n: float, unit: str) -> None:
     moved = {3: -0.05, 4: 0.03}
     shifts = [
         HangerShift(i, i - 1, NOW, tension_n, moved.get(i, 0.0) * tension_n, 0.002 * tension_n)

@@ -74,9 +74,7 @@ def test_names_from_outside_cannot_inject_markup(bare: HangerReport) -> None:
     )
 
 
-def test_document_holds_the_contract_and_null_for_the_unknown(
-    season: HangerReport, bare: HangerReport
-) -> None:
+def test_document_holds_contract_and_null(season: HangerReport, bare: HangerReport) -> None:
     document = json.loads(documents.dump(hanger_json(season)))
     posterior = documents.dump(documents.posterior_document(season.posterior))
     assert (document["schema"], document["status"]) == ("shm.report/1", "alert")
@@ -226,9 +224,7 @@ def test_report_has_every_table_it_has_data_for(season: HangerReport, bare: Hang
     assert "... and 18 earlier ones" in as_text(hanger_paper(long))
 
 
-def test_frequencies_say_what_was_not_measured_or_followed(
-    season: HangerReport, bare: HangerReport
-) -> None:
+def test_frequencies_not_measured_or_followed(season: HangerReport, bare: HangerReport) -> None:
     table = frequencies(bare)
     assert (table.rows[1][2], table.rows[1][-1]) == ("not measured", "not measured")
     assert "shm gap diagnose" not in table.note

@@ -204,9 +204,7 @@ MODES = [alert("check the modes", message="Modes. Look within a week.")]
         ({"warnings": ["It is new. Wait.", "Another. Wait."]}, "CHECK", "It is new."),
     ],
 )  # fmt: skip
-def test_message_of_a_moved_hanger_is_the_most_urgent(
-    changes: dict[str, Any], status: str, state: str
-) -> None:
+def test_message_of_moved_hanger(changes: dict[str, Any], status: str, state: str) -> None:
     message = with_tension(**changes, notes=("Ada looked.",)).message
     assert message.status is Status[status]
     assert state in message.lead.state
@@ -356,9 +354,7 @@ def row(*shares: float, families: str = "") -> str:
         (0.49, False, False),  # its interval reaches beyond half
     ],
 )
-def test_a_hanger_that_is_nearly_slack_by_its_own_test_is_said_first(
-    now: float, is_reported: bool, is_said: bool
-) -> None:
+def test_nearly_slack_is_said_first(now: float, is_reported: bool, is_said: bool) -> None:
     said = nearly_slack(
         HANGER_3, share_of_nominal(1.0), share_of_nominal(now), is_reported=is_reported
     )

@@ -132,9 +132,7 @@ def test_an_interval_wider_than_half_the_tension_determines_nothing() -> None:
         (20.0, "The tension is now 12.88 ± 0.27 MN. At the baseline it was 14.00 ± 0.26 MN."),
     ],
 )
-def test_an_alert_states_it_in_the_unit_that_fits_before_its_details(
-    size: float, said: str
-) -> None:
+def test_alert_states_tension_in_fitting_unit(size: float, said: str) -> None:
     found = now(baseline=tension(size * BASE_N, size * SD))
     alert = replace(an_alert(), message="Hanger 3: tension fell. Look today. Details: p 0.99.")
     told = with_tension(alert, found)

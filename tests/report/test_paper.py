@@ -135,17 +135,13 @@ def first_missing(paper: Paper, renderer: str, found: str) -> str | None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("renderer", RENDERERS)
-def test_all_that_a_paper_says_is_rendered_in_its_order(
-    kind: str, renderer: str, papers: dict[str, Paper]
-) -> None:
+def test_renderer_says_all_in_order(kind: str, renderer: str, papers: dict[str, Paper]) -> None:
     paper = papers[kind]
     assert first_missing(paper, renderer, squeezed(written(paper, renderer))) is None
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
-def test_a_cell_that_is_lost_or_out_of_order_is_found(
-    renderer: str, papers: dict[str, Paper]
-) -> None:
+def test_lost_or_moved_cell_is_found(renderer: str, papers: dict[str, Paper]) -> None:
     paper = papers["diagnosis"]
     *parts, last = paper.parts
     (first, *others) = last.tables
@@ -159,9 +155,7 @@ def test_a_cell_that_is_lost_or_out_of_order_is_found(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_leads_with_its_state_and_fits_a_terminal(
-    kind: str, papers: dict[str, Paper]
-) -> None:
+def test_kind_leads_with_state_and_fits(kind: str, papers: dict[str, Paper]) -> None:
     paper = papers[kind]
     assert paper.parts[0].title == "In short"
     assert paper.parts[0].full_summary

@@ -40,9 +40,7 @@ def test_the_same_content_gives_the_same_bytes(bare: HangerReport) -> None:
     assert first != as_pdf(hanger_paper(replace(bare, bridge="Another bridge")))
 
 
-def test_pages_are_few_named_numbered_and_the_first_says_what_to_do(
-    parsed: Pdf, content: bytes
-) -> None:
+def test_pages_are_few_and_named(parsed: Pdf, content: bytes) -> None:
     assert len(parsed.pages) > 2
     for number, page in enumerate(parsed.pages, 1):
         told = " ".join(page.split())
@@ -85,9 +83,7 @@ def test_words_are_set_as_they_are_in_embedded_fonts(bare: HangerReport) -> None
     assert sly in Pdf.parse(as_pdf(hanger_paper(named))).words
 
 
-def test_figures_are_as_fine_as_print_needs_and_have_numbered_captions(
-    season: HangerReport, content: bytes, parsed: Pdf
-) -> None:
+def test_figures_are_fine_and_numbered(season: HangerReport, content: bytes, parsed: Pdf) -> None:
     widths = [int(width) for width in re.findall(rb"/Subtype /Image.*?/Width (\d+)", content, re.S)]
     assert widths
     assert min(widths) / (WIDTH / 72) >= 200
@@ -128,9 +124,7 @@ def test_narrow_columns_keep_one_line_and_wide_ones_share_the_rest() -> None:
 
 
 @pytest.mark.parametrize(("columns", "marked"), [(1, 0), (2, 1), (3, 1), (5, 1)])
-def test_a_rows_mark_stands_before_its_second_cell_in_the_colour_of_its_verdict(
-    columns: int, marked: int
-) -> None:
+def test_row_mark_has_colour_of_verdict(columns: int, marked: int) -> None:
     verdicts = ("good", "unknown", "refused", "best", "warning")
     row = ("x",) * columns
     table = Table("t", row, (row,) * len(verdicts), marks=verdicts)
