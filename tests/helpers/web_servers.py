@@ -80,7 +80,7 @@ def a_thread(workers: int) -> ProcessPoolExecutor:
 
 @contextmanager
 def in_a_thread() -> Iterator[None]:
-    """What takes long is worked out in a thread here: its processes are tested by themselves."""
+    """Work out in a thread what takes long: its processes are tested by themselves."""
     worker = partial(BackgroundWorker, pool=a_thread)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("shm_daemon.web.app.BackgroundWorker", worker)
@@ -107,7 +107,7 @@ def outcome(client: httpx.Client, ordered: httpx.Response) -> httpx.Response:
 
 
 def add_a_user_of_each_role(workspace: Workspace) -> None:
-    """Each named as the role, with the one password."""
+    """Add users that are named as their roles, with the one password."""
     with workspace.store() as store:
         for role in Role:
             store.people.add(role, role, PASSWORD, utc_now())
