@@ -77,7 +77,8 @@ def check_effects(names: Sequence[str]) -> None:
     unknown = sorted(set(names) - set(EFFECTS))
     if unknown:
         raise UsageError(
-            f"No effect is called {', '.join(unknown)}. The catalogue has {', '.join(EFFECTS)}."
+            f"no effect is called {', '.join(unknown)}.",
+            remedy=f"Name effects of the catalogue: {', '.join(EFFECTS)}.",
         )
 
 

@@ -15,9 +15,7 @@ EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
 
 
 @pytest.mark.parametrize("example", few_of(EXAMPLES, 3), ids=lambda path: path.stem)
-def test_an_example_runs_and_finds_the_known_truth(
-    example: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_example_finds_the_truth(example: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = runpy.run_path(str(example), run_name="__main__")
     assert capsys.readouterr().out
     assert found["figure"].axes

@@ -26,7 +26,12 @@ def tree(
     return shm.export.datatree(posterior, [test_of_711_kn], hanger)
 
 
-def test_draws_are_one_chain_with_units(tree: xarray.DataTree, posterior: shm.Posterior) -> None:
+def test_datatree_holds_draws_likelihood_and_what_would_be_measured(
+    tree: xarray.DataTree,
+    posterior: shm.Posterior,
+    hanger: shm.Hanger,
+    test_of_711_kn: shm.ModalTest,
+) -> None:
     group = tree["posterior"]
     assert set(group.data_vars) == {*posterior.names, "tension_n"}
     assert group["tension_n"].dims == ("chain", "draw")
@@ -35,11 +40,6 @@ def test_draws_are_one_chain_with_units(tree: xarray.DataTree, posterior: shm.Po
     np.testing.assert_array_equal(tree["sample_stats"]["lp"].values[0], posterior.log_likelihood)
     assert tree.attrs["model"] == "beam1"
     assert tree.attrs["tests"] == ["t1"]
-
-
-def test_the_likelihood_of_all_measurements_adds_up(
-    hanger: shm.Hanger, tree: xarray.DataTree, test_of_711_kn: shm.ModalTest
-) -> None:
     # With the thesis's priors: those of the description know errors that measurements share.
     thesis = shm.update(test_of_711_kn, hanger, "beam1", samples=200, priors="thesis")
     each = shm.export.datatree(thesis, [test_of_711_kn], hanger)["log_likelihood"]
@@ -49,11 +49,6 @@ def test_the_likelihood_of_all_measurements_adds_up(
     assert list(observed.values) == [mode.frequency_hz for mode in test_of_711_kn.modes]
     assert list(observed["order"].values) == [mode.order for mode in test_of_711_kn.modes]
     assert set(observed["test"].values) == {"t1"}
-
-
-def test_what_would_be_measured_spreads_as_model_and_measurement_do(
-    tree: xarray.DataTree, posterior: shm.Posterior
-) -> None:
     first = tree["posterior_predictive"]["frequency_hz"].values[0, :, 0]
     row = posterior.predicted[0]
     sigma = np.hypot(posterior.parameter("sigma"), 0.001) * row.measured_hz
@@ -61,14 +56,11 @@ def test_what_would_be_measured_spreads_as_model_and_measurement_do(
     assert first.std() == pytest.approx(np.hypot(row.sd_hz, np.sqrt((sigma**2).mean())), rel=0.2)
 
 
-def test_without_tests_a_posterior_still_says_what_it_holds(posterior: shm.Posterior) -> None:
+def test_datatree_of_no_or_other_tests(
+    posterior: shm.Posterior, hanger: shm.Hanger, test_of_711_kn: shm.ModalTest
+) -> None:
     alone = shm.export.datatree(posterior)
     assert set(alone.children) == {"posterior", "sample_stats", "observed_data", "constant_data"}
-
-
-def test_a_posterior_of_other_tests_is_refused(
-    hanger: shm.Hanger, posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
-) -> None:
     longer = replace(hanger, length_m=11.0)
     with pytest.raises(BadInput, match="was not made from these tests"):
         shm.export.datatree(posterior, [test_of_711_kn], longer)
@@ -76,9 +68,7 @@ def test_a_posterior_of_other_tests_is_refused(
         shm.export.datatree(posterior, [test_of_711_kn])
 
 
-def test_a_data_set_that_counts_ten_times_is_known_again(
-    hanger: shm.Hanger, test_of_711_kn: shm.ModalTest
-) -> None:
+def test_test_that_counts_tenfold(hanger: shm.Hanger, test_of_711_kn: shm.ModalTest) -> None:
     """Posteriors of earlier versions say nothing of how often their one test counted."""
     copies = shm.update([test_of_711_kn] * 10, hanger, "beam1", samples=200, priors="thesis")
     first = copies.predicted[: len(test_of_711_kn.modes)]
@@ -106,8 +96,8 @@ def test_arviz_reads_the_file_and_finds_the_same_mean(
         assert np.isfinite(arviz.loo(read).elpd_loo)
 
 
-def test_tables_hold_draws_and_modes(
-    posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
+def test_tables_and_files_hold_draws_and_modes(
+    posterior: shm.Posterior, test_of_711_kn: shm.ModalTest, tmp_path: Path
 ) -> None:
     draws = shm.export.samples(posterior)
     assert list(draws.columns) == [*posterior.names, "tension_n", "log_likelihood"]
@@ -116,9 +106,6 @@ def test_tables_hold_draws_and_modes(
     assert len(modes) == 8
     assert modes["damping_ratio"].isna().all()
     assert str(modes["time"].dtype).endswith("UTC]")
-
-
-def test_files_hold_the_same_draws(tmp_path: Path, posterior: shm.Posterior) -> None:
     for suffix in ("csv", "npz", "json"):
         shm.export.write(posterior, tmp_path / f"a.{suffix}")
     tension = posterior.tension_n
@@ -128,9 +115,6 @@ def test_files_hold_the_same_draws(tmp_path: Path, posterior: shm.Posterior) -> 
     document = json.loads((tmp_path / "a.json").read_text())
     assert document["draws"]["tension_n"] == tension.tolist()
     assert document["samples"] == len(tension)
-
-
-def test_an_unknown_format_says_which_there_are(tmp_path: Path, posterior: shm.Posterior) -> None:
     with pytest.raises(UsageError, match=r"unknown suffix '.xls'. Use .csv, .nc, .json or .npz"):
         shm.export.write(posterior, tmp_path / "a.xls")
     with pytest.raises(UsageError, match="unknown format 'excel'"):
@@ -174,10 +158,10 @@ def test_datatree_units(
             for name, each in parameters.items() if name in units} == units  # fmt: skip
 
 
-@pytest.mark.parametrize("name", list(MODELS))
-def test_model_class_units(name: str) -> None:
+def test_model_class_units() -> None:
     """Every parameter of every class has a unit; a solid's springs are forces on a length."""
-    units, spring = MODELS[name].units, "N/m" if name.startswith("solid") else "N m/rad"
-    assert {each: units[each] for each in MODELS[name].bounds} == {
-        each: spring if each.startswith("log10_k") else "1" for each in MODELS[name].bounds
-    }
+    for name, model in MODELS.items():
+        spring = "N/m" if name.startswith("solid") else "N m/rad"
+        assert {each: model.units[each] for each in model.bounds} == {
+            each: spring if each.startswith("log10_k") else "1" for each in model.bounds
+        }

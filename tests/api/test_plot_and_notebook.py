@@ -61,18 +61,15 @@ def drawn(
     }
 
 
-def test_every_figure_of_a_notebook_is_drawn_here() -> None:
+def test_every_figure_of_a_notebook_is_drawn_and_says_what_it_lacks(
+    hanger: shm.Hanger, posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
+) -> None:
     offered = {
         name
         for name, each in vars(shm.plot).items()
         if inspect.isfunction(each) and each.__module__ == "shm.plot" and name[0] != "_"
     }
     assert offered == set(UNITS)
-
-
-def test_a_figure_without_its_data_says_so(
-    hanger: shm.Hanger, posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
-) -> None:
     with pytest.raises(NothingThere, match="'Trend of the tension'"):
         shm.plot.trend([posterior], [test_of_711_kn], hanger)  # no test has a time
     with pytest.raises(UsageError, match="1 posteriors and 0 tests"):
@@ -91,16 +88,6 @@ class Formatter:
         return before
 
 
-@pytest.fixture
-def formatters() -> dict[str, Formatter]:
-    return {"image/png": Formatter()}
-
-
-@pytest.fixture
-def shell(formatters: dict[str, Formatter]) -> SimpleNamespace:
-    return SimpleNamespace(display_formatter=SimpleNamespace(formatters=formatters))
-
-
 def test_a_notebook_shows_values(
     hanger: shm.Hanger, posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
 ) -> None:
@@ -112,9 +99,9 @@ def test_a_notebook_shows_values(
     assert re.search(r"Tension \d+ kN", posterior._repr_html_())
 
 
-def test_a_notebook_shows_figures_unless_it_does_already(
-    shell: SimpleNamespace, formatters: dict[str, Formatter], drawn: dict[str, Figure]
-) -> None:
+def test_notebook_shows_figures_once(drawn: dict[str, Figure]) -> None:
+    formatters = {"image/png": Formatter()}
+    shell = SimpleNamespace(display_formatter=SimpleNamespace(formatters=formatters))
     notebook.load_ipython_extension(shell)
     png = formatters["image/png"].shown["matplotlib.figure", "Figure"](drawn["tension"])
     assert bytes(png).startswith(b"\x89PNG")  # type: ignore[call-overload]

@@ -35,24 +35,19 @@ def test_planes_and_places_override_the_file(path: Path) -> None:
     assert [e.x_m for e in moved.accelerations[1:]] == [e.x_m for e in before.accelerations[1:]]
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
+def test_a_channel_plane_or_file_that_is_not_there_is_refused(path: Path) -> None:
+    for given, said in (
         ({"planes": {"acc_9": "transverse"}}, "'acc_9', which the file does not have"),
         ({"places_m": {"acc_9": 1.0}}, "'acc_9', which the file does not have"),
         ({"planes": "vertical"}, "'vertical' is no plane"),
-    ],
-)
-def test_a_channel_or_plane_that_is_not_there_is_refused(
-    path: Path, given: dict[str, object], said: str
-) -> None:
-    with pytest.raises(UsageError, match=said):
-        shm.read(path, **given)  # type: ignore[arg-type]
+    ):
+        with pytest.raises(UsageError, match=said):
+            shm.read(path, **given)  # type: ignore[arg-type]
+    with pytest.raises(BadInput, match=r"none\.csv"):
+        shm.read(path.with_name("none.csv"))
 
 
-def test_frequency_responses_are_placed_too(
-    identified: shm.Identification, hanger: shm.Hanger
-) -> None:
+def test_responses_are_placed(identified: shm.Identification, hanger: shm.Hanger) -> None:
     from shm.api.placing import with_places
 
     response = identified.frequency_response
@@ -72,17 +67,14 @@ def test_a_recording_shows_its_channels(recording: shm.Recording) -> None:
         assert re.search(rf"^{channel.name} +{channel.quantity}", text, re.MULTILINE)
     assert not re.search(r"\bnan\b|None", text)
     assert "<caption>Recording" in recording._repr_html_()
-
-
-def test_a_recording_is_drawn_channel_by_channel(recording: shm.Recording) -> None:
     figure = recording.plot()
     assert len(figure.axes) == len(recording.channels)
     assert figure.axes[-1].get_xlabel() == "time (s)"
     assert "acceleration (m/s²)" in figure.axes[1].get_ylabel().replace("\n", " ")
 
 
-def test_a_figure_is_drawn_on_axes_of_ones_own(
-    posterior: shm.Posterior, hanger: shm.Hanger
+def test_a_figure_is_drawn_on_given_axes_if_they_are_enough(
+    posterior: shm.Posterior, hanger: shm.Hanger, recording: shm.Recording
 ) -> None:
     figure = Figure()
     left, right = figure.subplots(1, 2)
@@ -90,11 +82,6 @@ def test_a_figure_is_drawn_on_axes_of_ones_own(
     assert left.get_xlabel() == "tension (kN)"
     assert len(left.patches) > 10
     assert not right.has_data()
-
-
-def test_too_few_axes_are_refused_with_the_call_that_makes_enough(
-    recording: shm.Recording,
-) -> None:
     axes = Figure().subplots()
     with pytest.raises(UsageError, match=r"has 5 panels, and ax has 1.*plt.subplots\(5\)"):
         shm.plot.recording(recording, ax=axes)
@@ -110,11 +97,6 @@ def test_errors_name_calls_and_not_commands() -> None:
     with pytest.raises(UsageError) as kept, in_python():
         raise UsageError("no sampler.", remedy="Name one of a, b.")
     assert kept.value.remedy == "Name one of a, b."
-
-
-def test_a_missing_file_is_told_with_its_name(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"none\.csv"):
-        shm.read(tmp_path / "none.csv")
 
 
 def test_an_average_over_classes_is_a_property(posterior: shm.Posterior) -> None:

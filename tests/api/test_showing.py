@@ -18,9 +18,7 @@ from shm.watch.frequency_watch import measured_levels
 from tests.helpers.diagnoses import a_diagnosis
 
 
-def test_a_line_says_what_whose_and_the_tension_as_the_report_rounds_it(
-    posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
-) -> None:
+def test_repr_rounds_as_report(posterior: shm.Posterior, test_of_711_kn: shm.ModalTest) -> None:
     stated = tension(Interval.of_samples(posterior.tension_n), force_unit(711e3))
     told = stated.replace("90 % interval", "90 % credible interval")
     told = re.sub(r" kN \((.*interval)", r" kN (\1", told)
@@ -36,7 +34,7 @@ def test_a_line_says_what_whose_and_the_tension_as_the_report_rounds_it(
     )
 
 
-def test_what_is_not_known_is_said() -> None:
+def test_line_and_summary_say_what_is_not_known() -> None:
     unknown = replace(a_diagnosis().tension_after_n, mean=math.nan)
     assert "tension not known" in repr(replace(a_diagnosis(), tension_after_n=unknown))
     alone = shm.ModalTest("a", ())
@@ -44,9 +42,7 @@ def test_what_is_not_known_is_said() -> None:
     assert "time not recorded, temperature not recorded" in alone.summary()
 
 
-def test_a_summary_is_in_the_words_of_the_report(
-    posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
-) -> None:
+def test_summary_has_report_words(posterior: shm.Posterior, test_of_711_kn: shm.ModalTest) -> None:
     doubted = replace(posterior, description_off_sd=5.0)
     diagnosis = a_diagnosis()
     for value in (posterior, test_of_711_kn, diagnosis):
@@ -55,11 +51,19 @@ def test_a_summary_is_in_the_words_of_the_report(
     assert doubted.faults[0] in " ".join(doubted.summary().split())
     assert write_lead(diagnosis) in " ".join(diagnosis.summary().split())
     assert len(test_of_711_kn.summary().splitlines()) == 3 + len(test_of_711_kn.modes)
+    doubted = replace(posterior, description_off_sd=5.0)
+    # Of classes it leads with caveats and the tension.
+    text = " ".join(shm.Selection((doubted, posterior), (0.6, 0.4)).summary().split())
+    caveat, tension, table = (
+        text.index(each)
+        for each in (doubted.faults[0], "Tension 69", "class probability log evidence")
+    )
+    assert caveat < tension < table
+    html = shm.Selection((posterior,), (1.0,))._repr_html_()
+    assert html.index("credible interval") < html.index("<table>")
 
 
-def test_tables_have_a_row_a_draw_a_mode_a_cause(
-    posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
-) -> None:
+def test_rows_of_dataframes(posterior: shm.Posterior, test_of_711_kn: shm.ModalTest) -> None:
     assert list(posterior.to_dataframe()["tension_n"]) == list(posterior.tension_n)
     modes = test_of_711_kn.to_dataframe()
     assert list(modes["frequency_hz"]) == [mode.frequency_hz for mode in test_of_711_kn.modes]
@@ -74,18 +78,13 @@ def test_tables_have_a_row_a_draw_a_mode_a_cause(
     assert "probability" in none
 
 
-def test_arviz_computes_with_a_posterior(posterior: shm.Posterior) -> None:
+def test_arviz_or_install(posterior: shm.Posterior, monkeypatch: pytest.MonkeyPatch) -> None:
     data = posterior.to_arviz()
     import arviz
 
     found = arviz.summary(data, var_names=["tension_n"], kind="stats", round_to="none")
     assert found.loc["tension_n", "mean"] == pytest.approx(posterior.tension_n.mean())
     assert data["posterior"]["tension_n"].attrs["units"] == "N"
-
-
-def test_without_arviz_it_says_what_to_install(
-    posterior: shm.Posterior, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setitem(sys.modules, "arviz", None)
     with pytest.raises(UsageError, match=r"arviz is not installed.*pip install 'shm\[arviz\]'"):
         posterior.to_arviz()
@@ -97,15 +96,3 @@ def test_posterior_of_structure_shows(test_of_711_kn: shm.ModalTest) -> None:
     html = found._repr_html_()
     assert "measured frequencies without a model" in html
     assert f"{test_of_711_kn.modes[0].frequency_hz:.3f}" in html
-
-
-def test_summary_of_classes_leads_with_caveats_and_the_tension(posterior: shm.Posterior) -> None:
-    doubted = replace(posterior, description_off_sd=5.0)
-    text = " ".join(shm.Selection((doubted, posterior), (0.6, 0.4)).summary().split())
-    caveat, tension, table = (
-        text.index(each)
-        for each in (doubted.faults[0], "Tension 69", "class probability log evidence")
-    )
-    assert caveat < tension < table
-    html = shm.Selection((posterior,), (1.0,))._repr_html_()
-    assert html.index("credible interval") < html.index("<table>")

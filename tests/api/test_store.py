@@ -27,7 +27,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     return with_a_loss(tmp_path_factory.mktemp("api") / "bridge")
 
 
-def test_it_gives_the_nouns_of_a_hanger(bridge: Workspace) -> None:
+def test_store_gives_the_nouns_of_a_hanger_and_their_trend(bridge: Workspace) -> None:
     with shm.Store(bridge.folder) as store:
         assert [hanger.id for hanger in store.hangers] == [3, 4]
         assert [test.id for test in store.tests(3)] == ["t0", "t1", "t2"]
@@ -36,6 +36,10 @@ def test_it_gives_the_nouns_of_a_hanger(bridge: Workspace) -> None:
         of_first = store.posterior(3, "t0", model="beam1")
         assert of_first.tension_n.mean() == pytest.approx(711e3, rel=0.02)
         assert store.selection(3).selected.model == "beam1"
+    with shm.Store(bridge.folder) as store:
+        figure = shm.plot.trend(store.posteriors(3), store.tests(3), store.hanger(3))
+    (tests,) = figure.axes[0].containers
+    assert len(tests.lines[0].get_xdata()) == 3
 
 
 def test_tension_is_headline(bridge: Workspace, capsys: pytest.CaptureFixture[str]) -> None:
@@ -109,10 +113,3 @@ def test_a_folder_that_is_no_workspace_is_refused_and_stays_as_it_is(tmp_path: P
     with pytest.raises(BadInput, match=r"bridge.toml: no such file"):
         shm.Store(tmp_path)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_trend_is_drawn_from_what_is_kept(bridge: Workspace) -> None:
-    with shm.Store(bridge.folder) as store:
-        figure = shm.plot.trend(store.posteriors(3), store.tests(3), store.hanger(3))
-    (tests,) = figure.axes[0].containers
-    assert len(tests.lines[0].get_xdata()) == 3

@@ -93,7 +93,7 @@ def run_python(code: str) -> str:
     return ran.stdout
 
 
-def test_the_names_are_pinned() -> None:
+def test_names_are_pinned_and_told_by_help_and_dir() -> None:
     top = {name for name in SIGNATURES if "." not in name}
     assert set(shm.__all__) == top | NOUNS | {"plot", "export"}
     assert {f"plot.{name}" for name in shm.plot.__all__} == {
@@ -102,23 +102,17 @@ def test_the_names_are_pinned() -> None:
     assert {f"export.{name}" for name in shm.export.__all__} == {
         name for name in SIGNATURES if name.startswith("export.")
     } | {"export.FORMATS"}
-
-
-@pytest.mark.parametrize("name", SIGNATURES)
-def test_a_signature_is_pinned(name: str) -> None:
-    assert bare(inspect.signature(named(name))) == SIGNATURES[name]  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("name", [name for name in SIGNATURES if name != "export.check_format"])
-def test_a_docstring_shows_an_example(name: str) -> None:
-    text = inspect.getdoc(named(name)) or ""
-    assert ">>> " in text
-
-
-def test_help_and_dir_tell_every_name() -> None:
     text = shm.__doc__ or ""
     assert set(shm.__all__) <= set(dir(shm))
     assert [name for name in shm.__all__ if f"`{name}`" not in text] == []
+    with pytest.raises(AttributeError, match="no attribute 'indentify'"):
+        shm.indentify  # noqa: B018
+
+
+@pytest.mark.parametrize("name", SIGNATURES)
+def test_a_signature_is_pinned_and_its_docstring_shows_an_example(name: str) -> None:
+    assert bare(inspect.signature(named(name))) == SIGNATURES[name]  # type: ignore[arg-type]
+    assert ">>> " in (inspect.getdoc(named(name)) or "") or name == "export.check_format"
 
 
 STEPS = ("read", "identify", "simulate")
@@ -134,6 +128,7 @@ def test_help_shows_function(name: str) -> None:
     assert signature.startswith(f"{name}({next(iter(inspect.signature(step).parameters))}: ")
     assert text[0].strip() == (inspect.getdoc(step) or "").partition("\n")[0]
     assert pydoc.locate(f"shm.{name}") is step
+    assert pickle.loads(pickle.dumps(step)) is step
 
 
 @pytest.mark.parametrize(
@@ -162,18 +157,7 @@ def test_step_after_any_import(imported: str) -> None:
     assert run_python(code) == "'function' object has no attribute 'nothing'\n"
 
 
-@pytest.mark.parametrize("name", STEPS)
-def test_step_pickles(name: str) -> None:
-    step = getattr(shm, name)
-    assert pickle.loads(pickle.dumps(step)) is step
-
-
-def test_a_wrong_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="no attribute 'indentify'"):
-        shm.indentify  # noqa: B018
-
-
-def test_import_loads_nothing_else() -> None:
+def test_import_is_cheap_and_steps_need_no_slow_library() -> None:
     code = (
         "import sys; before = set(sys.modules); import shm\n"
         "new = set(sys.modules) - before\n"
@@ -181,9 +165,6 @@ def test_import_loads_nothing_else() -> None:
     )
     printed = run_python(code)
     assert printed.split() == ["shm"]
-
-
-def test_the_steps_are_at_hand_without_the_libraries_that_take_long_to_load() -> None:
     code = (
         "import sys, shm\n"
         "for home in (shm, shm.plot, shm.export):\n"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+import shlex
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from tests.helpers.workspaces import make_workspace, write_test
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended and what it wrote."""
+    """How a command ended and what it wrote; `told` and `said` are its outputs on one line."""
 
     code: int
     out: str
@@ -30,8 +30,47 @@ class Ended:
     def document(self) -> Any:
         return json.loads(self.out)
 
+    @property
+    def told(self) -> str:
+        return " ".join(self.out.split())
 
-Shm = Callable[..., Ended]
+    @property
+    def said(self) -> str:
+        return " ".join(self.err.split())
+
+
+@dataclass(frozen=True)
+class Shm:
+    """The command line; a single text is taken apart as a shell does it."""
+
+    capsys: pytest.CaptureFixture[str]
+    before: tuple[object, ...] = ()
+
+    def at(self, workspace: Workspace | Path) -> Shm:
+        folder = workspace.folder if isinstance(workspace, Workspace) else workspace
+        return replace(self, before=("--workspace", folder))
+
+    def __call__(self, *arguments: object) -> Ended:
+        if len(arguments) == 1 and isinstance(arguments[0], str):
+            arguments = tuple(shlex.split(arguments[0]))
+        self.capsys.readouterr()
+        code = run([str(argument) for argument in (*self.before, *arguments)])
+        written = self.capsys.readouterr()
+        return Ended(code, written.out, written.err)
+
+    def done(self, *arguments: object) -> Ended:
+        """Run a command that must not fail."""
+        ended = self(*arguments)
+        assert ended.code == 0, ended.err
+        return ended
+
+    def told(self, *arguments: object) -> str:
+        return self.done(*arguments).told
+
+    def json(self, *arguments: object) -> Any:
+        if len(arguments) == 1 and isinstance(arguments[0], str):
+            arguments = tuple(shlex.split(arguments[0]))
+        return self.done(*arguments, "--json").document
 
 
 @pytest.fixture
@@ -39,14 +78,7 @@ def shm(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.delenv("SHM_WORKSPACE", raising=False)
     # What it ingests begins no processes: each first command would import all steps in new ones.
     monkeypatch.setattr(working, "executor_of", threads)
-
-    def call(*arguments: object) -> Ended:
-        capsys.readouterr()
-        code = run([str(argument) for argument in arguments])
-        written = capsys.readouterr()
-        return Ended(code, written.out, written.err)
-
-    return call
+    return Shm(capsys)
 
 
 @pytest.fixture(scope="session")
@@ -56,8 +88,29 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 
 @pytest.fixture
+def copied(bridge: Workspace, tmp_path: Path) -> Workspace:
+    """Return the same bridge, to be changed at will."""
+    return with_a_loss(tmp_path / "bridge")
+
+
+@pytest.fixture
 def empty(tmp_path: Path) -> Workspace:
-    return make_workspace(tmp_path / "bridge")
+    return make_workspace(tmp_path / "empty")
+
+
+@pytest.fixture
+def on_bridge(shm: Shm, bridge: Workspace) -> Shm:
+    return shm.at(bridge)
+
+
+@pytest.fixture
+def on_copy(shm: Shm, copied: Workspace) -> Shm:
+    return shm.at(copied)
+
+
+@pytest.fixture
+def on_empty(shm: Shm, empty: Workspace) -> Shm:
+    return shm.at(empty)
 
 
 @pytest.fixture(scope="session")

@@ -1,14 +1,13 @@
-"""`shm alerts ack` and `shm drift rebaseline`: what a person does about the watch, on record."""
+"""`shm alerts ack`, `shm drift rebaseline`, `gap adopt`: what a person does, on record."""
 
 from __future__ import annotations
 
-import shutil
-from pathlib import Path
-
+import numpy as np
 import pytest
 
-from shm.pipeline import rebaselining
+from shm.pipeline import adopting, rebaselining
 from shm.store import Store, StoredAlert, Workspace
+from shm.store.watch import list_adoptions
 from tests.cli.conftest import Shm
 from tests.helpers import quick_update
 from tests.helpers.flows import ingest
@@ -16,25 +15,30 @@ from tests.helpers.workspaces import write_test
 
 LOSS = 2
 """The number of the alert; the first asks to repeat the test that showed the loss first."""
-ACK = ("alerts", "ack", LOSS, "--why", "pin replaced")
-ANEW = ("drift", "rebaseline", "--hanger", 3, "--why", "pin replaced")
+REBASELINE = "drift rebaseline --hanger 3 --why 'pin replaced' --since"
+STIFFNESS = "beam1+bending_stiffness@everywhere"
+ADOPT = "gap adopt --hanger 3 --effect bending_stiffness --at everywhere --why"
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Put a stand-in in the sampler's place."""
+    for module in (rebaselining, adopting):
+        monkeypatch.setattr(
+            module, "update", lambda t, m, o, *_, **__: quick_update.update(t, m, o)
+        )
+    monkeypatch.setattr("shm_cli.update.update", lambda t, m, o, _: quick_update.update(t, m, o))
+    monkeypatch.setattr("shm_cli.update.select", lambda t, m, o, *_: quick_update.select(t, m, o))
 
 
 @pytest.fixture
-def workspace(bridge: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the bridge with a short history and one open alert, and a stand-in for the sampler."""
-    monkeypatch.setattr(
-        rebaselining,
-        "update",
-        lambda tests, model, options, *_, **__: quick_update.update(tests, model, options),
-    )
-    folder = tmp_path / "arch"
-    shutil.copytree(bridge.folder, folder)
-    with Workspace.open(folder, {}).store() as store:
+def on_copy(on_copy: Shm, copied: Workspace) -> Shm:
+    """Return commands on a bridge with one open alert."""
+    with copied.store() as store:
         notice, loss = sorted(store.alerts.list_all(), key=lambda each: each.id)
         assert (notice.alert.kinds, loss.id) == (("repeat the test",), LOSS)
         store.alerts.resolve(notice.id, "Jansen", "repeated", loss.raised_at)
-    return folder
+    return on_copy
 
 
 def loss_in(store: Store) -> StoredAlert:
@@ -42,101 +46,80 @@ def loss_in(store: Store) -> StoredAlert:
     return found
 
 
-def test_an_alert_is_acknowledged_with_who_and_why(shm: Shm, workspace: Path) -> None:
-    ended = shm("--workspace", workspace, *ACK, "--who", "Jansen")
-    assert ended.code == 0, ended.err
+def test_an_alert_is_acknowledged_with_who_and_why(on_copy: Shm, copied: Workspace) -> None:
+    """The list of alerts and the report say who took note."""
+    assert "open" in on_copy("alerts").out
+    ended = on_copy.done("alerts ack 2 --why 'pin replaced' --who Jansen")
     assert ended.out == "Alert 2 of hanger 3 is acknowledged.\n"
-    with Workspace.open(workspace, {}).store() as store:
+    with copied.store() as store:
         noted = loss_in(store).acknowledgement
     assert noted is not None
     assert (noted.who, noted.why) == ("Jansen", "pin replaced")
-
-
-def test_the_list_of_alerts_says_who_took_note(shm: Shm, workspace: Path) -> None:
-    assert "open" in shm("--workspace", workspace, "alerts").out
-    noted = shm("--workspace", workspace, *ACK, "--who", "Jansen", "--json").document
-    rows = shm("--workspace", workspace, "alerts", "--json").document["alerts"]
-    (listed,) = (row for row in rows if row["id"] == LOSS)
-    assert listed["acknowledged"] == noted["acknowledged"]
-    assert (noted["id"], noted["acknowledged"]["who"]) == (LOSS, "Jansen")
-    shown = shm("--workspace", workspace, "alerts").out
+    (listed,) = (row for row in on_copy.json("alerts")["alerts"] if row["id"] == LOSS)
+    assert listed["acknowledged"]["who"] == "Jansen"
+    shown = on_copy("alerts").out
     assert "Jansen" in shown
     assert "open" not in shown
+    report = on_copy.json("report --hanger 3")
+    words = report["acknowledged"]["hanger-3:two-tests-agree:tension-down:t2:baseline-1"]
+    assert words.startswith("Jansen, ")
+    assert words.endswith(": pin replaced")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "said"),
-    [
-        (("alerts", "ack", 7, "--why", "x"), 4, "no alert 7. See `shm alerts`."),
-        (("alerts", "ack", 1), 2, "--why"),
-        (("alerts", "ack", "x", "--why", "x"), 2, "ID"),
-        ((*ANEW, "--since", "2027-01-01"), 4, "no test since 2027-01-01"),
-        ((*ANEW, "--since", "lately"), 2, "--since"),
-        ((*ANEW,), 2, "--since"),
-        ((*ANEW, "--since", "2026-06-30", "--kind", "painted"), 2, "--kind"),
-        (("drift", "rebaseline", "--since", "2026-05-01", "--why", "x"), 2, "--hanger"),
-        (("drift", "rebaseline", "--hanger", 4, "--since", "2026-05-01", "--why", "x"), 4,
-         "no baseline yet"),
-        (("drift", "rebaseline", "--hanger", 9, "--since", "2026-05-01", "--why", "x"), 4,
-         "hanger 9"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_done_is_said_with_its_exit_code(
-    shm: Shm, workspace: Path, arguments: tuple[object, ...], code: int, said: str
-) -> None:
-    ended = shm("--workspace", workspace, *arguments)
-    assert ended.code == code, ended.err
-    assert said in " ".join(ended.err.split())
-    assert ended.out == ""
+def test_acknowledgement_as_a_document(on_copy: Shm) -> None:
+    noted = on_copy.json("alerts ack 2 --why 'pin replaced' --who Jansen")
+    (listed,) = (row for row in on_copy.json("alerts")["alerts"] if row["id"] == LOSS)
+    assert listed["acknowledged"] == noted["acknowledged"]
+    assert (noted["id"], noted["acknowledged"]["who"]) == (LOSS, "Jansen")
 
 
-def test_a_hanger_is_compared_anew_from_a_day_on(shm: Shm, workspace: Path) -> None:
-    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30")
-    assert ended.code == 0, ended.err
-    assert ended.out.startswith(
-        "Hanger 3 is compared with its one test since 2026-06-30 from now on: 5"
-    )
-    with Workspace.open(workspace, {}).store() as store:
+def test_a_hanger_is_compared_anew_from_a_day_on(on_copy: Shm, copied: Workspace) -> None:
+    """After it the shift from the old baseline is shown no more."""
+    told = on_copy.told(f"{REBASELINE} 2026-06-30")
+    assert told.startswith("Hanger 3 is compared with its one test since 2026-06-30 from now on: 5")
+    assert "Its tests still show what alert 2 told (tension fell by 20" in told
+    assert "still open" not in told, "resolved, and so open no more"
+    with copied.store() as store:
         baseline = store.watch.baseline(3)
     assert baseline is not None
     assert baseline.posterior.tests == ("t2",)
+    assert on_copy("drift").told == (
+        "Hanger 3 is compared anew since 2026-06-30; no test has come in after that baseline was "
+        "set."
+    )
+    report = on_copy.json("report --hanger 3")
+    assert report["drifts"] == []
+    assert report["status"] == "check", "20 % below nominal, whatever the baseline"
+    assert report["alerts"]
 
 
-def test_the_new_baseline_as_a_document(shm: Shm, workspace: Path) -> None:
-    ended = shm("drift", "rebaseline", "--workspace", workspace, *ANEW[2:], "--json",
-                "--who", "Jansen", "--since", "2026-05-31T09:00:00Z")  # fmt: skip
-    assert ended.code == 0, ended.err
-    document = ended.document
-    assert (document["hanger"], document["who"], document["why"], document["model"]) == (
-        3, "Jansen", "pin replaced", "beam1",
-    )  # fmt: skip
-    assert document["tests"] == ["t1", "t2"]
-    assert document["since"] == "2026-05-31T09:00:00Z"
+def test_the_new_baseline_as_a_document(on_copy: Shm) -> None:
+    document = on_copy.json(f"{REBASELINE} 2026-05-31T09:00:00Z --who Jansen")
+    known = [document[key] for key in ("hanger", "who", "why", "model", "tests", "since")]
+    assert known == [3, "Jansen", "pin replaced", "beam1", ["t1", "t2"], "2026-05-31T09:00:00Z"]
 
 
-def after_works(folder: Path, tension: float) -> None:
-    """Return a test of the day after the loss was told."""
-    opened = Workspace.open(folder, {})
-    write_test(opened.spool / "t3.modes.json", opened, day=61, tension=tension)
-    ingest(opened)
+def after_works(workspace: Workspace, tension: float) -> None:
+    """Take in a test of the day after the loss was told."""
+    write_test(workspace.spool / "t3.modes.json", workspace, day=61, tension=tension)
+    ingest(workspace)
 
 
 @pytest.mark.parametrize("kind", ["retensioned", "repaired"])
 @pytest.mark.parametrize("is_tested", [False, True])
-def test_works_that_no_test_shows_end_no_alert(
-    shm: Shm, workspace: Path, kind: str, is_tested: bool
-) -> None:
+def test_works_unseen_by_tests(on_copy: Shm, copied: Workspace, kind: str, is_tested: bool) -> None:
     # The tests since that day still show the loss: it would become the normal state.
     if is_tested:
-        after_works(workspace, 0.8)
+        after_works(copied, 0.8)
     since = "2026-07-01" if is_tested else "2026-06-30"
-    ended = shm("--workspace", workspace, *ANEW, "--since", since, "--kind", kind)
+    ended = on_copy(f"{REBASELINE} {since} --kind {kind}")
     assert ended.code == 3, ended.err
-    said = " ".join(ended.err.split())
-    assert f"hanger 3 is not {kind} by its tests since {since}" in said
-    assert "alert 2: tension fell by 20" in said
-    assert '--kind "accepted as it is"' in said
-    with Workspace.open(workspace, {}).store() as store:
+    for said in (
+        f"hanger 3 is not {kind} by its tests since {since}", "alert 2: tension fell by 20",
+        '--kind "accepted as it is"',
+    ):  # fmt: skip
+        assert said in ended.said
+    with copied.store() as store:
         stored = loss_in(store)
         baseline = store.watch.baseline(3)
     assert (stored.resolution, stored.acknowledgement) == (None, None)
@@ -144,71 +127,104 @@ def test_works_that_no_test_shows_end_no_alert(
     assert baseline.since is None, "the former baseline stays"
 
 
-def test_a_loss_that_is_accepted_as_it_is_ends_on_record(shm: Shm, workspace: Path) -> None:
-    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30", "--who", "Jansen",
-                "--kind", "accepted as it is", "--json")  # fmt: skip
-    assert ended.code == 0, ended.err
-    assert ended.document["alerts_explained"] == [LOSS]
-    (accepted,) = ended.document["accepted"]
+def test_a_loss_that_is_accepted_as_it_is_ends_on_record(on_copy: Shm, copied: Workspace) -> None:
+    document = on_copy.json(f"{REBASELINE} 2026-06-30 --who Jansen --kind 'accepted as it is'")
+    assert document["alerts_explained"] == [LOSS]
+    (accepted,) = document["accepted"]
     assert accepted["alert"] == LOSS
     assert accepted["words"].startswith("tension fell by 20")
-    with Workspace.open(workspace, {}).store() as store:
+    with copied.store() as store:
         resolution = loss_in(store).resolution
     assert resolution is not None
-    assert (resolution.who, resolution.why) == (
-        "Jansen", "new baseline: accepted as it is: pin replaced",
-    )  # fmt: skip
+    assert resolution.who == "Jansen"
+    assert resolution.why == "new baseline: accepted as it is: pin replaced"
 
 
-def test_an_event_ends_the_alerts_that_it_explains(shm: Shm, workspace: Path) -> None:
-    after_works(workspace, 1.0)
-    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-07-01", "--who", "Jansen",
-                "--kind", "retensioned", "--json")  # fmt: skip
-    assert ended.code == 0, ended.err
-    document = ended.document
+def test_an_event_ends_the_alerts_that_it_explains(on_copy: Shm, copied: Workspace) -> None:
+    after_works(copied, 1.0)
+    document = on_copy.json(f"{REBASELINE} 2026-07-01 --who Jansen --kind retensioned")
     assert (document["kind"], document["why"]) == ("retensioned", "retensioned: pin replaced")
     assert (document["alerts_explained"], document["alerts_open"]) == ([LOSS], [])
-    with Workspace.open(workspace, {}).store() as store:
+    with copied.store() as store:
         stored = loss_in(store)
     assert stored.resolution is not None
     assert stored.acknowledgement is not None
     assert stored.acknowledgement.why == "explained by: retensioned: pin replaced"
 
 
-def test_after_it_the_shift_from_the_old_baseline_is_shown_no_more(
-    shm: Shm, workspace: Path
-) -> None:
-    told = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30").out
-    assert "Its tests still show what alert 2 told (tension fell by 20" in " ".join(told.split())
-    assert "still open" not in told, "resolved, and so open no more"
-    shown = shm("--workspace", workspace, "drift").out
-    assert " ".join(shown.split()) == (
-        "Hanger 3 is compared anew since 2026-06-30; no test has come in after that baseline was "
-        "set."
-    )
-    report = shm("--workspace", workspace, "report", "--hanger", 3, "--json").document
-    assert report["drifts"] == []
-    assert report["status"] == "check", "20 % below nominal, whatever the baseline"
-    assert report["alerts"]
-
-
-def test_a_report_says_who_took_note_of_an_alert(shm: Shm, workspace: Path) -> None:
-    shm("--workspace", workspace, *ACK, "--who", "Jansen")
-    report = shm("--workspace", workspace, "report", "--hanger", 3, "--json").document
-    noted = report["acknowledged"]["hanger-3:two-tests-agree:tension-down:t2:baseline-1"]
-    assert noted.startswith("Jansen, ")
-    assert noted.endswith(": pin replaced")
-
-
-def test_of_one_hanger_drift_tells_how_it_goes_with_the_temperature(
-    shm: Shm, workspace: Path
-) -> None:
-    document = shm("--workspace", workspace, "drift", "--hanger", 3, "--json").document
-    tension = document["temperature_coefficients"][0]
+def test_drift_of_one_hanger_tells_how_it_goes_with_the_temperature(on_bridge: Shm) -> None:
+    why = "the temperatures of the tests differ by 0.0 K only"
+    tension = on_bridge.json("drift --hanger 3")["temperature_coefficients"][0]
     assert (tension["quantity"], tension["known"]) == ("tension", False)
-    assert tension["why_not_known"] == "the temperatures of the tests differ by 0.0 K only"
-    told = " ".join(shm("--workspace", workspace, "drift", "--hanger", 3).out.split())
-    assert "not known: the temperatures of the tests differ by 0.0 K only" in told
-    assert (
-        "temperature_coefficients" not in shm("--workspace", workspace, "drift", "--json").document
-    )
+    assert tension["why_not_known"] == why
+    assert f"not known: {why}" in on_bridge("drift --hanger 3").told
+    assert "temperature_coefficients" not in on_bridge.json("drift")
+
+
+# ------------------------------------------------------------ an effect is adopted
+
+
+def test_adopting_says_what_it_did_and_status_keeps_saying_it(on_copy: Shm) -> None:
+    """Select lets the adopted class compete."""
+    told = on_copy.told(f"{ADOPT} 'a strand, not a rod'")
+    assert f"Hanger 3 has the model class {STIFFNESS} from now on." in told
+    assert "beam1 with bending_stiffness (everywhere), adopted" in told
+    assert "hanger 3: beam1 with bending_stiffness (everywhere)" in on_copy("status").out
+    first, second = on_copy.json("status")["hangers"]
+    assert (first["model"], second["model"]) == (STIFFNESS, None)
+    assert STIFFNESS in first["competing"]
+    assert first["gap"]["has_grown"] is False
+    assert second["gap"] is None
+    models = on_copy.json("select --hanger 3")["models"]
+    assert [each["model"] for each in models] == ["beam1", STIFFNESS]
+
+
+def test_the_record_names_who_and_why_and_outlives_the_dropping(on_copy: Shm) -> None:
+    on_copy(f"{ADOPT} 'a strand' --who Jansen")
+    (listed,) = on_copy.json("gap adopted")["adoptions"]
+    assert (listed["who"], listed["why"], listed["model"]) == ("Jansen", "a strand", STIFFNESS)
+    told = on_copy.told("gap drop --hanger 3 --why 'a rod after all'")
+    assert "hanger 3 has the class beam1 again" in told
+    assert on_copy("gap adopted").code == 4
+    assert "Jansen" in on_copy("gap adopted --all").out
+    (record,) = on_copy.json("gap adopted --all")["adoptions"]
+    assert record["undone_why"] == "a rod after all"
+
+
+def test_several_adoptions_have_numbers(on_copy: Shm, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The gap now stands beside the one that is watched; one is dropped by its number."""
+    monkeypatch.setattr(adopting, "gap_percent", lambda found: 0.2 if "+" in found.model else 2.0)
+
+    def watch(store: Store, hanger: int) -> adopting.GapWatch:
+        return adopting.GapWatch(list_adoptions(store, hanger)[-1], 4.321, True)
+
+    monkeypatch.setattr("shm_cli.adopt.gap_watch", watch)
+    on_copy(f"{ADOPT} a")
+    on_copy("gap adopt --hanger 3 --effect distributed_mass --why b")
+    listed = on_copy.json("gap adopted")["adoptions"]
+    assert [each["gap_now_percent"] for each in listed] == [None, 4.321]
+    assert [each["gap_has_grown"] for each in listed] == [None, True]
+    rows = on_copy("gap adopted").told
+    for said in ("2.00, 0.20, none", "0.20, 0.20, 4.32", "gap before, with it, now (%)"):
+        assert said in rows
+    drop = "gap drop --hanger 3 --why no"
+    ended = on_copy(drop)
+    assert ended.code == 2
+    assert "one of 1, 2" in ended.err
+    assert on_copy(f"{drop} --number 7").code == 4
+    left = "has the class beam1+distributed_mass@everywhere again"
+    assert left in on_copy(f"{drop} --number 1").out
+    assert "has the class beam1 again" in on_copy(drop).out
+
+
+def test_adopted_class_is_known(shm: Shm, hanger_file: object, modes_file: object) -> None:
+    of = f"--hanger-file {hanger_file}"
+    zero = " ".join(f"--set={name}=0" for name in ("section", "density", "length", "modulus"))
+    found = [
+        [row["frequency_hz"] for row in shm.json(f"predict {words} {of}")["frequencies"]]
+        for words in ("beam1", f"{STIFFNESS} {zero} --set=stiffness_change=0")
+    ]
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-6)
+    document = shm.json(f"update {modes_file} {of} --model {STIFFNESS}")
+    assert document["model"] == STIFFNESS
+    assert "stiffness_change" in document["parameters"]

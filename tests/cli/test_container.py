@@ -42,7 +42,7 @@ def test_every_variable_of_ours_is_read_by_shm() -> None:
     assert named - known == {"SHM_NAME"}  # which the comment stands in for all
 
 
-def test_the_health_is_asked_where_the_interface_listens() -> None:
+def test_health_is_asked_where_it_listens_behind_our_proxy() -> None:
     web = SERVICES["web"]
     (url,) = re.findall(r'"(http://[^"]+)"', web["healthcheck"]["test"][-1])
     port = web["command"][web["command"].index("--port") + 1]
@@ -52,9 +52,6 @@ def test_the_health_is_asked_where_the_interface_listens() -> None:
     (default,) = re.findall(r"\{\$UPSTREAM:(.+)\}", (FOLDER / "Caddyfile").read_text())
     listens = {p.name: p.default for p in dict(commands())["web"].params}
     assert default == f"{listens['host']}:{listens['port']}"
-
-
-def test_the_proxy_that_is_believed_is_ours() -> None:
     address = SERVICES["proxy"]["networks"]["front"]["ipv4_address"]
     assert SERVICES["web"]["environment"]["SHM_WEB_PROXIES"] == address
     assert "front" not in SERVICES["daemon"].get("networks", ())
@@ -71,30 +68,23 @@ def test_a_service_is_confined_pinned_and_watched(name: str) -> None:
     assert re.fullmatch(r"[a-z]+:\d+\.\d+[\w.-]*", each["image"])
 
 
-def test_what_runs_here_is_the_package_of_this_version_as_a_plain_user() -> None:
+def test_image_is_this_version_as_a_plain_user_with_mounted_folders() -> None:
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert {each["image"] for each in OURS.values()} == {f"shm:{version}"}
     assert re.findall(r"^USER (\w+)$", CONTAINERFILE, re.M) == ["shm"]
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     (wanted,) = re.findall(r'"\.\[([\w,]+)\]"', CONTAINERFILE)
     assert set(wanted.split(",")) <= set(extras["optional-dependencies"])
-
-
-def test_its_folders_are_those_that_are_mounted() -> None:
     places = dict(re.findall(r"(SHM_\w+)=(\S+)", CONTAINERFILE))
     for each in OURS.values():
         mounted = {volume.rpartition(":")[2] for volume in each["volumes"]}
         assert {*places.values(), "/backup"} == mounted
 
 
-def test_the_page_says_what_stands_in_the_file_of_the_bridge() -> None:
+def test_page_names_variables_and_commands_that_are_taken() -> None:
     asked = set(re.findall(r"\$\{(\w+)", (FOLDER / "compose.yaml").read_text()))
     page = (DOCS / "install.md").read_text()
     assert asked == set(re.findall(r"^([A-Z]+)=", page, re.M))
-
-
-def test_every_command_of_the_page_in_a_container_is_taken() -> None:
-    page = (DOCS / "install.md").read_text()
     called = re.findall(
         r"docker compose (?:run --rm daemon|exec (?:-T )?daemon shm) ([^`|\n]+)", page
     )

@@ -31,9 +31,7 @@ def of_a_release(released: Path, empty: Workspace) -> Workspace:
 
 
 @pytest.mark.parametrize("released", few_of(RELEASED, 3), ids=lambda path: path.stem)
-def test_a_file_of_every_schema_upgrades_twice_without_complaint(
-    shm: Shm, empty: Workspace, released: Path
-) -> None:
+def test_file_of_schema_upgrades_twice(shm: Shm, empty: Workspace, released: Path) -> None:
     workspace = of_a_release(released, empty)
     for _ in range(2):
         ended = shm("--workspace", workspace.folder, "db", "upgrade", "--json")
@@ -69,9 +67,7 @@ def content(database: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("released", few_of(OLDER, 2), ids=lambda path: path.stem)
-def test_beside_a_daemon_nothing_is_upgraded_and_the_message_says_who_it_is(
-    shm: Shm, empty: Workspace, released: Path
-) -> None:
+def test_no_upgrade_beside_a_daemon(shm: Shm, empty: Workspace, released: Path) -> None:
     workspace = of_a_release(released, empty)
     before = content(workspace.database)
     with workspace.lock():
@@ -84,9 +80,7 @@ def test_beside_a_daemon_nothing_is_upgraded_and_the_message_says_who_it_is(
         assert check_store(store, quiet).troubles == ()
 
 
-def test_an_upgraded_store_holds_the_same_after_a_copy(
-    shm: Shm, empty: Workspace, tmp_path: Path
-) -> None:
+def test_upgraded_store_is_copied(shm: Shm, empty: Workspace, tmp_path: Path) -> None:
     workspace = of_a_release(OLDER[0], empty)
     assert shm("--workspace", workspace.folder, "db", "upgrade").code == 0
     with workspace.store() as store:

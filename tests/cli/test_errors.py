@@ -1,13 +1,16 @@
-"""What goes wrong is told with what, where and what to do: by every command, with no traceback."""
+"""What every command gives: JSON with --json, and an error that says what, where and what to do."""
 
 from __future__ import annotations
 
 import errno
+import json
+import re
 import shutil
 import sqlite3
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
@@ -16,6 +19,7 @@ from shm.store import Workspace
 from shm_cli import main
 from tests.cli.conftest import Ended, Shm
 from tests.helpers.command_lines import commands, examples, words_of
+from tests.helpers.workspaces import write_test
 
 NEEDS_NO_WORKSPACE = {
     "init", "demo", "completion", "manual", "notices", "settings", "gap effects",
@@ -55,12 +59,7 @@ def test_every_command_says_that_there_is_no_workspace_or_file(
     assert_told(shm(*words), {2, 3}, as_json="--json" in words)
 
 
-def test_a_missing_workspace_is_named(shm: Shm, tmp_path: Path) -> None:
-    ended = shm("--workspace", tmp_path / "arhc", "status")
-    assert ended.code == 3
-    assert str(tmp_path / "arhc") in ended.err
-    (tmp_path / "file").touch()
-    assert_told(shm("--workspace", tmp_path / "file", "status"), {3})
+Spoil = Callable[[Workspace], None]
 
 
 def _no_store(workspace: Workspace) -> None:
@@ -69,6 +68,10 @@ def _no_store(workspace: Workspace) -> None:
 
 def _no_database(workspace: Workspace) -> None:
     workspace.database.write_bytes(b"hello, I am no database" * 100)
+
+
+def _outdated_store(workspace: Workspace) -> None:
+    workspace.database.write_bytes(b"")
 
 
 def _newer_store(workspace: Workspace) -> None:
@@ -88,6 +91,7 @@ def _wrong_setting(workspace: Workspace) -> None:
         (_no_database, 5, "backup"),
         (_newer_store, 5, "Install the shm that wrote it"),
         (_wrong_setting, 3, "Give a whole number from 100"),
+        (_outdated_store, 5, "shm db upgrade"),
     ],
 )
 @pytest.mark.parametrize(
@@ -96,17 +100,12 @@ def _wrong_setting(workspace: Workspace) -> None:
      "archive fetch 1", "export --hanger 3 --out e.npz", "alerts ack 1 --why x"],
 )  # fmt: skip
 def test_a_workspace_that_is_spoilt_is_told_with_the_way_out(
-    shm: Shm,
-    empty: Workspace,
-    spoil: Callable[[Workspace], None],
-    code: int,
-    remedy: str,
-    line: str,
+    on_empty: Shm, empty: Workspace, spoil: Spoil, code: int, remedy: str, line: str
 ) -> None:
     spoil(empty)
-    ended = shm("--workspace", empty.folder, *line.split())
+    ended = on_empty(line)
     assert_told(ended, {code})
-    assert remedy in " ".join(ended.err.split())
+    assert remedy in ended.said
 
 
 def test_the_way_out_of_a_lost_store_works(shm: Shm, empty: Workspace, tmp_path: Path) -> None:
@@ -117,47 +116,6 @@ def test_the_way_out_of_a_lost_store_works(shm: Shm, empty: Workspace, tmp_path:
     assert shm("--workspace", empty.folder, "status").code == 0
     again = tmp_path / "anew"
     assert shm("init", again, "--from", empty.folder / "bridge.toml").code == 0
-
-
-@pytest.mark.parametrize(
-    "line",
-    ["export --hanger 3 --out {}/e.npz", "report --hanger 3 --format json --out {}/r.json",
-     "report --bridge --format text --out {}/r.txt", "gap diagnose --hanger 99 --html {}/g.html"],
-)  # fmt: skip
-def test_a_place_that_cannot_be_written_is_told_before_anything_is_done(
-    shm: Shm, bridge: Workspace, tmp_path: Path, line: str
-) -> None:
-    nowhere = tmp_path / "no" / "such"
-    ended = shm("--workspace", bridge.folder, *line.format(nowhere).split())
-    assert_told(ended, {3})
-    assert str(nowhere) in ended.err
-
-
-@pytest.mark.parametrize(
-    "line",
-    ["predict beam1 --hanger 3 --set theta_F=-1", "predict beam1 --hanger 3 --set theta_F=nan",
-     "predict beam1 --hanger 3 --sweep theta_F=0.9:1.1:0",
-     "predict beam1 --hanger 3 --sweep theta_F=0.9:1.1:100000000",
-     "predict beam77 --hanger 3", "gap adopt --hanger 3 --effect nonsense --why x",
-     "alerts test --hook nope"],
-)  # fmt: skip
-def test_a_value_that_means_nothing_is_a_wrong_call(shm: Shm, bridge: Workspace, line: str) -> None:
-    assert_told(shm("--workspace", bridge.folder, *line.split()), {2})
-
-
-@pytest.mark.parametrize(
-    "line",
-    ["alerts ack 1", "drift rebaseline --hanger 3 --since 2026-05-01", "gap drop --hanger 3",
-     "gap adopt --hanger 3 --effect point_mass"],
-)  # fmt: skip
-def test_nothing_goes_on_record_without_a_reason(shm: Shm, bridge: Workspace, line: str) -> None:
-    ended = shm("--workspace", bridge.folder, *line.split(), "--why", " ")
-    assert_told(ended, {2})
-    assert "it is empty" in ended.err
-
-
-def test_the_dashboard_is_not_announced_where_it_cannot_begin(shm: Shm, empty: Workspace) -> None:
-    assert_told(shm("--workspace", empty.folder, "web", "--host", "192.0.2.1"), {2})
 
 
 def test_an_answer_that_finds_no_room_is_no_fault_of_shm(
@@ -176,3 +134,100 @@ def test_an_answer_that_finds_no_room_is_no_fault_of_shm(
     assert main.run(["settings", "--json"]) == 3
     told = capsys.readouterr().err
     assert "no room is left where the answer goes" in told
+
+
+FOR_PEOPLE_ALONE = {"demo", "daemon", "web", "completion"}
+"""They serve until they are ended, or print what a shell reads; `export` writes files."""
+OF_FILES = {"export"}
+
+
+def has_json(command: click.Command) -> bool:
+    return any("--json" in parameter.opts for parameter in command.params)
+
+
+def test_every_command_that_a_script_would_call_takes_json() -> None:
+    lacking = {
+        name
+        for name, command in commands()
+        if not has_json(command)
+        and not (isinstance(command, click.Group) and not command.invoke_without_command)
+    }
+    assert lacking - OF_FILES == FOR_PEOPLE_ALONE
+
+
+def parsed(text: str) -> Any:
+    """One document; NaN and Infinity, which Python's parser would take, are refused."""
+
+    def refused(word: str) -> None:
+        raise AssertionError(f"{word} is no JSON")
+
+    return json.loads(text, parse_constant=refused)
+
+
+SCHEMAS = {"status": "shm.status/1", "status --of 1": "shm.recording_stages/1"}
+READING = (
+    "alerts",
+    "alerts --hanger 3",
+    "archive prune --keep-days 1 --dry-run",
+    "bridges",
+    "db check",
+    "db check --archive",
+    "doctor",
+    "drift",
+    "drift --hanger 3",
+    "drift --hanger 3 --all",
+    "drift bridge",
+    "gap adopted",
+    "predict beam1 --hanger 3",
+    "predict beam2 --hanger 3 --set log10_k1=8 --set log10_k2=8 --set log10_k3=8 --set log10_k4=8",
+    "predict beam1 --hanger 3 --sweep theta_F=0.9:1.1:2",
+    "report --hanger 3",
+    "report --bridge",
+    "status",
+    "status --of 1",
+    "token list",
+    "user list",
+    "audit",
+)
+
+
+@pytest.mark.parametrize("line", READING)
+def test_reading_command_gives_one_json_document(on_bridge: Shm, on_empty: Shm, line: str) -> None:
+    """With a schema first; the exit code is the same without --json."""
+    ended = on_bridge(f"{line} --json")
+    assert ended.code in (0, 1, 4), ended.err
+    document = parsed(ended.out)
+    expected = r"shm\.error/1" if ended.code == 4 else SCHEMAS.get(line, r"shm\.[a-z_-]+/\d")
+    assert re.fullmatch(expected, document["schema"]), document["schema"]
+    assert next(iter(document)) == "schema"
+    assert on_empty(line).code == on_empty(f"{line} --json").code
+
+
+def test_file_command_gives_one_document(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
+    for line in (
+        f"ingest --peek {modes_file}",
+        f"select {modes_file} --models beam1 --samples 200 --hanger-file {hanger_file}",
+        f"update {modes_file} --model beam1 --samples 200 --hanger-file {hanger_file}",
+    ):
+        assert isinstance(parsed(shm.done(f"{line} --json").out), dict)
+
+
+def test_writing_commands_say_what_they_did(
+    on_empty: Shm, empty: Workspace, hanger_file: Path, tmp_path: Path
+) -> None:
+    def of(line: str) -> Any:
+        return parsed(on_empty.done(f"{line} --json").out)
+
+    assert Path(of(f"init {tmp_path / 'arch'}")["description"]).is_file()
+    token = of("token create logger --scope write")
+    assert token["name"] == "logger"
+    assert token["token"]
+    revoked = {"schema": "shm.token_revoke/1", "name": "logger", "revoked": True}
+    assert of("token revoke logger") == revoked
+    assert of("db upgrade")["upgraded"] is True
+    made = of(f"simulate --hanger-file {hanger_file} --hits 1 --out {tmp_path / 'made'}")
+    assert all(Path(file).is_file() for file in made["files"])
+    write_test(tmp_path / "t1.modes.json", empty)
+    of(f"ingest {tmp_path / 't1.modes.json'}")
+    fetched = {"schema": "shm.archive_fetch/1", "recording": 1, "file": "t1.modes.json"}
+    assert of("archive fetch 1") == {**fetched, "from": None}

@@ -1,4 +1,4 @@
-"""`shm gap diagnose` on files and in a workspace, and what the report makes of it."""
+"""`shm gap diagnose` on files and in a workspace, of one hanger and of several, and `gap plan`."""
 
 from __future__ import annotations
 
@@ -7,24 +7,33 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from shm.documents import dump
 from shm.models.effects import EFFECTS
 from shm.modes_document import modes_document
 from shm.pipeline.diagnosing import choose_tests
-from shm.store import Workspace
-from shm.values import PLANES, ModalTest, Mode, ShapePoint
+from shm.simulate import HangerState, PlantedEffect
+from shm.values import PLANES, Hanger, ModalTest, Mode, ShapePoint
 from tests.cli.conftest import Shm
+from tests.gap.test_shared_causes import bridge as bridge_of
 from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.effects import all_but
 from tests.helpers.flows import ingest
+from tests.helpers.hangers import HANGER_3
 from tests.helpers.taken_in import with_a_loss
-from tests.helpers.workspaces import make_workspace
+from tests.helpers.workspaces import make_workspace, modes_of
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
-# Two effects keep a diagnosis short; the others are taken out of the catalogue.
+
+def without_all_but(*names: str) -> list[str]:
+    """Return options that keep a diagnosis short: few effects of the catalogue."""
+    return [word for name in all_but(*names) for word in ("--without", name)]
+
+
 TRIED = ("rotational_end_flexibility", "distributed_mass")
-SHORT = [word for name in all_but(*TRIED) for word in ("--without", name)]
+SHORT = without_all_but(*TRIED)
 # Hanger 3 as the thesis measured it (table 1.1).
 MEASURED = {
     "transverse": (5.82, 13.85, 26.17, 40.47),
@@ -41,23 +50,18 @@ def measured(name: str, orders: Sequence[int] = (1, 2, 3)) -> ModalTest:
     return ModalTest(name, modes, 3, temperature_c=12.0, amplitude=1.0)
 
 
-@pytest.fixture(scope="module")
-def modes(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("gap") / "t1.modes.json"
-    path.write_text(dump(modes_document([measured("t1")])))
+def written(path: Path, *tests: ModalTest) -> Path:
+    path.write_text(dump(modes_document(tests)))
     return path
 
 
-def test_files_alone_are_diagnosed_as_document_page_and_figures(
-    shm: Shm, modes: Path, hanger_file: Path, tmp_path: Path
-) -> None:
+def test_diagnose_files_alone(shm: Shm, hanger_file: Path, tmp_path: Path) -> None:
     page, figures = tmp_path / "gap.html", tmp_path / "figures"
-    ended = shm(
+    modes = written(tmp_path / "t1.modes.json", measured("t1"))
+    document = shm.json(
         "gap", "diagnose", modes, "--hanger-file", hanger_file, *SHORT, "--seed", 4,
-        "--html", page, "--figures", figures, "--json",
+        "--html", page, "--figures", figures,
     )  # fmt: skip
-    assert ended.code == 0, ended.err
-    document = ended.document
     assert document["baseline"] in ("beam1", "beam2", "beam3")
     assert document["seed"] == 4
     named = [*document["causes"], *document["invisible"]]  # a beam on springs has its ends itself
@@ -67,8 +71,7 @@ def test_files_alone_are_diagnosed_as_document_page_and_figures(
     assert total == pytest.approx(1.0, abs=1e-9)
     assert len(document["where"]) == 6
     assert sorted(document["left_out"]) == sorted(set(EFFECTS) - set(TRIED))
-    assert document["bar"]["length_m"] == 12.0
-    assert document["bar"]["sensors"] == []
+    assert (document["bar"]["length_m"], document["bar"]["sensors"]) == (12.0, [])
     assert "The bar as described" in page.read_text()
     assert "<svg" in page.read_text()
     assert {"causes.png", "gap_map.png"} <= {path.name for path in figures.iterdir()}
@@ -78,23 +81,19 @@ def test_a_diagnosis_of_a_workspace_is_kept_for_the_report(shm: Shm, tmp_path: P
     workspace = make_workspace(tmp_path / "bridge")
     for day, name in enumerate(("t1", "t2", "t3")):  # alike but for the warmth: no copies
         test = replace(measured(name), temperature_c=12.0 + 0.1 * day)
-        (workspace.spool / f"{name}.modes.json").write_text(dump(modes_document([test])))
+        written(workspace.spool / f"{name}.modes.json", test)
     ingest(workspace)
-    at = ("--workspace", workspace.folder)
-    before = shm(*at, "report", "--hanger", 3, "--json")
-    assert before.document["diagnosis"] is None
-    ended = shm(*at, "gap", "diagnose", "--hanger", 3, "--tests", 2, *SHORT, "--json")
-    assert ended.code == 0, ended.err
-    assert len(ended.document["tests"]) == 2
-    kept = shm(*at, "report", "--hanger", 3, "--json").document["diagnosis"]
-    assert kept == ended.document
-    assert "Gap diagnosis: " in shm(*at, "report", "--hanger", 3, "--full").out
+    shm = shm.at(workspace)
+    assert shm.json("report --hanger 3")["diagnosis"] is None
+    document = shm.json("gap", "diagnose", "--hanger", 3, "--tests", 2, *SHORT)
+    assert len(document["tests"]) == 2
+    assert shm.json("report --hanger 3")["diagnosis"] == document
+    assert "Gap diagnosis: " in shm("report --hanger 3 --full").out
 
 
 def test_diagnose_takes_tests_since_the_last_change(shm: Shm, tmp_path: Path) -> None:
     workspace = with_a_loss(tmp_path / "bridge")  # t1 and t2 read a fifth less tension than t0
-    kept = ("--workspace", workspace.folder, "gap", "diagnose", "--hanger", 3, *SHORT)
-    since = shm(*kept, "--json").document
+    since = shm.at(workspace).json("gap", "diagnose", "--hanger", 3, *SHORT)
     assert since["tests"] == ["t1"]  # t2 has the same numbers
     assert "Only the 2 tests since 2026-" in since["remarks"][0]
     assert "--all-tests" in since["remarks"][0]
@@ -112,66 +111,26 @@ def test_the_bar_has_the_sensors_of_all_tests(
     tests = []
     for name, x_m in (("t1", 2.5), ("t2", 4.4)):
         test = measured(name)
-        shape = (ShapePoint(x_m, 1.0),)
-        modes = tuple(replace(mode, shape=shape) for mode in test.modes)
+        modes = tuple(replace(mode, shape=(ShapePoint(x_m, 1.0),)) for mode in test.modes)
         tests.append(replace(test, modes=modes, temperature_c=10 * x_m))
-    path = tmp_path / "both.modes.json"
-    path.write_text(dump(modes_document(tests)))
+    path = written(tmp_path / "both.modes.json", *tests)
     workspace = make_workspace(tmp_path / "bridge")
     for test in tests:
-        (workspace.spool / f"{test.id}.modes.json").write_text(dump(modes_document([test])))
+        written(workspace.spool / f"{test.id}.modes.json", test)
     ingest(workspace)
-    kept = ("--workspace", workspace.folder, "gap", "diagnose", "--hanger", 3)
-    for command in (("gap", "diagnose", path, "--hanger-file", hanger_file), kept):
-        ended = shm(*command)
-        assert ended.code == 0, ended.err
+    for ended in (
+        shm.done("gap", "diagnose", path, "--hanger-file", hanger_file),
+        shm.at(workspace).done("gap diagnose --hanger 3"),
+    ):
         assert re.search(r"Sensors +both planes at 2.5 and 4.4 m", ended.out)
 
 
-def test_a_hanger_without_tests_is_nothing_there(shm: Shm, bridge: Workspace) -> None:
-    ended = shm("--workspace", bridge.folder, "gap", "diagnose", "--hanger", 4)
-    assert ended.code == 4
-    assert "shm ingest" in ended.err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--without", "ghosts"], "ghosts"),
-        (["--baseline", "beam9"], "beam9"),
-        (["--hold-out", "t77"], "t77"),
-    ],
-)
-def test_names_that_are_not_there_are_wrong_usage(
-    shm: Shm, modes: Path, hanger_file: Path, arguments: list[str], said: str
-) -> None:
-    ended = shm("gap", "diagnose", modes, "--hanger-file", hanger_file, *SHORT, *arguments)
-    assert ended.code == 2
-    assert said in ended.err
-    assert ended.out == ""
-
-
-def test_tests_that_cannot_be_used_are_bad_input(
-    shm: Shm, hanger_file: Path, tmp_path: Path
-) -> None:
-    path = tmp_path / "twice.modes.json"
-    path.write_text(dump(modes_document([measured("t1"), measured("t1")])))
-    ended = shm("gap", "diagnose", path, "--hanger-file", hanger_file)
-    assert ended.code == 3
-    assert "given 2 times" in ended.err
-
-
 @pytest.mark.slow
-def test_of_one_frequency_it_is_said_how_little_it_shows(
-    shm: Shm, hanger_file: Path, tmp_path: Path
-) -> None:
-    path = tmp_path / "one.modes.json"
+def test_one_frequency_shows_little(shm: Shm, hanger_file: Path, tmp_path: Path) -> None:
     one = ModalTest("t1", (Mode("transverse", 1, 5.82),), 3)
-    path.write_text(dump(modes_document([one])))
-    ended = shm("gap", "diagnose", path, "--hanger-file", hanger_file, *SHORT)
-    assert ended.code == 0
-    assert "Nothing visible in one mode" in ended.out
-    told = " ".join(ended.out.split())
+    path = written(tmp_path / "one.modes.json", one)
+    told = shm.told("gap", "diagnose", path, "--hanger-file", hanger_file, *SHORT)
+    assert "Nothing visible in one mode" in told
     assert "the tension may be off by" in told
     found = re.search(r"\(90 % interval (\d+) to (\d+) kN\); the baseline", told)
     assert found is not None
@@ -181,15 +140,94 @@ def test_of_one_frequency_it_is_said_how_little_it_shows(
 
 
 @pytest.mark.slow
-def test_weak_data_are_answered_first_and_their_weakness_said_next(
-    shm: Shm, hanger_file: Path, tmp_path: Path
-) -> None:
-    path = tmp_path / "weak.modes.json"
+def test_weak_data_are_answered_first(shm: Shm, hanger_file: Path, tmp_path: Path) -> None:
     weak = [Mode("transverse", order, MEASURED["transverse"][order - 1]) for order in (1, 2, 3)]
-    path.write_text(dump(modes_document([ModalTest("t1", tuple(weak), 3)])))
-    ended = shm("gap", "diagnose", path, "--hanger-file", hanger_file, *SHORT)
-    assert ended.code == 0, ended.err
-    lines = ended.out.splitlines()
-    assert lines[0].startswith("Gap diagnosis, Hanger 3: ")
-    assert max(map(len, lines)) <= 100
-    assert ended.out.index("\n! ") < ended.out.index("CAUSES, LIKELIEST FIRST")
+    path = written(tmp_path / "weak.modes.json", ModalTest("t1", tuple(weak), 3))
+    out = shm.done("gap", "diagnose", path, "--hanger-file", hanger_file, *SHORT).out
+    assert out.startswith("Gap diagnosis, Hanger 3: ")
+    assert max(map(len, out.splitlines())) <= 100
+    assert out.index("\n! ") < out.index("CAUSES, LIKELIEST FIRST")
+
+
+# ------------------------------------------------------------ several hangers together
+
+
+def sound(number: int) -> ModalTest:
+    """Three modes of each plane as the clamped beam has them, which is soon diagnosed."""
+    modes = [
+        replace(mode, frequency_sd_hz=1e-3 * mode.frequency_hz)
+        for mode in modes_of(replace(HANGER_3, plate=None), 0.9, 3)
+    ]
+    return ModalTest(f"t{number}", tuple(modes), number, temperature_c=12.0, amplitude=1.0)
+
+
+def test_pairs_of_files_are_diagnosed_together(
+    shm: Shm, hanger_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pairs = []
+    for number in (3, 4):
+        described = tmp_path / f"h{number}.toml"
+        described.write_text(hanger_file.read_text().replace("id = 3", f"id = {number}"))
+        pairs += [written(tmp_path / f"h{number}.modes.json", sound(number)), described]
+    given: list[tuple[int, str]] = []
+
+    def answer(hangers: Sequence[tuple[Hanger, Sequence[ModalTest]]], *_: object) -> object:
+        given.extend((hanger.id, test.id) for hanger, tests in hangers for test in tests)
+        return bridge_of((20.0, 20.0, 20.0, 20.0), (0.05, 0.05, 0.05, 0.05))
+
+    monkeypatch.setattr("shm_cli.gap.diagnose_bridge", answer)
+    page, figures = tmp_path / "bridge.html", tmp_path / "figures"
+    document = shm.json("gap", "diagnose", *pairs, "--html", page, "--figures", figures)
+    assert given == [(3, "t3"), (4, "t4")]
+    assert document["schema"] == "shm.bridge_diagnosis/1"
+    assert document["answer"] == "shared cause"
+    assert "shared by all 4 hangers" in document["summary"]
+    assert [bar["hanger"] for bar in document["bars"]] == [3, 4]
+    assert "The bars as described" in page.read_text()
+    assert "<svg" in page.read_text()
+    assert [path.name for path in figures.iterdir()] == ["shared.png"]
+
+
+def test_a_workspace_keeps_the_diagnosis_of_each_hanger(shm: Shm, tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "bridge", hangers=(3, 4))
+    for number in (3, 4):
+        written(workspace.spool / f"{number}.modes.json", sound(number))
+    ingest(workspace)
+    shm = shm.at(workspace)
+    assert shm.told("gap", "diagnose", "--bridge", *SHORT).startswith("Gap diagnosis, 2 hangers")
+    for number in (3, 4):
+        assert shm.json(f"report --hanger {number}")["diagnosis"] is not None
+
+
+# ------------------------------------------------------------ what to measure next
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> list[object]:
+    """Return the command for a hanger of less bending stiffness, tested in one plane."""
+    softer = PlantedEffect("bending_stiffness", "everywhere", {"stiffness_change": -0.2})
+    one_plane = CampaignPlan(
+        ("transverse",), 5, shapes=False, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0
+    )
+    rng = np.random.default_rng(1)
+    tests = campaign(HANGER_3, HangerState(711e3), (softer,), one_plane, rng)
+    short = without_all_but("bending_stiffness", "distributed_mass")
+    return ["gap", "plan", written(tmp_path / "t1.modes.json", *tests), *short]
+
+
+@pytest.mark.slow
+def test_a_plan_goes_by_the_owners_hours_within_the_budget(
+    shm: Shm, plan: list[object], hanger_file: Path, tmp_path: Path
+) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text(f"{hanger_file.read_text()}\n[measurement_hours]\nknown_mass = 7\n")
+    steps = shm.json(*plan, "--hanger-file", own, "--budget", 9)["steps"]
+    assert {step["hours"] for step in steps if step["kind"] == "known mass"} <= {7.0}
+    assert steps[-1]["hours_in_all"] == sum(step["hours"] for step in steps) <= 9
+    assert all(step["promised_log_odds"] > 0 for step in steps)
+
+
+def test_a_plan_is_shown_as_a_table(shm: Shm, plan: list[object], hanger_file: Path) -> None:
+    told = shm.told(*plan, "--hanger-file", hanger_file, "--baseline", "beam1")
+    assert "known mass of" in told
+    assert "promised log odds" in told

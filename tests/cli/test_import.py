@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,27 @@ def workspace(tmp_path: Path) -> Workspace:
     return make_workspace(tmp_path / "bridge", hangers=(3, 4))
 
 
+@pytest.fixture
+def shm(shm: Shm, workspace: Workspace) -> Shm:
+    return shm.at(workspace)
+
+
+@pytest.fixture
+def refused(workspace: Workspace) -> Callable[[], bool]:
+    """Return whether an import has kept nothing."""
+    return lambda: files_of(workspace) == [] and not (workspace.folder / "loggers").exists()
+
+
+def found_in(workspace: Workspace, name: str) -> Recording:
+    found = read(workspace.spool / name)
+    assert isinstance(found, Recording)
+    return found
+
+
+def abouts(document: Any) -> list[str]:
+    return [question["about"] for question in document["questions"]]
+
+
 def export(path: Path, seed: int = 1, columns: str = "A1") -> Path:
     """Return a German export of numbers that look like a hammer test."""
     rng = np.random.default_rng(seed)
@@ -51,86 +73,57 @@ def files_of(workspace: Workspace) -> list[str]:
     return sorted(path.name for path in workspace.spool.iterdir() if path.is_file())
 
 
-def test_without_a_terminal_it_says_what_to_add_and_keeps_nothing(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
-    ended = shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"))
+def test_import_without_terminal(shm: Shm, refused: Callable[[], bool], tmp_path: Path) -> None:
+    ended = shm("import", export(tmp_path / "a.csv"))
     assert ended.code == 3
     for word in ("Kraft", "force", "acceleration", "2 hits", "500 Hz", "█"):
         assert word in ended.out
     for option in ("--hanger N", "--place A1=M", "--plane A2=transverse|longitudinal"):
         assert option in ended.err
-    assert files_of(workspace) == []
-    assert not (workspace.folder / "loggers").exists()
+    assert refused()
 
 
-def test_the_second_file_of_a_logger_needs_nothing(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
-    first = shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *SAID)
+def test_second_file_needs_nothing(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+    first = shm("import", export(tmp_path / "a.csv"), *SAID)
     assert first.code == 0
     (profile,) = (workspace.folder / "loggers").iterdir()
     kept = tomllib.loads(profile.read_text())
     assert kept["hanger"] == 3
     assert kept["channel"]["A2"] == {"x_m": 2.52, "plane": "longitudinal"}
     assert kept["channel"]["Kraft"] == {"x_m": 1.9}
-    second = shm("--workspace", workspace.folder, "import", export(tmp_path / "b.csv", 2), "--json")
+    second = shm("import", export(tmp_path / "b.csv", 2), "--json")
     assert second.code == 0
     assert second.document["questions"] == []
     assert second.document["hanger"] == 3
     assert files_of(workspace) == ["a.csv", "a.toml", "b.csv", "b.toml"]
-    found = read(workspace.spool / "b.csv")
-    assert isinstance(found, Recording)
+    found = found_in(workspace, "b.csv")
     assert [(c.plane, c.x_m) for c in found.accelerations] == [
         ("transverse", 2.52),
         ("longitudinal", 2.52),
     ]
 
 
-def test_a_unit_that_the_file_does_not_state_is_asked_for(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
+def test_unstated_unit_is_asked(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
     """Names such as force mean newtons in nobody's file for certain."""
     bare = tmp_path / "bare.csv"
     rows = "".join(f"{n % 7},{n % 5}\n" for n in range(100))
     bare.write_text(f"# sampling_rate_hz: 512\nforce,acc_1\n{rows}")
-    said = ("import", bare, "--hanger", 3, "--place", "2.5", "--plane", "transverse")
-    asked = shm("--workspace", workspace.folder, *said)
+    said = f"import {bare} --hanger 3 --place 2.5 --plane transverse"
+    asked = shm(said)
     assert asked.code == 3
     assert "In what unit is force recorded" in asked.err
-    units = ("--unit", "force=N", "--unit", "acc_1=g")
-    assert shm("--workspace", workspace.folder, *said, *units).code == 0
-    found = read(workspace.spool / "bare.csv")
-    assert isinstance(found, Recording)
+    shm.done(f"{said} --unit force=N --unit acc_1=g")
+    found = found_in(workspace, "bare.csv")
     assert all(channel.states_unit for channel in found.channels)
 
 
-def test_a_recording_is_looked_at_as_it_would_be_taken_in(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
-    shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *SAID)
+def test_later_files_are_read_by_profile(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+    shm("import", export(tmp_path / "a.csv"), *SAID)
     with as_taken_in(export(tmp_path / "b.csv", 2), workspace) as path:
         found = read(path)
     assert isinstance(found, Recording)
     assert found.accelerations[1].plane == "longitudinal"
     assert not sidecar_path(tmp_path / "b.csv").exists()
-
-
-def test_a_place_off_the_hanger_is_told_before_it_is_kept(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
-    said = ("--hanger", 3, "--place", "22", "--plane", "transverse,longitudinal")
-    ended = shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *said)
-    assert ended.code == 3
-    assert "A1: it is said to be at 22 m from the deck end" in ended.err + ended.out
-    assert files_of(workspace) == []
-    assert not (workspace.folder / "loggers").exists()
-
-
-def test_what_is_dropped_into_the_spool_is_read_by_its_profile(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
-    shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *SAID)
     for path in workspace.spool.iterdir():
         if path.is_file():
             path.unlink()
@@ -147,9 +140,7 @@ def test_what_is_dropped_into_the_spool_is_read_by_its_profile(
     assert files_of(workspace) == []
 
 
-def test_a_file_of_an_unknown_logger_is_refused_with_the_command_to_give(
-    workspace: Workspace,
-) -> None:
+def test_unknown_logger_is_refused(workspace: Workspace) -> None:
     export(workspace.spool / "first.csv")
     ingest(workspace)
     with workspace.store() as store:
@@ -159,135 +150,106 @@ def test_a_file_of_an_unknown_logger_is_refused_with_the_command_to_give(
     assert "shm import FILE" in stored.reason["remedy"]
 
 
-def test_a_logger_that_goes_from_hanger_to_hanger_is_asked_each_time(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
-    shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *SAID)
+def test_roaming_logger_is_asked(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+    shm("import", export(tmp_path / "a.csv"), *SAID)
     other = export(tmp_path / "b.csv", 2)
-    moved = shm("--workspace", workspace.folder, "import", other, "--hanger", 4)
+    moved = shm("import", other, "--hanger", 4)
     assert moved.code == 0
     assert "each file must say its own" in moved.out
-    third = shm("--workspace", workspace.folder, "import", export(tmp_path / "c.csv", 3), "--json")
+    third = shm("import", export(tmp_path / "c.csv", 3), "--json")
     assert third.code == 3
-    assert [question["about"] for question in third.document["questions"]] == ["hanger"]
+    assert abouts(third.document) == ["hanger"]
     named = export(tmp_path / "haenger_03_c.csv", 4)
-    assert shm("--workspace", workspace.folder, "import", named).code == 0
+    assert shm("import", named).code == 0
 
 
-def test_a_dry_run_keeps_nothing(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+def test_wrong_answer_is_refused(shm: Shm, refused: Callable[[], bool], tmp_path: Path) -> None:
+    """Also a place off the hanger; a dry run keeps nothing either."""
     path = export(tmp_path / "a.csv")
-    ended = shm("--workspace", workspace.folder, "import", path, *SAID, "--dry-run")
-    assert ended.code == 0
-    assert files_of(workspace) == []
-    assert not (workspace.folder / "loggers").exists()
+    for more, code, words in (
+        ("--place 1,2,3", 2, "3 values for 2 channels"),
+        ("--plane up", 2, "'up' is no plane"),
+        ("--place A9=1", 2, "no column 'A9'"),
+        ("--unit A1=V", 2, "no unit that is read"),
+        ("--sensitivity A1=much", 2, "no sensitivity"),
+        ("--rate 0", 2, "no rate"),
+        ("--place 2.52 --plane transverse,longitudinal --hanger 9", 4, "hanger 9 is not described"),
+        ("--hanger 3 --place 22 --plane transverse,longitudinal", 3,
+         "A1: it is said to be at 22 m from the deck end"),
+    ):  # fmt: skip
+        ended = shm(f"import {path} {more}")
+        assert ended.code == code
+        assert words in ended.err + ended.out
+        assert refused()
+    shm.done("import", path, *SAID, "--dry-run")
+    assert refused()
 
 
-@pytest.mark.parametrize(
-    ("more", "code", "words"),
-    [
-        (("--place", "1,2,3"), 2, "3 values for 2 channels"),
-        (("--plane", "up"), 2, "'up' is no plane"),
-        (("--place", "A9=1"), 2, "no column 'A9'"),
-        (("--unit", "A1=V"), 2, "no unit that is read"),
-        (("--sensitivity", "A1=much"), 2, "no sensitivity"),
-        (("--rate", "0"), 2, "no rate"),
-        ((*SAID[2:], "--hanger", 9), 4, "hanger 9 is not described"),
-    ],
-)
-def test_a_wrong_answer_is_refused_with_what_may_be_said(
-    shm: Shm, workspace: Workspace, tmp_path: Path, more: tuple[Any, ...], code: int, words: str
-) -> None:
-    ended = shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *more)
-    assert ended.code == code
-    assert words in ended.err
-    assert files_of(workspace) == []
-
-
-def test_volts_and_shares_of_a_full_scale_are_asked_for_what_they_are_worth(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
+def test_volts_are_asked_for_worth(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     path = tmp_path / "tape.wav"
     wavfile.write(path, 1000, (rng.normal(0, 0.1, (3000, 2)) * 32767).astype(np.int16))
-    asked = shm("--workspace", workspace.folder, "import", path, "--json").document
-    assert [q["about"] for q in asked["questions"]] == ["hanger", "unit", "unit"]
-    ended = shm(
-        "--workspace", workspace.folder, "import", path, "--hanger", 3,
-        "--sensitivity", "channel_1=2000 N", "--sensitivity", "channel_2=50 g",
-        "--place", "2.52", "--plane", "transverse",
-    )  # fmt: skip
-    assert ended.code == 0
-    found = read(workspace.spool / "tape.wav")
-    assert isinstance(found, Recording)
+    asked = shm("import", path, "--json").document
+    assert abouts(asked) == ["hanger", "unit", "unit"]
+    shm.done(
+        f"import {path} --hanger 3 --sensitivity 'channel_1=2000 N' --sensitivity "
+        "'channel_2=50 g' --place 2.52 --plane transverse"
+    )
+    found = found_in(workspace, "tape.wav")
     assert [c.quantity for c in found.channels] == ["force", "acceleration"]
     assert np.std(found.channels[0].values) == pytest.approx(200, rel=0.05)
 
 
-def test_a_table_without_names_or_units_is_read_by_the_answers(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
+def test_bare_table_is_read(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
     rows = np.random.default_rng(1).normal(0, 1, (3000, 3))
     rows[:, 0] = np.arange(3000) / 512
     path = tmp_path / "table.mat"
     savemat(str(path), {"data": rows})
-    told = (
-        "--workspace", workspace.folder, "import", path, "--hanger", 3, "--unit", "data_1=s",
-        "--unit", "data_2=N", "--unit", "data_3=g",
-    )  # fmt: skip
-    asked = shm(*told, "--json").document
-    assert [q["about"] for q in asked["questions"]] == ["place", "place", "plane"]
+    told = f"import {path} --hanger 3 --unit data_1=s --unit data_2=N --unit data_3=g"
+    asked = shm(f"{told} --json").document
+    assert abouts(asked) == ["place", "place", "plane"]
     assert asked["sampling_rate_hz"] == pytest.approx(512)
-    assert shm(*told, "--place", "2.52", "--plane", "transverse").code == 0
-    found = read(workspace.spool / "table.mat")
-    assert isinstance(found, Recording)
+    shm.done(f"{told} --place 2.52 --plane transverse")
+    found = found_in(workspace, "table.mat")
     assert (found.samples, found.sampling_rate_hz) == (3000, pytest.approx(512))
 
 
-def test_counts_of_a_seismic_recorder_are_asked_for_what_they_are_worth(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
+def test_counts_are_asked_for_worth(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
     rows = np.random.default_rng(1).normal(0, 1e5, (2, 3000))
     path = tmp_path / "night.mseed"
     channels = (Channel("acc_1", "acceleration", rows[0]),)
     write_counts(path, rows, Recording("", channels, 200.0, None, NOW))
-    asked = shm("--workspace", workspace.folder, "import", path, "--json").document
-    assert [q["about"] for q in asked["questions"]] == ["hanger", "unit", "unit"]
+    asked = shm("import", path, "--json").document
+    assert abouts(asked) == ["hanger", "unit", "unit"]
     assert "What is one count of XX_HGR3_00_HN1 worth" in asked["questions"][1]["text"]
-    ended = shm(
-        "--workspace", workspace.folder, "import", path, "--hanger", 3,
-        "--sensitivity", "XX_HGR3_00_HN1=2e-6 m/s2", "--sensitivity", "XX_HGR3_00_HN2=1e-4 mg",
-        "--place", "2.52", "--plane", "transverse,longitudinal",
-    )  # fmt: skip
-    assert ended.code == 0
-    found = read(workspace.spool / "night.mseed")
-    assert isinstance(found, Recording)
+    shm.done(
+        f"import {path} --hanger 3 --sensitivity 'XX_HGR3_00_HN1=2e-6 m/s2' --sensitivity "
+        "'XX_HGR3_00_HN2=1e-4 mg' --place 2.52 --plane transverse,longitudinal"
+    )
+    found = found_in(workspace, "night.mseed")
     assert np.allclose(found.channels[0].values, 2e-6 * np.round(rows[0]), rtol=1e-9)
 
 
-def test_modes_of_another_program_come_in_with_their_orders_and_no_made_up_uncertainty(
-    shm: Shm, workspace: Workspace, tmp_path: Path
-) -> None:
+def test_modes_of_another_program(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
     path = modes_file(tmp_path / "m.uff")
-    asked = shm("--workspace", workspace.folder, "import", path, "--json")
+    asked = shm("import", path, "--json")
     assert asked.code == 3
-    assert [q["about"] for q in asked.document["questions"]] == ["hanger", "plane", "plane"]
+    assert abouts(asked.document) == ["hanger", "plane", "plane"]
     planes = "x=transverse,y=longitudinal"
-    ended = shm("--workspace", workspace.folder, "import", path, "--hanger", 3, "--plane", planes)
+    ended = shm("import", path, "--hanger", 3, "--plane", planes)
     assert ended.code == 0
     ingest(workspace)
     with workspace.store() as store:
         (test,) = (stored.test for stored in store.tests.list_all(3))
     found = [(mode.plane, mode.order, mode.frequency_hz) for mode in test.modes]
     assert found == [
-        ("transverse", 1, 6.1),
-        ("longitudinal", 1, 6.3),
-        ("transverse", 2, 13.0),
+        ("transverse", 1, 6.1), ("longitudinal", 1, 6.3), ("transverse", 2, 13.0),
         ("longitudinal", 2, 13.2),
-    ]
+    ]  # fmt: skip
     assert all(np.isnan(mode.frequency_sd_hz) for mode in test.modes)
     assert test.modes[0].damping_ratio == pytest.approx(0.004)
     assert [point.x_m for point in test.modes[0].shape] == [2.0, 4.0, 6.0, 8.0, 10.0]
-    again = shm("--workspace", workspace.folder, "import", path)
+    again = shm("import", path)
     assert again.code == 0
 
 
@@ -328,17 +290,13 @@ def bare_export(path: Path, seed: int = 1, decimals: int = 6) -> Path:
     return path
 
 
-def test_import_file_without_heading(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+def test_import_file_without_heading(shm: Shm, tmp_path: Path) -> None:
     """Its first column is rounded, and yet its times; what is asked once the next file knows."""
-    in_place = ("--workspace", workspace.folder)
-    units = ("--unit", "column_2=N", "--unit", "column_3=m/s2")
-    said = (*units, "--hanger", 3, "--place", "2.52", "--plane", "transverse")
-    ended = shm(*in_place, "import", bare_export(tmp_path / "a.csv"), *said, "--json")
-    assert ended.code == 0
-    assert ended.document["sampling_rate_hz"] == pytest.approx(512, rel=1e-5)
-    look = shm(*in_place, "ingest", "--peek", bare_export(tmp_path / "b.csv", 2), "--json")
-    assert look.code == 0
-    (found,) = look.document["files"]
+    units = "--unit column_2=N --unit column_3=m/s2"
+    said = f"{units} --hanger 3 --place 2.52 --plane transverse"
+    document = shm.json(f"import {bare_export(tmp_path / 'a.csv')} {said}")
+    assert document["sampling_rate_hz"] == pytest.approx(512, rel=1e-5)
+    (found,) = shm.json("ingest", "--peek", bare_export(tmp_path / "b.csv", 2))["files"]
     assert found["sampling_rate_hz"] == pytest.approx(512, rel=1e-5)
     assert [channel["name"] for channel in found["channels"]] == ["column_2", "column_3"]
 
@@ -347,12 +305,8 @@ def test_import_column_in_seconds(shm: Shm, workspace: Workspace, tmp_path: Path
     """What the import accepts is read: a column that a person calls times is no channel."""
     file = bare_export(tmp_path / "a.csv")
     file.write_text("ticks,b,c\n" + file.read_text())
-    in_place = ("--workspace", workspace.folder)
-    units = ("--unit", "ticks=s", "--unit", "b=N", "--unit", "c=m/s2")
-    said = (*units, "--hanger", 3, "--place", "2.52", "--plane", "transverse")
-    ended = shm(*in_place, "import", file, *said)
-    assert ended.code == 0, ended.err
-    found = read(workspace.spool / "a.csv")
-    assert isinstance(found, Recording)
+    units = "--unit ticks=s --unit b=N --unit c=m/s2"
+    shm.done(f"import {file} {units} --hanger 3 --place 2.52 --plane transverse")
+    found = found_in(workspace, "a.csv")
     assert [channel.name for channel in found.channels] == ["b", "c"]
     assert found.sampling_rate_hz == pytest.approx(512, rel=1e-5)

@@ -153,9 +153,7 @@ def kept(workspace: Workspace) -> list[str]:
     )
 
 
-def test_a_wrong_answer_is_asked_for_again_and_the_right_ones_are_kept(
-    workspace: Workspace, tmp_path: Path
-) -> None:
+def test_wrong_answer_is_asked_again(workspace: Workspace, tmp_path: Path) -> None:
     with terminal(workspace, export(tmp_path / "a.csv")) as person:
         person.answer("When was the test", "lately", "2026-05-01T10:00Z")
         person.answer("How warm", "very", "12,5")
@@ -171,13 +169,8 @@ def test_a_wrong_answer_is_asked_for_again_and_the_right_ones_are_kept(
     landed = tomllib.loads((workspace.spool / "a.toml").read_text())
     assert (landed["temperature_c"], landed["time"].hour, landed["operator"]) == (12.5, 10, "Ann")
     assert "Which hanger was tested? [3, 4]" in person.shown
-    for wrong in (
-        "'lately' is no day",
-        "'very' is no temperature",
-        "'three' is no number",
-        "hanger 9 is not described",
-        "'high up' is no place",
-    ):
+    for wrong in ("'lately' is no day", "'very' is no temperature", "'three' is no number",
+                  "hanger 9 is not described", "'high up' is no place"):  # fmt: skip
         assert wrong in person.shown
     (profile,) = (workspace.folder / "loggers").iterdir()
     said = tomllib.loads(profile.read_text())
@@ -190,9 +183,7 @@ def test_a_wrong_answer_is_asked_for_again_and_the_right_ones_are_kept(
     assert kept(workspace) == [f"loggers/{profile.name}", "spool/a.csv", "spool/a.toml"]
 
 
-def test_a_logger_that_is_carried_is_asked_for_its_hanger_each_time(
-    workspace: Workspace, tmp_path: Path
-) -> None:
+def test_carried_logger_is_asked_again(workspace: Workspace, tmp_path: Path) -> None:
     said = ("--place", "Kraft=1.9", "--place", "2.52", "--plane", "transverse,longitudinal")
     with terminal(workspace, export(tmp_path / "a.csv"), *said) as person:
         for question in OF_TEST:
@@ -232,9 +223,7 @@ def test_what_follows_from_an_answer_is_asked_next(workspace: Workspace, tmp_pat
     [("\x03", "Which hanger"), ("\x04", "which plane does A2"), ("\x03", "of hanger 3, too?")],
     ids=["Ctrl-C at first", "Ctrl-D", "Ctrl-C at last"],
 )
-def test_who_leaves_in_between_leaves_nothing(
-    workspace: Workspace, tmp_path: Path, key: str, at: str
-) -> None:
+def test_leaving_keeps_nothing(workspace: Workspace, tmp_path: Path, key: str, at: str) -> None:
     answers = {**OF_TEST, "Which hanger": "3", "hammer of Kraft": "2", "Where is A1": "2"}
     answers |= {"which plane does A1": "t"}
     answers |= {"Where is A2": "2", "which plane does A2": "l", "of hanger 3, too?": "y"}
@@ -249,9 +238,7 @@ def test_who_leaves_in_between_leaves_nothing(
     assert kept(workspace) == []
 
 
-def test_the_planes_of_foreign_modes_are_asked_for_until_they_are_planes(
-    workspace: Workspace, tmp_path: Path
-) -> None:
+def test_planes_of_foreign_modes(workspace: Workspace, tmp_path: Path) -> None:
     with terminal(workspace, modes_file(tmp_path / "m.uff")) as person:
         person.answer("Which hanger", "-3", "3")
         person.answer("axis x", "up", "transverse")

@@ -31,7 +31,7 @@ class Plated(Beam1):
         return "" if hanger.plate else "it needs end plates: give [hanger.plate]."
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def _plated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(MODELS, "plated", Plated)
 
@@ -56,9 +56,7 @@ def test_the_docs_describe_five_kinds_of_hanger(described: dict[str, Path]) -> N
 
 
 @pytest.mark.parametrize("heading", [heading for heading, _ in EXAMPLES])
-def test_every_example_of_the_docs_has_frequencies_near_those_of_a_string(
-    shm: Shm, described: dict[str, Path], heading: str
-) -> None:
+def test_docs_example_is_near_string(shm: Shm, described: dict[str, Path], heading: str) -> None:
     """n/(2 L) sqrt(T/m), raised by the bending stiffness, lowered by a turnbuckle's mass."""
     hanger = load_hanger(described[heading])
     if not hanger.as_hanger:
@@ -94,20 +92,11 @@ def test_simulate_refuses_a_bar_that_is_held_otherwise_or_slack(
     assert not out.exists()
 
 
-@pytest.mark.usefixtures("_plated")
-def test_predict_refuses_a_class_that_does_not_apply_with_the_reason(
-    shm: Shm, hanger_file: Path
-) -> None:
+def test_class_does_not_apply(shm: Shm, hanger_file: Path, modes_file: Path) -> None:
     ended = shm("predict", "plated", "--hanger-file", hanger_file)
     assert ended.code == 2
     assert "does not apply to hanger 3: it needs end plates" in ended.err
     assert "Classes that apply: beam1, " in ended.err
-
-
-@pytest.mark.usefixtures("_plated")
-def test_select_leaves_out_what_does_not_apply_and_says_why(
-    shm: Shm, modes_file: Path, hanger_file: Path
-) -> None:
     call = ("select", modes_file, "--hanger-file", hanger_file, "--models", "plated,beam1", *QUICK)
     ended = shm(*call)
     assert ended.code == 0, ended.err
@@ -115,12 +104,6 @@ def test_select_leaves_out_what_does_not_apply_and_says_why(
     document = shm(*call, "--json").document
     assert document["not_applicable"] == {"plated": "it needs end plates: give [hanger.plate]."}
     assert [model["model"] for model in document["models"]] == ["beam1"]
-
-
-@pytest.mark.usefixtures("_plated")
-def test_select_without_a_class_that_applies_names_all_reasons(
-    shm: Shm, modes_file: Path, hanger_file: Path
-) -> None:
     ended = shm("select", modes_file, "--hanger-file", hanger_file, "--models", "plated", *QUICK)
     assert ended.code == 2
     assert "no model class applies to hanger 3" in ended.err
@@ -129,19 +112,18 @@ def test_select_without_a_class_that_applies_names_all_reasons(
 
 def test_select_takes_the_classes_of_the_setting_unless_told(shm: Shm, bridge: Workspace) -> None:
     """The workspace's setting is beam1 alone."""
-    ended = shm("--workspace", bridge.folder, "select", "--hanger", 3, *QUICK, "--json")
-    assert [model["model"] for model in ended.document["models"]] == ["beam1"]
-    assert ended.document["not_applicable"] == {}
+    document = shm.at(bridge).json("select", "--hanger", 3, *QUICK)
+    assert [model["model"] for model in document["models"]] == ["beam1"]
+    assert document["not_applicable"] == {}
 
 
-@pytest.mark.usefixtures("_plated")
 def test_status_says_why_a_class_does_not_apply(shm: Shm, tmp_path: Path) -> None:
     workspace = make_workspace(
         tmp_path / "bridge", hangers=(3, 4), settings={"models": "beam1,beam2,plated"}
     )
     path = workspace.folder / "bridge.toml"
     path.write_text(path.read_text().replace("id = 4", 'id = 4\nmodels = ["beam2"]'))
-    rows = shm("--workspace", workspace.folder, "status", "--json").document["hangers"]
+    rows = shm.at(workspace).json("status")["hangers"]
     assert [row["competing"] for row in rows] == [["beam1", "beam2"], ["beam2"]]
     assert set(rows[0]["not_applicable"]) == {"plated"}
     assert rows[0]["not_applicable"]["plated"].startswith("it needs")

@@ -45,12 +45,15 @@ def bridge(tmp_path: Path, start: datetime) -> Workspace:
     return workspace
 
 
-def test_the_table_says_what_is_live_and_what_was_lost(
-    shm: Shm, bridge: Workspace, start: datetime
-) -> None:
+@pytest.fixture
+def on_ring(shm: Shm, bridge: Workspace) -> Shm:
+    return shm.at(bridge)
+
+
+def test_table_of_streams(on_ring: Shm, bridge: Workspace, start: datetime) -> None:
     with bridge.store() as store:
         store.streams.save_window(a_window())
-    ended = shm("--workspace", bridge.folder, "stream", "--json")
+    ended = on_ring("stream", "--json")
     assert ended.code == 0
     (row,) = ended.document["streams"]
     assert (row["name"], row["hanger"], row["state"]) == ("h3", 3, "late")
@@ -61,55 +64,53 @@ def test_the_table_says_what_is_live_and_what_was_lost(
     assert row["ring_bytes"] > 100_000
     assert (row["last_window_kind"], row["last_window_how"]) == ("wind", "tracked")
     assert row["apart_s_24h"] == 0
-    said = shm("--workspace", bridge.folder, "stream").out
+    said = on_ring("stream").out
     assert "3.33%" in said
     assert "late" in said
 
 
 def test_a_stream_that_never_sent_or_sends_now(shm: Shm, tmp_path: Path) -> None:
     workspace = with_stream(make_workspace(tmp_path / "other"))
-    (row,) = shm("--workspace", workspace.folder, "stream", "--json").document["streams"]
+    (row,) = shm.at(workspace).json("stream")["streams"]
     assert (row["state"], row["last_sample"], row["lag_s"]) == ("never sent", None, None)
     assert row["lost_share_24h"] is None
     Ring(workspace.folder / "ring").append(chunk_document(a_chunk(0, utc_now())))
-    assert "live" in shm("--workspace", workspace.folder, "stream").out
+    assert "live" in shm.at(workspace)("stream").out
 
 
-def test_what_a_stream_differs_by_from_hammer_tests_is_said_where_both_exist(
-    shm: Shm, tmp_path: Path
-) -> None:
+def test_stream_differs_from_hammer_tests(shm: Shm, tmp_path: Path) -> None:
     workspace = with_stream(make_workspace(tmp_path / "both"))
     with workspace.store() as store:
         (test,) = entered(store, [1])
         lower = replace(test.test.modes[0], frequency_hz=test.test.modes[0].frequency_hz * 0.99)
         hour = replace(a_reading(), start=test.time, modes=(lower,))
         store.streams.save_pooled(replace(hour, start=test.time - timedelta(days=3)))
-        (row,) = shm("--workspace", workspace.folder, "stream", "--json").document["streams"]
+        (row,) = shm.at(workspace).json("stream")["streams"]
         assert (row["ambient_bias"], row["hammer_tests"]) == (None, 0)
         store.streams.save_pooled(hour)
-    (row,) = shm("--workspace", workspace.folder, "stream", "--json").document["streams"]
+    (row,) = shm.at(workspace).json("stream")["streams"]
     assert row["hammer_tests"] == 1
     assert row["ambient_bias"] == pytest.approx(math.log(0.99), abs=1e-6)
     assert row["ambient_bias"] < -row["ambient_bias_sd"] < 0
-    assert "differ from those of hammer" in shm("--workspace", workspace.folder, "stream").out
+    assert "differ from those of hammer" in shm.at(workspace)("stream").out
 
 
-def test_events_are_listed_with_their_times(shm: Shm, bridge: Workspace, start: datetime) -> None:
+def test_events_are_listed(on_ring: Shm, bridge: Workspace, start: datetime) -> None:
     with bridge.store() as store:
         store.streams.save_event(an_event())  # of months ago
-    ended = shm("--workspace", bridge.folder, "stream", "--events", "--json")
+    ended = on_ring("stream", "--events", "--json")
     (event,) = ended.document["events"]
     assert (event["kind"], event["start"]) == ("gap", format_time(start + timedelta(minutes=12)))
-    assert "6000 samples" in shm("--workspace", bridge.folder, "stream", "--events").out
+    assert "6000 samples" in on_ring("stream", "--events").out
 
 
 @pytest.mark.parametrize("name", ["h3.csv", "h3.h5"])
 def test_an_export_is_a_recording_with_what_is_missing_empty(
-    shm: Shm, bridge: Workspace, start: datetime, tmp_path: Path, name: str
+    on_ring: Shm, bridge: Workspace, start: datetime, tmp_path: Path, name: str
 ) -> None:
     file = tmp_path / name
     times = [format_time(start + timedelta(minutes=minute)) for minute in (11, 14)]
-    ended = shm("--workspace", bridge.folder, "stream", "export", "h3", *times, file)
+    ended = on_ring("stream", "export", "h3", *times, file)
     assert ended.code == 0
     assert "18000 samples of 2 channels" in ended.out
     found = read(file)
@@ -130,12 +131,10 @@ def test_an_export_is_a_recording_with_what_is_missing_empty(
     assert np.allclose(values[12_000:], a_chunk(13, samples=6000).values[0], rtol=1e-5)
 
 
-def test_what_is_kept_stays_when_the_rest_goes(
-    shm: Shm, bridge: Workspace, start: datetime
-) -> None:
+def test_kept_samples_stay(on_ring: Shm, bridge: Workspace, start: datetime) -> None:
     times = [format_time(start + timedelta(minutes=minute)) for minute in (21, 22)]
     arguments = ("stream", "keep", "h3", *times, "--why", "a train")
-    assert shm("--workspace", bridge.folder, *arguments).code == 0
+    assert on_ring(*arguments).code == 0
     ring = Ring(bridge.folder / "ring")
     ring.sweep(utc_now() + timedelta(days=400), 30)
     assert ring.periods("h3", start) == (start + 2 * PERIOD,)
@@ -144,7 +143,6 @@ def test_what_is_kept_stays_when_the_rest_goes(
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (("export", "h9", "2026-05-01", "2026-05-02", "x.csv"), 4, "is not described"),
         (("export", "h3", "yesterday", "2026-05-02", "x.csv"), 3, "not an ISO 8601 time"),
         (("export", "h3", "2026-05-01T10:00", "2026-05-01T11:00", "x.csv"), 4, "has no sample"),
         (("export", "h3", "2026-05-01", "2027-05-01", "x.csv"), 2, "more than the 10000000"),
@@ -152,15 +150,8 @@ def test_what_is_kept_stays_when_the_rest_goes(
     ],
 )
 def test_what_cannot_be_done_is_said(
-    shm: Shm, bridge: Workspace, arguments: tuple[str, ...], code: int, said: str
+    on_ring: Shm, bridge: Workspace, arguments: tuple[str, ...], code: int, said: str
 ) -> None:
-    ended = shm("--workspace", bridge.folder, "stream", *arguments)
+    ended = on_ring("stream", *arguments)
     assert ended.code == code
     assert said in ended.err
-
-
-def test_a_bridge_without_streams_has_nothing_to_show(shm: Shm, tmp_path: Path) -> None:
-    workspace = make_workspace(tmp_path / "plain")
-    ended = shm("--workspace", workspace.folder, "stream")
-    assert (ended.code, ended.out) == (4, "")
-    assert "permanent_sensors.md" in ended.err

@@ -92,7 +92,7 @@ def shown(line: str, workspace: Workspace, tmp_path: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("line", LINES)
-def test_verb_prints_no_controls(
+def test_no_controls(
     shm: Shm, hostile: Workspace, tmp_path: Path, line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "200")

@@ -1,4 +1,4 @@
-"""`shm update` and `shm select`: the documents of DESIGN, from files alone or from a workspace."""
+"""`shm update`, `shm select` and the assumptions they state, from files alone or a workspace."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from shm.assumptions import DEFAULTS
 from shm.documents import dump
 from shm.modes_document import modes_document
 from shm.store import Workspace
@@ -28,9 +29,7 @@ def call(modes_file: Path, hanger_file: Path, *more: object) -> tuple[object, ..
     return (*known, *QUICK, "--json", *more)
 
 
-def test_the_document_of_update_has_the_keys_of_the_contract_and_repeats(
-    shm: Shm, modes_file: Path, hanger_file: Path
-) -> None:
+def test_update_document_and_repeat(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
     ended = shm(*call(modes_file, hanger_file))
     assert ended.code == 0, ended.err
     document = ended.document
@@ -66,20 +65,16 @@ def test_sampler_emcee_says_so_and_agrees(shm: Shm, modes_file: Path, hanger_fil
     assert not any("emcee" in caveat for caveat in usual["caveats"])
     found = other["tension_n"]["q50"]
     assert found == pytest.approx(usual["tension_n"]["q50"], abs=usual["tension_n"]["sd"])
-    refused = shm("select", modes_file, "--hanger-file", hanger_file, "--sampler", "tmcmc")
-    assert refused.code == 2
 
 
-def test_the_priors_of_the_thesis_have_its_parameters(
-    shm: Shm, modes_file: Path, hanger_file: Path
-) -> None:
+def test_priors_of_thesis(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
     document = shm(*call(modes_file, hanger_file, *THESIS)).document
     assert set(document["parameters"]) == {"theta_F", "theta_L", "sigma"}
     assert document["priors"] == "thesis"
     assert document["repeatability_sd_n"] is None
 
 
-def test_the_tension_leads_with_both_intervals_and_the_limits(
+def test_tension_leads_select(
     shm: Shm, modes_file: Path, hanger_file: Path, tmp_path: Path
 ) -> None:
     limited = tmp_path / "limited.toml"
@@ -101,7 +96,7 @@ def test_the_tension_leads_with_both_intervals_and_the_limits(
 
 
 @pytest.mark.slow
-def test_a_tension_that_was_measured_calibrates_another_test(
+def test_measured_tension_calibrates(
     shm: Shm, modes_file: Path, hanger_file: Path, tmp_path: Path
 ) -> None:
     weighed = json.loads(modes_file.read_text(encoding="utf-8"))
@@ -119,9 +114,7 @@ def test_a_tension_that_was_measured_calibrates_another_test(
     assert shm(*call(modes_file, hanger_file, *THESIS, "--calibrated-by", known)).code == 2
 
 
-def test_select_ranks_the_models_and_their_probabilities_add_to_one(
-    shm: Shm, modes_file: Path, hanger_file: Path
-) -> None:
+def test_select_ranks_the_models(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
     ended = shm(
         "select", modes_file, "--hanger-file", hanger_file, "--models", "beam1, beam1",
         *QUICK, "--json",
@@ -203,27 +196,15 @@ def test_tensions_are_told_in_the_unit_that_fits_them(
     assert 0 < low < high
 
 
-def test_the_latest_test_of_a_hanger_of_the_workspace_is_taken(shm: Shm, bridge: Workspace) -> None:
-    ended = shm(
-        "--workspace", bridge.folder, "update", "--hanger", 3, "--model", "beam1", *QUICK, "--json"
-    )
-    assert ended.document["tests"] == ["t2"]
-    assert ended.document["tension_n"]["mean"] == pytest.approx(0.8 * 711e3, rel=0.05)
+def test_tests_of_the_workspace_are_taken(on_bridge: Shm, modes_file: Path) -> None:
+    """The latest of a hanger; a file may name its hanger."""
+    document = on_bridge.json("update", "--hanger", 3, "--model", "beam1", *QUICK)
+    assert document["tests"] == ["t2"]
+    assert document["tension_n"]["mean"] == pytest.approx(0.8 * 711e3, rel=0.05)
+    assert on_bridge.json("update", modes_file, "--model", "beam1", *QUICK)["hanger"] == 3
 
 
-def test_a_file_may_name_its_hanger_of_the_workspace(
-    shm: Shm, bridge: Workspace, modes_file: Path
-) -> None:
-    ended = shm(
-        "--workspace", bridge.folder, "update", modes_file, "--model", "beam1", *QUICK, "--json"
-    )
-    assert ended.code == 0, ended.err
-    assert ended.document["hanger"] == 3
-
-
-def test_a_description_of_another_hanger_is_remarked(
-    shm: Shm, hanger_file: Path, modes_file: Path, tmp_path: Path
-) -> None:
+def test_other_hangers_file(shm: Shm, hanger_file: Path, modes_file: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.modes.json"
     other.write_text(json.dumps({**json.loads(modes_file.read_text()), "hanger": 7}))
     ended = shm("update", other, "--hanger-file", hanger_file, "--model", "beam1", *QUICK)
@@ -233,7 +214,7 @@ def test_a_description_of_another_hanger_is_remarked(
     assert first.startswith(f"Doubtful: test t9. It {said}")
 
 
-def test_modes_that_no_such_hanger_can_have_are_doubted_before_any_result(
+def test_impossible_modes_are_doubted(
     shm: Shm, hanger_file: Path, modes_file: Path, tmp_path: Path
 ) -> None:
     """A 12 m hanger's modes by the description of one of 9 m; by its own they are not doubted."""
@@ -249,27 +230,6 @@ def test_modes_that_no_such_hanger_can_have_are_doubted_before_any_result(
     assert doubt.startswith("Doubtful: test t9.")
     own = shm("update", modes_file, "--hanger-file", hanger_file, "--model", "beam1", *QUICK)
     assert "Doubtful" not in own.out + own.err
-
-
-def test_a_hanger_without_tests_is_nothing_there(shm: Shm, bridge: Workspace) -> None:
-    ended = shm("--workspace", bridge.folder, "select", "--hanger", 4)
-    assert ended.code == 4
-    assert "shm ingest" in ended.err
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [("", "not JSON"), ('{"schema": "shm.modes/1", "tests": []}', "missing or empty")],
-)
-def test_a_wrong_file_is_bad_input(
-    shm: Shm, tmp_path: Path, hanger_file: Path, content: str, said: str
-) -> None:
-    path = tmp_path / "wrong.modes.json"
-    path.write_text(content)
-    ended = shm("update", path, "--hanger-file", hanger_file)
-    assert ended.code == 3
-    assert said in ended.err
-    assert "wrong.modes.json" in ended.err
 
 
 @pytest.mark.parametrize(
@@ -308,3 +268,60 @@ def test_a_class_that_misses_the_frequencies_by_far_is_said(
     assert "beam1 misses the measured frequencies by" in said
     assert "Check the orders of the modes and the description" in said
     assert "misses" not in ended.err  # in one place, in one wording
+
+
+@pytest.fixture
+def overridden(hanger_file: Path, tmp_path: Path) -> Path:
+    """Hanger 3, whose owner has weighed the sensors."""
+    path = tmp_path / "weighed.toml"
+    text = hanger_file.read_text(encoding="utf-8")
+    row = '[assumptions]\naccelerometer_mass_kg = {value = 0.2, reason = "weighed"}\n\n'
+    path.write_text(row + text, encoding="utf-8")
+    return path
+
+
+def test_settings_lists_assumptions(shm: Shm, empty: Workspace, overridden: Path) -> None:
+    listed = shm("settings", "--assumptions", "--json").document
+    assert listed["schema"] == "shm.assumptions/1"
+    assert list(listed["assumptions"]) == list(DEFAULTS)
+    sensor = listed["assumptions"]["accelerometer_mass_kg"]
+    assert (sensor["value"], sensor["sd"], sensor["unit"]) == (0.05, 0.05, "kg")
+    assert sensor["from"] == "default"
+    printed = shm("settings", "--assumptions").out
+    assert all(f"{name} = " in printed for name in DEFAULTS)
+    path = Path(empty.bridge.source)
+    own = "[assumptions]\nend_restraint = [3, 1000]\n"
+    path.write_text(own + path.read_text(encoding="utf-8"), encoding="utf-8")
+    listed = shm("--workspace", empty.folder, "settings", "--assumptions", "--json").document
+    ends = listed["assumptions"]["end_restraint"]
+    assert (ends["lower"], ends["from"]) == (3.0, "bridge.toml")
+    ended = shm("settings", "--assumptions", "--hanger-file", overridden)
+    assert "accelerometer_mass_kg = 0.2 ± 0.05 kg (bridge.toml)\n    weighed" in ended.out
+
+
+def test_update_and_select_name_overridden_rows(
+    shm: Shm, modes_file: Path, hanger_file: Path, overridden: Path
+) -> None:
+    calls = (("update", "--model", "beam1"), ("select", "--models", "beam1"))
+    for verb, *model in calls:
+        document = shm.json(verb, modes_file, "--hanger-file", overridden, *model, *QUICK)
+        (name,) = document["assumptions"]
+        assert name == "accelerometer_mass_kg"
+        assert document["assumptions"][name]["reason"] == "weighed"
+        plain = shm.json(verb, modes_file, "--hanger-file", hanger_file, *model, *QUICK)
+        assert "assumptions" not in plain
+    model = ("--model", "beam1", "--samples", 100)
+    assert (
+        "accelerometer_mass_kg = 0.2"
+        in shm("update", modes_file, "--hanger-file", overridden, *model).out
+    )
+    assert "ssum" not in shm("update", modes_file, "--hanger-file", hanger_file, *model).out
+
+
+def test_misspelled_assumption_has_hint(shm: Shm, modes_file: Path, overridden: Path) -> None:
+    text = overridden.read_text(encoding="utf-8")
+    overridden.write_text(text.replace("accelerometer_mass_kg", "acelerometer_mass_kg"))
+    ended = shm("update", modes_file, "--hanger-file", overridden, "--model", "beam1")
+    assert ended.code == 3
+    assert "Did you mean accelerometer_mass_kg?" in ended.err
+    assert "line 2" in ended.err

@@ -1,18 +1,22 @@
-"""Verbs on a workspace: init, status, report, drift, alerts, export, db."""
+"""Verbs on a workspace: init, status, report, alerts, export, note, manual."""
 
 from __future__ import annotations
 
 import csv
 import shutil
 import tomllib
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
+from PIL import Image
 
 from shm.store import Workspace
-from tests.cli.conftest import Shm
+from tests.cli.conftest import Ended, Shm
+from tests.helpers.pdf_words import Pdf
 
 
 def test_init_makes_a_workspace_that_status_can_read(shm: Shm, tmp_path: Path) -> None:
@@ -24,9 +28,7 @@ def test_init_makes_a_workspace_that_status_can_read(shm: Shm, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("name", ['Arch "of" Döm', "back\\slash \\1", "plain"])
-def test_init_writes_the_name_of_the_bridge_and_leaves_the_rest(
-    shm: Shm, tmp_path: Path, name: str
-) -> None:
+def test_init_writes_bridge_name(shm: Shm, tmp_path: Path, name: str) -> None:
     shm("init", tmp_path / "a")
     shm("init", tmp_path / "b", "--bridge", name)
     plain, named = (tomllib.loads((tmp_path / n / "bridge.toml").read_text()) for n in "ab")
@@ -34,67 +36,33 @@ def test_init_writes_the_name_of_the_bridge_and_leaves_the_rest(
     assert {**named, "bridge": None} == {**plain, "bridge": None}
 
 
-def test_a_workspace_is_not_made_twice(shm: Shm, empty: Workspace) -> None:
-    ended = shm("init", empty.folder)
-    assert ended.code == 2
-    assert "workspace already" in ended.err
-
-
-def test_status_counts_tests_and_alerts_of_each_hanger(shm: Shm, bridge: Workspace) -> None:
-    document = shm("--workspace", bridge.folder, "status", "--json").document
+def test_status_counts_tests_and_alerts_of_each_hanger(on_bridge: Shm) -> None:
+    document = on_bridge.json("status")
     assert document["recordings"]["done"] == 3
-    assert document["alerts"] == 2  # that t1 is to be repeated, and what t2 found
+    assert (document["alerts"], document["open_alerts"]) == (2, 2)  # repeat t1, and what t2 found
     three, four = document["hangers"]
     assert (three["hanger"], three["tests"], three["model"]) == (3, 3, "beam1")
-    assert three["latest_test"] == "2026-06-30T10:00:00Z"
-    assert (four["tests"], four["latest_test"]) == (0, None)
-    told = shm("--workspace", bridge.folder, "status").out
-    assert "Test bridge: recordings: 3 done" in told
+    assert (three["latest_test"], three["open_alerts"]) == ("2026-06-30T10:00:00Z", 2)
+    assert three["baseline_since"] is not None
+    assert (four["tests"], four["latest_test"], four["open_alerts"]) == (0, None, 0)
+    assert "Test bridge: recordings: 3 done" in on_bridge("status").out
 
 
-def test_the_report_comes_as_text_html_or_json(shm: Shm, bridge: Workspace) -> None:
-    call = ("--workspace", bridge.folder, "report", "--hanger", 3)
-    assert shm(*call).out.startswith("Hanger 3, Test bridge: Alert")
-    assert shm(*call, "--format", "html").out.lstrip().startswith("<!doctype html>")
-    document = shm(*call, "--json").document
-    assert document == {
-        **shm(*call, "--format", "json").document,
-        "generated_at": document["generated_at"],
-    }
+def test_report_comes_in_the_form_of_its_format_or_file(on_bridge: Shm, tmp_path: Path) -> None:
+    call = "report --hanger 3"
+    assert on_bridge(call).out.startswith("Hanger 3, Test bridge: Alert")
+    assert on_bridge(f"{call} --format html").out.lstrip().startswith("<!doctype html>")
+    document = on_bridge.json(call)
     assert document["schema"] == "shm.report/1"
     assert [row["test"] for row in document["trend"]] == ["t0", "t1", "t2"]
     assert document["posterior"]["tests"] == ["t2"]
-
-
-@pytest.mark.parametrize(
-    ("name", "start"), [("r.html", "<!doctype"), ("r.json", "{"), ("r.txt", "Hanger 3")]
-)
-def test_the_suffix_of_the_file_chooses_the_form_of_the_report(
-    shm: Shm, bridge: Workspace, tmp_path: Path, name: str, start: str
-) -> None:
-    out = tmp_path / name
-    ended = shm("--workspace", bridge.folder, "report", "--hanger", 3, "--out", out)
-    assert (ended.code, ended.out) == (0, "")
-    assert str(out) in ended.err
-    assert out.read_text().lstrip().startswith(start)
-
-
-@pytest.mark.parametrize("verb", ["report", "drift", "alerts", "export"])
-def test_a_hanger_that_the_bridge_lacks_is_not_there(
-    shm: Shm, bridge: Workspace, tmp_path: Path, verb: str
-) -> None:
-    out = ["--out", tmp_path / "x.csv"] if verb == "export" else []
-    ended = shm("--workspace", bridge.folder, verb, "--hanger", 9, *out)
-    assert ended.code == 4
-    assert "known: 3, 4" in ended.err
-
-
-@pytest.mark.parametrize("verb", ["report", "drift", "export"])
-def test_a_hanger_without_tests_has_nothing_yet(
-    shm: Shm, bridge: Workspace, tmp_path: Path, verb: str
-) -> None:
-    out = ["--out", tmp_path / "x.csv"] if verb == "export" else []
-    assert shm("--workspace", bridge.folder, verb, "--hanger", 4, *out).code == 4
+    as_json = on_bridge(f"{call} --format json").document
+    assert document == {**as_json, "generated_at": document["generated_at"]}
+    for name, start in (("r.html", "<!doctype"), ("r.json", "{"), ("r.txt", "Hanger 3")):
+        ended = on_bridge.done(f"{call} --out {tmp_path / name}")
+        assert ended.out == ""
+        assert str(tmp_path / name) in ended.err
+        assert (tmp_path / name).read_text().lstrip().startswith(start)
 
 
 def test_alerts_are_listed_with_what_the_hooks_got(shm: Shm, bridge: Workspace) -> None:
@@ -107,9 +75,7 @@ def test_alerts_are_listed_with_what_the_hooks_got(shm: Shm, bridge: Workspace) 
     assert shm(*call, "--hanger", 4).out.strip() == "No alert has been raised."
 
 
-def test_posterior_samples_are_exported_alike_as_csv_and_npz(
-    shm: Shm, bridge: Workspace, tmp_path: Path
-) -> None:
+def test_export_csv_and_npz_agree(shm: Shm, bridge: Workspace, tmp_path: Path) -> None:
     call = ("--workspace", bridge.folder, "export", "--hanger", 3, "--test", "t0", "--out")
     assert shm(*call, tmp_path / "s.csv").code == 0
     assert shm(*call, tmp_path / "s.npz").code == 0
@@ -125,9 +91,7 @@ def test_posterior_samples_are_exported_alike_as_csv_and_npz(
     assert tension_n == pytest.approx(table[:, 0] * 711e3)
 
 
-def test_an_export_for_arviz_adds_the_likelihood_unless_the_description_has_changed(
-    shm: Shm, bridge: Workspace, tmp_path: Path
-) -> None:
+def test_export_for_arviz_adds_likelihood(shm: Shm, bridge: Workspace, tmp_path: Path) -> None:
     changed = tmp_path / "bridge"
     shutil.copytree(bridge.folder, changed)
     described = (changed / "bridge.toml").read_text()
@@ -142,14 +106,6 @@ def test_an_export_for_arviz_adds_the_likelihood_unless_the_description_has_chan
         with xarray.open_datatree(tmp_path / "s.dat", engine="h5netcdf") as tree:
             assert tree["posterior"].sizes["draw"] == ended.document["samples"]
             assert set(tree.children) & {"log_likelihood", "posterior_predictive"} == group
-
-
-def test_an_export_of_an_unknown_kind_is_a_usage_error(
-    shm: Shm, bridge: Workspace, tmp_path: Path
-) -> None:
-    ended = shm("--workspace", bridge.folder, "export", "--hanger", 3, "--out", tmp_path / "s.xls")
-    assert ended.code == 2
-    assert ".csv, .nc, .json or .npz" in ended.err
 
 
 def test_a_workspace_without_a_store_says_so(shm: Shm, empty: Workspace) -> None:
@@ -178,3 +134,49 @@ def test_manual_page(shm: Shm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     page.touch()
     assert shm("manual").out == f"{page}\n"
     assert shm("manual", "--json").document == {"schema": "shm.manual/1", "page": str(page)}
+
+
+def test_the_suffix_pdf_gives_a_pdf_with_origin(
+    shm: Shm, bridge: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "r.PDF"
+    ended = shm.at(bridge)("report", "--hanger", 3, "--out", out)
+    assert (ended.code, ended.out) == (0, "")
+    told = Pdf.parse(out.read_bytes()).words
+    assert "Hanger 3 ● Alert" in told
+    assert "t2.modes.json" in told
+    assert "SHA-256 of that file" in told
+    assert "band_low_hz" not in told  # the settings are an appendix of the page
+    monkeypatch.setattr("shm_cli.report.on_a_terminal", lambda: True)
+    ended = shm.at(bridge)("report", "--hanger", 3, "--format", "pdf")
+    assert ended.code == 2
+    assert "--out FILE.pdf" in ended.err
+
+
+def test_a_period_keeps_what_lies_in_it(shm: Shm, bridge: Workspace) -> None:
+    call = ("--workspace", bridge.folder, "report", "--hanger", 3, "--json")
+    whole = shm(*call).document
+    second = whole["trend"][1]["time"]
+    document = shm(*call, "--since", second).document
+    assert [row["test"] for row in document["trend"]] == ["t1", "t2"]
+    assert document["period"]["since"] == second
+    assert "In the period" in document["summary"]
+    assert document["posterior"] == whole["posterior"]
+
+
+@pytest.fixture
+def note(on_empty: Shm) -> Callable[..., Ended]:
+    return partial(on_empty, "note")
+
+
+def test_note_is_written_and_listed(note: Callable[..., Ended], tmp_path: Path) -> None:
+    assert "No note" in note("list").out
+    photo = tmp_path / "pin.png"
+    Image.new("RGB", (4, 4)).save(photo)
+    told = ("--hanger", 3, "--kind", "repair", "--at", "2026-05-01", "--photo", photo)
+    made = note("add", "new pin", *told, "--who", "anna", "--json").document
+    assert (made["id"], made["has_photo"], made["at"][:10]) == (1, True, "2026-05-01")
+    assert note("add", "storm", "--bridge").code == 0
+    listed = note("list", "--hanger", 3, "--json").document["notes"]
+    assert [each["text"] for each in listed] == ["storm", "new pin"]
+    assert "new pin" in note("list").out

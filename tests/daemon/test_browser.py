@@ -13,7 +13,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import timedelta
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -28,17 +27,15 @@ from shm.store.journal import Actor
 from shm.store.recordings import list_recordings
 from shm.store.rows import Role
 from shm_daemon.web.address import test_page as page_of
-from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.frame import FOR_ENGINEERS, NAVIGATION
 from tests.helpers.browsers import PHONE, Browser, a_browser, faults, undrawn_charts, width_px
 from tests.helpers.daemons import real_daemon
 from tests.helpers.flows import ingest
 from tests.helpers.slow import few_of
-from tests.helpers.web_servers import Served, a_thread, served
+from tests.helpers.web_servers import PASSWORD, Served, in_a_thread, served
 from tests.helpers.workspaces import START, make_workspace, write_held, write_loss, write_test
 
 RECORDED = "recorded"
-PASSWORD = "correct horse battery"
 PAGES = {
     "hanger": "/hangers/3",
     "tests": "/hangers/3/tests",
@@ -86,12 +83,8 @@ def site(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator
         store.people.add("Anna", Role.ENGINEER, PASSWORD, utc_now())
         assert {each.stage for each in list_recordings(store)} == {Stage.DONE}
         assert [each.test.id for each in store.tests.list_all(3)][-1] == RECORDED
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            "shm_daemon.web.app.BackgroundWorker", partial(BackgroundWorker, pool=a_thread)
-        )
-        with real_daemon(folder), served(workspace) as running:
-            yield Site(running, workspace)
+    with in_a_thread(), real_daemon(folder), served(workspace) as running:
+        yield Site(running, workspace)
 
 
 @pytest.fixture(autouse=True)
@@ -122,9 +115,7 @@ def signed_in(browser: Browser, site: Site) -> Browser:
 
 
 @pytest.mark.parametrize("name", few_of(PAGES, 2))
-def test_a_page_is_whole_for_everybody_by_day_and_night_on_desk_and_phone(
-    signed_in: Browser, site: Site, name: str
-) -> None:
+def test_page_is_whole_for_everybody(signed_in: Browser, site: Site, name: str) -> None:
     page = signed_in.open(site.url + PAGES[name])
     assert page.locator("figure.chart").count() >= CHARTS.get(name, 0)
     assert faults(page) == []
@@ -143,9 +134,7 @@ def test_a_page_is_whole_for_everybody_by_day_and_night_on_desk_and_phone(
 
 
 @pytest.mark.parametrize("name", few_of(PAGES, 3))
-def test_each_part_of_a_page_is_short_and_names_no_command_of_a_shell(
-    signed_in: Browser, site: Site, name: str
-) -> None:
+def test_page_parts_are_short(signed_in: Browser, site: Site, name: str) -> None:
     page = signed_in.open(site.url + PAGES[name])
     page.set_viewport_size({"width": 1280, "height": 900})
     for show in [tab.click for tab in page.get_by_role("tab").all()] or [lambda: None]:
@@ -165,7 +154,7 @@ def test_a_table_is_kept_as_a_file_that_a_spreadsheet_reads(signed_in: Browser, 
     assert re.fullmatch(r"\d{4}-\d\d-\d\d .*ago.*", row[heading.index("last test")])
 
 
-def test_the_keyboard_reaches_the_content_and_every_hanger(signed_in: Browser, site: Site) -> None:
+def test_the_keyboard_and_tabs_reach_every_part(signed_in: Browser, site: Site) -> None:
     page = signed_in.open(site.url)
     page.keyboard.press("Tab")
     skip = page.get_by_role("link", name="Skip to the content")
@@ -229,9 +218,7 @@ def test_an_alert_is_acknowledged_with_a_name_and_a_reason(signed_in: Browser, s
     assert page.locator("article.card.open").count() == before - 1
 
 
-def test_on_a_phone_what_matters_does_not_lie_off_to_the_side(
-    signed_in: Browser, site: Site
-) -> None:
+def test_phone_shows_what_matters(signed_in: Browser, site: Site) -> None:
     page = signed_in.open(site.url)
     page.set_viewport_size(PHONE)  # type: ignore[arg-type]
     tension = page.locator("table.hangers th", has_text="tension").bounding_box()
@@ -256,9 +243,7 @@ def test_on_a_phone_what_matters_does_not_lie_off_to_the_side(
     assert width_px(page) == PHONE["width"]
 
 
-def test_a_held_upload_says_why_and_is_decided_there(
-    signed_in: Browser, site: Site, tmp_path: Path
-) -> None:
+def test_held_upload_is_decided(signed_in: Browser, site: Site, tmp_path: Path) -> None:
     write_held(site.workspace, 3, tmp_path)
     (path,) = tmp_path.iterdir()
     page = signed_in.open(f"{site.url}/upload")

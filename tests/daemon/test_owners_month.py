@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import timedelta
-from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -19,18 +18,16 @@ from shm.pipeline import utc_now
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Workspace
 from shm.store.rows import Role
-from shm_daemon.web.background_work import BackgroundWorker
 from tests.helpers.browsers import PHONE, a_browser, faults, undrawn_charts
 from tests.helpers.daemons import real_daemon
 from tests.helpers.flows import ingest
-from tests.helpers.web_servers import a_thread, served
+from tests.helpers.web_servers import PASSWORD, in_a_thread, served
 from tests.helpers.workspaces import make_workspace, write_held, write_slow_loss
 from tests.worlds import logger_files
 from tests.worlds.recordings import Channel, Recording
 
 pytestmark = pytest.mark.slow
 
-PASSWORD = "correct horse battery"
 LOGGERS = {"catman": "Brücke 7.asc", "dewesoft": "visit two.txt", "xlsx": "third.xlsx"}
 PLACE_M = 2.52
 UNITS = {"force": "N", "acceleration": "m/s²"}
@@ -48,10 +45,7 @@ def month(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Page, Work
     ingest(workspace)
     with workspace.store() as store:
         store.people.add("Anna", Role.ENGINEER, PASSWORD, utc_now())
-    with pytest.MonkeyPatch.context() as patch, a_browser() as browser:
-        patch.setattr(
-            "shm_daemon.web.app.BackgroundWorker", partial(BackgroundWorker, pool=a_thread)
-        )
+    with in_a_thread(), a_browser() as browser:
         with real_daemon(folder), served(workspace) as running:
             page = browser.open(f"{running.url}/sign-in")
             page.get_by_label("Name").fill("Anna")

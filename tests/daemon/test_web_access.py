@@ -1,4 +1,4 @@
-"""Who may do what over HTTP, and what an answer and the log give away."""
+"""Who may do what over HTTP: tokens, the cookie, roles, and what answers and logs give away."""
 
 from __future__ import annotations
 
@@ -10,70 +10,64 @@ from pathlib import Path
 
 import httpx
 import pytest
+from fastapi.dependencies.models import Dependant
+from fastapi.routing import APIRoute
 
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.store import Scope, Workspace
+from shm_daemon.web.access import COOKIE, engineering, reading, signed_in_person, writing
 from shm_daemon.web.address import Address, caller_of
+from shm_daemon.web.app import make_pages
 from shm_daemon.web.middleware import HTTPS_ONLY, PROTECTION
 from shm_daemon.web.serving import refuse_unguarded
-from shm_daemon.web.site import MOST_WRONG, WITHIN_S, WrongAttempts
-from tests.helpers.web_servers import Served, served
+from shm_daemon.web.site import MOST_WRONG, WITHIN_S, Description, Site, WrongAttempts
+from tests.helpers.web_servers import ELSEWHERE, HTML, UPLOAD, Served, served
 
 READING = (
     "/api/status", "/api/hangers", "/api/hangers/3", "/api/alerts", "/metrics", "/openapi.json",
 )  # fmt: skip
-UPLOAD = "/api/recordings?name=x.csv"
-ELSEWHERE = Address("0.0.0.0")
-
-
-@pytest.fixture
-def at_home(workspace: Workspace) -> Iterator[Served]:
-    with served(workspace) as site:
-        yield site
-
-
-@pytest.fixture
-def elsewhere(workspace: Workspace) -> Iterator[Served]:
-    with served(workspace, ELSEWHERE) as site:
-        yield site
+OPEN = {"/health", "/sign-in", "/sign-in/provider", "/sign-in/back", "/sign-out"}
 
 
 def statuses(client: httpx.Client) -> set[int]:
     return {client.get(path).status_code for path in READING}
 
 
+def is_protected(answer: httpx.Response) -> bool:
+    return {name: answer.headers[name] for name in PROTECTION} == PROTECTION
+
+
+# ------------------------------------------------------------ tokens
+
+
 def test_this_machine_reads_without_a_token_but_never_writes(at_home: Served) -> None:
     with at_home.client() as client:
         assert statuses(client) == {200}
         refused = client.post(UPLOAD, content=b"x")
-        assert refused.status_code == 401
-        assert refused.headers["WWW-Authenticate"] == "Bearer"
+        assert (refused.status_code, refused.headers["WWW-Authenticate"]) == (401, "Bearer")
         acknowledgement = client.post("/api/alerts/1/acknowledgement", json={"why": "seen"})
         assert acknowledgement.status_code == 401
-
-
-def test_what_a_proxy_passes_on_needs_a_token(at_home: Served) -> None:
     with at_home.client(**{"X-Forwarded-For": "203.0.113.9"}) as client:
-        assert statuses(client) == {401}
-
-
-def test_from_elsewhere_all_but_health_needs_a_token(elsewhere: Served) -> None:
-    with elsewhere.client() as client:
-        assert statuses(client) == {401}
-        assert client.get("/health").status_code == 503  # no daemon, but an answer
-    with elsewhere.client(elsewhere.read_token) as client:
-        assert statuses(client) == {200}
-
-
-def test_a_token_that_may_read_may_not_write(at_home: Served) -> None:
+        assert statuses(client) == {401}, "what a proxy passes on needs a token"
     with at_home.client(at_home.read_token) as client:
         refused = client.post(UPLOAD, content=b"x")
     assert refused.status_code == 403
     assert "shm token create" in refused.json()["remedy"]
 
 
-def test_a_revoked_token_is_refused_at_once(elsewhere: Served, workspace: Workspace) -> None:
+def test_elsewhere_needs_a_token(elsewhere: Served, workspace: Workspace) -> None:
+    """A revoked one is refused at once."""
+    with elsewhere.client() as client:
+        assert statuses(client) == {401}
+        assert client.get("/health").status_code == 503  # no daemon, but an answer
+    with elsewhere.client(elsewhere.read_token) as client:
+        assert statuses(client) == {200}
+        paths = client.get("/openapi.json").json()["paths"]
+    guarded = {
+        path for path, verbs in paths.items() if all("security" in verb for verb in verbs.values())
+    }
+    assert set(paths) - guarded == {"/health"}
     with elsewhere.client(elsewhere.write_token) as client:
         assert client.post(UPLOAD, content=b"x").status_code == 202
         with workspace.store() as store:
@@ -82,22 +76,14 @@ def test_a_revoked_token_is_refused_at_once(elsewhere: Served, workspace: Worksp
         assert statuses(client) == {401}
 
 
-def test_a_name_that_is_not_ours_is_refused(at_home: Served) -> None:
+def test_only_names_of_ours_are_answered_to(at_home: Served) -> None:
     for host in (
-        "evil.example",
-        "evil.example:8400",
-        "127.0.0.1.evil.example",
-        "",
-        "localhost:8400@evil.example",
-        "localhost@evil.example",
-        "[::1]evil.example",
+        "evil.example", "evil.example:8400", "127.0.0.1.evil.example", "",
+        "localhost:8400@evil.example", "localhost@evil.example", "[::1]evil.example",
         "localhost:8400/evil.example",
-    ):
+    ):  # fmt: skip
         with at_home.client(at_home.read_token, Host=host) as client:
             assert client.get("/api/status").status_code == 400
-
-
-def test_names_of_ours_are_answered_to() -> None:
     home = Address()
     assert all(home.answers_to(host, ()) for host in ("localhost:1", "127.0.0.1", "[::1]:8400"))
     assert not home.answers_to("192.0.2.7", ())
@@ -106,40 +92,28 @@ def test_names_of_ours_are_answered_to() -> None:
     assert not ELSEWHERE.answers_to("evil.example", ("bridge.example",))
 
 
-def test_every_answer_carries_the_protecting_headers(at_home: Served) -> None:
-    with at_home.client() as client:
-        for path in ("/api/status", "/no/such/page", "/health", "/metrics", "/openapi.json"):
-            headers = client.get(path).headers
-            assert {name: headers[name] for name in PROTECTION} == PROTECTION
-            assert "server" not in headers
-
-
-def test_who_came_by_https_is_told_to_come_by_nothing_else(at_home: Served) -> None:
-    """Also where a proxy took HTTPS off; a page that fails is protected as any other."""
+def test_answers_carry_protecting_headers(at_home: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who came by HTTPS is told to come by nothing else, also where a proxy took it off."""
+    paths = ("/", "/api/status", "/no/such/page", "/health", "/metrics", "/openapi.json")
     with at_home.client(at_home.read_token) as client:
-        assert "Strict-Transport-Security" not in client.get("/").headers
-        for path in ("/", "/health", "/metrics", "/no/such/page", "/openapi.json"):
-            headers = client.get(path, headers={"X-Forwarded-Proto": "https"}).headers
-            assert headers["Strict-Transport-Security"] == HTTPS_ONLY["Strict-Transport-Security"]
-            assert {name: headers[name] for name in PROTECTION} == PROTECTION
+        for path in paths:
+            plain = client.get(path)
+            assert is_protected(plain)
+            assert not {"server", "Strict-Transport-Security"} & set(plain.headers)
+            secure = client.get(path, headers={"X-Forwarded-Proto": "https"})
+            assert is_protected(secure)
+            assert {name: secure.headers[name] for name in HTTPS_ONLY} == HTTPS_ONLY
+
+        def broken(*_: object) -> None:
+            raise RuntimeError("a fault of ours")
+
+        monkeypatch.setattr("shm_daemon.web.hangers.quarantined", broken)
+        failed = client.get("/api/status")
+    assert failed.status_code == 500
+    assert is_protected(failed)
 
 
-def test_an_error_of_ours_is_protected_as_well(
-    at_home: Served, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def broken(*_: object) -> None:
-        raise RuntimeError("a fault of ours")
-
-    monkeypatch.setattr("shm_daemon.web.hangers.quarantined", broken)
-    with at_home.client() as client:
-        answer = client.get("/api/status")
-    assert answer.status_code == 500
-    assert {name: answer.headers[name] for name in PROTECTION} == PROTECTION
-
-
-def test_wrong_tokens_are_throttled_and_logged_by_address_without_the_token(
-    elsewhere: Served, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_wrong_tokens_are_throttled(elsewhere: Served, caplog: pytest.LogCaptureFixture) -> None:
     with elsewhere.client("shm_guess") as client:
         told = [client.get("/api/status").status_code for _ in range(MOST_WRONG + 3)]
         refused = client.get("/api/status")
@@ -154,9 +128,7 @@ def test_wrong_tokens_are_throttled_and_logged_by_address_without_the_token(
     assert "shm_guess" not in caplog.text
 
 
-def test_behind_a_proxy_the_callers_are_told_apart(
-    elsewhere: Served, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_callers_behind_a_proxy(elsewhere: Served, caplog: pytest.LogCaptureFixture) -> None:
     """The proxy adds whom it was called by at the end; what stands before is anybody's word."""
     for number in range(MOST_WRONG + 1):
         forwarded = f"198.51.100.{number}, 203.0.113.9"
@@ -167,14 +139,14 @@ def test_behind_a_proxy_the_callers_are_told_apart(
         assert client.get("/api/status").status_code == 401
     assert "203.0.113.9" in caplog.text
     assert "198.51.100" not in caplog.text
-
-
-def test_whom_a_stranger_names_is_not_believed() -> None:
     proxies = "127.0.0.1, 192.0.2.1"
-    assert caller_of("203.0.113.5", "198.51.100.7", proxies) == "203.0.113.5"
-    assert caller_of("127.0.0.1", "", proxies) == "127.0.0.1"
-    assert caller_of("127.0.0.1", "198.51.100.7, 192.0.2.1", proxies) == "198.51.100.7"
-    assert caller_of("127.0.0.1", "no address\n", proxies) == "127.0.0.1"
+    for peer, forwarded, caller in (
+        ("203.0.113.5", "198.51.100.7", "203.0.113.5"),
+        ("127.0.0.1", "", "127.0.0.1"),
+        ("127.0.0.1", "198.51.100.7, 192.0.2.1", "198.51.100.7"),
+        ("127.0.0.1", "no address\n", "127.0.0.1"),
+    ):
+        assert caller_of(peer, forwarded, proxies) == caller
 
 
 def test_wrong_passwords_make_wait_by_user_and_far_more_by_address() -> None:
@@ -191,6 +163,7 @@ def test_wrong_passwords_make_wait_by_user_and_far_more_by_address() -> None:
 def test_no_secret_reaches_the_log_or_the_disk(
     elsewhere: Served, workspace: Workspace, caplog: pytest.LogCaptureFixture
 ) -> None:
+    """Of a token its checksum alone is kept; its name is free again after it was revoked."""
     caplog.set_level(logging.DEBUG)
     secret = elsewhere.write_token
     with elsewhere.client(secret) as client:
@@ -202,21 +175,14 @@ def test_no_secret_reaches_the_log_or_the_disk(
     assert not [line for line in ours if secret in line]
     for path in workspace.folder.rglob("*"):
         assert not path.is_file() or secret.encode() not in path.read_bytes()
-
-
-def test_only_the_checksum_of_a_token_is_kept(workspace: Workspace) -> None:
-    with workspace.store() as store:
-        secret = store.upkeep.create_token("logger", Scope.READ, utc_now())
-    with sqlite3.connect(workspace.database) as connection:
-        kept = connection.execute("SELECT * FROM tokens").fetchone()
-    assert len(secret) > 40
-    assert secret not in map(str, kept)
-
-
-def test_a_name_is_free_again_after_its_token_was_revoked(workspace: Workspace) -> None:
     now = utc_now()
     with workspace.store() as store:
         first = store.upkeep.create_token("logger", Scope.READ, now)
+        with sqlite3.connect(workspace.database) as connection:
+            kept = connection.execute("SELECT * FROM tokens WHERE name = 'logger'").fetchone()
+        connection.close()
+        assert len(first) > 40
+        assert first not in map(str, kept)
         with pytest.raises(UsageError, match="in force already"):
             store.upkeep.create_token("logger", Scope.WRITE, now)
         store.upkeep.revoke_token("logger", now)
@@ -228,10 +194,11 @@ def test_a_name_is_free_again_after_its_token_was_revoked(workspace: Workspace) 
         assert found is not None
         assert found.scopes == {Scope.READ, Scope.WRITE}
         store.upkeep.token_of(second, now + timedelta(seconds=30))
-        assert [token.last_used_at for token in store.upkeep.list_tokens()] == [None, now]
+        used = [each.last_used_at for each in store.upkeep.list_tokens() if each.name == "logger"]
+        assert used == [None, now]
 
 
-def test_without_a_token_it_does_not_open_to_others(workspace: Workspace) -> None:
+def test_it_does_not_open_to_others_without_a_token(workspace: Workspace) -> None:
     refuse_unguarded(workspace, Address())
     with pytest.raises(UsageError, match="nobody may sign in") as refused:
         refuse_unguarded(workspace, ELSEWHERE)
@@ -241,15 +208,6 @@ def test_without_a_token_it_does_not_open_to_others(workspace: Workspace) -> Non
     refuse_unguarded(workspace, ELSEWHERE)
 
 
-def test_every_route_but_health_asks_for_a_token(elsewhere: Served) -> None:
-    with elsewhere.client(elsewhere.read_token) as client:
-        paths = client.get("/openapi.json").json()["paths"]
-    guarded = {
-        path for path, verbs in paths.items() if all("security" in verb for verb in verbs.values())
-    }
-    assert set(paths) - guarded == {"/health"}
-
-
 def test_a_workspace_folder_is_not_told(at_home: Served, workspace: Workspace) -> None:
     Path(workspace.database).rename(workspace.folder / "gone.db")
     with at_home.client() as client:
@@ -257,3 +215,102 @@ def test_a_workspace_folder_is_not_told(at_home: Served, workspace: Workspace) -
     assert health.status_code == 503
     assert "The store cannot be used." in health.json()["reasons"]
     assert str(workspace.folder) not in health.text
+
+
+def calls_of(dependant: Dependant) -> Iterator[object]:
+    """Yield what a route depends on, and what that depends on."""
+    for each in dependant.dependencies:
+        yield each.call
+        yield from calls_of(each)
+
+
+def test_every_route_asks_for_its_role(workspace: Workspace) -> None:
+    pages = make_pages(Site(Description(workspace), Address()))
+    routers = [getattr(each, "original_router", each) for each in pages.routes]
+    found = [route for each in routers for route in getattr(each, "routes", [each])]
+    routes = [each for each in found if isinstance(each, APIRoute)]
+    assert len(routes) > 20
+    for route in routes:
+        if route.path not in OPEN and not route.path.startswith("/static"):
+            needed = reading if route.methods <= {"GET", "HEAD"} else writing
+            asked = set(calls_of(route.dependant))
+            assert {needed, engineering, signed_in_person} & asked, route.path
+
+
+# ------------------------------------------------------------ signing in with a token
+
+
+@pytest.fixture
+def browser(elsewhere: Served) -> Iterator[httpx.Client]:
+    """As a browser has it: it names the origin of what it sends."""
+    with elsewhere.client(**HTML, Origin=elsewhere.url) as client:
+        yield client
+
+
+def sign_in(client: httpx.Client, token: str, wanted: str = "/", **headers: str) -> httpx.Response:
+    return client.post("/sign-in", data={"token": token, "next": wanted}, headers=headers)
+
+
+def test_token_opens_pages(browser: httpx.Client, elsewhere: Served) -> None:
+    refused = browser.get("/alerts")
+    assert refused.status_code == 401
+    assert 'name="next" value="/alerts"' in refused.text
+    entered = sign_in(browser, elsewhere.read_token, "/alerts")
+    assert (entered.status_code, entered.headers["Location"]) == (303, "/alerts")
+    assert browser.get("/alerts").status_code == 200
+    assert browser.get("/api/status").status_code == 200
+    wrong = {"Authorization": "Bearer shm_wrong"}  # a header goes before the cookie
+    assert browser.get("/api/status", headers=wrong).status_code == 401
+    assert browser.post("/sign-out").status_code == 303
+    assert COOKIE not in browser.cookies
+    assert browser.get("/").status_code == 401
+
+
+def test_cookie_lasts_a_month(browser: httpx.Client, elsewhere: Served) -> None:
+    """Over HTTPS it never travels in clear."""
+
+    def attributes(answer: httpx.Response) -> set[str]:
+        found = answer.headers["Set-Cookie"].split("; ")[1:]
+        return {each.lower() for each in found if not each.lower().startswith("expires=")}
+
+    kept = {"httponly", "path=/", "samesite=strict"}
+    assert attributes(sign_in(browser, elsewhere.read_token)) == kept | {"max-age=2592000"}
+    assert attributes(browser.post("/sign-out")) == kept | {"max-age=0"}
+    entered = sign_in(browser, elsewhere.read_token, **{"X-Forwarded-Proto": "https"})
+    assert "; Secure" in entered.headers["Set-Cookie"]
+
+
+def test_a_wrong_token_is_said_on_the_page(browser: httpx.Client) -> None:
+    for token in ("shm_wrong", "", "é", "x" * 4000):
+        refused = sign_in(browser, token)
+        assert refused.status_code == 401
+        assert "wrong or revoked" in refused.text
+        assert "Set-Cookie" not in refused.headers
+    assert sign_in(browser, "x" * 10_000).status_code == 413
+
+
+@pytest.mark.parametrize("origin", ["https://evil.example", "http://127.0.0.1:1", "null", ""])
+def test_page_of_another_site(browser: httpx.Client, elsewhere: Served, origin: str) -> None:
+    sign_in(browser, elsewhere.write_token)
+    foreign = {"Origin": origin}
+    assert browser.post(UPLOAD, content=b"x", headers=foreign).status_code == 403
+    assert browser.post("/sign-out", headers=foreign).status_code == 403
+    assert sign_in(browser, elsewhere.read_token, **foreign).status_code == 403
+    told = {"why": "seen"}
+    posted = browser.post("/api/alerts/1/acknowledgement", json=told, headers=foreign)
+    assert posted.status_code == 403
+
+
+def test_sign_in_leads_to_no_stranger(browser: httpx.Client, elsewhere: Served) -> None:
+    for wanted in (
+        "https://evil.example", "//evil.example", "/\\evil.example", "evil", "/\r\nX: y",
+    ):  # fmt: skip
+        assert sign_in(browser, elsewhere.read_token, wanted).headers["Location"] == "/"
+
+
+def test_a_cookie_out_of_date_takes_nothing_from_this_machine(workspace: Workspace) -> None:
+    with served(workspace) as site, site.client(**HTML) as client:
+        client.cookies.set(COOKIE, "shm_old")
+        page = client.get("/")
+    assert page.status_code == 200
+    assert 'href="/sign-in"' in page.text

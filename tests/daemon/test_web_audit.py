@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 
 import httpx
 import pytest
@@ -14,23 +15,15 @@ from shm.store import Scope, Workspace
 from shm.store.journal import Actor, list_changes
 from shm.store.rows import Role
 from shm_cli.main import run
-from tests.daemon.test_web_people import PASSWORD, UPLOAD, sign_in
-from tests.helpers.web_servers import Served, served
+from tests.helpers.web_servers import PASSWORD, UPLOAD, Served, sign_in
 
 
 @pytest.fixture
-def site(workspace: Workspace) -> Iterator[Served]:
-    with workspace.store() as store:
+def browser(workspace: Workspace, at_home: Served) -> Iterator[httpx.Client]:
+    with replace(workspace, actor=Actor("anna", "page")).store() as store:
         for role in Role:
-            anna = store.acting_as(Actor("anna", "page"))
-            anna.people.add(role, role, PASSWORD, utc_now())
-    with served(workspace) as site:
-        yield site
-
-
-@pytest.fixture
-def browser(site: Served) -> Iterator[httpx.Client]:
-    with site.client(Origin=site.url) as client:
+            store.people.add(role, role, PASSWORD, utc_now())
+    with at_home.client(Origin=at_home.url) as client:
         yield client
 
 
@@ -41,7 +34,7 @@ def newest(workspace: Workspace) -> tuple[str, ...]:
 
 
 def test_what_page_api_and_command_line_change_is_noted_with_who_did_it(
-    site: Served,
+    at_home: Served,
     browser: httpx.Client,
     workspace: Workspace,
     monkeypatch: pytest.MonkeyPatch,
@@ -50,7 +43,7 @@ def test_what_page_api_and_command_line_change_is_noted_with_who_did_it(
     sign_in(browser, "operator")
     browser.post(UPLOAD, content=b"x")
     assert newest(workspace) == ("operator", "page", "recording uploaded", "x.csv")
-    with site.client(site.write_token) as program:
+    with at_home.client(at_home.write_token) as program:
         program.post(UPLOAD, content=b"y")
     assert newest(workspace)[:3] == ("token write", "API", "recording uploaded")
     monkeypatch.setattr("getpass.getuser", lambda: "huber")
@@ -66,9 +59,7 @@ def test_what_page_api_and_command_line_change_is_noted_with_who_did_it(
     assert json.loads(capsys.readouterr().out)["changes"][0]["detail"] == "paint"
 
 
-def test_a_change_that_fails_leaves_no_row_and_what_shm_does_by_itself_none(
-    workspace: Workspace,
-) -> None:
+def test_failed_change_leaves_no_row(workspace: Workspace) -> None:
     with workspace.store() as store:
         anna = store.acting_as(Actor("anna", "page"))
         with pytest.raises(NothingThere, match="no token"):
@@ -77,26 +68,24 @@ def test_a_change_that_fails_leaves_no_row_and_what_shm_does_by_itself_none(
         assert list_changes(store) == ()
 
 
-def test_only_an_engineer_reads_it(browser: httpx.Client, site: Served) -> None:
+def test_only_an_engineer_reads_it(browser: httpx.Client, at_home: Served) -> None:
     assert browser.get("/audit").status_code == 401
     sign_in(browser, "operator")
     assert browser.get("/audit").status_code == 403
     assert 'href="/audit"' not in browser.get("/operation").text
-    with site.client(site.write_token) as program:
+    with at_home.client(at_home.write_token) as program:
         assert program.get("/audit").status_code == 401
     sign_in(browser, "engineer")
     assert "user added" in browser.get("/audit").text
     assert 'href="/audit"' in browser.get("/operation").text
 
 
-def test_who_is_signed_in_need_not_sign_in_and_each_is_told_what_to_do(
-    browser: httpx.Client, site: Served
-) -> None:
+def test_signed_in_need_not_sign_in(browser: httpx.Client, at_home: Served) -> None:
     wrong = browser.post("/sign-in", data={"name": "reader", "password": "wrong"})
     assert wrong.status_code == 401
     assert "password" in wrong.json()["remedy"]
     assert "Bearer" not in wrong.json()["remedy"]
-    with site.client("wrong") as program:
+    with at_home.client("wrong") as program:
         assert "Bearer" in program.get("/api/status").json()["remedy"]
     sign_in(browser, "reader")
     gone_on = browser.get("/sign-in?next=/alerts")

@@ -74,9 +74,7 @@ def until(found: Callable[[], Text | None]) -> Text:
     raise AssertionError("nothing came")
 
 
-def test_what_fails_says_why_and_stops_nothing_else(
-    background_worker: BackgroundWorker[Text],
-) -> None:
+def test_failure_stops_nothing_else(background_worker: BackgroundWorker[Text]) -> None:
     for how, told in (("refused", "is no word"), ("bug", "internal error")):
         order = Order("none", how)
         with pytest.raises(ShmError, match=told):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
 from dataclasses import replace
 from datetime import timedelta
 from itertools import pairwise
@@ -23,7 +22,7 @@ from shm_daemon.web.bridge_view import HangerGlance, elevation
 from shm_daemon.web.site import Description, Site
 from tests.helpers.nouns import a_summary, averaged
 from tests.helpers.taken_in import ingest_quickly
-from tests.helpers.web_servers import Served, served
+from tests.helpers.web_servers import HTML, served
 from tests.helpers.workspaces import START, make_workspace, write_test
 
 
@@ -31,11 +30,8 @@ def glance(hanger: Hanger, shift: float = 0.0, sd: float = 0.003) -> HangerGlanc
     """Return a hanger whose tension moved by so much since its baseline."""
     moved = Drift(hanger.id, "t9", START, TENSION, 711e3, 711e3, shift, sd, 0.05, 0.1)
     tension = Interval.normal(711e3, 5e3)
-    return HangerGlance(
-        a_summary(
-            hanger, Status.STEADY, tension, drifts=(moved,), baseline=averaged(tension), tests=9
-        ),
-    )
+    known = {"drifts": (moved,), "baseline": averaged(tension), "tests": 9}
+    return HangerGlance(a_summary(hanger, Status.STEADY, tension, **known))
 
 
 @pytest.fixture(scope="module")
@@ -50,18 +46,6 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 
 @pytest.fixture(scope="module")
-def site(bridge: Workspace) -> Iterator[Served]:
-    with served(bridge) as site:
-        yield site
-
-
-@pytest.fixture(scope="module")
-def client(site: Served) -> Iterator[httpx.Client]:
-    with site.client(Accept="text/html") as client:
-        yield client
-
-
-@pytest.fixture(scope="module")
 def hanger(bridge: Workspace) -> Hanger:
     return bridge.bridge.hangers[0]
 
@@ -72,16 +56,14 @@ def drawn(page: str) -> ET.Element:
     return ET.fromstring(found[0])
 
 
-def test_each_hanger_is_a_link_with_its_state_in_words(client: httpx.Client) -> None:
+def test_elevation_marks_each_hanger_with_its_state(client: httpx.Client) -> None:
+    """A link with the state in words, in colour, and a loss by an arrow."""
     links = drawn(client.get("/").text).findall("a")
     assert [link.get("href") for link in links] == ["/hangers/3", "/hangers/4"]
     lost, never = (link.get("aria-label", "") for link in links)
     assert re.match(r"Hanger 3, Alert, -(19|20|21)\.?\d* ± .* % since the baseline", lost)
     assert "open alert" in lost
     assert "no test yet" in never
-
-
-def test_state_is_marked_in_colour_and_a_loss_by_an_arrow(client: httpx.Client) -> None:
     page = client.get("/").text
     lost, never = drawn(page).findall("a")
     assert "alert" in str(lost.get("class"))
@@ -93,7 +75,7 @@ def test_state_is_marked_in_colour_and_a_loss_by_an_arrow(client: httpx.Client) 
     assert words[:2] == ["Alert", "no result yet"]
 
 
-def test_the_table_says_the_same(client: httpx.Client) -> None:
+def test_table_and_json_say_the_same(client: httpx.Client) -> None:
     page = client.get("/").text
     rows = re.findall(r"<tr><th scope=\"row\">.*?</tr>", page, re.DOTALL)
     text = [" ".join(re.sub(r"<[^>]+>", " ", row).split()) for row in rows]
@@ -102,9 +84,6 @@ def test_the_table_says_the_same(client: httpx.Client) -> None:
     assert re.search(r"-(19|20|21)\.\d+ ± \d+\.\d+", text[0])
     assert text[1].startswith("Hanger 4 no test yet next test")
     assert "/alerts?hanger=3" in rows[0]
-
-
-def test_the_same_stands_in_json(client: httpx.Client) -> None:
     found = client.get("/api/bridge").json()
     lost, never = found["hangers"]
     assert found["status"] == lost["status"] == "alert"
@@ -119,7 +98,7 @@ def test_the_same_stands_in_json(client: httpx.Client) -> None:
 def test_a_bridge_without_hangers_has_a_page(workspace: Workspace) -> None:
     Path(workspace.bridge.source).write_text('[bridge]\nname = "Empty"\n', encoding="utf-8")
     empty = Workspace.open(workspace.folder)
-    with served(empty) as site, site.client(Accept="text/html") as client:
+    with served(empty) as site, site.client(**HTML) as client:
         page = client.get("/")
     assert page.status_code == 200
     assert "describes no hanger yet" in page.text
@@ -144,13 +123,8 @@ def test_a_hanger_long_not_tested_is_said(bridge: Workspace) -> None:
     site = Site(Description(bridge), Address())
     later = START + timedelta(days=bridge.settings.quiet_days + 1000)
     try:
-        assert [each.is_quiet for each in bridge_view.summarize_hangers(site, START).hangers] == [
-            False,
-            False,
-        ]
-        assert [each.is_quiet for each in bridge_view.summarize_hangers(site, later).hangers] == [
-            True,
-            False,
-        ]
+        for now, quiet in ((START, [False, False]), (later, [True, False])):
+            hangers = bridge_view.summarize_hangers(site, now).hangers
+            assert [each.is_quiet for each in hangers] == quiet
     finally:
         site.close()

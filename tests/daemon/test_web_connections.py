@@ -143,9 +143,7 @@ def test_uploads_may_follow_each_other(site: Served) -> None:
             assert sent.status_code == 202
 
 
-def test_too_much_at_once_is_refused_in_our_words_and_health_still_answers(
-    site: Served, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_too_much_at_once(site: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(middleware, "PLACES", dict.fromkeys(middleware.Kind, 0))
     with site.client() as client:
         refused = client.get("/")

@@ -14,20 +14,15 @@ from shm.store import Workspace
 from shm_daemon.doctor import Level, examine
 from shm_daemon.heartbeat import beat
 from shm_daemon.web.frame import NAVIGATION
-from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace
 from tests.store.make_released_database import fill
 
+LENGTH = "length_m = 12.0"
 FAULTS = {
-    "syntax": ("length_m = 12.0", "length_m = = 12.0", 7, "not a readable TOML file"),
-    "unknown key": ("length_m = 12.0", "lenght_m = 12.0", 7, "unknown key lenght_m"),
-    "no number": (
-        "length_m = 12.0",
-        'length_m = "12 m"',
-        7,
-        "length_m = '12 m' is not a positive number",
-    ),
-    "missing key": ("length_m = 12.0\n", "", 4, "length_m is missing"),
+    "syntax": (LENGTH, "length_m = = 12.0", 7, "not a readable TOML file"),
+    "unknown key": (LENGTH, "lenght_m = 12.0", 7, "unknown key lenght_m"),
+    "no number": (LENGTH, 'length_m = "12 m"', 7, "length_m = '12 m' is not a positive number"),
+    "missing key": (f"{LENGTH}\n", "", 4, "length_m is missing"),
     "unknown setting": ("samples = 100", "sampels = 100", None, "unknown setting 'sampels'"),
 }
 PAGES = ("/hangers/3", *(address for address, _ in NAVIGATION))
@@ -39,12 +34,6 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     with workspace.store() as store:
         fill(store)
     return workspace
-
-
-@pytest.fixture(scope="module")
-def client(bridge: Workspace) -> Iterator[httpx.Client]:
-    with served(bridge) as site, site.client(Accept="text/html") as client:
-        yield client
 
 
 @pytest.fixture
@@ -96,7 +85,7 @@ def test_health_pages_and_doctor_say_what_is_wrong_and_where(
     assert found.remedy
 
 
-def test_a_file_that_is_gone_is_told_too(client: httpx.Client, described: Path) -> None:
+def test_lost_file_or_hanger(client: httpx.Client, described: Path, bridge: Workspace) -> None:
     before = described.read_text()
     described.unlink()
     answer = client.get("/health").json()
@@ -106,11 +95,6 @@ def test_a_file_that_is_gone_is_told_too(client: httpx.Client, described: Path) 
     assert answer["reasons"][0].startswith("bridge.toml: no such file in the workspace.")
     assert "no such file" in page
     assert client.get("/health").json()["status"] == "ok"
-
-
-def test_a_hanger_that_is_no_longer_described_is_told(
-    client: httpx.Client, bridge: Workspace, described: Path
-) -> None:
     described.write_text(described.read_text().replace("id = 3\n", "id = 7\n", 1))
     answer = client.get("/health")
     page = client.get("/").text

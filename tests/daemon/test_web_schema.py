@@ -85,9 +85,7 @@ def test_the_routes_are_those_that_are_tried(schema: schemathesis.BaseSchema) ->
 
 
 @pytest.mark.parametrize("route", few_of(ROUTES, 8))
-def test_no_request_makes_a_server_error_or_an_answer_that_is_not_described(
-    site: Served, schema: schemathesis.BaseSchema, route: str
-) -> None:
+def test_requests_as_described(site: Served, schema: schemathesis.BaseSchema, route: str) -> None:
     verb, path = route.split()
     kinds = list(schemathesis.GenerationMode)
     if route == "GET /health":

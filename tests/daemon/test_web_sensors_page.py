@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 
 import httpx
@@ -13,7 +12,6 @@ from shm.values import Mode
 from shm.values.stream import PooledReading, StreamEvent, Window, WindowReading
 from shm_daemon.doctor import Level, examine
 from tests.helpers.live_streams import HOUR, send, with_live_streams
-from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace
 
 NAME = "hanger03"
@@ -45,31 +43,17 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     return workspace
 
 
-@pytest.fixture(scope="module")
-def client(bridge: Workspace) -> Iterator[httpx.Client]:
-    with served(bridge) as site, site.client(Accept="text/html") as client:
-        yield client
-
-
-def test_the_list_says_of_each_stream_how_it_is_and_how_far_tension_moved(
-    client: httpx.Client,
-) -> None:
+def test_pages_and_health_say_how_each_stream_is(client: httpx.Client) -> None:
+    """How far tension moved, what befell it, and on every page that it is silent."""
     page = client.get("/streams").text
     assert "silent" in page
     assert "wind, 1 mode" in page
     assert "-3.10 ± 0.16 %" in page
-
-
-def test_a_silent_stream_is_told_on_every_page_and_by_health(client: httpx.Client) -> None:
     said = f"Stream {NAME} (last sample "
-    for address in ("/", "/alerts"):
-        assert said in client.get(address).text
+    assert all(said in client.get(address).text for address in ("/", "/alerts"))
     (told,) = client.get("/health").json()["attention"]
     assert told.startswith(said)
     assert told.endswith("silent.")
-
-
-def test_a_stream_has_a_page_with_its_figure_and_what_befell_it(client: httpx.Client) -> None:
     page = client.get(f"/streams/{NAME}").text
     assert "no motion (3 times in a row)" in page
     assert f"/api/streams/{NAME}/figure?days=7" in page
@@ -81,16 +65,13 @@ def test_a_stream_has_a_page_with_its_figure_and_what_befell_it(client: httpx.Cl
     assert client.get("/api/streams/nobody/figure").status_code == 404
 
 
-def test_a_scrape_tells_lag_and_size_of_each_stream(client: httpx.Client) -> None:
+def test_scrape_and_doctor_tell_lag_and_silence(client: httpx.Client, bridge: Workspace) -> None:
     lines = client.get("/metrics").text.splitlines()
     (lag,) = (line for line in lines if line.startswith("shm_stream_lag_seconds{"))
     assert 2.8 * 3600 < float(lag.split()[-1]) < 4 * 3600
     assert f'shm_stream_apart_seconds{{stream="{NAME}"}} 0.0' in lines
     (size,) = (line for line in lines if line.startswith("shm_stream_ring_bytes{"))
     assert float(size.split()[-1]) > 100_000
-
-
-def test_the_doctor_names_what_is_silent(bridge: Workspace) -> None:
     (finding,) = (
         each for each in examine(bridge.folder, datetime.now(UTC)) if each.check == "streams"
     )

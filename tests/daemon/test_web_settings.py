@@ -13,17 +13,17 @@ from shm.store import Workspace
 from shm.store.journal import list_changes
 from shm_cli.main import run
 from shm_daemon.doctor import examine
-from tests.daemon.test_web_people import PASSWORD, add_a_user_of_each_role, sign_in
 from tests.helpers.outboxes import make_baseline, raise_alerts
-from tests.helpers.web_servers import served
+from tests.helpers.web_servers import HTML, PASSWORD, Served, add_a_user_of_each_role, sign_in
 
 LEVEL = "hanger.3.thresholds.alert_probability"
 
 
 @pytest.fixture
-def browser(workspace: Workspace) -> Iterator[httpx.Client]:
+def browser(workspace: Workspace, at_home: Served) -> Iterator[httpx.Client]:
+    """Yield a signed-in engineer."""
     add_a_user_of_each_role(workspace)
-    with served(workspace) as site, site.client(Origin=site.url, Accept="text/html") as client:
+    with at_home.client(**HTML, Origin=at_home.url) as client:
         sign_in(client, "engineer")
         yield client
 
@@ -71,9 +71,7 @@ def test_a_threshold_holds_from_now_on_and_goes_back_to_the_file(
     assert level(workspace) == in_file
 
 
-def test_who_saves_on_what_another_has_changed_meanwhile_is_shown_it_and_overwrites_nothing(
-    browser: httpx.Client, workspace: Workspace
-) -> None:
+def test_saving_overwrites_nothing(browser: httpx.Client, workspace: Workspace) -> None:
     opened = based_on(browser, LEVEL)
     assert put(browser, LEVEL, "0.9").status_code == 303
     refused = browser.post("/settings", data=filled_in(LEVEL, opened, value="0.7"))
@@ -86,9 +84,7 @@ def test_who_saves_on_what_another_has_changed_meanwhile_is_shown_it_and_overwri
         assert list_changes(store, limit=1)[0].detail == "from 0.9 to 0.7"
 
 
-def test_a_wrong_value_saves_nothing_and_what_was_typed_stays_in_the_form(
-    browser: httpx.Client, workspace: Workspace
-) -> None:
+def test_wrong_value_stays_typed(browser: httpx.Client, workspace: Workspace) -> None:
     attempts = "settings.hook_attempts"
     told = filled_in(attempts, "0", value="9") | filled_in(LEVEL, "0", value="minus ten")
     refused = browser.post("/settings", data=told)
@@ -100,9 +96,7 @@ def test_a_wrong_value_saves_nothing_and_what_was_typed_stays_in_the_form(
         assert not store.settings.list_current()
 
 
-def test_what_nobody_changed_is_not_set_though_all_is_one_form(
-    browser: httpx.Client, workspace: Workspace
-) -> None:
+def test_unchanged_setting_is_not_set(browser: httpx.Client, workspace: Workspace) -> None:
     other = "hanger.3.thresholds.tension_shift_fraction"
     unchanged = {f"based_on.{other}": "0", f"value.{other}": "0.05", f"was_value.{other}": "0.05"}
     opened = based_on(browser, LEVEL)
@@ -112,9 +106,7 @@ def test_what_nobody_changed_is_not_set_though_all_is_one_form(
         assert [row.key for row in store.settings.list_current().values()] == [LEVEL]
 
 
-def test_a_test_alert_is_sent_from_the_page_and_what_went_wrong_is_said(
-    browser: httpx.Client, workspace: Workspace
-) -> None:
+def test_test_alert_from_the_page(browser: httpx.Client, workspace: Workspace) -> None:
     told = workspace.folder / "told.json"
     with (workspace.folder / "bridge.toml").open("a") as file:
         file.write(f'\n[[hook]]\nname = "file"\ncommand = ["tee", "{told}"]\n')
@@ -128,9 +120,7 @@ def test_a_test_alert_is_sent_from_the_page_and_what_went_wrong_is_said(
         assert store.alerts.list_all() == ()
 
 
-def test_the_page_says_whether_stored_tests_are_judged_with_what_it_shows(
-    browser: httpx.Client, workspace: Workspace
-) -> None:
+def test_page_says_how_tests_are_judged(browser: httpx.Client, workspace: Workspace) -> None:
     make_baseline(workspace)
     raise_alerts(workspace, [1], [])
     shown = browser.get("/settings?hanger=3").text
@@ -170,9 +160,7 @@ def hours(workspace: Workspace) -> str:
     return str(hook.quiet_hours or "none")
 
 
-def test_quiet_hours_of_a_hook_are_set_taken_away_and_given_back_to_the_file(
-    hooked: httpx.Client, workspace: Workspace
-) -> None:
+def test_quiet_hours_set_and_given_back(hooked: httpx.Client, workspace: Workspace) -> None:
     opened, found = based_on(hooked, HOURS), [hours(workspace)]
     shown = hooked.get("/settings").text
     assert f'name="begins.{HOURS}" value="22:00"' in shown
@@ -199,46 +187,31 @@ def test_quiet_hours_of_a_hook_are_set_taken_away_and_given_back_to_the_file(
     assert "Your change, none, was not saved" in late.text
 
 
-@pytest.mark.parametrize("span", [("22:00", ""), ("", "06:00"), ("24:00", "6"), ("06:00", "06:00")])
-def test_quiet_hours_that_are_no_span_are_refused(
-    hooked: httpx.Client, workspace: Workspace, span: tuple[str, str]
-) -> None:
-    answer = put_hours(hooked, *span)
-    assert answer.status_code == 422
-    assert "is not a span of the day" in answer.text
-    assert "Give two different times" in answer.text
-    assert workspace.reopened().bridge.as_in_file is None
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "said"),
-    [
+def test_settings_refuse_as_the_file(hooked: httpx.Client, workspace: Workspace) -> None:
+    """And no page changes what runs on the computer."""
+    for span in (("22:00", ""), ("", "06:00"), ("24:00", "6"), ("06:00", "06:00")):
+        answer = put_hours(hooked, *span)
+        assert answer.status_code == 422
+        assert "is not a span of the day" in answer.text
+        assert "Give two different times" in answer.text
+    for key, value, said in (
         (LEVEL, "1.5", "alert_probability must be at least 0.5 and below 1"),
         ("hanger.3.thresholds.tension_shift_fraction", "5", "Give 0.05 for 5 %"),
         (LEVEL, "much", "is not a number"),
         ("hanger.3.limits.tension_max_n", "-1", "is not a positive number"),
         ("settings.false_call_years", "0", "false_call_years"),
-    ],
-)
-def test_what_bridge_toml_would_refuse_is_refused_with_its_words(
-    browser: httpx.Client, workspace: Workspace, key: str, value: str, said: str
-) -> None:
-    answer = put(browser, key, value)
-    assert answer.status_code == 422
-    assert said in answer.text
-    assert workspace.reopened().bridge.as_in_file is None
-
-
-def test_no_page_changes_what_runs_on_the_computer(browser: httpx.Client) -> None:
+    ):
+        answer = put(hooked, key, value)
+        assert answer.status_code == 422
+        assert said in answer.text
     for key in ("hook.mail.command", "settings.store", "hanger.3.length_m", "hanger.77.limits"):
-        assert put(browser, key, "1").status_code == 404
-    sign_in(browser, "operator")
-    assert put(browser, LEVEL, "0.9").status_code == 403
+        assert put(hooked, key, "1").status_code == 404
+    assert workspace.reopened().bridge.as_in_file is None
+    sign_in(hooked, "operator")
+    assert put(hooked, LEVEL, "0.9").status_code == 403
 
 
-def test_an_engineer_lets_people_in_and_out_but_never_ends_the_last_engineer(
-    browser: httpx.Client, workspace: Workspace
-) -> None:
+def test_engineer_manages_people(browser: httpx.Client, workspace: Workspace) -> None:
     def ask(action: str, name: str, **more: str) -> httpx.Response:
         return browser.post("/users", data={"action": action, "name": name, **more})
 

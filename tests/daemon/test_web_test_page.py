@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import json
 import re
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from html import unescape
 from urllib.parse import unquote
 
@@ -28,10 +26,9 @@ from shm.values import Channel
 from shm_daemon.web.address import name_in
 from shm_daemon.web.address import test_json as document_of
 from shm_daemon.web.address import test_page as page_of
-from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.modal_test_view import FIGURES, FROM_RECORDS
 from tests.helpers.flows import ingest
-from tests.helpers.web_servers import Served, a_thread, served
+from tests.helpers.web_servers import Served, at_last, in_a_thread, served
 from tests.helpers.workspaces import START, make_workspace, write_test
 from tests.worlds.simulated.hammer import hammer_test
 
@@ -70,6 +67,7 @@ def _silent_after_the_second_hit(channel: Channel, plan: HammerPlan) -> Channel:
 class Site:
     workspace: Workspace
     served: Served
+    client: httpx.Client
     odd: str
     """The name that the store has given the odd test."""
     largest_force_n: float
@@ -87,42 +85,21 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         names = [stored.test.id for stored in store.tests.list_all(3)]
         assert {recording.stage for recording in list_recordings(store)} == {Stage.DONE}
     assert names[1:] == [MODES_ALONE]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            "shm_daemon.web.app.BackgroundWorker", partial(BackgroundWorker, pool=a_thread)
-        )
-        with served(workspace) as running:
-            yield Site(workspace, running, names[0], largest_n)
+    with in_a_thread(), served(workspace) as running, running.client() as client:
+        yield Site(workspace, running, client, names[0], largest_n)
 
 
 @pytest.fixture
-def client(site: Site) -> Iterator[httpx.Client]:
-    with site.served.client() as client:
-        yield client
-
-
-def at_last(client: httpx.Client, address: str) -> httpx.Response:
-    """Return the answer once nothing more is worked out."""
-    for _ in range(600):
-        answer = client.get(address)
-        if "Retry-After" not in answer.headers:
-            return answer
-        time.sleep(0.1)
-    raise AssertionError(f"{address} never came")
+def client(site: Site) -> httpx.Client:
+    return site.client
 
 
 def test_the_page_answers_before_the_raw_file_was_read(site: Site, client: httpx.Client) -> None:
     answer = client.get(page_of(3, site.odd))
     text = unescape(answer.text)
     assert answer.status_code == 200
-    for said in (
-        "Use with care",
-        "double hit",
-        "transverse",
-        "12.5 °C",
-        "Tension by this test",
-        "90 % interval",
-    ):
+    for said in ("Use with care", "double hit", "transverse", "12.5 °C", "Tension by this test",
+                 "90 % interval"):  # fmt: skip
         assert said in text
     assert "<b>Hänger" not in answer.text
     assert not re.search(r"\b(nan|None)\b", text)
@@ -134,9 +111,7 @@ def test_the_page_answers_before_the_raw_file_was_read(site: Site, client: httpx
     assert "identified once more" in history.json()["message"]
 
 
-def test_every_figure_of_the_page_comes_and_is_one_that_plotly_takes(
-    site: Site, client: httpx.Client
-) -> None:
+def test_every_figure_comes(site: Site, client: httpx.Client) -> None:
     page = client.get(page_of(3, site.odd)).text
     addresses = [unescape(found) for found in re.findall(r'data-figure="([^"]+)"', page)]
     assert [re.sub(r".*/figures/|\?.*", "", each) for each in addresses] == list(FIGURES)
@@ -149,9 +124,7 @@ def test_every_figure_of_the_page_comes_and_is_one_that_plotly_takes(
         assert document["alt"]
 
 
-def test_a_time_history_keeps_the_extremes_and_marks_each_hit(
-    site: Site, client: httpx.Client
-) -> None:
+def test_hits_and_time_history(site: Site, client: httpx.Client) -> None:
     answer = at_last(client, f"{document_of(3, site.odd)}/figures/time_history")
     traces = answer.json()["data"]
     force = next(trace for trace in traces if trace["mode"] == "lines" and trace["yaxis"] == "y")
@@ -163,9 +136,6 @@ def test_a_time_history_keeps_the_extremes_and_marks_each_hit(
     assert set(marks) == {"3 hits used", "1 hit dropped: not-a-number samples"}
     marked_s = [at_s for times_s in marks.values() for at_s in times_s]
     assert sorted(marked_s) == pytest.approx([hit["start_s"] for hit in hits], rel=1e-3)
-
-
-def test_each_hit_is_told_with_the_reason_to_drop_it(site: Site, client: httpx.Client) -> None:
     found = at_last(client, f"{document_of(3, site.odd)}/hits").json()
     assert len(found["hits"]) == 4
     assert [hit["reason"] for hit in found["hits"] if not hit["used"]] == ["not-a-number samples"]
@@ -217,7 +187,7 @@ def test_the_document_tells_where_the_results_come_from(site: Site, client: http
     assert f'href="{page_of(3, MODES_ALONE)}"' in page
 
 
-def test_modes_that_came_as_such_say_why_there_is_no_more(client: httpx.Client) -> None:
+def test_modes_that_came_as_such_say_why_there_is_no_more(client: httpx.Client, site: Site) -> None:
     page = unescape(client.get(page_of(3, MODES_ALONE)).text)
     assert "x.modes.json gave the modes of this test" in page
     assert "Not checked" in page
@@ -229,9 +199,6 @@ def test_modes_that_came_as_such_say_why_there_is_no_more(client: httpx.Client) 
         answer = client.get(f"{document_of(3, MODES_ALONE)}/figures/{name}")
         assert answer.status_code == 404
         assert answer.json()["message"]
-
-
-def test_what_is_none_is_not_there(site: Site, client: httpx.Client) -> None:
     for path in (
         page_of(3, "none"), document_of(3, "none"), document_of(7, site.odd),
         f"{document_of(3, site.odd)}/figures/none",

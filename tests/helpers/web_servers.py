@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+import html
+import re
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import httpx
+import pytest
 
 from shm.pipeline import utc_now
 from shm.store import Scope, Workspace
+from shm.store.rows import Role
 from shm_daemon.web.address import Address
+from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.serving import make_app, make_server
+
+PASSWORD = "correct horse battery"
+UPLOAD = "/api/recordings?name=x.csv"
+ELSEWHERE = Address("0.0.0.0")
+HTML = {"Accept": "text/html"}
 
 
 @dataclass(frozen=True)
@@ -64,3 +76,47 @@ def served(
 def a_thread(workers: int) -> ProcessPoolExecutor:
     """Where a background_worker works without a process of its own."""
     return ThreadPoolExecutor(workers)  # type: ignore[return-value]
+
+
+@contextmanager
+def in_a_thread() -> Iterator[None]:
+    """Work out in a thread what takes long: its processes are tested by themselves."""
+    worker = partial(BackgroundWorker, pool=a_thread)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("shm_daemon.web.app.BackgroundWorker", worker)
+        yield
+
+
+def at_last(client: httpx.Client, address: str) -> httpx.Response:
+    """Return the answer once nothing more is worked out."""
+    for _ in range(600):
+        answer = client.get(address)
+        if answer.status_code != 202 and "Retry-After" not in answer.headers:
+            return answer
+        time.sleep(0.1)
+    raise AssertionError(f"{address} never came")
+
+
+def outcome(client: httpx.Client, ordered: httpx.Response) -> httpx.Response:
+    """Return the outcome of an order that its page follows, once it was made."""
+    assert ordered.status_code == 303
+    page = ordered.headers["location"]
+    address = page.replace("?", "/outcome?")
+    assert f'data-fragment="{address}"' in client.get(page).text
+    return at_last(client, address)
+
+
+def add_a_user_of_each_role(workspace: Workspace) -> None:
+    """Add users that are named as their roles, with the one password."""
+    with workspace.store() as store:
+        for role in Role:
+            store.people.add(role, role, PASSWORD, utc_now())
+
+
+def sign_in(client: httpx.Client, name: str, password: str = PASSWORD) -> int:
+    return client.post("/sign-in", data={"name": name, "password": password}).status_code
+
+
+def words_of(page: str) -> str:
+    """Return the visible text of a page on one line."""
+    return " ".join(html.unescape(re.sub(r"<(?:.|\n)*?>", " ", page)).split())

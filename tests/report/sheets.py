@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 
@@ -249,3 +249,20 @@ _LONG_REMEDY = (
     "Move the cables of acc_1 and acc_3 away from the mains, run the logger on its battery, and "
     "repeat the test."
 )
+
+
+EIGHT_M = (0.9, 2.1, 3.4, 4.6, 5.8, 7.1, 8.3, 9.6)
+SHEETS: dict[str, Callable[[], ModalTestReport]] = {
+    "two sensors": make_sheet,
+    "eight sensors": lambda: make_sheet(places_m=EIGHT_M, orders=12),
+    "dropped hits": lambda: make_sheet(
+        hits=6, dropped={2: "double hit", 5: "not-a-number samples"}
+    ),
+    "single hit": lambda: make_sheet(hits=1),
+    "given responses": given_responses,
+    "one sensor": one_sensor,
+    "ambient": ambient,
+    "warned": lambda: warned(make_sheet()),
+    "refused": lambda: refused(make_sheet()),
+    "no records": lambda: replace(make_sheet(), records=(), hanger=None, band_hz=None),
+}

@@ -12,14 +12,10 @@ import numpy as np
 import pytest
 
 from shm import documents
-from shm.report.as_html import as_html
-from shm.report.as_pdf import as_pdf
-from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
 from shm.report.contents import (
     BridgeReport,
     HangerReport,
-    ModalTestReport,
     TrendRow,
 )
 from shm.report.formatting import Interval
@@ -27,15 +23,15 @@ from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_status import Status
 from shm.report.hanger_summary import PeriodSummary
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
+from shm.report.paper import Paper
 from shm.report.states import CalledChange, Period, QuantityOverTime, StatesOverTime
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
 from shm.watch.state import Band
 from tests.helpers.nouns import a_change, a_summary, with_now
-from tests.helpers.pdf_words import Pdf
 from tests.report.conftest import START
 from tests.report.diagnoses import CASES
-from tests.report.outline import Outline
-from tests.report.sheets import ambient, given_responses, make_sheet, one_sensor, refused
+from tests.report.outline import page_words, pdf_words, text_words
+from tests.report.sheets import SHEETS
 
 UNSPOKEN = re.compile(r"(?<![\w.])[+-]?(?:nan|inf|infinity|None|NaN)(?!\w)")
 Change = Callable[[HangerReport], HangerReport]
@@ -123,20 +119,13 @@ KINDS: dict[str, Change] = {
 }  # fmt: skip
 
 
-DRAWN = ("called drift", "no standard deviations", "period", "diagnosis of nothing")
+DRAWN = ("called drift", "no standard deviations", "period", "diagnosis of nothing", "bare")
 
 
 def assert_spoken(told: str) -> None:
     assert told.strip()
     found = UNSPOKEN.search(told)
     assert found is None, told[max(0, found.start() - 60) : found.end() + 60]
-
-
-def page_words(page: str) -> str:
-    parsed = Outline()
-    parsed.feed(page)
-    assert parsed.open == []
-    return " ".join(" ".join(parsed.words).split())
 
 
 def document_words(document: object) -> str:
@@ -158,26 +147,23 @@ def document_words(document: object) -> str:
     return "\n".join(texts(standard_json.loads(documents.dump(document), parse_constant=strict)))
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_hanger_of_any_kind_is_told_in_numbers_and_words(kind: str, season: HangerReport) -> None:
-    data = KINDS[kind](season)
-    assert_spoken(as_text(hanger_paper(data)))
-    assert_spoken(document_words(hanger_json(data)))
-    # Drawing takes its time: who has no figure or table of its own is told by the others' words.
+def assert_forms_spoken(paper: Paper, document: object) -> None:
+    for told in (text_words(paper), page_words(paper), pdf_words(paper), document_words(document)):
+        assert_spoken(told)
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "bare"])
+def test_hanger_of_any_kind_is_spoken(kind: str, season: HangerReport, bare: HangerReport) -> None:
+    data = bare if kind == "bare" else KINDS[kind](season)
     if kind in DRAWN:
-        assert_spoken(page_words(as_html(hanger_paper(data))))
-        assert_spoken(Pdf.parse(as_pdf(hanger_paper(data))).words)
-
-
-def test_a_bare_hanger_is_told_in_numbers_and_words(bare: HangerReport) -> None:
-    assert_spoken(as_text(hanger_paper(bare)))
-    assert_spoken(page_words(as_html(hanger_paper(bare))))
-    assert_spoken(Pdf.parse(as_pdf(hanger_paper(bare))).words)
-    assert_spoken(document_words(hanger_json(bare)))
+        assert_forms_spoken(hanger_paper(data), hanger_json(data))
+    else:  # who has no figure or table of its own is told by the others' words: drawing takes time
+        assert_spoken(text_words(hanger_paper(data)))
+        assert_spoken(document_words(hanger_json(data)))
 
 
 @pytest.mark.parametrize("with_period", [False, True])
-def test_a_bridge_is_told_in_numbers_and_words(season: HangerReport, with_period: bool) -> None:
+def test_bridge_is_spoken(season: HangerReport, with_period: bool) -> None:
     drift = replace(season.drifts[0], shift_mean=NAN, shift_sd=NAN, probability=NAN)
     tension = Interval(650e3, 640e3, 660e3)
     course = PeriodSummary(2, 1, Interval(-0.07, -0.08, -0.06)) if with_period else None
@@ -194,34 +180,18 @@ def test_a_bridge_is_told_in_numbers_and_words(season: HangerReport, with_period
         "Arch", lines, None, "Nothing can be compared.", START, "0.1.0", period,
         settings={"seed": "1"},
     )  # fmt: skip
-    assert_spoken(as_text(bridge_paper(data)))
-    assert_spoken(page_words(as_html(bridge_paper(data))))
-    assert_spoken(Pdf.parse(as_pdf(bridge_paper(data))).words)
-    assert_spoken(document_words(bridge_json(data)))
+    assert_forms_spoken(bridge_paper(data), bridge_json(data))
 
 
-def refused_sheet() -> ModalTestReport:
-    return refused(make_sheet())
+@pytest.mark.parametrize("kind", ["refused", "given responses", "one sensor", "ambient"])
+def test_test_of_any_kind_is_spoken(kind: str) -> None:
+    sheet = SHEETS[kind]()
+    assert_forms_spoken(modal_test_paper(sheet), modal_test_json(sheet))
+    assert ("Do not use" in pdf_words(modal_test_paper(sheet))) == (kind == "refused")
 
 
-@pytest.mark.parametrize("make", [refused_sheet, given_responses, one_sensor, ambient])
-def test_a_test_of_any_kind_is_told_in_numbers_and_words(
-    make: Callable[[], ModalTestReport],
-) -> None:
-    sheet = make()
-    on_paper = Pdf.parse(as_pdf(modal_test_paper(sheet))).words
-    assert_spoken(as_text(modal_test_paper(sheet)))
-    assert_spoken(page_words(as_html(modal_test_paper(sheet))))
-    assert_spoken(on_paper)
-    assert_spoken(document_words(modal_test_json(sheet)))
-    assert ("Do not use" in on_paper) == (make is refused_sheet)
-
-
-@pytest.mark.parametrize("told", ["is nan kN", "+inf %", "None", "(nan to nan)"])
-def test_what_must_not_be_said_is_found(told: str) -> None:
-    assert UNSPOKEN.search(told)
-
-
-@pytest.mark.parametrize("told", ["none", "-0.01 %", "2026-05-01", "information", "No change"])
-def test_what_may_be_said_is_not(told: str) -> None:
-    assert UNSPOKEN.search(told) is None
+def test_unspoken_words_are_found() -> None:
+    for told in ("is nan kN", "+inf %", "None", "(nan to nan)"):
+        assert UNSPOKEN.search(told), told
+    for told in ("none", "-0.01 %", "2026-05-01", "information", "No change"):
+        assert UNSPOKEN.search(told) is None, told

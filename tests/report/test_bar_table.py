@@ -1,4 +1,4 @@
-"""Every report names the bar it is about, on its first page, as far as its owner described it."""
+"""Every report names the bar it is about, on its first page, as described, with a sketch."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 from shm import documents
 from shm.report.as_html import as_html
@@ -15,18 +17,15 @@ from shm.report.as_pdf import as_pdf
 from shm.report.bar_table import bar_document, bar_rows, bar_table, bars_table
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_json, bridge_diagnosis_paper
 from shm.report.bridge_report import bridge_json, bridge_paper
-from shm.report.contents import (
-    BridgeDiagnosisSheet,
-    BridgeReport,
-    DiagnosisSheet,
-    HangerReport,
-)
+from shm.report.contents import BridgeDiagnosisSheet, BridgeReport, DiagnosisSheet, HangerReport
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
+from shm.report.figures.bar_sketch import FIGURE
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_status import Status
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.paper import Paper
 from shm.values import (
+    NAN,
     EndPlate,
     Hanger,
     ModalTest,
@@ -39,6 +38,7 @@ from shm.values import (
 )
 from shm.values.bar_description import BarDescription, describe_bar, list_sensors
 from tests.gap.test_shared_causes import bridge as shared_diagnosis
+from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_summary, with_now
 from tests.helpers.pdf_words import Pdf
 from tests.report.conftest import START
@@ -117,22 +117,17 @@ def missing(text: str) -> list[str]:
 
 
 @every_report
-def test_pdf_describes_the_bar_on_page_1(make: Made, season: HangerReport, unpainted: None) -> None:
-    first = Pdf.parse(as_pdf(make(season)[0])).pages[0]
+def test_forms_describe_bar_first(make: Made, season: HangerReport, unpainted: None) -> None:
+    """On page 1 of the PDF, and before the figures of the page."""
+    paper = make(season)[0]
+    first = Pdf.parse(as_pdf(paper)).pages[0]
     if make in (of_bridge, of_bridge_diagnosis):  # cells fold: words of columns stand mixed
         assert [w for _, value in ROWS for w in value.split() if w not in first] == []
     else:
         assert missing(first) == []
-
-
-@every_report
-def test_html_describes_the_bar_before_figures(
-    make: Made, season: HangerReport, unpainted: None
-) -> None:
-    page = as_html(make(season)[0]).split("<figure")[0]
     outline = Outline()
-    outline.feed(page)
-    assert missing(" ".join(outline.words)) == []
+    outline.feed(as_html(paper).split("<figure")[0])
+    assert missing(outline.told) == []
 
 
 def test_what_is_not_stated_is_said_never_invented() -> None:
@@ -155,7 +150,7 @@ def test_what_is_not_stated_is_said_never_invented() -> None:
     }  # fmt: skip
 
 
-def test_plates_turnbuckles_and_hanging_masses_are_named() -> None:
+def test_rows_name_what_was_described_and_no_more() -> None:
     plate = EndPlate(1.0915, 0.040, 1.0644, 0.241, 0.562, 0.0425)
     coupler = Turnbuckle(1.4, 0.45, 62.0, 4.1e6)
     ends = Supports("free", "pinned", 40.0)
@@ -164,9 +159,6 @@ def test_plates_turnbuckles_and_hanging_masses_are_named() -> None:
     )
     assert rows["Fittings"] == "end plates 1.0915 m long, 40 mm thick; turnbuckle of 62 kg at 1.4 m"
     assert rows["Ends"] == "free (deck), pinned (arch), 40 kg hang from the free end"
-
-
-def test_a_bar_that_is_not_described_has_its_sensors_alone() -> None:
     rows = bar_rows(given_responses().bar)
     assert rows[0] == ("Bar", "not described")
     assert rows[1][1].startswith("plane not stated, at 0.1, 1.4")
@@ -178,15 +170,11 @@ def test_a_bar_that_is_not_described_has_its_sensors_alone() -> None:
     [
         ((ResponsePoint("a"),), "1 channel, places not stated"),
         ((ResponsePoint("a", "transverse", 2.5),), "transverse at 2.5 m"),
-        (
-            (ResponsePoint("a", "transverse", 2.5), ResponsePoint("b", "longitudinal", 1.00049)),
-            "transverse at 2.5 m; longitudinal at 1 m",
-        ),
+        ((ResponsePoint("a", "transverse", 2.5), ResponsePoint("b", "longitudinal", 1.00049)),
+         "transverse at 2.5 m; longitudinal at 1 m"),
     ],
-)
-def test_sensors_are_told_by_plane_and_place(
-    sensors: tuple[ResponsePoint, ...], words: str
-) -> None:
+)  # fmt: skip
+def test_sensors_by_plane_and_place(sensors: tuple[ResponsePoint, ...], words: str) -> None:
     assert dict(bar_rows(BarDescription(3, sensors=sensors)))["Sensors"] == words
 
 
@@ -203,7 +191,8 @@ def test_list_sensors_takes_records_then_shapes() -> None:
     assert list_sensors(ModalTest("t", ())) == ()
 
 
-def test_bars_table_names_once_what_all_bars_share() -> None:
+def test_tables_of_bars_fold() -> None:
+    """What all bars share is named once; a folded table has its second half at the right."""
     bars = [describe_bar(replace(DESCRIBED, id=n, length_m=10.0 + n)) for n in (1, 2)]
     table = bars_table(bars)
     assert table.headings == ("hanger", "length")
@@ -214,12 +203,57 @@ def test_bars_table_names_once_what_all_bars_share() -> None:
     (only,) = bars_table(bars[:1]).rows
     assert only[1:] == tuple(value for _, value in bar_rows(bars[0]))
     assert bars_table([]).rows == ()
-
-
-def test_a_folded_table_has_its_second_half_at_the_right() -> None:
     table = bar_table(describe_bar(DESCRIBED, SENSORS))
     assert table.is_folded
     folded = table.folded()
     assert folded.rows[0] == (*ROWS[0], *ROWS[5])
     assert folded.rows[-1] == (*ROWS[4], "", "")
     assert {len(row) for row in folded.rows} == {len(folded.headings)}
+
+
+SKETCHED = (
+    ResponsePoint("acc_1", "transverse", 2.5),
+    ResponsePoint("acc_2", "longitudinal", 2.5),
+    ResponsePoint("acc_3", "transverse", 4.4),
+)
+HITS = (ResponsePoint("hit", None, 1.9),)
+
+
+@pytest.fixture
+def bar() -> BarDescription:
+    return describe_bar(replace(HANGER_3, fittings_m=(0.6, 0.4)), SKETCHED, HITS)
+
+
+def drawn(bar: BarDescription) -> Axes:
+    figure = FIGURE.figure(bar)
+    assert figure is not None
+    (axes,) = figure.axes
+    return axes
+
+
+def places(axes: Axes, name: str) -> list[float]:
+    (line,) = [line for line in axes.lines if line.get_label() == name]
+    return np.asarray(line.get_xdata()).tolist()
+
+
+def test_sketch_has_sensors_by_plane_hits_and_fittings(bar: BarDescription) -> None:
+    axes = drawn(bar)
+    assert places(axes, "sensor, transverse") == [2.5, 4.4]
+    assert places(axes, "sensor, longitudinal") == [2.5]
+    assert places(axes, "hit") == [1.9]
+    low, high = axes.get_xlim()
+    assert low < 0 < bar.length_m < high
+    ends = [
+        np.asarray(line.get_xdata()).tolist()
+        for line in drawn(bar).lines
+        if line.get_linewidth() == 9.0
+    ]
+    assert ends == [[0.0, 0.6], [bar.length_m - 0.4, bar.length_m]]
+
+
+def test_sketch_says_what_is_not_stated(bar: BarDescription) -> None:
+    unknown = replace(bar, hits=(replace(HITS[0], x_m=NAN),))
+    assert "hits is not stated" in FIGURE.caption(unknown)
+    assert "not stated" not in FIGURE.caption(bar)
+    assert "3 sensors and 1 place of hits" in FIGURE.alt(bar)
+    assert FIGURE.figure(replace(bar, sensors=(), hits=())) is None

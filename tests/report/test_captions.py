@@ -20,7 +20,7 @@ from shm.report.figures.modal_test_axes import ResponseCurves
 from shm.report.modal_test_report import FIGURES as OF_MODAL_TEST
 from tests.report.conftest import bare, hanger, season
 from tests.report.diagnoses import sheet
-from tests.report.test_modal_test_figures import CASES as SHEETS
+from tests.report.sheets import SHEETS
 
 OF_HANGER = (TREND, FREQUENCIES, STIFFNESS, TEMPERATURE)
 KEPT = Path(__file__).parent / "data" / "captions.txt"
@@ -52,9 +52,7 @@ def _lines(name: str, *texts: str) -> Iterator[str]:
     yield ""
 
 
-def test_the_words_beside_every_figure_are_those_that_were_agreed(
-    season: HangerReport, bare: HangerReport
-) -> None:
+def test_captions_are_as_agreed(season: HangerReport, bare: HangerReport) -> None:
     assert written(season, bare) == KEPT.read_text(encoding="utf-8")
 
 

@@ -30,6 +30,7 @@ from shm.watch.neighbours import HangerShift, bridge_pattern
 from tests.helpers.nouns import a_summary
 from tests.helpers.slow import few_of
 from tests.report.diagnoses import HANGER, sheet
+from tests.report.outline import text_words
 
 NOW = datetime(2026, 5, 1, tzinfo=UTC)
 SIZES = [(5.4, "N"), (20e3, "kN"), (12e6, "MN")]
@@ -54,9 +55,7 @@ NOTHING = re.compile(r"(?<![\d.])0\.0*(?!\d)")
         (0.0, "N", "0 N", 1),
     ],
 )
-def test_a_force_has_the_unit_of_its_size(
-    force_n: float, unit: str, told: str, decimals: int
-) -> None:
+def test_force_unit_of_size(force_n: float, unit: str, told: str, decimals: int) -> None:
     found = force_unit(force_n)
     assert found.name == unit
     assert found.with_unit(force_n) == told
@@ -84,25 +83,16 @@ def of_size(season: HangerReport, tension_n: float) -> HangerReport:
     compared = Selection(tuple(map(scaled, selection.posteriors)), selection.probabilities)
     posterior, baseline = scaled(season.posterior), scaled(season.baseline)
     now = summary_of(hanger, season.latest, posterior, baseline, compared)
-    return replace(
-        season,
-        now=replace(now, drifts=season.drifts),
-        posterior=posterior,
-        baseline=baseline,
-        selection=compared,
-        trend=tuple(replace(row, tension_n=row.tension_n.scaled(factor)) for row in season.trend),
-    )
+    trend = tuple(replace(row, tension_n=row.tension_n.scaled(factor)) for row in season.trend)
+    now = replace(now, drifts=season.drifts)
+    return replace(season, now=now, posterior=posterior, baseline=baseline, selection=compared,
+                   trend=trend)  # fmt: skip
 
 
 @pytest.mark.parametrize(("tension_n", "unit"), few_of(SIZES, 1), ids=NAMES)
-def test_a_report_tells_every_tension_in_that_unit(
-    season: HangerReport, tension_n: float, unit: str
-) -> None:
+def test_report_tells_tensions_in_unit(season: HangerReport, tension_n: float, unit: str) -> None:
     data = of_size(season, tension_n)
-    for told in (
-        " ".join(as_text(hanger_paper(data)).split()),
-        DRAWING.sub("", as_html(hanger_paper(data))),
-    ):
+    for told in (text_words(hanger_paper(data)), DRAWING.sub("", as_html(hanger_paper(data)))):
         found = WITH_UNIT.findall(told)
         assert {each for _, each in found} == {unit}
         assert not [value for value, _ in found if NOTHING.fullmatch(value)]
@@ -114,9 +104,7 @@ def test_a_report_tells_every_tension_in_that_unit(
 
 
 @pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
-def test_figures_are_labelled_in_that_unit(
-    season: HangerReport, tension_n: float, unit: str
-) -> None:
+def test_figures_are_in_unit(season: HangerReport, tension_n: float, unit: str) -> None:
     (item,) = drawn((TREND,), of_size(season, tension_n))
     (trend,) = item.figure.axes
     assert trend.get_ylabel() == f"tension ({unit})"
@@ -127,9 +115,7 @@ def test_figures_are_labelled_in_that_unit(
 
 
 @pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
-def test_a_bridge_has_one_unit_for_its_tensions_and_their_shifts(
-    hanger: Hanger, tension_n: float, unit: str
-) -> None:
+def test_bridge_has_one_unit(hanger: Hanger, tension_n: float, unit: str) -> None:
     moved = {3: -0.05, 4: 0.03}
     shifts = [
         HangerShift(i, i - 1, NOW, tension_n, moved.get(i, 0.0) * tension_n, 0.002 * tension_n)

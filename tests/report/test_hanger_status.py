@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from functools import cache
 from typing import Any
 
+import numpy as np
 import pytest
 
+from shm.inference import UpdateOptions, update
+from shm.models import DESCRIPTION, THESIS, build
+from shm.report.contents import HangerReport
+from shm.report.formatting import Interval
+from shm.report.hanger_report import facts
 from shm.report.hanger_status import (
     BridgeMessage,
     HangerMessage,
@@ -18,11 +26,29 @@ from shm.report.hanger_status import (
     still_detected,
 )
 from shm.report.hanger_summary import HangerSummary, LatestTest
-from shm.values import Averaged, Drift, Summary
+from shm.report.open_warnings import nearly_slack, open_warnings, standing_out
+from shm.report.states import states_over_time
+from shm.values import (
+    NAN,
+    PLANES,
+    Averaged,
+    BaselineCheck,
+    Change,
+    Drift,
+    FloatArray,
+    MistakenMode,
+    MistakenTest,
+    ModalTest,
+    Mode,
+    RepeatedMistake,
+    Summary,
+    WatchedTest,
+)
 from shm.values.hanger import Limits
 from shm.values.messages import Lead
+from shm.watch import Watched, WatchOptions, watch_hanger
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.nouns import NOW, a_change, a_drift, a_watched_test, an_alert
+from tests.helpers.nouns import NOW, a_change, a_drift, a_watched_test, an_alert, averaged, with_now
 
 HANGER = replace(HANGER_3, nominal_tension_n=700e3)
 LIMITED = replace(HANGER, limits=Limits(900e3, 500e3))
@@ -42,35 +68,48 @@ def tension(mean_n: float, half_n: float = 10e3, **probabilities: float) -> Aver
     return Averaged(Summary(mean_n, half_n / 1.645, low, mean_n, high), 5e3, **probabilities)
 
 
+WARNED = {"warnings": ["It is new."]}
+WATCHED = ("beyond threshold", "slow drift", "sudden change", "tests disagree", "gap", "held",
+           "repeat the test")  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("said", "status"),
     [
         ({}, Status.STEADY),
         ({"is_first": True}, Status.FIRST),
-        ({"drifts": [drift(0.949)]}, Status.WATCH),
-        ({"drifts": [drift(0.95)]}, Status.ALERT),
-        ({"drifts": [drift(0.5)]}, Status.WATCH),
-        ({"drifts": [drift(0.499)]}, Status.STEADY),
+        *(({"drifts": [drift(p)]}, status) for p, status in (
+            (0.949, Status.WATCH), (0.95, Status.ALERT), (0.5, Status.WATCH),
+            (0.499, Status.STEADY), (math.nan, Status.STEADY))),
         ({"drifts": [drift(0.3), drift(0.96), drift(0.1)]}, Status.ALERT),
         ({"drifts": [drift(math.nan), drift(0.96)]}, Status.ALERT),
-        ({"drifts": [drift(math.nan)]}, Status.STEADY),
         ({"is_called": True}, Status.WATCH),
         ({"is_called": True, "is_first": True}, Status.WATCH),
-        ({"standing": [alert("beyond threshold")]}, Status.ALERT),
-        ({"standing": [alert("slow drift")]}, Status.WATCH),
-        ({"standing": [alert()]}, Status.WATCH),
-        ({"standing": [alert("check the modes")]}, Status.CHECK),
+        *(({"standing": [alert(kind)], "is_first": is_first}, status)
+          for is_first in (True, False) for kind, status in (
+              *((kind, Status.WATCH) for kind in WATCHED[1:]), ("beyond threshold", Status.ALERT),
+              ("check the modes", Status.CHECK), ("check the baseline", Status.CHECK))),
+        ({"standing": [alert()]}, Status.WATCH),  # what the row said is lost
+        ({"standing": [alert()], "is_first": True}, Status.WATCH),
         ({"standing": [alert("check the modes", "check the baseline")]}, Status.CHECK),
         ({"standing": [alert("check the modes", "slow drift")]}, Status.WATCH),
         ({"standing": [alert("check the modes"), alert("held")]}, Status.WATCH),
-        ({"warnings": ["It is new."]}, Status.CHECK),
-        ({"warnings": ["It is new."], "is_first": True}, Status.CHECK),
-        ({"warnings": ["It is new."], "drifts": [drift(0.6)]}, Status.WATCH),
+        (WARNED, Status.CHECK),
+        ({**WARNED, "is_first": True}, Status.CHECK),
+        ({**WARNED, "drifts": [drift(0.6)]}, Status.WATCH),
+        ({**WARNED, "drifts": [drift(0.99)]}, Status.ALERT),
+        ({**WARNED, "drifts": [drift(0.99)], "is_first": True}, Status.ALERT),
     ],
-)
-def test_the_state_in_a_word(said: dict[str, Any], status: Status) -> None:
+)  # fmt: skip
+def test_status_of_hanger(said: dict[str, Any], status: Status) -> None:
     known = {"drifts": [], "is_first": False, "is_called": False, **said}
+    known["standing"] = findings([*known.get("standing", ()), alert("test")])  # a trial is nothing
     assert status_of(known.pop("drifts"), HANGER, **known) is status
+
+
+def test_trials_of_a_hook_are_no_finding() -> None:
+    found = [alert("test"), alert("held"), alert()]
+    assert findings(found) == tuple(found[1:])
 
 
 UNWATCHED = Lead("Hanger 3: not tested for 400 days.", "Repeat the hammer test within a week.")
@@ -85,52 +124,33 @@ def with_tension(tension: Averaged | None = None, **changes: Any) -> HangerSumma
     return replace(QUIET, **changes)
 
 
+DETAILED = replace(HANGER, limits=Limits(math.nan, 5e5))
+UNCOMPARED = "its latest test cannot be compared with the baseline."
+
+
 @pytest.mark.parametrize(
     ("changes", "status", "state", "action"),
     [
         ({}, "STEADY", "no change detected since the baseline (tension -0.40 ± 0.66 %).", NOTHING),
-        (
-            {"is_first": True},
-            "FIRST",
-            "tension 702 ± 10 kN, and no test after its baseline.",
-            "Choose a warmer or colder day at the next planned test, so that the baseline covers "
-            "temperature.",
-        ),
+        ({"is_first": True}, "FIRST", "tension 702 ± 10 kN, and no test after its baseline.",
+         "Choose a warmer or colder day at the next planned test, so that the baseline covers "
+         "temperature."),
         ({"latest": None}, None, "no test yet.", "Test it at the next planned test."),
-        (
-            {"latest": None, "tests": 5},
-            None,
-            "5 tests, no result yet.",
-            "No action is needed: the daemon is at work, or waits for more tests for a baseline.",
-        ),
-        (
-            {"unwatched": UNWATCHED},
-            "UNCLEAR",
-            "not tested for 400 days.",
-            "Repeat the hammer test within a week.",
-        ),
-        (
-            {"drifts": []},
-            "UNCLEAR",
-            "its latest test cannot be compared with the baseline.",
-            "Repeat the hammer test within a week: it lacks modes of the baseline.",
-        ),
-        ({"drifts": [drift(shift=math.nan)]}, "UNCLEAR", "its latest test cannot be", None),
-        ({"drifts": [drift(sd=math.inf)]}, "UNCLEAR", "its latest test cannot be", None),
-        (
-            {"drifts": [drift(sd=0.0305)]},
-            "UNCLEAR",
-            "no change detected, but its tests are too few or too rough to show one "
-            "(tension -0.4 ± 5.0 %).",
-            "Identify more modes at the next planned test, or test more often.",
-        ),
+        ({"latest": None, "tests": 5}, None, "5 tests, no result yet.",
+         "No action is needed: the daemon is at work, or waits for more tests for a baseline."),
+        ({"unwatched": UNWATCHED}, "UNCLEAR", "not tested for 400 days.",
+         "Repeat the hammer test within a week."),
+        ({"drifts": []}, "UNCLEAR", UNCOMPARED,
+         "Repeat the hammer test within a week: it lacks modes of the baseline."),
+        ({"drifts": [drift(shift=math.nan)]}, "UNCLEAR", UNCOMPARED, None),
+        ({"drifts": [drift(sd=math.inf)]}, "UNCLEAR", UNCOMPARED, None),
+        ({"drifts": [drift(sd=0.0305)]}, "UNCLEAR",
+         "no change detected, but its tests are too few or too rough to show one "
+         "(tension -0.4 ± 5.0 %).",
+         "Identify more modes at the next planned test, or test more often."),
         ({"drifts": [drift(sd=0.0303)]}, "STEADY", "no change detected since", NOTHING),
-        (
-            {"tension": tension(840e3)},
-            "CHECK",
-            "tension is 20.0 ± 1.4 % above nominal.",
-            "Compare it with the design at the next planned test, or give limits in bridge.toml.",
-        ),
+        ({"tension": tension(840e3)}, "CHECK", "tension is 20.0 ± 1.4 % above nominal.",
+         "Compare it with the design at the next planned test, or give limits in bridge.toml."),
         ({"tension": tension(560e3)}, "CHECK", "tension is 20.0 ± 1.4 % below nominal.", None),
         ({"tension": tension(814e3)}, "STEADY", "no change detected", None),
         ({"tension": tension(816e3)}, "CHECK", "tension is 16.6 ± 1.4 % above nominal.", None),
@@ -138,49 +158,24 @@ def with_tension(tension: Averaged | None = None, **changes: Any) -> HangerSumma
         ({"tension": tension(584e3)}, "CHECK", "tension is 16.6 ± 1.4 % below nominal.", None),
         ({"tension": tension(840e3), "hanger": LIMITED}, "STEADY", "no change detected", None),
         ({"tension": tension(560e3), "hanger": LIMITED}, "STEADY", "no change detected", None),
-        (
-            {"tension": tension(840e3), "hanger": replace(HANGER, limits=Limits(math.nan, 5e5))},
-            "CHECK",
-            "tension is 20.0 ± 1.4 % above nominal.",
-            None,
-        ),
-        (
-            {"tension": tension(840e3), "hanger": replace(HANGER, nominal_tension_n=0.0)},
-            "STEADY",
-            "no change detected",
-            None,
-        ),
-        (
-            {"tension": tension(480e3, probability_slack=0.51)},
-            "CHECK",
-            "tension 480 ± 10 kN is probably below its lower limit.",
-            "Repeat the hammer test today, and compare it with its design.",
-        ),
-        (
-            {"tension": tension(920e3, probability_above_limit=0.51)},
-            "CHECK",
-            "tension 920 ± 10 kN is probably above its upper limit.",
-            "Repeat the hammer test within a week, and compare it with its design.",
-        ),
+        ({"tension": tension(840e3), "hanger": DETAILED}, "CHECK",
+         "tension is 20.0 ± 1.4 % above nominal.", None),
+        ({"tension": tension(840e3), "hanger": replace(HANGER, nominal_tension_n=0.0)}, "STEADY",
+         "no change detected", None),
+        ({"tension": tension(480e3, probability_slack=0.51)}, "CHECK",
+         "tension 480 ± 10 kN is probably below its lower limit.",
+         "Repeat the hammer test today, and compare it with its design."),
+        ({"tension": tension(920e3, probability_above_limit=0.51)}, "CHECK",
+         "tension 920 ± 10 kN is probably above its upper limit.",
+         "Repeat the hammer test within a week, and compare it with its design."),
         ({"tension": tension(702e3, probability_slack=0.5)}, "STEADY", "no change", NOTHING),
-        (
-            {
-                "tension": tension(480e3, probability_slack=0.9),
-                "unwatched": UNWATCHED,
-            },
-            "CHECK",
-            "tension 480 ± 10 kN is probably below",
-            None,
-        ),
-        (
-            {"tension": tension(840e3), "unwatched": UNWATCHED},
-            "UNCLEAR",
-            "not tested for 400 days.",
-            None,
-        ),
+        ({"tension": tension(480e3, probability_slack=0.9), "unwatched": UNWATCHED}, "CHECK",
+         "tension 480 ± 10 kN is probably below", None),
+        ({"tension": tension(840e3), "unwatched": UNWATCHED}, "UNCLEAR", "not tested for 400 days.",
+         None),
     ],
 )  # fmt: skip
-def test_of_a_quiet_hanger_what_its_tests_can_say(
+def test_message_of_a_quiet_hanger(
     changes: dict[str, Any], status: str | None, state: str, action: str | None
 ) -> None:
     message = with_tension(**changes, notes=("Ada looked.",)).message
@@ -191,35 +186,25 @@ def test_of_a_quiet_hanger_what_its_tests_can_say(
     assert message.notes == (("Ada looked.",) if status else ())
 
 
+HELD = [alert("held", message="One is held. Look today."),
+        alert("held", message="Another is held. Look within a week.")]  # fmt: skip
+MODES = [alert("check the modes", message="Modes. Look within a week.")]
+
+
 @pytest.mark.parametrize(
     ("changes", "status", "state"),
     [
         ({"drifts": [drift(0.97, -0.08, 0.01)]}, "ALERT", "tension"),
         ({"called": [a_change()]}, "WATCH", "tension"),
-        (
-            {"drifts": [drift(0.6, -0.045, 0.02), drift(0.2)]},
-            "WATCH",
-            "tension fell by 4.5 ± 3.3 %, more likely than not beyond its threshold.",
-        ),
-        (
-            {"standing": [alert("held", message="One is held. Look today."),
-                          alert("held", message="Another is held. Look within a week.")]},
-            "WATCH",
-            "One is held.",
-        ),
+        ({"drifts": [drift(0.6, -0.045, 0.02), drift(0.2)]}, "WATCH",
+         "tension fell by 4.5 ± 3.3 %, more likely than not beyond its threshold."),
+        ({"standing": HELD}, "WATCH", "One is held."),
         ({"standing": [alert("slow drift", message="It creeps. Go today.")]}, "WATCH", "It c"),
-        (
-            {"warnings": ["It is new. Wait."],
-             "standing": [alert("check the modes", message="Modes. Look within a week.")]},
-            "CHECK",
-            "Modes.",
-        ),
+        ({"warnings": ["It is new. Wait."], "standing": MODES}, "CHECK", "Modes."),
         ({"warnings": ["It is new. Wait.", "Another. Wait."]}, "CHECK", "It is new."),
     ],
 )  # fmt: skip
-def test_of_a_hanger_that_moved_the_most_urgent_is_said(
-    changes: dict[str, Any], status: str, state: str
-) -> None:
+def test_message_of_moved_hanger(changes: dict[str, Any], status: str, state: str) -> None:
     message = with_tension(**changes, notes=("Ada looked.",)).message
     assert message.status is Status[status]
     assert state in message.lead.state
@@ -230,14 +215,12 @@ def test_an_alert_stays_as_sure_as_it_was_while_it_stands() -> None:
     """Of the latest test, or where the latest no longer reaches the threshold, its own number."""
     told = alert("beyond threshold", drifts=(drift(0.99, -0.08, 0.01),), test="t1")
     newest = drift(0.6, -0.06, 0.01)
-    said = with_tension(drifts=[newest], standing=[told]).message.lead.state
-    assert "6.0 ± 1.6 %" in said
-    small = replace(newest, shift_mean=-0.01)
-    said = with_tension(drifts=[small], standing=[told]).message.lead.state
-    assert "8.0 ± 1.6 %" in said
-    own = replace(told, test="t2")
-    said = with_tension(drifts=[newest], standing=[own]).message.lead.state
-    assert "8.0 ± 1.6 %" in said
+    for now, standing, said in (
+        (newest, told, "6.0 ± 1.6 %"),
+        (replace(newest, shift_mean=-0.01), told, "8.0 ± 1.6 %"),
+        (newest, replace(told, test="t2"), "8.0 ± 1.6 %"),
+    ):
+        assert said in with_tension(drifts=[now], standing=[standing]).message.lead.state
 
 
 def test_a_detected_change_is_over_when_the_latest_test_shows_it() -> None:
@@ -248,11 +231,6 @@ def test_a_detected_change_is_over_when_the_latest_test_shows_it() -> None:
     assert still_detected([change], latest, HANGER) == (change,)
     assert still_detected([change], None, HANGER) == (change,)
     assert still_detected([change], a_watched_test(probability=level - 1e-9), HANGER) == ()
-
-
-def test_trials_of_a_hook_are_no_finding() -> None:
-    found = [alert("test"), alert("held"), alert()]
-    assert findings(found) == tuple(found[1:])
 
 
 def message(status: Status | None, action: str = NOTHING, **said: Any) -> HangerMessage:
@@ -340,3 +318,161 @@ def test_hanger_message_tension_unusable(caveat: str, state: str, action: str) -
     assert state in said.lead.state
     assert action in said.lead.action
     assert caveat in said.reasons
+
+
+SINCE = datetime(2026, 5, 1, tzinfo=UTC)
+MODE = MistakenMode("t1", "transverse", 2, 21.3, 14.2)
+
+
+def share_of_nominal(share: float, half_width: float = 0.02) -> Summary:
+    ends = share - half_width, share, share + half_width
+    return Summary(*(each * HANGER_3.nominal_tension_n for each in (share, 0.01, *ends)))
+
+
+def latest(mistaken: tuple[RepeatedMistake, ...] = (), **of_change: Any) -> WatchedTest:
+    """Return a test whose change is far from being called, but for what is given."""
+    given = {"evidence_years": 1.0, "limit_years": 100.0, "probability": 0.01, "sudden": 0.5,
+             "began_after": SINCE, "began_by": SINCE, "moved": ()}  # fmt: skip
+    return WatchedTest("t9", SINCE, 10.0, (), Change(**{**given, **of_change}), mistaken=mistaken)
+
+
+def row(*shares: float, families: str = "") -> str:
+    """Return the warning about the third of hangers with such relative tensions."""
+    families = families or "a" * len(shares)
+    hangers = [replace(HANGER_3, id=n, family=f) for n, f in enumerate(families)]
+    return standing_out(
+        hangers[2], hangers, {n: share_of_nominal(each) for n, each in enumerate(shares)}
+    )
+
+
+@pytest.mark.parametrize(
+    ("now", "is_reported", "is_said"),
+    [
+        (0.03, False, True),
+        (0.03, True, False),  # the alert says it
+        (0.6, False, False),
+        (0.49, False, False),  # its interval reaches beyond half
+    ],
+)
+def test_nearly_slack_is_said_first(now: float, is_reported: bool, is_said: bool) -> None:
+    said = nearly_slack(
+        HANGER_3, share_of_nominal(1.0), share_of_nominal(now), is_reported=is_reported
+    )
+    assert bool(said) is is_said
+    if is_said:
+        assert said.startswith("Hanger 3 carries 3.0 ± 2.0 % of its nominal tension by its latest")
+        assert len(said.split(":")[0].split()) <= 25
+        assert "today" in said
+        assert open_warnings(HANGER_3, None, now=(said,)) == (said,)
+
+
+@pytest.mark.parametrize(
+    ("check", "said"),
+    [
+        (BaselineCheck(misfit="5 of 12 modes fit nothing"), "Why: 5 of 12 modes fit nothing."),
+        (BaselineCheck(tests=(MistakenTest("t4", "a wrong clock"),)),
+         "without test t4. Find out within a week"),
+    ],
+)  # fmt: skip
+def test_baseline_that_does_not_fit_is_a_warning(check: BaselineCheck, said: str) -> None:
+    """A mode left out of a baseline that fits is none."""
+    (warning,) = open_warnings(HANGER_3, check)
+    assert warning.startswith("Hanger 3: its baseline ")
+    assert said in warning
+    for sound in (BaselineCheck(modes=(MODE,)), BaselineCheck(), None):
+        assert open_warnings(HANGER_3, sound) == ()
+
+
+def test_a_mode_is_a_warning_from_the_third_test_on_that_has_it_wrong() -> None:
+    twice = RepeatedMistake("transverse", 3, SINCE, 2)
+    assert open_warnings(HANGER_3, None, latest=latest(mistaken=(twice,))) == ()
+    (warning,) = open_warnings(HANGER_3, None, latest=latest(mistaken=(replace(twice, tests=3),)))
+    assert warning == (
+        "Hanger 3: transverse 3 has not fitted the other modes since 2026-05-01. Check its number "
+        "at the next planned test."
+    )
+
+
+def test_a_baseline_that_stands_alone_is_a_warning() -> None:
+    assert open_warnings(HANGER_3, None, latest=latest(against_baseline=2)) == ()
+    (warning,) = open_warnings(HANGER_3, None, latest=latest(against_baseline=6))
+    assert "the 6 tests since the baseline agree with each other" in warning
+    called = latest(against_baseline=6, evidence_years=1e4)
+    assert open_warnings(HANGER_3, None, latest=called) == (), "it is told as a change"
+
+
+def test_tension_far_off_stands_out_beside_neighbours_that_are_not() -> None:
+    assert "% above nominal, unlike its neighbours" in row(1.05, 0.97, 1.41, 1.0, 1.02)
+    assert "% below nominal, unlike its neighbours" in row(1.05, 0.97, 0.62, 1.0, 1.02)
+    assert row(1.05, 0.97, 1.2, 1.0, 1.02) == ""
+    assert row(1.4, 1.5, 1.41, 1.38, 1.45) == "", "all are off: the nominal tensions are"
+    assert row(1.05, 0.97, 1.41, 1.0, families="abaa") != ""
+    assert row(1.05, 0.97, 1.41, 1.0, families="bbab") == "", "none is of its kind"
+    hangers = [replace(HANGER_3, id=n) for n in range(4)]
+    known = {0: share_of_nominal(1.0), 1: share_of_nominal(1.02), 3: share_of_nominal(0.98)}
+    assert standing_out(hangers[2], hangers, {**known, 2: share_of_nominal(1.4)}) != ""
+    assert standing_out(hangers[2], hangers, {**known, 2: share_of_nominal(1.4, 0.3)}) == ""
+    assert standing_out(hangers[2], hangers, known) == ""
+
+
+BEGIN = datetime(2026, 1, 5, tzinfo=UTC)
+# In percent of each mode: what no tension and no end stiffness does.
+OTHER_BAR = np.array([[4, -4, 4, -4, 4, -4], [-4, 4, -4, 4, -4, 4]])
+
+
+def modal_test(number: int, off_percent: FloatArray) -> ModalTest:
+    theta = np.array([(1.0, 1.0, 7.3, 7.1, 7.2, 7.4)])
+    hz = build("beam2", HANGER_3, THESIS).frequencies_hz(theta, 6)[0] * (1 + off_percent / 100)
+    modes = tuple(
+        Mode(plane, order, float(value), float(value) * 2e-4)
+        for plane, row in zip(PLANES, hz, strict=True)
+        for order, value in enumerate(row, start=1)
+    )
+    time = BEGIN + timedelta(weeks=2 * number)
+    return ModalTest(f"t{number}", modes, 3, time, temperature_c=10.0)
+
+
+@cache
+def watched() -> Watched:
+    """One test of the baseline, and one of another bar."""
+    first, other = modal_test(0, np.zeros((2, 6))), modal_test(1, OTHER_BAR)
+    baseline = update(
+        [first], build("beam2", HANGER_3, DESCRIPTION), UpdateOptions(samples=300, seed=1)
+    )
+    of_first, of_other = [(first, BEGIN)], [(other, BEGIN + timedelta(weeks=2))]
+    return watch_hanger(baseline, of_first, of_other, HANGER_3, WatchOptions())
+
+
+def test_unexplained_test_has_no_shift_and_no_state() -> None:
+    """But a loss that is probable is reported although the modes fit no state."""
+    latest = watched().latest
+    assert not latest.change.called
+    assert all(math.isnan(each.shift_mean) for each in latest.published_drifts)
+    assert all(math.isnan(each.probability) for each in latest.published_drifts)
+    latest = watched().latest
+    drifts = tuple(replace(each, probability=0.9) for each in latest.drifts)
+    probable = replace(latest, drifts=drifts)
+    assert probable.is_unexplained
+    assert probable.published_drifts == drifts
+    states = states_over_time(watched(), HANGER_3)
+    (tension,) = (each for each in states.quantities if each.is_tension)
+    for band in (tension.read, tension.filtered, tension.smoothed):
+        assert np.isfinite(band.middle).tolist() == [True, False]
+
+
+def test_unexplained_test_is_doubted_and_gives_no_shift(season: HangerReport) -> None:
+    latest = watched().latest
+    warnings = open_warnings(HANGER_3, None, latest=latest)
+    tension = averaged(Interval.normal(711e3, 5e3))
+    of_test = LatestTest(latest.test, BEGIN, tension)
+    message = HangerSummary(
+        HANGER_3, of_test, drifts=latest.published_drifts, warnings=warnings
+    ).message
+    assert message.status is Status.CHECK
+    assert message.urgency == "week"
+    assert "explains its latest test" in message.words
+    drifts = tuple(replace(each, shift_mean=NAN, probability=NAN) for each in season.drifts)
+    unknown = replace(with_now(season, drifts=drifts, standing=()), alerts=())
+    assert unknown.now.change is None
+    values = {what: value for what, value, _ in facts(unknown)}
+    assert values["Since the baseline"] == "not known"

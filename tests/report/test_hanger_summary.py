@@ -68,43 +68,28 @@ def test_after_a_change_it_is_the_baseline_moved_by_the_change_and_not_the_lates
     assert found.tension.repeatability_sd_n == 1.5e3  # of the latest test, as its own is
 
 
-def test_without_a_detected_change_a_well_known_shift_moves_it_as_stated() -> None:
-    found = now(drifts=(drift(0.004),))
-    assert found.basis == BASELINE_AND_CHANGE
-    assert not found.is_found
-    assert mean_n(found) == pytest.approx(BASE_N * 1.004)
-
-
-def test_rough_tests_leave_it_at_the_baseline() -> None:
-    """Nothing was found, and a shift beyond the threshold would not have been seen."""
-    found = now(drifts=(drift(0.03, sd=0.04),))
-    assert found.basis == BASELINE_ALONE
-    assert mean_n(found) == BASE_N
-
-
-def test_a_detected_change_moves_it_however_rough_the_tests() -> None:
-    found = now(drifts=(drift(-0.2, sd=0.04, probability=0.97),), called=(a_change(),))
-    assert mean_n(found) == pytest.approx(0.8 * BASE_N)
-
-
-def test_a_shift_that_is_not_known_leaves_it_at_the_baseline() -> None:
-    found = now(drifts=(drift(NAN, NAN, NAN),))
-    assert found.basis == BASELINE_ALONE
-    assert found.change is None
-    assert mean_n(found) == BASE_N
-
-
-def test_of_the_baselines_own_tests_it_is_the_baseline() -> None:
-    found = now(drifts=(), is_first=True)
-    assert found.basis == BASELINE_TESTS
-    assert (found.change, mean_n(found)) == (None, BASE_N)
-
-
-@pytest.mark.parametrize("baseline", [None, tension()])
-def test_a_test_that_was_never_compared_speaks_for_itself(baseline: Averaged | None) -> None:
-    found = now(drifts=(), baseline=baseline)
-    assert found.basis == LATEST_TEST
-    assert mean_n(found) == 650e3
+@pytest.mark.parametrize(
+    ("changes", "basis", "mean"),
+    [
+        ({"drifts": (drift(0.004),)}, BASELINE_AND_CHANGE, 1.004 * BASE_N),  # nothing detected
+        # Nothing was found, and a shift beyond the threshold would not have been seen.
+        ({"drifts": (drift(0.03, sd=0.04),)}, BASELINE_ALONE, BASE_N),
+        # A detected change moves it however rough the tests.
+        ({"drifts": (drift(-0.2, sd=0.04, probability=0.97),), "called": (a_change(),)},
+         BASELINE_AND_CHANGE, 0.8 * BASE_N),
+        ({"drifts": (drift(NAN, NAN, NAN),)}, BASELINE_ALONE, BASE_N),
+        ({"drifts": (), "is_first": True}, BASELINE_TESTS, BASE_N),
+        ({"drifts": (), "baseline": None}, LATEST_TEST, 650e3),  # never compared
+        ({"drifts": ()}, LATEST_TEST, 650e3),
+    ],
+)  # fmt: skip
+def test_tension_rests_on(changes: dict[str, Any], basis: str, mean: float) -> None:
+    found = now(**changes)
+    assert found.basis == basis
+    assert found.is_found is ("called" in changes)
+    assert mean_n(found) == pytest.approx(mean)
+    if basis == BASELINE_TESTS or (found.drifts and math.isnan(found.drifts[0].shift_sd)):
+        assert found.change is None
 
 
 def test_a_hanger_without_a_test_has_neither_tension_nor_change() -> None:
@@ -147,17 +132,12 @@ def test_an_interval_wider_than_half_the_tension_determines_nothing() -> None:
         (20.0, "The tension is now 12.88 ± 0.27 MN. At the baseline it was 14.00 ± 0.26 MN."),
     ],
 )
-def test_an_alert_states_it_in_the_unit_that_fits_before_its_details(
-    size: float, said: str
-) -> None:
+def test_alert_states_tension_in_fitting_unit(size: float, said: str) -> None:
     found = now(baseline=tension(size * BASE_N, size * SD))
     alert = replace(an_alert(), message="Hanger 3: tension fell. Look today. Details: p 0.99.")
     told = with_tension(alert, found)
     assert told.tension == found.tension
     assert told.message == f"Hanger 3: tension fell. Look today. {said} Details: p 0.99."
-
-
-def test_an_alert_without_a_known_change_states_no_tension() -> None:
-    alert = with_tension(an_alert(), now(drifts=(drift(0.03, sd=0.04),)))
-    assert alert.message == an_alert().message
-    assert alert.tension is not None
+    unknown = with_tension(an_alert(), now(drifts=(drift(0.03, sd=0.04),)))
+    assert unknown.message == an_alert().message
+    assert unknown.tension is not None

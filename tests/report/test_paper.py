@@ -11,7 +11,6 @@ import pytest
 
 import shm.report
 from shm.report.as_html import as_html
-from shm.report.as_pdf import as_pdf
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_paper
 from shm.report.contents import BridgeReport, HangerReport
@@ -22,10 +21,9 @@ from shm.report.modal_test_report import modal_test_paper
 from shm.report.paper import Paper, Section, Table
 from shm.watch.neighbours import HangerShift, bridge_pattern
 from tests.helpers.nouns import a_summary
-from tests.helpers.pdf_words import Pdf
 from tests.report.conftest import START
 from tests.report.diagnoses import CASES, sheet
-from tests.report.outline import Outline
+from tests.report.outline import page_words, pdf_words
 from tests.report.sheets import make_sheet, warned
 
 pytestmark = pytest.mark.usefixtures("unpainted", "drawn_once")
@@ -111,10 +109,8 @@ def written(paper: Paper, renderer: str) -> str:
     if renderer == "as_text":
         return as_text(unabridged(paper), WIDE)
     if renderer == "as_pdf":
-        return Pdf.parse(as_pdf(paper)).words
-    outline = Outline()
-    outline.feed(as_html(paper))
-    return " ".join(outline.words)
+        return pdf_words(paper)
+    return page_words(paper)
 
 
 def squeezed(text: str) -> str:
@@ -139,17 +135,13 @@ def first_missing(paper: Paper, renderer: str, found: str) -> str | None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("renderer", RENDERERS)
-def test_all_that_a_paper_says_is_rendered_in_its_order(
-    kind: str, renderer: str, papers: dict[str, Paper]
-) -> None:
+def test_renderer_says_all_in_order(kind: str, renderer: str, papers: dict[str, Paper]) -> None:
     paper = papers[kind]
     assert first_missing(paper, renderer, squeezed(written(paper, renderer))) is None
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
-def test_a_cell_that_is_lost_or_out_of_order_is_found(
-    renderer: str, papers: dict[str, Paper]
-) -> None:
+def test_lost_or_moved_cell_is_found(renderer: str, papers: dict[str, Paper]) -> None:
     paper = papers["diagnosis"]
     *parts, last = paper.parts
     (first, *others) = last.tables
@@ -163,21 +155,15 @@ def test_a_cell_that_is_lost_or_out_of_order_is_found(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_leads_with_its_state_and_a_summary(kind: str, papers: dict[str, Paper]) -> None:
+def test_kind_leads_with_state_and_fits(kind: str, papers: dict[str, Paper]) -> None:
     paper = papers[kind]
     assert paper.parts[0].title == "In short"
     assert paper.parts[0].full_summary
     assert paper.status
-    first_line = as_text(paper).splitlines()[0]
-    assert first_line == paper.headline
+    assert as_text(paper).splitlines()[0] == paper.headline
     assert f"<title>{paper.headline}</title>" in as_html(paper)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("width", [100, 72])
-def test_a_text_fits_its_terminal(kind: str, width: int, papers: dict[str, Paper]) -> None:
-    lines = as_text(papers[kind], width).splitlines()
-    assert max(map(len, lines)) <= width
+    for width in (100, 72):
+        assert max(map(len, as_text(paper, width).splitlines())) <= width
 
 
 def test_a_terminal_says_how_many_rows_it_leaves_out() -> None:
@@ -200,7 +186,7 @@ def test_a_part_that_has_nothing_is_not_headed() -> None:
     ])  # fmt: skip
     assert "Figures" not in as_text(paper)
     assert "Figures" not in as_html(paper)
-    assert "Figures" not in Pdf.parse(as_pdf(paper)).words
+    assert "Figures" not in pdf_words(paper)
 
 
 def _paper(table: Table) -> Paper:

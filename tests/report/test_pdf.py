@@ -1,18 +1,21 @@
-"""Reports as PDF: pages, fonts, properties, the same bytes for the same content."""
+"""Reports as PDF: pages, fonts, properties, the logo, the same bytes for the same content."""
 
 from __future__ import annotations
 
+import base64
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from shm.report.as_pdf import WIDTH, _rules, as_pdf, widths
 from shm.report.contents import HangerReport
 from shm.report.figures import style
 from shm.report.hanger_report import hanger_paper
 from shm.report.hanger_tables import alerts
-from shm.report.paper import Paper, Section, Table
+from shm.report.paper import Logo, Paper, Section, Table, read_logo
 from tests.helpers.nouns import with_now
 from tests.helpers.painting import paint_blank
 from tests.helpers.pdf_words import Pdf
@@ -37,7 +40,7 @@ def test_the_same_content_gives_the_same_bytes(bare: HangerReport) -> None:
     assert first != as_pdf(hanger_paper(replace(bare, bridge="Another bridge")))
 
 
-def test_every_page_names_bridge_hanger_version_and_its_number(parsed: Pdf) -> None:
+def test_pages_are_few_and_named(parsed: Pdf, content: bytes) -> None:
     assert len(parsed.pages) > 2
     for number, page in enumerate(parsed.pages, 1):
         told = " ".join(page.split())
@@ -45,9 +48,6 @@ def test_every_page_names_bridge_hanger_version_and_its_number(parsed: Pdf) -> N
         assert f"Page {number} of" in told
     total = [body for body in parsed.objects.values() if b"/Form" in body or b" Tj T*" in body]
     assert any(f"({len(parsed.pages)})".encode() in body for body in total)
-
-
-def test_a_hanger_has_at_most_five_pages_of_which_the_first_says_what_to_do(parsed: Pdf) -> None:
     assert len(parsed.pages) <= 5
     first = " ".join(parsed.pages[0].split())
     for words in (
@@ -62,9 +62,6 @@ def test_a_hanger_has_at_most_five_pages_of_which_the_first_says_what_to_do(pars
         assert words in first
     assert "Prepared by" in parsed.pages[-1]
     assert not any("Appendix" in page or "log10" in page for page in parsed.pages)
-
-
-def test_it_has_a_title_properties_an_outline_and_a_language(content: bytes, parsed: Pdf) -> None:
     assert b"/Title (Hanger 3, Arch bridge)" in content
     assert b"/CreationDate (D:20260908100000Z)" in content
     assert b"/Lang (en)" in content
@@ -74,17 +71,19 @@ def test_it_has_a_title_properties_an_outline_and_a_language(content: bytes, par
 
 
 @pytest.mark.usefixtures("unpainted")
-def test_its_words_are_set_in_embedded_fonts_that_hold_every_sign(bare: HangerReport) -> None:
+def test_words_are_set_as_they_are_in_embedded_fonts(bare: HangerReport) -> None:
+    """Names from outside, too."""
     signs = "α → ± ² · ≤ ✓ ✗ – … ° é Ł ω"  # noqa: RUF001
     told = Pdf.parse(as_pdf(hanger_paper(replace(bare, bridge=signs))))
     assert signs in told.words
     used = {name for name in told.fonts if name.startswith(("F1", "F2"))}
     assert all(b"FontFile2" in told._referred(told.fonts[name], b"FontDescriptor") for name in used)
+    sly = '<b>&amp;</b> "x" <img src="http://example.org/a.png"/>'
+    named = replace(with_now(bare, hanger=replace(bare.hanger, name=sly)), bridge=sly)
+    assert sly in Pdf.parse(as_pdf(hanger_paper(named))).words
 
 
-def test_figures_are_as_fine_as_print_needs_and_have_numbered_captions(
-    season: HangerReport, content: bytes, parsed: Pdf
-) -> None:
+def test_figures_are_fine_and_numbered(season: HangerReport, content: bytes, parsed: Pdf) -> None:
     widths = [int(width) for width in re.findall(rb"/Subtype /Image.*?/Width (\d+)", content, re.S)]
     assert widths
     assert min(widths) / (WIDTH / 72) >= 200
@@ -95,38 +94,24 @@ def test_figures_are_as_fine_as_print_needs_and_have_numbered_captions(
 
 
 @pytest.mark.usefixtures("unpainted")
-def test_a_long_table_goes_on_under_repeated_headings(
-    bare: HangerReport, season: HangerReport
-) -> None:
+def test_long_tables_and_cells_are_set_in_full(bare: HangerReport, season: HangerReport) -> None:
+    """A table goes on under repeated headings; a cell may be longer than a page."""
+
+    def printed(table: Table) -> Pdf:
+        paper = Paper("Long", "", "first", [Section("In short", tables=[table])], "That is all.")
+        return Pdf.parse(as_pdf(paper))
+
     (history,) = [
         table
         for part in hanger_paper(replace(bare, trend=season.trend * 12)).parts
         for table in part.tables
         if table.title.startswith("Tests")
     ]
-    paper = Paper("Long", "", "first", [Section("In short", tables=[history])], "That is all.")
-    pages = Pdf.parse(as_pdf(paper)).pages
+    pages = printed(history).pages
     with_heading = [page for page in pages if "credible interval, kN" in page and "beam2" in page]
     assert len([page for page in with_heading if "t004" in page]) >= 2
-
-
-@pytest.mark.usefixtures("unpainted")
-def test_a_cell_longer_than_a_page_is_set(bare: HangerReport, season: HangerReport) -> None:
     alert = replace(season.alerts[0], message="The tension fell. " * 700)
-    table = alerts(replace(bare, alerts=(alert,)))
-    paper = Paper("Long", "", "first", [Section("In short", tables=[table])], "That is all.")
-    assert Pdf.parse(as_pdf(paper)).words.count("fell.") == 700
-
-
-@pytest.mark.usefixtures("unpainted")
-def test_names_from_outside_are_set_as_they_are(bare: HangerReport) -> None:
-    sly = '<b>&amp;</b> "x" <img src="http://example.org/a.png"/>'
-    told = Pdf.parse(
-        as_pdf(
-            hanger_paper(replace(with_now(bare, hanger=replace(bare.hanger, name=sly)), bridge=sly))
-        )
-    )
-    assert sly in told.words
+    assert printed(alerts(replace(bare, alerts=(alert,)))).words.count("fell.") == 700
 
 
 def test_narrow_columns_keep_one_line_and_wide_ones_share_the_rest() -> None:
@@ -139,9 +124,7 @@ def test_narrow_columns_keep_one_line_and_wide_ones_share_the_rest() -> None:
 
 
 @pytest.mark.parametrize(("columns", "marked"), [(1, 0), (2, 1), (3, 1), (5, 1)])
-def test_a_rows_mark_stands_before_its_second_cell_in_the_colour_of_its_verdict(
-    columns: int, marked: int
-) -> None:
+def test_row_mark_has_colour_of_verdict(columns: int, marked: int) -> None:
     verdicts = ("good", "unknown", "refused", "best", "warning")
     row = ("x",) * columns
     table = Table("t", row, (row,) * len(verdicts), marks=verdicts)
@@ -155,3 +138,29 @@ def test_a_rows_mark_stands_before_its_second_cell_in_the_colour_of_its_verdict(
         (marked, line, style.VERDICT_COLOURS[verdict][1:].lower())  # type: ignore[index]
         for line, verdict in coloured
     ]
+
+
+@pytest.mark.parametrize(("form", "kind"), [("PNG", "image/png"), ("JPEG", "image/jpeg")])
+def test_a_logo_is_kept_as_it_is_with_its_size(form: str, kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "logo"
+    Image.new("RGB", (7, 4)).save(path, form)
+    logo = read_logo(path)
+    assert logo == Logo(path.read_bytes(), kind, 7, 4)
+    head, _, content = logo.as_address.partition(",")
+    assert head == f"data:{kind};base64"
+    assert base64.b64decode(content) == logo.content
+
+
+def test_logo_that_cannot_be_read_is_a_fault_that_names_it(tmp_path: Path) -> None:
+    assert read_logo(None) == Logo(b"", "", 0, 0, "")
+    Image.new("RGB", (7, 4)).save(tmp_path / "b.png", "GIF")
+    Image.new("RGB", (70, 40)).save(tmp_path / "c.png", "PNG")
+    (tmp_path / "c.png").write_bytes((tmp_path / "c.png").read_bytes()[:60])
+    for name, fault in (
+        ("a.png", "cannot be read: No such file or directory"),
+        ("b.png", "cannot be read: it is no PNG or JPEG image"),
+        ("c.png", ""),
+    ):
+        logo = read_logo(tmp_path / name)
+        assert logo.fault.startswith(f"Without the logo {name}, which {fault}")
+        assert logo.content == b""
