@@ -15,45 +15,36 @@ from shm.values import FloatArray, IntArray
 from tests.gap import linear_toy as toy
 
 
-def far(causes: list[list[Fit]]) -> tuple[tuple[int, ...], ...]:
-    """Group causes of which none is near the best by evidence."""
-    return group(causes, [False] * len(causes))
-
-
-def test_expected_factor_rigid_half_square() -> None:
+def test_expected_factor_half_square_beyond_what_follows() -> None:
+    """A rigid rival of 4 standard deviations; one that follows is the same."""
     one, other = np.zeros(toy.design().size), np.zeros(toy.design().size)
     other[0] = 4 * toy.FREQUENCY_SD
     rigid = np.zeros((len(one), 1))
     found = expected_log_bayes_factor(toy.fit(one, rigid), toy.fit(other, rigid))
     assert found == pytest.approx(8.0)
+    follows = toy.fit(toy.tension(0.001)[:, 0], toy.tension())
+    assert expected_log_bayes_factor(toy.fit(one, toy.tension()), follows) < 0.01
 
 
-def test_expected_factor_rival_follows() -> None:
-    near, far = toy.fit(np.zeros(toy.design().size), toy.tension()), toy.tension(0.001)[:, 0]
-    assert expected_log_bayes_factor(near, toy.fit(far, toy.tension())) < 0.01
+SHIFTED = {k: toy.fit(toy.stiffening(k * 2e-3), toy.tension()) for k in (0, 1, 1.005, 2)}
+STEPS = [toy.fit(toy.stiffening(k * 5e-5), 0 * toy.tension()) for k in range(3)]
 
 
-def test_group_alike() -> None:
-    alike = [toy.fit(toy.stiffening(size), toy.tension()) for size in (2e-3, 2.01e-3)]
-    apart = toy.fit(np.zeros(toy.design().size), toy.tension())
-    assert far([[alike[0]], [apart], [alike[1]]]) == ((0, 2),)
-
-
-def test_group_connected() -> None:
-    steps = [toy.fit(toy.stiffening(k * 5e-5), np.zeros((toy.design().size, 1))) for k in range(3)]
-    assert expected_log_bayes_factor(steps[0], steps[2]) > 3
-    assert far([[step] for step in steps]) == ((0, 1, 2),)
-
-
-def test_group_any_view() -> None:
-    one, other = (toy.fit(toy.stiffening(size), toy.tension()) for size in (0.0, 2e-3))
-    assert far([[one, other], [toy.fit(toy.stiffening(2e-3), toy.tension())]]) == ((0, 1),)
-
-
-def test_group_near_by_evidence() -> None:
-    causes = [[toy.fit(toy.stiffening(size), toy.tension())] for size in (0.0, 2e-3, 4e-3)]
-    assert far(causes) == ()
-    assert group(causes, [True, False, True]) == ((0, 2),)
+@pytest.mark.parametrize(
+    ("causes", "near", "groups"),
+    [
+        ([[SHIFTED[1]], [SHIFTED[0]], [SHIFTED[1.005]]], (), ((0, 2),)),
+        ([[step] for step in STEPS], (), ((0, 1, 2),)),  # each alike to the next
+        ([[SHIFTED[0], SHIFTED[1]], [SHIFTED[1]]], (), ((0, 1),)),  # by any view
+        ([[SHIFTED[0]], [SHIFTED[1]], [SHIFTED[2]]], (), ()),
+        ([[SHIFTED[0]], [SHIFTED[1]], [SHIFTED[2]]], (0, 2), ((0, 2),)),  # near by evidence
+    ],
+)
+def test_group_alike(
+    causes: list[list[Fit]], near: tuple[int, ...], groups: tuple[tuple[int, ...], ...]
+) -> None:
+    assert group(causes, [k in near for k in range(len(causes))]) == groups
+    assert expected_log_bayes_factor(STEPS[0], STEPS[2]) > 3
 
 
 class Mirrored:

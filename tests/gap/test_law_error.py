@@ -13,34 +13,23 @@ from shm.gap.probabilities import CALIBRATION, ByLaws, allow_for_laws
 from shm.gap.problem import GapProblem
 from shm.gap.search import fit_alone
 from shm.models.effects import EFFECTS
-from shm.simulate import HangerState, PlantedEffect
-from shm.values import FloatArray
-from tests.helpers.gap_campaigns import HANGER, fit_of, problem_of
-from tests.worlds.simulated.campaign import CampaignPlan, campaign
+from shm.simulate import PlantedEffect
+from tests.helpers.gap_campaigns import HANGER, fit_of, problem_of, simulated
 from tests.worlds.simulated.reality import Reality
 
 WORN = PlantedEffect("section_loss", "everywhere", {"loss": 0.3, "x_m": 4.0, "extent_m": 2.0})
-TENSION_N = 711e3
 CASES = [("section_loss", True), ("section_loss", False), ("point_mass", True)]
 
 
 @cache
 def _by_laws(effect: str, own_laws: bool) -> tuple[ByLaws, Fit, GapProblem]:
     """Fit `effect` to a worn hanger."""
-    plan = CampaignPlan(
-        modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), reality=Reality(own_laws=own_laws)
-    )
-    tests = campaign(HANGER, HangerState(TENSION_N), [WORN], plan, np.random.default_rng(3))
+    tests = simulated(WORN, seed=3, mass_share=0.02, reality=Reality(own_laws=own_laws))
     problem, rng = problem_of(tests), np.random.default_rng(1)
-    baseline = fit_alone(problem, rng)
     variants = EFFECTS[effect].variants(HANGER, problem.design.survey)
     (variant,) = [each for each in variants if each.at == WORN.at]
     fit = fit_of(problem, Hypothesis(((effect, variant),)))
-    return allow_for_laws(problem, baseline, fit, rng), fit, problem
-
-
-def _loss(problem: GapProblem, fit: Fit, draws: FloatArray) -> FloatArray:
-    return problem.coordinates(fit.hypothesis).effect_values(draws)[:, 0]
+    return allow_for_laws(problem, fit_alone(problem, rng), fit, rng), fit, problem
 
 
 def test_allow_for_laws_no_shift_no_gain() -> None:
@@ -51,16 +40,11 @@ def test_allow_for_laws_no_shift_no_gain() -> None:
 
 
 @pytest.mark.parametrize(("effect", "own_laws"), CASES)
-def test_gain_at_least_log_exact(effect: str, own_laws: bool) -> None:
-    found, *_ = _by_laws(effect, own_laws)
+def test_laws_gain_at_least_log_exact(effect: str, own_laws: bool) -> None:
+    """And the tension is as wide as by the exact one at least."""
+    found, fit, problem = _by_laws(effect, own_laws)
     assert found.gain >= np.log(CALIBRATION.exact.known)
     assert found.mimic >= np.log(CALIBRATION.exact.unknown)
-
-
-@pytest.mark.parametrize(("effect", "own_laws"), CASES)
-def test_tension_never_sharper(effect: str, own_laws: bool) -> None:
-    """By laws that may be off, the tension is as wide as by the exact one at least."""
-    found, fit, problem = _by_laws(effect, own_laws)
     after, before = (problem.tension_n(fit.hypothesis, d).std() for d in (found.draws, fit.draws))
     assert after > 0.85 * before
 
@@ -68,19 +52,15 @@ def test_tension_never_sharper(effect: str, own_laws: bool) -> None:
 @pytest.mark.slow
 def test_worn_without_edges_its_size_right() -> None:
     found, fit, problem = _by_laws("section_loss", True)
-    loss = _loss(problem, fit, found.draws)
+    loss = problem.coordinates(fit.hypothesis).effect_values(found.draws)[:, 0]
     assert abs(loss.mean() - WORN.values["loss"]) < 3 * loss.std()
 
 
-def test_exact_law_pays_little() -> None:
-    found, *_ = _by_laws("section_loss", False)
-    assert found.gain < 1.0
-
-
 def test_mimic_exceeds_gain_far_off() -> None:
-    """What is exactly an effect hardly is something unknown that passes for it."""
+    """What is exactly an effect hardly is something unknown that passes for it, and pays little."""
     exact, *_ = _by_laws("section_loss", False)
     wrong, *_ = _by_laws("point_mass", True)
+    assert exact.gain < 1.0
     assert exact.mimic < exact.gain - 0.5
     assert wrong.mimic > wrong.gain + 0.5
 

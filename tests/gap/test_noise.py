@@ -16,7 +16,7 @@ from shm.gap.noise import (
     nodes,
 )
 from shm.gap.repeated_errors import Repeated
-from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
+from shm.inference.likelihood import Covariance, Likelihood
 from shm.values import FloatArray
 from tests.gap import linear_toy as toy
 
@@ -28,17 +28,6 @@ def _observations(sd: float | None = 2e-4) -> Observations:
     found = toy.observations(np.zeros(toy.design().size))
     frequency = np.full(found.design.frequencies, np.nan if sd is None else sd)
     return replace(found, sd=np.concatenate([frequency, found.sd[found.design.frequencies :]]))
-
-
-def _dense(found: tuple[NoiseNode, ...], residual: FloatArray) -> float:
-    count = len(found[0].covariance.frequency)
-    logs = [
-        node.log_weight
-        + stats.multivariate_normal.logpdf(residual[:count], None, node.covariance.frequency)
-        + stats.multivariate_normal.logpdf(residual[count:], None, _shape(node.covariance))
-        for node in found
-    ]
-    return float(logsumexp(logs))
 
 
 def _shape(covariance: Covariance) -> FloatArray:
@@ -150,51 +139,33 @@ def test_where_some_standard_deviations_are_unknown_both_unknowns_are_integrated
 
 
 @pytest.mark.parametrize("shuffled", [False, True])
-def test_the_likelihood_is_that_of_the_full_covariance(shuffled: bool) -> None:
-    found = _observations()
-    rng = np.random.default_rng(2)
-    kinds = nodes(found, _repeated(found))[::4]
-    if shuffled:
-        order = rng.permutation(found.design.frequencies)
-        kinds = tuple(
-            replace(
-                node,
-                covariance=replace(
-                    node.covariance, frequency=node.covariance.frequency[np.ix_(order, order)]
-                ),
-            )
-            for node in kinds
-        )
+def test_the_likelihood_and_its_products_are_those_of_the_full_covariance(shuffled: bool) -> None:
+    found, rng = _observations(), np.random.default_rng(2)
+    kinds, count = nodes(found, _repeated(found))[::4], found.design.frequencies
+    order = rng.permutation(count) if shuffled else np.arange(count)
+    covariances = [
+        replace(each.covariance, frequency=each.covariance.frequency[np.ix_(order, order)])
+        for each in kinds
+    ]
+    own = Likelihood(
+        [replace(node, covariance=each) for node, each in zip(kinds, covariances, strict=True)]
+    )
     residual = found.sd * rng.standard_normal((3, found.design.size))
-    exact = [_dense(kinds, each) for each in residual]
-    np.testing.assert_allclose(Likelihood(kinds).log(residual), exact, rtol=1e-10)
-
-
-def test_products_are_those_of_the_full_covariance() -> None:
-    found, rng = _observations(), np.random.default_rng(3)
-    kinds = nodes(found, _repeated(found))
-    own = Likelihood(kinds)
+    exact = [
+        node.log_weight
+        + stats.multivariate_normal.logpdf(residual[:, :count], None, each.frequency)
+        + stats.multivariate_normal.logpdf(residual[:, count:], None, _shape(each))
+        for node, each in zip(kinds, covariances, strict=True)
+    ]
+    np.testing.assert_allclose(own.log(residual), logsumexp(exact, axis=0), rtol=1e-10)
     columns = rng.standard_normal((found.design.size, 3))
-    count = found.design.frequencies
-    weighed = own.weighed(columns).products(columns.T)
-    squares = own.squares(columns.T).T
-    for node, gram, product, square in zip(
-        kinds, own.gram(columns[None])[0], weighed, squares, strict=True
-    ):
-        exact = columns[:count].T @ np.linalg.solve(node.covariance.frequency, columns[:count])
-        exact += columns[count:].T @ np.linalg.solve(_shape(node.covariance), columns[count:])
-        np.testing.assert_allclose(gram, exact, rtol=1e-8)
-        np.testing.assert_allclose(product, exact, rtol=1e-8)
-        np.testing.assert_allclose(square, np.diag(exact), rtol=1e-8)
-
-
-def test_a_prediction_that_failed_has_no_likelihood_and_spoils_no_other() -> None:
-    found = _observations()
-    residual = np.zeros((2, found.design.size))
-    residual[0, 3] = np.nan
-    log = Likelihood(nodes(found)).log(residual)
-    assert log[0] == -np.inf
-    assert np.isfinite(log[1])
+    weighed, squares = own.weighed(columns).products(columns.T), own.squares(columns.T).T
+    for k, each in enumerate(covariances):
+        product = columns[:count].T @ np.linalg.solve(each.frequency, columns[:count])
+        product += columns[count:].T @ np.linalg.solve(_shape(each), columns[count:])
+        np.testing.assert_allclose(own.gram(columns[None])[0, k], product, rtol=1e-8)
+        np.testing.assert_allclose(weighed[k], product, rtol=1e-8)
+        np.testing.assert_allclose(squares[k], np.diag(product), rtol=1e-8)
 
 
 def test_the_scatter_of_shapes_between_tests_says_how_wrong_their_sds_are() -> None:

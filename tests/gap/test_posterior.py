@@ -14,7 +14,7 @@ from shm.gap.contract import Hypothesis
 from shm.gap.posterior import Target
 from shm.gap.sampling import Sampling, approximate, sample
 from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
-from shm.inference.posterior import climb, find_peaks, laplace
+from shm.inference.posterior import find_peaks, laplace
 from shm.models.effects import Parameter
 from shm.values import ENOUGH_EFFECTIVE, FloatArray, IntArray
 
@@ -123,17 +123,6 @@ def test_find_peaks_mirrored() -> None:
     assert found[0].log == pytest.approx(found[1].log, abs=0.05)
 
 
-def test_climb_hopeless_gives_up() -> None:
-    """What cannot come near is left where it is."""
-    of = problem(mirrored, (0, 1))
-    of.value = of.value + 50.0
-    target = Target(of, ALONE)
-    (_, given_up), (_, whole) = (
-        climb(target, starts(1.0), hopeless=hopeless) for hopeless in (0.0, -np.inf)
-    )
-    assert given_up[0] <= whole[0] < 0.0
-
-
 @pytest.mark.parametrize("columns", [(0, 1, 2), (0, 1), ()])
 def test_sampling_linear_exact(columns: tuple[int, ...]) -> None:
     """All, some and none of the parameters integrated out in closed form."""
@@ -209,8 +198,3 @@ def test_approximate_peaks_by_weight() -> None:
     assert found.log_fit == pytest.approx(
         float(target.likelihood.log(target.residual(peaks[0].z[None]))[0])
     )
-
-
-def test_sampling_same_seed_same_draws() -> None:
-    one, other = (sampled(problem(mirrored, (0, 1))).fit(50) for _ in range(2))
-    np.testing.assert_array_equal(one.draws, other.draws)

@@ -11,7 +11,7 @@ from shm.gap.contract import Hypothesis
 from shm.gap.search import fit_alone
 from shm.inference.likelihood import Likelihood
 from shm.models.base import point_mass
-from shm.models.effects import EFFECTS, Variant
+from shm.models.effects import Variant
 from shm.models.hanger import solve
 from tests.helpers.gap_campaigns import HANGER, PLACES_M, campaign, problem_of
 
@@ -52,13 +52,6 @@ def test_predicted_shapes_have_unit_length_and_the_measured_sign() -> None:
         assert predicted[0, rows] @ value[rows] > 0.99
 
 
-def test_the_tension_is_that_of_theta() -> None:
-    problem = problem_of(campaign())
-    z = np.random.default_rng(2).standard_normal((4, problem.dimension(MASS)))
-    exact = problem.coordinates(MASS).theta(z)[:, 0] * HANGER.nominal_tension_n
-    np.testing.assert_allclose(problem.tension_n(MASS, z), exact)
-
-
 def test_settle_keeps_straight_terms_linear() -> None:
     """What is taken as linear is so within a tenth of the likeliest errors."""
     problem = problem_of(campaign(shape_sd=0.01))
@@ -71,23 +64,6 @@ def test_settle_keeps_straight_terms_linear() -> None:
         step[:, column] = np.sqrt(fit.covariance[column, column]) * np.array([1.0, -1.0])
         there, back = problem.predict(BASELINE, fit.z + step) - fit.predicted
         assert errors.squares((there + back)[None] / 2)[0, 0] < 0.1**2
-
-
-def test_a_part_predicts_the_same_rows_of_the_data() -> None:
-    problem = problem_of(campaign(shape_sd=0.01))
-    kept = problem.design.frequency_order != 3
-    part = problem.part(kept)
-    whole = np.concatenate([kept, kept[problem.design.shape_mode]])
-    z = np.random.default_rng(3).standard_normal((2, problem.dimension(MASS)))
-    np.testing.assert_array_equal(part.observations.value, problem.observations.value[whole])
-    np.testing.assert_allclose(part.predict(MASS, z), problem.predict(MASS, z)[:, whole])
-    assert part.design.survey is problem.design.survey
-
-
-def test_a_part_may_hold_no_shapes_and_one_test_alone() -> None:
-    problem = problem_of(campaign())
-    part = problem.part(np.flatnonzero(problem.design.frequency_test == 1))
-    assert part.predict(BASELINE, part.near).shape == (1, 12)
 
 
 def test_another_design_has_further_sensors_behind_those_of_the_survey() -> None:
@@ -104,16 +80,3 @@ def test_another_design_has_further_sensors_behind_those_of_the_survey() -> None
     shape = predicted[0, own.frequencies :]
     assert np.linalg.norm(shape) == pytest.approx(1)
     assert shape[-1] > 0
-
-
-def test_a_cut_prior_begins_where_it_was_cut() -> None:
-    problem = problem_of(campaign())
-    size = EFFECTS["point_mass"].parameters(HANGER, Variant())[0]
-    problem.smallest["point_mass", Variant()] = 0.4
-    least = np.zeros((1, problem.dimension(MASS)))
-    least[0, -2] = -7.0
-    assert problem.coordinates(MASS).effect_values(least)[0, 0] == pytest.approx(
-        size.lower * (size.upper / size.lower) ** 0.4, rel=1e-3
-    )
-    whole = problem.coordinates(MASS, whole=True).effect_values(least)
-    assert whole[0, 0] == pytest.approx(size.lower, rel=1e-3)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from shm.assumptions import DEFAULTS
-from shm.gap.contract import Hypothesis, Observations
+from shm.gap.contract import Hypothesis
 from shm.gap.problem import GapProblem
 from shm.gap.repeated_errors import (
     STRETCHES,
@@ -19,51 +20,50 @@ from shm.gap.repeated_errors import (
 )
 from shm.inference.systematic_errors import errors_of_sensors, felt_by, loads_of_ends
 from shm.models.hanger import Zone, solve
-from shm.simulate import HangerState
 from shm.values import AddedMass, FloatArray
-from tests.helpers.gap_campaigns import HANGER, problem_of
-from tests.worlds.simulated.campaign import CampaignPlan, campaign
+from tests.helpers.gap_campaigns import HANGER, problem_of, simulated
 
-PLAN = CampaignPlan(
-    modes=5, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, as_made=False, shape_sd=1e-3
-)
-TENSION_N = 711e3
 USUAL = HANGER.scatter
+PLAN: dict[str, Any] = {"modes": 5, "as_made": False, "shape_sd": 1e-3, "seed": 4}
 
 
 @pytest.fixture(scope="module")
 def problem() -> GapProblem:
-    tests = campaign(HANGER, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
-    return problem_of(tests)
+    return problem_of(simulated(**PLAN))
 
 
-def _shapes(observations: Observations) -> FloatArray:
-    return observations.value[observations.design.frequencies :]
+@pytest.fixture(scope="module")
+def value(problem: GapProblem) -> FloatArray:
+    """Return the measured components of shapes."""
+    return problem.value[problem.design.frequencies :]
 
 
-def _scaled(problem: GapProblem, raw: FloatArray) -> FloatArray:
-    return np.asarray(ShapeScaling.measured(problem.observations).scaled(raw[None])[0])
+def _changed(problem: GapProblem, raw: FloatArray) -> FloatArray:
+    """Return the change of the shapes, scaled, where `raw` is measured in place of them."""
+    scaled = ShapeScaling.measured(problem.observations).scaled(raw[None])[0]
+    return np.asarray(scaled - problem.value[problem.design.frequencies :])
 
 
-def test_a_channels_gain_changes_what_its_load_says(problem: GapProblem) -> None:
-    design, value = problem.design, _shapes(problem.observations)
-    channel = (design.shape_place == 1) & (design.shape_component == 0)
-    change = _scaled(problem, value * np.where(channel, 1 + USUAL.sensor_gain, 1.0)) - value
-    assert _nearest(problem.repeated.sensors, change) < 0.02
-
-
-def test_a_turned_sensor_changes_what_its_load_says(problem: GapProblem) -> None:
-    design, value = problem.design, _shapes(problem.observations)
+@pytest.mark.parametrize("error", ["gain", "turn"])
+def test_a_sensor_changes_what_its_load_says(
+    problem: GapProblem, value: FloatArray, error: str
+) -> None:
+    """Of one channel's gain, or of a sensor that is turned."""
+    design, other = problem.design, value.reshape(-1, 2)[:, ::-1].ravel()
+    transverse = design.shape_component == 0
     own = design.shape_place == 2
-    other = value.reshape(-1, 2)[:, ::-1].ravel()
-    sign = np.where(design.shape_component == 0, 1.0, -1.0)
-    change = _scaled(problem, value + sign * USUAL.sensor_turn * own * other) - value
-    assert _nearest(problem.repeated.sensors, change) < 0.02
+    raw = {
+        "gain": value * np.where((design.shape_place == 1) & transverse, 1 + USUAL.sensor_gain, 1),
+        "turn": value + np.where(transverse, 1.0, -1.0) * USUAL.sensor_turn * own * other,
+    }[error]
+    assert _nearest(problem.repeated.sensors, _changed(problem, raw)) < 0.02
 
 
-def test_axes_that_hear_each_other_vary_each_on_its_own(problem: GapProblem) -> None:
+def test_axes_that_hear_each_other_vary_each_on_its_own(
+    problem: GapProblem, value: FloatArray
+) -> None:
     """Turn and cross-axis sensitivity together: the axes' own variances, correlated by a turn."""
-    design, value = problem.design, _shapes(problem.observations)
+    design = problem.design
     loads = {
         kind: problem.repeated.sensors[:, k]
         for k, (kind, place, _) in enumerate(problem.repeated.sensor_errors)
@@ -71,7 +71,7 @@ def test_axes_that_hear_each_other_vary_each_on_its_own(problem: GapProblem) -> 
     }
     other = value.reshape(-1, 2)[:, ::-1].ravel() * (design.shape_place == 2)
     for axis in (0, 1):
-        heard = _scaled(problem, value + 1e-3 * other * (design.shape_component == axis)) - value
+        heard = _changed(problem, value + 1e-3 * other * (design.shape_component == axis))
         both = 1e-3 * (loads["cross"] / USUAL.sensor_cross_mean) / 2
         both += 1e-3 * (1, -1)[axis] * (loads["turn"] / USUAL.sensor_turn) / 2
         assert np.linalg.norm(heard - both) < 0.02 * np.linalg.norm(heard)
@@ -80,7 +80,9 @@ def test_axes_that_hear_each_other_vary_each_on_its_own(problem: GapProblem) -> 
     assert variance == pytest.approx(turn**2 + USUAL.sensor_cross_axis**2)
 
 
-def test_a_sensor_elsewhere_changes_what_its_load_says(problem: GapProblem) -> None:
+def test_a_sensor_elsewhere_changes_what_its_load_says(
+    problem: GapProblem, value: FloatArray
+) -> None:
     """The shapes of the baseline there, against those where it should be."""
     design = problem.design
     moved = (*design.places_m, design.places_m[2] + USUAL.sensor_place_m)
@@ -92,7 +94,7 @@ def test_a_sensor_elsewhere_changes_what_its_load_says(problem: GapProblem) -> N
             replace(design, places_m=moved, shape_place=place),
         )
     )
-    agrees = np.bincount(design.shape_mode, here * _shapes(problem.observations)) > 0
+    agrees = np.bincount(design.shape_mode, here * value) > 0
     change = np.where(agrees, 1.0, -1.0)[design.shape_mode] * (there - here)
     assert _nearest(problem.repeated.sensors, change) < 0.05
 
@@ -103,9 +105,11 @@ def _nearest(loads: FloatArray, change: FloatArray) -> float:
     return float(np.linalg.norm(signed - change[:, None], axis=0).min() / np.linalg.norm(change))
 
 
-def test_loads_of_sensors_do_not_change_a_shapes_length(problem: GapProblem) -> None:
+def test_loads_of_sensors_do_not_change_a_shapes_length(
+    problem: GapProblem, value: FloatArray
+) -> None:
     scaling = ShapeScaling.measured(problem.observations)
-    along = scaling.weight * _shapes(problem.observations)
+    along = scaling.weight * value
     for column in problem.repeated.sensors.T:
         assert np.abs(np.bincount(scaling.shape, along * column)).max() < 1e-12
 
@@ -126,7 +130,7 @@ def test_a_thicker_middle_shifts_frequencies_as_the_sections_loads_say(
         for a, b, f in zip(edges_m[:-1], edges_m[1:], thick, strict=True)
     )
     bars = (replace(plain, zones=(*plain.zones, *more)) for more in (zones, ()))
-    solved = [solve(bar, PLAN.modes, np.empty(0), shapes=False).frequency_hz[0] for bar in bars]
+    solved = [solve(bar, 5, np.empty(0), shapes=False).frequency_hz[0] for bar in bars]
     shift = np.log(solved[0] / solved[1])[problem.design.frequency_plane][
         np.arange(problem.design.frequencies), problem.design.frequency_order - 1
     ]
@@ -136,18 +140,19 @@ def test_a_thicker_middle_shifts_frequencies_as_the_sections_loads_say(
     assert 0.5 < np.linalg.norm(ways) < 3.0
 
 
-@pytest.mark.parametrize("length_m", [3.0, 12.0])
-def test_the_section_varies_about_its_mean_by_what_the_description_says(length_m: float) -> None:
-    ways = section_ways(length_m, 0.001, DEFAULTS.section_reach_m.value)
-    assert np.sqrt(np.mean((ways**2).sum(axis=1))) == pytest.approx(0.001, rel=1e-3)
-    np.testing.assert_allclose(ways.mean(axis=0), 0.0, atol=1e-12)
+def test_the_section_varies_about_its_mean_by_what_the_description_says() -> None:
+    """In fewer ways where its reach is longer: a bar alike over metres has hardly a freedom."""
+    for length_m in (3.0, 12.0):
+        ways = section_ways(length_m, 0.001, DEFAULTS.section_reach_m.value)
+        assert np.sqrt(np.mean((ways**2).sum(axis=1))) == pytest.approx(0.001, rel=1e-3)
+        np.testing.assert_allclose(ways.mean(axis=0), 0.0, atol=1e-12)
+    counts = [section_ways(12.0, 0.001, reach_m).shape[1] for reach_m in (0.5, 2.0, 8.0)]
+    assert counts[0] > counts[1] > counts[2] >= 1
 
 
 def test_a_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -> None:
-    scatter = replace(HANGER.scatter, along=0.0)
-    tests = campaign(HANGER, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
-    hanger = replace(HANGER, scatter=scatter)
-    found = problem_of(tests, hanger=hanger)
+    hanger = replace(HANGER, scatter=replace(HANGER.scatter, along=0.0))
+    found = problem_of(simulated(**PLAN), hanger=hanger)
     design = found.design
     theta = found.described.theta(found.near)
     bars = found.model.physical(np.repeat(theta, STRETCHES + 1, axis=0))
@@ -162,22 +167,18 @@ def test_a_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -
 
 
 def test_without_shapes_sensors_have_no_loads() -> None:
-    plan = replace(PLAN, shapes=False)
-    tests = campaign(HANGER, HangerState(TENSION_N), (), plan, np.random.default_rng(4))
-    found = problem_of(tests)
+    found = problem_of(simulated(**PLAN, shapes=False))
     assert found.repeated.sensors.shape == Repeated.none(found.design).sensors.shape
     assert np.isfinite(found.likelihood(Hypothesis()).log(np.zeros((1, found.design.size)))).all()
 
 
 def test_an_unstated_radius_of_a_known_mass_is_an_error_of_its_test() -> None:
     """One standard deviation more and less makes what its load says, in that test alone."""
-    tests = campaign(HANGER, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
-    clamp, row = AddedMass(25.0, 3.4), DEFAULTS.added_mass_radius_m
-    laden = [replace(tests[0], id="laden", added_mass=clamp)]
+    tests, row = simulated(**PLAN), DEFAULTS.added_mass_radius_m
 
     def problem_with(radius_m: float | None) -> GapProblem:
-        body = replace(clamp, radius_of_gyration_m=radius_m)
-        return problem_of([*tests, replace(laden[0], added_mass=body)])
+        clamp = AddedMass(25.0, 3.4, radius_of_gyration_m=radius_m)
+        return problem_of([*tests, replace(tests[0], id="laden", added_mass=clamp)])
 
     unstated = problem_with(None)
     own = unstated.design.frequency_test == len(tests)
@@ -194,9 +195,3 @@ def test_an_unstated_radius_of_a_known_mass_is_an_error_of_its_test() -> None:
     count = len(own)
     with_load = unstated.repeated.loads[:count] @ unstated.repeated.loads[:count].T
     np.testing.assert_allclose(unstated.repeated.frequency, with_load)
-
-
-def test_section_varies_in_fewer_ways_where_its_reach_is_longer() -> None:
-    """Each way is one more freedom: a rolled bar that is alike over metres has hardly any."""
-    counts = [section_ways(12.0, 0.001, reach_m).shape[1] for reach_m in (0.5, 2.0, 8.0)]
-    assert counts[0] > counts[1] > counts[2] >= 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,21 +11,17 @@ import pytest
 from shm.gap.noise import nodes
 from shm.gap.observations import observed, separate_turn
 from shm.gap.repeated_errors import turn_loads
-from shm.simulate import HangerState
-from shm.values import ModalTest, Mode
-from tests.helpers.gap_campaigns import problem_of
+from shm.values import FloatArray, ModalTest, Mode
+from tests.helpers.gap_campaigns import problem_of, simulated
 from tests.helpers.hangers import HANGER_3
-from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
-PLAN = CampaignPlan(
-    modes=4, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, as_made=False, shape_sd=1e-3
-)
+PLAN: dict[str, Any] = {"modes": 4, "as_made": False, "shape_sd": 1e-3, "hanger": HANGER_3}
 SIZE = np.array([0.1, 0.4, 1.0, 0.8])
 
 
 @pytest.fixture(scope="module")
 def test() -> ModalTest:
-    return campaign(HANGER_3, HangerState(711e3), (), PLAN, np.random.default_rng(4))[0]
+    return simulated(**PLAN, seed=4)[0]
 
 
 def _may_be_turned(mode: Mode, rad: float) -> Mode:
@@ -42,23 +39,22 @@ def _turned(mode: Mode, rad: float) -> Mode:
     return replace(mode, shape=shape)
 
 
-def test_what_grows_with_the_shape_is_the_turn() -> None:
-    own, turn = separate_turn(np.hypot(0.005, 0.1 * SIZE), SIZE, 0.004)
-    assert turn == pytest.approx(0.1)
-    assert own == pytest.approx(0.005)
-
-
-def test_standard_deviations_that_do_not_grow_with_the_shape_stay_as_they_are() -> None:
-    for sd in (np.full(4, 0.005), np.array([0.0055, 0.005, 0.006, 0.0052])):
-        own, turn = separate_turn(sd, SIZE, 0.005)
-        assert turn == 0
-        assert own is sd
-
-
-def test_own_deviations_are_never_smaller_than_the_least() -> None:
-    own, turn = separate_turn(0.2 * SIZE, SIZE, 0.005)
-    assert own == pytest.approx(0.005)
-    assert turn == pytest.approx(0.2, rel=0.01)
+@pytest.mark.parametrize(
+    ("sd", "least", "expected_own", "expected_turn"),
+    [
+        (np.hypot(0.005, 0.1 * SIZE), 0.004, 0.005, 0.1),
+        (np.full(4, 0.005), 0.005, None, 0.0),
+        (np.array([0.0055, 0.005, 0.006, 0.0052]), 0.005, None, 0.0),
+        (0.2 * SIZE, 0.005, 0.005, 0.2),
+    ],
+)
+def test_what_grows_with_the_shape_is_the_turn(
+    sd: FloatArray, least: float, expected_own: float | None, expected_turn: float
+) -> None:
+    """What does not grow stays as it is; own deviations are never smaller than the least."""
+    own, turn = separate_turn(sd, SIZE, least)
+    assert turn == pytest.approx(expected_turn, rel=0.01)
+    assert own is sd if expected_own is None else own == pytest.approx(expected_own)
 
 
 def test_without_turns_nothing_changes(test: ModalTest) -> None:

@@ -1,9 +1,10 @@
-"""Small campaigns of hanger 3, without its plates, made by the general model itself."""
+"""Small campaigns of hanger 3, without its plates, by the general model and by the simulator."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from shm.inference.posterior import find_peaks
 from shm.models import MODELS, AsMade
 from shm.models.effects import Conditions, Variant
 from shm.models.hanger_model import DENSITY, LENGTH, MODULUS, SECTION, TENSION
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import (
     ENOUGH_EFFECTIVE,
     NAN,
@@ -32,6 +34,8 @@ from shm.values import (
     ShapePoint,
 )
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan
+from tests.worlds.simulated.campaign import campaign as simulate_campaign
 
 TOUCHLESS = DEFAULTS.with_numbers(support_compliance_m_n=0.0, accelerometer_mass_kg=0.0)
 """Supports that do not give and sensors without mass, as simulated: their means, not their sds."""
@@ -39,6 +43,16 @@ HANGER = replace(HANGER_3, plate=None, assumptions=TOUCHLESS)
 PLACES_M = (2.0, 4.5, 6.5, 9.0)
 CLAMP = AddedMass(25.0, 3.6)
 Effects = tuple[tuple[str, Variant], ...]
+ONE_TEST = CampaignPlan(modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0)
+PLANTED_CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
+
+
+def simulated(
+    *effects: PlantedEffect, seed: int = 1, hanger: Hanger = HANGER, **plan: Any
+) -> tuple[ModalTest, ...]:
+    """Simulate one test of six modes at 711 kN with effects, or what else a plan has of it."""
+    made, rng = replace(ONE_TEST, **plan), np.random.default_rng(seed)
+    return simulate_campaign(hanger, HangerState(711e3), effects, made, rng)
 
 
 def campaign(
