@@ -462,20 +462,6 @@ class Receipt:
 
 
 @dataclass(frozen=True)
-class Step:
-    """A stage that a recording or, where one is named, a test of it has reached.
-
-    `version` is that of the shm that brought it there; None where it was not noted.
-    """
-
-    stage: str
-    at: datetime
-    version: str | None
-    test_id: int | None = None
-    test: str | None = None
-
-
-@dataclass(frozen=True)
 class Rerun:
     """Tests that were sent back to be done again, and the results that this has superseded.
 
@@ -488,17 +474,6 @@ class Rerun:
     posteriors: int
     watches: int
     of_baseline: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something noticed on the way: a duplicate, a file reopened or refused."""
-
-    at: datetime
-    kind: str
-    file_name: str
-    message: str
-    recording_id: int | None = field(default=None)
 
 
 @dataclass(frozen=True)
@@ -758,19 +733,6 @@ class StreamWatchCheckpoint:
 
 
 @dataclass(frozen=True)
-class AuditRow:
-    """One change: `who` did `action` on `subject` by `via`; `detail` is the reason or the value."""
-
-    id: int
-    at: datetime
-    who: str
-    via: str
-    action: str
-    subject: str
-    detail: str
-
-
-@dataclass(frozen=True)
 class ChangedSetting:
     """The value of a key of `bridge.toml` that holds instead of what the file says."""
 
@@ -798,7 +760,10 @@ def said(value: float | str | None) -> str:
 
 @dataclass(frozen=True)
 class Entry:
-    """Entry of the journal: the event, its subject, when, by whom, by which way, why, which shm."""
+    """Entry of the journal: the event, its subject, when, by whom, by which way, why, which shm.
+
+    A step has the name of its `test`, where it is of one; `version` is None where it was not noted.
+    """
 
     at: datetime
     kind: str
@@ -809,3 +774,12 @@ class Entry:
     who: str | None
     via: str | None
     version: str | None
+    id: int = 0
+    test: str | None = field(default=None, metadata={"stored": False})
+
+    @property
+    def message(self) -> str:
+        """Return what was noticed; of a decision who made it, too."""
+        if self.kind not in (*Decision,) or not self.who:
+            return self.detail
+        return f"{self.kind} by {self.who}" + (f": {self.detail}" if self.detail else "")

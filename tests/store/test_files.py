@@ -47,7 +47,7 @@ def test_only_what_still_waits_at_a_stage_is_refused_from_there(store: Store) ->
     for _ in range(2):
         store.recordings.refuse(first, REASON, NOW, stage=Stage.RECEIVED)
     assert len(list_events(store, "refused")) == 1
-    assert [step.stage for step in list_steps(store, first)].count(Stage.REFUSED) == 1
+    assert [step.kind for step in list_steps(store, first)].count(Stage.REFUSED) == 1
     store.tests.save(second, [IdentifiedTest(a_test("t2"))], LINEAGE, NOW)
     (test,) = store.tests.list_all()
     assert not is_waiting(store, second, Stage.RECEIVED)
@@ -68,7 +68,7 @@ def test_files_refused_together_each_end_with_their_own_tests(store: Store) -> N
     for number in ids:
         store.recordings.refuse(number, REASON, NOW, tests, stage=Stage.IDENTIFIED)
     for number in ids:
-        stages = [step.stage for step in list_steps(store, number)]
+        stages = [step.kind for step in list_steps(store, number)]
         assert stages.count(Stage.REFUSED) == 2  # the file and its test
 
 

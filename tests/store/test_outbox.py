@@ -105,7 +105,7 @@ def test_a_test_is_through_when_no_hook_is_owed_its_alert(filled_copy: Store) ->
     """Once, however many hooks there are."""
     store = filled_copy
     (first,) = (e for e in store.alerts.list_deliveries() if e.stored.alert.test == "t2")
-    before = [step.stage for step in list_steps(store, 2)]
+    before = [step.kind for step in list_steps(store, 2)]
     store.alerts.save_delivery(first, NOW + HOUR)
-    after = [step.stage for step in list_steps(store, 2)]
+    after = [step.kind for step in list_steps(store, 2)]
     assert after == [*before, "notified"]

@@ -125,7 +125,7 @@ def test_a_renamed_file_is_found_by_both_names(store: Store) -> None:
     names = ("t1", "h3-1.csv", "h3-1", "crew/new.uff", "new.uff", "copy", "copy.csv")
     assert {find_recording(store, name) for name in names} == {(test.recording_id, None)}
     assert find_recording(store, "new") == (test.recording_id, "new")
-    came_as = {each.file_name for each in list_events(store, recording_id=recording.id)}
+    came_as = {each.subject for each in list_events(store, recording_id=recording.id)}
     assert came_as == {"crew/new.uff", "h3-1.csv", "copy.csv"}
     with pytest.raises(NothingThere):
         find_recording(store, "h3")

@@ -116,5 +116,5 @@ def test_a_delivery_that_two_have_made_is_ended_once(
     store.alerts.save_failure(owed, "no answer", NOW, NOW)
     (ended,) = store.alerts.list_deliveries()
     assert (ended.state, ended.attempts, ended.last_error) == (DeliveryState.DELIVERED, 1, "")
-    reached = [step.stage for step in list_steps(store, updated[0].recording_id)]
+    reached = [step.kind for step in list_steps(store, updated[0].recording_id)]
     assert reached.count("notified") == 1
