@@ -14,8 +14,7 @@ import logging
 import math
 import threading
 from collections import deque
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
@@ -300,7 +299,10 @@ def _library() -> Any:
 
 
 class StreamAskers:
-    """A thread for each stream that is asked for, as `bridge.toml` describes them now."""
+    """A thread for each stream that is asked for, as `bridge.toml` describes them now.
+
+    For the holder of the workspace's lock; nobody is asked before `use`.
+    """
 
     def __init__(self, clock: Clock, pace: Pace | None = None):
         self._clock, self._pace = clock, pace
@@ -327,20 +329,3 @@ class StreamAskers:
             for asker, thread in ending:
                 asker.end()  # Python 3.11 loses one that comes as a wait ends (wait_for)
                 thread.join(0.1)
-
-
-@contextmanager
-def streams_asked(
-    workspace: Workspace, clock: Clock, *, begun: bool = True, pace: Pace | None = None
-) -> Iterator[StreamAskers]:
-    """Ask for streams while the context lasts; nobody is asked unless it has `begun`.
-
-    For the holder of the workspace's lock.
-    """
-    askers = StreamAskers(clock, pace)
-    try:
-        if begun:
-            askers.use(workspace)
-        yield askers
-    finally:
-        askers.close()
