@@ -105,8 +105,8 @@ class Publisher(Background):
         self,
         workspace: Workspace,
         clock: Clock,
-        pause_s: float = _LOOK_S,
-        retry_s: float = _RETRY_S,
+        pause_s: float = 10.0,
+        retry_s: float = 60.0,
     ):
         super().__init__(workspace, clock, pause_s, retry_s)
         self._client, self._outbox = HttpClient(), PointOutbox(workspace.folder)

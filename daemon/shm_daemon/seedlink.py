@@ -126,20 +126,17 @@ class StreamAsker:
         while not self._ended.is_set():
             try:
                 with self._workspace.store() as self._store:
-                    await self._receive_or_note()
+                    try:
+                        await self._receive()
+                    except known[1:] as error:
+                        if not self._arrived:
+                            self._note_refused(error)
+                        raise
             except Exception as error:  # the daemon goes on without this stream
                 is_known = isinstance(error, known)
                 name = self._stream.name
                 log.warning("stream %s waits: %s", name, error, exc_info=not is_known)
             await asyncio.sleep(self._pace.retry_s)
-
-    async def _receive_or_note(self) -> None:
-        try:
-            await self._receive()
-        except (OSError, _library().SeedLinkError) as error:
-            if not self._arrived:
-                self._note_refused(error)
-            raise
 
     def _note_refused(self, error: Exception) -> None:
         """Note once an hour why the server sends nothing, or something that cannot be used."""

@@ -10,7 +10,7 @@ import math
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, tzinfo
 from datetime import time as clock_time
 from functools import partial
@@ -105,8 +105,8 @@ class Answers:
     """The answers of a person about a file; NaN and None where there are none.
 
     `channels` are keys of a sidecar's table of a channel, by its name. `each_time`: the logger
-    goes from hanger to hanger, and its profile is to name none. `is_time_unknown`: which of two
-    days the file means, or when it was at all, is not known either.
+    goes from hanger to hanger, and its profile is to name none. `unknown` are those of `OF_TEST`
+    that nobody knows, such as which of two days the file means.
     """
 
     hanger: int | None = None
@@ -116,9 +116,7 @@ class Answers:
     operator: str = ""
     channels: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     each_time: bool = False
-    is_time_unknown: bool = False
-    is_temperature_unknown: bool = False
-    is_operator_unknown: bool = False
+    unknown: frozenset[str] = frozenset()
 
     @property
     def said(self) -> dict[str, Any]:
@@ -297,12 +295,13 @@ def _refuse_unknown(own: Described, found: Survey, path: Path) -> None:
             )
 
 
-_OF_TEST = ("time", "temperature_c", "operator")
+OF_TEST = {"time": "time", "temperature": "temperature_c", "operator": "operator"}
+"""What is asked of one test alone, and the key of a sidecar that says it."""
 
 
 def _to_keep(known: Described, said: Described, found: Survey) -> dict[str, Any]:
     """Return what holds for every file of the logger: not the hanger that the file itself says."""
-    kept = _joined(known, {k: v for k, v in said.items() if k not in _OF_TEST})
+    kept = _joined(known, {k: v for k, v in said.items() if k not in OF_TEST.values()})
     if found.layout.hanger is not None:
         kept.pop("hanger", None)
     return kept
@@ -352,23 +351,24 @@ def _questions(
     return asked + [each for column in columns for each in _of_sensor(column, described)]
 
 
-def _says(described: Described, key: str, is_unknown: bool) -> bool:
-    return key in described or is_unknown
-
-
 def _of_test(found: Survey, described: Described, answers: Answers) -> list[Question]:
     """Return the questions about one test alone, without which a file can be taken in."""
-    asked = []
-    if found.time is None and not _says(described, "time", answers.is_time_unknown):
-        asked.append(_of_time(found))
-    warmth = _says(described, "temperature_c", answers.is_temperature_unknown)
-    if math.isnan(found.temperature_c) and not warmth:
-        text = "How warm was the steel, in degrees Celsius (or 'unknown')?"
-        asked.append(Question("temperature", "", text, "--temperature C", needed=False))
-    if not found.operator and not _says(described, "operator", answers.is_operator_unknown):
-        text = "Who measured (or 'unknown')?"
-        asked.append(Question("operator", "", text, "--operator NAME", needed=False))
-    return asked
+    warmth = "How warm was the steel, in degrees Celsius (or 'unknown')?"
+    asked = {
+        "time": _of_time(found),
+        "temperature": Question("temperature", "", warmth, "--temperature C", needed=False),
+        "operator": Question(
+            "operator", "", "Who measured (or 'unknown')?", "--operator NAME", needed=False
+        ),
+    }
+    stated = {"time": found.time, "temperature_c": found.temperature_c, "operator": found.operator}
+    return [
+        question
+        for about, question in asked.items()
+        if about not in answers.unknown
+        and OF_TEST[about] not in described
+        and ((value := stated[OF_TEST[about]]) in (None, "") or value != value)
+    ]
 
 
 def _of_time(found: Survey) -> Question:
@@ -578,40 +578,25 @@ def answer_to(question: Question, text: str, found: Import) -> dict[str, object]
     return channel_answer("sensitivity" if is_raw else "unit", plain, unit)
 
 
-def answer_time(text: str, answers: Answers) -> Answers:
-    """Return the answers with the time of the test, by an ISO 8601 time or day, or 'unknown'."""
-    if text.strip().lower() in _UNKNOWN:
-        return replace(answers, is_time_unknown=True)
-    try:
-        return replace(answers, time=parse_time(text.strip()))
-    except (ValueError, OverflowError):
-        raise UsageError(f"{text!r} is no day.", remedy="Write it as 2026-05-01.") from None
+def answer_of_test(about: str, text: str, answers: Answers) -> Answers:
+    """Return the answers with the time, temperature or operator of a test, or that it is unknown.
 
-
-def answer_temperature(text: str, answers: Answers) -> Answers:
-    """Return the answers with the temperature of the steel, by degrees Celsius or 'unknown'."""
-    if text.strip().lower() in _UNKNOWN:
-        return replace(answers, is_temperature_unknown=True)
-    try:
-        number = float(text.replace(",", "."))
-    except ValueError:
-        number = NAN
+    A time is an ISO 8601 time or day, a temperature in degrees Celsius; raises UsageError.
+    """
+    plain = text.strip()
+    if plain.lower() in _UNKNOWN or (about == "operator" and not plain):
+        return replace(answers, unknown=answers.unknown | {about})
+    if about == "operator":
+        return replace(answers, operator=plain)
+    if about == "time":
+        try:
+            return replace(answers, time=parse_time(plain))
+        except (ValueError, OverflowError):
+            raise UsageError(f"{text!r} is no day.", remedy="Write it as 2026-05-01.") from None
+    number = _number(plain.replace(",", "."))
     if math.isnan(outdoor_c(number)):
         raise UsageError(f"{text!r} is no temperature outdoors.", remedy="Give degrees Celsius.")
     return replace(answers, temperature_c=number)
-
-
-def answer_operator(text: str, answers: Answers) -> Answers:
-    """Return the answers with who measured, by a name or 'unknown'."""
-    if text.strip().lower() in (*_UNKNOWN, ""):
-        return replace(answers, is_operator_unknown=True)
-    return replace(answers, operator=text.strip())
-
-
-ANSWERS_OF_TEST: dict[str, Callable[[str, Answers], Answers]] = {
-    "time": answer_time, "temperature": answer_temperature, "operator": answer_operator,
-}  # fmt: skip
-"""What takes the answer to a question about one test, by what it is about."""
 
 
 def unit_recorded(name: str, found: Import) -> str:
@@ -666,7 +651,7 @@ def import_document(found: Import) -> dict[str, Any]:
         "operator": found.described.get("operator", survey.operator),
         "sampling_rate_hz": found.sampling_rate_hz,
         "samples": survey.samples,
-        "columns": [_column(column) for column in found.columns],
+        "columns": [asdict(column) for column in found.columns],
         "questions": [question_document(question) for question in found.questions],
         "of_test": [question_document(question) for question in found.of_test],
         "problems": list(found.problems),
@@ -676,18 +661,4 @@ def import_document(found: Import) -> dict[str, Any]:
 
 def question_document(question: Question) -> dict[str, object]:
     """A question, and the option of `shm import` that answers it."""
-    return {
-        "about": question.about,
-        "channel": question.channel,
-        "text": question.text,
-        "option": question.option,
-        "choices": list(question.choices),
-    }
-
-
-def _column(column: Understood) -> dict[str, Any]:
-    names = (
-        "name", "unit", "quantity", "plane", "x_m", "least", "largest", "overloads", "is_clipped",
-        "hits",
-    )  # fmt: skip
-    return {**{name: getattr(column, name) for name in names}, "outline": list(column.outline)}
+    return {name: value for name, value in asdict(question).items() if name != "needed"}

@@ -274,8 +274,8 @@ class WatchCheckpoint:
 
 
 @dataclass(frozen=True)
-class Note:
-    """Note of somebody on an alert, made once."""
+class AlertNote:
+    """Note on an alert, made once: who has taken note of it, or found that its condition ended."""
 
     alert_id: int
     who: str
@@ -286,14 +286,6 @@ class Note:
     def said(self) -> dict[str, object]:
         """Return who, why and when, for documents."""
         return {"who": self.who, "why": self.why, "at": self.at}
-
-
-class Acknowledgement(Note):
-    """Person who has taken note of an alert, when, and what they say to it."""
-
-
-class Resolution(Note):
-    """End of the condition of an alert: when, found by whom (`shm` or a person), why."""
 
 
 @dataclass(frozen=True)
@@ -307,8 +299,8 @@ class StoredAlert:
     id: int
     alert: Alert
     raised_at: datetime
-    acknowledgement: Acknowledgement | None = None
-    resolution: Resolution | None = None
+    acknowledgement: AlertNote | None = None
+    resolution: AlertNote | None = None
     baseline_id: int | None = None
 
     @property
@@ -474,17 +466,6 @@ class Rerun:
     posteriors: int
     watches: int
     of_baseline: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class RecordingInProgress:
-    """A recording that is not through: how far it has come, and since when it is there."""
-
-    id: int
-    file_name: str
-    stage: Stage
-    hanger: int | None
-    since: datetime
 
 
 @dataclass(frozen=True)

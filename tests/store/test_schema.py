@@ -18,7 +18,7 @@ from alembic.script import ScriptDirectory
 
 from shm.errors import NothingThere, SchemaOutdated, StoreError
 from shm.resources import migrations_folder
-from shm.store import Acknowledgement, Decision, Stage, Store
+from shm.store import AlertNote, Decision, Stage, Store
 from shm.store.journal import (
     change_document,
     list_changes,
@@ -119,7 +119,7 @@ def test_all_that_a_database_of_1_0_0_holds_is_kept(schema: int, tmp_path: Path)
         stored = store.alerts.list_all()[0]
         assert stored.alert.kinds == ("beyond threshold",)
         assert stored.alert.change == a_change()
-        assert stored.acknowledgement == Acknowledgement(1, "engineer", "looked at the pin", NOW)
+        assert stored.acknowledgement == AlertNote(1, "engineer", "looked at the pin", NOW)
         watch = store.watch.list_all(3)[0]
         assert watch.watched.change == a_change()
         assert [drift.quantity for drift in watch.watched.drifts] == ["tension"]
