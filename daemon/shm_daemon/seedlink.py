@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from shm.documents import dump
+from shm.documents import dump, value_of
 from shm.errors import BadInput, ShmError, needing
 from shm.pipeline import Clock
 from shm.pipeline.lineage import read_limits
@@ -78,13 +78,8 @@ class Progress:
     @classmethod
     def read(cls, path: Path) -> Progress:
         """Read it; empty where there is none, or it is damaged: known samples are known then."""
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            found = json.loads(path.read_text(encoding="utf-8"))
-            last = {key: (int(seq), str(time)) for key, (seq, time) in found["last"].items()}
-            known = {
-                key: [(int(n), int(us)) for n, us in some] for key, some in found["known"].items()
-            }
-            return cls(last, known, int(found["done_us"]))
+        with suppress(OSError, ValueError):
+            return value_of(cls, json.loads(path.read_text(encoding="utf-8")))
         return cls({}, {})
 
 
