@@ -226,22 +226,29 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     described = with_times(completed(known, found.layout, own, path.name, zone), found)
     hanger = described.get("hanger", found.hanger)
     rate, uneven = rate_told(found, described)
-    questions = _questions(found, described, hanger, rate, workspace)
+    told = [_told(column, described) for column in found.columns]
+    questions = _questions(found, told, described, hanger, rate, workspace)
     of_test = _of_test(found, described, answers)
     if found.layout.possible_times:  # two days in question are asked of each file
         questions += [each for each in of_test if each.about == "time"]
     problems = (
         *_hanger_problem(hanger, workspace),
-        *_place_problems(found, described, hanger, workspace),
+        *_place_problems(told, hanger, workspace),
     )
-    record, fault = _recording(found, described, rate, path)
+    record, fault = _recording(told, rate, path)
     fault = uneven or fault
     if found.lines or any(question.about in ("unit", "rate") for question in questions):
         fault = ""  # the answers may mend it
-    if _holds_nothing(found, described, questions):
+    is_measured = any(each.quantity == "acceleration" for each in told)
+    if not is_measured and all(question.about != "unit" for question in questions):
+        # No answer can make it a recording.
         questions, fault = [], "; ".join(found.problems) or fault
     kept = with_day_order(_to_keep(known, answers.said, found), order)
-    columns = _columns(found, described, record, rate)
+    channels = {} if record is None else {c.name: c for c in record.channels}
+    columns = tuple(
+        _understood(raw, column, channels.get(column.name), rate)
+        for raw, column in zip(found.columns, told, strict=True)
+    )
     problems = (*problems, *((fault,) if fault else ()))
     return Import(
         found, described, kept, profile, columns, rate, hanger, tuple(questions), problems,
@@ -318,13 +325,12 @@ def _hanger_problem(hanger: object, workspace: Workspace) -> tuple[str, ...]:
 
 
 def _place_problems(
-    found: Survey, described: Described, hanger: object, workspace: Workspace
+    columns: Sequence[SurveyedColumn], hanger: object, workspace: Workspace
 ) -> list[str]:
     """Sensors that are said to be off the hanger, where it is one of the bridge."""
     tested = next((each for each in workspace.bridge.bars if each.id == hanger), None)
     if tested is None:
         return []
-    columns = [_told(column, described) for column in found.columns]
     of_sensors = [each for each in columns if each.quantity == "acceleration"]
     faults = {each.name: fault_of_place(each.x_m, tested) for each in of_sensors}
     return [f"{name}: {fault}" for name, fault in faults.items() if fault]
@@ -337,7 +343,12 @@ _UNITS = ("N", "kN", "lbf", "m/s2", "mm/s2", "g", "mg", "s", "none")
 
 
 def _questions(
-    found: Survey, described: Described, hanger: object, rate: float, workspace: Workspace
+    found: Survey,
+    columns: Sequence[SurveyedColumn],
+    described: Described,
+    hanger: object,
+    rate: float,
+    workspace: Workspace,
 ) -> list[Question]:
     asked: list[Question] = []
     if hanger is None:
@@ -346,7 +357,6 @@ def _questions(
         asked.append(Question("hanger", "", text, option, choices=known))
     if math.isnan(rate) and not found.lines:
         asked.append(Question("rate", "", "How many samples a second?", "--rate HZ"))
-    columns = [_told(column, described) for column in found.columns]
     asked += [_of_unit(column) for column in _open(columns)]
     return asked + [each for column in columns for each in _of_sensor(column, described)]
 
@@ -379,13 +389,6 @@ def _of_time(found: Survey) -> Question:
         return Question("time", "", text, "--time TIME", needed=False)
     text = f"Was the test on {' or on '.join(days)} (or 'unknown')?"
     return Question("time", "", text, f"--time {'|'.join(days)}", False, days)
-
-
-def _holds_nothing(found: Survey, described: Described, questions: Sequence[Question]) -> bool:
-    """Return True if no answer can make it a recording: no column may be an acceleration."""
-    may_be = any(question.about == "unit" for question in questions)
-    measured = {_told(column, described).quantity for column in found.columns}
-    return "acceleration" not in measured and not may_be
 
 
 def _told(column: SurveyedColumn, described: Described) -> SurveyedColumn:
@@ -472,14 +475,14 @@ def _of_sensor(column: SurveyedColumn, described: Described) -> list[Question]:
 
 
 def _recording(
-    found: Survey, described: Described, rate: float, path: Path
+    told: Sequence[SurveyedColumn], rate: float, path: Path
 ) -> tuple[Recording | None, str]:
     """The recording as it will be read, or why it will be refused."""
     try:
         columns = [
             Column(c.name, len(c.values), partial(np.asarray, c.values), role="channel",
                    stated=_entries(c, path))
-            for c in (_told(column, described) for column in found.columns)
+            for c in told
             if c.quantity is not None and c.values is not None
         ]  # fmt: skip
         rates = {} if math.isnan(rate) else {"sampling_rate_hz": Entry(rate, path)}
@@ -501,16 +504,6 @@ def _entries(column: SurveyedColumn, path: Path) -> dict[str, Entry]:
     }
     known = {k: v for k, v in document.items() if v is not None and v == v and k in CHANNEL_KEYS}
     return {key: Entry(value, path) for key, value in known.items()}
-
-
-def _columns(
-    found: Survey, described: Described, record: Recording | None, rate: float
-) -> tuple[Understood, ...]:
-    channels = {} if record is None else {c.name: c for c in record.channels}
-    return tuple(
-        _understood(column, _told(column, described), channels.get(column.name), rate)
-        for column in found.columns
-    )
 
 
 def _understood(

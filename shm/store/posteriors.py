@@ -81,47 +81,6 @@ _OF_TEST = ("id", "name", "hanger", "time", "taken_at", "temperature_c")
 _SUMMARY = summaries.c.key, summaries.c.document.label("summary")
 
 
-class Trends(Repository):
-    """The part of `Posteriors` that answers in numbers."""
-
-    def save_summaries(self, hanger: Hanger) -> int:
-        """Keeps the summaries of a hanger that are not kept yet; how many there were.
-
-        Some at a time, each time a transaction: it may be killed and begun again.
-        """
-        with self.reading() as connection:
-            key = key_of(hanger, selection_numbers(connection).get(hanger.id))
-        missing = self._missing(hanger, key)
-        for begin in range(0, len(missing), _AT_ONCE):
-            some = missing[begin : begin + _AT_ONCE]
-            with self.reading() as connection:
-                made = _made(connection, some, {hanger.id: hanger})
-            rows = [
-                {"posterior_id": id_, "key": key, "document": asdict(numbers)}
-                for id_, numbers in made.items()
-            ]
-            with self.writing() as connection:
-                former = summaries.c.posterior_id.in_(some)
-                connection.execute(sa.delete(summaries).where(former))
-                if rows:
-                    connection.execute(sa.insert(summaries), rows)
-        return len(missing)
-
-    def _missing(self, hanger: Hanger, key: str) -> list[int]:
-        """Return what is shown of a hanger and has no summary under its present description."""
-        up_to_date = sa.exists().where(
-            summaries.c.posterior_id == posteriors.c.id, summaries.c.key == key
-        )
-        of_baselines = sa.select(baselines.c.posterior_id).where(
-            baselines.c.id.in_(baselines_now(hanger.id))
-        )
-        looked_at = posteriors.c.id.not_in(hidden) | posteriors.c.id.in_(of_baselines)
-        query = sa.select(posteriors.c.id).where(
-            posteriors.c.hanger == hanger.id, is_current(posteriors), looked_at, ~up_to_date
-        )
-        return list(self.scalars(query.order_by(posteriors.c.id)))
-
-
 def load_points(
     store: Repository, chosen: sa.Select[Any] | Sequence[int], hangers: Iterable[Hanger]
 ) -> tuple[TrendPoint, ...]:
@@ -278,7 +237,7 @@ class _OfBaseline:
 _in_force = adoptions.c.undone_at.is_(None)
 
 
-class Posteriors(Trends):
+class Posteriors(Repository):
     """Posteriors, selections, diagnoses and adoptions."""
 
     def save(
@@ -412,6 +371,43 @@ class Posteriors(Trends):
             subject = f"hanger {row.hanger}, {row.model}"
             note(connection, at, "adoption dropped", subject, why, who)
             return value_in(connection.execute(by_id).one(), StoredAdoption)
+
+    def save_summaries(self, hanger: Hanger) -> int:
+        """Keeps the summaries of a hanger that are not kept yet; how many there were.
+
+        Some at a time, each time a transaction: it may be killed and begun again.
+        """
+        with self.reading() as connection:
+            key = key_of(hanger, selection_numbers(connection).get(hanger.id))
+        missing = self._missing(hanger, key)
+        for begin in range(0, len(missing), _AT_ONCE):
+            some = missing[begin : begin + _AT_ONCE]
+            with self.reading() as connection:
+                made = _made(connection, some, {hanger.id: hanger})
+            rows = [
+                {"posterior_id": id_, "key": key, "document": asdict(numbers)}
+                for id_, numbers in made.items()
+            ]
+            with self.writing() as connection:
+                former = summaries.c.posterior_id.in_(some)
+                connection.execute(sa.delete(summaries).where(former))
+                if rows:
+                    connection.execute(sa.insert(summaries), rows)
+        return len(missing)
+
+    def _missing(self, hanger: Hanger, key: str) -> list[int]:
+        """Return what is shown of a hanger and has no summary under its present description."""
+        up_to_date = sa.exists().where(
+            summaries.c.posterior_id == posteriors.c.id, summaries.c.key == key
+        )
+        of_baselines = sa.select(baselines.c.posterior_id).where(
+            baselines.c.id.in_(baselines_now(hanger.id))
+        )
+        looked_at = posteriors.c.id.not_in(hidden) | posteriors.c.id.in_(of_baselines)
+        query = sa.select(posteriors.c.id).where(
+            posteriors.c.hanger == hanger.id, is_current(posteriors), looked_at, ~up_to_date
+        )
+        return list(self.scalars(query.order_by(posteriors.c.id)))
 
 
 def _has(connection: Connection, hanger: int) -> bool:

@@ -36,7 +36,6 @@ from shm.store.selects import (
     plain_tests,
     select_since_baseline,
     test_columns,
-    test_row,
 )
 from shm.store.tables import (
     baselines,
@@ -167,7 +166,7 @@ def list_test_rows(
     if before is not None:
         query = query.where(_is_before(before))
     newest = query.order_by(tests.c.time.desc(), tests.c.id.desc()).limit(limit)
-    return tuple(map(test_row, store.rows(newest)))
+    return tuple(value_in(row, TestRow) for row in store.rows(newest))
 
 
 def list_waiting_tests(
@@ -187,7 +186,7 @@ def list_waiting_tests(
     chosen = sa.select(found).order_by(found.c.hanger, found.c.time, found.c.id)
     if limit is not None:
         chosen = chosen.where(found.c.place <= limit)
-    return tuple(map(test_row, store.rows(chosen)))
+    return tuple(value_in(row, TestRow) for row in store.rows(chosen))
 
 
 def list_baseline_tests(store: Repository, baseline: Baseline) -> tuple[StoredTest, ...]:
@@ -407,7 +406,9 @@ def list_watched_tests(
     if before is not None:
         at_once = (tests.c.time == before.time) & (tests.c.id < before.id)
         query = query.where((tests.c.time < before.time) | at_once)
-    return tuple(map(test_row, store.rows(query.order_by(tests.c.time, tests.c.id))))
+    return tuple(
+        value_in(row, TestRow) for row in store.rows(query.order_by(tests.c.time, tests.c.id))
+    )
 
 
 def _around(
