@@ -114,10 +114,10 @@ def load_points(
     )
 
 
-def baselines_in_numbers(
-    connection: Connection, hangers: Iterable[Hanger]
+def list_baselines_in_force(
+    store: Repository, hangers: Iterable[Hanger]
 ) -> dict[int, BaselineGlance]:
-    """The baseline in force of each hanger that has one, by hanger."""
+    """Return the baseline in force of each hanger that has one, in numbers."""
     known = {hanger.id: hanger for hanger in hangers}
     now = baselines_now(next(iter(known)) if len(known) == 1 else None)
     query = (
@@ -127,9 +127,10 @@ def baselines_in_numbers(
         .where(baselines.c.id.in_(now))
         .order_by(baselines.c.hanger)
     )
-    rows = [row for row in connection.execute(query) if row.hanger in known]
-    numbers = _numbers(connection, rows, known)
-    made_of = _made_of(connection, [row.posterior_id for row in rows])
+    with store.reading() as connection:
+        rows = [row for row in connection.execute(query) if row.hanger in known]
+        numbers = _numbers(connection, rows, known)
+        made_of = _made_of(connection, [row.posterior_id for row in rows])
     return {
         row.hanger: _baseline(row, made_of[row.posterior_id], numbers[row.posterior_id])
         for row in rows

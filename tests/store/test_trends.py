@@ -19,9 +19,13 @@ from shm.store import (
     StoredTest,
     TrendPoint,
 )
-from shm.store.posteriors import find_latest_trends, list_history, list_trend
+from shm.store.posteriors import (
+    find_latest_trends,
+    list_baselines_in_force,
+    list_history,
+    list_trend,
+)
 from shm.store.tables import posteriors
-from shm.store.watch import list_baselines_in_force
 from shm.values import Hanger, Limits, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
 from tests.helpers.hangers import HANGER_3
