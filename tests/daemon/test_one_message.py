@@ -28,20 +28,20 @@ from shm.report.bridge_report import summary as bridge_summary
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_sentences import summary
 from shm.report.hanger_status import Status
-from shm.store import IdentifiedTest, Lineage, Store, StoredTest, Workspace
-from shm.values import Alert, Change, Drift, Moved, RepeatedMistake, Selection, WatchedTest
+from shm.store import Store, StoredTest, Workspace
+from shm.values import Alert, Change, Drift, Moved, RepeatedMistake, WatchedTest
 from shm.values.messages import Lead, Urgency
 from shm.watch.alert_text import message_of
 from shm.watch.watching import alerts_of
 from shm_cli.main import cli
 from shm_daemon.web.commands import without_commands
+from tests.helpers.entering import LINEAGE, identified, selected
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.nouns import NOW, a_change, a_file, a_posterior, a_test
+from tests.helpers.nouns import NOW, a_change, a_posterior
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import make_workspace
 from tests.watch.test_alert_language import AVOIDED, MOST_NUMBERS, MOST_WORDS, NUMBER
 
-_LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 _QUIET = a_change(
     evidence_years=0.2, probability=0.02, moved=(a_change().moved[0],), outlier_probability=0.01
 )
@@ -58,18 +58,15 @@ class Hangers:
     def test(self, hanger: int, days: float, tension: float = 1.0) -> StoredTest:
         """One test that has been through updating, so many days after the baseline."""
         count = len(self.store.tests.list_all(hanger))
-        name = f"h{hanger}-{count}"
-        recording = self.store.recordings.receive(a_file(100 * hanger + count), NOW).recording
-        test = a_test(name, days, hanger=hanger)
-        self.store.tests.save(recording.id, [IdentifiedTest(test)], _LINEAGE, NOW)
-        stored = next(t for t in self.store.tests.list_all(hanger) if t.test.id == name)
-        posterior = replace(a_posterior(tests=(name,)), hanger=hanger, effective_sample_size=400.0)
-        posterior = replace(posterior, samples=posterior.samples * np.array([tension, 1, 1]))
+        named = {"hanger": hanger, "name": f"h{hanger}-{count}", "days": days}
+        stored = identified(self.store, 100 * hanger + count, **named)  # type: ignore[arg-type]
+        plain = replace(a_posterior(tests=(stored.test.id,)), hanger=hanger)
+        samples = plain.samples * np.array([tension, 1, 1])
+        posterior = replace(plain, samples=samples, effective_sample_size=400.0)
         if count:
-            self.store.posteriors.save(stored, posterior, _LINEAGE, NOW)
+            self.store.posteriors.save(stored, posterior, LINEAGE, NOW)
         else:
-            chosen = Selection((posterior,), (1.0,))
-            self.store.posteriors.save_selection(hanger, [stored], chosen, _LINEAGE, NOW)
+            selected(self.store, [stored], posterior)
         return stored
 
     def watched(self, hanger: int, drifts: Sequence[Drift], change: Change, **more: object) -> None:

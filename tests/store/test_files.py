@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from shm.store import IdentifiedTest, Judgement, Lineage, Outcome, Stage, Store
+from shm.store import IdentifiedTest, Judgement, Outcome, Stage, Store
 from shm.store.journal import list_events, list_former_tests, list_steps
 from shm.store.recordings import (
     is_waiting,
     list_recordings,
 )
+from tests.helpers.entering import LINEAGE
 from tests.helpers.nouns import NOW, a_file, a_test
 
-LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 REASON = {"message": "no sampling rate.", "remedy": "Give it.", "sha256": "1"}
 
 

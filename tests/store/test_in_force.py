@@ -12,8 +12,7 @@ from shm.store import Adoption, Baseline, Store, StoredAdoption, StoredTest, pos
 from shm.store import tables as t
 from shm.store.posteriors import list_history
 from shm.store.watch import list_adoptions, list_selected_models
-from tests.helpers.nouns import NOW, a_posterior, an_alert
-from tests.store.entering import (
+from tests.helpers.entering import (
     LINEAGE,
     assert_all_or_nothing,
     baseline_of,
@@ -23,7 +22,8 @@ from tests.store.entering import (
     selected,
     updated,
 )
-from tests.store.entering import watch as watched
+from tests.helpers.entering import watch as watched
+from tests.helpers.nouns import NOW, a_posterior, an_alert
 
 LATER = NOW + timedelta(days=30)
 MASS = "beam1+point_mass@everywhere"

@@ -20,8 +20,8 @@ from shm.store.alerts import (
 )
 from shm.store.tests import list_test_rows
 from shm.store.watch import find_latest_watches
+from tests.helpers.entering import identified, selected, updated
 from tests.helpers.nouns import NOW, a_change, a_watched_test, an_alert
-from tests.store.entering import identified, selected, updated
 
 
 def with_baseline(store: Store, number: int, hanger: int) -> Baseline:

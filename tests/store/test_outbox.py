@@ -11,9 +11,9 @@ from shm.errors import NothingThere, StoreError, UsageError
 from shm.store import DeliveryState, Reconciled, Stage, Store
 from shm.store.alerts import count_deliveries
 from shm.store.journal import list_steps
+from tests.helpers.entering import four_tests, watch
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import a_reading
-from tests.store.entering import four_tests, watch
 
 HOUR = timedelta(hours=1)
 WAITING, DELIVERED = DeliveryState.WAITING, DeliveryState.DELIVERED

@@ -13,8 +13,8 @@ from shm.store.journal import list_events, list_former_tests
 from shm.store.posteriors import list_history, list_posteriors
 from shm.store.recordings import find_recording
 from shm.store.tests import list_waiting_tests
+from tests.helpers.entering import LINEAGE, identified, selected, updated, watch
 from tests.helpers.nouns import NOW, a_file, a_test
-from tests.store.entering import LINEAGE, identified, selected, updated, watch
 
 OLD, NEW = LINEAGE, replace(LINEAGE, version="0.2.0")
 LATER = NOW + timedelta(days=400)

@@ -17,8 +17,8 @@ from shm.store.tests import list_known_samples, load_frequency_response
 from shm.store.watch import list_selected_models
 from shm.values import AddedMass, Fingerprint
 from tests.helpers.comparing import assert_same
+from tests.helpers.entering import LINEAGE, identified, selected
 from tests.helpers.nouns import NOW, a_file, a_posterior, a_response, a_test
-from tests.store.entering import LINEAGE, identified, selected
 
 
 def baseline_of_two_models(store: Store, *tests: StoredTest) -> None:

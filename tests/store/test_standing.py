@@ -10,8 +10,8 @@ from shm.store.recordings import (
     count_deaths,
     list_stage_seconds,
 )
+from tests.helpers.entering import LINEAGE
 from tests.helpers.nouns import NOW, a_file, a_test
-from tests.store.entering import LINEAGE
 
 HOUR = timedelta(hours=1)
 

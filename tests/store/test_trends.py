@@ -28,11 +28,11 @@ from shm.store.posteriors import (
 from shm.store.tables import posteriors
 from shm.values import Hanger, Limits, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
+from tests.helpers.entering import LINEAGE, identified, selected
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import posterior as modelled
 from tests.helpers.nouns import NOW, a_posterior
 from tests.helpers.slow import few_of
-from tests.store.entering import LINEAGE, identified, selected
 
 SPRUNG = [1.0, 0.98, 7.0, 7.4, 7.2, 7.1]
 Told = tuple[str, tuple[datetime, datetime | None, float], str, Numbers]

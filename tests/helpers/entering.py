@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import datetime
 from types import ModuleType
 
 import pytest
@@ -18,19 +20,27 @@ LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 
 
 def identified(
-    store: Store, number: int, *found: IdentifiedTest, hanger: int = 3, lineage: Lineage = LINEAGE
+    store: Store,
+    number: int,
+    *found: IdentifiedTest,
+    hanger: int = 3,
+    lineage: Lineage = LINEAGE,
+    name: str = "",
+    days: float | None = None,
+    at: datetime = NOW,
 ) -> StoredTest:
     """Enter a recording; without its tests named it has one, so many days after `NOW`."""
-    recording = store.recordings.receive(a_file(number), NOW).recording
-    items = found or (IdentifiedTest(a_test(f"t{number}", days=number, hanger=hanger)),)
-    store.tests.save(recording.id, items, lineage, NOW)
+    recording = store.recordings.receive(a_file(number), at).recording
+    days = number if days is None else days
+    items = found or (IdentifiedTest(a_test(name or f"t{number}", days=days, hanger=hanger)),)
+    store.tests.save(recording.id, items, lineage, at)
     return next(test for test in store.tests.list_all() if test.recording_id == recording.id)
 
 
 def selected(store: Store, tests: Sequence[StoredTest], *ranked: Posterior) -> Baseline:
     """Make the baseline of a hanger from tests; the first of the posteriors is selected."""
     hanger, names = tests[0].hanger, tuple(test.test.id for test in tests)
-    posteriors = ranked or (a_posterior("beam1", names),)
+    posteriors = ranked or (replace(a_posterior("beam1", names), hanger=hanger),)
     probabilities = (0.8, 0.2)[: len(posteriors)] if ranked[1:] else (1.0,)
     selection = Selection(posteriors, probabilities)
     store.posteriors.save_selection(hanger, tests, selection, LINEAGE, NOW)
@@ -41,7 +51,7 @@ def updated(
     store: Store, test: StoredTest, seed: int = 1, lineage: Lineage = LINEAGE, model: str = "beam1"
 ) -> StoredTest:
     posterior = a_posterior(model, (test.test.id,), seed=seed)
-    store.posteriors.save(test, posterior, lineage, NOW)
+    store.posteriors.save(test, replace(posterior, hanger=test.hanger), lineage, NOW)
     return test
 
 
