@@ -22,7 +22,8 @@ from shm.report.hanger_tables import temperature_documents, temperature_table
 from shm.report.shifts import pattern_json, pattern_tables, shift_cells
 from shm.report.states import NOTHING_WATCHED
 from shm.store import Baseline, BaselineGlance
-from shm.store.watch import find_latest_watches, list_baselines_in_force
+from shm.store.posteriors import list_baselines_in_force
+from shm.store.watch import find_latest_watches
 from shm.values import Drift, Hanger
 from shm.watch.repair_check import EVENT_KINDS
 from shm_cli import flags

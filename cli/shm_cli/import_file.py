@@ -23,7 +23,7 @@ from shm.pipeline.importing import (
     Import,
     Question,
     Understood,
-    answer_time,
+    answer_of_test,
     answer_to,
     channel_answer,
     import_document,
@@ -241,7 +241,8 @@ def _whole_file(options: dict[str, Any]) -> Answers:
         operator=options["operator"].strip(),
         each_time=options["each_time"],
     )
-    return answers if options["time"] is None else answer_time(options["time"], answers)
+    time = options["time"]
+    return answers if time is None else answer_of_test("time", time, answers)
 
 
 def _answers(options: dict[str, Any], found: Import) -> Answers:

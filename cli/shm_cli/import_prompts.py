@@ -11,7 +11,7 @@ from typing import TypeVar
 import rich_click as click
 
 from shm.errors import BadInput, UsageError
-from shm.pipeline.importing import ANSWERS_OF_TEST, Answers, Question
+from shm.pipeline.importing import OF_TEST, Answers, Question, answer_of_test
 from shm.store import Workspace
 
 T = TypeVar("T")
@@ -29,7 +29,7 @@ def asked(
             answers = replace(answers, hanger=_prompt(question, lambda t: _hanger(t, workspace)))
         elif question.about == "rate":
             answers = replace(answers, sampling_rate_hz=_prompt(question, _rate_hz))
-        elif question.about in ANSWERS_OF_TEST:
+        elif question.about in OF_TEST:
             answers = _of_test(question, answers)
         else:
             given = _prompt(question, partial(of_channel, question))
@@ -38,7 +38,7 @@ def asked(
 
 
 def _of_test(question: Question, answers: Answers) -> Answers:
-    return _prompt(question, lambda text: ANSWERS_OF_TEST[question.about](text, answers))
+    return _prompt(question, lambda text: answer_of_test(question.about, text, answers))
 
 
 def asked_if_it_stays(answers: Answers, *, is_known: bool) -> Answers:

@@ -9,7 +9,7 @@ import rich_click as click
 
 from shm.errors import UsageError
 from shm.pipeline import utc_now
-from shm.store.journal import list_changes
+from shm.store.journal import change_document, list_changes
 from shm.values.notes import NoteKind
 from shm_cli import flags
 from shm_cli.common import answer, opened_store, show_rows
@@ -110,9 +110,9 @@ def audit(ctx: click.Context, limit: int | None) -> None:
     Example: shm audit --limit 20
     """
     with opened_store(ctx) as (_, store):
-        rows = list_changes(store, limit)
+        rows = [change_document(each) for each in list_changes(store, limit)]
     if flags.wants_json() or not rows:
-        answer({"changes": [vars(each) for each in rows]}, "Nothing was changed.")
+        answer({"changes": rows}, "Nothing was changed.")
         return
-    cells = [(f"{each.at:%Y-%m-%d %H:%M}", *list(vars(each).values())[2:]) for each in rows]
+    cells = [(f"{each['at']:%Y-%m-%d %H:%M}", *list(each.values())[2:]) for each in rows]
     show_rows("changes", ("time", "who", "by", "action", "of", "detail"), cells)

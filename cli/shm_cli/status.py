@@ -360,6 +360,7 @@ def _applicable(hanger: Hanger, names: Sequence[str]) -> tuple[Sequence[str], di
 
 
 _OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
+_OF_STEP = ("at", "version", "test_id", "test")
 
 
 def show_stages(ctx: click.Context, which: str) -> None:
@@ -372,7 +373,7 @@ def show_stages(ctx: click.Context, which: str) -> None:
             list_former_tests(store, recording_id),
         )
         noticed = list_events(store, recording_id=recording_id)
-        names = dict.fromkeys(event.file_name for event in noticed)
+        names = dict.fromkeys(event.subject for event in noticed)
         other_names = [name for name in names if name != recording.file.file_name]
     if flags.wants_json():
         show(
@@ -381,7 +382,10 @@ def show_stages(ctx: click.Context, which: str) -> None:
                 "file": recording.file.file_name,
                 "also_came_as": other_names,
                 "stage": recording.stage.value,
-                "steps": [asdict(step) for step in steps],
+                "steps": [
+                    {"stage": e.kind, **{name: getattr(e, name) for name in _OF_STEP}}
+                    for e in steps
+                ],
                 "noticed": [
                     {"at": event.at, "kind": event.kind, "message": event.message}
                     for event in noticed
@@ -395,7 +399,7 @@ def show_stages(ctx: click.Context, which: str) -> None:
     title = f"recording {recording_id}: {recording.file.file_name}{also}"
     by_a_person = {event.at: event.kind for event in noticed if event.kind in _OUT}
     rows = [
-        (by_a_person.get(e.at, e.stage), e.test or "", f"{e.at:%Y-%m-%d %H:%M:%S}", e.version or "")
+        (by_a_person.get(e.at, e.kind), e.test or "", f"{e.at:%Y-%m-%d %H:%M:%S}", e.version or "")
         for e in steps
     ]
     show_rows(title, ("stage", "test", "at", "shm"), rows)

@@ -194,18 +194,18 @@ def check_under_way(examined: DoctorContext) -> Iterator[Finding]:
     store, now = examined.store, examined.now
     unready = _without_baseline(examined)
     standing = [
-        each
-        for each in list_under_way(store)
+        (each, since)
+        for each, since in list_under_way(store)
         if each.stage is Stage.RECEIVED or each.hanger not in unready
     ]
     if not standing:
         yield ok("recordings", "none is on its way")
         return
-    oldest = min(standing, key=lambda each: each.since)
+    oldest, since = min(standing, key=lambda each: each[1])
     newest_at = find_newest_step(store) or now
-    waits, idle = now - oldest.since, now - newest_at
+    waits, idle = now - since, now - newest_at
     found = (
-        f"{len(standing)} on their way; {oldest.file_name} (recording {oldest.id}) has been "
+        f"{len(standing)} on their way; {oldest.file.file_name} (recording {oldest.id}) has been "
         f"{oldest.stage} for {duration_words(waits)}"
     )
     if waits > _STUCK_BEHIND_OTHERS or (waits > _STUCK and idle > _NOTHING_MOVES):

@@ -31,10 +31,10 @@ from shm_daemon.heartbeat import Pulse, longest_wait_s, tell_systemd, turn_faile
 from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
-from shm_daemon.publishing import results_published
-from shm_daemon.seedlink import streams_asked
+from shm_daemon.publishing import Publisher
+from shm_daemon.seedlink import StreamAskers
 from shm_daemon.spool import FileStabilityTracker, scan
-from shm_daemon.streams import streams_kept
+from shm_daemon.streams import StreamKeeper
 from shm_daemon.wakeup import Wakeup, stopped_by_signals
 from shm_daemon.web.site import modified_ns
 
@@ -151,14 +151,18 @@ class Daemon:
         )
         stack.callback(self._streaming.close)
         stack.enter_context(messages(workspace))
-        sealed = self._streaming.note_sealed
-        self._described: tuple[Described, ...] = (
-            self._flow,
-            self._streaming,
-            stack.enter_context(streams_kept(workspace, clock, until_done=once, sealed=sealed)),
-            stack.enter_context(results_published(workspace, clock, when_done=once)),
-            stack.enter_context(streams_asked(workspace, clock, begun=not once)),
-        )
+        keeper = StreamKeeper(workspace, clock, self._streaming.note_sealed)
+        self._publisher, askers = Publisher(workspace, clock), StreamAskers(clock)
+        for each in (keeper, self._publisher, askers):
+            stack.callback(each.close)
+        self._described: tuple[Described, ...]
+        self._described = (self._flow, self._streaming, keeper, self._publisher, askers)
+        if once:
+            keeper.drain()
+        else:
+            askers.use(workspace)
+            stack.enter_context(keeper.running())
+            stack.enter_context(self._publisher.running())
         stack.callback(self._end_executor)
         self._tracker = FileStabilityTracker(settings.spool_stable_seconds, time.monotonic)
         self._longest_wait_s = longest_wait_s()
@@ -184,6 +188,8 @@ class Daemon:
             if self._once and not busy and not self._tracker.watching:
                 break
             self._rest()
+        if self._once:
+            self._publisher.turn()
         log.info("ended")
         return True
 

@@ -2,9 +2,9 @@
 
 Topic `shm/<bridge>/stream/<name>` is for chunks of permanent sensors: acknowledged once on disk.
 
-A message lands in the spool as an upload does, and is acknowledged only once the store says that
-its file was received: a daemon or a broker killed before that has it sent again. Protocol 3.1.1,
-which every broker speaks, with a session that the broker keeps while the daemon is down.
+A message lands in the spool as an upload does, and is acknowledged once it is on disk there: a
+daemon or a broker killed before that has it sent again. Protocol 3.1.1, which every broker speaks,
+with a session that the broker keeps while the daemon is down.
 
 One message at a time is in memory. While it cannot land no other is read from the connection, so
 that the broker keeps them; one that gives the connection up sends them again on the next.
@@ -29,7 +29,7 @@ from shm.read import FORMATS
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
 from shm.store.recordings import find_by_checksum
-from shm_daemon.spool import Landed, incoming, landing_name
+from shm_daemon.spool import incoming, landing_name
 from shm_daemon.streams import take_chunks
 from shm_daemon.web.site import Description
 
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 PASSWORD_VARIABLE = "SHM_MQTT_PASSWORD"  # noqa: S105
 _PORTS = {"mqtt": 1883, "mqtts": 8883}
-_LOOK_S = 0.2
 _RETRY_S = 5.0
 _LONGEST_RETRY_S = 120
 _HEAD_BYTES = 4096
@@ -99,33 +98,21 @@ def messages(workspace: Workspace) -> Iterator[None]:
         listener.end()
 
 
-@dataclass(frozen=True)
-class _Landed:
-    """A message in the spool; its number `mid` has a meaning on its connection only."""
-
-    connection: int
-    mid: int
-    file: Landed
-
-
 class Listener:
-    """One connection, whose thread lands messages, and a thread that acknowledges them."""
+    """One connection, whose thread takes a message after the other and acknowledges it."""
 
     def __init__(self, workspace: Workspace, broker: Broker):
         self._workspace, self._broker = workspace, broker
         self._description = Description(workspace)  # streams may be added while we run
         self._topic = topic_of(workspace.bridge.name)
-        self._pending: list[_Landed] = []
-        self._connection, self._ended = 0, threading.Event()
+        self._ended = threading.Event()
         self._store: Store | None = None
-        self._opening = threading.Lock()
-        self._subscribed = False
-        self._worker = threading.Thread(target=self._work, name="mqtt", daemon=True)
         self._client = self._make_client()
+        self.connected = False
+        """Whether the broker has accepted our subscription."""
 
     def begin(self) -> None:
         """Connects, or goes on trying, and returns at once."""
-        self._worker.start()
         self._client.connect_async(self._broker.host, self._broker.port, keepalive=30)
         self._client.loop_start()
 
@@ -134,19 +121,8 @@ class Listener:
         self._ended.set()
         self._client.disconnect()
         self._client.loop_stop()
-        self._worker.join(_RETRY_S)
         if self._store is not None:
             self._store.close()
-
-    @property
-    def connected(self) -> bool:
-        """Return True if the broker has accepted our subscription."""
-        return self._subscribed
-
-    @property
-    def waiting(self) -> list[str]:
-        """The checksums of what has landed and is not acknowledged yet."""
-        return [each.file.sha256 for each in list(self._pending)]
 
     def _make_client(self) -> Client:
         with needing("mqtt"):
@@ -166,48 +142,45 @@ class Listener:
         client.on_subscribe, client.on_message = self._granted, self._heard
         return client
 
-    # ------------------------------------------------------------ on the connection's thread
-
     def _connected(self, client: Client, _: Any, flags: Any, reason: Any, properties: Any) -> None:
         if reason.is_failure:
             log.warning("the broker %s refuses us: %s", self._broker.host, reason)
-            return
-        self._connection += 1
-        client.subscribe([(f"{self._topic}/+", 1), (f"{self._topic}/+/+", 1)])
+        else:
+            client.subscribe([(f"{self._topic}/+", 1), (f"{self._topic}/+/+", 1)])
 
     def _granted(self, client: Client, _: Any, mid: int, reasons: Any, properties: Any) -> None:
         if any(reason.is_failure for reason in reasons):
             log.warning("the broker %s does not let us have %s/#", self._broker.host, self._topic)
             return
-        self._subscribed = True
+        self.connected = True
         log.info("recordings are taken from %s, topic %s/#", self._broker.host, self._topic)
 
     def _disconnected(self, client: Client, _: Any, flags: Any, reason: Any, __: Any) -> None:
-        self._connection += 1
-        self._subscribed = False
+        self.connected = False
         if not self._ended.is_set():
             log.warning("no connection to the broker %s: %s", self._broker.host, reason)
 
     def _heard(self, client: Client, _: Any, message: MQTTMessage) -> None:
-        """Land a message, however long that takes."""
+        """Take a message in, however long that takes, then acknowledge it."""
         while not self._ended.is_set():
             try:
                 self._take(message)
-            except Exception as error:  # noqa: BLE001 - the daemon goes on whatever a message holds
-                self._wait(error)
+            except Exception as error:
+                is_known = isinstance(error, ShmError | OSError)
+                log.warning("messages wait: %s", error, exc_info=not is_known)
+                self._ended.wait(retry_pause_s(error, _RETRY_S))
             else:
+                client.ack(message.mid, qos=1)
                 return
 
     def _take(self, message: MQTTMessage) -> None:
+        """Put a message where it is safe; what cannot be used must not come again."""
         level, _, given = message.topic.removeprefix(f"{self._topic}/").partition("/")
         payload = bytes(message.payload)
         if level == _STREAM and given:
-            # One that cannot be used is noted and logged, and acknowledged too: the broker would
-            # send it again for ever.
-            with suppress(BadInput):
+            with suppress(BadInput):  # which is noted and logged
                 workspace, _ = self._description.now()
                 take_chunks(workspace, self._opened(), given, [payload], utc_now())
-            self._client.ack(message.mid, qos=1)
             return
         with incoming(self._workspace.spool, len(payload)) as file:
             file.write(payload)
@@ -216,56 +189,26 @@ class Listener:
             except BadInput:
                 suffix = _suffix(payload[:_HEAD_BYTES])
                 name = landing_name(f"hanger-{level}-{file.sha256[:8]}{suffix}")
-            if (message.dup or message.retain) and self._is_received(file.sha256):
-                self._client.ack(message.mid, qos=1)
+            is_again = message.dup or message.retain
+            if is_again and find_by_checksum(self._opened(), file.sha256) is not None:
                 return
             try:
                 for setting in ("max_file_bytes", "mqtt_max_bytes"):
                     most = getattr(self._workspace.settings, setting)
                     refuse_oversize(file.size_bytes, most, setting=setting)
-            except TooLarge as error:  # the broker would send it again for ever
+            except TooLarge as error:
                 move_to_quarantine(
                     self._workspace, file.whole(), name, error, utc_now(), file.sha256
                 )
                 log.warning("%s is refused: %s %s", name, error.message, error.remedy)
-                self._client.ack(message.mid, qos=1)
                 return
             hanger = int(level) if re.fullmatch(r"\d{1,9}", level) else level
-            landed = file.land(name, {"hanger": hanger})
-            self._pending.append(_Landed(self._connection, message.mid, landed))
-
-    # ------------------------------------------------------------ on the worker's thread
-
-    def _work(self) -> None:
-        while not self._ended.wait(_LOOK_S):
-            try:
-                self._acknowledge_received()
-            except Exception as error:  # noqa: BLE001 - the daemon goes on without messages
-                self._wait(error)
-
-    def _acknowledge_received(self) -> None:
-        """Acknowledge what has left the spool for the store; forget former connections'."""
-        for each in list(self._pending):
-            if each.connection != self._connection:
-                self._pending.remove(each)
-            elif not each.file.path.exists() and self._is_received(each.file.sha256):
-                self._pending.remove(each)
-                self._client.ack(each.mid, qos=1)
-
-    # ------------------------------------------------------------ on both
-
-    def _wait(self, error: Exception) -> None:
-        log.warning("messages wait: %s", error, exc_info=not isinstance(error, ShmError | OSError))
-        self._ended.wait(retry_pause_s(error, _RETRY_S))
-
-    def _is_received(self, sha256: str) -> bool:
-        return find_by_checksum(self._opened(), sha256) is not None
+            file.land(name, {"hanger": hanger})
 
     def _opened(self) -> Store:
-        with self._opening:
-            if self._store is None:
-                self._store = self._workspace.store()
-            return self._store
+        if self._store is None:
+            self._store = self._workspace.store()
+        return self._store
 
 
 def _suffix(head: bytes) -> str:

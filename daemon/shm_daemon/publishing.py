@@ -11,18 +11,16 @@ import json
 import logging
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 
 from shm.bridge.publish import Publication
 from shm.errors import ShmError
 from shm.pipeline import Clock
 from shm.pipeline.publishing import Progress, queue_results
-from shm.store import Store, Workspace
+from shm.store import Workspace
 from shm.store.point_outbox import PointOutbox, WaitingPoint
-from shm_daemon.background import repeated
+from shm_daemon.background import Background
 from shm_daemon.hooks.contract import SHOWN_CHARACTERS, one_line, read_secret
 from shm_daemon.http_client import HttpClient, NoAnswer
 
@@ -32,16 +30,10 @@ _POINTS_REFUSED = (
     HTTPStatus.UNPROCESSABLE_ENTITY,
 )
 
+
+_AT_ONCE = 5000  # lines of one post: InfluxData's own advice
+
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Pace:
-    """Define how often to look and to retry, in s, and the lines of one post (InfluxData: 5000)."""
-
-    look_s: float = 10.0
-    retry_s: float = 60.0
-    at_once: int = 5000
 
 
 class NotTaken(ShmError):
@@ -104,20 +96,26 @@ def _refusal(publication: Publication, status: int, words: bytes) -> ShmError:
     return kind(message, remedy=remedy)
 
 
-class Publisher:
+class Publisher(Background):
     """One turn after the other: what is new into the outbox, what waits to the databases."""
 
-    def __init__(self, workspace: Workspace, clock: Clock, pace: Pace | None = None):
-        self._workspace, self._clock, self._client = workspace, clock, HttpClient()
-        self.pace = pace or Pace()
-        self._outbox = PointOutbox(workspace.folder)
-        self._store: Store | None = None
+    name = "publish"
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        clock: Clock,
+        pause_s: float = 10.0,
+        retry_s: float = 60.0,
+    ):
+        super().__init__(workspace, clock, pause_s, retry_s)
+        self._client, self._outbox = HttpClient(), PointOutbox(workspace.folder)
         self._progress: dict[str, Progress] = {}
         self._retry_at: dict[str, float] = {}
 
     def use(self, workspace: Workspace) -> None:
         """Take a changed description over, and try at once what it may have corrected."""
-        self._workspace = workspace
+        super().use(workspace)
         self._retry_at.clear()
         self._progress.clear()
 
@@ -125,8 +123,6 @@ class Publisher:
         """Queue what is new for each database, and post what waits where it is time to try."""
         for publication in self._workspace.bridge.publications:
             name = publication.name
-            if self._store is None:
-                self._store = self._workspace.store()
             if name not in self._progress:
                 self._progress[name] = Progress()
                 self._outbox.retry_refused(name)
@@ -135,19 +131,23 @@ class Publisher:
             if time.monotonic() >= self._retry_at.get(name, 0.0):
                 self._deliver(publication)
 
+    def break_off(self) -> None:
+        """End what is being sent; it is sent again."""
+        self._client.close()
+
     def _deliver(self, publication: Publication) -> None:
         """Post all that waits; note and log why where it is not taken."""
         name, before = publication.name, self._outbox.state(publication.name).why
         try:
             token = token_of(publication, self._workspace, os.environ)
-            while waiting := self._outbox.list_waiting(name, self.pace.at_once):
+            while waiting := self._outbox.list_waiting(name, _AT_ONCE):
                 refusals = self._post_in_parts(publication, token, waiting)
                 if refusals:
                     found = f"{len(refusals)} of {len(waiting)} points were refused"
                     log.warning("publish %s: %s, the first: %s", name, found, refusals[0])
         except NotTaken as error:
             why = f"{error.message} {error.remedy}"
-            self._retry_at[name] = time.monotonic() + self.pace.retry_s
+            self._retry_at[name] = time.monotonic() + self.retry_s
         else:
             why = ""
         if why != before and not self._client.closed:
@@ -170,35 +170,3 @@ class Publisher:
             return [error]
         self._outbox.mark(points, "taken")
         return []
-
-    def close(self) -> None:
-        if self._store is not None:
-            self._store.close()
-
-    def break_off(self) -> None:
-        """End, from another thread, what is being sent; it is sent again."""
-        self._client.close()
-
-
-@contextmanager
-def results_published(
-    workspace: Workspace, clock: Clock, *, when_done: bool = False, pace: Pace | None = None
-) -> Iterator[Publisher]:
-    """Publish while the context lasts; with `when_done` once, at its end.
-
-    For the holder of the workspace's lock.
-    """
-    publisher = Publisher(workspace, clock, pace)
-    pauses = {"pause_s": publisher.pace.look_s, "retry_s": publisher.pace.retry_s}
-    try:
-        if when_done:
-            yield publisher
-            publisher.turn()
-            return
-        with repeated("publish", publisher.turn, **pauses):
-            try:
-                yield publisher
-            finally:
-                publisher.break_off()
-    finally:
-        publisher.close()

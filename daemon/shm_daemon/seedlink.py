@@ -14,8 +14,7 @@ import logging
 import math
 import threading
 from collections import deque
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
@@ -23,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from shm.documents import dump
+from shm.documents import dump, value_of
 from shm.errors import BadInput, ShmError, needing
 from shm.pipeline import Clock
 from shm.pipeline.lineage import read_limits
@@ -79,13 +78,8 @@ class Progress:
     @classmethod
     def read(cls, path: Path) -> Progress:
         """Read it; empty where there is none, or it is damaged: known samples are known then."""
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            found = json.loads(path.read_text(encoding="utf-8"))
-            last = {key: (int(seq), str(time)) for key, (seq, time) in found["last"].items()}
-            known = {
-                key: [(int(n), int(us)) for n, us in some] for key, some in found["known"].items()
-            }
-            return cls(last, known, int(found["done_us"]))
+        with suppress(OSError, ValueError):
+            return value_of(cls, json.loads(path.read_text(encoding="utf-8")))
         return cls({}, {})
 
 
@@ -127,20 +121,17 @@ class StreamAsker:
         while not self._ended.is_set():
             try:
                 with self._workspace.store() as self._store:
-                    await self._receive_or_note()
+                    try:
+                        await self._receive()
+                    except known[1:] as error:
+                        if not self._arrived:
+                            self._note_refused(error)
+                        raise
             except Exception as error:  # the daemon goes on without this stream
                 is_known = isinstance(error, known)
                 name = self._stream.name
                 log.warning("stream %s waits: %s", name, error, exc_info=not is_known)
             await asyncio.sleep(self._pace.retry_s)
-
-    async def _receive_or_note(self) -> None:
-        try:
-            await self._receive()
-        except (OSError, _library().SeedLinkError) as error:
-            if not self._arrived:
-                self._note_refused(error)
-            raise
 
     def _note_refused(self, error: Exception) -> None:
         """Note once an hour why the server sends nothing, or something that cannot be used."""
@@ -300,7 +291,10 @@ def _library() -> Any:
 
 
 class StreamAskers:
-    """A thread for each stream that is asked for, as `bridge.toml` describes them now."""
+    """A thread for each stream that is asked for, as `bridge.toml` describes them now.
+
+    For the holder of the workspace's lock; nobody is asked before `use`.
+    """
 
     def __init__(self, clock: Clock, pace: Pace | None = None):
         self._clock, self._pace = clock, pace
@@ -327,20 +321,3 @@ class StreamAskers:
             for asker, thread in ending:
                 asker.end()  # Python 3.11 loses one that comes as a wait ends (wait_for)
                 thread.join(0.1)
-
-
-@contextmanager
-def streams_asked(
-    workspace: Workspace, clock: Clock, *, begun: bool = True, pace: Pace | None = None
-) -> Iterator[StreamAskers]:
-    """Ask for streams while the context lasts; nobody is asked unless it has `begun`.
-
-    For the holder of the workspace's lock.
-    """
-    askers = StreamAskers(clock, pace)
-    try:
-        if begun:
-            askers.use(workspace)
-        yield askers
-    finally:
-        askers.close()

@@ -21,7 +21,6 @@ import re
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -40,7 +39,7 @@ from shm.store.ring import StoredChunk, ring_of
 from shm.store.streams import list_stream_events
 from shm.values import Channel, FloatArray, Recording
 from shm.values.stream import Chunk, Stream, StreamEvent
-from shm_daemon.background import repeated
+from shm_daemon.background import Background
 from shm_daemon.spool import STREAMS, FileStabilityTracker, scan
 
 log = logging.getLogger(__name__)
@@ -83,13 +82,12 @@ _MINUTE_S = 60
 class RollingFiles:
     """Files in the folders of the streams, of which the whole ones are taken."""
 
-    def __init__(self, workspace: Workspace, store: Store, clock: Callable[[], datetime]):
-        self._store, self._clock = store, clock
-        stable_s = workspace.settings.spool_stable_seconds
+    def __init__(self, stable_s: float, clock: Callable[[], datetime]):
+        self._clock = clock
         self._older = FileStabilityTracker(stable_s, time.monotonic)
         self._newest = FileStabilityTracker(_PATIENCE_WITH_NEWEST * stable_s, time.monotonic)
 
-    def take(self, workspace: Workspace) -> int:
+    def take(self, workspace: Workspace, store: Store) -> int:
         """Takes what is whole; how many files are left to be taken."""
         looks = scan(workspace.spool / STREAMS)
         newest = {max((look, path) for path, look in looks.items() if path.parent == folder)[1]
@@ -99,7 +97,7 @@ class RollingFiles:
             some = {path: look for path, look in looks.items() if (path in newest) == is_newest}
             for path in tracker.whole(some):
                 try:
-                    self._take(workspace, path)
+                    self._take(workspace, store, path)
                     left -= 1
                     if path.exists():  # it was refused, and cannot be moved away
                         tracker.leave(path)
@@ -108,16 +106,16 @@ class RollingFiles:
                     tracker.put_off(path, retry_pause_s(error, _RETRY_FILE_S))
         return left
 
-    def _take(self, workspace: Workspace, path: Path) -> None:
+    def _take(self, workspace: Workspace, store: Store, path: Path) -> None:
         name, now = path.parent.name, self._clock()
         try:
             refuse_oversize(path.stat().st_size, workspace.settings.max_file_bytes)
             stream = workspace.bridge.stream(name)
             contents = [chunk_document(chunk) for chunk in _chunks(workspace, stream, path)]
-            take_chunks(workspace, self._store, name, contents, now)
+            take_chunks(workspace, store, name, contents, now)
         except BadInput as error:
             if not isinstance(error, DoubledChunk):  # which is noted
-                note_refused(self._store, name, error, now)
+                note_refused(store, name, error, now)
             move_to_quarantine(workspace, path, path.name, error, now, checksum(path))
         else:
             path.unlink()
@@ -191,19 +189,17 @@ Sealed = Callable[[Sequence[tuple[str, datetime]]], object]
 """Is told each stream and beginning of ten minutes that has new samples."""
 
 
-class StreamKeeper:
+class StreamKeeper(Background):
     """One turn after the other, in a thread or by whoever calls `turn`."""
+
+    name = "streams"
 
     def __init__(
         self, workspace: Workspace, clock: Callable[[], datetime], sealed: Sealed = lambda _: None
     ):
-        self._workspace, self._clock, self._sealed = workspace, clock, sealed
-        self._store: Store | None = None
-        self._sweep_at = 0.0
-
-    def use(self, workspace: Workspace) -> None:
-        """Takes a changed description over."""
-        self._workspace = workspace
+        super().__init__(workspace, clock, pause_s=_LOOK_S, retry_s=_RETRY_S)
+        self._sealed, self._sweep_at = sealed, 0.0
+        self._files = RollingFiles(workspace.settings.spool_stable_seconds, clock)
 
     def turn(self) -> int:
         """Files in, ten minutes sealed and, once an hour, what is old out; how many files are left.
@@ -213,10 +209,7 @@ class StreamKeeper:
         workspace = self._workspace
         if not workspace.bridge.streams and not (workspace.spool / STREAMS).is_dir():
             return 0
-        if self._store is None:
-            self._store = workspace.store()
-            self._files = RollingFiles(workspace, self._store, self._clock)
-        left, now = self._files.take(workspace), self._clock()
+        left, now = self._files.take(workspace, self._store), self._clock()
         ring = ring_of(workspace, self._clock, self._store.streams.save_event)
         if sealed := ring.seal(now):
             self._sealed(sealed)
@@ -226,32 +219,7 @@ class StreamKeeper:
             self._store.streams.sweep(now, workspace.settings.window_days)
         return left
 
-    def close(self) -> None:
-        if self._store is not None:
-            self._store.close()
-
-
-@contextmanager
-def streams_kept(
-    workspace: Workspace,
-    clock: Callable[[], datetime],
-    *,
-    until_done: bool = False,
-    sealed: Sealed = lambda _: None,
-) -> Iterator[StreamKeeper]:
-    """Keeps the ring while the context lasts.
-
-    For the holder of the workspace's lock. With `until_done` all is kept before the context begins,
-    and nothing after.
-    """
-    keeper = StreamKeeper(workspace, clock, sealed)
-    try:
-        if not until_done:
-            with repeated("streams", keeper.turn, pause_s=_LOOK_S, retry_s=_RETRY_S):
-                yield keeper
-            return
-        while keeper.turn():
+    def drain(self) -> None:
+        """Take turns until no file is left."""
+        while self.turn():
             time.sleep(_LOOK_S / 10)
-        yield keeper
-    finally:
-        keeper.close()

@@ -40,11 +40,10 @@ from shm.store import (
     Workspace,
 )
 from shm.store.alerts import count_open_alerts, describe_silence, silenced_until
-from shm.store.posteriors import find_latest_trends, list_trend
+from shm.store.posteriors import find_latest_trends, list_baselines_in_force, list_trend
 from shm.store.tests import count_tests, list_undated_names, load_frequency_response
 from shm.store.watch import (
     find_latest_watches,
-    list_baselines_in_force,
     list_detected_changes,
 )
 from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest

@@ -10,7 +10,7 @@ import math
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, tzinfo
 from datetime import time as clock_time
 from functools import partial
@@ -105,8 +105,8 @@ class Answers:
     """The answers of a person about a file; NaN and None where there are none.
 
     `channels` are keys of a sidecar's table of a channel, by its name. `each_time`: the logger
-    goes from hanger to hanger, and its profile is to name none. `is_time_unknown`: which of two
-    days the file means, or when it was at all, is not known either.
+    goes from hanger to hanger, and its profile is to name none. `unknown` are those of `OF_TEST`
+    that nobody knows, such as which of two days the file means.
     """
 
     hanger: int | None = None
@@ -116,9 +116,7 @@ class Answers:
     operator: str = ""
     channels: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     each_time: bool = False
-    is_time_unknown: bool = False
-    is_temperature_unknown: bool = False
-    is_operator_unknown: bool = False
+    unknown: frozenset[str] = frozenset()
 
     @property
     def said(self) -> dict[str, Any]:
@@ -228,22 +226,29 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     described = with_times(completed(known, found.layout, own, path.name, zone), found)
     hanger = described.get("hanger", found.hanger)
     rate, uneven = rate_told(found, described)
-    questions = _questions(found, described, hanger, rate, workspace)
+    told = [_told(column, described) for column in found.columns]
+    questions = _questions(found, told, described, hanger, rate, workspace)
     of_test = _of_test(found, described, answers)
     if found.layout.possible_times:  # two days in question are asked of each file
         questions += [each for each in of_test if each.about == "time"]
     problems = (
         *_hanger_problem(hanger, workspace),
-        *_place_problems(found, described, hanger, workspace),
+        *_place_problems(told, hanger, workspace),
     )
-    record, fault = _recording(found, described, rate, path)
+    record, fault = _recording(told, rate, path)
     fault = uneven or fault
     if found.lines or any(question.about in ("unit", "rate") for question in questions):
         fault = ""  # the answers may mend it
-    if _holds_nothing(found, described, questions):
+    is_measured = any(each.quantity == "acceleration" for each in told)
+    if not is_measured and all(question.about != "unit" for question in questions):
+        # No answer can make it a recording.
         questions, fault = [], "; ".join(found.problems) or fault
     kept = with_day_order(_to_keep(known, answers.said, found), order)
-    columns = _columns(found, described, record, rate)
+    channels = {} if record is None else {c.name: c for c in record.channels}
+    columns = tuple(
+        _understood(raw, column, channels.get(column.name), rate)
+        for raw, column in zip(found.columns, told, strict=True)
+    )
     problems = (*problems, *((fault,) if fault else ()))
     return Import(
         found, described, kept, profile, columns, rate, hanger, tuple(questions), problems,
@@ -297,12 +302,13 @@ def _refuse_unknown(own: Described, found: Survey, path: Path) -> None:
             )
 
 
-_OF_TEST = ("time", "temperature_c", "operator")
+OF_TEST = {"time": "time", "temperature": "temperature_c", "operator": "operator"}
+"""What is asked of one test alone, and the key of a sidecar that says it."""
 
 
 def _to_keep(known: Described, said: Described, found: Survey) -> dict[str, Any]:
     """Return what holds for every file of the logger: not the hanger that the file itself says."""
-    kept = _joined(known, {k: v for k, v in said.items() if k not in _OF_TEST})
+    kept = _joined(known, {k: v for k, v in said.items() if k not in OF_TEST.values()})
     if found.layout.hanger is not None:
         kept.pop("hanger", None)
     return kept
@@ -319,13 +325,12 @@ def _hanger_problem(hanger: object, workspace: Workspace) -> tuple[str, ...]:
 
 
 def _place_problems(
-    found: Survey, described: Described, hanger: object, workspace: Workspace
+    columns: Sequence[SurveyedColumn], hanger: object, workspace: Workspace
 ) -> list[str]:
     """Sensors that are said to be off the hanger, where it is one of the bridge."""
     tested = next((each for each in workspace.bridge.bars if each.id == hanger), None)
     if tested is None:
         return []
-    columns = [_told(column, described) for column in found.columns]
     of_sensors = [each for each in columns if each.quantity == "acceleration"]
     faults = {each.name: fault_of_place(each.x_m, tested) for each in of_sensors}
     return [f"{name}: {fault}" for name, fault in faults.items() if fault]
@@ -338,7 +343,12 @@ _UNITS = ("N", "kN", "lbf", "m/s2", "mm/s2", "g", "mg", "s", "none")
 
 
 def _questions(
-    found: Survey, described: Described, hanger: object, rate: float, workspace: Workspace
+    found: Survey,
+    columns: Sequence[SurveyedColumn],
+    described: Described,
+    hanger: object,
+    rate: float,
+    workspace: Workspace,
 ) -> list[Question]:
     asked: list[Question] = []
     if hanger is None:
@@ -347,28 +357,28 @@ def _questions(
         asked.append(Question("hanger", "", text, option, choices=known))
     if math.isnan(rate) and not found.lines:
         asked.append(Question("rate", "", "How many samples a second?", "--rate HZ"))
-    columns = [_told(column, described) for column in found.columns]
     asked += [_of_unit(column) for column in _open(columns)]
     return asked + [each for column in columns for each in _of_sensor(column, described)]
 
 
-def _says(described: Described, key: str, is_unknown: bool) -> bool:
-    return key in described or is_unknown
-
-
 def _of_test(found: Survey, described: Described, answers: Answers) -> list[Question]:
     """Return the questions about one test alone, without which a file can be taken in."""
-    asked = []
-    if found.time is None and not _says(described, "time", answers.is_time_unknown):
-        asked.append(_of_time(found))
-    warmth = _says(described, "temperature_c", answers.is_temperature_unknown)
-    if math.isnan(found.temperature_c) and not warmth:
-        text = "How warm was the steel, in degrees Celsius (or 'unknown')?"
-        asked.append(Question("temperature", "", text, "--temperature C", needed=False))
-    if not found.operator and not _says(described, "operator", answers.is_operator_unknown):
-        text = "Who measured (or 'unknown')?"
-        asked.append(Question("operator", "", text, "--operator NAME", needed=False))
-    return asked
+    warmth = "How warm was the steel, in degrees Celsius (or 'unknown')?"
+    asked = {
+        "time": _of_time(found),
+        "temperature": Question("temperature", "", warmth, "--temperature C", needed=False),
+        "operator": Question(
+            "operator", "", "Who measured (or 'unknown')?", "--operator NAME", needed=False
+        ),
+    }
+    stated = {"time": found.time, "temperature_c": found.temperature_c, "operator": found.operator}
+    return [
+        question
+        for about, question in asked.items()
+        if about not in answers.unknown
+        and OF_TEST[about] not in described
+        and ((value := stated[OF_TEST[about]]) in (None, "") or value != value)
+    ]
 
 
 def _of_time(found: Survey) -> Question:
@@ -379,13 +389,6 @@ def _of_time(found: Survey) -> Question:
         return Question("time", "", text, "--time TIME", needed=False)
     text = f"Was the test on {' or on '.join(days)} (or 'unknown')?"
     return Question("time", "", text, f"--time {'|'.join(days)}", False, days)
-
-
-def _holds_nothing(found: Survey, described: Described, questions: Sequence[Question]) -> bool:
-    """Return True if no answer can make it a recording: no column may be an acceleration."""
-    may_be = any(question.about == "unit" for question in questions)
-    measured = {_told(column, described).quantity for column in found.columns}
-    return "acceleration" not in measured and not may_be
 
 
 def _told(column: SurveyedColumn, described: Described) -> SurveyedColumn:
@@ -472,14 +475,14 @@ def _of_sensor(column: SurveyedColumn, described: Described) -> list[Question]:
 
 
 def _recording(
-    found: Survey, described: Described, rate: float, path: Path
+    told: Sequence[SurveyedColumn], rate: float, path: Path
 ) -> tuple[Recording | None, str]:
     """The recording as it will be read, or why it will be refused."""
     try:
         columns = [
             Column(c.name, len(c.values), partial(np.asarray, c.values), role="channel",
                    stated=_entries(c, path))
-            for c in (_told(column, described) for column in found.columns)
+            for c in told
             if c.quantity is not None and c.values is not None
         ]  # fmt: skip
         rates = {} if math.isnan(rate) else {"sampling_rate_hz": Entry(rate, path)}
@@ -501,16 +504,6 @@ def _entries(column: SurveyedColumn, path: Path) -> dict[str, Entry]:
     }
     known = {k: v for k, v in document.items() if v is not None and v == v and k in CHANNEL_KEYS}
     return {key: Entry(value, path) for key, value in known.items()}
-
-
-def _columns(
-    found: Survey, described: Described, record: Recording | None, rate: float
-) -> tuple[Understood, ...]:
-    channels = {} if record is None else {c.name: c for c in record.channels}
-    return tuple(
-        _understood(column, _told(column, described), channels.get(column.name), rate)
-        for column in found.columns
-    )
 
 
 def _understood(
@@ -578,40 +571,25 @@ def answer_to(question: Question, text: str, found: Import) -> dict[str, object]
     return channel_answer("sensitivity" if is_raw else "unit", plain, unit)
 
 
-def answer_time(text: str, answers: Answers) -> Answers:
-    """Return the answers with the time of the test, by an ISO 8601 time or day, or 'unknown'."""
-    if text.strip().lower() in _UNKNOWN:
-        return replace(answers, is_time_unknown=True)
-    try:
-        return replace(answers, time=parse_time(text.strip()))
-    except (ValueError, OverflowError):
-        raise UsageError(f"{text!r} is no day.", remedy="Write it as 2026-05-01.") from None
+def answer_of_test(about: str, text: str, answers: Answers) -> Answers:
+    """Return the answers with the time, temperature or operator of a test, or that it is unknown.
 
-
-def answer_temperature(text: str, answers: Answers) -> Answers:
-    """Return the answers with the temperature of the steel, by degrees Celsius or 'unknown'."""
-    if text.strip().lower() in _UNKNOWN:
-        return replace(answers, is_temperature_unknown=True)
-    try:
-        number = float(text.replace(",", "."))
-    except ValueError:
-        number = NAN
+    A time is an ISO 8601 time or day, a temperature in degrees Celsius; raises UsageError.
+    """
+    plain = text.strip()
+    if plain.lower() in _UNKNOWN or (about == "operator" and not plain):
+        return replace(answers, unknown=answers.unknown | {about})
+    if about == "operator":
+        return replace(answers, operator=plain)
+    if about == "time":
+        try:
+            return replace(answers, time=parse_time(plain))
+        except (ValueError, OverflowError):
+            raise UsageError(f"{text!r} is no day.", remedy="Write it as 2026-05-01.") from None
+    number = _number(plain.replace(",", "."))
     if math.isnan(outdoor_c(number)):
         raise UsageError(f"{text!r} is no temperature outdoors.", remedy="Give degrees Celsius.")
     return replace(answers, temperature_c=number)
-
-
-def answer_operator(text: str, answers: Answers) -> Answers:
-    """Return the answers with who measured, by a name or 'unknown'."""
-    if text.strip().lower() in (*_UNKNOWN, ""):
-        return replace(answers, is_operator_unknown=True)
-    return replace(answers, operator=text.strip())
-
-
-ANSWERS_OF_TEST: dict[str, Callable[[str, Answers], Answers]] = {
-    "time": answer_time, "temperature": answer_temperature, "operator": answer_operator,
-}  # fmt: skip
-"""What takes the answer to a question about one test, by what it is about."""
 
 
 def unit_recorded(name: str, found: Import) -> str:
@@ -666,7 +644,7 @@ def import_document(found: Import) -> dict[str, Any]:
         "operator": found.described.get("operator", survey.operator),
         "sampling_rate_hz": found.sampling_rate_hz,
         "samples": survey.samples,
-        "columns": [_column(column) for column in found.columns],
+        "columns": [asdict(column) for column in found.columns],
         "questions": [question_document(question) for question in found.questions],
         "of_test": [question_document(question) for question in found.of_test],
         "problems": list(found.problems),
@@ -676,18 +654,4 @@ def import_document(found: Import) -> dict[str, Any]:
 
 def question_document(question: Question) -> dict[str, object]:
     """A question, and the option of `shm import` that answers it."""
-    return {
-        "about": question.about,
-        "channel": question.channel,
-        "text": question.text,
-        "option": question.option,
-        "choices": list(question.choices),
-    }
-
-
-def _column(column: Understood) -> dict[str, Any]:
-    names = (
-        "name", "unit", "quantity", "plane", "x_m", "least", "largest", "overloads", "is_clipped",
-        "hits",
-    )  # fmt: skip
-    return {**{name: getattr(column, name) for name in names}, "outline": list(column.outline)}
+    return {name: value for name, value in asdict(question).items() if name != "needed"}

@@ -12,17 +12,16 @@ import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from datetime import UTC, datetime, tzinfo
+from datetime import UTC, datetime
 from pathlib import Path
 
 from shm.errors import BadInput, TooLarge
 from shm.pipeline.faults import move_to_quarantine
 from shm.pipeline.lineage import read_limits
 from shm.read import sidecar_path
-from shm.read.base import Layout
-from shm.read.profiles import Profile, any_profile, completed, learn_day_order, profile_for
+from shm.read.profiles import any_profile, completed, learn_day_order, profile_for
 from shm.read.sandbox import layout_of
-from shm.read.sidecar import Described, sidecar_document, sidecar_text
+from shm.read.sidecar import sidecar_document, sidecar_text
 from shm.read.stamps import may_hold_days, order_of_choice
 from shm.store import Hold, Receipt, ReceivedFile, Store, Workspace
 from shm.store.archive import (
@@ -91,7 +90,8 @@ def _keep(
     kept_sidecar = None
     if _is_plain(sidecar):
         kept_sidecar = archive.keep(sidecar, most_bytes=most, on_progress=on_progress)
-    text = _learnt_sidecar(path, workspace, follow)
+    is_read = follow or not path.is_symlink()
+    text = _sidecar_by_profile(path, workspace, learns=True) if is_read else None
     if text is not None:
         with tempfile.TemporaryDirectory(prefix="shm-") as folder:
             made_up = Path(folder) / sidecar.name
@@ -105,7 +105,7 @@ def _keep(
 def as_taken_in(path: Path, workspace: Workspace) -> Iterator[Path]:
     """A recording beside the sidecar with which it would be taken in: itself, or a copy for as
     long as it is used, where its logger's profile says more than its own sidecar."""
-    text = _by_profile(path, workspace)
+    text = _sidecar_by_profile(path, workspace, learns=False)
     if text is None:
         yield path
         return
@@ -115,51 +115,30 @@ def as_taken_in(path: Path, workspace: Workspace) -> Iterator[Path]:
         yield copied
 
 
-def _learnt_sidecar(path: Path, workspace: Workspace, follow: bool) -> str | None:
-    """Make the sidecar of a file by its logger's profile, which learns from the file first.
+def _sidecar_by_profile(path: Path, workspace: Workspace, *, learns: bool) -> str | None:
+    """Make the sidecar of a file: what its logger's profile and the zone add to its own, with it.
 
-    It is kept with the file, so that a profile which changes later changes no test of before. None
-    where there is no such profile, or it adds nothing.
+    A profile that `learns` from the file does so first. The sidecar is kept with the file, so that
+    a profile which changes later changes no test of before. None where nothing is added, and of
+    what cannot be read.
     """
-    zone = workspace.bridge.time_zone
-    may_teach = any_profile(workspace.folder) or may_hold_days(path) or zone is not UTC
-    if not may_teach or (path.is_symlink() and not follow):
-        return None
-    known = _layout_and_sidecar(path, workspace)
-    if known is None:
-        return None
-    profile = learn_day_order(known[0], known[0].day_order, workspace.folder)
-    return _completed_text(profile, *known, path, zone)
-
-
-def _by_profile(path: Path, workspace: Workspace) -> str | None:
-    """Make the sidecar of a file by its logger's profile, which stays as it is."""
-    zone = workspace.bridge.time_zone
-    may_add = any_profile(workspace.folder) or zone is not UTC
-    known = _layout_and_sidecar(path, workspace) if may_add else None
-    if known is None:
-        return None
-    return _completed_text(profile_for(known[0], workspace.folder), *known, path, zone)
-
-
-def _layout_and_sidecar(path: Path, workspace: Workspace) -> tuple[Layout, Described] | None:
-    """Return how a recording looks and what its own sidecar says; None of what cannot be read."""
-    if path.name.lower().endswith(MODES_SUFFIX):
+    zone, folder = workspace.bridge.time_zone, workspace.folder
+    may_add = any_profile(folder) or zone is not UTC or (learns and may_hold_days(path))
+    if not may_add or path.name.lower().endswith(MODES_SUFFIX):
         return None
     try:
-        return layout_of(path, read_limits(workspace.settings)), sidecar_document(path)
+        layout, own = layout_of(path, read_limits(workspace.settings)), sidecar_document(path)
     except BadInput:
         return None  # it is refused with its reason where it is read
-
-
-def _completed_text(
-    profile: Profile | None, layout: Layout, own: Described, path: Path, zone: tzinfo
-) -> str | None:
-    """Return what profile and zone add to a file's own sidecar, with it; None if it is nothing."""
+    if learns:
+        profile = learn_day_order(layout, layout.day_order, folder)
+    else:
+        profile = profile_for(layout, folder)
+    if profile is None and zone is UTC:
+        return None
     known = profile.described if profile is not None else {}
-    is_silent = profile is None and zone is UTC
-    whole = own if is_silent else completed(known, layout, own, path.name, zone)
-    return sidecar_text(whole) if whole != own else None
+    complete = completed(known, layout, own, path.name, zone)
+    return sidecar_text(complete) if complete != own else None
 
 
 def learn_from_answer(workspace: Workspace, store: Store, hold: Hold) -> None:

@@ -96,49 +96,27 @@ def set_baseline(
     at: datetime,
     progress: Progress = silent,
 ) -> Outcome:
-    """`rebaseline`, with all that who ordered it should know; raises as that does."""
-    within = changes_within(store, hanger.id, order.since)
-    is_accepted = order.kind is None or order.kind.accepts
-    accepted = still_shown(store, hanger, order) if is_accepted else ()
-    made = rebaseline(workspace, store, hanger, order, at, progress)
-    alerts = store.alerts.list_all(hanger.id)
-    explained = [each.id for each in alerts if _is_explained_by(each, made)] if order.kind else []
-    left = tuple(each.id for each in alerts if each.is_open)
-    return Outcome(made, within, accepted, tuple(explained), left)
-
-
-def _is_explained_by(stored: StoredAlert, made: Baseline) -> bool:
-    """Return True if a new baseline has ended an alert, and nobody had taken note of it before."""
-    noted = stored.acknowledgement
-    return noted is not None and (noted.who, noted.at) == (made.who, made.set_at)
-
-
-def rebaseline(
-    workspace: Workspace,
-    store: Store,
-    hanger: Hanger,
-    order: Order,
-    at: datetime,
-    progress: Progress = silent,
-) -> Baseline:
     """Updates the tests since then jointly and has later tests compared with them.
 
     Raises NothingThere where the hanger has no baseline, or no test as young as that has been
     worked through; BadInput where the class in force cannot describe the tests, or where works are
     to have put right what the tests still show; StoreBusy where another baseline came in meanwhile.
     """
-    before = store.watch.baseline(hanger.id)
+    before, kind = store.watch.baseline(hanger.id), order.kind
     if before is None:
         raise NothingThere(
             f"hanger {hanger.id} has no baseline yet, and so none to replace.",
             remedy="Take in its first tests with `shm ingest FILE`.",
         )
     chosen = _since(store, hanger, order.since)
-    explained = None
-    if order.kind is not None:
-        explained = [each.id for each in _explained(store, hanger, order)]
-        if order.kind.is_remedy and not order.kind.accepts:
-            _refuse_unrepaired(still_shown(store, hanger, order), hanger, order)
+    is_accepted = kind is None or kind.accepts
+    shown = (
+        _still_shown(store, hanger, order) if kind is None or kind.is_remedy or is_accepted else ()
+    )
+    if kind is not None and kind.is_remedy and not is_accepted:
+        _refuse_unrepaired(shown, hanger, order)
+    within = changes_within(store, hanger.id, order.since)
+    numbers = [each.id for each in _explained(store, hanger, order)] if kind else None
     model = before.posterior.model
     terms, lineage = update_terms(hanger, [model], chosen, workspace.settings)
     measured = [test.test for test in chosen]
@@ -151,19 +129,26 @@ def rebaseline(
         warm_start=before.posterior,
     )
     posterior = replace(posterior, baseline_check=check)
-    why = f"{order.kind.name}: {order.why}" if order.kind else order.why
+    why = f"{kind.name}: {order.why}" if kind else order.why
     record = (order.who, why, order.since)
-    return store.watch.rebaseline(before, posterior, chosen, record, lineage, at, explained)
+    made = store.watch.rebaseline(before, posterior, chosen, record, lineage, at, numbers)
+    alerts = store.alerts.list_all(hanger.id)
+    explained = [each.id for each in alerts if _is_explained_by(each, made)] if kind else []
+    left = tuple(each.id for each in alerts if each.is_open)
+    return Outcome(made, within, shown if is_accepted else (), tuple(explained), left)
 
 
-def still_shown(store: Store, hanger: Hanger, order: Order) -> tuple[Unrepaired, ...]:
+def _is_explained_by(stored: StoredAlert, made: Baseline) -> bool:
+    """Return True if a new baseline has ended an alert, and nobody had taken note of it before."""
+    noted = stored.acknowledgement
+    return noted is not None and (noted.who, noted.at) == (made.who, made.set_at)
+
+
+def _still_shown(store: Store, hanger: Hanger, order: Order) -> tuple[Unrepaired, ...]:
     """Return what tests of a request still show of the alerts that it ends.
 
     Each against the baseline that it was raised against: a later one may hold the loss already.
-    Raises NothingThere as `rebaseline` does.
     """
-    if store.watch.baseline(hanger.id) is None:
-        return ()
     since = [(each.test, each.time) for each in _since(store, hanger, order.since)]
     tests = {each.test.id: each.test for each in store.tests.list_all(hanger.id)}
     kind = order.kind

@@ -9,12 +9,11 @@ after it and its alert: this may be killed at any instant and simply goes on.
 
 from __future__ import annotations
 
-import bisect
 import logging
-from collections import defaultdict
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import suppress
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from queue import SimpleQueue
@@ -81,6 +80,22 @@ Work = Generator[Callable[[], Any], Any, None]
 """Work on a stream: yields what is to be computed elsewhere, is sent the result and stores it."""
 
 
+@dataclass
+class _Course:
+    """How far a stream has come, as the store says: read again after whatever went wrong.
+
+    Ten minutes from `waiting` on are to be read, those before `done` came late; `pooled` is up to
+    when each period is pooled, `changed` the first late window since. The watch has gone over
+    hours before `settled` already.
+    """
+
+    done: datetime | None
+    waiting: set[datetime]
+    changed: datetime | None
+    pooled: dict[Period, datetime] = field(default_factory=dict)
+    settled: datetime = _EVER
+
+
 class Streaming:
     """All streams of a workspace; `lanes` is how many steps may be under way at once.
 
@@ -100,12 +115,7 @@ class Streaming:
         self.store, self.executor, self.clock = store, executor, clock
         self.lanes, self.wake = lanes, wake
         self._running: dict[str, tuple[Work, Future[Any]]] = {}
-        self._done: dict[str, datetime] = {}
-        self._waiting: defaultdict[str, list[datetime]] = defaultdict(list)  # ten minutes, by time
-        self._recalled: set[str] = set()
-        self._pooled: dict[tuple[str, Period], datetime] = {}
-        self._changed: dict[str, datetime] = {}
-        self._settled: dict[str, datetime] = {}
+        self._courses: dict[str, _Course] = {}
         self._not_before: dict[str, datetime] = {}
         self._news: SimpleQueue[tuple[str, datetime]] = SimpleQueue()
         self._first, self._look_at, self._rest = 0, _EVER, RestOfDays(clock)
@@ -140,19 +150,23 @@ class Streaming:
             if future.done():
                 del self._running[name]
                 self._finish(name, work, future)
-        while not self._news.empty():
-            self._note(*self._news.get())
         streams = self.workspace.bridge.streams
+        named = {stream.name: stream for stream in streams}
+        while not self._news.empty():
+            name, start = self._news.get()
+            if name in named:
+                self._course_of(named[name]).waiting.add(start)
         # Each turn begins with another, or the first would keep all lanes while they catch up.
         for stream in (*streams[self._first :], *streams[: self._first]):
             if len(self._running) >= self.lanes:
                 break
-            if stream.name in self._running or not self._may_begin(stream.name):
+            is_due = self.clock() >= self._not_before.get(stream.name, _EVER)
+            if stream.name in self._running or not is_due:
                 continue
             try:
                 self._begin(stream)
             except (ShmError, BrokenExecutor):
-                self._recalled.discard(stream.name)  # what was to be read is looked for again
+                self._courses.pop(stream.name, None)  # what was to be read is looked for again
                 raise
             except Exception:  # what one stream holds must not stop the others
                 log.exception("stream %s cannot begin its next step", stream.name)
@@ -163,13 +177,6 @@ class Streaming:
             evaluate_silent_streams(self.workspace, self.store, now)
         return bool(self._running)
 
-    def _note(self, name: str, start: datetime) -> None:
-        if start not in self._waiting[name]:
-            bisect.insort(self._waiting[name], start)
-
-    def _may_begin(self, name: str) -> bool:
-        return self.clock() >= self._not_before.get(name, _EVER)
-
     def _begin(self, stream: Stream) -> None:
         """Begin the next step of a stream, if there is one: pools come before further windows."""
         work = self._next_work(stream)
@@ -179,54 +186,53 @@ class Streaming:
             future.add_done_callback(lambda _: self.wake())
 
     def _next_work(self, stream: Stream) -> Work | None:
-        name = stream.name
-        if name not in self._recalled:
-            self._recall(stream)
-        done, waiting = self._done.get(name), self._waiting[name]
-        is_late = done is not None and bool(waiting) and waiting[0] < done
-        if name in self._changed and not is_late:
-            self._go_back(stream, self._changed.pop(name))
-        for period, length in PERIODS.items() if done is not None else ():
-            start = self._next_pool(stream, period, length, done or _EVER)
-            if start is not None:
-                return self._pool(stream, period, start)
-        start = self._next_window(name)
+        course = self._course_of(stream)
+        if course.done is not None:
+            if (
+                course.changed is not None
+                and min(course.waiting, default=course.done) >= course.done
+            ):
+                self._go_back(stream, course, course.changed)
+                course.changed = None
+            for period in PERIODS:
+                start = self._next_pool(stream, course, period, course.done)
+                if start is not None:
+                    return self._pool(stream, period, start)
+        start = self._next_window(stream.name, course)
         return None if start is None else self._read(stream, start)
 
-    def _recall(self, stream: Stream) -> None:
-        """Recall how far the stream had come, what came since, and what came late."""
+    def _course_of(self, stream: Stream) -> _Course:
+        """Return how far a stream has come, what came since, and what came late."""
         name, store, now = stream.name, self.store, self.clock()
+        if name in self._courses:
+            return self._courses[name]
         changed = find_first_unpooled(store, name, lateness_limit(self.workspace, now))
-        if changed is not None:
-            self._changed[name] = changed
+        unread = set(list_unread(self.workspace, self.ring, store, name, now))
+        course = _Course(find_progress(store, name), unread, changed)
         hours, watched = find_pooled_range(store, name, "hour"), self._watched_until(stream)
         if hours is not None and watched is not None and watched <= hours[1]:
-            self._pooled[name, "hour"] = watched
-            self._settled[name] = hours[1] + PERIODS["hour"]
-        if (done := find_progress(store, name)) is not None:
-            self._done[name] = done
-        for start in list_unread(self.workspace, self.ring, store, name, now):
-            self._note(name, start)
-        self._recalled.add(name)
+            course.pooled["hour"] = watched
+            course.settled = hours[1] + PERIODS["hour"]
+        self._courses[name] = course
+        return course
 
-    def _go_back(self, stream: Stream, changed: datetime) -> None:
+    def _go_back(self, stream: Stream, course: _Course, changed: datetime) -> None:
         """Pool again from the earliest window on that came late.
 
         The watch goes on from how it was before them; further back than its states are kept, they
         are pooled and not watched.
         """
-        name, streams = stream.name, self.store.streams
         starts = {each: period_start(changed, length) for each, length in PERIODS.items()}
         newest = load_stream_watch(self.store, stream.hanger)
         before = load_stream_watch(self.store, stream.hanger, starts["hour"])
         if newest and before and starts["hour"] < newest.reading_time:
             with suppress(BadInput):  # states of before an upgrade cannot be read
                 content = gone_back(before.content, newest.content)
-                streams.go_back(stream.hanger, before.reading_time, content)
+                self.store.streams.go_back(stream.hanger, before.reading_time, content)
                 starts["hour"] = before.reading_time
-                self._settled[name] = max(newest.reading_time, self._settled.get(name, _EVER))
+                course.settled = max(newest.reading_time, course.settled)
         for period, start in starts.items():
-            self._pooled[name, period] = min(self._pooled.get((name, period), start), start)
+            course.pooled[period] = min(course.pooled.get(period, start), start)
 
     def _watched_until(self, stream: Stream) -> datetime | None:
         watch = load_stream_watch(self.store, stream.hanger)
@@ -234,17 +240,16 @@ class Streaming:
 
     # ------------------------------------------------------------ windows
 
-    def _next_window(self, name: str) -> datetime | None:
+    def _next_window(self, name: str, course: _Course) -> datetime | None:
         """Return the next ten minutes that are whole, or not waited for any more; late ones last.
 
         Those that were read before, of which there is more now, are late ones, too.
         """
-        waiting = self._waiting[name]
-        first_new = bisect.bisect_left(waiting, self._done.get(name, _EVER))
-        new = waiting[first_new:]
-        if len(new) > 1 or (new and self._is_whole(name, new[0])):
-            return waiting.pop(first_new)
-        return waiting.pop(0) if first_new else None
+        new = sorted(each for each in course.waiting if each >= (course.done or _EVER))
+        is_ready = len(new) > 1 or bool(new and self._is_whole(name, new[0]))
+        start = new[0] if is_ready else min(course.waiting.difference(new), default=None)
+        course.waiting.discard(start or _EVER)
+        return start
 
     def _is_whole(self, name: str, start: datetime) -> bool:
         if self.clock() >= start + WINDOW + _PATIENCE:
@@ -285,13 +290,13 @@ class Streaming:
             self._save(WindowReading(window, (), "none", f"it could not be read: {error}"))
 
     def _save(self, reading: WindowReading) -> None:
-        window = reading.window
+        start, course = reading.window.start, self._courses[reading.window.stream]
         self.store.streams.save_window(reading)
-        name, done = window.stream, self._done.get(window.stream, _EVER)
-        self._rest.note(name, window.start, done)
-        if window.start < done:
-            self._changed[name] = min(window.start, self._changed.get(name, window.start))
-        self._done[name] = max(done, window.start + WINDOW)
+        done = course.done or _EVER
+        self._rest.note(reading.window.stream, start, done)
+        if start < done:
+            course.changed = min(start, course.changed or start)
+        course.done = max(done, start + WINDOW)
 
     def _windows(
         self, stream: Stream, start: datetime, length: timedelta
@@ -302,11 +307,11 @@ class Streaming:
     # ------------------------------------------------------------ pools
 
     def _next_pool(
-        self, stream: Stream, period: Period, length: timedelta, done: datetime
+        self, stream: Stream, course: _Course, period: Period, done: datetime
     ) -> datetime | None:
         """Return the next period that is over and has windows; those without are passed over."""
-        key = stream.name, period
-        start = self._pooled.get(key) or self._pooled_until(stream, period, length)
+        length = PERIODS[period]
+        start = course.pooled.get(period) or self._pooled_until(stream, period, length)
         if start is None:
             return None
         while start + length <= done:
@@ -315,7 +320,7 @@ class Streaming:
             if self._is_due(stream, period, start):
                 break
             start += length
-        self._pooled[key] = start
+        course.pooled[period] = start
         return start if start + length <= done else None
 
     def _is_due(self, stream: Stream, period: Period, start: datetime) -> bool:
@@ -359,12 +364,11 @@ class Streaming:
         try:
             found: Pooled = yield step
             self._store_pooled(stream, start + length, found)
-            self._pooled[stream.name, period] = start + length
         except Exception as error:
             if _is_passing(error):
                 raise
             _log_failure(stream, error)
-            self._pooled[stream.name, period] = start + length
+        self._courses[stream.name].pooled[period] = start + length
 
     def _store_pooled(self, stream: Stream, end: datetime, found: Pooled) -> None:
         for event in found.events:
@@ -377,7 +381,7 @@ class Streaming:
             why = f"alert {found.alert.key}"
             self.ring.keep(stream.name, end - _KEPT_BEFORE_ALERT, end, why)
         hooks = [hook.name for hook in self.workspace.bridge.hooks]
-        is_again = end <= self._settled.get(stream.name, _EVER)
+        is_again = end <= self._courses[stream.name].settled
         changes = self._reconciled(stream.hanger, found, is_again=is_again)
         kept = found.kept or None
         for raised in self.store.streams.save_pooled(
@@ -416,7 +420,7 @@ class Streaming:
                 else:
                     work.throw(error)
         except StoreError:
-            self._recalled.discard(name)
+            self._courses.pop(name, None)
             raise
         except Exception as error:  # noqa: BLE001 - it must stop neither stream nor files
             self._retry_later(name)
@@ -425,7 +429,7 @@ class Streaming:
     def _retry_later(self, name: str) -> None:
         """Leave a stream alone for a minute, then look for its unread windows again."""
         self._not_before[name] = self.clock() + _AGAIN
-        self._recalled.discard(name)
+        self._courses.pop(name, None)
 
 
 def _is_passing(error: Exception) -> bool:

@@ -38,8 +38,7 @@ from shm.store.tests import (
     is_caught_up,
     is_watched_again,
     list_baseline_tests,
-    list_tests_by_receipt,
-    list_tests_by_time,
+    list_nearest_tests,
     list_watched_tests,
 )
 from shm.store.watch import find_latest_watches
@@ -90,8 +89,9 @@ def find_neighbouring_tests(store: Store, baseline: Baseline, newest: StoredTest
     by_clock = [
         hold.recording_id for hold in list_holds(store, newest.hanger) if hold.is_for_its_clock
     ]
-    came = list_tests_by_receipt(store, baseline, newest, _BESIDE, by_clock)
-    dated = list_tests_by_time(store, baseline, newest, _BESIDE)
+    of_test = store, baseline, newest, _BESIDE
+    came = list_nearest_tests(*of_test, as_received=True, held=by_clock)
+    dated = list_nearest_tests(*of_test)
     held = [each.test.id for each in (*came[0], *came[1]) if each.stage is Stage.HELD]
     watched = {each.id for each in list_watched_tests(store, baseline)}
     of_works = {

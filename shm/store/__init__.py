@@ -4,8 +4,8 @@ from shm.store.archive import Archive, Quarantine
 from shm.store.disposition import RERUN_STAGES, Exclusion, Judgement
 from shm.store.rows import (
     ENDED,
-    Acknowledgement,
     Adoption,
+    AlertNote,
     Baseline,
     BaselineGlance,
     Deaths,
@@ -27,11 +27,9 @@ from shm.store.rows import (
     ReceivedFile,
     Reconciled,
     Rerun,
-    Resolution,
     Scope,
     Silence,
     Stage,
-    Step,
     StoredAdoption,
     StoredAlert,
     StoredDiagnosis,
@@ -48,11 +46,11 @@ from shm.store.store import Store
 from shm.store.workspace import Workspace
 
 __all__ = [
-    "ENDED", "RERUN_STAGES", "Acknowledgement", "Adoption", "Archive", "Baseline",
+    "ENDED", "RERUN_STAGES", "Adoption", "AlertNote", "Archive", "Baseline",
     "BaselineGlance", "Deaths", "Decision", "Delivery", "DeliveryState", "EventKind", "Exclusion",
     "FormerPosterior", "FormerTest", "HangerEvent", "HeldTest", "Hold", "IdentifiedTest",
     "Judgement", "Lineage", "News", "Numbers", "Outcome", "Quarantine", "Receipt", "ReceivedFile",
-    "Reconciled", "Rerun", "Resolution", "Scope", "Silence", "Stage", "Step", "Store",
+    "Reconciled", "Rerun", "Scope", "Silence", "Stage", "Store",
     "StoredAdoption", "StoredAlert", "StoredDiagnosis", "StoredRecording", "StoredSelection",
     "StoredTest", "StoredToken", "StoredWatch", "TestRow", "TrendPoint", "WatchCheckpoint",
     "Workspace",

@@ -19,14 +19,13 @@ from shm.store.columns import insert_value, value_in
 from shm.store.database import Repository, insert
 from shm.store.journal import NOTIFIED, note, write
 from shm.store.rows import (
-    Acknowledgement,
+    AlertNote,
     Delivery,
     DeliveryState,
     EventKind,
     HangerEvent,
     News,
     Reconciled,
-    Resolution,
     Silence,
     StoredAlert,
     StoredTest,
@@ -151,8 +150,8 @@ def _owed(alert_id: int, hook: str, news: News, at: datetime) -> dict[str, Any]:
 
 def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert with its acknowledgement and resolution, of a row of `stored_alerts`."""
-    noted = row.noted_at and Acknowledgement(row.id, row.noted_who, row.noted_why, row.noted_at)
-    ended = row.ended_at and Resolution(row.id, row.ended_who, row.ended_why, row.ended_at)
+    noted = row.noted_at and AlertNote(row.id, row.noted_who, row.noted_why, row.noted_at)
+    ended = row.ended_at and AlertNote(row.id, row.ended_who, row.ended_why, row.ended_at)
     return StoredAlert(row.id, row.document, row.raised_at, noted, ended, row.baseline_id)
 
 
@@ -275,7 +274,7 @@ class Alerts(Repository):
                 )
             acknowledge(connection, alert_id, who, why, at)
             note(connection, at, "alert acknowledged", _said_of(alert), why, who)
-        return replace(alert, acknowledgement=Acknowledgement(alert_id, who, why, at))
+        return replace(alert, acknowledgement=AlertNote(alert_id, who, why, at))
 
     def list_deliveries(
         self,

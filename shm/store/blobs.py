@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from shm.documents import number, value_of
+from shm.documents import value_of
 from shm.models import class_units
 from shm.modes_document import MODES_SCHEMA, parse_modes
-from shm.store.columns import loads
+from shm.store.columns import value_from
 from shm.values import (
+    NAN,
     Alert,
     Change,
     CreepRate,
@@ -28,7 +28,6 @@ from shm.values import (
     collect_conditions,
 )
 
-_HELD = 1024  # technical: what stands is shown again and again, some kilobytes a hanger
 _NO_TIME = datetime.min.replace(tzinfo=UTC)
 _POSTERIOR_ARRAYS = ("samples", "log_likelihood", "most_probable")
 
@@ -131,24 +130,28 @@ def watch_document(watched: WatchedTest) -> dict[str, Any]:
     }
 
 
-@lru_cache(_HELD)
+@dataclass(frozen=True)
+class _Watch:
+    """The document of a watch; those of former versions tell less."""
+
+    temperature_c: float
+    change: Change
+    creep_per_year: CreepRate | None = None
+    mistaken: tuple[RepeatedMistake, ...] = ()
+    alert_probability: float = NAN
+    calls_for: Alert | None = None
+
+
 def watch_in(text: str) -> tuple[WatchedTest, float, Alert | None]:
     """The watch after a test back from its document, for its test, time and drifts to be put in,
     the alert probability that it was judged with, and the alert that it called for.
     """
-    document = loads(text)
-    temperature_c = number(document["temperature_c"])
-    kept = document.get("creep_per_year")
-    creep = value_of(CreepRate, kept) if kept else None
-    # Documents of former versions tell nothing of mistaken modes.
-    mistaken = value_of(tuple[RepeatedMistake, ...], document.get("mistaken", []))
-    found = WatchedTest("", _NO_TIME, temperature_c, (), change_in(text), creep, mistaken)
-    called = document.get("calls_for")
-    alert = value_of(Alert, called) if called else None
-    return found, number(document.get("alert_probability")), alert
+    found = value_from(_Watch, text)
+    of_test = found.temperature_c, (), found.change, found.creep_per_year, found.mistaken
+    return WatchedTest("", _NO_TIME, *of_test), found.alert_probability, found.calls_for
 
 
-@lru_cache(_HELD)
 def change_in(text: str) -> Change:
     """Return the change from the document of a watch."""
-    return value_of(Change, loads(text)["change"])
+    change: Change = value_from(_Watch, text).change
+    return change

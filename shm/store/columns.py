@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, fields, is_dataclass, replace
 from datetime import UTC, datetime
 from enum import StrEnum
-from functools import lru_cache
+from functools import cache, lru_cache
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -80,7 +80,7 @@ class Json(Document):
     def process_result_value(self, value: str | None, dialect: Dialect) -> Any:
         if value is None:
             return self.absent
-        return (_cached_value if self.cached else _value)(self.kind, value)
+        return (value_from if self.cached else _value)(self.kind, value)
 
 
 def _plain(value: Any) -> Any:
@@ -93,7 +93,9 @@ def _value(kind: Any, text: str) -> Any:
     return value_of(kind, loads(text))
 
 
-_cached_value = lru_cache(1024)(_value)  # technical: what is shown again, some kilobytes each
+# technical: what is shown again, some kilobytes each
+value_from: Callable[[Any, str], Any] = lru_cache(1024)(_value)
+"""Return an immutable value of a kind from the text of its document."""
 
 
 class Name(sa.types.TypeDecorator[Any]):
@@ -213,7 +215,6 @@ _TYPES: Mapping[Any, Any] = {
     str: sa.Text,
 }
 T = TypeVar("T")
-_FIELDS: dict[Any, tuple[tuple[str, Any], ...]] = {}
 
 
 def mapped(
@@ -247,13 +248,14 @@ def mapped(
 
 def value_in(row: Row[Any], kind: type[T], **given: Any) -> T:
     """Return a row as a value; fields that the row lacks are `given`, or have their default."""
-    return _value_of_row(row._mapping, kind, given)
+    found: T = _value_of_row(row._mapping, kind, given)
+    return found
 
 
-def row_of(value: object, table: sa.Table) -> dict[str, Any]:
+def row_of(value: Any, table: sa.Table) -> dict[str, Any]:
     """Return a value by the columns of a table; its number is left to the table where it is 0."""
     found: dict[str, Any] = {}
-    for name, nested in _fields(type(value)):
+    for name, nested in _fields(value.__class__):
         own = getattr(value, name)
         if name in table.c:
             found[name] = own
@@ -270,7 +272,7 @@ def insert_value(connection: Connection, table: sa.Table, value: T, **others: An
     return replace(value, id=number)  # type: ignore[type-var]
 
 
-def _value_of_row(row: Mapping[Any, Any], kind: type[T], given: Mapping[str, Any]) -> T:
+def _value_of_row(row: Mapping[Any, Any], kind: Any, given: Mapping[str, Any]) -> Any:
     values = dict(given)
     for name, nested in _fields(kind):
         if name in given:
@@ -299,16 +301,13 @@ def _flat(kind: type, without: Collection[str] = ()) -> list[tuple[str, Any]]:
     return found
 
 
+@cache
 def _fields(kind: Any) -> tuple[tuple[str, Any], ...]:
     """Return the stored fields of a dataclass, each with its own dataclass if it is one."""
-    if kind not in _FIELDS:
-        hints = get_type_hints(kind)
-        stored = [each.name for each in fields(kind) if each.metadata.get("stored", True)]
-        plain = {name: _without_none(hints[name]) for name in stored}
-        _FIELDS[kind] = tuple(
-            (n, each if is_dataclass(each) else None) for n, each in plain.items()
-        )
-    return _FIELDS[kind]
+    hints = get_type_hints(kind)
+    stored = (each.name for each in fields(kind) if each.metadata.get("stored", True))
+    plain = {name: _without_none(hints[name]) for name in stored}
+    return tuple((name, each if is_dataclass(each) else None) for name, each in plain.items())
 
 
 def _without_none(hint: Any) -> Any:

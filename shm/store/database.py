@@ -8,7 +8,7 @@ What a database's errors mean, what to do, and when trying again may help.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -305,17 +305,13 @@ class Repository:
     def __init__(self, engine: Engine):
         self.engine = engine
 
-    @contextmanager
-    def writing(self) -> Iterator[Connection]:
+    def writing(self) -> AbstractContextManager[Connection]:
         """One transaction, all or nothing; raises StoreBusy or StoreError."""
-        with writing(self.engine) as connection:
-            yield connection
+        return writing(self.engine)
 
-    @contextmanager
-    def reading(self) -> Iterator[Connection]:
+    def reading(self) -> AbstractContextManager[Connection]:
         """One consistent view that holds up nobody; raises StoreError."""
-        with reading(self.engine) as connection:
-            yield connection
+        return reading(self.engine)
 
     def rows(self, query: sa.Executable) -> Sequence[Any]:
         """All rows of a query, of one view."""

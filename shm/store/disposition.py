@@ -14,12 +14,11 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import value_of
 from shm.errors import UsageError, sentence
 from shm.modes_document import test_document
 from shm.store.alerts import acknowledge, raise_alert, resolve
 from shm.store.blobs import pack, test_from_document, unpack
-from shm.store.columns import loads, value_in
+from shm.store.columns import loads, value_from, value_in
 from shm.store.database import Repository, insert
 from shm.store.files import (
     advance_recordings,
@@ -108,8 +107,7 @@ def keep_judgement(
 
 def insert_hold(connection: Connection, hold: Hold) -> int:
     """Store what is held, or a decision of what was not; return its number."""
-    tests = [asdict(test) for test in hold.tests]
-    document = {"message": hold.message, "sidecar_as": hold.sidecar_as, "tests": tests}
+    document = asdict(_Held(hold.message, hold.tests, hold.sidecar_as))
     row = {"recording_id": hold.recording_id, "held_at": hold.held_at, "document": document}
     return insert(connection, holds, row)
 
@@ -250,9 +248,16 @@ def _decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime
 
 def hold_from(row: Row[Any]) -> Hold:
     """Return a row of `stored_holds` as a value."""
-    document = loads(row.document)
-    known = {name: document[name] for name in ("message", "sidecar_as")}
-    return value_in(row, Hold, tests=value_of(tuple[HeldTest, ...], document["tests"]), **known)
+    return value_in(row, Hold, **vars(value_from(_Held, row.document)))
+
+
+@dataclass(frozen=True)
+class _Held:
+    """The document of a hold."""
+
+    message: str
+    tests: tuple[HeldTest, ...]
+    sidecar_as: str | None = None
 
 
 RERUN_STAGES = (Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)

@@ -18,15 +18,12 @@ import shm
 from shm.store.columns import row_of, value_in
 from shm.store.database import Repository, insert
 from shm.store.rows import (
-    AuditRow,
     Decision,
     Entry,
-    Event,
     FormerPosterior,
     FormerTest,
     Outcome,
     Stage,
-    Step,
 )
 from shm.store.tables import journal, posterior_tests, posteriors, tests
 
@@ -128,12 +125,23 @@ def find_newest_entry(store: Repository) -> int:
 
 def list_changes(
     store: Repository, limit: int | None = None, before: int | None = None
-) -> tuple[AuditRow, ...]:
+) -> tuple[Entry, ...]:
     """Return what people changed, the newest first; `before` is the number to go on after."""
     query = sa.select(journal).where(journal.c.who.is_not(None)).order_by(journal.c.id.desc())
     if before is not None:
         query = query.where(journal.c.id < before)
-    return tuple(map(_change, store.rows(query.limit(limit))))
+    return tuple(value_in(row, Entry) for row in store.rows(query.limit(limit)))
+
+
+def change_document(entry: Entry) -> dict[str, Any]:
+    """Return a change as the audit log shows it: who did what to what by which way, and why."""
+    detail = entry.detail
+    if entry.kind in (Stage.RECEIVED, *Outcome):
+        detail = str(Outcome.NEW) if entry.kind == Stage.RECEIVED else entry.kind
+    of_change: dict[str, Any] = {name: getattr(entry, name) for name in ("id", "at", "who")}
+    action = ACTIONS.get(entry.kind, entry.kind)
+    of_change |= {"via": entry.via or "", "action": action, "subject": entry.subject}
+    return {**of_change, "detail": detail}
 
 
 def list_events(
@@ -142,7 +150,7 @@ def list_events(
     *,
     recording_id: int | None = None,
     file_name: str | None = None,
-) -> tuple[Event, ...]:
+) -> tuple[Entry, ...]:
     """Return what was noticed of recordings, the oldest first; `kind` as duplicate or refused.
 
     Of one recording, or of what came under one name, where that is given.
@@ -152,17 +160,15 @@ def list_events(
     for name, value in wanted.items():
         if value is not None:
             query = query.where(journal.c[name] == value)
-    return tuple(map(_event, store.rows(query)))
+    return tuple(value_in(row, Entry) for row in store.rows(query))
 
 
-def list_steps(store: Repository, recording_id: int) -> tuple[Step, ...]:
+def list_steps(store: Repository, recording_id: int) -> tuple[Entry, ...]:
     """Return the stages that a recording and its tests have reached, in that order."""
     query = sa.select(journal, tests.c.name).outerjoin(tests, tests.c.id == journal.c.test_id)
     query = query.where(is_step, journal.c.recording_id == recording_id)
-    return tuple(
-        Step(row.kind, row.at, row.version, row.test_id, row.name)
-        for row in store.rows(query.order_by(journal.c.id))
-    )
+    rows = store.rows(query.order_by(journal.c.id))
+    return tuple(value_in(row, Entry, test=row.name) for row in rows)
 
 
 def list_former_tests(store: Repository, recording_id: int) -> tuple[FormerTest, ...]:
@@ -182,18 +188,3 @@ def list_former_tests(store: Repository, recording_id: int) -> tuple[FormerTest,
         for row in connection.execute(made):
             by_test[row.test_id].append(value_in(row, FormerPosterior))
     return tuple(value_in(row, FormerTest, posteriors=tuple(by_test[row.id])) for row in rows)
-
-
-def _change(row: sa.Row[Any]) -> AuditRow:
-    detail = row.detail
-    if row.kind in (Stage.RECEIVED, *Outcome):
-        detail = str(Outcome.NEW) if row.kind == Stage.RECEIVED else row.kind
-    action = ACTIONS.get(row.kind, row.kind)
-    return AuditRow(row.id, row.at, row.who, row.via or "", action, row.subject, detail)
-
-
-def _event(row: sa.Row[Any]) -> Event:
-    message = row.detail
-    if row.kind in (*Decision,) and row.who:
-        message = f"{row.kind} by {row.who}" + (f": {row.detail}" if row.detail else "")
-    return Event(row.at, row.kind, row.subject, message, row.recording_id)

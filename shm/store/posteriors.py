@@ -7,12 +7,11 @@ described otherwise by now, it is made from the samples anew: the answer is the 
 from __future__ import annotations
 
 import hashlib
-import json
 import logging
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from functools import lru_cache
 from statistics import fmean
@@ -22,14 +21,12 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.diagnosis_document import diagnosis_document
-from shm.documents import averaged_document, number, value_of
 from shm.errors import NothingThere, StoreBusy, UsageError
-from shm.store.columns import loads, row_of, value_in
+from shm.store.columns import row_of, value_from, value_in
 from shm.store.database import Repository, insert
 from shm.store.files import all_at, is_counted, is_current, move
 from shm.store.journal import note
 from shm.store.rows import (
-    DESCRIBED,
     Adoption,
     BaselineGlance,
     Lineage,
@@ -68,7 +65,6 @@ from shm.store.tables import (
 )
 from shm.values import (
     NAN,
-    Averaged,
     BaselineCheck,
     Diagnosis,
     Hanger,
@@ -82,51 +78,7 @@ log = logging.getLogger(__name__)
 _AT_ONCE = 50  # technical: posteriors of some 100 kB each
 _HANGERS_KNOWN = 4096  # technical: more than any bridge has
 _OF_TEST = ("id", "name", "hanger", "time", "taken_at", "temperature_c")
-_NAMED = ("stiffness", "parameters")
-_NUMBERS_HELD = 1024  # technical: a page shows some hundred
 _SUMMARY = summaries.c.key, summaries.c.document.label("summary")
-
-
-class Trends(Repository):
-    """The part of `Posteriors` that answers in numbers."""
-
-    def save_summaries(self, hanger: Hanger, tell: Callable[[float], None] = lambda _: None) -> int:
-        """Keeps the summaries of a hanger that are not kept yet; how many there were.
-
-        Some at a time, each time a transaction: it may be killed and begun again.
-        """
-        with self.reading() as connection:
-            key = key_of(hanger, selection_numbers(connection).get(hanger.id))
-        missing = self._missing(hanger, key)
-        for begin in range(0, len(missing), _AT_ONCE):
-            some = missing[begin : begin + _AT_ONCE]
-            with self.reading() as connection:
-                made = _made(connection, some, {hanger.id: hanger})
-            rows = [
-                {"posterior_id": id_, "key": key, "document": _document(numbers)}
-                for id_, numbers in made.items()
-            ]
-            with self.writing() as connection:
-                former = summaries.c.posterior_id.in_(some)
-                connection.execute(sa.delete(summaries).where(former))
-                if rows:
-                    connection.execute(sa.insert(summaries), rows)
-            tell((begin + len(some)) / len(missing))
-        return len(missing)
-
-    def _missing(self, hanger: Hanger, key: str) -> list[int]:
-        """Return what is shown of a hanger and has no summary under its present description."""
-        up_to_date = sa.exists().where(
-            summaries.c.posterior_id == posteriors.c.id, summaries.c.key == key
-        )
-        of_baselines = sa.select(baselines.c.posterior_id).where(
-            baselines.c.id.in_(baselines_now(hanger.id))
-        )
-        looked_at = posteriors.c.id.not_in(hidden) | posteriors.c.id.in_(of_baselines)
-        query = sa.select(posteriors.c.id).where(
-            posteriors.c.hanger == hanger.id, is_current(posteriors), looked_at, ~up_to_date
-        )
-        return list(self.scalars(query.order_by(posteriors.c.id)))
 
 
 def load_points(
@@ -162,10 +114,10 @@ def load_points(
     )
 
 
-def baselines_in_numbers(
-    connection: Connection, hangers: Iterable[Hanger]
+def list_baselines_in_force(
+    store: Repository, hangers: Iterable[Hanger]
 ) -> dict[int, BaselineGlance]:
-    """The baseline in force of each hanger that has one, by hanger."""
+    """Return the baseline in force of each hanger that has one, in numbers."""
     known = {hanger.id: hanger for hanger in hangers}
     now = baselines_now(next(iter(known)) if len(known) == 1 else None)
     query = (
@@ -175,9 +127,10 @@ def baselines_in_numbers(
         .where(baselines.c.id.in_(now))
         .order_by(baselines.c.hanger)
     )
-    rows = [row for row in connection.execute(query) if row.hanger in known]
-    numbers = _numbers(connection, rows, known)
-    made_of = _made_of(connection, [row.posterior_id for row in rows])
+    with store.reading() as connection:
+        rows = [row for row in connection.execute(query) if row.hanger in known]
+        numbers = _numbers(connection, rows, known)
+        made_of = _made_of(connection, [row.posterior_id for row in rows])
     return {
         row.hanger: _baseline(row, made_of[row.posterior_id], numbers[row.posterior_id])
         for row in rows
@@ -195,7 +148,9 @@ def _numbers(
     selected = selection_numbers(connection)
     keys = {id_: key_of(hanger, selected.get(id_)) for id_, hanger in hangers.items()}
     kept = {
-        row.posterior_id: _from_text(row.summary) for row in rows if row.key == keys[row.hanger]
+        row.posterior_id: value_from(Numbers, row.summary)
+        for row in rows
+        if row.key == keys[row.hanger]
     }
     missing = [row.posterior_id for row in rows if row.posterior_id not in kept]
     for begin in range(0, len(missing), _AT_ONCE):
@@ -241,56 +196,8 @@ def summarised(posterior: Posterior, hanger: Hanger, selection: Selection | None
 @lru_cache(_HANGERS_KNOWN)
 def key_of(hanger: Hanger, selection_id: int | None) -> str:
     """Tells one description of a hanger, and one choice among its classes, from another."""
-    return hashlib.sha256(repr((hanger, selection_id)).encode()).hexdigest()
-
-
-def _document(numbers: Numbers) -> dict[str, Any]:
-    """Each summary as a list: there are thousands of them to be read at once."""
-    named = {
-        part: {name: astuple(each) for name, each in getattr(numbers, part).items()}
-        for part in _NAMED
-    }
-    return {
-        "tension_n": astuple(numbers.tension_n),
-        "most_probable_tension_n": numbers.most_probable_tension_n,
-        "averaged": averaged_document(numbers.averaged),
-        **named,
-    }
-
-
-@lru_cache(_NUMBERS_HELD)
-def _from_text(text: str) -> Numbers:
-    """A summary as it is kept; the latest of all hangers are asked for again and again."""
-    document = json.loads(text)
-    return Numbers(
-        tension_n=_summary(document["tension_n"]),
-        most_probable_tension_n=number(document["most_probable_tension_n"]),
-        averaged=value_of(Averaged, document["averaged"]),
-        **{part: _Summaries(document[part]) for part in _NAMED},
-    )
-
-
-class _Summaries(Mapping[str, Summary]):
-    """Each made of its list where it is wanted: of thousands of tests few are asked for all."""
-
-    def __init__(self, lists: Mapping[str, Sequence[float | None]]):
-        self._lists = lists
-
-    def __getitem__(self, name: str) -> Summary:
-        return _summary(self._lists[name])
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._lists)
-
-    def __len__(self) -> int:
-        return len(self._lists)
-
-    def __repr__(self) -> str:
-        return repr(dict(self))
-
-
-def _summary(values: Sequence[float | None]) -> Summary:
-    return Summary(*map(number, values))
+    text = repr(("fields by name", hanger, selection_id))  # 1.0.0 stored lists
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _made_of(connection: Connection, ids: Sequence[int]) -> defaultdict[int, list[Row[Any]]]:
@@ -307,39 +214,31 @@ def _made_of(connection: Connection, ids: Sequence[int]) -> defaultdict[int, lis
 
 def _baseline(row: Row[Any], made_of: Sequence[Row[Any]], numbers: Numbers) -> BaselineGlance:
     temperatures_c = [each.temperature_c for each in made_of if math.isfinite(each.temperature_c)]
+    document = value_from(_OfBaseline, row.document)
     return value_in(
         row,
         BaselineGlance,
         tests=tuple(each.name for each in made_of),
         temperature_c=fmean(temperatures_c) if temperatures_c else NAN,
-        check=_check(row.document),
+        check=document.baseline_check,
         begins_at=min((each.time for each in made_of), default=None),
-        described=_described(row.document),
+        described=document.described,
         **vars(numbers),
     )
 
 
-@lru_cache(_NUMBERS_HELD)
-def _described(document: str) -> Mapping[str, Any] | None:
-    """Return the hanger as it was described then; None of a damaged document."""
-    try:
-        found: Mapping[str, Any] | None = loads(document).get(DESCRIBED)
-    except ValueError:
-        return None
-    return found
+@dataclass(frozen=True)
+class _OfBaseline:
+    """The part of a posterior's document that the pages show of a baseline."""
 
-
-@lru_cache(_NUMBERS_HELD)
-def _check(document: str) -> BaselineCheck | None:
-    """Return the check of the baseline's tests."""
-    found = loads(document).get("baseline_check")
-    return None if found is None else value_of(BaselineCheck, found)
+    baseline_check: BaselineCheck | None = None
+    described: dict[str, Any] | None = None
 
 
 _in_force = adoptions.c.undone_at.is_(None)
 
 
-class Posteriors(Trends):
+class Posteriors(Repository):
     """Posteriors, selections, diagnoses and adoptions."""
 
     def save(
@@ -473,6 +372,43 @@ class Posteriors(Trends):
             subject = f"hanger {row.hanger}, {row.model}"
             note(connection, at, "adoption dropped", subject, why, who)
             return value_in(connection.execute(by_id).one(), StoredAdoption)
+
+    def save_summaries(self, hanger: Hanger) -> int:
+        """Keeps the summaries of a hanger that are not kept yet; how many there were.
+
+        Some at a time, each time a transaction: it may be killed and begun again.
+        """
+        with self.reading() as connection:
+            key = key_of(hanger, selection_numbers(connection).get(hanger.id))
+        missing = self._missing(hanger, key)
+        for begin in range(0, len(missing), _AT_ONCE):
+            some = missing[begin : begin + _AT_ONCE]
+            with self.reading() as connection:
+                made = _made(connection, some, {hanger.id: hanger})
+            rows = [
+                {"posterior_id": id_, "key": key, "document": asdict(numbers)}
+                for id_, numbers in made.items()
+            ]
+            with self.writing() as connection:
+                former = summaries.c.posterior_id.in_(some)
+                connection.execute(sa.delete(summaries).where(former))
+                if rows:
+                    connection.execute(sa.insert(summaries), rows)
+        return len(missing)
+
+    def _missing(self, hanger: Hanger, key: str) -> list[int]:
+        """Return what is shown of a hanger and has no summary under its present description."""
+        up_to_date = sa.exists().where(
+            summaries.c.posterior_id == posteriors.c.id, summaries.c.key == key
+        )
+        of_baselines = sa.select(baselines.c.posterior_id).where(
+            baselines.c.id.in_(baselines_now(hanger.id))
+        )
+        looked_at = posteriors.c.id.not_in(hidden) | posteriors.c.id.in_(of_baselines)
+        query = sa.select(posteriors.c.id).where(
+            posteriors.c.hanger == hanger.id, is_current(posteriors), looked_at, ~up_to_date
+        )
+        return list(self.scalars(query.order_by(posteriors.c.id)))
 
 
 def _has(connection: Connection, hanger: int) -> bool:

@@ -40,7 +40,6 @@ from shm.store.rows import (
     Outcome,
     Receipt,
     ReceivedFile,
-    RecordingInProgress,
     Stage,
     StoredRecording,
     sum_counts,
@@ -212,7 +211,7 @@ def list_waiting_recordings(
     return _load(store, query.order_by(recordings.c.id).limit(limit))
 
 
-def list_under_way(store: Repository) -> tuple[RecordingInProgress, ...]:
+def list_under_way(store: Repository) -> tuple[tuple[StoredRecording, datetime], ...]:
     """List recordings under way, each with the time of its last step."""
     reached = sa.func.max(journal.c.at).label("reached_at")
     query = (
@@ -222,16 +221,9 @@ def list_under_way(store: Repository) -> tuple[RecordingInProgress, ...]:
         .group_by(recordings.c.id)
         .order_by(recordings.c.id)
     )
-    rows = store.rows(query)
     return tuple(
-        RecordingInProgress(
-            row.id,
-            row.file_name,
-            row.stage,
-            row.hanger,
-            row.reached_at or row.received_at,
-        )
-        for row in rows
+        (value_in(row, StoredRecording), row.reached_at or row.received_at)
+        for row in store.rows(query)
     )
 
 

@@ -274,8 +274,8 @@ class WatchCheckpoint:
 
 
 @dataclass(frozen=True)
-class Note:
-    """Note of somebody on an alert, made once."""
+class AlertNote:
+    """Note on an alert, made once: who has taken note of it, or found that its condition ended."""
 
     alert_id: int
     who: str
@@ -286,14 +286,6 @@ class Note:
     def said(self) -> dict[str, object]:
         """Return who, why and when, for documents."""
         return {"who": self.who, "why": self.why, "at": self.at}
-
-
-class Acknowledgement(Note):
-    """Person who has taken note of an alert, when, and what they say to it."""
-
-
-class Resolution(Note):
-    """End of the condition of an alert: when, found by whom (`shm` or a person), why."""
 
 
 @dataclass(frozen=True)
@@ -307,8 +299,8 @@ class StoredAlert:
     id: int
     alert: Alert
     raised_at: datetime
-    acknowledgement: Acknowledgement | None = None
-    resolution: Resolution | None = None
+    acknowledgement: AlertNote | None = None
+    resolution: AlertNote | None = None
     baseline_id: int | None = None
 
     @property
@@ -462,20 +454,6 @@ class Receipt:
 
 
 @dataclass(frozen=True)
-class Step:
-    """A stage that a recording or, where one is named, a test of it has reached.
-
-    `version` is that of the shm that brought it there; None where it was not noted.
-    """
-
-    stage: str
-    at: datetime
-    version: str | None
-    test_id: int | None = None
-    test: str | None = None
-
-
-@dataclass(frozen=True)
 class Rerun:
     """Tests that were sent back to be done again, and the results that this has superseded.
 
@@ -488,28 +466,6 @@ class Rerun:
     posteriors: int
     watches: int
     of_baseline: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something noticed on the way: a duplicate, a file reopened or refused."""
-
-    at: datetime
-    kind: str
-    file_name: str
-    message: str
-    recording_id: int | None = field(default=None)
-
-
-@dataclass(frozen=True)
-class RecordingInProgress:
-    """A recording that is not through: how far it has come, and since when it is there."""
-
-    id: int
-    file_name: str
-    stage: Stage
-    hanger: int | None
-    since: datetime
 
 
 @dataclass(frozen=True)
@@ -758,19 +714,6 @@ class StreamWatchCheckpoint:
 
 
 @dataclass(frozen=True)
-class AuditRow:
-    """One change: `who` did `action` on `subject` by `via`; `detail` is the reason or the value."""
-
-    id: int
-    at: datetime
-    who: str
-    via: str
-    action: str
-    subject: str
-    detail: str
-
-
-@dataclass(frozen=True)
 class ChangedSetting:
     """The value of a key of `bridge.toml` that holds instead of what the file says."""
 
@@ -798,7 +741,10 @@ def said(value: float | str | None) -> str:
 
 @dataclass(frozen=True)
 class Entry:
-    """Entry of the journal: the event, its subject, when, by whom, by which way, why, which shm."""
+    """Entry of the journal: the event, its subject, when, by whom, by which way, why, which shm.
+
+    A step has the name of its `test`, where it is of one; `version` is None where it was not noted.
+    """
 
     at: datetime
     kind: str
@@ -809,3 +755,12 @@ class Entry:
     who: str | None
     via: str | None
     version: str | None
+    id: int = 0
+    test: str | None = field(default=None, metadata={"stored": False})
+
+    @property
+    def message(self) -> str:
+        """Return what was noticed; of a decision who made it, too."""
+        if self.kind not in (*Decision,) or not self.who:
+            return self.detail
+        return f"{self.kind} by {self.who}" + (f": {self.detail}" if self.detail else "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from datetime import datetime
 from typing import Any
@@ -64,11 +64,6 @@ _OF_WORKS = (
 test_columns = tuple(tests.c[field.name] for field in fields(TestRow))
 
 
-def test_row(row: Row[Any]) -> TestRow:
-    """Return a test by its `test_columns`."""
-    return value_in(row, TestRow)
-
-
 def counted_tests(hanger: int | None = None) -> sa.Select[Any]:
     """The tests of a hanger, or of all, that are neither refused nor held, by time."""
     query = plain_tests.where(is_counted(tests), is_current(tests))
@@ -107,9 +102,6 @@ def posterior_of_row(row: Row[Any]) -> Posterior:
     return posterior_from(loads(row.document), row.samples)
 
 
-_BASELINE = ("id", "set_at", "who", "why", "since")
-
-
 def read_baseline(
     connection: Connection,
     hanger: int,
@@ -120,8 +112,8 @@ def read_baseline(
     """The baseline in force, the last of one class or that of a `number`, with its posterior; for a
     test of `time`."""
     query = (
-        sa.select(posteriors, *(baselines.c[name].label(f"b_{name}") for name in _BASELINE))
-        .join(baselines)
+        sa.select(baselines, posteriors.c.document, posteriors.c.samples)
+        .select_from(baselines.join(posteriors))
         .where(baselines.c.hanger == hanger)
         .order_by(baselines.c.id.desc())
         .limit(1)
@@ -133,14 +125,10 @@ def read_baseline(
     if time is not None:
         query = query.where(baselines.c.since.is_(None) | (baselines.c.since <= time))
     row = connection.execute(query).one_or_none()
-    return None if row is None else _baseline(row, hanger)
-
-
-def _baseline(row: Row[Any], hanger: int) -> Baseline:
-    values = {name: getattr(row, f"b_{name}") for name in _BASELINE}
-    posterior = posterior_of_row(row)
+    if row is None:
+        return None
     described = loads(row.document).get(DESCRIBED)
-    return Baseline(hanger=hanger, posterior=posterior, described=described, **values)
+    return value_in(row, Baseline, posterior=posterior_of_row(row), described=described)
 
 
 def selection_of(connection: Connection, hanger: int) -> StoredSelection | None:
@@ -223,21 +211,10 @@ def insert_posterior(
     at: datetime,
 ) -> int:
     """Keeps a posterior of tests; its number."""
-    values = posterior_values(hanger, posterior, chosen, lineage, at)
-    posterior_id = insert(connection, posteriors, values)
-    pairs = [{"posterior_id": posterior_id, "test_id": test.id} for test in chosen]
-    connection.execute(sa.insert(posterior_tests), pairs)
-    return posterior_id
-
-
-def posterior_values(
-    hanger: int, posterior: Posterior, chosen: Sequence[StoredTest], lineage: Lineage, at: datetime
-) -> Mapping[str, Any]:
-    """A posterior of tests, by column."""
     document = posterior_document(posterior)
     if lineage.described is not None:
         document[DESCRIBED] = dict(lineage.described)
-    return {
+    values = {
         **lineage.columns,
         "hanger": hanger,
         "model": posterior.model,
@@ -249,6 +226,10 @@ def posterior_values(
         "seed": posterior.seed,
         "updated_at": at,
     }
+    posterior_id = insert(connection, posteriors, values)
+    pairs = [{"posterior_id": posterior_id, "test_id": test.id} for test in chosen]
+    connection.execute(sa.insert(posterior_tests), pairs)
+    return posterior_id
 
 
 def insert_selection(

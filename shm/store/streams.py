@@ -6,15 +6,14 @@ import json
 from collections.abc import Sequence
 from dataclasses import fields
 from datetime import datetime, timedelta
-from functools import lru_cache
 from typing import Any, TypeVar
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
-from shm.documents import compact, parse_time
+from shm.documents import compact
 from shm.store.alerts import settle
-from shm.store.columns import row_of, value_in
+from shm.store.columns import row_of, value_from, value_in
 from shm.store.database import Repository, insert
 from shm.store.rows import Reconciled, StoredAlert, StreamWatchCheckpoint
 from shm.store.tables import (
@@ -25,7 +24,7 @@ from shm.store.tables import (
     stream_watch_days,
     stream_windows,
 )
-from shm.values import NAN, ShapePoint
+from shm.values import ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import (
     PERIODS,
@@ -343,26 +342,4 @@ def find_progress(store: Repository, stream: str) -> datetime | None:
 
 
 def _values(store: Repository, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:
-    of_window = kind is WindowReading
-    return tuple(_reading(row.document, of_window=of_window) for row in store.rows(query))
-
-
-@lru_cache(1024)  # technical: each window asks for the 36 before it; some 10 kB each
-def _reading(text: str, *, of_window: bool) -> Any:
-    """Return a reading from its document, types unchecked: there are thousands at once."""
-    document: dict[str, Any] = json.loads(text)
-    if of_window:
-        document["window"] = Window(**_known(document["window"]))
-        document["spectrum_db"] = tuple(document["spectrum_db"])
-    document["modes"] = tuple(map(_mode, document["modes"]))
-    return (WindowReading if of_window else PooledReading)(**_known(document))
-
-
-def _known(values: dict[str, Any]) -> dict[str, Any]:
-    known: dict[str, Any] = {k: NAN if value is None else value for k, value in values.items()}
-    return {**known, "start": parse_time(known["start"])} if "start" in known else known
-
-
-def _mode(values: dict[str, Any]) -> Mode:
-    shape = tuple(ShapePoint(**_known(each)) for each in values.pop("shape", ()))
-    return Mode(**_known(values), shape=shape)
+    return tuple(value_from(kind, row.document) for row in store.rows(query))

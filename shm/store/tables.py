@@ -305,7 +305,6 @@ adoptions = mapped(
 journal = mapped(
     "journal",
     Entry,
-    identity(),
     sa.Index(None, "recording_id"),
     sa.Index(None, "test_id"),
     at=sa.Column(UtcTime, nullable=False, index=True),

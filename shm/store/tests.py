@@ -36,7 +36,6 @@ from shm.store.selects import (
     plain_tests,
     select_since_baseline,
     test_columns,
-    test_row,
 )
 from shm.store.tables import (
     baselines,
@@ -167,7 +166,7 @@ def list_test_rows(
     if before is not None:
         query = query.where(_is_before(before))
     newest = query.order_by(tests.c.time.desc(), tests.c.id.desc()).limit(limit)
-    return tuple(map(test_row, store.rows(newest)))
+    return tuple(value_in(row, TestRow) for row in store.rows(newest))
 
 
 def list_waiting_tests(
@@ -187,7 +186,7 @@ def list_waiting_tests(
     chosen = sa.select(found).order_by(found.c.hanger, found.c.time, found.c.id)
     if limit is not None:
         chosen = chosen.where(found.c.place <= limit)
-    return tuple(map(test_row, store.rows(chosen)))
+    return tuple(value_in(row, TestRow) for row in store.rows(chosen))
 
 
 def list_baseline_tests(store: Repository, baseline: Baseline) -> tuple[StoredTest, ...]:
@@ -329,29 +328,31 @@ def _before(
     return (id_ != recording_id) & (stage.not_in([Stage.REFUSED, Stage.HELD]) | held_before)
 
 
-def list_tests_by_time(
-    store: Repository, baseline: Baseline, test: StoredTest, limit: int
+def list_nearest_tests(
+    store: Repository,
+    baseline: Baseline,
+    test: StoredTest,
+    limit: int,
+    *,
+    as_received: bool = False,
+    held: Collection[int] = (),
 ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
-    """List so many tests since a baseline before and after a test by time, the nearest first.
+    """List so many tests since a baseline before and after a test, the nearest first.
 
-    Those passed over for planned works are among them.
+    By time or, `as_received`, as they came in. Those passed over for planned works are among them,
+    and those that are held of the recordings `held`.
     """
-    compared = select_since_baseline(baseline, include_maintenance=True)
-    query = plain_tests.where(*compared, tests.c.id != test.id)
-    order = sa.tuple_(tests.c.time, tests.c.id)
-    return _around(store, query, order, (test.time, test.id), limit)
-
-
-def list_tests_by_receipt(
-    store: Repository, baseline: Baseline, test: StoredTest, limit: int, held: Collection[int] = ()
-) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
-    """List the same by receipt, with those held of the recordings `held`."""
     is_held = (tests.c.hanger == baseline.hanger) & (tests.c.stage == Stage.HELD)
     is_held &= tests.c.recording_id.in_(held) & is_current(tests)
     counted = sa.and_(*select_since_baseline(baseline, include_maintenance=True))
     query = plain_tests.where(counted | is_held, tests.c.id != test.id)
-    order = sa.tuple_(tests.c.recording_id, tests.c.id)
-    return _around(store, query, order, (test.recording_id, test.id), limit)
+    first, here = (
+        (tests.c.recording_id, test.recording_id) if as_received else (tests.c.time, test.time)
+    )
+    order, place = sa.tuple_(first, tests.c.id), (here, test.id)
+    down, up = ([getattr(each, way)() for each in order.clauses] for way in ("desc", "asc"))
+    before = load_tests(store, query.where(order < place).order_by(*down).limit(limit))
+    return before, load_tests(store, query.where(order > place).order_by(*up).limit(limit))
 
 
 def find_latest_weighed(
@@ -407,12 +408,6 @@ def list_watched_tests(
     if before is not None:
         at_once = (tests.c.time == before.time) & (tests.c.id < before.id)
         query = query.where((tests.c.time < before.time) | at_once)
-    return tuple(map(test_row, store.rows(query.order_by(tests.c.time, tests.c.id))))
-
-
-def _around(
-    store: Repository, query: sa.Select[Any], order: sa.Tuple, here: tuple[object, int], limit: int
-) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
-    down, up = ([getattr(each, way)() for each in order.clauses] for way in ("desc", "asc"))
-    before = load_tests(store, query.where(order < here).order_by(*down).limit(limit))
-    return before, load_tests(store, query.where(order > here).order_by(*up).limit(limit))
+    return tuple(
+        value_in(row, TestRow) for row in store.rows(query.order_by(tests.c.time, tests.c.id))
+    )

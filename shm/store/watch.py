@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from datetime import datetime
 from typing import Any
@@ -22,10 +22,8 @@ from shm.store.database import Repository, insert
 from shm.store.disposition import rerun_watched
 from shm.store.files import all_at, is_current, move
 from shm.store.journal import note
-from shm.store.posteriors import baselines_in_numbers
 from shm.store.rows import (
     Baseline,
-    BaselineGlance,
     Lineage,
     Reconciled,
     Stage,
@@ -295,14 +293,6 @@ def list_adoptions(
     if not undone:
         query = query.where(adoptions.c.undone_at.is_(None))
     return tuple(value_in(row, StoredAdoption) for row in store.rows(query))
-
-
-def list_baselines_in_force(
-    store: Repository, hangers: Iterable[Hanger]
-) -> dict[int, BaselineGlance]:
-    """Return the baseline in force of each hanger that has one, in numbers."""
-    with store.reading() as connection:
-        return baselines_in_numbers(connection, hangers)
 
 
 def find_latest_watches(

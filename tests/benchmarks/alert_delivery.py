@@ -36,10 +36,11 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from shm.pipeline import utc_now
 from shm.store import DeliveryState, Workspace
 from tests.helpers.daemons import real_daemon, until_serving
 from tests.helpers.listeners import Answer, Told, a_listener
-from tests.helpers.outboxes import make_baseline, make_baselines, raise_alerts, raise_alike
+from tests.helpers.outboxes import make_baseline, raise_alerts, raise_alike
 from tests.helpers.workspaces import make_workspace
 
 SECRET = b"of the benchmark"
@@ -243,9 +244,8 @@ def alike(options: argparse.Namespace) -> None:
                 f'secret_file = "secret"\nescalation_after_seconds = {late}\n'
             )
             workspace = workspace.reopened()
-            make_baselines(workspace, hangers)
             began = time.time()
-            raise_alike(workspace, hangers, ["ops", "chief"])
+            raise_alike(workspace, hangers, ["ops", "chief"], utc_now())
             for _ in range(options.kills):
                 with real_daemon(workspace.folder) as daemon:
                     until_serving(daemon.pid, workspace.folder)

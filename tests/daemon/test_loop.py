@@ -259,6 +259,6 @@ def test_no_name_of_a_file_holds_up_the_others(
     assert why_turn_failed(workspace) == ""
     with workspace.store() as store:
         assert check_store(store, lambda *_: None).troubles == ()
-        names = [event.file_name for event in list_events(store, "refused")]
+        names = [event.subject for event in list_events(store, "refused")]
     assert len(names) == len(_ODD_NAMES)
     assert all(name.isprintable() and len(name) <= 200 for name in names)

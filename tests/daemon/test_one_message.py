@@ -28,20 +28,20 @@ from shm.report.bridge_report import summary as bridge_summary
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_sentences import summary
 from shm.report.hanger_status import Status
-from shm.store import IdentifiedTest, Lineage, Store, StoredTest, Workspace
-from shm.values import Alert, Change, Drift, RepeatedMistake, Selection, WatchedTest
+from shm.store import Store, StoredTest, Workspace
+from shm.values import Alert, Change, Drift, Moved, RepeatedMistake, WatchedTest
 from shm.values.messages import Lead, Urgency
 from shm.watch.alert_text import message_of
 from shm.watch.watching import alerts_of
 from shm_cli.main import cli
 from shm_daemon.web.commands import without_commands
+from tests.helpers.entering import LINEAGE, identified, selected
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.nouns import NOW, a_change, a_file, a_posterior, a_test
+from tests.helpers.nouns import NOW, a_change, a_posterior
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import make_workspace
 from tests.watch.test_alert_language import AVOIDED, MOST_NUMBERS, MOST_WORDS, NUMBER
 
-_LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 _QUIET = a_change(
     evidence_years=0.2, probability=0.02, moved=(a_change().moved[0],), outlier_probability=0.01
 )
@@ -58,18 +58,15 @@ class Hangers:
     def test(self, hanger: int, days: float, tension: float = 1.0) -> StoredTest:
         """One test that has been through updating, so many days after the baseline."""
         count = len(self.store.tests.list_all(hanger))
-        name = f"h{hanger}-{count}"
-        recording = self.store.recordings.receive(a_file(100 * hanger + count), NOW).recording
-        test = a_test(name, days, hanger=hanger)
-        self.store.tests.save(recording.id, [IdentifiedTest(test)], _LINEAGE, NOW)
-        stored = next(t for t in self.store.tests.list_all(hanger) if t.test.id == name)
-        posterior = replace(a_posterior(tests=(name,)), hanger=hanger, effective_sample_size=400.0)
-        posterior = replace(posterior, samples=posterior.samples * np.array([tension, 1, 1]))
+        named = {"hanger": hanger, "name": f"h{hanger}-{count}", "days": days}
+        stored = identified(self.store, 100 * hanger + count, **named)  # type: ignore[arg-type]
+        plain = replace(a_posterior(tests=(stored.test.id,)), hanger=hanger)
+        samples = plain.samples * np.array([tension, 1, 1])
+        posterior = replace(plain, samples=samples, effective_sample_size=400.0)
         if count:
-            self.store.posteriors.save(stored, posterior, _LINEAGE, NOW)
+            self.store.posteriors.save(stored, posterior, LINEAGE, NOW)
         else:
-            chosen = Selection((posterior,), (1.0,))
-            self.store.posteriors.save_selection(hanger, [stored], chosen, _LINEAGE, NOW)
+            selected(self.store, [stored], posterior)
         return stored
 
     def watched(self, hanger: int, drifts: Sequence[Drift], change: Change, **more: object) -> None:
@@ -93,115 +90,35 @@ def tension(shift: float = 0.002, sd: float = 0.007, probability: float = 0.01) 
     return Drift(3, "", NOW, "tension", 711e3, 711e3 * (1 + shift), shift, sd, 0.05, probability)
 
 
-def deck_end(shift: float, probability: float) -> Drift:
-    return Drift(3, "", NOW, "log10_k1", 7.0, 7.0 + shift, shift, 0.1, 0.5, probability)
+def moved(**values: object) -> tuple[Moved, ...]:
+    return (replace(a_change().moved[0], **values),)
 
 
-def a_loss(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    of.watched(hanger, [tension(-0.085, 0.0055, 0.999)], a_change())
+def watched(*drifts: Drift, change: Change = _QUIET, times: int = 1, **more: object) -> Make:
+    """Make a first test and, so many times, a later one as the watch found it."""
+
+    def make(of: Hangers, hanger: int) -> None:
+        if not of.store.tests.list_all(hanger):
+            of.test(hanger, 0)
+        for _ in range(times):
+            of.watched(hanger, drifts, change, **more)
+
+    return make
 
 
-def _first(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
+def after(*steps: Make) -> Make:
+    """Make one thing after the other."""
+
+    def make(of: Hangers, hanger: int) -> None:
+        for step in steps:
+            step(of, hanger)
+
+    return make
 
 
-def _steady(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    of.watched(hanger, [tension()], _QUIET)
-
-
-def _rough(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    of.watched(hanger, [tension(0.01, 0.04, 0.1)], _QUIET)
-
-
-def _unknown(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    of.watched(hanger, [tension(float("nan"), float("nan"), float("nan"))], _QUIET)
-
-
-def _not_compared(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    of.test(hanger, 30)
-
-
-def _likely(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    of.watched(hanger, [tension(-0.055, 0.012, 0.7)], _QUIET)
-
-
-def _below(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    moved = replace(a_change().moved[0], shift_mean=-0.03, probability=0.97, alike=())
-    of.watched(hanger, [tension(-0.03, 0.01, 0.05)], a_change(moved=(moved,)))
-
-
-def _slow(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    moved = replace(a_change().moved[0], shift_mean=-0.03, probability=0.97, alike=())
-    of.watched(hanger, [tension(-0.03, 0.01, 0.05)], a_change(moved=(moved,), sudden=0.05))
-
-
-def _gain(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    moved = replace(a_change().moved[0], shift_mean=0.08)
-    of.watched(hanger, [tension(0.08, 0.006, 0.99)], a_change(moved=(moved,)))
-
-
-def _two_quantities(of: Hangers, hanger: int) -> None:
-    """Return a loss stands; then an end loosens, too."""
-    a_loss(of, hanger)
-    later = [tension(-0.09, 0.005, 0.999), deck_end(-0.8, 0.99)]
-    of.watched(hanger, later, replace(_QUIET, probability=0.99))
-
-
-def _acknowledged(of: Hangers, hanger: int) -> None:
-    a_loss(of, hanger)
-    of.store.alerts.acknowledge(of.raised(hanger), "Ann", "crew is on its way", NOW)
-
-
-def _silenced(of: Hangers, hanger: int) -> None:
-    a_loss(of, hanger)
+def _silence(of: Hangers, hanger: int) -> None:
     period = (of.now - timedelta(hours=1), of.now + timedelta(days=3))
     of.store.silences.make(hanger, period, "Ann", "works", of.now)
-
-
-def _ended(of: Hangers, hanger: int) -> None:
-    a_loss(of, hanger)
-    of.store.alerts.resolve(of.raised(hanger), "Ann", "retensioned", NOW)
-    of.watched(hanger, [tension()], _QUIET)
-
-
-def _odd(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    of.watched(hanger, [tension()], replace(_QUIET, outlier_probability=0.97))
-
-
-def _three_odd(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    for _ in range(3):
-        of.watched(hanger, [tension()], replace(_QUIET, outlier_probability=0.97))
-
-
-def _misnumbered(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    wrong = (RepeatedMistake("transverse", 3, NOW, 3),)
-    of.watched(hanger, [tension()], _QUIET, mistaken=wrong)
-
-
-def _baseline_alone(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    of.watched(hanger, [tension()], replace(_QUIET, against_baseline=4))
-
-
-def _off_nominal(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0, 1.2)
-
-
-def _stale(of: Hangers, hanger: int) -> None:
-    of.test(hanger, -900)
-    of.store.watch.baseline(hanger)
 
 
 def _held(of: Hangers, hanger: int) -> None:
@@ -237,31 +154,56 @@ def _raise(
 
 
 Make = Callable[[Hangers, int], None]
+a_loss = watched(tension(-0.085, 0.0055, 0.999), change=a_change())
+_below = moved(shift_mean=-0.03, probability=0.97, alike=())
+_gain = a_change(moved=moved(shift_mean=0.08))
+_mistake = RepeatedMistake("transverse", 3, NOW, 3)
+_deck_end = Drift(3, "", NOW, "log10_k1", 7.0, 6.2, -0.8, 0.1, 0.5, 0.99)
+# A loss stands; then an end loosens, too.
+_loosened = replace(_QUIET, probability=0.99)
+_two_quantities = after(a_loss, watched(tension(-0.09, 0.005, 0.999), _deck_end, change=_loosened))
+_acknowledged = after(
+    a_loss, lambda of, n: of.store.alerts.acknowledge(of.raised(n), "Ann", "on its way", NOW)
+)
+_ended = after(
+    a_loss,
+    lambda of, n: of.store.alerts.resolve(of.raised(n), "Ann", "retensioned", NOW),
+    watched(tension()),
+)
+_odd = replace(_QUIET, outlier_probability=0.97)
+_not_known = tension(*[float("nan")] * 3)
 STATES: dict[str, tuple[Make, Status | None, Urgency]] = {
-    "no test yet": (lambda of, hanger: None, None, "next_test"),
-    "first test": (_first, Status.FIRST, "next_test"),
-    "steady": (_steady, Status.STEADY, "none"),
-    "too rough to judge": (_rough, Status.UNCLEAR, "next_test"),
-    "shift not known": (_unknown, Status.UNCLEAR, "week"),
-    "not compared": (_not_compared, Status.UNCLEAR, "week"),
-    "likely beyond": (_likely, Status.WATCH, "week"),
-    "detected below its threshold": (_below, Status.WATCH, "week"),
-    "slow": (_slow, Status.WATCH, "next_test"),
+    "no test yet": (lambda of, n: None, None, "next_test"),
+    "first test": (lambda of, n: of.test(n, 0), Status.FIRST, "next_test"),
+    "steady": (watched(tension()), Status.STEADY, "none"),
+    "too rough to judge": (watched(tension(0.01, 0.04, 0.1)), Status.UNCLEAR, "next_test"),
+    "shift not known": (watched(_not_known), Status.UNCLEAR, "week"),
+    "not compared": (lambda of, n: (of.test(n, 0), of.test(n, 30)), Status.UNCLEAR, "week"),
+    "likely beyond": (watched(tension(-0.055, 0.012, 0.7)), Status.WATCH, "week"),
+    "detected below its threshold": (
+        watched(tension(-0.03, 0.01, 0.05), change=a_change(moved=_below)), Status.WATCH, "week",
+    ),
+    "slow": (
+        watched(tension(-0.03, 0.01, 0.05), change=a_change(moved=_below, sudden=0.05)),
+        Status.WATCH, "next_test",
+    ),
     "loss": (a_loss, Status.ALERT, "today"),
-    "gain": (_gain, Status.ALERT, "week"),
+    "gain": (watched(tension(0.08, 0.006, 0.99), change=_gain), Status.ALERT, "week"),
     "an end after a loss": (_two_quantities, Status.ALERT, "today"),
     "acknowledged": (_acknowledged, Status.ALERT, "today"),
-    "silenced": (_silenced, Status.ALERT, "today"),
-    "odd test": (_odd, Status.WATCH, "week"),
-    "three odd tests": (_three_odd, Status.WATCH, "week"),
-    "misnumbered mode": (_misnumbered, Status.CHECK, "next_test"),
-    "baseline alone": (_baseline_alone, Status.CHECK, "week"),
-    "off nominal": (_off_nominal, Status.CHECK, "next_test"),
-    "stale": (_stale, Status.UNCLEAR, "week"),
+    "silenced": (after(a_loss, _silence), Status.ALERT, "today"),
+    "odd test": (watched(tension(), change=_odd), Status.WATCH, "week"),
+    "three odd tests": (watched(tension(), change=_odd, times=3), Status.WATCH, "week"),
+    "misnumbered mode": (watched(tension(), mistaken=(_mistake,)), Status.CHECK, "next_test"),
+    "baseline alone": (
+        watched(tension(), change=replace(_QUIET, against_baseline=4)), Status.CHECK, "week",
+    ),
+    "off nominal": (lambda of, n: of.test(n, 0, 1.2), Status.CHECK, "next_test"),
+    "stale": (lambda of, n: of.test(n, -900), Status.UNCLEAR, "week"),
     "held": (_held, Status.WATCH, "week"),
     "stream alone": (_stream_alone, Status.ALERT, "today"),
     "ended": (_ended, Status.STEADY, "none"),
-}
+}  # fmt: skip
 NUMBER_OF = {name: number for number, name in enumerate(STATES, start=1)}
 every_state = pytest.mark.parametrize("name", STATES)
 

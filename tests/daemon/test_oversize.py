@@ -48,7 +48,7 @@ def test_a_hundred_sparse_gigabytes_go_to_the_quarantine_unread(tmp_path: Path) 
     assert "max_file_bytes" in reason["remedy"]
     with workspace.store() as store:
         assert [each.stage for each in list_recordings(store)] == [Stage.DONE]
-        assert [event.file_name for event in list_events(store, "refused")] == ["huge.csv"]
+        assert [event.subject for event in list_events(store, "refused")] == ["huge.csv"]
 
 
 def test_a_file_that_a_person_names_is_refused_unread_and_stays(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import re
 import shutil
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import httpx
@@ -22,7 +23,7 @@ from shm.store import Workspace
 from shm.store.point_outbox import PointOutbox
 from shm_cli.main import cli
 from shm_daemon.doctor import examine
-from shm_daemon.publishing import Pace, results_published
+from shm_daemon.publishing import Publisher
 from tests.helpers.flows import ingest, threads
 from tests.helpers.listeners import Answer, Told, a_listener
 from tests.helpers.pages import ROOT
@@ -74,8 +75,8 @@ def publishing(workspace: Workspace, url: str, more: str = 'database = "shm"') -
 
 def publish(workspace: Workspace) -> None:
     """Publish once, as the daemon does with --once."""
-    with results_published(workspace, utc_now, when_done=True):
-        pass
+    with closing(Publisher(workspace, utc_now)) as publisher:
+        publisher.turn()
 
 
 def status(workspace: Workspace) -> str:
@@ -447,7 +448,8 @@ def test_publish_sends_token(
 
 def test_running_daemon_goes_on(workspace: Workspace, server: Server) -> None:
     server.answer, server.takes = Answer(500), False
-    with results_published(workspace, utc_now, pace=Pace(look_s=0.05, retry_s=0.05)):
+    publisher = Publisher(workspace, utc_now, pause_s=0.05, retry_s=0.05)
+    with closing(publisher), publisher.running():
         until(lambda: waiting(workspace) > 100)
         server.answer, server.takes = Answer(204), True
         until(lambda: waiting(workspace) == 0)

@@ -6,7 +6,7 @@ import random
 import shutil
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from shm.store.ring import Ring
 from shm.store.streams import list_stream_events
 from shm.values import FloatArray
 from shm_daemon.heartbeat import HEARTBEAT
-from shm_daemon.seedlink import Pace, streams_asked
+from shm_daemon.seedlink import Pace, StreamAskers
 from shm_daemon.wakeup import Wakeup
 from tests.helpers.flows import Clock, threads
 from tests.helpers.seedlink_servers import a_seedlink_server
@@ -93,7 +93,8 @@ def asking(workspace: Workspace, port: int) -> Workspace:
 
 @contextmanager
 def asked(workspace: Workspace, pace: Pace = QUICK) -> Iterator[None]:
-    with streams_asked(workspace, Clock(NOW), pace=pace):
+    with closing(StreamAskers(Clock(NOW), pace)) as askers:
+        askers.use(workspace)
         yield
 
 

@@ -12,7 +12,7 @@ import pytest
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.store import Scope, Workspace
-from shm.store.journal import Actor, list_changes
+from shm.store.journal import Actor, change_document, list_changes
 from shm.store.rows import Role
 from shm_cli.main import run
 from tests.helpers.web_servers import PASSWORD, UPLOAD, Served, sign_in
@@ -30,7 +30,8 @@ def browser(workspace: Workspace, at_home: Served) -> Iterator[httpx.Client]:
 def newest(workspace: Workspace) -> tuple[str, ...]:
     with workspace.store() as store:
         (row,) = list_changes(store, limit=1)
-    return row.who, row.via, row.action, row.subject
+    change = change_document(row)
+    return tuple(str(change[name]) for name in ("who", "via", "action", "subject"))
 
 
 def test_what_page_api_and_command_line_change_is_noted_with_who_did_it(

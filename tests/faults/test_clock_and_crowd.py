@@ -34,7 +34,7 @@ def test_a_clock_that_jumps_back_holds_nothing_up(workspace: Workspace) -> None:
             flow.drain()
         assert count_stages(flow.store)[Stage.DONE] == 3
         assert [test.test.id for test, _ in list_history(flow.store, 3)] == ["t0", "t1", "t2"]
-        stages = [step.stage for step in list_steps(flow.store, 3)]
+        stages = [step.kind for step in list_steps(flow.store, 3)]
     assert stages == ["archived", "received", *2 * ["identified"], *2 * ["updated"],
                       "watched", "done"]  # fmt: skip
 

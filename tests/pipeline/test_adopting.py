@@ -12,15 +12,15 @@ from shm.inference import UpdateOptions
 from shm.models import Model
 from shm.pipeline import adopting, steps
 from shm.pipeline.adopting import AdoptionRequest, adopt, gap_watch
-from shm.store import Lineage, Store, StoredAdoption, Workspace
+from shm.store import Store, StoredAdoption, Workspace
 from shm.store.posteriors import list_history
 from shm.values import ModalTest, Posterior, PredictedFrequency
 from tests.helpers import quick_update
 from tests.helpers.diagnoses import MASS, a_diagnosis
+from tests.helpers.entering import LINEAGE
 from tests.helpers.flows import Postman, ingest
 from tests.helpers.workspaces import START, write_test
 
-LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 MASS_MODEL = "beam1+point_mass@everywhere"
 _UPDATE = quick_update.update
 STIFFNESS = "beam1+bending_stiffness@everywhere"

@@ -107,6 +107,6 @@ def test_a_file_mended_by_a_sidecar_is_taken_when_dropped_again(workspace: Works
     ingest(workspace)
     assert "sampling" not in reason_of(workspace, "no_rate.csv")["message"]
     with workspace.store() as store:
-        assert [event.file_name for event in list_events(store, "reopened")] == ["no_rate.csv"]
+        assert [event.subject for event in list_events(store, "reopened")] == ["no_rate.csv"]
         assert len(list_recordings(store)) == 1
     assert (workspace.folder / "quarantine" / "no_rate.toml").is_file()

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -15,13 +15,13 @@ from shm.bridge import Hook
 from shm.errors import UsageError
 from shm.pipeline import Flow
 from shm.pipeline.courier import after_works, quiet_until, works_before
-from shm.store import IdentifiedTest, Lineage, Silence, Store, StoredTest, Workspace
-from shm.values import Alert, Selection
+from shm.store import Silence, Workspace
+from shm.values import Alert
 from tests.helpers.flows import Clock, a_flow
-from tests.helpers.nouns import NOW, a_drift, a_file, a_posterior, a_test, a_watched_test
+from tests.helpers.nouns import NOW, a_drift
+from tests.helpers.outboxes import raise_alike
 from tests.helpers.workspaces import make_workspace
 
-LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 HANGERS = tuple(range(1, 51))
 HOUR = 3600.0
 
@@ -67,44 +67,9 @@ def bridge(tmp_path: Path) -> Workspace:
     return made.reopened()
 
 
-def raise_on(
-    workspace: Workspace, clock: Clock, hangers: Sequence[int], shift: float = -0.08, day: int = 1,
-    action: str = "",
-) -> None:  # fmt: skip
-    """An alert on each hanger, as the watch raises it; their first tests make the baselines."""
+def raise_on(workspace: Workspace, clock: Clock, hangers: Sequence[int], action: str = "") -> None:
     hooks = [hook.name for hook in workspace.bridge.hooks]
-    with workspace.store() as store:
-        for hanger in hangers:
-            baseline = store.watch.baseline(hanger)
-            if baseline is None:
-                (first,) = _entered(store, hanger, 0, clock())
-                found = replace(a_posterior(tests=(first.test.id,)), hanger=hanger)
-                store.posteriors.save_selection(
-                    hanger, [first], Selection((found,), (1.0,)), LINEAGE, clock()
-                )
-                baseline = store.watch.baseline(hanger)
-            assert baseline is not None
-            (test,) = _entered(store, hanger, day, clock())
-            name = test.test.id
-            posterior = replace(a_posterior(tests=(name,)), hanger=hanger)
-            store.posteriors.save(test, posterior, LINEAGE, clock())
-            drift = replace(a_drift(name), hanger=hanger, shift_mean=shift - hanger / 1e4)
-            message = f"Hanger {hanger}: tension fell. {action}".rstrip()
-            key = f"hanger-{hanger}:{name}"
-            kinds = ("beyond threshold",)
-            alert = Alert(key, hanger, name, test.time, message, (drift,), kinds)
-            assert store.watch.save(
-                test, baseline, a_watched_test(name), alert, hooks, clock()
-            )  # fmt: skip
-
-
-def _entered(store: Store, hanger: int, day: int, at: datetime) -> list[StoredTest]:
-    name = f"h{hanger}-{day}"
-    received = store.recordings.receive(a_file(100 * hanger + day), at).recording
-    store.tests.save(
-        received.id, [IdentifiedTest(a_test(name, days=day, hanger=hanger))], LINEAGE, at
-    )
-    return [test for test in store.tests.list_all(hanger) if test.test.id == name]
+    raise_alike(workspace, hangers, hooks, clock(), action=action)
 
 
 def look(workspace: Workspace, clock: Clock, inbox: Inbox) -> None:

@@ -11,7 +11,7 @@ import pytest
 from shm.inference import UpdateOptions
 from shm.models import Model
 from shm.pipeline import rebaselining
-from shm.pipeline.rebaselining import Order, changes_within, rebaseline
+from shm.pipeline.rebaselining import Order, changes_within, set_baseline
 from shm.store import Baseline, Workspace
 from shm.values import ModalTest, Posterior
 from tests.helpers import quick_update
@@ -57,7 +57,7 @@ def spool(workspace: Workspace, day: int, tension: float) -> None:
 def anew(workspace: Workspace, day: float, hanger: int = 3) -> Baseline:
     order = Order(START + timedelta(days=day), "a new pin", "engineer")
     with workspace.store() as store:
-        return rebaseline(workspace, store, workspace.bridge.hanger(hanger), order, AT)
+        return set_baseline(workspace, store, workspace.bridge.hanger(hanger), order, AT).made
 
 
 def test_the_tests_since_that_day_make_the_baseline(

@@ -36,10 +36,7 @@ def outcome(workspace: Workspace) -> object:
     """All that must not double: stages reached, results, alerts, what was owed to hooks."""
     with workspace.store() as store:
         return (
-            [
-                [step.stage for step in list_steps(store, each.id)]
-                for each in list_recordings(store)
-            ],
+            [[step.kind for step in list_steps(store, each.id)] for each in list_recordings(store)],
             tension_kn(store),
             len(store.watch.list_drifts(3)),
             [stored.alert.key for stored in store.alerts.list_all()],

@@ -15,12 +15,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
 
-from shm.store import Adoption, HeldTest, IdentifiedTest, Judgement, Lineage, Stage, Store
+from shm.store import Adoption, HeldTest, IdentifiedTest, Judgement, Stage, Store
 from shm.store.rows import Role
 from shm.store.tables import SCHEMA
 from shm.values import Doubt, Fingerprint, Selection
 from shm.values.notes import NoteKind
 from tests.helpers.diagnoses import a_diagnosis
+from tests.helpers.entering import LINEAGE
 from tests.helpers.nouns import (
     NOW,
     a_change,
@@ -35,7 +36,6 @@ from tests.helpers.nouns import (
 )
 from tests.helpers.streams import fill_streams
 
-LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 ADOPTED = "beam1+point_mass@everywhere"
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from shm.store import IdentifiedTest, Judgement, Lineage, Outcome, Stage, Store
+from shm.store import IdentifiedTest, Judgement, Outcome, Stage, Store
 from shm.store.journal import list_events, list_former_tests, list_steps
 from shm.store.recordings import (
     is_waiting,
     list_recordings,
 )
+from tests.helpers.entering import LINEAGE
 from tests.helpers.nouns import NOW, a_file, a_test
 
-LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 REASON = {"message": "no sampling rate.", "remedy": "Give it.", "sha256": "1"}
 
 
@@ -47,7 +47,7 @@ def test_only_what_still_waits_at_a_stage_is_refused_from_there(store: Store) ->
     for _ in range(2):
         store.recordings.refuse(first, REASON, NOW, stage=Stage.RECEIVED)
     assert len(list_events(store, "refused")) == 1
-    assert [step.stage for step in list_steps(store, first)].count(Stage.REFUSED) == 1
+    assert [step.kind for step in list_steps(store, first)].count(Stage.REFUSED) == 1
     store.tests.save(second, [IdentifiedTest(a_test("t2"))], LINEAGE, NOW)
     (test,) = store.tests.list_all()
     assert not is_waiting(store, second, Stage.RECEIVED)
@@ -68,7 +68,7 @@ def test_files_refused_together_each_end_with_their_own_tests(store: Store) -> N
     for number in ids:
         store.recordings.refuse(number, REASON, NOW, tests, stage=Stage.IDENTIFIED)
     for number in ids:
-        stages = [step.stage for step in list_steps(store, number)]
+        stages = [step.kind for step in list_steps(store, number)]
         assert stages.count(Stage.REFUSED) == 2  # the file and its test
 
 

@@ -11,16 +11,7 @@ import pytest
 import sqlalchemy as sa
 
 from shm.errors import NothingThere
-from shm.store import (
-    Baseline,
-    IdentifiedTest,
-    Lineage,
-    Stage,
-    Store,
-    StoredAlert,
-    StoredTest,
-    StoredWatch,
-)
+from shm.store import Baseline, Stage, Store, StoredAlert, StoredWatch
 from shm.store.alerts import (
     count_alerts,
     count_open_alerts,
@@ -29,44 +20,17 @@ from shm.store.alerts import (
 )
 from shm.store.tests import list_test_rows
 from shm.store.watch import find_latest_watches
-from shm.values import Selection
-from tests.helpers.nouns import (
-    NOW,
-    a_change,
-    a_file,
-    a_posterior,
-    a_test,
-    a_watched_test,
-    an_alert,
-)
-
-LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+from tests.helpers.entering import identified, selected, updated
+from tests.helpers.nouns import NOW, a_change, a_watched_test, an_alert
 
 
-def identified(store: Store, number: int, hanger: int = 3) -> StoredTest:
-    recording = store.recordings.receive(a_file(number), NOW).recording
-    made = a_test(f"t{number}", days=number, hanger=hanger)
-    store.tests.save(recording.id, [IdentifiedTest(made)], LINEAGE, NOW)
-    return next(test for test in store.tests.list_all() if test.recording_id == recording.id)
-
-
-def with_baseline(store: Store, number: int = 1, hanger: int = 3) -> Baseline:
-    first = identified(store, number, hanger)
-    posterior = a_posterior("beam1", (first.test.id,))
-    store.posteriors.save_selection(hanger, [first], Selection((posterior,), (1.0,)), LINEAGE, NOW)
-    return baseline_of(store, hanger)
-
-
-def baseline_of(store: Store, hanger: int = 3) -> Baseline:
-    baseline = store.watch.baseline(hanger)
-    assert baseline is not None
-    return baseline
+def with_baseline(store: Store, number: int, hanger: int) -> Baseline:
+    return selected(store, [identified(store, number, hanger=hanger)])
 
 
 def watched(store: Store, baseline: Baseline, number: int, evidence_years: float = 1.0) -> None:
-    test = identified(store, number, baseline.hanger)
+    test = updated(store, identified(store, number, hanger=baseline.hanger), number)
     name = test.test.id
-    store.posteriors.save(test, a_posterior("beam1", (name,), seed=number), LINEAGE, NOW)
     found = replace(a_watched_test(name), change=a_change(evidence_years=evidence_years))
     alert = replace(an_alert(), key=f"alert {number}", hanger=baseline.hanger, test=name)
     store.watch.save(test, baseline, replace(found, time=test.time), alert, ["mail"], NOW)

@@ -7,10 +7,11 @@ from datetime import timedelta
 
 import pytest
 
-from shm.errors import NothingThere, UsageError
-from shm.store import DeliveryState, Reconciled, Store
+from shm.errors import NothingThere, StoreError, UsageError
+from shm.store import DeliveryState, Reconciled, Stage, Store
 from shm.store.alerts import count_deliveries
 from shm.store.journal import list_steps
+from tests.helpers.entering import four_tests, watch
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import a_reading
 
@@ -105,7 +106,69 @@ def test_a_test_is_through_when_no_hook_is_owed_its_alert(filled_copy: Store) ->
     """Once, however many hooks there are."""
     store = filled_copy
     (first,) = (e for e in store.alerts.list_deliveries() if e.stored.alert.test == "t2")
-    before = [step.stage for step in list_steps(store, 2)]
+    before = [step.kind for step in list_steps(store, 2)]
     store.alerts.save_delivery(first, NOW + HOUR)
-    after = [step.stage for step in list_steps(store, 2)]
+    after = [step.kind for step in list_steps(store, 2)]
     assert after == [*before, "notified"]
+
+
+def test_a_new_alert_owes_each_hook_a_delivery(store: Store) -> None:
+    _, test, *_ = four_tests(store)
+    raised = watch(store, test, an_alert(test="t1"), "mail", "siren")
+    assert raised is not None
+    assert store.alerts.list_all(3) == (raised,)
+    assert raised.alert == an_alert(test="t1")
+    due = store.alerts.list_due_deliveries(NOW, 10)
+    assert [(each.hook, each.attempts, each.alert) for each in due] == [
+        ("mail", 0, raised.alert),
+        ("siren", 0, raised.alert),
+    ]
+
+
+def test_watching_a_test_again_changes_nothing(store: Store) -> None:
+    _, test, *_ = four_tests(store)
+    watch(store, test)
+    assert watch(store, test, an_alert(), "mail") is None
+    assert len(store.watch.list_drifts()) == 1
+    assert store.alerts.list_all() == ()
+
+
+def test_an_alert_whose_delivery_cannot_be_entered_is_not_raised(store: Store) -> None:
+    _, test, *_ = four_tests(store)
+    with pytest.raises(StoreError):
+        watch(store, test, an_alert(), "mail", "mail")
+    assert (
+        store.alerts.list_all() == store.alerts.list_deliveries() == store.watch.list_drifts() == ()
+    )
+    assert store.tests.get(test.id).stage is Stage.UPDATED
+
+
+def test_a_delivery_put_off_by_a_clock_that_was_ahead_is_due_once_it_is_right(
+    store: Store,
+) -> None:
+    _, test, *_ = four_tests(store)
+    watch(store, test, an_alert(), "mail")
+    waits = [timedelta(0), timedelta(seconds=5), timedelta(seconds=10)]
+    before = NOW - timedelta(days=400)
+    assert store.alerts.list_due_deliveries(before, 10) == ()
+    (delivery,) = store.alerts.list_due_deliveries(before, 10, (), waits)
+    for tries in range(1, 5):
+        wait = waits[min(tries, 2)]
+        store.alerts.save_failure(delivery, "exit code 1", NOW, NOW + wait)
+        (again,) = store.alerts.list_due_deliveries(before, 10, (), waits)
+        assert again.attempts == tries
+        assert store.alerts.list_due_deliveries(NOW, 10, (), waits) == ()
+
+
+def test_a_delivery_that_two_have_made_is_ended_once(store: Store) -> None:
+    _, test, *_ = four_tests(store)
+    watch(store, test, an_alert(test="t1"), "mail")
+    (owed,) = store.alerts.list_deliveries()
+    store.alerts.save_delivery(owed, NOW)
+    store.alerts.save_delivery(owed, NOW)
+    store.alerts.save_failure(owed, "no answer", NOW, None)
+    store.alerts.save_failure(owed, "no answer", NOW, NOW)
+    (ended,) = store.alerts.list_deliveries()
+    assert (ended.state, ended.attempts, ended.last_error) == (DeliveryState.DELIVERED, 1, "")
+    reached = [step.kind for step in list_steps(store, test.recording_id)]
+    assert reached.count("notified") == 1

@@ -9,41 +9,26 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
-from shm.store import IdentifiedTest, Judgement, Lineage, Stage, Store, StoredTest
+from shm.store import IdentifiedTest, Judgement, Stage, Store, StoredTest
 from shm.store import tests as judging
 from shm.store.blobs import unpack
 from shm.store.posteriors import list_history, list_posteriors
 from shm.store.tests import list_known_samples, load_frequency_response
 from shm.store.watch import list_selected_models
-from shm.values import AddedMass, Fingerprint, Selection
+from shm.values import AddedMass, Fingerprint
 from tests.helpers.comparing import assert_same
-from tests.helpers.nouns import (
-    NOW,
-    a_file,
-    a_posterior,
-    a_response,
-    a_test,
-)
-
-LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
-
-
-def identified(store: Store, number: int, *found: IdentifiedTest) -> tuple[StoredTest, ...]:
-    recording = store.recordings.receive(a_file(number), NOW).recording
-    items = found or (IdentifiedTest(a_test(f"t{number}", days=number)),)
-    store.tests.save(recording.id, items, LINEAGE, NOW)
-    return tuple(test for test in store.tests.list_all() if test.recording_id == recording.id)
+from tests.helpers.entering import LINEAGE, identified, selected
+from tests.helpers.nouns import NOW, a_file, a_posterior, a_response, a_test
 
 
 def baseline_of_two_models(store: Store, *tests: StoredTest) -> None:
     names = tuple(test.test.id for test in tests)
-    posteriors = (a_posterior("beam2", names), a_posterior("beam1", names))
-    store.posteriors.save_selection(3, tests, Selection(posteriors, (0.8, 0.2)), LINEAGE, NOW)
+    selected(store, tests, a_posterior("beam2", names), a_posterior("beam1", names))
 
 
 def test_a_test_comes_back_as_it_was(store: Store) -> None:
     test = a_test(added_mass=AddedMass(25.0, 3.6))
-    (stored,) = identified(store, 1, IdentifiedTest(test, 0, None, ("3 poles: too damped",)))
+    stored = identified(store, 1, IdentifiedTest(test, 0, None, ("3 poles: too damped",)))
     assert_same(stored.test, test)
     assert math.isnan(stored.test.amplitude)
     assert (stored.time, stored.stage, stored.notes) == (
@@ -71,7 +56,7 @@ def test_frequency_response_every_field(store: Store) -> None:
     for value in (response, test):
         for field in fields(value):
             assert repr(getattr(value, field.name)) != repr(field.default), field.name
-    (stored,) = identified(store, 1, IdentifiedTest(test, 0, response))
+    stored = identified(store, 1, IdentifiedTest(test, 0, response))
     found = load_frequency_response(store, stored)
     assert found is not None
     single = {
@@ -90,7 +75,7 @@ def test_two_files_may_call_their_tests_the_same(store: Store) -> None:
 
 
 def test_the_most_probable_class_is_selected_and_its_posterior_the_baseline(store: Store) -> None:
-    (first,) = identified(store, 1)
+    first = identified(store, 1)
     baseline_of_two_models(store, first)
     selection = store.posteriors.selection(3)
     assert selection is not None
@@ -105,7 +90,7 @@ def test_the_most_probable_class_is_selected_and_its_posterior_the_baseline(stor
 
 
 def test_several_tests_may_make_one_baseline(store: Store) -> None:
-    tests = (*identified(store, 1), *identified(store, 2))
+    tests = identified(store, 1), identified(store, 2)
     baseline_of_two_models(store, *tests)
     history = list_history(store, 3)
     assert [test.test.id for test, _ in history] == ["t1", "t2"]
@@ -114,8 +99,8 @@ def test_several_tests_may_make_one_baseline(store: Store) -> None:
 
 
 def test_a_posterior_comes_back_complete_with_its_samples(store: Store) -> None:
-    (first,) = identified(store, 1)
-    (second,) = identified(store, 2)
+    first = identified(store, 1)
+    second = identified(store, 2)
     baseline_of_two_models(store, first)
     posterior = a_posterior("beam2", ("t2",), seed=2**32 - 1)
     store.posteriors.save(second, posterior, LINEAGE, NOW)
@@ -130,9 +115,9 @@ def test_a_posterior_comes_back_complete_with_its_samples(store: Store) -> None:
 
 def test_posterior_of_a_sampler_that_is_gone_is_read(store: Store) -> None:
     """Earlier versions had the thesis's own sampler."""
-    (first,) = identified(store, 1)
+    first = identified(store, 1)
     posterior = replace(a_posterior("beam2", ("t1",)), method="textbook", priors="thesis")
-    store.posteriors.save_selection(3, [first], Selection((posterior,), (1.0,)), LINEAGE, NOW)
+    selected(store, [first], posterior)
     assert_same(store.posteriors.get(3), posterior)
 
 

@@ -18,8 +18,14 @@ from alembic.script import ScriptDirectory
 
 from shm.errors import NothingThere, SchemaOutdated, StoreError
 from shm.resources import migrations_folder
-from shm.store import Acknowledgement, Decision, Stage, Store
-from shm.store.journal import list_changes, list_events, list_former_tests, list_steps
+from shm.store import AlertNote, Decision, Stage, Store
+from shm.store.journal import (
+    change_document,
+    list_changes,
+    list_events,
+    list_former_tests,
+    list_steps,
+)
 from shm.store.posteriors import list_history
 from shm.store.recordings import count_stages, find_latest_hold, list_holds
 from shm.store.schema import changed_objects
@@ -97,7 +103,7 @@ def test_a_database_of_the_first_release_has_alerts_open_and_what_is_known_of_it
         assert baseline is not None
         assert (baseline.since, baseline.posterior.tests) == (None, ("t1",))
         steps = list_steps(store, 1)
-        assert [(step.stage, step.test, step.version) for step in steps] == [
+        assert [(step.kind, step.test, step.version) for step in steps] == [
             ("received", None, None),
             ("identified", "t1", "0.1.0"),
         ]
@@ -113,7 +119,7 @@ def test_all_that_a_database_of_1_0_0_holds_is_kept(schema: int, tmp_path: Path)
         stored = store.alerts.list_all()[0]
         assert stored.alert.kinds == ("beyond threshold",)
         assert stored.alert.change == a_change()
-        assert stored.acknowledgement == Acknowledgement(1, "engineer", "looked at the pin", NOW)
+        assert stored.acknowledgement == AlertNote(1, "engineer", "looked at the pin", NOW)
         watch = store.watch.list_all(3)[0]
         assert watch.watched.change == a_change()
         assert [drift.quantity for drift in watch.watched.drifts] == ["tension"]
@@ -138,14 +144,14 @@ def test_all_that_a_database_of_1_0_0_holds_is_kept(schema: int, tmp_path: Path)
 
 def test_four_histories_become_one_journal_in_which_a_refusal_is_one_entry(tmp_path: Path) -> None:
     with upgraded(1, tmp_path) as store:
-        steps = [(each.stage, each.test) for each in list_steps(store, 3)]
+        steps = [(each.kind, each.test) for each in list_steps(store, 3)]
         assert steps == [("archived", None), ("received", None), ("refused", None)]
         assert list_steps(store, 3)[-1].version == "0.1.0"
-        events = [(each.kind, each.file_name) for each in list_events(store)]
+        events = [(each.kind, each.subject) for each in list_events(store)]
         assert events.count(("refused", "h3-3.csv")) == 1
-        held = [each.stage for each in list_steps(store, 6) if each.test is None]
+        held = [each.kind for each in list_steps(store, 6) if each.test is None]
         assert held.count("held") == 1
-        changes = {(each.who, each.action) for each in list_changes(store)}
+        changes = {(each.who, change_document(each)["action"]) for each in list_changes(store)}
         assert ("engineer", "recording confirmed") in changes
         assert ("engineer", "baseline set") in changes
 

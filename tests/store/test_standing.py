@@ -4,29 +4,20 @@ from __future__ import annotations
 
 from datetime import datetime, timedelta
 
-from shm.store import Deaths, IdentifiedTest, Lineage, Store
+from shm.store import Deaths, IdentifiedTest, Store
 from shm.store.journal import list_events
 from shm.store.recordings import (
     count_deaths,
     list_stage_seconds,
 )
-from shm.store.tests import StoredTest
+from tests.helpers.entering import LINEAGE
 from tests.helpers.nouns import NOW, a_file, a_test
 
-HOUR, DAY = timedelta(hours=1), timedelta(days=1)
-LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+HOUR = timedelta(hours=1)
 
 
 def received(store: Store, number: int, at: datetime = NOW) -> int:
     return store.recordings.receive(a_file(number), at).recording.id
-
-
-def identified(store: Store, number: int, day: float, **changes: object) -> StoredTest:
-    """A test of its own recording."""
-    test = a_test(f"t{number}", day, **changes)
-    id_ = received(store, number)
-    store.tests.save(id_, [IdentifiedTest(test)], LINEAGE, NOW)
-    return next(t for t in store.tests.list_all(test.hanger) if t.recording_id == id_)
 
 
 def test_steps_take_from_the_one_before_and_only_those_made_lately_are_told(

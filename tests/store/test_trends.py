@@ -13,25 +13,27 @@ import shm.store.posteriors as stored
 from shm.models import described, end_stiffness
 from shm.store import (
     Adoption,
-    IdentifiedTest,
-    Lineage,
     Numbers,
     Stage,
     Store,
     StoredTest,
     TrendPoint,
 )
-from shm.store.posteriors import find_latest_trends, list_history, list_trend
+from shm.store.posteriors import (
+    find_latest_trends,
+    list_baselines_in_force,
+    list_history,
+    list_trend,
+)
 from shm.store.tables import posteriors
-from shm.store.watch import list_baselines_in_force
 from shm.values import Hanger, Limits, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
+from tests.helpers.entering import LINEAGE, identified, selected
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import posterior as modelled
-from tests.helpers.nouns import NOW, a_file, a_posterior, a_test
+from tests.helpers.nouns import NOW, a_posterior
 from tests.helpers.slow import few_of
 
-LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 SPRUNG = [1.0, 0.98, 7.0, 7.4, 7.2, 7.1]
 Told = tuple[str, tuple[datetime, datetime | None, float], str, Numbers]
 ANOTHER = replace(HANGER_3, id=4)
@@ -41,23 +43,15 @@ def a_sprung(test: str, tension: float = 1.0) -> Posterior:
     return replace(modelled([tension, *SPRUNG[1:]]), tests=(test,))
 
 
-def identified(store: Store, number: int, hanger: int = 3) -> StoredTest:
-    recording = store.recordings.receive(a_file(number), NOW).recording
-    made = a_test(f"t{number}", days=number, hanger=hanger)
-    store.tests.save(recording.id, [IdentifiedTest(made)], LINEAGE, NOW)
-    return next(test for test in store.tests.list_all() if test.recording_id == recording.id)
-
-
 def begun(store: Store, number: int = 1, hanger: int = 3) -> StoredTest:
     """The first test of a hanger: two classes compete, the sprung one is selected."""
-    first = identified(store, number, hanger)
-    ranked = (a_sprung(first.test.id), a_posterior("beam1", (first.test.id,)))
-    store.posteriors.save_selection(hanger, [first], Selection(ranked, (0.9, 0.1)), LINEAGE, NOW)
+    first = identified(store, number, hanger=hanger)
+    selected(store, [first], a_sprung(first.test.id), a_posterior("beam1", (first.test.id,)))
     return first
 
 
 def updated(store: Store, number: int, tension: float, hanger: int = 3) -> StoredTest:
-    test = identified(store, number, hanger)
+    test = identified(store, number, hanger=hanger)
     store.posteriors.save(test, a_sprung(test.test.id, tension), LINEAGE, NOW)
     return test
 

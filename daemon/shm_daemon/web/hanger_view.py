@@ -27,10 +27,9 @@ from shm.store import (
     Workspace,
 )
 from shm.store.alerts import list_hanger_events
-from shm.store.posteriors import list_trend
+from shm.store.posteriors import list_baselines_in_force, list_trend
 from shm.store.tests import list_watched_tests
 from shm.store.watch import (
-    list_baselines_in_force,
     list_detections,
 )
 from shm.values import Hanger

@@ -14,8 +14,9 @@ from shm.errors import NothingThere
 from shm.report import formatting
 from shm.report.paper import Table
 from shm.report.shared_tables import overall
-from shm.store import FormerPosterior, FormerTest, Step
+from shm.store import FormerPosterior, FormerTest
 from shm.store.journal import list_former_tests, list_steps
+from shm.store.rows import Entry
 from shm.store.tests import find_neighbours
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import name_in
@@ -48,7 +49,7 @@ def origin(view: ModalTestView) -> Table:
     return Table("Raw file and lineage", ("what", "value"), tuple(facts.items()))
 
 
-def steps_of(view: ModalTestView) -> tuple[Step, ...]:
+def steps_of(view: ModalTestView) -> tuple[Entry, ...]:
     """Return the steps of the file, and those of this test of it."""
     found = list_steps(view.store, view.recording.id)
     return tuple(step for step in found if step.test in (None, view.stored.test.id))
@@ -60,7 +61,7 @@ def steps(view: ModalTestView) -> Table:
     before: list[datetime | None] = [None, *(step.at for step in found)]
     rows = tuple(
         (
-            step.stage,
+            step.kind,
             "test" if step.test else "file",
             f"{step.at:%Y-%m-%d %H:%M:%S} UTC",
             _after(step.at, then),
@@ -211,7 +212,7 @@ def test(_: Reader, view: View) -> JSONResponse:
             "archived": view.is_archived,
         },
         "lineage": stored.lineage.columns,
-        "steps": [{"stage": s.stage, "at": s.at, "version": s.version} for s in steps_of(view)],
+        "steps": [{"stage": s.kind, "at": s.at, "version": s.version} for s in steps_of(view)],
         "superseded": [
             {
                 "what": "posterior" if model else "identification",

@@ -17,8 +17,7 @@ from shm.report import formatting
 from shm.report.figures.compared_hangers import MOST, TensionShifts, alt, caption, specify
 from shm.report.formatting import Interval
 from shm.report.hanger_summary import HangerSummary
-from shm.store.posteriors import list_trend
-from shm.store.watch import list_baselines_in_force
+from shm.store.posteriors import list_baselines_in_force, list_trend
 from shm.values import Hanger
 from shm_daemon.web import with_plotly
 from shm_daemon.web.access import AtSite, Reader

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,10 +20,11 @@ from starlette.concurrency import run_in_threadpool
 from shm.errors import BadInput, UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.importing import (
-    ANSWERS_OF_TEST,
+    OF_TEST,
     Answers,
     Import,
     Question,
+    answer_of_test,
     answer_to,
     import_document,
     keep_profile,
@@ -161,17 +161,12 @@ def _answers(body: str, found: Import) -> Answers:
         channels=tables,
         each_time=said.get("each_time") is True,
     )
-    for key, answer in ANSWERS_OF_TEST.items():
-        if key in said:
-            answers = _with(answer, answers, said[key])
-    return answers
-
-
-def _with(answer: Callable[[str, Answers], Answers], answers: Answers, text: object) -> Answers:
     try:
-        return answer(str(text), answers)
+        for about in (about for about in OF_TEST if about in said):
+            answers = answer_of_test(about, str(said[about]), answers)
     except UsageError as error:
         raise BadInput(error.message, remedy=error.remedy) from error
+    return answers
 
 
 def _answered(question: Question, about: str, text: str, found: Import) -> dict[str, object]:

@@ -10,7 +10,7 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.report import formatting
 from shm.report.paper import Table
-from shm.store.journal import list_changes
+from shm.store.journal import change_document, list_changes
 from shm.store.rows import Role
 from shm_daemon.web.access import AtSite, Engineer, with_passwords
 from shm_daemon.web.forms import Form, redirect_or_show_error
@@ -71,7 +71,7 @@ def audit_page(request: Request, site: AtSite, _: Engineer, before: Before = Non
         "Changes",
         ("time", "who", "by", "action", "of", "detail"),
         tuple(
-            (formatting.moment(each.at), each.who, each.via, each.action, each.subject, each.detail)
+            (formatting.moment(each.at), *list(change_document(each).values())[2:])
             for each in shown
         ),
     )
