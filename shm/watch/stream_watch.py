@@ -94,8 +94,9 @@ class StreamState:
 
     `lagged_c` are the temperature's exponential means, `reference` its first value, that of the
     log level and of the wind; `known_day` is the last with a temperature. `ring` (24, n) are the
-    newest readings' modes, `ring_conditions` and `ring_day` what they are of, `old` (n,) the mean of
-    those before with the conditions taken off. Shifts count from `zero`, compensated ones from `compensated_zero`; a change
+    newest readings' modes, `ring_conditions` and `ring_day` what they are of, `old` (n,) the mean
+    of those before without what the conditions do. Shifts count from `zero`, compensated ones from
+    `compensated_zero`; a change
     that was told of the tension is `called`, of one plane `apart`. `contrast` are the filters of
     what one plane says more than the other, less what was `absorbed` into the modes' levels.
     The planes have looked exchanged for `exchanged_hours`. `unknown_sd` of ln T is what an unknown
@@ -454,7 +455,7 @@ class StreamWatch:
         return StreamWatched(b"", its, its_sd, shift, sd, test, alert, events, ended, ""), state
 
     def _weigh(self, state: StreamState) -> tuple[Evidence, Evidence, Evidence, bool]:
-        """Return the evidence of any change, of the tension's, of one plane's, and if it is that."""
+        """Return the evidence of any change, the tension's, one plane's, and if it is that."""
         of_tension = state.bank.evidence(self.options.least_shift)
         apart = state.contrast.evidence(self.options.least_shift)
         share = self.options.share_of_one_plane
