@@ -96,9 +96,9 @@ class StreamState:
     log level and of the wind; `known_day` is the last with a temperature. `ring` (24, n) are the
     newest readings' modes, `ring_conditions` and `ring_day` what they are of, `old` (n,) the mean
     of those before without what the conditions do. Shifts count from `zero`, compensated ones from
-    `compensated_zero`; a change
-    that was told of the tension is `called`, of one plane `apart`. `contrast` are the filters of
-    what one plane says more than the other, less what was `absorbed` into the modes' levels.
+    `compensated_zero`; a change that was told of the tension is `called`, of one plane `apart`.
+    `contrast` are the filters of what one plane says more than the other, less what was `absorbed`
+    into the modes' levels.
     The planes have looked exchanged for `exchanged_hours`. `unknown_sd` of ln T is what an unknown
     temperature may do, 0 where it is known. Up to `settled_day` readings are gone over again: no
     alert ends before.
