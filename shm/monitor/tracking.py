@@ -15,6 +15,7 @@ from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.planes import shape_points
 from shm.identify.options import NO_CROSS_CHECK
 from shm.monitor.close_modes import Band, BandFit, CloseModes, directions, lines_of
+from shm.monitor.limits import LIMITS
 from shm.monitor.sensor_health import exchanged
 from shm.monitor.spectrum import ALONE, REACH, Peaks, Stretch, found_peaks
 from shm.monitor.windows import Judged, judged
@@ -31,24 +32,6 @@ from shm.values import (
 )
 from shm.values.rounding import listed
 from shm.values.stream import Piece, Stream, Window, WindowReading
-
-_HALF_WIDTHS = 10.0
-"""Of a peak, to either side of it in its band. What white force leaves out of the slope of the
-motion's spectrum moves a frequency by 0.6 n z^2 of it, n half widths to a side at a damping z."""
-_LEAST_LINES = 12  # judgement: to either side: a floor is known to a fifth by 24 lines
-_OTHER_PLANE = 0.08
-"""judgement: of the frequency; sensors that are a few degrees off see the other plane, too."""
-_LEAST_GAIN = 15.0
-"""judgement: of log likelihood by which a mode is proven: its five parameters and some two hundred
-places to look make 10 by chance."""
-_NARROWER = 10.0
-"""judgement: than the mode as it was known, or than a line: a tone, of trains or machines, near it.
-Two close modes that were taken for one had up to seven times the damping of each."""
-_FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
-_REVIEW_S, _REVIEW_FEW_S, _FEW = 12 * 3600, 3600, 2
-"""judgement: how often modes are sought that were missed at first, by day and by night; each hour
-where so few are known, or most are lost. From scratch costs as much as twenty windows that are
-followed."""
 
 
 def read_window(
@@ -79,7 +62,7 @@ def read_window(
     if 2 * len(modes) <= len(known) or guessed:
         if found.window.kind == "quiet":
             why.append("the modes are hidden by the noise of the sensors")
-        elif not is_confirmed or _is_due(found.window, _REVIEW_FEW_S):
+        elif not is_confirmed or _is_due(found.window, LIMITS.review_few_s):
             try:
                 fresh = _from_scratch(found, stream, hanger, options)
                 if not is_confirmed or is_moved_by_tension(known, fresh):
@@ -107,7 +90,7 @@ def _is_reviewed(known: Sequence[Mode], window: Window) -> bool:
     highest = max(mode.order for mode in known)
     if all(len(each) == highest for each in orders):
         return False
-    return _is_due(window, _REVIEW_S if len(known) > _FEW else _REVIEW_FEW_S)
+    return _is_due(window, LIMITS.review_s if len(known) > LIMITS.few else LIMITS.review_few_s)
 
 
 def _is_due(window: Window, every_s: int) -> bool:
@@ -135,7 +118,7 @@ def _reviewed(
         fresh = _from_scratch(found, stream, hanger, options)
     except ShmError as error:
         return WindowReading(found.window, modes, "tracked", f"{why}; none sought: {error}")
-    if len(known) <= _FEW and len(fresh) > 2 * len(known):
+    if len(known) <= LIMITS.few and len(fresh) > 2 * len(known):
         return WindowReading(found.window, fresh, "from scratch", why)
     return WindowReading(found.window, modes + _missed(known, modes, fresh), "tracked", why)
 
@@ -194,7 +177,7 @@ def _missed(
             return False
         return all(
             (each.frequency_hz - mode.frequency_hz) * (each.order - mode.order) > 0
-            and abs(each.frequency_hz / mode.frequency_hz - 1) > _OTHER_PLANE
+            and abs(each.frequency_hz / mode.frequency_hz - 1) > LIMITS.other_plane
             for each in its
         )
 
@@ -289,9 +272,9 @@ def _prove(
 def _half_hz(peaks: Peaks, stretches: Sequence[Stretch]) -> FloatArray:
     """To either side of each mode, how wide its band is."""
     hz = peaks.frequency_hz
-    least = _LEAST_LINES / max(each.seconds for each in stretches)
+    least = LIMITS.least_lines / max(each.seconds for each in stretches)
     # Technical: of the frequency; a band's floor is taken as flat
-    wide = np.minimum(_HALF_WIDTHS * peaks.damping * hz, 0.03 * hz)
+    wide = np.minimum(LIMITS.half_widths * peaks.damping * hz, 0.03 * hz)
     half: FloatArray = np.maximum(wide, least)
     return half
 
@@ -305,7 +288,7 @@ def _groups(
         if group:
             away = hz[index] - hz[group[-1]]
             other = all(known[index].plane != known[each].plane for each in group)
-            near = _OTHER_PLANE * hz[index] if other else 0.0
+            near = LIMITS.other_plane * hz[index] if other else 0.0
             if away > max(near, half_hz[index], half_hz[group[-1]]):
                 yield group
                 group = []
@@ -364,7 +347,7 @@ class _Group:
                 without = band.only(rest).fitted(fit.modes.only(rest), 6)
                 gains.append(fit.log_likelihood - without.log_likelihood)
             weakest = int(np.argmin(gains))
-            if gains[weakest] >= _LEAST_GAIN:
+            if gains[weakest] >= LIMITS.least_gain:
                 return fit, chosen
             del chosen[weakest]
             start = fit.modes.only([p for p in range(len(gains)) if p != weakest])
@@ -383,7 +366,7 @@ class _Group:
         power = np.maximum(power, 1e-6 / np.max(self.shapes**2))
         seen = directions(self.shapes)
         along = np.real(np.einsum("xij,ik,jk->kx", self.lines.power, seen, seen))
-        floor = np.quantile(along, _FLOOR, axis=1)[[0, -1]]
+        floor = np.quantile(along, LIMITS.floor, axis=1)[[0, -1]]
         zero = np.zeros(count)
         return CloseModes(radians, decay, power, zero, zero, np.eye(count, dtype=complex), floor)
 
@@ -401,7 +384,7 @@ class _Group:
         options = replace(self.options, ambient_s=sum(s.seconds for s in self.found.stretches))
         best = options.ambient_width * options.at_best(hz, damping)[0]
         if (
-            damping < self.peaks.damping[index] / _NARROWER
+            damping < self.peaks.damping[index] / LIMITS.narrower
             or decay * max(each.seconds for each in self.found.stretches) < 1.0
             or damping > self.options.max_damping_ratio
             or sd_hz > hz * max(2 * self.options.max_frequency_sd, best)

@@ -23,6 +23,7 @@ import scipy
 
 from shm.values import BoolArray, FloatArray, IntArray
 from shm.watch.causes import DetectedChange, Direction, Layout
+from shm.watch.limits import LIMITS
 from shm.watch.options import OF_ONE_VISIT_YEARS
 
 STEP, RAMP = 0, 1
@@ -31,10 +32,8 @@ SIZES = np.array([1.0, 6.0])
 
 # Judgement: nine of ten changes are just what may not be missed.
 LOG_SHARES = np.log([0.9, 0.1])
-_A_WEEK_YEARS = 7 / 365.25
 SAMPLES = 500
 """Of a summary: a probability of a half is known to 0.02, a mean to a twentieth of its sd."""
-_LEADING = 24  # technical: changes that draws are of, the most probable
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +128,9 @@ class Evidence:
         prior = np.array([each.log_prior for each in self.directions]) - kinds
         over_scatters = np.logaddexp.reduce(self.log_mass[at, :, STEP], axis=0) - waited
         factor = float((over_scatters - prior[:, None] - LOG_SHARES).max())
-        return factor, _total(self.log_mass[at]) - waited + max(waited, math.log(_A_WEEK_YEARS))
+        return factor, _total(self.log_mass[at]) - waited + max(
+            waited, math.log(LIMITS.a_week_years)
+        )
 
     def by_direction(self) -> FloatArray:
         """Probability (D,) of each direction, given a change."""
@@ -147,7 +148,7 @@ class Evidence:
         log_mass = np.where(part[:, None], self.log_mass, -np.inf)
         if not is_last_counted:
             log_mass[-1:] = -np.inf
-        leading = np.argsort(log_mass.ravel())[-_LEADING:]
+        leading = np.argsort(log_mass.ravel())[-LIMITS.change_point_leading :]
         leading = leading[np.isfinite(log_mass.ravel()[leading])]
         if not len(leading):
             return np.zeros((0, self.layout.n + self.layout.q)), np.zeros((0, len(loadings)))

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded, rounded_percent
+from shm.watch.limits import LIMITS
 from shm.watch.neighbours import REACH, BridgePattern, HangerRow
-
-_SURE_WHICH = 0.8  # judgement: four to one
 
 
 def sentence_of(pattern: BridgePattern, named_from: float) -> str:
@@ -84,7 +83,9 @@ def _moved(pattern: BridgePattern) -> str:
         )
     else:
         words.append(f"{'Its' if one else 'Their'} neighbours have no test to compare.")
-    if len(suspects) > 1 and suspects[0].probability <= _SURE_WHICH * pattern.probability(name):
+    if len(suspects) > 1 and suspects[0].probability <= LIMITS.sure_which * pattern.probability(
+        name
+    ):
         words.append(
             f"It may also be {_hangers(suspects[1].hangers).lower()} (probability "
             f"{suspects[1].probability:.2f})."

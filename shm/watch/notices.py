@@ -41,13 +41,11 @@ from shm.watch.alert_text import (
     size_words,
     structure_words,
 )
+from shm.watch.limits import LIMITS
 from shm.watch.mistaken_modes import MOST_MISTAKEN
 from shm.watch.quantities import MeasuredMode
 
 _CHECK: AlertKind = "check the baseline"
-_CLEAR_DRIFT = 2.0  # judgement: that tests and baseline disagree is known by then
-# Of a log frequency: more than sensors, joints and traffic do to a mode by itself (judgement).
-_OFF = 0.01
 
 
 # ---------------------------------------------------------------- the baseline
@@ -58,7 +56,7 @@ def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
 
     One mistaken mode of the only test before passes for an end that moved.
     """
-    clear = [each for each in test.drifts if _deviations(each) > _CLEAR_DRIFT]
+    clear = [each for each in test.drifts if _deviations(each) > LIMITS.clear_drift]
     lead = max(clear, key=_deviations, default=None)
     kind, drifts = _CHECK, tuple[Drift, ...]()
     if lead is None or not hanger.is_modelled:
@@ -152,7 +150,7 @@ def off_the_baseline(reading: Reading) -> BoolArray:
     if modes is None:
         return np.zeros(0, bool)
     measured = np.isfinite(modes.variances)
-    off = measured & (np.abs(modes.values - modes.slopes @ reading.mean) > _OFF)
+    off = measured & (np.abs(modes.values - modes.slopes @ reading.mean) > LIMITS.notices_off)
     can_tell = measured.sum() > len(reading.mean) + 1
     are_too_many = can_tell and off.sum() > MOST_MISTAKEN * measured.sum()
     return off if are_too_many else np.zeros(len(off), bool)

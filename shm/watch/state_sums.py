@@ -25,6 +25,7 @@ from shm.values import (
 )
 from shm.watch.causes import DetectedChange, Structure
 from shm.watch.change_point import SIZES, Evidence, Sums, sums_of
+from shm.watch.limits import LIMITS
 from shm.watch.options import (
     OF_ONE_VISIT_YEARS,
     Warmth,
@@ -84,13 +85,6 @@ class WatchState:
         """Logarithms (T,), NaN where an amplitude is not known."""
         amplitude = np.array([each.amplitude for each in self.readings])
         return np.log(np.where(amplitude > 0, amplitude, np.nan))
-
-
-_LEAST_SHARE = 1e-6  # judgement: of a cause in a call, which later tests may yet speak for
-_PRIOR_TESTS = 6.0  # judgement: a dozen tests say more than what was assumed of any hanger
-# Of a difference, in its own sds: up to the first all counts, from the second on nothing: what lies
-# that far is a change, and no scatter (Hampel 1974). One good one in 370 is beyond the first.
-_SCATTER_UP_TO, _CHANGE_FROM = 3.0, 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,11 +180,13 @@ class StateSums:
             along = (weighted * values).sum(axis=1)
             explained = (scaled * weighted).sum(axis=1)
             far = np.abs(along) / np.sqrt(np.maximum(explained, 1e-12))
-            left = np.clip((_CHANGE_FROM - far) / (_CHANGE_FROM - _SCATTER_UP_TO), 0.0, 1.0)
-            square = explained * np.minimum(far, _SCATTER_UP_TO) ** 2
+            left = np.clip(
+                (LIMITS.change_from - far) / (LIMITS.change_from - LIMITS.scatter_up_to), 0.0, 1.0
+            )
+            square = explained * np.minimum(far, LIMITS.scatter_up_to) ** 2
             expected = there * (left * square + (1 - left) * explained + 1 - explained)
-            variance = (_PRIOR_TESTS * prior + variance * expected.sum(axis=0)) / (
-                _PRIOR_TESTS + there.sum(axis=0)
+            variance = (LIMITS.prior_tests * prior + variance * expected.sum(axis=0)) / (
+                LIMITS.prior_tests + there.sum(axis=0)
             )
         return np.asarray(variance)
 
@@ -301,7 +297,7 @@ def detected_change(evidence: Evidence, rows: IntArray, change: Change) -> Detec
         [np.full(layout.n, 1e-5), 1e-3 * layout.prior_sd[layout.n :][: layout.q]]
     )
     covariance = np.diag(least**2)
-    shares = np.maximum(evidence.shares.sum(axis=(0, 1, 2)), _LEAST_SHARE)
+    shares = np.maximum(evidence.shares.sum(axis=(0, 1, 2)), LIMITS.state_sums_least_share)
     for direction, by_size in zip(evidence.directions, shares, strict=True):
         for share, size in zip(by_size, SIZES, strict=True):
             covariance += share * size**2 * direction.factor @ direction.factor.T

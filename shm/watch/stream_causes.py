@@ -15,6 +15,7 @@ import numpy as np
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode, Moved, Plane, Posterior
 from shm.watch.causes import SENSOR_MASS, TIMEBASE, UNEXPLAINED, structure_of
 from shm.watch.change_point import evidence_of, sums_of
+from shm.watch.limits import LIMITS
 from shm.watch.options import WatchOptions
 from shm.watch.posterior_summary import SummaryContext, rank_causes
 from shm.watch.quantities import MeasuredMode
@@ -22,7 +23,6 @@ from shm.watch.readings import Reader
 from shm.watch.state_sums import effects_of
 from shm.watch.stream_reading import ModeTable, baseline_of
 
-_DAY_SD = 3e-4  # of ln f: joints that slip by another level, each mode by its own. Judgement
 EXCHANGED = "exchanged planes"
 """A cause that no hammer test has: the cables of the sensors are exchanged. Record 0002."""
 _NEVER = datetime(2000, 1, 1, tzinfo=UTC)  # technical: these readings need no time
@@ -78,7 +78,7 @@ def find_cause(
     n = structure.layout.n
     columns = np.zeros((2, n, len(structure.layout.prior_sd)))
     columns[:, :, :n], columns[:, :, n : n + len(slopes.T)] = np.eye(n), slopes
-    of_day = np.full(n, _DAY_SD**2)
+    of_day = np.full(n, LIMITS.day_sd**2)
     wander = wander_sd * slopes[:, 0]
     sums = sums_of(
         columns,
@@ -134,4 +134,4 @@ def _is_clock(moved: Sequence[Moved]) -> bool:
 
 def _as_test(keys: Sequence[MeasuredMode], log_hz: FloatArray) -> ModalTest:
     modes = zip(keys, np.exp(log_hz).tolist(), strict=True)
-    return ModalTest("before", tuple(Mode(*key, hz, _DAY_SD * hz) for key, hz in modes))
+    return ModalTest("before", tuple(Mode(*key, hz, LIMITS.day_sd * hz) for key, hz in modes))

@@ -13,14 +13,9 @@ from datetime import datetime, timedelta
 
 from shm.values import COLDEST_C, NAN, WARMEST_C, outdoor_c
 from shm.values.stream import StreamEvent, Window, WindowReading
+from shm.watch.limits import LIMITS
 
-FASTEST_K_PER_H = 57.0
-"""Derived: of a rod of 20 mm, the thinnest hanger, that loses nothing of the 900 W/m2 of a high sun
-which fall on its diameter d: 4 x 900 / (pi rho c d), with 7850 kg/m3 and 460 J/(kg K)."""
 _WINDOW = timedelta(minutes=10)  # the least time over which two values are compared
-_STILL_K, _STILL_S, _STILL_WINDOWS = 1e-3, 86400.0, 24
-"""Judgement: no thermometer resolves less, and no sun's round leaves the air as it was from hour to
-hour; two days alike at noon are no wonder."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +39,9 @@ class Thermometer:
             return self
         step = value_c - self.seen_c
         hours = max(at_s - self.seen_s, _WINDOW.total_seconds()) / 3600
-        if abs(step) < _STILL_K:  # compared with the first of them, or a creep would be none
+        if abs(step) < LIMITS.still_k:  # compared with the first of them, or a creep would be none
             seen = replace(self, seen_s=at_s, still=self.still + 1)
-            is_stuck = at_s - self.still_s >= _STILL_S and seen.still >= _STILL_WINDOWS
+            is_stuck = at_s - self.still_s >= LIMITS.still_s and seen.still >= LIMITS.still_windows
             if self.is_doubted(at_s) or not is_stuck:
                 return seen
             return replace(seen, since_s=at_s, until_s=math.inf)
@@ -55,7 +50,7 @@ class Thermometer:
             return replace(seen, until_s=at_s)
         if abs(self.off_k + step) < abs(self.off_k) / 2:
             return replace(seen, off_k=0.0, until_s=at_s)
-        if not abs(step) > FASTEST_K_PER_H * hours:  # NaN at first
+        if not abs(step) > LIMITS.fastest_k_per_h * hours:  # NaN at first
             return seen
         since_s = self.since_s if self.off_k else at_s
         return replace(seen, off_k=self.off_k + step, since_s=since_s, until_s=math.inf)
@@ -116,7 +111,7 @@ def _impossible(value_c: float) -> str:
 
 
 def _why_doubted(thermometer: Thermometer, first: Window) -> str:
-    if thermometer.since_s - thermometer.still_s >= _STILL_S:
+    if thermometer.since_s - thermometer.still_s >= LIMITS.still_s:
         return _stuck(thermometer, first)
     return _jumped(thermometer, first.start)
 

@@ -43,6 +43,7 @@ from shm.values.stream import (
 )
 from shm.watch.causes import TIMEBASE
 from shm.watch.kept_state import from_bytes, to_bytes
+from shm.watch.limits import LIMITS
 from shm.watch.stream_causes import EXCHANGED, StreamCause, find_cause, find_exchange
 from shm.watch.stream_filter import CLIP, FAST, FEATURES, LEVEL, NOTHING, SLOW, Bank, Evidence
 from shm.watch.stream_reading import ModeTable, SeenReading, planes_of, usable
@@ -55,11 +56,8 @@ _LAGS_DAYS = np.array([2.0, 14.0, 240.0]) / HOURS_A_DAY
 # Judgement: by what an hour's temperature differs from ten days' mean, and that the errors of some
 # ten hours without a thermometer are one error: an hour counts for a third of what it would.
 _UNKNOWN_K, TOGETHER = 4.0, 3.0
-HOURS_EXCHANGED = 3  # judgement: until it is reported, as mistaken modes look like it for an hour
 NO_CONDITIONS = np.zeros(0)
 """Of the contrast of the planes: what the weather does to one more than the other is its wander."""
-_RING = 24  # readings: a change is told within a day or is slow
-OLD_READINGS = 120.0  # judgement: five days, as what a mode differs by is learnt over
 
 
 def condition_sd(assumed: Assumptions) -> FloatArray:
@@ -231,10 +229,10 @@ def with_ring(
     old = np.append(state.old, np.full(n - len(state.old), NAN))
     ring, days = np.vstack([grown, seen.off]), np.append(state.ring_day, day)
     met = np.vstack([state.ring_conditions, conditions])
-    if len(ring) > _RING:
+    if len(ring) > LIMITS.ring:
         left = _at_rest(state.table, state.bank, ring[:1], met[:1])[0]
         ring, met, days = ring[1:], met[1:], days[1:]
-        share = 1 / min(max(state.readings - _RING, 1), OLD_READINGS)
+        share = 1 / min(max(state.readings - LIMITS.ring, 1), LIMITS.old_readings)
         mixed = np.where(np.isfinite(left), old + share * (left - old), old)
         old = np.where(np.isfinite(old), mixed, left)
     return replace(state, ring=ring, ring_conditions=met, ring_day=days, old=old)
@@ -247,7 +245,6 @@ def _at_rest(table: ModeTable, bank: Bank, ring: FloatArray, conditions: FloatAr
 
 
 _VERSION = "stream-watch-2"
-_MODEL_OFF = 0.2  # judgement: by what the part of bending in a sensitivity is known
 _CLOCK = (
     "All frequencies moved by one same fraction, {size}: the time base, not the tension. Check the "
     "logger's clock and sampling rate."
@@ -260,7 +257,6 @@ _SENSORS = (
     "Each mode moved by its own fraction: the sensors, not the tension. Check which sensors are "
     "mounted, and where."
 )
-_HOURS_OF_A_FAULT = 8  # judgement: of which a mistaken mode spoils one or two
 
 
 @dataclass(frozen=True)
@@ -415,7 +411,7 @@ class StreamWatch:
             by_mode, since = _move_of_modes(state, bank, evidence)
             wander_sd = _wander_sd(state, since)
             cause = find_cause(by_mode, state.table, self.baseline, self.hanger, wander_sd)
-            if cause.takes_hours and since < _HOURS_OF_A_FAULT:
+            if cause.takes_hours and since < LIMITS.hours_of_a_fault:
                 evidence = NOTHING
             elif cause.is_measurement:
                 events += (_event(cause, state, evidence, reading, end),)
@@ -570,7 +566,9 @@ def shift_of_reading(state: StreamState, seen: SeenReading) -> tuple[float, floa
 
 def fraction_of(log_shift: float, sd: float, table: ModeTable) -> tuple[float, float]:
     """A shift is off by what the sensitivities are: the share of bending is known to a fifth."""
-    off = _MODEL_OFF * float(np.mean(0.5 - table.tension) / np.mean(table.tension))
+    off = LIMITS.stream_watch_model_off * float(
+        np.mean(0.5 - table.tension) / np.mean(table.tension)
+    )
     return math.expm1(log_shift), math.hypot(sd, off * log_shift)
 
 
@@ -587,7 +585,7 @@ def _move_of_modes(state: StreamState, bank: Bank, evidence: Evidence) -> tuple[
     later[-1] = True
     earlier = state.ring_day <= evidence.after_day
     before = np.vstack([state.old, ring[earlier]])
-    weight = np.append(OLD_READINGS, np.ones(earlier.sum()))[:, None] * np.isfinite(before)
+    weight = np.append(LIMITS.old_readings, np.ones(earlier.sum()))[:, None] * np.isfinite(before)
     moved = np.full(before.shape[1], np.nan)
     known = (weight.sum(axis=0) > 0) & np.isfinite(ring[later]).any(axis=0)
     weight, before = weight[:, known], np.nan_to_num(before[:, known])
@@ -647,7 +645,7 @@ def _with_exchange(
     """Count the hours that the planes look exchanged; after a few it is an event."""
     exchange = find_exchange(seen.off, state.table)
     state = replace(state, exchanged_hours=state.exchanged_hours + 1 if exchange else 0)
-    if exchange is None or state.exchanged_hours < HOURS_EXCHANGED:
+    if exchange is None or state.exchanged_hours < LIMITS.hours_exchanged:
         return state, ()
     return _absorb_fault(state, exchange), (_event(exchange, state, NOTHING, reading, end),)
 

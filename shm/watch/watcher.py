@@ -29,6 +29,7 @@ from shm.values.drift import ENOUGH_AGAINST
 from shm.watch.causes import Columns, DetectedChange, Structure, structure_of
 from shm.watch.change_point import Evidence, evidence_of
 from shm.watch.kept_state import to_bytes
+from shm.watch.limits import LIMITS
 from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of
 from shm.watch.persistence import bound_by_recurrence, outlier_probability, select_consistent_tests
 from shm.watch.posterior_summary import (
@@ -38,11 +39,6 @@ from shm.watch.posterior_summary import (
     summarize_drifts,
 )
 from shm.watch.state_sums import StateSums, WatchState, detected_change
-
-# To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 16
-# Technical: what a test says goes nearly in proportion to its weight.
-_MOST_REPEATS, _NEARLY = 6, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +81,7 @@ class Watcher:
     @cached_property
     def key(self) -> str:
         """Return a digest of what a state rests on but the readings: rules, options, quantities."""
-        given = to_bytes((_VERSION, self.options, self.quantities))
+        given = to_bytes((LIMITS.version, self.options, self.quantities))
         return hashlib.sha256(given).hexdigest()
 
     @cached_property
@@ -236,12 +232,12 @@ class Watcher:
         rows = np.union1d(np.flatnonzero(state.counted), [state.tests - 1])
         most = math.log(self.options.most_of_one_test * self.options.limit_years)
         evidence = self._evidence(state, rows)
-        for _ in range(_MOST_REPEATS):
+        for _ in range(LIMITS.most_repeats):
             factor, mass = evidence.of_last_visit
-            if mass <= most + _NEARLY or factor <= 0:  # the latter at a limit of days
+            if mass <= most + LIMITS.nearly or factor <= 0:  # the latter at a limit of days
                 break
             weight = state.weight.copy()
-            weight[visit] *= max(factor - (mass - most), _NEARLY) / factor
+            weight[visit] *= max(factor - (mass - most), LIMITS.nearly) / factor
             state = replace(state, weight=weight)
             evidence = self._evidence(state, rows)
         return state, evidence
