@@ -204,7 +204,8 @@ class Structure:
     Tests scatter along the quantities' slopes and along `scattering` (n, c) by variances (q + c,)
     that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that. Along
     `wander` (n, w) they differ slowly: all tests within `wander_years` of one have it alike.
-    Quantities go with the temperature by `thermal_laws` coefficients each.
+    Quantities go with the temperature by `thermal_laws` coefficients each, the second of frost.
+    Where it is not `is_modelled`, each frequency counts: which of them matters no model says.
     """
 
     layout: Layout
@@ -216,6 +217,7 @@ class Structure:
     wander: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))
     wander_years: float = 0.0
     thermal_laws: int = 1
+    is_modelled: bool = True
 
 
 def structure_of(

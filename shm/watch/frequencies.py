@@ -10,23 +10,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime
-from functools import cached_property
 
 import numpy as np
 import scipy
 
 from shm.assumptions import DEFAULTS
 from shm.errors import BadInput
-from shm.values import FREQUENCY, FloatArray, ModalTest, ModeReading, Reading, WatchedQuantity
+from shm.values import FREQUENCY, ModalTest, ModeReading, Reading, WatchedQuantity
 from shm.watch.causes import UNEXPLAINED, Columns, Direction, Layout, Structure
-from shm.watch.change_point import Evidence
 from shm.watch.limits import LIMITS
-from shm.watch.options import DAYS_PER_YEAR, Warmth, WatchOptions, reference_of
+from shm.watch.options import DAYS_PER_YEAR, WatchOptions, reference_of
 from shm.watch.quantities import MeasuredMode
-from shm.watch.state_sums import StateSums, WatchState
-from shm.watch.watcher import Watcher
 
 POOLED_DAYS = 3.0  # judgement: short beside three weeks in which an owner wants to know, and cheap
 
@@ -171,51 +166,5 @@ def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
         wander=wander,
         wander_years=LIMITS.wander_days / DAYS_PER_YEAR,
         thermal_laws=2,
+        is_modelled=False,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class FrequencySums(StateSums):
-    """The sums of tests of such a structure."""
-
-    def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
-        return self._warmth(state), frost_of(state.temperature_c, self.options.thermometer_sd_k)
-
-    def effects(self, state: WatchState) -> tuple[FloatArray, FloatArray]:
-        """Each frequency counts: which of them matters no model says."""
-        n = self.structure.layout.n
-        every = np.hstack([np.eye(n), np.eye(n)])
-        return every, every
-
-
-@dataclass(frozen=True, eq=False)
-class FrequencyWatcher(Watcher):
-    """Watches the frequencies of one structure."""
-
-    @cached_property
-    def structure(self) -> Structure:
-        """The hypotheses."""
-        return structure_of_frequencies(len(self.quantities), self.options)
-
-    @cached_property
-    def sums(self) -> StateSums:
-        """Return what the tests of a state are to the evidence."""
-        return FrequencySums(self.quantities, self.columns.modes, self.structure, self.options)
-
-    def _creep(self, evidence: Evidence) -> None:
-        """It is allowed for, and of no interest."""
-
-
-def frost_of(temperatures_c: FloatArray, thermometer_sd_k: float) -> Warmth:
-    """Kelvin below 0 C of tests at `temperatures_c` (T,), 0 above it, as far as one knows.
-
-    The deck follows the air in its own time, so that near 0 C its mean is what counts.
-    """
-    known = np.isfinite(temperatures_c)
-    scaled = np.where(known, temperatures_c, 0.0) / thermometer_sd_k
-    below = scipy.special.ndtr(-scaled)
-    density = np.exp(-(scaled**2) / 2) / math.sqrt(2 * math.pi)
-    kelvin = thermometer_sd_k * (scaled * below - density)
-    kelvin = np.where(known, kelvin, kelvin[known].mean() if known.any() else 0.0)
-    sd = np.where(known, thermometer_sd_k * below, LIMITS.frost_spread_k)
-    return Warmth(kelvin, sd, np.ones(len(known)))

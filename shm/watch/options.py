@@ -9,11 +9,13 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
+import scipy
 
 from shm.assumptions import DEFAULTS, Assumptions
 from shm.errors import UsageError
 from shm.values import NAN, FloatArray
 from shm.values.drift import OF_ONE_VISIT
+from shm.watch.limits import LIMITS
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,21 @@ def temperature_offsets(
     lately = (years[:, None] >= years) & (years > years[:, None] - _SEASON_YEARS) & ~known
     in_order = np.tril(lately)  # of tests at the very same time those before
     return Warmth(kelvin, of_each, np.where(known, 1.0, in_order.sum(axis=1)))
+
+
+def frost_of(temperatures_c: FloatArray, thermometer_sd_k: float) -> Warmth:
+    """Kelvin below 0 C of tests at `temperatures_c` (T,), 0 above it, as far as one knows.
+
+    The deck follows the air in its own time, so that near 0 C its mean is what counts.
+    """
+    known = np.isfinite(temperatures_c)
+    scaled = np.where(known, temperatures_c, 0.0) / thermometer_sd_k
+    below = scipy.special.ndtr(-scaled)
+    density = np.exp(-(scaled**2) / 2) / math.sqrt(2 * math.pi)
+    kelvin = thermometer_sd_k * (scaled * below - density)
+    kelvin = np.where(known, kelvin, kelvin[known].mean() if known.any() else 0.0)
+    sd = np.where(known, thermometer_sd_k * below, LIMITS.frost_spread_k)
+    return Warmth(kelvin, sd, np.ones(len(known)))
 
 
 def years_between(first: datetime, second: datetime) -> float:

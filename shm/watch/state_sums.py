@@ -30,6 +30,7 @@ from shm.watch.options import (
     OF_ONE_VISIT_YEARS,
     Warmth,
     WatchOptions,
+    frost_of,
     temperature_offsets,
     years_between,
 )
@@ -109,8 +110,9 @@ class StateSums:
         )
 
     def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
-        """Return the kelvin that quantities go with, and as many further laws as there are."""
-        return (self._warmth(state),)
+        """Return the kelvin that quantities go with, and those of frost where they are a law."""
+        frost = frost_of(state.temperature_c, self.options.thermometer_sd_k)
+        return (self._warmth(state), frost)[: self.structure.thermal_laws]
 
     def _by_law(self, values: FloatArray) -> FloatArray:
         """Coefficients (laws q,), or their sds, by law (laws, q)."""
@@ -266,6 +268,9 @@ class StateSums:
 
     def effects(self, state: WatchState) -> tuple[FloatArray, FloatArray]:
         """Return what a change does to what owners look at, and to every mode (`effects_of`)."""
+        if not self.structure.is_modelled:
+            every = np.eye(self.structure.layout.n)
+            return np.hstack([every, every]), np.hstack([every, every])
         measured = np.isfinite(state.modes.variances)
         count = np.maximum(measured.sum(axis=0), 1)[:, None]
         slopes = np.where(measured[:, :, None], state.modes.slopes, 0.0).sum(axis=0) / count

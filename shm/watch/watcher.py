@@ -28,6 +28,7 @@ from shm.values import (
 from shm.values.drift import ENOUGH_AGAINST
 from shm.watch.causes import Columns, DetectedChange, Structure, structure_of
 from shm.watch.change_point import Evidence, evidence_of
+from shm.watch.frequencies import structure_of_frequencies
 from shm.watch.kept_state import to_bytes
 from shm.watch.limits import LIMITS
 from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of
@@ -87,6 +88,8 @@ class Watcher:
     @cached_property
     def structure(self) -> Structure:
         """The hypotheses."""
+        if not self.hanger.is_modelled:
+            return structure_of_frequencies(len(self.quantities), self.options)
         return structure_of(self.quantities, self.columns, self.options)
 
     @cached_property
@@ -289,7 +292,8 @@ class Watcher:
 
         It is the last covariate of the null, before the called changes.
         """
-        if probability_of_change(evidence, self.options) > 0.5:
+        is_likely = probability_of_change(evidence, self.options) > 0.5
+        if is_likely or not self.hanger.is_modelled:
             return None
         at, weights = len(self.structure.layout.null) - 1, np.exp(evidence.log_null)
         means, variances = evidence.null_mean[:, at], evidence.null_covariance[:, at, at]
