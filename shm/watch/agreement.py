@@ -17,9 +17,8 @@ from typing import Literal
 
 import numpy as np
 
-from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, WatchedQuantity
+from shm.values import TENSION, Beside, Drift, Hanger, ModalTest, WatchedQuantity
 from shm.values.drift import threshold_of
-from shm.watch.alert_text import alert_of, message_of_agreeing
 from shm.watch.limits import LIMITS
 from shm.watch.options import WatchOptions
 from shm.watch.posterior_summary import drift_of_normal
@@ -50,6 +49,15 @@ class Shown:
         return self.mean * other.mean > 0 and apart < within
 
 
+@dataclass(frozen=True)
+class Agreement:
+    """Two `tests`, by name, that show the same `drift`; the first may be held."""
+
+    drift: Drift
+    tests: tuple[str, str]
+    is_held: bool
+
+
 def agreement(
     reader: Reader,
     newest: tuple[ModalTest, datetime],
@@ -57,13 +65,13 @@ def agreement(
     hanger: Hanger,
     options: WatchOptions,
     told: Collection[tuple[str, Way]],
-) -> Alert | None:
-    """Return the alert of a test that is the second to show a tension beyond its threshold.
+) -> Agreement | None:
+    """Return that a test is the second to show a tension beyond its threshold.
 
     None where it shows none, no test next to it agrees, the clocks say that it was a later visit,
     a test of a visit before shows the same, or the shift is `told` already.
     """
-    test, at = newest
+    test, _ = newest
     tension = reader.quantities[0]
     threshold = threshold_of(TENSION, hanger)
 
@@ -94,10 +102,7 @@ def agreement(
         shown = show(other)
         if is_shown(shown) and mine.agrees(shown):
             drift = _drift(tension, newest, (mine, shown), hanger)
-            what = f"two-tests-agree:{drift.quantity}-{way_of(drift.shift_mean)}"
-            names, is_held = (other.id, test.id), other.id in beside.held
-            words = message_of_agreeing(drift, hanger, names, is_held=is_held)
-            return alert_of(hanger, (test.id, at), what, words, ("beyond threshold",), (drift,))
+            return Agreement(drift, (other.id, test.id), other.id in beside.held)
     return None
 
 

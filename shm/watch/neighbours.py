@@ -221,18 +221,16 @@ def _is_known(drift: Drift) -> bool:
     return drift.quantity == TENSION and usable
 
 
-def bridge_pattern(
+def weigh_pattern(
     shifts: Sequence[HangerShift],
     order: Sequence[int] = (),
     options: NeighbourOptions | None = None,
 ) -> BridgePattern:
-    """Return what moved over the bridge; shifts whose tests are older than the window are left out.
+    """Weigh what moved over the bridge; shifts whose tests are older than the window are left out.
 
     `order` names all hangers along the bridge (index: place), so that those without a shift are
     listed. Raises NothingThere where fewer than three hangers can be compared.
     """
-    from shm.watch.neighbours_words import remarks_of, sentence_of
-
     options = options or NeighbourOptions()
     compared, left_out = _compared(shifts, order, options.window_days)
     bridge, groups = _Bridge.of(compared, options), _weigh(compared, options)
@@ -253,7 +251,7 @@ def bridge_pattern(
             for values in ([each.mean_n for each in alike], [each.sd_n for each in alike])
         ),
     )
-    pattern = BridgePattern(
+    return BridgePattern(
         newest=max(each.time for each in compared),
         explanations=tuple(Explanation(*each) for each in ranked),
         suspects=suspects,
@@ -265,8 +263,6 @@ def bridge_pattern(
         not_compared=left_out,
         sentence="",
     )
-    sentence = sentence_of(pattern, options.named_from)
-    return replace(pattern, sentence=sentence, remarks=remarks_of(pattern))
 
 
 def _compared(

@@ -3,10 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded, rounded_percent
 from shm.watch.limits import LIMITS
-from shm.watch.neighbours import REACH, BridgePattern, HangerRow
+from shm.watch.neighbours import (
+    REACH,
+    BridgePattern,
+    HangerRow,
+    HangerShift,
+    NeighbourOptions,
+    weigh_pattern,
+)
+
+
+def bridge_pattern(
+    shifts: Sequence[HangerShift],
+    order: Sequence[int] = (),
+    options: NeighbourOptions | None = None,
+) -> BridgePattern:
+    """Return what moved over the bridge, as `weigh_pattern` does, with sentence and remarks."""
+    options = options or NeighbourOptions()
+    pattern = weigh_pattern(shifts, order, options)
+    sentence = sentence_of(pattern, options.named_from)
+    return replace(pattern, sentence=sentence, remarks=remarks_of(pattern))
 
 
 def sentence_of(pattern: BridgePattern, named_from: float) -> str:

@@ -31,12 +31,13 @@ from shm.values.drift import ENOUGH_FITS
 from shm.values.messages import WEEK
 from shm.values.rounding import listed
 from shm.values.stream import StreamEvent
-from shm.watch.agreement import BY_A_LOAD
+from shm.watch.agreement import BY_A_LOAD, Agreement, way_of
 from shm.watch.alert_text import (
     against_baseline_words,
     alert_of,
     is_stiffness,
     look_again,
+    message_of_agreeing,
     quantity_words,
     size_words,
     structure_words,
@@ -85,6 +86,15 @@ def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
 
 def _deviations(drift: Drift) -> float:
     return abs(drift.shift_mean) / drift.shift_sd if drift.shift_sd > 0 else 0.0
+
+
+def alert_of_agreement(found: Agreement, hanger: Hanger) -> Alert:
+    """Return the alert of two tests that agree."""
+    drift = found.drift
+    what = f"two-tests-agree:{drift.quantity}-{way_of(drift.shift_mean)}"
+    words = message_of_agreeing(drift, hanger, found.tests, is_held=found.is_held)
+    of_test = drift.test, drift.time
+    return alert_of(hanger, of_test, what, words, ("beyond threshold",), (drift,))
 
 
 # ---------------------------------------------------------------- tests that agree with none

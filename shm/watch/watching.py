@@ -35,6 +35,7 @@ from shm.watch.alert_text import CAUSES, alert_of, message_of, suspects
 from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.limits import LIMITS
 from shm.watch.notices import (
+    alert_of_agreement,
     alert_of_baseline,
     message_of_odd,
     news_of,
@@ -228,8 +229,9 @@ def watch_newest(
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
         agreed = agreement(reader, later[-1], beside, hanger, options, reported.beyond)
         if agreed is not None:
-            alert, reported = agreed, reported.with_beyond(agreed.drifts, agreed.time)
-            both = reported.agreed.union(map(condition_of, agreed.drifts))
+            alert = alert_of_agreement(agreed, hanger)
+            reported = reported.with_beyond(alert.drifts, alert.time)
+            both = reported.agreed.union(map(condition_of, alert.drifts))
             reported = replace(reported, agreed=both)
     return Newest(found, alert, to_bytes((state, reported)))
 

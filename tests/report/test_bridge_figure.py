@@ -10,7 +10,8 @@ from matplotlib.colors import to_hex
 
 from shm.report.figures import style
 from shm.report.figures.along_the_bridge import bridge_illustration
-from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
+from shm.watch.neighbours import BridgePattern, HangerShift
+from shm.watch.neighbours_words import bridge_pattern
 
 NOW = datetime(2026, 5, 1, tzinfo=UTC)
 
