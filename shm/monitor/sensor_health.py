@@ -28,13 +28,14 @@ SEEN_BEFORE = timedelta(days=3)
 _BLIND = timedelta(days=1)  # derived: each day has traffic and wind, whatever the level is
 
 
-def broken_channels(pieces: Sequence[Piece], stream: Stream) -> dict[str, str]:
-    """Channels of a window that cannot be used, and why."""
-    found = {}
-    for channel in stream.channels:
-        if fault := _fault(channel, _samples(pieces, channel.name)):
-            found[channel.name] = fault[1]
-    return found
+Fault = tuple[StreamEventKind, str]
+"""The kind of a fault, and what was seen."""
+
+
+def broken_channels(pieces: Sequence[Piece], stream: Stream) -> dict[str, Fault]:
+    """Return the channels of a window that cannot be used, and why."""
+    faults = {each.name: _fault(each, _samples(pieces, each.name)) for each in stream.channels}
+    return {name: fault for name, fault in faults.items() if fault}
 
 
 def sensor_faults(
@@ -43,12 +44,8 @@ def sensor_faults(
     """Return the faults that a window shows."""
     if not pieces:
         return ()
-    found: list[tuple[StreamEventKind, str, str]] = []
-    broken = set()
-    for channel in stream.channels:
-        if fault := _fault(channel, _samples(pieces, channel.name)):
-            found.append((fault[0], channel.name, fault[1]))
-            broken.add(channel.name)
+    broken = broken_channels(pieces, stream)
+    found = [(kind, name, why) for name, (kind, why) in broken.items()]
     usable = [channel for channel in stream.channels if channel.name not in broken]
     stretches = [
         stretch(part, piece.sampling_rate_hz)
@@ -267,7 +264,7 @@ def _likeness(seen: Sequence[FloatArray], hz: FloatArray, shapes: FloatArray) ->
     return float(np.median(shares))
 
 
-def _fault(channel: StreamChannel, values: FloatArray) -> tuple[StreamEventKind, str] | None:
+def _fault(channel: StreamChannel, values: FloatArray) -> Fault | None:
     known = values[np.isfinite(values)]
     if not len(known):
         return "dead", "no samples"

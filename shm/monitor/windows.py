@@ -45,7 +45,7 @@ def judged(pieces: Sequence[Piece], stream: Stream, known: Sequence[Mode]) -> Ju
     broken = broken_channels(pieces, stream)
     rows = [row for row, each in enumerate(stream.channels) if each.name not in broken]
     channels = tuple(stream.channels[row] for row in rows)
-    reason = "; ".join(f"{name}: {why}" for name, why in broken.items())
+    reason = "; ".join(f"{name}: {why}" for name, (_, why) in broken.items())
     if not rows:
         return _unusable(pieces, stream, f"no channel can be used ({reason})")
     values = [part for piece in pieces for part in _known_parts(piece, channels)]
@@ -58,26 +58,13 @@ def judged(pieces: Sequence[Piece], stream: Stream, known: Sequence[Mode]) -> Ju
     if sum(part.shape[1] for part in parts) < LIMITS.least_s * rate:
         why = f"{events.kind}: less than {LIMITS.least_s:g} s are undisturbed"
         return _unusable(pieces, stream, why, events)
-    return _used(pieces, stream, known, channels, parts, events, band, reason)
-
-
-def _used(
-    pieces: Sequence[Piece],
-    stream: Stream,
-    known: Sequence[Mode],
-    channels: tuple[StreamChannel, ...],
-    parts: tuple[FloatArray, ...],
-    events: _Events,
-    band_hz: tuple[float, float],
-    reason: str,
-) -> Judged:
-    stretches = tuple(stretch(part, stream.sampling_rate_hz) for part in parts)
-    peaks = found_peaks(stretches, channels, known, channel_noise(stretches, *band_hz))
+    stretches = tuple(stretch(part, rate) for part in parts)
+    peaks = found_peaks(stretches, channels, known, channel_noise(stretches, *band))
     height = float(np.median(peaks.height_db[peaks.seen])) if peaks.seen else NAN
     kind: WindowKind = events.kind
-    if kind == "wind" and height < LIMITS.quiet_db and not _has_strong_peaks(stretches, band_hz):
+    if kind == "wind" and height < LIMITS.quiet_db and not _has_strong_peaks(stretches, band):
         kind = "quiet"
-    window = _window(pieces, stream, kind, _level(stretches, band_hz), events.unrest, height)
+    window = _window(pieces, stream, kind, _level(stretches, band), events.unrest, height)
     apart = f"{events.seconds:.0f} s are set apart: {events.kind}" if events.seconds else ""
     reason = "; ".join(each for each in (reason, apart) if each)
     return Judged(window, channels, parts, stretches, peaks, reason)

@@ -25,7 +25,6 @@ from shm.plausibility.bar_evidence import (
     Bar,
     Evidence,
     Origin,
-    OriginKind,
     Seen,
     changes_of,
     fit_bars,
@@ -49,18 +48,15 @@ class Known:
 
 
 @dataclass(frozen=True)
-class OtherOrigin:
+class OtherOrigin(Origin):
     """That a test is not what it is filed as: `probability` of it, and what it is instead.
 
     `hanger` is the other one where `kind` is "hanger"; `factor` that of all frequencies over the
     expected ones where it is "time base". `text` is for a person.
     """
 
-    kind: OriginKind
-    probability: float
-    text: str
-    hanger: int | None = None
-    factor: float = NAN
+    probability: float = NAN
+    text: str = ""
 
 
 OWN = Origin()
@@ -140,8 +136,7 @@ def _said(origin: Origin, probability: float, own: Hanger) -> OtherOrigin:
         "sampling rate?",
         "planes": f"The modes fit {name} with its two planes exchanged: right axes of the sensors?",
     }
-    assert origin.kind
-    return OtherOrigin(origin.kind, probability, texts[origin.kind], origin.hanger, origin.factor)
+    return OtherOrigin(origin.kind, origin.hanger, origin.factor, probability, texts[origin.kind])
 
 
 def _twins(one: Hanger, other: Hanger) -> bool:

@@ -125,9 +125,7 @@ def _tabulate(
                 sd = mode.frequency_sd_hz / mode.frequency_hz
                 is_stated = sd > 0 and math.isfinite(sd)
                 table[row, at] = math.log(mode.frequency_hz)
-                variance[row, at] = (
-                    sd if is_stated else unstated
-                ) ** 2 + LIMITS.baseline_check_scatter**2
+                variance[row, at] = (sd if is_stated else unstated) ** 2 + LIMITS.mode_scatter**2
     return table, variance
 
 
@@ -145,7 +143,7 @@ def _fit_tests(
     states = np.zeros((len(tests), bar.count))
     off, expected, why = np.zeros(table.shape, bool), table.copy(), [""] * len(tests)
     conditions = [bar.model.conditions(test) for test in tests]
-    for _ in range(LIMITS.baseline_check_rounds):
+    for _ in range(LIMITS.rounds):
         predicted = np.array(
             [bar.predict(x[None], its)[0] for x, its in zip(states, conditions, strict=True)]
         )
@@ -158,7 +156,7 @@ def _fit_tests(
             left = rest - slopes @ found.x
             states[n] = found.x
             expected[n, seen] = table[n, seen] - left
-            is_far = np.abs(left) > LIMITS.least
+            is_far = np.abs(left) > LIMITS.least_mistake
             off[n, seen] = ~found.sound & is_far
             is_unfit = found.is_misfit and is_far.sum() > MOST_MISTAKEN * len(seen)
             why[n] = "its modes fit none of the other tests'" if is_unfit else ""

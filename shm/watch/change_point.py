@@ -137,7 +137,11 @@ class Evidence:
         return np.asarray(self.shares.sum(axis=(0, 1, 2, 4)))
 
     def draw(
-        self, part: BoolArray, loadings: FloatArray, *, is_last_counted: bool = True
+        self,
+        part: BoolArray | None = None,
+        loadings: FloatArray | None = None,
+        *,
+        is_last_counted: bool = True,
     ) -> tuple[FloatArray, FloatArray]:
         """Draw changes (SAMPLES, n + q) by the last test, and the null's parameters with each.
 
@@ -145,7 +149,9 @@ class Evidence:
         the directions of `part` (D,); where there is none, none is drawn. Unless `is_last_counted`,
         changes that begin at the last test are left out. Draws come in pairs about the mean.
         """
-        log_mass = np.where(part[:, None], self.log_mass, -np.inf)
+        loadings = np.zeros((0, self.null_mean.shape[1])) if loadings is None else loadings
+        chosen = np.ones(len(self.directions), bool) if part is None else part
+        log_mass = np.where(chosen[:, None], self.log_mass, -np.inf)
         if not is_last_counted:
             log_mass[-1:] = -np.inf
         leading = np.argsort(log_mass.ravel())[-LIMITS.change_point_leading :]
@@ -236,13 +242,6 @@ def evidence_of(
     log_null = log_null - _total(log_null)
     first = max([baseline_tests, *(each.first + 1 for each in called)])
     beginnings = _chosen(np.arange(first, len(years)), most_beginnings)
-    if not len(beginnings):
-        nothing = np.zeros((0, len(log_null), 2, len(directions), len(SIZES)))
-        empty = np.zeros((2, 0))
-        return Evidence(
-            layout, tuple(directions), years, beginnings, tuple(called),
-            log_null, nothing, mean, covariance, (empty, empty, empty),
-        )  # fmt: skip
     seen = null.seen(years, beginnings, mean, covariance)
     waited = np.log(np.maximum(_onset_interval_years(years, beginnings), 1e-12))
     log_mass = _log_factors(directions, seen) + log_null[None, :, None, None, None]

@@ -62,7 +62,7 @@ class FrequencyReader:
                 # The median of m has pi / 2 times the variance of the mean, of up to two the same.
                 wider = math.pi / 2 if len(seen) > 2 else 1.0
                 its = wider * float(np.mean([sd**2 for _, sd in seen])) / len(seen)
-                variances[j] = its + LIMITS.allowance**2
+                variances[j] = its + LIMITS.frequency_allowance**2
         levels = [math.log(test.amplitude) for test in tests if test.amplitude > 0]
         return Reading(
             test=tests[-1].id,

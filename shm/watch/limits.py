@@ -35,18 +35,15 @@ class Limits:
     # ---- baseline check
     enough: int = 3  # tests from which on the odd mode can be told: of two that differ, neither is
     baseline_check_fewest: int = 5  # modes of a test: fewer leave nothing to tell the odd one by
-    # Of a log frequency. Judgement: what a joint or a sensor does to one mode from test to test; by
-    # which no bar as made is off its class in one mode alone; a class compared with a bar as made.
-    least: float = 0.006
+    # Of a log frequency. Judgement: by which no bar as made is off its class in one mode alone; a
+    # class compared with a bar as made.
     baseline_check_off: float = 0.04
     model_sd: float = 0.01
     # Judgement, standard deviations of what tests of one baseline differ by: in common, as clocks
-    # and sensors do; in tension, as seasons and traffic do; in decades of a spring; of each mode
-    # alone.
+    # and sensors do; in tension, as seasons and traffic do; in decades of a spring.
     common_sd: float = 1e-3
     tension_sd: float = 0.1
     decades_sd: float = 0.3
-    baseline_check_scatter: float = 1e-3
     # Judgement: by what all modes of a wrong clock are off alike; how many tests have one; below
     # which warmth and sensors do as much; and the least that tests differ by in tension and
     # decades.
@@ -55,7 +52,6 @@ class Limits:
     least_clock: float = 0.007
     least_spread: tuple[float, ...] = (0.01, 0.03)
     enough_for_clocks: int = 4  # of three tests, two alike may be chance
-    baseline_check_rounds: int = 3  # technical: of "what is mistaken" and "where the tests lie"
     baseline_check_tension_step: float = 0.02  # technical: of finite differences
     decades_step: float = 0.1
     farthest_tension: float = 0.4  # technical: beyond it nothing is linearised
@@ -63,7 +59,7 @@ class Limits:
     draws: int = 4000  # of the description: technical, refined below
     # technical: of the prior's range, about the best draw
     narrower: tuple[float, ...] = (0.3, 0.1, 0.03)
-    tension_range: tuple[float, ...] = (0.3, 2.5)  # of the nominal one; technical
+    tension_range: tuple[float, float] = (0.3, 2.5)  # of the nominal one; technical
     tensions: int = 60
 
     # ---- causes
@@ -104,7 +100,6 @@ class Limits:
     wander_days: float = 45.0  # judgement: as long as a deck takes to dry
     frequencies_scatter: float = 5e-4  # before any test: traffic; the identification
     scatter_of_a_mode: float = 5e-4
-    allowance: float = 1e-4  # as of a hanger's tests (`readings`)
     # of frost where no thermometer was read: judgement, a mild winter's days
     frost_spread_k: float = 2.0
     # Judgement: of what lasts, loads, stiffness of the whole and clocks are half; a local damage
@@ -146,12 +141,10 @@ class Limits:
     notices_off: float = 0.01
 
     # ---- persistence
-    persistence_seldom: float = 1e-3  # of tests that agree so many are taken for such that do not
     near: int = 2  # tests to each side: a blunder may lie between two that agree
     before: int = 5  # counted tests that say where the hanger was
     agreeing: float = 0.4  # judgement: of those before; two of five
-    # Of a log frequency (judgement): further off than by any load, and nearer than orders are.
-    strays: float = 0.04
+    # Of a log frequency (judgement): nearer than orders are.
     same: float = 0.02
     wider: float = 10.0  # judgement: how a blunder lies, ten times as wide and with heavy tails
     persistence_tail: float = 2.0
@@ -174,9 +167,8 @@ class Limits:
     # and visits in haste make a change that stays no less likely.
     least_waited: float = 7 / 365.25
     most_waited: float = 1 / 12
-    # Hypotheses that are asked: none that others beat by 20 to 1 (technical: of so many at most).
+    # Hypotheses that are asked, none that others beat by 20 to 1: technical, of so many at most.
     persistence_leading: int = 12
-    beaten_nats: float = 3.0
     telling: float = 0.5  # of a change: a test that is less sure of it by itself says nothing
 
     # ---- posterior summary
@@ -201,10 +193,9 @@ class Limits:
 
     # ---- readings
     # Of good tests, by their misfit (judgement): a worse one has larger errors than stated.
-    readings_seldom: float = 1e-3
+    seldom: float = 1e-3
     # Far above the rounding of a log frequency, far below what a test can tell.
     least_slope_step: float = 1e-7
-    pull_sd_in_steps: float = 10.0
     most_steps: int = 12
     starts: int = 24  # technical: of a tension from a fiftieth to five times the nominal one
     # In units of the reading's variance: a last step of a tenth of its standard deviation is taken
@@ -232,7 +223,7 @@ class Limits:
     loosened: float = 0.5
     # Of a log frequency: a mode that is off by less may be so by its joint or its sensor.
     least_mistake: float = 0.006
-    readings_rounds: int = 3  # technical: of "which modes are sound" and "where they lie"
+    rounds: int = 3  # technical: of "which modes are sound" and "where they lie"
     prior_freedom: float = 4.0  # judgement: stated sds are off by a factor of up to two
 
     # ---- repair check
@@ -274,6 +265,7 @@ class Limits:
     season_per_root_year: float = 3e-3
     fast_days: float = 1.3 / 24
     slow_days: float = 1.5
+    # judgement: of the hours' wander, by what each reading is off on its own: live load
     unsteady: float = 0.2
     slope_days: float = 60.0  # judgement: how long a loss goes on at one rate
     # judgement: of a coefficient's prior sd, by what it wanders in a year
@@ -325,7 +317,6 @@ class Limits:
     # judgement: until it is reported, as mistaken modes look like it for an hour
     hours_exchanged: int = 3
     ring: int = 24  # readings: a change is told within a day or is slow
-    old_readings: float = 120.0  # judgement: five days, as what a mode differs by is learnt over
     # judgement: by what the part of bending in a sensitivity is known
     stream_watch_model_off: float = 0.2
     hours_of_a_fault: int = 8  # judgement: of which a mistaken mode spoils one or two

@@ -55,7 +55,7 @@ class Seen:
     def agree(self, one: int, other: int) -> bool:
         """Return True if two tests may be of one state."""
         square, modes = self.distance(one, other)
-        return modes > 0 and square < float(scipy.special.chdtri(modes, LIMITS.persistence_seldom))
+        return modes > 0 and square < float(scipy.special.chdtri(modes, LIMITS.seldom))
 
 
 def select_consistent_tests(seen: Seen, known: BoolArray, baseline_tests: int) -> BoolArray:
@@ -92,7 +92,7 @@ def _has_outlying_mode(seen: Seen, found: BoolArray, test: int, near: Sequence[i
         measured = np.isfinite(seen.variances[:, mode])
         before = np.flatnonzero(found[:test] & measured[:test])[-LIMITS.before :]
         its, others = seen.values[test, mode], seen.values[:, mode]
-        if not len(before) or abs(its - np.median(others[before])) <= LIMITS.strays:
+        if not len(before) or abs(its - np.median(others[before])) <= LIMITS.large:
             continue
         if not any(measured[each] and abs(its - others[each]) < LIMITS.same for each in near):
             return True
@@ -165,7 +165,7 @@ def bound_by_recurrence(
     leading = float(evidence.log_mass.max(initial=-math.inf))
     for n, index in enumerate(_likeliest(evidence)):
         mass = float(evidence.log_mass[index])
-        if mass < leading - LIMITS.beaten_nats:
+        if mass < leading - LIMITS.alike_nats:
             break
         log_years, is_of_those_before, showing = _of_change(evidence, course, index)
         found = max(found, min(mass, log_years))

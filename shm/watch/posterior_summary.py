@@ -106,7 +106,7 @@ def summarize_change(
         evidence_years=math.exp(min(evidence.log_evidence, 700.0)),
         limit_years=subject.options.limit_years,
         probability=1 - (1 - before) * (1 - now),
-        sudden=_sudden(causes),
+        sudden=float(causes.shares[:, :, STEP].sum()) if len(causes.beginnings) else NAN,
         began_after=began_after,
         began_by=began_by,
         moved=rank_causes(subject, causes),
@@ -119,7 +119,7 @@ def summarize_change(
 def _material(subject: SummaryContext, evidence: Evidence) -> float:
     """The probability that a change, if there is one, moves one of the frequencies that owners look
     at by more than what is to be told."""
-    changes, _ = evidence.draw(_everything(evidence), _nothing(evidence))
+    changes, _ = evidence.draw()
     return float(_are_material(subject, evidence, changes).mean()) if len(changes) else 0.0
 
 
@@ -129,21 +129,6 @@ def _are_material(subject: SummaryContext, evidence: Evidence, changes: FloatArr
     if evidence.log_evidence > math.log(LIMITS.beyond_doubt * subject.options.limit_years):
         effects = np.vstack([effects, subject.by_mode])
     return np.asarray((np.abs(changes @ effects.T) > least).any(axis=1))
-
-
-def _everything(evidence: Evidence) -> BoolArray:
-    return np.ones(len(evidence.directions), bool)
-
-
-def _nothing(evidence: Evidence) -> FloatArray:
-    """Return loadings that ask nothing of the null's parameters."""
-    return np.zeros((0, evidence.null_mean.shape[1]))
-
-
-def _sudden(evidence: Evidence) -> float:
-    if not len(evidence.beginnings):
-        return NAN
-    return float(evidence.shares[:, :, STEP].sum())
 
 
 def _began(
@@ -204,7 +189,7 @@ def _as_changed(
 
     Of a cause that is no quantity the shift is that of the frequencies' mean, a fraction.
     """
-    changes, _ = evidence.draw(part, _nothing(evidence))
+    changes, _ = evidence.draw(part)
     n = evidence.layout.n
     together, similar = _find_company(evidence, part, names, names[j])
     shift, end, plane = changes[:, :n].mean(axis=1), None, None
@@ -273,7 +258,7 @@ def summarize_drifts(
     evidence = causes
     loadings = _of_null(evidence, subject)
     unmoved = subject.with_model(evidence.draw_null(loadings))
-    moved, changes = _draw_shifts(subject, evidence, _everything(evidence), loadings)
+    moved, changes = _draw_shifts(subject, evidence, None, loadings)
     probability = probability if len(moved) else 0.0
     is_material = np.ones(len(moved), bool)
     if len(moved) and not evidence.called:
@@ -332,14 +317,12 @@ def _of_null(evidence: Evidence, subject: SummaryContext) -> FloatArray:
 def _draw_shifts(
     subject: SummaryContext,
     evidence: Evidence,
-    part: BoolArray,
+    part: BoolArray | None,
     loadings: FloatArray,
     *,
     is_last_counted: bool = True,
 ) -> tuple[FloatArray, FloatArray]:
     """Draw the quantities' shifts (draws, q), given one change of `part`, and the changes."""
-    if not len(evidence.beginnings):
-        return np.zeros((0, evidence.layout.q)), np.zeros((0, 0))
     changes, before = evidence.draw(part, loadings, is_last_counted=is_last_counted)
     return subject.with_model(changes[:, evidence.layout.n :] + before), changes
 

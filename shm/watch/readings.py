@@ -128,7 +128,7 @@ class Likelihood:
         names = model.parameter_names
         self._columns = [[names.index(name) for name in each.parameters] for each in quantities]
         self._scale: FloatArray = np.array([each.step_sd for each in quantities])
-        self.pull: FloatArray = 1 / (LIMITS.pull_sd_in_steps * self._scale) ** 2
+        self.pull: FloatArray = 1 / (LIMITS.pull_steps * self._scale) ** 2
         self._lowest = np.array([each.coordinates[0] for each in quantities])
         self._highest = np.array([each.coordinates[-1] for each in quantities])
 
@@ -152,7 +152,7 @@ class Likelihood:
         """
         near = self._descended(np.zeros(len(self._quantities)), seen)
         misfit = float(near.residual @ near.residual)
-        if misfit <= scipy.special.chdtri(len(near.residual), LIMITS.readings_seldom):
+        if misfit <= scipy.special.chdtri(len(near.residual), LIMITS.seldom):
             return near
         far = self._descended(self.far_start(seen), seen)
         return far if far.cost < near.cost else near
@@ -191,7 +191,7 @@ class Likelihood:
         return LinearReading(x, residual / sd, slopes / sd[:, None], self.pull)
 
     def read(self, linear: LinearReading, off: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return what moves of the modes `off` (k, n), over sd, make of the coordinates (k, q).
+        """Return what moves of the modes `off` (n,), over sd, make of the coordinates (q,).
 
         And the information (q, q) of the likelihood alone, 0 along what is not seen.
         """
@@ -199,7 +199,7 @@ class Likelihood:
         shares, axes = np.linalg.eigh(slopes.T @ slopes)
         shares = shares / _error_inflation(linear.residual, len(linear.x))
         seen = shares > LIMITS.unseen
-        steps = (off @ slopes @ axes)[:, seen] / np.linalg.norm(slopes @ axes[:, seen], axis=0) ** 2
+        steps = (off @ slopes @ axes)[seen] / np.linalg.norm(slopes @ axes[:, seen], axis=0) ** 2
         information = (axes[:, seen] * shares[seen]) @ axes[:, seen].T
         information = information / np.outer(self._scale, self._scale)
         return self._scale * (steps @ axes[:, seen].T), (information + information.T) / 2
@@ -373,41 +373,23 @@ class Reader:
         blind = Reading(test.id, time, test.temperature_c, np.zeros(count), np.zeros((count,) * 2))
         if not (_is_described(test, self._model) and len((seen := self._seen(test)).own)):
             return blind
-        sound = self._sound(seen)
-        mistaken, seen = seen.own[~sound], seen.taken(sound)
-        linear = self._likelihood.settled(seen)
-        misfit = linear.residual + linear.slopes @ linear.x
-        softer = self._per_kelvin[seen.own] / np.sqrt(seen.variance)
-        (mean, per_kelvin), information = self._likelihood.read(linear, np.array([misfit, softer]))
-        left = None if self._is_warmth_known(test) else per_kelvin
-        modes = self._by_mode(seen, linear, mistaken, is_warmth_known=left is None)
-        return replace(
-            blind,
-            mean=mean,
-            information=information,
-            per_kelvin=left,
-            modes=modes,
-            amplitude=test.amplitude,
-        )
-
-    def _by_mode(
-        self, seen: SeenModes, linear: LinearReading, mistaken: IntArray, *, is_warmth_known: bool
-    ) -> ModeReading:
-        """Return the same for each of the baseline's modes.
-
-        Stated errors are taken to be off by a factor that the misfit tells, as far as it can.
-        """
-        sd, n = np.sqrt(seen.variance), len(self.modes)
-        larger = _error_inflation(linear.residual, len(linear.x))
-        values, variances = np.zeros(n), np.full(n, np.inf)
-        slopes = np.zeros((n, len(linear.x)))
-        values[seen.own] = sd * (linear.residual + linear.slopes @ linear.x)
-        variances[seen.own] = larger * seen.variance
-        slopes[seen.own] = sd[:, None] * linear.slopes
+        sound, n = self._sound(seen), len(self.modes)
         wrong = np.zeros(n, bool)
-        wrong[mistaken] = True
-        softer = np.zeros(n) if is_warmth_known else self._per_kelvin
-        return ModeReading(values, variances, slopes, softer, wrong)
+        wrong[seen.own[~sound]] = True
+        seen = seen.taken(sound)
+        linear, sd = self._likelihood.settled(seen), np.sqrt(seen.variance)
+        moved_by = linear.residual + linear.slopes @ linear.x
+        mean, information = self._likelihood.read(linear, moved_by)
+        values, variances, slopes = np.zeros(n), np.full(n, np.inf), np.zeros((n, count))
+        values[seen.own] = sd * moved_by
+        # Stated errors are taken to be off by a factor that the misfit tells, as far as it can.
+        variances[seen.own] = _error_inflation(linear.residual, count) * seen.variance
+        slopes[seen.own] = sd[:, None] * linear.slopes
+        softer = np.zeros(n) if self._is_warmth_known(test) else self._per_kelvin
+        modes = ModeReading(values, variances, slopes, softer, wrong)
+        return replace(
+            blind, mean=mean, information=information, modes=modes, amplitude=test.amplitude
+        )
 
     def _sound(self, seen: SeenModes) -> BoolArray:
         """Return which modes (n,) are not mistaken: more probably good than off by anything.
@@ -424,8 +406,7 @@ class Reader:
         if found.sound.all():
             return every
         slack = self._sound_by(seen, none, self._likelihood.far_start(seen))
-        if slack.log_evidence > found.log_evidence:
-            found = slack
+        found = max(found, slack, key=lambda each: each.log_evidence)
         if self._loosening.size:
             loose = self._sound_by(seen, self._loosening, still)
             if loose.log_evidence + math.log(LIMITS.loosened) > found.log_evidence:
@@ -443,7 +424,7 @@ class Reader:
             self._likelihood.pull, np.full(more.shape[1], 1 / LIMITS.loosened_steps**2)
         )
         x = start
-        for _ in range(LIMITS.readings_rounds):
+        for _ in range(LIMITS.rounds):
             linear = self._likelihood.linear(x, wide)
             off = sd * (linear.residual + linear.slopes @ x)
             slopes = np.hstack([sd[:, None] * linear.slopes, more])
@@ -464,7 +445,7 @@ class Reader:
         its = np.concatenate([seen.own for seen in tests])
         base = np.zeros((1, len(self.quantities)))
         off = [seen.log_frequency - self._likelihood.predicted(base, seen)[0] for seen in tests]
-        if len(tests) < LIMITS.readings_rounds:
+        if len(tests) < LIMITS.rounds:
             weight = 1 / np.concatenate([seen.variance for seen in tests])
             total = np.bincount(its, weight * np.concatenate(off), len(self.modes))
             return np.asarray(total / np.bincount(its, weight, len(self.modes)))
@@ -472,7 +453,7 @@ class Reader:
         for row, seen, each in zip(table, tests, off, strict=True):
             row[seen.own] = each
         residual = np.nanmedian(table, axis=0)
-        for _ in range(LIMITS.readings_rounds):
+        for _ in range(LIMITS.rounds):
             common = np.nanmedian(table - residual, axis=1)
             residual = np.nanmedian(table - common[:, None], axis=0)
         return np.asarray(residual)

@@ -232,7 +232,7 @@ def with_ring(
     if len(ring) > LIMITS.ring:
         left = _at_rest(state.table, state.bank, ring[:1], met[:1])[0]
         ring, met, days = ring[1:], met[1:], days[1:]
-        share = 1 / min(max(state.readings - LIMITS.ring, 1), LIMITS.old_readings)
+        share = 1 / min(max(state.readings - LIMITS.ring, 1), LIMITS.memory_readings)
         mixed = np.where(np.isfinite(left), old + share * (left - old), old)
         old = np.where(np.isfinite(old), mixed, left)
     return replace(state, ring=ring, ring_conditions=met, ring_day=days, old=old)
@@ -585,7 +585,9 @@ def _move_of_modes(state: StreamState, bank: Bank, evidence: Evidence) -> tuple[
     later[-1] = True
     earlier = state.ring_day <= evidence.after_day
     before = np.vstack([state.old, ring[earlier]])
-    weight = np.append(LIMITS.old_readings, np.ones(earlier.sum()))[:, None] * np.isfinite(before)
+    weight = np.append(LIMITS.memory_readings, np.ones(earlier.sum()))[:, None] * np.isfinite(
+        before
+    )
     moved = np.full(before.shape[1], np.nan)
     known = (weight.sum(axis=0) > 0) & np.isfinite(ring[later]).any(axis=0)
     weight, before = weight[:, known], np.nan_to_num(before[:, known])
