@@ -28,7 +28,7 @@ def pooled(
     )
     chosen = _without_outlying([each for each in inside if each.modes])
     least = max(1, math.ceil(LIMITS.least_share * len(chosen)))
-    keys = sorted({(mode.plane, mode.order) for each in chosen for mode in each.modes}, key=_place)
+    keys = sorted({(mode.plane, mode.order) for each in chosen for mode in each.modes})
     series = [_Series.of(chosen, *key) for key in keys]
     modes = tuple(each.mode() for each in series if len(each.modes) >= least)
     if not modes:
@@ -63,10 +63,6 @@ def as_modal_test(reading: PooledReading) -> ModalTest:
     )
 
 
-def _place(key: tuple[Plane, int]) -> tuple[str, int]:
-    return key[0], key[1]
-
-
 def _mean(values: Sequence[float]) -> float:
     known = [value for value in values if math.isfinite(value)]
     return float(np.mean(known)) if known else NAN
@@ -78,7 +74,7 @@ def _without_outlying(readings: list[WindowReading]) -> list[WindowReading]:
         return readings
     off: list[list[float]] = [[] for _ in readings]
     keys = {(mode.plane, mode.order) for each in readings for mode in each.modes}
-    for key in sorted(keys, key=_place):
+    for key in sorted(keys):
         series = _Series.of(readings, *key)
         for number, value in zip(series.numbers, np.abs(series.deviations()), strict=True):
             off[number].append(float(value))
@@ -153,17 +149,15 @@ class _Series:
             if len(sd) >= LIMITS.least_to_judge
             else sd > 0
         )
-        weight = np.where(used, sd**-2.0, 0.0)
-        inverse = np.linalg.pinv((design.T * weight) @ design)
-        found = inverse @ (design.T * weight) @ self.hz
-        off = self.hz - design @ found
-        if design.shape[1] > 1:
-            usual = LIMITS.usual_sd * float(np.median(np.abs(off[used])))
-            used &= np.abs(off) <= LIMITS.outlying * np.maximum(sd, usual)
+        # Once more without the windows that what was regressed on does not explain.
+        for is_first in (True, False)[: design.shape[1]]:
             weight = np.where(used, sd**-2.0, 0.0)
             inverse = np.linalg.pinv((design.T * weight) @ design)
             found = inverse @ (design.T * weight) @ self.hz
             off = self.hz - design @ found
+            if is_first and design.shape[1] > 1:
+                usual = LIMITS.usual_sd * float(np.median(np.abs(off[used])))
+                used &= np.abs(off) <= LIMITS.outlying * np.maximum(sd, usual)
         freedom = max(1, int(used.sum()) - design.shape[1])
         excess = float(weight @ off**2) / freedom
         together = _together(off[used] / sd[used])

@@ -59,21 +59,26 @@ def read_window(
     why = [found.reason] if found.reason else []
     why += [f"not found: {listed(lost)}"] if lost else []
     guessed = 2 * (found.peaks.guessed if found.peaks else 0) > len(known)
-    if 2 * len(modes) <= len(known) or guessed:
-        if found.window.kind == "quiet":
-            why.append("the modes are hidden by the noise of the sensors")
-        elif not is_confirmed or _is_due(found.window, LIMITS.review_few_s):
-            try:
-                fresh = _from_scratch(found, stream, hanger, options)
-                if not is_confirmed or is_moved_by_tension(known, fresh):
-                    return WindowReading(found.window, fresh, "from scratch", "; ".join(why))
-                why.append(f"no change of tension explains the {len(fresh)} modes that are seen")
-            except ShmError as error:
-                why.append(str(error))
-        modes = _exclude_strays(modes, known)
-    elif found.window.kind != "quiet" and _is_reviewed(known, found.window):
-        return _reviewed(known, found, modes, stream, hanger, options, "; ".join(why))
-    return WindowReading(found.window, modes, "tracked" if modes else "none", "; ".join(why))
+    is_lost = 2 * len(modes) <= len(known) or guessed
+    is_quiet = found.window.kind == "quiet"
+    fresh: tuple[Mode, ...] = ()
+    if is_quiet and is_lost:
+        why.append("the modes are hidden by the noise of the sensors")
+    if not is_quiet and _is_search_due(known, found.window, is_confirmed, is_lost):
+        try:
+            fresh = _from_scratch(found, stream, hanger, options)
+        except ShmError as error:
+            why.append(str(error))
+    # What was followed where hardly any are known was a peak of the deck or of the traffic.
+    is_few = len(known) <= LIMITS.few and len(fresh) > 2 * len(known)
+    is_new = not is_confirmed or is_moved_by_tension(known, fresh)
+    if fresh and (is_new if is_lost else is_few):
+        return WindowReading(found.window, fresh, "from scratch", "; ".join(why))
+    if fresh and is_lost:
+        why.append(f"no change of tension explains the {len(fresh)} modes that are seen")
+    # A mode that the windows after this do not show again is forgotten, and no hour has it.
+    more = _exclude_strays(modes, known) if is_lost else modes + _missed(known, modes, fresh)
+    return WindowReading(found.window, more, "tracked" if more else "none", "; ".join(why))
 
 
 def _has(modes: Sequence[Mode], known: Mode) -> bool:
@@ -84,43 +89,22 @@ def _is(mode: Mode, known: Mode) -> bool:
     return (mode.plane, mode.order) == (known.plane, known.order)
 
 
-def _is_reviewed(known: Sequence[Mode], window: Window) -> bool:
-    """Return where an order lacks in a plane, each stream at ten minutes of its own."""
+def _is_search_due(
+    known: Sequence[Mode], window: Window, is_confirmed: bool, is_lost: bool
+) -> bool:
+    """Return True where most modes are lost, or an order lacks in a plane, seldom."""
+    if is_lost:
+        return not is_confirmed or _is_due(window, LIMITS.review_few_s)
     orders = [{m.order for m in known if m.plane == plane} for plane in PLANES]
     highest = max(mode.order for mode in known)
-    if all(len(each) == highest for each in orders):
-        return False
-    return _is_due(window, LIMITS.review_s if len(known) > LIMITS.few else LIMITS.review_few_s)
+    few_s = LIMITS.review_s if len(known) > LIMITS.few else LIMITS.review_few_s
+    return any(len(each) < highest for each in orders) and _is_due(window, few_s)
 
 
 def _is_due(window: Window, every_s: int) -> bool:
     """Return True once in ``every_s``, at a time of its own for each stream."""
     since_s = window.start.timestamp() + crc32(window.stream.encode()) % every_s
     return since_s % every_s < window.duration_s
-
-
-def _reviewed(
-    known: Sequence[Mode],
-    found: Judged,
-    modes: tuple[Mode, ...],
-    stream: Stream,
-    hanger: Hanger,
-    options: IdentifyOptions,
-    why: str,
-) -> WindowReading:
-    """Add modes that were missed at first to the followed ones.
-
-    Where hardly any are known and a search finds more than twice as many, all are from scratch:
-    what was followed was a peak of the deck or of the traffic. A mode that the windows after this
-    do not show again is forgotten, and no hour has it (`pooling`).
-    """
-    try:
-        fresh = _from_scratch(found, stream, hanger, options)
-    except ShmError as error:
-        return WindowReading(found.window, modes, "tracked", f"{why}; none sought: {error}")
-    if len(known) <= LIMITS.few and len(fresh) > 2 * len(known):
-        return WindowReading(found.window, fresh, "from scratch", why)
-    return WindowReading(found.window, modes + _missed(known, modes, fresh), "tracked", why)
 
 
 def is_moved_by_tension(
