@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from datetime import datetime
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import scipy
@@ -19,7 +19,18 @@ from shm.watch.limits import LIMITS
 
 
 @dataclass(frozen=True)
-class WatchOptions:
+class Assumed:
+    """Options, some of which are rows of the table of assumptions."""
+
+    @classmethod
+    def of(cls, assumed: Assumptions, **given: Any) -> Self:
+        """Return options with what is assumed of a hanger, but for those that are given."""
+        rows = {each.name: assumed[each.name].value for each in fields(cls) if each.name in assumed}
+        return cls(**{**rows, **given})
+
+
+@dataclass(frozen=True)
+class WatchOptions(Assumed):
     """Limits and priors of the sequential test.
 
     `limit_years` is the mean time to a false call of one hanger, or less than it. The `scatter`
@@ -54,12 +65,6 @@ class WatchOptions:
     most_of_one_test: float = 0.2
     baseline_tests: int = 1
     beginnings: int = 60
-
-    @classmethod
-    def of(cls, assumed: Assumptions, **given: Any) -> WatchOptions:
-        """Return options with what is assumed of a hanger, but for those that are given."""
-        rows = {each.name: assumed[each.name].value for each in fields(cls) if each.name in assumed}
-        return cls(**{**rows, **given})
 
     def __post_init__(self) -> None:
         if not self.scatter_scales:

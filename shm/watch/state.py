@@ -11,21 +11,20 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
 import numpy as np
 import scipy
 
-from shm.assumptions import DEFAULTS, Assumptions
+from shm.assumptions import DEFAULTS
 from shm.errors import NothingThere, UsageError
 from shm.values import FloatArray
 from shm.values.drift import TENSION, Change, Reading, TemperatureCoefficient, WatchedQuantity
 from shm.values.kinds import NAN
 from shm.values.rounding import NINETY_PERCENT
 from shm.watch.limits import LIMITS
-from shm.watch.options import reference_of
+from shm.watch.options import Assumed, reference_of
 from shm.watch.quantities import value_at
 
 
@@ -47,7 +46,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class StateOptions:
+class StateOptions(Assumed):
     """Weak priors of the state over time; one to three tests leave them as they are.
 
     `reference_temperature_c` NaN is the mean of the known ones. In units of a quantity's `step_sd`:
@@ -68,12 +67,6 @@ class StateOptions:
     unknown_temperature_sd_k: float = DEFAULTS.unknown_temperature_sd_k.value
     jump_of_step: float = 3.0
     largest_inflation: float = 1e4
-
-    @classmethod
-    def of(cls, assumed: Assumptions, **given: Any) -> StateOptions:
-        """Return options with what is assumed of a hanger, but for those that are given."""
-        rows = {each.name: assumed[each.name].value for each in fields(cls) if each.name in assumed}
-        return cls(**{**rows, **given})
 
 
 @dataclass(frozen=True, eq=False)

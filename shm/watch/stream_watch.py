@@ -230,7 +230,7 @@ def with_ring(
     ring, days = np.vstack([grown, seen.off]), np.append(state.ring_day, day)
     met = np.vstack([state.ring_conditions, conditions])
     if len(ring) > LIMITS.ring:
-        left = _at_rest(state.table, state.bank, ring[:1], met[:1])[0]
+        left = _without_conditions(state.table, state.bank, ring[:1], met[:1])[0]
         ring, met, days = ring[1:], met[1:], days[1:]
         share = 1 / min(max(state.readings - LIMITS.ring, 1), LIMITS.memory_readings)
         mixed = np.where(np.isfinite(left), old + share * (left - old), old)
@@ -238,13 +238,15 @@ def with_ring(
     return replace(state, ring=ring, ring_conditions=met, ring_day=days, old=old)
 
 
-def _at_rest(table: ModeTable, bank: Bank, ring: FloatArray, conditions: FloatArray) -> FloatArray:
+def _without_conditions(
+    table: ModeTable, bank: Bank, ring: FloatArray, conditions: FloatArray
+) -> FloatArray:
     """Return changes of ln f (readings, n) without what the conditions (readings, k) do."""
     coefficients = bank.weight @ bank.mean[:, FEATURES:]
     return np.asarray(ring - np.outer(conditions @ coefficients, table.tension))
 
 
-_VERSION = "stream-watch-2"
+_VERSION = "stream-watch-3"
 _CLOCK = (
     "All frequencies moved by one same fraction, {size}: the time base, not the tension. Check the "
     "logger's clock and sampling rate."
@@ -580,7 +582,7 @@ def _move_of_modes(state: StreamState, bank: Bank, evidence: Evidence) -> tuple[
 
     And the number of readings since. What the conditions do is by `bank`.
     """
-    ring = _at_rest(state.table, bank, state.ring, state.ring_conditions)
+    ring = _without_conditions(state.table, bank, state.ring, state.ring_conditions)
     later = state.ring_day >= evidence.by_day
     later[-1] = True
     earlier = state.ring_day <= evidence.after_day
