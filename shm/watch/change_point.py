@@ -252,6 +252,18 @@ def evidence_of(
     )  # fmt: skip
 
 
+def select_null(years: FloatArray, layout: Layout, called: Sequence[DetectedChange]) -> FloatArray:
+    """Return what makes the columns of tests those of the null (T, z, p), called changes in it."""
+    every = np.eye(len(layout.prior_sd))
+    columns = [np.tile(every[:, layout.null], (len(years), 1, 1))]
+    for each in called:
+        since = (np.arange(len(years)) >= each.first)[:, None, None] * every[:, layout.change]
+        columns.append(since)
+        if each.is_ramp:
+            columns.append((years - each.years)[:, None, None] * since)
+    return np.concatenate(columns, axis=2)
+
+
 @dataclass(frozen=True, eq=False)
 class _NullSums:
     """Sums of tests (T, K, ...) by the columns of the null (p), called changes among them.
@@ -273,16 +285,11 @@ class _NullSums:
     def of(
         cls, sums: Sums, years: FloatArray, layout: Layout, called: Sequence[DetectedChange]
     ) -> _NullSums:
-        part, every = layout.change, np.eye(sums.square.shape[-1])
-        columns = [np.tile(every[:, layout.null], (len(years), 1, 1))]
+        part = layout.change
         priors = [np.diag(layout.prior_sd[layout.null] ** -2.0)]
         for each in called:
-            since = (np.arange(len(years)) >= each.first)[:, None, None] * every[:, part]
-            columns.append(since)
-            if each.is_ramp:
-                columns.append((years - each.years)[:, None, None] * since)
             priors += [each.precision] * (2 if each.is_ramp else 1)
-        taken = np.concatenate(columns, axis=2)[:, None]
+        taken = select_null(years, layout, called)[:, None]
         turned = np.swapaxes(taken, 2, 3)
         weighted = turned @ sums.square
         return cls(

@@ -24,7 +24,7 @@ from shm.values import (
     is_ratio,
 )
 from shm.watch.causes import DetectedChange, Structure
-from shm.watch.change_point import SIZES, Evidence, Sums, sums_of
+from shm.watch.change_point import SIZES, Evidence, Sums, select_null, sums_of
 from shm.watch.limits import LIMITS
 from shm.watch.options import (
     OF_ONE_VISIT_YEARS,
@@ -248,19 +248,11 @@ class StateSums:
 
     def course(self, state: WatchState, rows: IntArray, called: Sequence[DetectedChange]) -> Course:
         """Return the tests `rows` with what the null says of each, called changes included."""
-        layout = self.structure.layout
-        columns = self._columns(state, rows)
-        changing, years = columns[:, :, layout.change], state.years[rows]
-        parts = [columns[:, :, layout.null]]
-        for each in called:
-            since = np.where(np.arange(len(rows)) >= each.first, 1.0, 0.0)
-            for _ in range(2 if each.is_ramp else 1):
-                parts.append(changing * since[:, None, None])
-                since = since * (years - each.years)
+        layout, columns = self.structure.layout, self._columns(state, rows)
         its = self.options.mode_scatter**2
         return Course(
-            np.concatenate(parts, axis=2),
-            changing,
+            columns @ select_null(state.years[rows], layout, called),
+            columns[:, :, layout.change],
             self._softened(state, rows),
             state.modes.variances[rows] + its,
             int((rows < self.options.baseline_tests).sum()),
