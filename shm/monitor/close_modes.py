@@ -22,19 +22,10 @@ from itertools import combinations, product
 
 import numpy as np
 
+from shm.monitor.limits import LIMITS
 from shm.monitor.spectrum import Stretch
 from shm.values import ComplexArray, FloatArray
 
-_BIN = 0.25
-"""technical: lines are averaged over so much of a mode's half bandwidth, where T gives more."""
-_DAMPING_SD, _SLOPE_SD, _TILT_SD, _COHERENCE_SD, _FLOOR_SD = 0.7, 10.0, 0.05, 0.5, 2.0
-"""judgement: weak knowledge of the logarithms of damping and floor from before, of the correlation
-of two modes, and of the slope of the force and of what other modes, moved by the same wind, add to
-a mode's tails: R times what its own stiffness would, R of 3 to 5, is a slope of 2 R; of shapes as
-identified from one window, three degrees."""
-_MOST_COHERENT = 0.9
-_SAME_DIRECTION = 0.1  # judgement: modes of nearer shapes differ by frequency alone
-_MOST_STEP = 1.0  # technical: a half bandwidth, and a factor of e
 _SIGNS = np.array([1.0, -1.0, -1.0, -1.0])[:, np.newaxis]
 
 
@@ -66,7 +57,7 @@ def lines_of(
     for each, band_hz in product(stretches, bands_hz):
         inside = each.between(*band_hz)
         values = each.values[:, inside] / unit[:, np.newaxis]
-        many = max(1, int(_BIN * half_hz * each.seconds))
+        many = max(1, int(LIMITS.bin * half_hz * each.seconds))
         bins = values.shape[1] // many
         grouped = values[:, : bins * many].reshape(len(values), bins, many).transpose(1, 0, 2)
         at = inside.start + many * np.arange(bins) + (many - 1) / 2
@@ -128,7 +119,7 @@ class CloseModes:
             value = coherence[one, two] + real + 1j * imaginary
             # What moves both is at most wholly coherent, and modes apart in frequency then less.
             poles = decay[one] + decay[two] + 1j * (radians[one] - radians[two])
-            most = _MOST_COHERENT * 2 * math.sqrt(decay[one] * decay[two]) / abs(poles)
+            most = LIMITS.most_coherent * 2 * math.sqrt(decay[one] * decay[two]) / abs(poles)
             value *= min(1.0, most / max(abs(value), most))
             coherence[one, two], coherence[two, one] = value, np.conj(value)
         return CloseModes(
@@ -185,7 +176,7 @@ class Band:
         value, gradient, information = self.evaluated(modes)
         for _ in range(most):
             curved = information + damped * np.diag(np.diag(information))
-            step = np.clip(np.linalg.solve(curved, gradient), -_MOST_STEP, _MOST_STEP)
+            step = np.clip(np.linalg.solve(curved, gradient), -LIMITS.most_step, LIMITS.most_step)
             trial = modes.moved(step)
             better, *others = self.evaluated(trial)
             if better > value:
@@ -280,7 +271,15 @@ class Band:
         ]
         offset += [np.array([[p.real, p.imag] for p in pairs]).ravel()]
         offset += [np.log(modes.floor / self.known.floor)]
-        sds = (math.inf, _DAMPING_SD, math.inf, _SLOPE_SD, _TILT_SD, _COHERENCE_SD, _FLOOR_SD)
+        sds = (
+            math.inf,
+            LIMITS.damping_sd,
+            math.inf,
+            LIMITS.slope_sd,
+            LIMITS.tilt_sd,
+            LIMITS.coherence_sd,
+            LIMITS.floor_sd,
+        )
         precision = [np.full(len(each), sd**-2) for each, sd in zip(offset, sds, strict=True)]
         return np.concatenate(offset), np.concatenate(precision)
 
@@ -295,7 +294,7 @@ def directions(shapes: FloatArray) -> FloatArray:
     rest = unit - first @ (first.T @ unit)
     size = np.linalg.norm(rest, axis=0)
     most = int(np.argmax(size))
-    if size[most] < _SAME_DIRECTION:
+    if size[most] < LIMITS.same_direction:
         return np.asarray(first)
     return np.hstack((first, rest[:, [most]] / size[most]))
 

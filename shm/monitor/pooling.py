@@ -9,25 +9,9 @@ from datetime import datetime
 
 import numpy as np
 
+from shm.monitor.limits import LIMITS
 from shm.values import NAN, BoolArray, FloatArray, ModalTest, Mode, Plane, ShapePoint, as_test_id
 from shm.values.stream import PERIODS, Period, PooledReading, WindowReading
-
-_OUTLYING = 4.0
-"""judgement: usual deviations; of 144 windows of a day one in a hundred days by chance."""
-_USUAL_SD = 1.4826  # of the median absolute deviation of normal numbers
-_LEAST_TO_JUDGE = 3  # technical: two windows do not say which of them is wrong
-_LEAST_SHARE = 0.2
-"""judgement: of the windows, in which a mode must have been found: one that is seen now and then is
-seen when chance raises it."""
-_LEAST_TO_REGRESS = 12  # judgement: six windows a slope
-_LEAST_SPREAD = 0.1, 0.5
-"""judgement: of the level (a fraction) and the temperature (degrees), for a slope to matter."""
-_LEAST_BATCHES, _LEAST_TO_BATCH = 6, 24
-"""technical: their scatter knows a standard deviation to a third, and one of four windows forgets
-what comes before it."""
-_REPEATS = 6e-5
-"""Of a frequency: what stays the same in every window: close modes, softening joints. Measured by
-`tests/benchmarks/stream_windows.py --seed 20 --seeds 4 --hours 3` (62 modes)."""
 
 
 def pooled(
@@ -43,8 +27,8 @@ def pooled(
         key=lambda each: each.window.start,
     )
     chosen = _without_outlying([each for each in inside if each.modes])
-    least = max(1, math.ceil(_LEAST_SHARE * len(chosen)))
-    keys = sorted({(mode.plane, mode.order) for each in chosen for mode in each.modes}, key=_place)
+    least = max(1, math.ceil(LIMITS.least_share * len(chosen)))
+    keys = sorted({(mode.plane, mode.order) for each in chosen for mode in each.modes})
     series = [_Series.of(chosen, *key) for key in keys]
     modes = tuple(each.mode() for each in series if len(each.modes) >= least)
     if not modes:
@@ -79,10 +63,6 @@ def as_modal_test(reading: PooledReading) -> ModalTest:
     )
 
 
-def _place(key: tuple[Plane, int]) -> tuple[str, int]:
-    return key[0], key[1]
-
-
 def _mean(values: Sequence[float]) -> float:
     known = [value for value in values if math.isfinite(value)]
     return float(np.mean(known)) if known else NAN
@@ -90,18 +70,18 @@ def _mean(values: Sequence[float]) -> float:
 
 def _without_outlying(readings: list[WindowReading]) -> list[WindowReading]:
     """Return the readings without those of which most modes are off what they usually are."""
-    if len(readings) < _LEAST_TO_JUDGE:
+    if len(readings) < LIMITS.least_to_judge:
         return readings
     off: list[list[float]] = [[] for _ in readings]
     keys = {(mode.plane, mode.order) for each in readings for mode in each.modes}
-    for key in sorted(keys, key=_place):
+    for key in sorted(keys):
         series = _Series.of(readings, *key)
         for number, value in zip(series.numbers, np.abs(series.deviations()), strict=True):
             off[number].append(float(value))
     return [
         each
         for each, its in zip(readings, off, strict=True)
-        if not its or np.median(its) <= _OUTLYING
+        if not its or np.median(its) <= LIMITS.outlying
     ]
 
 
@@ -140,7 +120,7 @@ class _Series:
     def deviations(self) -> FloatArray:
         """From the median, in usual ones."""
         off = self.hz - np.median(self.hz)
-        usual = _USUAL_SD * float(np.median(np.abs(off)))
+        usual = LIMITS.usual_sd * float(np.median(np.abs(off)))
         deviations: FloatArray = off / np.maximum(self.sd_hz, usual)
         return deviations
 
@@ -154,7 +134,7 @@ class _Series:
         return replace(
             chosen[-1],
             frequency_hz=hz,
-            frequency_sd_hz=math.hypot(sd, _REPEATS * hz),
+            frequency_sd_hz=math.hypot(sd, LIMITS.repeats * hz),
             damping_ratio=damping,
             damping_sd=damping_sd,
             shape=_mean_shape(chosen),
@@ -164,18 +144,20 @@ class _Series:
     def _regressed(self) -> tuple[float, float, BoolArray]:
         """Frequency at the mean conditions, its standard deviation, and which windows were used."""
         design, sd = self._design(), self.sd_hz
-        used = np.abs(self.deviations()) <= _OUTLYING if len(sd) >= _LEAST_TO_JUDGE else sd > 0
-        weight = np.where(used, sd**-2.0, 0.0)
-        inverse = np.linalg.pinv((design.T * weight) @ design)
-        found = inverse @ (design.T * weight) @ self.hz
-        off = self.hz - design @ found
-        if design.shape[1] > 1:
-            usual = _USUAL_SD * float(np.median(np.abs(off[used])))
-            used &= np.abs(off) <= _OUTLYING * np.maximum(sd, usual)
+        used = (
+            np.abs(self.deviations()) <= LIMITS.outlying
+            if len(sd) >= LIMITS.least_to_judge
+            else sd > 0
+        )
+        # Once more without the windows that what was regressed on does not explain.
+        for is_first in (True, False)[: design.shape[1]]:
             weight = np.where(used, sd**-2.0, 0.0)
             inverse = np.linalg.pinv((design.T * weight) @ design)
             found = inverse @ (design.T * weight) @ self.hz
             off = self.hz - design @ found
+            if is_first and design.shape[1] > 1:
+                usual = LIMITS.usual_sd * float(np.median(np.abs(off[used])))
+                used &= np.abs(off) <= LIMITS.outlying * np.maximum(sd, usual)
         freedom = max(1, int(used.sum()) - design.shape[1])
         excess = float(weight @ off**2) / freedom
         together = _together(off[used] / sd[used])
@@ -185,10 +167,10 @@ class _Series:
         """1, and level and temperature off their means where windows differ in them."""
         level = np.array([mode.acceleration_m_s2 for mode in self.modes])
         columns = [np.ones(len(self.modes))]
-        if len(self.modes) >= _LEAST_TO_REGRESS:
-            if np.std(level) > _LEAST_SPREAD[0] * np.mean(level):
+        if len(self.modes) >= LIMITS.least_to_regress:
+            if np.std(level) > LIMITS.least_spread[0] * np.mean(level):
                 columns.append(level / np.mean(level) - 1)
-            if np.std(self.temperature_c) > _LEAST_SPREAD[1]:
+            if np.std(self.temperature_c) > LIMITS.least_spread[1]:
                 columns.append(self.temperature_c - np.mean(self.temperature_c))
         return np.array(columns).T
 
@@ -197,9 +179,9 @@ def _together(off: FloatArray) -> float:
     """Windows a window that stands for itself: the variance of means of batches over that of
     independent windows; 1 where there are too few to say.
     """
-    if len(off) < _LEAST_TO_BATCH:
+    if len(off) < LIMITS.least_to_batch:
         return 1.0
-    size = max(len(off) // (2 * _LEAST_BATCHES), len(off) // int(len(off) ** 0.5))
+    size = max(len(off) // (2 * LIMITS.least_batches), len(off) // int(len(off) ** 0.5))
     count = len(off) // size
     batches = off[: count * size].reshape(count, size).mean(axis=1)
     return size * float(np.var(batches, ddof=1)) / float(np.mean(off**2))
@@ -225,7 +207,7 @@ def _mean_shape(modes: Sequence[Mode]) -> tuple[ShapePoint, ...]:
         return ()
     values = np.array([[(p.value, p.cross, p.sd) for p in mode.shape] for mode in similar])
     middle = np.median(values, axis=0)
-    scatter = _USUAL_SD * np.median(np.abs(values - middle), axis=0)[:, 0]
+    scatter = LIMITS.usual_sd * np.median(np.abs(values - middle), axis=0)[:, 0]
     formal = middle[:, 2]
     sd = np.maximum(formal, scatter) / math.sqrt(len(similar))
     return tuple(

@@ -10,6 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
+from shm.monitor.limits import LIMITS
 from shm.monitor.spectrum import Stretch, power_near, shape_on, stretch
 from shm.values import PLANES, FloatArray, Mode, Plane
 from shm.values.stream import (
@@ -22,30 +23,19 @@ from shm.values.stream import (
     WindowReading,
 )
 
-_AT_FULL_SCALE, _CLIPPED = 0.99, 1e-3
-"""judgement: of the full scale, and the share of samples beyond; 0.6 s of ten minutes."""
-_HOUR = 6  # windows: a quiet quarter of an hour hides the modes of a sound sensor, too
 SEEN_BEFORE = timedelta(days=3)
 """What the windows without modes are compared with: as long as the watch learns."""
-_LEAST_BEFORE = 36  # judgement: six hours of windows, which have met more than one level of motion
-_FALLEN = 0.5
-"""Of the lowest level before: no motion is less than the noise of the sensor itself, which of a
-sound one changes by 1 dB between -20 and +40 degrees (with the root of the absolute temperature),
-and hides the modes once the motion is as low; this is 6 dB."""
 _BLIND = timedelta(days=1)  # derived: each day has traffic and wind, whatever the level is
-_LEAST_MODES = 3  # judgement: one mode or two agree with an exchange by chance
-_AS_KNOWN, _GAIN = 0.9, 0.15
-"""judgement: share of the motion that is explained with the exchange, and how much less without."""
-_WITHIN = 0.02  # of a frequency: what temperature moves, and the other plane's mode
 
 
-def broken_channels(pieces: Sequence[Piece], stream: Stream) -> dict[str, str]:
-    """Channels of a window that cannot be used, and why."""
-    found = {}
-    for channel in stream.channels:
-        if fault := _fault(channel, _samples(pieces, channel.name)):
-            found[channel.name] = fault[1]
-    return found
+Fault = tuple[StreamEventKind, str]
+"""The kind of a fault, and what was seen."""
+
+
+def broken_channels(pieces: Sequence[Piece], stream: Stream) -> dict[str, Fault]:
+    """Return the channels of a window that cannot be used, and why."""
+    faults = {each.name: _fault(each, _samples(pieces, each.name)) for each in stream.channels}
+    return {name: fault for name, fault in faults.items() if fault}
 
 
 def sensor_faults(
@@ -54,12 +44,8 @@ def sensor_faults(
     """Return the faults that a window shows."""
     if not pieces:
         return ()
-    found: list[tuple[StreamEventKind, str, str]] = []
-    broken = set()
-    for channel in stream.channels:
-        if fault := _fault(channel, _samples(pieces, channel.name)):
-            found.append((fault[0], channel.name, fault[1]))
-            broken.add(channel.name)
+    broken = broken_channels(pieces, stream)
+    found = [(kind, name, why) for name, (kind, why) in broken.items()]
     usable = [channel for channel in stream.channels if channel.name not in broken]
     stretches = [
         stretch(part, piece.sampling_rate_hz)
@@ -162,7 +148,7 @@ def _find_loss(
         return None
     none = _tail(few, lambda each: each.n_modes > 0)
     before = [each for each in sound if each.window.start < few[0].window.start]
-    is_known = sum(1 for each in before if each.n_modes) >= _LEAST_BEFORE
+    is_known = sum(1 for each in before if each.n_modes) >= LIMITS.least_before
     level = float(np.median([each.window.level_m_s2 for each in few]))
     lowest = min(each.window.level_m_s2 for each in before) if is_known else math.nan
     since: Sequence[_Row] = few
@@ -170,7 +156,7 @@ def _find_loss(
         since = none
     if since is none and not (is_known and _is_lasting(none) and _are_visible(before, level, 0.0)):
         highest = max((each.window.level_m_s2 for each in none), default=math.nan)
-        fallen = _is_lasting(none) and highest < _FALLEN * lowest
+        fallen = _is_lasting(none) and highest < LIMITS.fallen * lowest
         if not fallen and not (none and end - none[0].window.start >= _BLIND):
             return None
     first = since[0].window
@@ -210,10 +196,10 @@ def _are_visible(
     for each in sorted(before, key=lambda each: each.window.level_m_s2):
         quieter_db = 20 * math.log10(level_m_s2 / each.window.level_m_s2)
         height_db = each.window.signal_to_noise_db + quieter_db
-        if quieter_db < 0 and (math.isnan(height_db) or len(found) >= _HOUR):
+        if quieter_db < 0 and (math.isnan(height_db) or len(found) >= LIMITS.hour):
             continue
         found.append(each.n_modes > n_modes and (quieter_db >= 0 or height_db >= visible_db))
-    return len(found) >= _HOUR and float(np.mean(found)) >= enough
+    return len(found) >= LIMITS.hour and float(np.mean(found)) >= enough
 
 
 def _tail(rows: Sequence[_Row], is_seen: Callable[[_Row], bool]) -> Sequence[_Row]:
@@ -233,17 +219,17 @@ def exchanged(
     rows = [shape_on(channels, mode) for mode in known]
     shapes = np.array(rows).reshape(len(known), len(channels))
     reported = np.all(np.isfinite(shapes), axis=1) & np.any(shapes != 0, axis=1)
-    if reported.sum() < _LEAST_MODES or not stretches:
+    if reported.sum() < LIMITS.least_modes or not stretches:
         return None
     hz = np.array([mode.frequency_hz for mode in known])[reported]
-    seen = [power_near(stretches, each, within=_WITHIN) for each in hz]
+    seen = [power_near(stretches, each, within=LIMITS.within) for each in hz]
     shapes = shapes[reported]
     straight = _likeness(seen, hz, shapes)
     changes: list[tuple[float, str, str]] = [
         (_likeness(seen, hz, changed), name, words)
         for changed, name, words in _changes(shapes, channels)
     ]
-    if not changes or max(changes)[0] < max(_AS_KNOWN, straight + _GAIN):
+    if not changes or max(changes)[0] < max(LIMITS.as_known, straight + LIMITS.gain):
         return None
     share, name, words = max(changes)
     return name, f"{words} (that explains {share:.2f} of the motion, else {straight:.2f})"
@@ -271,22 +257,22 @@ def _likeness(seen: Sequence[FloatArray], hz: FloatArray, shapes: FloatArray) ->
     """Median share of the motion near the modes' frequencies in the shapes of those near by."""
     shares = []
     for power, at_hz in zip(seen, hz, strict=True):
-        near = shapes[np.abs(hz / at_hz - 1) < 2 * _WITHIN]
+        near = shapes[np.abs(hz / at_hz - 1) < 2 * LIMITS.within]
         left, size, _ = np.linalg.svd(near.T, full_matrices=False)
         axes = left[:, size > 0.1 * size[0]]
         shares.append(np.trace(axes.T @ power @ axes) / np.trace(power))
     return float(np.median(shares))
 
 
-def _fault(channel: StreamChannel, values: FloatArray) -> tuple[StreamEventKind, str] | None:
+def _fault(channel: StreamChannel, values: FloatArray) -> Fault | None:
     known = values[np.isfinite(values)]
     if not len(known):
         return "dead", "no samples"
     if np.ptp(known) == 0:
         return "dead", f"its value never changes ({known[0]:.4g} m/s^2)"
     if math.isfinite(channel.full_scale):
-        share = float(np.mean(np.abs(known) >= _AT_FULL_SCALE * channel.full_scale))
-        if share > _CLIPPED:
+        share = float(np.mean(np.abs(known) >= LIMITS.at_full_scale * channel.full_scale))
+        if share > LIMITS.clipped:
             return "saturated", f"{share:.1%} of its samples are at full scale"
     return None
 

@@ -9,22 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from shm.monitor.limits import LIMITS
 from shm.values import ComplexArray, FloatArray, Mode
 from shm.values.stream import StreamChannel
 
 REACH = 0.06
 """A tenth of the tension lost moves the frequencies of a taut string by 5 %."""
-_STEP = 2e-4  # technical: of a grid of frequencies, a fifth of the peaks' width at 0.5 % of damping
 ALONE, _ALONE_SHARE = 0.004, 0.3
 """judgement: how far a mode may be from where the others say that all have gone: what temperature
 does to one more than to another between windows, and a share of the whole change."""
-_DAMPING = 0.003
-"""judgement: of a mode whose damping is not known; bars have 0.001, strands 0.005."""
-_SAME_PLACE_M = 0.01
-"""technical: positions are read off a tape."""
-_MIXED = 0.4  # judgement: of the motion in its own plane; sensors turned by 22 degrees
-_SMOOTHED = 16  # technical: lines averaged, a quarter of which is their scatter
-_ALIKE = 9.0  # judgement: a factor of three between the noise of sensors of one logger
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,14 +56,14 @@ def channel_noise(stretches: Sequence[Stretch], low_hz: float, high_hz: float) -
         [_quiet(each.values[:, each.between(low_hz, high_hz)]) for each in stretches], 0
     )
     usual = float(np.median(quiet))
-    noise: FloatArray = np.sqrt(np.clip(quiet, usual / _ALIKE, usual * _ALIKE))
+    noise: FloatArray = np.sqrt(np.clip(quiet, usual / LIMITS.alike, usual * LIMITS.alike))
     return np.maximum(noise, np.finfo(float).tiny)
 
 
 def _quiet(lines: ComplexArray) -> FloatArray:
-    count = lines.shape[1] // _SMOOTHED * _SMOOTHED
+    count = lines.shape[1] // LIMITS.smoothed * LIMITS.smoothed
     power = np.abs(lines[:, :count]) ** 2
-    smooth = power.reshape(len(lines), -1, _SMOOTHED).mean(axis=2)
+    smooth = power.reshape(len(lines), -1, LIMITS.smoothed).mean(axis=2)
     found: FloatArray = np.quantile(smooth, 0.1, axis=1)
     return found
 
@@ -84,13 +77,13 @@ def shape_on(channels: Sequence[StreamChannel], mode: Mode) -> FloatArray:
     value, cross = (
         np.nan_to_num([getattr(point, name) for point in mode.shape]) for name in ("value", "cross")
     )
-    mixed = np.sum(cross**2) > _MIXED**2 * np.sum(value**2)
+    mixed = np.sum(cross**2) > LIMITS.mixed**2 * np.sum(value**2)
     found = np.full(len(channels), np.nan)
     for row, channel in enumerate(channels):
         inside = channel.plane == mode.plane
         found[row] = math.nan if inside else 0.0
         for point in mode.shape:
-            if abs(point.x_m - channel.x_m) < _SAME_PLACE_M:
+            if abs(point.x_m - channel.x_m) < LIMITS.same_place_m:
                 across = 0.0 if mixed else float(np.nan_to_num(point.cross))
                 found[row] = point.value if inside else across
     return found
@@ -181,8 +174,8 @@ def found_peaks(
     own shape, has its highest peak there.
     """
     shapes, guessed = _known_shapes(channels, known, stretches)
-    damping = np.array([m.damping_ratio if m.damping_ratio > 0 else _DAMPING for m in known])
-    shift = np.arange(-REACH, REACH + _STEP / 2, _STEP)
+    damping = np.array([m.damping_ratio if m.damping_ratio > 0 else LIMITS.damping for m in known])
+    shift = np.arange(-REACH, REACH + LIMITS.step / 2, LIMITS.step)
     rows = [
         _raised(stretches, mode, row, z, shift)
         for mode, row, z in zip(known, _seen_by(known, shapes, noise), damping, strict=True)

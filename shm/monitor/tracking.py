@@ -15,6 +15,7 @@ from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.planes import shape_points
 from shm.identify.options import NO_CROSS_CHECK
 from shm.monitor.close_modes import Band, BandFit, CloseModes, directions, lines_of
+from shm.monitor.limits import LIMITS
 from shm.monitor.sensor_health import exchanged
 from shm.monitor.spectrum import ALONE, REACH, Peaks, Stretch, found_peaks
 from shm.monitor.windows import Judged, judged
@@ -31,24 +32,6 @@ from shm.values import (
 )
 from shm.values.rounding import listed
 from shm.values.stream import Piece, Stream, Window, WindowReading
-
-_HALF_WIDTHS = 10.0
-"""Of a peak, to either side of it in its band. What white force leaves out of the slope of the
-motion's spectrum moves a frequency by 0.6 n z^2 of it, n half widths to a side at a damping z."""
-_LEAST_LINES = 12  # judgement: to either side: a floor is known to a fifth by 24 lines
-_OTHER_PLANE = 0.08
-"""judgement: of the frequency; sensors that are a few degrees off see the other plane, too."""
-_LEAST_GAIN = 15.0
-"""judgement: of log likelihood by which a mode is proven: its five parameters and some two hundred
-places to look make 10 by chance."""
-_NARROWER = 10.0
-"""judgement: than the mode as it was known, or than a line: a tone, of trains or machines, near it.
-Two close modes that were taken for one had up to seven times the damping of each."""
-_FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
-_REVIEW_S, _REVIEW_FEW_S, _FEW = 12 * 3600, 3600, 2
-"""judgement: how often modes are sought that were missed at first, by day and by night; each hour
-where so few are known, or most are lost. From scratch costs as much as twenty windows that are
-followed."""
 
 
 def read_window(
@@ -76,21 +59,26 @@ def read_window(
     why = [found.reason] if found.reason else []
     why += [f"not found: {listed(lost)}"] if lost else []
     guessed = 2 * (found.peaks.guessed if found.peaks else 0) > len(known)
-    if 2 * len(modes) <= len(known) or guessed:
-        if found.window.kind == "quiet":
-            why.append("the modes are hidden by the noise of the sensors")
-        elif not is_confirmed or _is_due(found.window, _REVIEW_FEW_S):
-            try:
-                fresh = _from_scratch(found, stream, hanger, options)
-                if not is_confirmed or is_moved_by_tension(known, fresh):
-                    return WindowReading(found.window, fresh, "from scratch", "; ".join(why))
-                why.append(f"no change of tension explains the {len(fresh)} modes that are seen")
-            except ShmError as error:
-                why.append(str(error))
-        modes = _exclude_strays(modes, known)
-    elif found.window.kind != "quiet" and _is_reviewed(known, found.window):
-        return _reviewed(known, found, modes, stream, hanger, options, "; ".join(why))
-    return WindowReading(found.window, modes, "tracked" if modes else "none", "; ".join(why))
+    is_lost = 2 * len(modes) <= len(known) or guessed
+    is_quiet = found.window.kind == "quiet"
+    fresh: tuple[Mode, ...] = ()
+    if is_quiet and is_lost:
+        why.append("the modes are hidden by the noise of the sensors")
+    if not is_quiet and _is_search_due(known, found.window, is_confirmed, is_lost):
+        try:
+            fresh = _from_scratch(found, stream, hanger, options)
+        except ShmError as error:
+            why.append(str(error))
+    # What was followed where hardly any are known was a peak of the deck or of the traffic.
+    is_few = len(known) <= LIMITS.few and len(fresh) > 2 * len(known)
+    is_new = not is_confirmed or is_moved_by_tension(known, fresh)
+    if fresh and (is_new if is_lost else is_few):
+        return WindowReading(found.window, fresh, "from scratch", "; ".join(why))
+    if fresh and is_lost:
+        why.append(f"no change of tension explains the {len(fresh)} modes that are seen")
+    # A mode that the windows after this do not show again is forgotten, and no hour has it.
+    more = _exclude_strays(modes, known) if is_lost else modes + _missed(known, modes, fresh)
+    return WindowReading(found.window, more, "tracked" if more else "none", "; ".join(why))
 
 
 def _has(modes: Sequence[Mode], known: Mode) -> bool:
@@ -101,43 +89,22 @@ def _is(mode: Mode, known: Mode) -> bool:
     return (mode.plane, mode.order) == (known.plane, known.order)
 
 
-def _is_reviewed(known: Sequence[Mode], window: Window) -> bool:
-    """Return where an order lacks in a plane, each stream at ten minutes of its own."""
+def _is_search_due(
+    known: Sequence[Mode], window: Window, is_confirmed: bool, is_lost: bool
+) -> bool:
+    """Return True where most modes are lost, or an order lacks in a plane, seldom."""
+    if is_lost:
+        return not is_confirmed or _is_due(window, LIMITS.review_few_s)
     orders = [{m.order for m in known if m.plane == plane} for plane in PLANES]
     highest = max(mode.order for mode in known)
-    if all(len(each) == highest for each in orders):
-        return False
-    return _is_due(window, _REVIEW_S if len(known) > _FEW else _REVIEW_FEW_S)
+    few_s = LIMITS.review_s if len(known) > LIMITS.few else LIMITS.review_few_s
+    return any(len(each) < highest for each in orders) and _is_due(window, few_s)
 
 
 def _is_due(window: Window, every_s: int) -> bool:
     """Return True once in ``every_s``, at a time of its own for each stream."""
     since_s = window.start.timestamp() + crc32(window.stream.encode()) % every_s
     return since_s % every_s < window.duration_s
-
-
-def _reviewed(
-    known: Sequence[Mode],
-    found: Judged,
-    modes: tuple[Mode, ...],
-    stream: Stream,
-    hanger: Hanger,
-    options: IdentifyOptions,
-    why: str,
-) -> WindowReading:
-    """Add modes that were missed at first to the followed ones.
-
-    Where hardly any are known and a search finds more than twice as many, all are from scratch:
-    what was followed was a peak of the deck or of the traffic. A mode that the windows after this
-    do not show again is forgotten, and no hour has it (`pooling`).
-    """
-    try:
-        fresh = _from_scratch(found, stream, hanger, options)
-    except ShmError as error:
-        return WindowReading(found.window, modes, "tracked", f"{why}; none sought: {error}")
-    if len(known) <= _FEW and len(fresh) > 2 * len(known):
-        return WindowReading(found.window, fresh, "from scratch", why)
-    return WindowReading(found.window, modes + _missed(known, modes, fresh), "tracked", why)
 
 
 def is_moved_by_tension(
@@ -194,7 +161,7 @@ def _missed(
             return False
         return all(
             (each.frequency_hz - mode.frequency_hz) * (each.order - mode.order) > 0
-            and abs(each.frequency_hz / mode.frequency_hz - 1) > _OTHER_PLANE
+            and abs(each.frequency_hz / mode.frequency_hz - 1) > LIMITS.other_plane
             for each in its
         )
 
@@ -289,9 +256,9 @@ def _prove(
 def _half_hz(peaks: Peaks, stretches: Sequence[Stretch]) -> FloatArray:
     """To either side of each mode, how wide its band is."""
     hz = peaks.frequency_hz
-    least = _LEAST_LINES / max(each.seconds for each in stretches)
+    least = LIMITS.least_lines / max(each.seconds for each in stretches)
     # Technical: of the frequency; a band's floor is taken as flat
-    wide = np.minimum(_HALF_WIDTHS * peaks.damping * hz, 0.03 * hz)
+    wide = np.minimum(LIMITS.half_widths * peaks.damping * hz, 0.03 * hz)
     half: FloatArray = np.maximum(wide, least)
     return half
 
@@ -305,7 +272,7 @@ def _groups(
         if group:
             away = hz[index] - hz[group[-1]]
             other = all(known[index].plane != known[each].plane for each in group)
-            near = _OTHER_PLANE * hz[index] if other else 0.0
+            near = LIMITS.other_plane * hz[index] if other else 0.0
             if away > max(near, half_hz[index], half_hz[group[-1]]):
                 yield group
                 group = []
@@ -364,7 +331,7 @@ class _Group:
                 without = band.only(rest).fitted(fit.modes.only(rest), 6)
                 gains.append(fit.log_likelihood - without.log_likelihood)
             weakest = int(np.argmin(gains))
-            if gains[weakest] >= _LEAST_GAIN:
+            if gains[weakest] >= LIMITS.least_gain:
                 return fit, chosen
             del chosen[weakest]
             start = fit.modes.only([p for p in range(len(gains)) if p != weakest])
@@ -383,7 +350,7 @@ class _Group:
         power = np.maximum(power, 1e-6 / np.max(self.shapes**2))
         seen = directions(self.shapes)
         along = np.real(np.einsum("xij,ik,jk->kx", self.lines.power, seen, seen))
-        floor = np.quantile(along, _FLOOR, axis=1)[[0, -1]]
+        floor = np.quantile(along, LIMITS.floor, axis=1)[[0, -1]]
         zero = np.zeros(count)
         return CloseModes(radians, decay, power, zero, zero, np.eye(count, dtype=complex), floor)
 
@@ -401,7 +368,7 @@ class _Group:
         options = replace(self.options, ambient_s=sum(s.seconds for s in self.found.stretches))
         best = options.ambient_width * options.at_best(hz, damping)[0]
         if (
-            damping < self.peaks.damping[index] / _NARROWER
+            damping < self.peaks.damping[index] / LIMITS.narrower
             or decay * max(each.seconds for each in self.found.stretches) < 1.0
             or damping > self.options.max_damping_ratio
             or sd_hz > hz * max(2 * self.options.max_frequency_sd, best)

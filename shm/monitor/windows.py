@@ -15,23 +15,11 @@ import scipy
 
 from shm.identify.measuring.ambient import LOUDER
 from shm.identify.options import PASSED
+from shm.monitor.limits import LIMITS
 from shm.monitor.sensor_health import broken_channels
 from shm.monitor.spectrum import Peaks, Stretch, channel_noise, found_peaks, stretch
 from shm.values import NAN, BoolArray, FloatArray, Mode
 from shm.values.stream import Piece, Stream, StreamChannel, Window, WindowKind
-
-LEAST_S = 120.0
-"""judgement: a fifth of a window of ten minutes, whose frequencies are known 2.2 times worse."""
-_LEAST_STRETCH_S = 20.0  # technical: 60 periods of 3 Hz; shorter ones hardly resolve a peak
-_BLOCK_S = 0.25
-_STRETCH_S = 5.0  # as `unrest` of an ambient record, shm/identify/quality/of_ambient.py
-_BEFORE_S, _AFTER_S = 2.0, 3.0  # judgement: a train comes and goes without a block's edge
-_KNOCK_RISE_S = 0.5  # judgement: an impulse is at its highest in two blocks, a train in seconds
-_KNOCK_S = 20.0  # judgement: a knock's ring-down falls by a factor of five in less
-_QUIET_DB = 5.0
-"""judgement: five deviations of a mean of twenty spectra."""
-_STRONG_DB, _STRONG_PEAKS = 10.0, 3
-"""judgement: peaks that no known mode explains and that a search from scratch may understand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,39 +45,26 @@ def judged(pieces: Sequence[Piece], stream: Stream, known: Sequence[Mode]) -> Ju
     broken = broken_channels(pieces, stream)
     rows = [row for row, each in enumerate(stream.channels) if each.name not in broken]
     channels = tuple(stream.channels[row] for row in rows)
-    reason = "; ".join(f"{name}: {why}" for name, why in broken.items())
+    reason = "; ".join(f"{name}: {why}" for name, (_, why) in broken.items())
     if not rows:
         return _unusable(pieces, stream, f"no channel can be used ({reason})")
     values = [part for piece in pieces for part in _known_parts(piece, channels)]
     rate = stream.sampling_rate_hz
-    if sum(part.shape[1] for part in values) < LEAST_S * rate:
-        return _unusable(pieces, stream, f"less than {LEAST_S:g} s without a gap")
+    if sum(part.shape[1] for part in values) < LIMITS.least_s * rate:
+        return _unusable(pieces, stream, f"less than {LIMITS.least_s:g} s without a gap")
     band = _band_hz(known, rate)
     events = _Events.of(values, rate, band)
     parts = tuple(events.undisturbed(values))
-    if sum(part.shape[1] for part in parts) < LEAST_S * rate:
-        why = f"{events.kind}: less than {LEAST_S:g} s are undisturbed"
+    if sum(part.shape[1] for part in parts) < LIMITS.least_s * rate:
+        why = f"{events.kind}: less than {LIMITS.least_s:g} s are undisturbed"
         return _unusable(pieces, stream, why, events)
-    return _used(pieces, stream, known, channels, parts, events, band, reason)
-
-
-def _used(
-    pieces: Sequence[Piece],
-    stream: Stream,
-    known: Sequence[Mode],
-    channels: tuple[StreamChannel, ...],
-    parts: tuple[FloatArray, ...],
-    events: _Events,
-    band_hz: tuple[float, float],
-    reason: str,
-) -> Judged:
-    stretches = tuple(stretch(part, stream.sampling_rate_hz) for part in parts)
-    peaks = found_peaks(stretches, channels, known, channel_noise(stretches, *band_hz))
+    stretches = tuple(stretch(part, rate) for part in parts)
+    peaks = found_peaks(stretches, channels, known, channel_noise(stretches, *band))
     height = float(np.median(peaks.height_db[peaks.seen])) if peaks.seen else NAN
     kind: WindowKind = events.kind
-    if kind == "wind" and height < _QUIET_DB and not _has_strong_peaks(stretches, band_hz):
+    if kind == "wind" and height < LIMITS.quiet_db and not _has_strong_peaks(stretches, band):
         kind = "quiet"
-    window = _window(pieces, stream, kind, _level(stretches, band_hz), events.unrest, height)
+    window = _window(pieces, stream, kind, _level(stretches, band), events.unrest, height)
     apart = f"{events.seconds:.0f} s are set apart: {events.kind}" if events.seconds else ""
     reason = "; ".join(each for each in (reason, apart) if each)
     return Judged(window, channels, parts, stretches, peaks, reason)
@@ -163,7 +138,9 @@ def _known_parts(piece: Piece, channels: Sequence[StreamChannel]) -> list[FloatA
     good = np.all(np.isfinite(values), axis=0)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], good, [False]))))
     parts = [values[:, begin:end] for begin, end in edges.reshape(-1, 2)]
-    return [part for part in parts if part.shape[1] >= _LEAST_STRETCH_S * piece.sampling_rate_hz]
+    return [
+        part for part in parts if part.shape[1] >= LIMITS.least_stretch_s * piece.sampling_rate_hz
+    ]
 
 
 def _level(stretches: Sequence[Stretch], band_hz: tuple[float, float]) -> float:
@@ -183,8 +160,8 @@ def _has_strong_peaks(stretches: Sequence[Stretch], band_hz: tuple[float, float]
     many = 8  # technical: lines averaged, whose sum by chance is 10 dB up once in 1e14
     mean = power[: len(power) // many * many].reshape(-1, many).mean(axis=1)
     around = scipy.ndimage.median_filter(mean, size=max(9, len(mean) // 20), mode="nearest")
-    raised = mean > 10 ** (_STRONG_DB / 10) * around
-    return int(np.sum(np.diff(raised.astype(int)) == 1)) >= _STRONG_PEAKS
+    raised = mean > 10 ** (LIMITS.strong_db / 10) * around
+    return int(np.sum(np.diff(raised.astype(int)) == 1)) >= LIMITS.strong_peaks
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +175,7 @@ class _Events:
 
     @classmethod
     def of(cls, parts: Sequence[FloatArray], rate: float, band_hz: tuple[float, float]) -> _Events:
-        block = max(1, round(_BLOCK_S * rate))
+        block = max(1, round(LIMITS.block_s * rate))
         sections = scipy.signal.butter(2, band_hz, "bandpass", fs=rate, output="sos")
         inside, slow = [], []
         for part in parts:
@@ -212,7 +189,7 @@ class _Events:
             below = np.pad(below, (0, len(its) - len(below)), "edge")
             marked = (its > LOUDER * level) | (below > 2 * LOUDER * sway)
             loud.append(_with_edges(marked))
-            kinds |= {_kind_of(its[first:end]) for first, end in _runs(marked, _AFTER_S)}
+            kinds |= {_kind_of(its[first:end]) for first, end in _runs(marked, LIMITS.after_s)}
         kind: Literal["wind", "traffic", "knock"] = "wind"
         kind = "traffic" if "traffic" in kinds else "knock" if kinds else kind
         return cls(kind, _unrest(inside), block, tuple(loud))
@@ -220,11 +197,11 @@ class _Events:
     @property
     def seconds(self) -> float:
         """Return how long the disturbed parts are."""
-        return _BLOCK_S * float(sum(np.sum(each) for each in self.loud))
+        return LIMITS.block_s * float(sum(np.sum(each) for each in self.loud))
 
     def undisturbed(self, parts: Sequence[FloatArray]) -> list[FloatArray]:
         """Return what lies between the events and is long enough."""
-        least = int(_LEAST_STRETCH_S / _BLOCK_S)
+        least = int(LIMITS.least_stretch_s / LIMITS.block_s)
         return [
             part[:, first * self.block : (end * self.block if end < len(loud) else None)]
             for part, loud in zip(parts, self.loud, strict=True)
@@ -253,7 +230,7 @@ def _median(parts: Sequence[FloatArray]) -> float:
 
 def _unrest(parts: Sequence[FloatArray]) -> float:
     """Return the loudest five seconds over the median five seconds."""
-    many = int(_STRETCH_S / _BLOCK_S)
+    many = int(LIMITS.stretch_s / LIMITS.block_s)
     level = np.sqrt(
         np.concatenate([np.mean(_blocks(p[np.newaxis] ** 2, many), axis=2)[0] for p in parts])
     )
@@ -265,7 +242,7 @@ def _runs(marked: BoolArray, gap_s: float) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate(([False], marked, [False])))).reshape(-1, 2)
     runs: list[tuple[int, int]] = []
     for first, end in edges.tolist():
-        if runs and (first - runs[-1][1]) * _BLOCK_S < gap_s:
+        if runs and (first - runs[-1][1]) * LIMITS.block_s < gap_s:
             runs[-1] = runs[-1][0], end
         else:
             runs.append((first, end))
@@ -274,13 +251,20 @@ def _runs(marked: BoolArray, gap_s: float) -> list[tuple[int, int]]:
 
 def _kind_of(level: FloatArray) -> Literal["traffic", "knock"]:
     """A knock is at its highest at once, and rings down."""
-    rise_s = int(np.argmax(level)) * _BLOCK_S
-    return "knock" if rise_s <= _KNOCK_RISE_S and len(level) * _BLOCK_S < _KNOCK_S else "traffic"
+    rise_s = int(np.argmax(level)) * LIMITS.block_s
+    return (
+        "knock"
+        if rise_s <= LIMITS.knock_rise_s and len(level) * LIMITS.block_s < LIMITS.knock_s
+        else "traffic"
+    )
 
 
 def _with_edges(marked: BoolArray) -> BoolArray:
     """Return the loud blocks with what comes just before and after."""
     wide = marked.copy()
     for first, end in _runs(marked, 0.0):
-        wide[max(0, first - int(_BEFORE_S / _BLOCK_S)) : end + int(_AFTER_S / _BLOCK_S)] = True
+        wide[
+            max(0, first - int(LIMITS.before_s / LIMITS.block_s)) : end
+            + int(LIMITS.after_s / LIMITS.block_s)
+        ] = True
     return wide

@@ -273,7 +273,7 @@ def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
     Raises NothingThere where fewer than three of them can be compared.
     """
     # It is loaded where it is sought: who lists the hangers does without.
-    from shm.watch.neighbours import bridge_pattern
+    from shm.watch.neighbours_words import bridge_pattern
 
     return bridge_pattern(hanger_shifts(store, order), order)
 

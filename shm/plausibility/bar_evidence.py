@@ -14,6 +14,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from shm.models.tensioned_beam import frequencies_hz
+from shm.plausibility.limits import LIMITS
 from shm.values import NAN, PLANES, BoolArray, FloatArray, Hanger, ModalTest
 
 OriginKind: TypeAlias = Literal["hanger", "unknown bar", "time base", "planes"]
@@ -30,52 +31,19 @@ over that of a solid section."""
 _LIMITS = np.array([(-7, 4), (-3, 3), *[(-2.5, 4)] * 4, (0.01, 3)]).T
 """Technical: of the parameters in a fit."""
 
-_STARTS = (-1.0, 0.75, 2.5)
-"""log10 k L/EI near a pin, in the middle and near a clamp, from where fits begin."""
-
-_STEPS, _WIDE, _NARROWS, _FIT_SD = 14, 0.1, 0.5, 2e-3
-"""Of fits: misfits of 10 % count at first, those of 0.2 % in the end."""
 
 _TENSION = (math.log(0.6), 1.0)
 """Of ln(tension over nominal): of the assumed `tension_ratio`, mostly a third to 1.5."""
 
-_MODEL_C = 0.005
-"""Of ln c: what end zones and sensors do to a bar that is taken as uniform."""
-
-_ROD_SHEAR = (1.0, 0.02)
-"""Of the share of shear of a rod: that of theory."""
-
-_ANY_BAR = (2.0, 0.7)
-"""Standard deviations of ln tension and ln c of a bar that nobody described: c from a quarter to
-four times as large, as that of a bar of half or twice the length is."""
 
 #         weight  ln T  ln c  log10 k  time base
 ORDINARY = 0.93, 0.02, 3e-4, 0.05, 0.0
 TIGHTER = 0.04, 0.25, 3e-4, 0.05, 0.0
-_LOOSER = 0.02, 0.05, 3e-4, 0.5, 0.0
-_ALTERED = 0.01, 0.40, 1e-2, 0.7, 0.0
 OTHER_CLOCK = 1.0, 0.02, 3e-4, 0.05, 1.5
 """What tests of one hanger differ by, standard deviations: temperature; a tension that was lost or
 restored; end springs of a third or three times; all of it. And a time base of any factor."""
 
-_TEST_ERRORS = ((0.55, 3e-4), (0.35, 1e-3), (0.08, 3e-3), (0.02, 0.03))
-_BAR_ERRORS = ((0.3, 1e-3), (0.45, 3e-3), (0.2, 1e-2), (0.05, 0.03))
-"""Weights and standard deviations of ln f of each mode beyond the stated ones: of one test against
-another (0.03: a change of no known kind), and of a bar against its description."""
 
-_TOGETHER, _ALONG_ORDERS = 0.9, 0.7
-"""Of the variance of a bar's errors, what goes together in neighbouring orders, and how far in ln
-of the order: fittings, end zones and sensors raise or lower many modes alike."""
-
-_OFF_SHIFT = 0.01
-"""Share by which a fitted bar mistakes the shift of a frequency."""
-
-_MISTAKEN, _MISTAKEN_DENSITY, _MOST_MISTAKEN = 0.02, 2.5, 2
-"""Probability that a mode is another peak or has another's order, within 20 % to either side."""
-
-_MASSES, _MASS_ERROR = (0.01, 0.15), 2e-3
-"""Probability that something was hung on the bar; share by which Rayleigh's quotient errs, and the
-error of each mode besides."""
 # Of the bar's own mass, from what moves a mode by 0.1 % to a clamp of twice the bar; places up to
 # the middle, as a mass acts alike from both ends.
 _MASS_SHARES = np.geomspace(0.003, 2.0, 11)
@@ -129,7 +97,7 @@ def seen_in(tests: Sequence[ModalTest], hanger: Hanger) -> Seen:
             place = test.added_mass.x_m / hanger.length_m
             shift = _by_mass(np.array(test.added_mass.mass_kg / whole), np.array(place))
             log_f[row] -= shift
-            variance[row] += (_MASSES[1] * shift) ** 2
+            variance[row] += (LIMITS.masses[1] * shift) ** 2
     count = np.isfinite(log_f).sum(axis=0)
     some = np.maximum(count, 1)
     mean = np.where(count, np.nansum(log_f, axis=0) / some, NAN)
@@ -154,7 +122,7 @@ class Evidence:
     off: Seen
     sensitivity: FloatArray
     changes: tuple[tuple[float, FloatArray], ...]
-    errors: tuple[tuple[float, float], ...] = _TEST_ERRORS
+    errors: tuple[tuple[float, float], ...] = LIMITS.test_errors
     masses: bool = False
 
     @property
@@ -178,26 +146,28 @@ class Evidence:
     def _alike(self, mask: BoolArray) -> FloatArray:
         """Correlation (modes, modes) of the errors: what a bar model lacks is of no mode alone."""
         its = np.eye(int(mask.sum()))
-        if self.errors is _TEST_ERRORS:
+        if self.errors is LIMITS.test_errors:
             return its
         plane, order = mask.nonzero()
         log = np.log(order + 1.0)
-        along = np.exp(-0.5 * (np.subtract.outer(log, log) / _ALONG_ORDERS) ** 2)
+        along = np.exp(-0.5 * (np.subtract.outer(log, log) / LIMITS.along_orders) ** 2)
         across = np.where(np.equal.outer(plane, plane), 1.0, 0.5)
-        return np.asarray((1 - _TOGETHER) * its + _TOGETHER * along * across)
+        return np.asarray((1 - LIMITS.together) * its + LIMITS.together * along * across)
 
     def _with_mass(self, mask: BoolArray) -> float:
         """With something of any mass at any place hung on it."""
         share, place = (a.ravel() for a in np.meshgrid(_MASS_SHARES, _MASS_PLACES))
         shift = np.repeat(_by_mass(share, place)[:, None], 2, axis=1)[:, mask]
         way, (_, sds) = self.sensitivity[mask], self.changes[0]
-        covariance = (way * sds**2) @ way.T + np.diag(self.off.variance[mask] + _MASS_ERROR**2)
-        wide = covariance + (_MASSES[1] * shift)[:, :, None] ** 2 * np.eye(shift.shape[1])
+        covariance = (way * sds**2) @ way.T + np.diag(
+            self.off.variance[mask] + LIMITS.mass_error**2
+        )
+        wide = covariance + (LIMITS.masses[1] * shift)[:, :, None] ** 2 * np.eye(shift.shape[1])
         rest = self.off.log_f[mask] - shift
         _, size = np.linalg.slogdet(wide)
         along = np.linalg.solve(wide, rest[..., None])[..., 0]
         log = -0.5 * ((rest * along).sum(axis=1) + size + len(rest.T) * math.log(2 * math.pi))
-        return log_sum(log) + math.log(_MASSES[0] / len(log))
+        return log_sum(log) + math.log(LIMITS.masses[0] / len(log))
 
 
 def _log_normal(off: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -210,12 +180,12 @@ def _log_normal(off: FloatArray, covariance: FloatArray) -> FloatArray:
     every, modes = np.arange(len(covariance)), len(off)
     log = -0.5 * (inverse @ off @ off + size + modes * math.log(2 * math.pi))
     found, left = [log], np.ones((len(covariance), modes), dtype=bool)
-    for _ in range(min(_MOST_MISTAKEN, modes - LEAST_MODES)):
+    for _ in range(min(LIMITS.most_mistaken, modes - LEAST_MODES)):
         # Without a mode: less its density given the others, which the inverse holds.
         weight = np.where(left, np.diagonal(inverse, axis1=1, axis2=2), 1.0)
         given = 0.5 * np.log(weight / (2 * math.pi)) - 0.5 * (inverse @ off) ** 2 / weight
         worst = np.where(left, given, np.inf).argmin(axis=1)
-        log = log - given[every, worst] + math.log(_MISTAKEN * _MISTAKEN_DENSITY)
+        log = log - given[every, worst] + math.log(LIMITS.mistaken * LIMITS.mistaken_density)
         found.append(log)
         left[every, worst] = False
         row = inverse[every, worst]
@@ -245,7 +215,7 @@ class Bar:
         """Return the bar of a description; its tension and section may be any."""
         mean, sd = _prior(hanger)
         if any_bar:
-            sd[:2] = _ANY_BAR
+            sd[:2] = LIMITS.any_bar
         return cls(hanger, seen, mean, sd)
 
 
@@ -267,25 +237,25 @@ class Fit:
         away = self.theta - bar.mean
         off = bar.seen.log_f - self.log_f + self.way[..., :_PARAMETERS] @ away
         more = 3.0 if bar.hanger.turnbuckles else 1.0
-        errors = tuple((weight, more * sd) for weight, sd in _BAR_ERRORS)
+        errors = tuple((weight, more * sd) for weight, sd in LIMITS.bar_errors)
         changes = ((1.0, np.append(bar.sd, 0.0)),)
         return Evidence(replace(bar.seen, log_f=off), self.way, changes, errors)
 
     def changed(self, shift: Seen) -> Evidence:
         """Return the hanger of earlier tests with whatever may have changed since."""
-        changes = changes_of(ORDINARY, TIGHTER, _LOOSER, _ALTERED)
+        changes = changes_of(ORDINARY, TIGHTER, LIMITS.looser, LIMITS.altered)
         moved = replace(shift, log_f=self.log_f + shift.log_f)
         sd = changes[-1][1][:_PARAMETERS]
         (fit,) = fit_bars([Bar(self.bar.hanger, moved, self.theta, sd)], self.theta)
         expected = fit.log_f - self.log_f
         off = shift.log_f - expected + fit.way[..., :_PARAMETERS] @ (fit.theta - self.theta)
-        variance = shift.variance + np.nan_to_num(_OFF_SHIFT * expected) ** 2
+        variance = shift.variance + np.nan_to_num(LIMITS.off_shift * expected) ** 2
         return Evidence(Seen(off, variance), fit.way, changes, masses=True)
 
 
 def fit_bars(bars: Sequence[Bar], start: FloatArray | None = None) -> list[Fit]:
     """Fit each bar by Gauss-Newton steps with Student's weights, from `start` (7,) or three."""
-    starts, rows = 1 if start is not None else len(_STARTS), len(bars)
+    starts, rows = 1 if start is not None else len(LIMITS.starts), len(bars)
     log_f, stated, mean, sd = (
         np.repeat(each, starts, axis=0)
         for each in (
@@ -302,12 +272,12 @@ def fit_bars(bars: Sequence[Bar], start: FloatArray | None = None) -> list[Fit]:
     measured = np.isfinite(y)
     theta = mean.copy()
     if start is None:
-        theta[:, _SPRINGS] = np.tile(_STARTS, rows)[:, None]
+        theta[:, _SPRINGS] = np.tile(LIMITS.starts, rows)[:, None]
         theta[:, 0] = solver.string_tension(log_f)
     else:
         theta[:] = start
-    for step in range(_STEPS):
-        variance = stated + max(_FIT_SD, _WIDE * _NARROWS**step) ** 2
+    for step in range(LIMITS.steps):
+        variance = stated + max(LIMITS.fit_sd, LIMITS.wide * LIMITS.narrows**step) ** 2
         found, way = solver.with_slopes(theta)
         off = np.where(measured, y - found, 0.0)
         weight = measured * 4 / (3 + off**2 / variance) / variance
@@ -318,7 +288,7 @@ def fit_bars(bars: Sequence[Bar], start: FloatArray | None = None) -> list[Fit]:
         theta = np.clip(theta + move.clip(-1, 1), *_LIMITS)
     found, way = solver.with_slopes(theta)
     off = np.where(measured, y - found, 0.0)
-    cost = 2 * np.log1p(off**2 / (stated + _FIT_SD**2) / 3).sum(axis=1)
+    cost = 2 * np.log1p(off**2 / (stated + LIMITS.fit_sd**2) / 3).sum(axis=1)
     cost += 0.5 * (((theta - mean) / sd) ** 2).sum(axis=1)
     best = cost.reshape(rows, starts).argmin(axis=1) + starts * np.arange(rows)
     full_f = np.full((rows, 2, _MOST_ORDER), NAN)
@@ -385,12 +355,12 @@ def _uniform(lower: float, upper: float) -> tuple[float, float]:
 def _prior(hanger: Hanger) -> tuple[FloatArray, FloatArray]:
     """Means and standard deviations (7,) of the parameters by the description."""
     scatter, assumed = hanger.scatter, hanger.assumptions
-    shear, shear_sd = _ROD_SHEAR
+    shear, shear_sd = LIMITS.rod_shear
     if hanger.kind == "strand":
         shear, shear_sd = _uniform(*assumed.strand_shear_share.bounds)
     end, end_sd = _uniform(*(math.log10(each) for each in assumed.end_restraint.bounds))
     mean = np.array([_TENSION[0], 0.0, *(end,) * 4, shear])
-    sd = np.array([_TENSION[1], _MODEL_C, *(end_sd,) * 4, shear_sd])
+    sd = np.array([_TENSION[1], LIMITS.model_c, *(end_sd,) * 4, shear_sd])
     if math.isfinite(scatter.tension):
         mean[0], sd[0] = 0.0, math.hypot(scatter.tension, scatter.section)
     its = [scatter.section / 2, scatter.density / 2, scatter.modulus / 2, 2 * scatter.length]

@@ -25,7 +25,6 @@ from shm.plausibility.bar_evidence import (
     Bar,
     Evidence,
     Origin,
-    OriginKind,
     Seen,
     changes_of,
     fit_bars,
@@ -33,24 +32,10 @@ from shm.plausibility.bar_evidence import (
     seen_in,
 )
 from shm.plausibility.candidate import Candidate
+from shm.plausibility.limits import LIMITS
 from shm.values import NAN, PLANES, Doubt, FloatArray, Hanger, ModalTest
 
-SWAP, UNKNOWN_BAR, TIME_BASE, PLANES_EXCHANGED = 0.015, 0.003, 0.004, 0.003
-"""Prior probabilities that a test is not what it is filed as. Of numbers keyed in once and not
-checked 1 to 2 % are wrong (Barchard and Pace 2011, Computers in Human Behavior 27, 1834); the
-others are rarer: each needs a wrong setting, not a wrong digit."""
-
-DOUBTED_FROM = 0.5
-"""Probability of not being what it is filed as from which a test is doubted."""
-
-FACTORS = (2.0, 0.5, 10.0, 0.1, 1.024, 1 / 1.024)
-"""Of a wrong time base: the rate of every second sample, a decade, 1000 for 1024."""
-
-_CLEARLY_NATS = 3.0
-"""20 to 1 (judgement): where a described hanger is that near to a bar that nobody described, the
-person who looks is better served with its number."""
-
-COARSE_FACTORS = tuple(factor for factor in FACTORS if abs(math.log(factor)) > 0.1)
+COARSE_FACTORS = tuple(factor for factor in LIMITS.factors if abs(math.log(factor)) > 0.1)
 """Those that a description can show: area, modulus and tape leave ln f open by some percent."""
 
 
@@ -63,18 +48,15 @@ class Known:
 
 
 @dataclass(frozen=True)
-class OtherOrigin:
+class OtherOrigin(Origin):
     """That a test is not what it is filed as: `probability` of it, and what it is instead.
 
     `hanger` is the other one where `kind` is "hanger"; `factor` that of all frequencies over the
     expected ones where it is "time base". `text` is for a person.
     """
 
-    kind: OriginKind
-    probability: float
-    text: str
-    hanger: int | None = None
-    factor: float = NAN
+    probability: float = NAN
+    text: str = ""
 
 
 OWN = Origin()
@@ -101,11 +83,11 @@ def _leading(test: ModalTest, own: Known, others: Sequence[Known]) -> OtherOrigi
         return None
     total = log_sum(np.array(list(odds.values())))
     probability = -math.expm1(odds.pop(OWN) - total)
-    if probability < DOUBTED_FROM:
+    if probability < LIMITS.doubted_from:
         return None
     leading = max(odds, key=lambda each: odds[each])
     if leading.kind == "unknown bar":
-        nearly = odds[leading] - _CLEARLY_NATS
+        nearly = odds[leading] - LIMITS.clearly_nats
         described = [each for each in odds if each.kind == "hanger" and odds[each] > nearly]
         leading = max(described, key=lambda each: odds[each], default=leading)
     return _said(leading, probability, own.hanger)
@@ -131,7 +113,11 @@ def origins(test: ModalTest, own: Known, others: Sequence[Known]) -> dict[Origin
     if not own.tests:
         others = [each for each in others if not _twins(own.hanger, each.hanger)]
     mine, rivals = _candidates(test, own, others)
-    odds = {OWN: math.log(1 - SWAP - UNKNOWN_BAR - TIME_BASE - PLANES_EXCHANGED)}
+    odds = {
+        OWN: math.log(
+            1 - LIMITS.swap - LIMITS.unknown_bar - LIMITS.time_base - LIMITS.planes_exchanged
+        )
+    }
     for origin, (prior, rival) in rivals.items():
         both = mine.mask & rival.mask
         if both.sum() >= LEAST_MODES:
@@ -150,8 +136,7 @@ def _said(origin: Origin, probability: float, own: Hanger) -> OtherOrigin:
         "sampling rate?",
         "planes": f"The modes fit {name} with its two planes exchanged: right axes of the sensors?",
     }
-    assert origin.kind
-    return OtherOrigin(origin.kind, probability, texts[origin.kind], origin.hanger, origin.factor)
+    return OtherOrigin(origin.kind, origin.hanger, origin.factor, probability, texts[origin.kind])
 
 
 def _twins(one: Hanger, other: Hanger) -> bool:
@@ -201,7 +186,7 @@ def _candidates(
     if id_ not in before:
         return replace(mine.described(), masses=True), _with_priors(rivals, len(others))
     shift, way = seen.over(before[id_]), mine.way
-    for factor in FACTORS:
+    for factor in LIMITS.factors:
         rivals[Origin("time base", factor=factor)] = _as_before(shift.times(1 / factor), way)
     if shift.mask.any():
         factor = math.exp(float(np.median(shift.log_f[shift.mask])))
@@ -215,10 +200,10 @@ def _with_priors(
     rivals: dict[Origin, Evidence], others: int
 ) -> dict[Origin, tuple[float, Evidence]]:
     each = {
-        "hanger": SWAP / max(1, others),
-        "unknown bar": UNKNOWN_BAR,
-        "time base": TIME_BASE / (len(FACTORS) + 1),
-        "planes": PLANES_EXCHANGED,
+        "hanger": LIMITS.swap / max(1, others),
+        "unknown bar": LIMITS.unknown_bar,
+        "time base": LIMITS.time_base / (len(LIMITS.factors) + 1),
+        "planes": LIMITS.planes_exchanged,
     }
     return {origin: (each[origin.kind], rival) for origin, rival in rivals.items()}
 

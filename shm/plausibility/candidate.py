@@ -10,6 +10,7 @@ import numpy as np
 
 from shm.documents import format_time
 from shm.models.tensioned_beam import frequencies_hz
+from shm.plausibility.limits import LIMITS
 from shm.values import (
     NAN,
     Doubt,
@@ -60,14 +61,8 @@ class Candidate:
     signals: Sequence[str] = ()
 
 
-_MOST_ORDERS = 20  # higher ones say next to nothing of the tension
-_STEP = 0.02  # of ln T: small against its curvature, large against the solver's error
-
-
 Check = Callable[[Candidate], Doubt | None]
 """Gives one reason to hold a test; None where there is none, or nothing to judge by."""
-
-_ORDERS_OF_TWO = 3  # two unknowns, and one mode that may speak against them
 
 
 def implied_shift(test: ModalTest, reference: Sequence[ModalTest], hanger: Hanger) -> float:
@@ -86,7 +81,7 @@ def implied_shift(test: ModalTest, reference: Sequence[ModalTest], hanger: Hange
     slopes = _slopes(hanger, max(order for _, order in change))
     gain = np.array([slopes[order - 1] for _, order in change])
     shift = np.array(list(change.values()))
-    if len({order for _, order in change}) < _ORDERS_OF_TWO:
+    if len({order for _, order in change}) < LIMITS.orders_of_two:
         return float(np.expm1(gain @ shift / (gain @ gain)))
     # f^2 goes with a T + b EI, so both logarithmic slopes add up to a half.
     both = np.column_stack([gain, 0.5 - gain])
@@ -96,12 +91,12 @@ def implied_shift(test: ModalTest, reference: Sequence[ModalTest], hanger: Hange
 def _slopes(hanger: Hanger, modes: int) -> FloatArray:
     """d ln f / d ln T of the first modes."""
     end = np.full(2, 0.0 if hanger.supports.ends("pinned") else np.inf)
-    tension_n = hanger.nominal_tension_n * np.exp([-_STEP / 2, _STEP / 2])
+    tension_n = hanger.nominal_tension_n * np.exp([-LIMITS.step / 2, LIMITS.step / 2])
     length_m = np.full(2, hanger.length_m)
     stiffness = np.asarray(hanger.bending_stiffness_n_m2)
     mass = np.asarray(hanger.mass_per_length_kg_m)
     below, above = frequencies_hz(length_m, tension_n, stiffness, mass, end, end, modes)
-    return np.asarray(np.log(above / below) / _STEP)
+    return np.asarray(np.log(above / below) / LIMITS.step)
 
 
 def _shared(test: ModalTest, reference: Sequence[ModalTest]) -> dict[tuple[str, int], float]:
@@ -113,7 +108,7 @@ def _shared(test: ModalTest, reference: Sequence[ModalTest]) -> dict[tuple[str, 
     return {
         key: float(np.log(mode.frequency_hz / np.mean(before[key])))
         for mode in test.regular_modes
-        if mode.order <= _MOST_ORDERS and (key := (mode.plane, mode.order)) in before
+        if mode.order <= LIMITS.most_orders and (key := (mode.plane, mode.order)) in before
     }
 
 

@@ -17,6 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from shm.plausibility.candidate import Candidate
+from shm.plausibility.limits import LIMITS
 from shm.values import (
     Doubt,
     Fingerprint,
@@ -28,49 +29,11 @@ from shm.values import (
 )
 from shm.values.rounding import listed
 
-_SAMPLES = 32
-"""Of each shape, from its reach before its place up to its reach after it."""
-
-_MOST_A_CHANNEL, _MOST = 48, 800
-"""Shapes: some 3 kB a channel, and 60 kB a recording at most."""
-
-_HALF = 32
-"""Samples to either side that the choice of a place looks at; the mean of as many is taken off."""
-
-_CHIRP = np.cos(np.pi * np.arange(-_HALF, _HALF + 1) ** 2 / (4 * _HALF) + 1)
+_CHIRP = np.cos(np.pi * np.arange(-LIMITS.half, LIMITS.half + 1) ** 2 / (4 * LIMITS.half) + 1)
 """Runs from half of the highest frequency to 0 and back: a hanger rings below that."""
 
-_PLACE, _REACH = 2, 3  # columns of the marks, after the channel and the number of its samples
-
-_LEAST = 2
-"""Shapes that must be moved alike: a single one may look like another by chance."""
-
-_SHARE = 0.75
-"""Of the shapes that both should have; numbers rounded to four digits keep 90 % of them."""
-
-_SAME = 5e-8
-"""1 - correlation of two shapes of copies at most. Numbers rounded to four digits come to 8e-9 in
-the median and stay below 4.5e-8 in 2,500 shapes.
-
-It would have to be above 1e-4 for any of 780 pairs of simulated tests of one hanger with a single
-hit each to pass as copies, or of 780 with three, or of the five real hits in shared/data; 3e-6 with
-a tenth of the noise, 0.2 mm/s2. With a hundredth, which no sensor has, the closest of 378 pairs
-came to 5.6e-8: its hits fell at the same fraction of a sample.
-"""
-
-_ROUGHLY = 1e-4  # single precision errs by far less
-
-_REPEATED = 1e-5
-"""1 - correlation of two shapes in one channel, at which neither tells anything: a hum, or a mode
-that rings alone without noise, comes again in other tests, too."""
-
-_MOST_NAMED = 3  # recordings in one message
 
 _WHY = "One impact counted twice would confirm itself."
-
-_TELLING = 0.25
-"""Of the shapes of a channel must come once: else those of another reach are only not seen twice.
-It is 0.1 of a hum at most, and all of each simulated or real response that was tried."""
 
 
 def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerprint | None:
@@ -82,12 +45,12 @@ def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerpr
     with np.errstate(over="ignore"):  # a number beyond single precision is infinite in each copy
         numbers = [row.astype("<f4") for row in (*moved, *(force.values for force in forces))]
     hashes = sorted(hashlib.sha256(row.tobytes()).digest() for row in numbers)
-    most = max(2, min(_MOST_A_CHANNEL, _MOST // len(moved)))
+    most = max(2, min(LIMITS.most_a_channel, LIMITS.most // len(moved)))
     found = [_shapes(row, channel, most) for channel, row in enumerate(moved)]
     return Fingerprint(
         hashlib.sha256(b"".join(hashes)).hexdigest(),
-        np.concatenate([shapes for shapes, _ in found])[:_MOST],
-        np.concatenate([marks for _, marks in found])[:_MOST],
+        np.concatenate([shapes for shapes, _ in found])[: LIMITS.most],
+        np.concatenate([marks for _, marks in found])[: LIMITS.most],
     )
 
 
@@ -112,7 +75,7 @@ def copied(candidate: Candidate) -> Doubt | None:
     if longer == 0:
         return _again(f"it holds the samples of {name} again")
     parts = [each for each in similar if each.counts == known.counts]
-    names = [_name(each, candidate.hanger.id) for each in parts[:_MOST_NAMED]]
+    names = [_name(each, candidate.hanger.id) for each in parts[: LIMITS.most_named]]
     more = len(parts) - len(names)
     return Doubt(
         "copy",
@@ -134,11 +97,11 @@ def shared(own: Fingerprint, other: Fingerprint) -> bool:
     if not len(own.marks) or not len(other.marks):
         return False
     here, there = _alike(own, other)
-    shifts = own.marks[here, _PLACE] - other.marks[there, _PLACE]
+    shifts = own.marks[here, LIMITS.place] - other.marks[there, LIMITS.place]
     pairs: set[tuple[int, int]] = set()
     for shift in np.unique(shifts):
         by = shifts == shift
-        if by.sum() >= _LEAST:
+        if by.sum() >= LIMITS.least:
             pairs |= _channels(own.marks[here[by]], other.marks[there[by]], own, other)
     similar = min(len({pair[side] for pair in pairs}) for side in (0, 1))
     return bool(pairs) and 2 * similar >= min(len(_lengths(each)) for each in (own, other))
@@ -157,10 +120,10 @@ def _alike(own: Fingerprint, other: Fingerprint) -> tuple[IntArray, IntArray]:
     """Return the shapes that are equal: roughly first, as hundreds are looked through."""
     rough = [each.shapes.astype(np.float32) for each in (own, other)]
     mine, its = (each / np.linalg.norm(each, axis=1, keepdims=True) for each in rough)
-    here, there = np.nonzero(np.abs(mine @ its.T) > 1 - _ROUGHLY)
+    here, there = np.nonzero(np.abs(mine @ its.T) > 1 - LIMITS.roughly)
     one, two = _unit(own.shapes[here]), _unit(other.shapes[there])
-    same = 1 - np.abs(np.sum(one * two, axis=1)) < _SAME
-    same &= own.marks[here, _REACH] == other.marks[there, _REACH]
+    same = 1 - np.abs(np.sum(one * two, axis=1)) < LIMITS.same
+    same &= own.marks[here, LIMITS.reach] == other.marks[there, LIMITS.reach]
     return here[same], there[same]
 
 
@@ -171,19 +134,19 @@ def _channels(
 
     Most of the shapes that both should have, where both have samples, are the same.
     """
-    shift = int(mine[0, _PLACE] - its[0, _PLACE])
+    shift = int(mine[0, LIMITS.place] - its[0, LIMITS.place])
     found = set()
     pairs = Counter(zip(mine[:, 0].tolist(), its[:, 0].tolist(), strict=True))
     for (one, two), count in pairs.items():
         both = own.marks[own.marks[:, 0] == one], other.marks[other.marks[:, 0] == two].copy()
-        both[1][:, _PLACE] += shift
+        both[1][:, LIMITS.place] += shift
         start, end = max(0, shift), min(both[0][0, 1], both[1][0, 1] + shift)
         within = [
-            (marks[:, _PLACE] - marks[:, _REACH] >= start)
-            & (marks[:, _PLACE] + marks[:, _REACH] < end)
+            (marks[:, LIMITS.place] - marks[:, LIMITS.reach] >= start)
+            & (marks[:, LIMITS.place] + marks[:, LIMITS.reach] < end)
             for marks in both
         ]
-        if count >= _SHARE * min(int(each.sum()) for each in within):
+        if count >= LIMITS.share * min(int(each.sum()) for each in within):
             found.add((one, two))
     return found
 
@@ -217,15 +180,17 @@ def _shapes(row: FloatArray, channel: int, most: int) -> tuple[NDArray[np.int16]
     places = np.flatnonzero(reach)
     places = places[np.lexsort((-likeness[places], -reach[places]))[:most]]
     reach = reach[places]
-    spread = np.outer(2 * reach // _SAMPLES, np.arange(-_SAMPLES // 2, _SAMPLES // 2))
+    spread = np.outer(
+        2 * reach // LIMITS.samples, np.arange(-LIMITS.samples // 2, LIMITS.samples // 2)
+    )
     shapes = _unit(row[places[:, None] + spread])
-    twins = (1 - np.abs(shapes @ shapes.T) < _REPEATED) & (reach == reach[:, None])
+    twins = (1 - np.abs(shapes @ shapes.T) < LIMITS.repeated) & (reach == reach[:, None])
     once = (twins.sum(axis=1) == 1) & shapes.any(axis=1)
-    once &= once.mean() >= _TELLING if len(once) else True
+    once &= once.mean() >= LIMITS.telling if len(once) else True
     shapes, places, reach = shapes[once], places[once], reach[once]
     highest = np.abs(shapes).max(axis=1, keepdims=True)
     marks = np.full((len(places), 4), (channel, len(row), 0, 0))
-    marks[:, _PLACE], marks[:, _REACH] = places, reach
+    marks[:, LIMITS.place], marks[:, LIMITS.reach] = places, reach
     return np.rint(shapes / highest * np.iinfo(np.int16).max).astype(np.int16), marks
 
 
@@ -235,9 +200,9 @@ def _likeness(row: FloatArray) -> FloatArray:
     A crossing is where it was whatever is rounded; a crest is flat, and its highest sample may
     change.
     """
-    if len(row) <= 4 * _HALF:
+    if len(row) <= 4 * LIMITS.half:
         return np.zeros(len(row))
-    ones = np.ones(2 * _HALF + 1)
+    ones = np.ones(2 * LIMITS.half + 1)
     motion = row - np.convolve(row, ones / len(ones), "same")
     below = motion < 0
     crossing = np.append(False, below[1:] != below[:-1])
@@ -250,7 +215,7 @@ def _reach(likeness: FloatArray) -> IntArray:
     """The largest power of two of samples to either side, all in the record, without a greater
     likeness; 0 where it is below what the likeness looks at."""
     found = np.zeros(len(likeness), dtype=int)
-    reach = 2 * _HALF
+    reach = 2 * LIMITS.half
     while len(likeness) > 2 * reach:
         inside = slice(reach, len(likeness) - reach)
         around = scipy.ndimage.maximum_filter1d(likeness, 2 * reach + 1)

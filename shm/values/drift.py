@@ -135,10 +135,8 @@ class Reading:
     Its log likelihood at coordinates x (q,) is -(x - mean)' information (x - mean) / 2, of the
     errors that differ from test to test: what all tests share, the model's error above all, cancels
     in every comparison and is left out. `information` (q, q) is singular where a test cannot tell
-    quantities apart; `mean` (q,) is then 0 along what it does not see. `per_kelvin` (q,) is
-    what a kelvin of warmth has moved `mean` by, as steel softens, where that was not taken off for
-    want of a temperature; else None. `modes` is the same mode by mode, `amplitude` the excitation
-    over the reference (NaN: not known).
+    quantities apart; `mean` (q,) is then 0 along what it does not see. `modes`
+    is the same mode by mode, `amplitude` the excitation over the reference (NaN: not known).
     """
 
     test: str
@@ -146,7 +144,6 @@ class Reading:
     temperature_c: float
     mean: FloatArray
     information: FloatArray
-    per_kelvin: FloatArray | None = None
     modes: ModeReading | None = None
     amplitude: float = NAN
 

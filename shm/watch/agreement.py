@@ -17,26 +17,17 @@ from typing import Literal
 
 import numpy as np
 
-from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, WatchedQuantity
+from shm.values import TENSION, Beside, Drift, Hanger, ModalTest, WatchedQuantity
 from shm.values.drift import threshold_of
-from shm.watch.alert_text import alert_of, message_of_agreeing
+from shm.watch.limits import LIMITS
 from shm.watch.options import WatchOptions
 from shm.watch.posterior_summary import drift_of_normal
 from shm.watch.quantities import shift_of
 from shm.watch.readings import Reader
 
-CLEAR = 3.0
-"""Standard deviations from the baseline, temperature and scatter included: one good test in 740
-lies that far to one side, fewer than are blunders."""
-
 BY_A_LOAD = 0.1
 """Of the tension (judgement): a lift or a lorry that stands beside the hanger."""
 
-_PULL_STEPS = 10.0
-"""Standard deviation, in steps, of what a test does not see: far beyond any threshold."""
-
-_MOST_SCATTER = 2.0
-"""Of what a test scatters by beyond its errors: the most that is usual over what is assumed."""
 
 _APART = timedelta(days=3)
 """Tests that far apart by their clocks are two visits."""
@@ -54,8 +45,17 @@ class Shown:
     def agrees(self, other: Shown) -> bool:
         """Return True if two are on one side of the baseline, and within their errors."""
         apart = abs(self.mean - other.mean)
-        within = CLEAR * math.sqrt(self.variance + other.variance)
+        within = LIMITS.agreement_clear * math.sqrt(self.variance + other.variance)
         return self.mean * other.mean > 0 and apart < within
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Two `tests`, by name, that show the same `drift`; the first may be held."""
+
+    drift: Drift
+    tests: tuple[str, str]
+    is_held: bool
 
 
 def agreement(
@@ -65,13 +65,13 @@ def agreement(
     hanger: Hanger,
     options: WatchOptions,
     told: Collection[tuple[str, Way]],
-) -> Alert | None:
-    """Return the alert of a test that is the second to show a tension beyond its threshold.
+) -> Agreement | None:
+    """Return that a test is the second to show a tension beyond its threshold.
 
     None where it shows none, no test next to it agrees, the clocks say that it was a later visit,
     a test of a visit before shows the same, or the shift is `told` already.
     """
-    test, at = newest
+    test, _ = newest
     tension = reader.quantities[0]
     threshold = threshold_of(TENSION, hanger)
 
@@ -79,7 +79,7 @@ def agreement(
         return read_alone(reader, test, options)[0]
 
     def is_shown(shown: Shown) -> bool:
-        is_clear = abs(shown.mean) >= CLEAR * math.sqrt(shown.variance)
+        is_clear = abs(shown.mean) >= LIMITS.agreement_clear * math.sqrt(shown.variance)
         return is_clear and abs(shift_of(tension, shown.mean)) >= threshold
 
     mine = show(test)
@@ -102,10 +102,7 @@ def agreement(
         shown = show(other)
         if is_shown(shown) and mine.agrees(shown):
             drift = _drift(tension, newest, (mine, shown), hanger)
-            what = f"two-tests-agree:{drift.quantity}-{way_of(drift.shift_mean)}"
-            names, is_held = (other.id, test.id), other.id in beside.held
-            words = message_of_agreeing(drift, hanger, names, is_held=is_held)
-            return alert_of(hanger, (test.id, at), what, words, ("beyond threshold",), (drift,))
+            return Agreement(drift, (other.id, test.id), other.id in beside.held)
     return None
 
 
@@ -125,7 +122,7 @@ def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[S
     These are errors, scatter, and the temperature.
     """
     reading = reader.reading(test, datetime.max)
-    pull = [1 / (_PULL_STEPS * each.step_sd) ** 2 for each in reader.quantities]
+    pull = [1 / (LIMITS.pull_steps * each.step_sd) ** 2 for each in reader.quantities]
     covariance = np.linalg.inv(reading.information + np.diag(pull))
     kelvin = test.temperature_c - reader.reference_temperature_c
     if not math.isfinite(kelvin):
@@ -136,7 +133,9 @@ def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[S
         if quantity.name != TENSION:
             scatter = options.spring_scatter_of_step * quantity.step_sd
             per_kelvin = options.spring_per_kelvin_sd_of_step * quantity.step_sd
-        of_both = 2 * (_MOST_SCATTER * scatter) ** 2  # a baseline of one test scatters as much
+        of_both = (
+            2 * (LIMITS.most_scatter * scatter) ** 2
+        )  # a baseline of one test scatters as much
         variance = float(covariance[j, j]) + of_both + (per_kelvin * kelvin) ** 2
         found.append(Shown(float(reading.mean[j]), variance))
     return found

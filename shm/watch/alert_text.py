@@ -28,6 +28,7 @@ from shm.values import (
 )
 from shm.values.messages import NEXT_TEST, TODAY, WEEK, Lead, Urgency
 from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
+from shm.watch.limits import LIMITS
 
 CAUSES = {
     **{name: each.over_time for name, each in EFFECTS.items() if each.over_time},
@@ -39,13 +40,7 @@ CAUSES = {
 }
 """Possible causes of moved frequencies, next to tension and end stiffness."""
 
-_PROBABLE = 0.1  # judgement: one in ten is worth a test that tells it from the rest
-_SURE = 0.9  # judgement: below nine in ten a sentence says "most likely"
-_EITHER_LIKELY = 0.8  # judgement: four to one that it was sudden, or slow
-_CERTAIN = 0.995  # reads 1.00 in two decimals, which nobody may claim
-_LEAST_SHARE, _LARGEST_FACTOR = 0.05, 1e3  # judgement: beyond, an end is as good as free or clamped
 _WHICH_END, _FORMER = "which end is not known", " of its former value"
-_LONGEST_TEST, _DIGITS = 80, 12  # of a key's 255 characters
 
 
 # ---------------------------------------------------------------- what may have changed
@@ -71,7 +66,7 @@ def suspects(change: Change) -> list[Moved]:
 def probable_groups(change: Change | None) -> list[tuple[Moved, ...]]:
     """Return these groups without what the data fit as well but nobody need expect."""
     groups = suspected_groups(change) if change else []
-    return [*groups[:1], *(each for each in groups[1:] if each[0].probability >= _PROBABLE)]
+    return [*groups[:1], *(each for each in groups[1:] if each[0].probability >= LIMITS.probable)]
 
 
 # ---------------------------------------------------------------- names and sizes
@@ -115,11 +110,11 @@ def shift_words(quantity: str, mean: float, sd: float) -> str:
     verb = "moved" if abs(mean) <= half else "fell" if mean < 0 else "rose"
     if is_stiffness(quantity):
         times = 10 ** min(mean, 10.0)
-        if times < _LEAST_SHARE:
+        if times < LIMITS.alert_text_least_share:
             return f"{verb} to less than a twentieth"
         if times < 1:
             return f"{verb} to about {100 * times:.0f} %{_FORMER}"
-        about = "" if times > _LARGEST_FACTOR else "about "
+        about = "" if times > LIMITS.largest_factor else "about "
         return f"{verb} to {about}{factor(mean)} times its former value"
     if verb == "moved":
         return f"moved by {rounded_percent(mean, half, '+')}"
@@ -133,9 +128,9 @@ def size_words(each: Moved | Drift) -> str:
 def factor(decades: float) -> str:
     """Return how many times what it was: `0.50`, `1.06`, `3.2`."""
     times = 10 ** min(decades, 10.0)
-    if times > _LARGEST_FACTOR:
+    if times > LIMITS.largest_factor:
         return "more than 1000"
-    if times < 1 / _LARGEST_FACTOR:
+    if times < 1 / LIMITS.largest_factor:
         return "less than 0.001"
     return f"{times:.2f}" if times < 2 else f"{times:.1f}" if times < 10 else f"{times:.0f}"
 
@@ -198,7 +193,7 @@ def _changed(change: Change) -> str:
         return "the tests do not show what changed"
     first, *others = groups
     if not others:
-        doubt = "" if first[0].probability >= _SURE else "most likely, "
+        doubt = "" if first[0].probability >= LIMITS.sure else "most likely, "
         return f"{doubt}{_moved(first)}"
     kinds = list(dict.fromkeys(_kind(each) for each in others if _kind(each) != _kind(first)))
     if not kinds:
@@ -423,17 +418,17 @@ def _details(sizes: str, change: Change | None, beyond: Sequence[Drift], *, is_c
 
 def _probability(value: float) -> str:
     """Return two decimals, with no certainty pretended."""
-    if value > _CERTAIN:
+    if value > LIMITS.certain:
         return "above 0.99"
-    return "below 0.01" if value < 1 - _CERTAIN else f"{value:.2f}"
+    return "below 0.01" if value < 1 - LIMITS.certain else f"{value:.2f}"
 
 
 def _when(change: Change) -> str:
     first, last = f"{change.began_after:%Y-%m-%d}", f"{change.began_by:%Y-%m-%d}"
     since = f"on {first}" if first == last else f"between {first} and {last}"
-    if change.sudden >= _EITHER_LIKELY:
+    if change.sudden >= LIMITS.either_likely:
         return f"It came suddenly, {since}."
-    if change.sudden <= 1 - _EITHER_LIKELY:
+    if change.sudden <= 1 - LIMITS.either_likely:
         return f"It came slowly and began {since}."
     return f"It began {since}; it is not clear yet whether suddenly or slowly."
 
@@ -486,9 +481,9 @@ def alert_of(
     """Return an alert that a test, its name and time, calls for: its key names `what` it is of."""
     name, time = test
     short = name
-    if len(name) > _LONGEST_TEST:  # names that begin alike stay apart
-        digest = hashlib.sha256(name.encode()).hexdigest()[:_DIGITS]
-        short = f"{name[:_LONGEST_TEST]}-{digest}"
+    if len(name) > LIMITS.longest_test:  # names that begin alike stay apart
+        digest = hashlib.sha256(name.encode()).hexdigest()[: LIMITS.alert_text_digits]
+        short = f"{name[: LIMITS.longest_test]}-{digest}"
     return Alert(
         f"hanger-{hanger.id}:{what}:{short}", hanger.id, name, time, message, drifts, kinds, change
     )

@@ -18,12 +18,11 @@ from shm.assumptions import DEFAULTS
 from shm.values import NAN, ModalTest, Mode
 from shm.values.rounding import NINETY_PERCENT, rounded_percent
 from shm.values.stream import PooledReading
+from shm.watch.limits import LIMITS
 from shm.watch.quantities import MeasuredMode
 
 TOGETHER = timedelta(hours=3)
 """Judgement: so long temperature and traffic are alike, and a stream that ran has shown a mode."""
-_TEST_SCATTER = 5e-4
-"""Of ln f, from test to test of a mode: conditions within TOGETHER, and how sensors are mounted."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ def _compare(test: ModalTest, readings: Sequence[PooledReading]) -> tuple[float,
     if not pairs:
         return None
     off = [math.log(mode.frequency_hz / its.frequency_hz) for mode, its in pairs]
-    variance = [_variance(mode) + _variance(its) + _TEST_SCATTER**2 for mode, its in pairs]
+    variance = [_variance(mode) + _variance(its) + LIMITS.test_scatter**2 for mode, its in pairs]
     return float(np.mean(off)), float(np.sum(variance)) / len(pairs) ** 2
 
 

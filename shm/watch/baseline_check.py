@@ -31,30 +31,13 @@ from shm.values import (
     ModalTest,
     Mode,
 )
+from shm.watch.limits import LIMITS
 from shm.watch.mistaken_modes import MOST_MISTAKEN, log_mixture, sound_modes
 from shm.watch.quantities import MeasuredMode
 
-_ENOUGH = 3  # tests from which on the odd mode can be told: of two that differ, neither is
-_FEWEST = 5  # modes of a test: fewer leave nothing to tell the odd one by
-# Of a log frequency. Judgement: what a joint or a sensor does to one mode from test to test; by
-# which no bar as made is off its class in one mode alone; a class compared with a bar as made.
-_LEAST, _OFF, _MODEL_SD = 0.006, 0.04, 0.01
-# Judgement, standard deviations of what tests of one baseline differ by: in common, as clocks and
-# sensors do; in tension, as seasons and traffic do; in decades of a spring; of each mode alone.
-_COMMON_SD, _TENSION_SD, _DECADES_SD, _SCATTER = 1e-3, 0.1, 0.3, 1e-3
-# Judgement: by what all modes of a wrong clock are off alike; how many tests have one; below which
-# warmth and sensors do as much; and the least that tests differ by in tension and decades.
-_CLOCK_SD, _WRONG_CLOCK, _LEAST_CLOCK, _LEAST_SPREAD = 0.05, 0.003, 0.007, (0.01, 0.03)
-_ENOUGH_FOR_CLOCKS = 4  # of three tests, two alike may be chance
 _FIT_NO_STATE = "fit no tension and no end stiffness that the description allows"
 
-_ROUNDS = 3  # technical: of "what is mistaken" and "where the tests lie"
-_TENSION_STEP, _DECADES_STEP = 0.02, 0.1  # technical: of finite differences
-_FARTHEST_TENSION, _FARTHEST_DECADES = 0.4, 1.0  # technical: beyond it nothing is linearised
-_DRAWS = 4000  # of the description: technical, refined below
-_NARROWER = (0.3, 0.1, 0.03)  # technical: of the prior's range, about the best draw
 _SPRING, _FELT = "log10_k", 3.0  # of the stiffness of a wave: a spring that bends with the bar
-_TENSION_RANGE, _TENSIONS = (0.3, 2.5), 60  # of the nominal one; technical
 
 
 def known_modes(test: ModalTest) -> list[Mode]:
@@ -69,7 +52,7 @@ def check_baseline(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
     """
     if not any(known_modes(test) for test in tests):
         return BaselineCheck(unchecked="no test has a mode that a tension is inferred from")
-    if len(tests) >= _ENOUGH:
+    if len(tests) >= LIMITS.enough:
         return _check_together(tests, model)
     checks = [_check_alone(test, model) for test in tests]
     return BaselineCheck(
@@ -82,14 +65,15 @@ def check_baseline(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
 def _check_alone(test: ModalTest, model: Model) -> BaselineCheck:
     """Compare a test with what the description allows."""
     modes = known_modes(test)
-    if len(modes) < _FEWEST:
+    if len(modes) < LIMITS.baseline_check_fewest:
         return BaselineCheck(
-            unchecked=f"test {test.id} has {len(modes)} modes, and at least {_FEWEST} are needed"
+            unchecked=f"test {test.id} has {len(modes)} modes, and at least "
+            f"{LIMITS.baseline_check_fewest} are needed"
         )
     measured = np.log([mode.frequency_hz for mode in modes])
     bar = _Bar.of([(mode.plane, mode.order) for mode in modes], model, measured)
     off = bar.off_description(model.conditions(test))
-    odd: BoolArray = np.abs(off) > _OFF
+    odd: BoolArray = np.abs(off) > LIMITS.baseline_check_off
     if odd.sum() > MOST_MISTAKEN * len(modes):
         return BaselineCheck(
             misfit=f"{odd.sum()} of the {len(modes)} modes of test {test.id} {_FIT_NO_STATE}"
@@ -107,7 +91,7 @@ def _check_alone(test: ModalTest, model: Model) -> BaselineCheck:
 def _check_together(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
     """Compare each test with the median of all."""
     every = [(mode.plane, mode.order) for test in tests for mode in known_modes(test)]
-    keys = sorted(key for key in set(every) if every.count(key) >= _ENOUGH)
+    keys = sorted(key for key in set(every) if every.count(key) >= LIMITS.enough)
     if not keys:
         return BaselineCheck(unchecked="no mode is measured in three of its tests")
     table, variance = _tabulate(tests, keys, model)
@@ -141,7 +125,7 @@ def _tabulate(
                 sd = mode.frequency_sd_hz / mode.frequency_hz
                 is_stated = sd > 0 and math.isfinite(sd)
                 table[row, at] = math.log(mode.frequency_hz)
-                variance[row, at] = (sd if is_stated else unstated) ** 2 + _SCATTER**2
+                variance[row, at] = (sd if is_stated else unstated) ** 2 + LIMITS.mode_scatter**2
     return table, variance
 
 
@@ -155,11 +139,11 @@ def _fit_tests(
     """
     # A median of n is off by 1.25 standard deviations over the root of n.
     variance = variance * (1 + 1.57 / np.isfinite(table).sum(axis=0))
-    sds = np.array([_COMMON_SD, _TENSION_SD, *[_DECADES_SD] * (bar.count - 2)])
+    sds = np.array([LIMITS.common_sd, LIMITS.tension_sd, *[LIMITS.decades_sd] * (bar.count - 2)])
     states = np.zeros((len(tests), bar.count))
     off, expected, why = np.zeros(table.shape, bool), table.copy(), [""] * len(tests)
     conditions = [bar.model.conditions(test) for test in tests]
-    for _ in range(_ROUNDS):
+    for _ in range(LIMITS.rounds):
         predicted = np.array(
             [bar.predict(x[None], its)[0] for x, its in zip(states, conditions, strict=True)]
         )
@@ -172,11 +156,11 @@ def _fit_tests(
             left = rest - slopes @ found.x
             states[n] = found.x
             expected[n, seen] = table[n, seen] - left
-            is_far = np.abs(left) > _LEAST
+            is_far = np.abs(left) > LIMITS.least_mistake
             off[n, seen] = ~found.sound & is_far
             is_unfit = found.is_misfit and is_far.sum() > MOST_MISTAKEN * len(seen)
             why[n] = "its modes fit none of the other tests'" if is_unfit else ""
-    for n, its in enumerate(conditions if len(tests) >= _ENOUGH_FOR_CLOCKS else ()):
+    for n, its in enumerate(conditions if len(tests) >= LIMITS.enough_for_clocks else ()):
         seen = np.flatnonzero(np.isfinite(table[n]))
         spread = _measure_spread(np.delete(states, n, axis=0), sds)
         by_state = []
@@ -195,7 +179,9 @@ def _fit_tests(
 
 def _measure_spread(states: FloatArray, sds: FloatArray) -> FloatArray:
     """Return what tests (n, q) differ by, robustly, between what they surely and at most may."""
-    least = np.array([_COMMON_SD, _LEAST_SPREAD[0], *[_LEAST_SPREAD[1]] * (len(sds) - 2)])
+    least = np.array(
+        [LIMITS.common_sd, LIMITS.least_spread[0], *[LIMITS.least_spread[1]] * (len(sds) - 2)]
+    )
     found = 1.4826 * np.median(np.abs(states - np.median(states, axis=0)), axis=0)
     # Of four tests the spread is hardly known: in one of ten it seems a third of what it is.
     return np.asarray(np.clip(3 * found, least, sds))
@@ -211,11 +197,11 @@ def _find_clock_error(about_state: _Linear, about_median: _Linear, spread: Float
     little that is common to all frequencies may be theirs, too.
     """
     tension, clock = spread.copy(), spread.copy()
-    tension[:2], clock[0] = (_COMMON_SD, _TENSION_SD), _CLOCK_SD
+    tension[:2], clock[0] = (LIMITS.common_sd, LIMITS.tension_sd), LIMITS.clock_sd
     by_tension = sound_modes(*about_state, 1 / tension**2)
     by_clock = sound_modes(*about_median, 1 / clock**2)
-    odds = math.log(_WRONG_CLOCK / (1 - _WRONG_CLOCK))
-    least = max(_LEAST_CLOCK, float(np.median(about_median[1][:, 1])) * spread[1])
+    odds = math.log(LIMITS.wrong_clock / (1 - LIMITS.wrong_clock))
+    least = max(LIMITS.least_clock, float(np.median(about_median[1][:, 1])) * spread[1])
     common = float(by_clock.x[0])
     is_clock = by_clock.log_evidence + odds > by_tension.log_evidence and abs(common) > least
     return common if is_clock else 0.0
@@ -224,10 +210,14 @@ def _find_clock_error(about_state: _Linear, about_median: _Linear, spread: Float
 def _misfit_of_all(bar: _Bar, keys: Sequence[MeasuredMode]) -> str:
     """State which modes no description allows, though the tests agree on them."""
     off = bar.off_description(Conditions()).tolist()
-    odd = [(key, each) for key, each in zip(keys, off, strict=True) if abs(each) > _OFF]
+    odd = [
+        (key, each)
+        for key, each in zip(keys, off, strict=True)
+        if abs(each) > LIMITS.baseline_check_off
+    ]
     if len(odd) > MOST_MISTAKEN * len(keys):
         return f"{len(odd)} of the {len(keys)} modes of its tests {_FIT_NO_STATE}"
-    if not odd or len(keys) < _FEWEST:
+    if not odd or len(keys) < LIMITS.baseline_check_fewest:
         return ""
     (plane, order), worst = max(odd, key=lambda each: abs(each[1]))
     return (
@@ -262,17 +252,19 @@ class _Bar:
     def _best(self, theta: FloatArray, its: Conditions) -> tuple[FloatArray, FloatArray]:
         """Return the most probable of parameter sets and its misfit; a few modes are mistaken."""
         off = self.measured - self._log_frequencies(theta, its)
-        at = int(np.nanargmax(log_mixture(off, _MODEL_SD**2).sum(axis=1)))
+        at = int(np.nanargmax(log_mixture(off, LIMITS.model_sd**2).sum(axis=1)))
         return theta[at], off[at]
 
     def off_description(self, conditions: Conditions) -> FloatArray:
         """Return what modes (n,) are off from the description's most probable parameter set."""
         rng = np.random.default_rng(0)
         lower, upper = self.model.prior.lower, self.model.prior.upper
-        theta = lower + (upper - lower) * rng.random((_DRAWS, len(lower)))
+        theta = lower + (upper - lower) * rng.random((LIMITS.draws, len(lower)))
         best, off = self._best(theta, conditions)
-        for width in _NARROWER:
-            near = best + width * (upper - lower) * rng.uniform(-1, 1, (_DRAWS // 4, len(lower)))
+        for width in LIMITS.narrower:
+            near = best + width * (upper - lower) * rng.uniform(
+                -1, 1, (LIMITS.draws // 4, len(lower))
+            )
             best, off = self._best(np.vstack([best, np.clip(near, lower, upper)]), conditions)
         return off
 
@@ -291,8 +283,8 @@ class _Bar:
                 theta[column] = 1.0
             elif name.startswith(_SPRING):
                 theta[column] = math.log10(_FELT * model.wave_stiffness_n_m_rad(1))
-        every = np.tile(theta, (_TENSIONS, 1))
-        every[:, names.index("theta_F")] = np.geomspace(*_TENSION_RANGE, _TENSIONS)
+        every = np.tile(theta, (LIMITS.tensions, 1))
+        every[:, names.index("theta_F")] = np.geomspace(*LIMITS.tension_range, LIMITS.tensions)
         return self._best(np.clip(every, prior.lower, prior.upper), Conditions())[0]
 
     @cached_property
@@ -309,8 +301,10 @@ class _Bar:
         """Return log frequencies (sets, n) of states (sets, q)."""
         theta, prior, springs = np.tile(self.base, (len(x), 1)), self.model.prior, self._springs
         tension = self.model.parameter_names.index("theta_F")
-        theta[:, tension] *= np.exp(np.clip(x[:, 1], -_FARTHEST_TENSION, _FARTHEST_TENSION))
-        decades = np.clip(x[:, 2:], -_FARTHEST_DECADES, _FARTHEST_DECADES)
+        theta[:, tension] *= np.exp(
+            np.clip(x[:, 1], -LIMITS.farthest_tension, LIMITS.farthest_tension)
+        )
+        decades = np.clip(x[:, 2:], -LIMITS.farthest_decades, LIMITS.farthest_decades)
         theta[:, springs] = np.clip(
             theta[:, springs] + decades, prior.lower[springs], prior.upper[springs]
         )
@@ -318,7 +312,9 @@ class _Bar:
 
     def slopes(self, x: FloatArray, conditions: Conditions) -> FloatArray:
         """Return how log frequencies go with the state (n, q), by central differences."""
-        steps = np.array([1.0, _TENSION_STEP, *[_DECADES_STEP] * len(self._springs)])
+        steps = np.array(
+            [1.0, LIMITS.baseline_check_tension_step, *[LIMITS.decades_step] * len(self._springs)]
+        )
         both = np.vstack([x + np.diag(steps), x - np.diag(steps)])
         up, down = np.split(self.predict(both, conditions), 2)
         return np.asarray(((up - down) / (2 * steps[:, None])).T)

@@ -19,6 +19,7 @@ from shm.models.end_effects import coupled_bar
 from shm.models.hanger import PointMass, solve
 from shm.models.hanger.physical import Zone
 from shm.values import PLANES, TENSION, End, FloatArray, Hanger, IntArray, WatchedQuantity
+from shm.watch.limits import LIMITS
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import MeasuredMode
 
@@ -93,25 +94,9 @@ _SHARES = {
     TIMEBASE: 0.05,
     UNEXPLAINED: 0.07,
 }
-# Places along the hanger, a share of the length: a uniform bar is the same from either end.
-_PLACES = (0.06, 0.13, 0.2, 0.28, 0.36, 0.43, 0.5)
-_APART = 0.035  # to half way between two places, among which a mass is anywhere
-_LAMP_UNITS = 3.0  # judgement: lamps and cables are a few per cent of a hanger, no longer linear
-_STRETCHES = ((0.08, 0.15), (0.25, 0.15), (0.5, 0.15), (0.3, 0.4))
-# One unit of each cause: what there is as a rule; six times as much is looked for, too.
-_MASS_SHARE = 0.01
 _SENSOR_PLACES = np.linspace(0.1, 0.9, 17)
-_LOSS = 0.05
-_STIFFER = 0.03
-_CLOCK = 1e-3
-_UNEXPLAINED = 3e-3
-_SEEN_OF_SENSORS = 1e-2  # technical: of the largest; the rest is within a mode's own scatter
-_STEP_TO = 0.1  # technical: causes are linear to a tenth of a unit and beyond
 _NOWHERE = np.empty(0)
 _ENDS: tuple[End, ...] = ("deck", "arch")
-# Shifts of springs that one cause loosens, in steps, before any data (judgement): a pin that wears
-# takes stiffness from its end in both planes about alike.
-_CORRELATION = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,37 +157,41 @@ def _columns_on(
     still = log_hz(bar)
     mass_kg = float(hanger.mass_per_length_kg_m * length_m[0])
 
-    def by_mass(place: float, units: float = _STEP_TO) -> FloatArray:
-        put_on_kg = units * _MASS_SHARE * mass_kg
+    def by_mass(place: float, units: float = LIMITS.step_to) -> FloatArray:
+        put_on_kg = units * LIMITS.mass_share * mass_kg
         laden = replace(bar, masses=(*bar.masses, PointMass(place * length_m, put_on_kg * one)))
         return (log_hz(laden) - still) / units
 
     def about(place: float) -> FloatArray:
         """At a place, and what the way to its neighbours adds: one sd (2, n)."""
-        low, here, high = (by_mass(place + way, _LAMP_UNITS) for way in (-_APART, 0, _APART))
+        low, here, high = (
+            by_mass(place + way, LIMITS.lamp_units) for way in (-LIMITS.apart, 0, LIMITS.apart)
+        )
         return np.array([here, (high - low) / 2 / math.sqrt(3)])
 
     def by_loss(place: float, extent: float) -> FloatArray:
-        left = 1 - _STEP_TO * _LOSS
+        left = 1 - LIMITS.step_to * LIMITS.loss
         zone = Zone(
             start_m=(place - extent / 2) * length_m,
             end_m=(place + extent / 2) * length_m,
             stiffness_factor=left**2 * one,
             mass_factor=left * one,
         )
-        return (log_hz(replace(bar, zones=(*bar.zones, zone))) - still) / _STEP_TO
+        return (log_hz(replace(bar, zones=(*bar.zones, zone))) - still) / LIMITS.step_to
 
-    stiffer = replace(bar, bending_stiffness_n_m2=bar.bending_stiffness_n_m2 * (1 + _STIFFER))
+    stiffer = replace(
+        bar, bending_stiffness_n_m2=bar.bending_stiffness_n_m2 * (1 + LIMITS.causes_stiffer)
+    )
     sensors = np.array([by_mass(place) for place in _SENSOR_PLACES])
-    sensors = sensors * mounted_kg(hanger) / (_MASS_SHARE * mass_kg)
+    sensors = sensors * mounted_kg(hanger) / (LIMITS.mass_share * mass_kg)
     spread = sensors - sensors.mean(axis=0)
     return Columns(
         tuple(modes),
         {
-            POINT_MASS: np.array([about(place) for place in _PLACES]),
-            SECTION_LOSS: np.array([by_loss(*each) for each in _STRETCHES])[:, None],
+            POINT_MASS: np.array([about(place) for place in LIMITS.places]),
+            SECTION_LOSS: np.array([by_loss(*each) for each in LIMITS.stretches])[:, None],
             BENDING_STIFFNESS: (log_hz(stiffer) - still)[None, None],
-            TIMEBASE: np.full((1, 1, len(modes)), _CLOCK),
+            TIMEBASE: np.full((1, 1, len(modes)), LIMITS.clock),
         },
         spread.T @ spread / len(spread),
     )
@@ -215,7 +204,8 @@ class Structure:
     Tests scatter along the quantities' slopes and along `scattering` (n, c) by variances (q + c,)
     that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that. Along
     `wander` (n, w) they differ slowly: all tests within `wander_years` of one have it alike.
-    Quantities go with the temperature by `thermal_laws` coefficients each.
+    Quantities go with the temperature by `thermal_laws` coefficients each, the second of frost.
+    Where it is not `is_modelled`, each frequency counts: which of them matters no model says.
     """
 
     layout: Layout
@@ -227,6 +217,7 @@ class Structure:
     wander: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))
     wander_years: float = 0.0
     thermal_laws: int = 1
+    is_modelled: bool = True
 
 
 def structure_of(
@@ -246,7 +237,7 @@ def structure_of(
     )
     last = [options.bending_per_amplitude_sd, options.creep_per_year_sd]
     strength, axes = np.linalg.eigh(columns.sensors)
-    is_seen = strength > _SEEN_OF_SENSORS * strength[-1]
+    is_seen = strength > LIMITS.seen_of_sensors * strength[-1]
     sensors = axes[:, is_seen] * np.sqrt(strength[is_seen])
     stiffer = columns.by_cause[BENDING_STIFFNESS][0].T
     # A joint that gives for a day does so along what it does as it loosens.
@@ -256,7 +247,7 @@ def structure_of(
         [
             each_sd(options.tension_scatter, gives),
             np.ones(loosening.shape[1] + sensors.shape[1]),
-            [options.bending_scatter / _STIFFER, options.clock_scatter],
+            [options.bending_scatter / LIMITS.causes_stiffer, options.clock_scatter],
             np.full(n, options.mode_scatter),
         ]
     )
@@ -266,7 +257,7 @@ def structure_of(
         ),
         directions=tuple(_directions(quantities, columns, sensors)),
         scattering=np.hstack([gives * loosening, sensors, stiffer, np.ones((n, 1)), np.eye(n)]),
-        stiffening=stiffer[:, 0] / _STIFFER,
+        stiffening=stiffer[:, 0] / LIMITS.causes_stiffer,
         scatter_variance=scatter_sd**2,
         scales=np.array(options.scatter_scales),
     )
@@ -303,7 +294,7 @@ def _directions(
         ]
     # Sensors of two tests differ, each by its own.
     for cause, factor in ((SENSOR_MASS, math.sqrt(2) * sensors), (UNEXPLAINED, np.eye(n))):
-        size = _UNEXPLAINED if cause == UNEXPLAINED else 1.0
+        size = LIMITS.unexplained if cause == UNEXPLAINED else 1.0
         log_prior = math.log(_SHARES[cause])
         found.append(Direction(cause, of_modes(size * factor), (), log_prior, False))
     return found
@@ -330,7 +321,7 @@ def _root(members: tuple[int, ...], springs: Sequence[int], q: int) -> FloatArra
     n = len(members)
     among = np.eye(n)
     similar = np.isin(members, springs)
-    among[np.ix_(similar, similar)] += _CORRELATION * (1 - np.eye(int(similar.sum())))
+    among[np.ix_(similar, similar)] += LIMITS.correlation * (1 - np.eye(int(similar.sum())))
     root = np.zeros((q, n))
     root[list(members)] = np.linalg.cholesky(among)
     return root

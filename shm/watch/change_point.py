@@ -23,6 +23,7 @@ import scipy
 
 from shm.values import BoolArray, FloatArray, IntArray
 from shm.watch.causes import DetectedChange, Direction, Layout
+from shm.watch.limits import LIMITS
 from shm.watch.options import OF_ONE_VISIT_YEARS
 
 STEP, RAMP = 0, 1
@@ -31,10 +32,8 @@ SIZES = np.array([1.0, 6.0])
 
 # Judgement: nine of ten changes are just what may not be missed.
 LOG_SHARES = np.log([0.9, 0.1])
-_A_WEEK_YEARS = 7 / 365.25
 SAMPLES = 500
 """Of a summary: a probability of a half is known to 0.02, a mean to a twentieth of its sd."""
-_LEADING = 24  # technical: changes that draws are of, the most probable
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,14 +128,20 @@ class Evidence:
         prior = np.array([each.log_prior for each in self.directions]) - kinds
         over_scatters = np.logaddexp.reduce(self.log_mass[at, :, STEP], axis=0) - waited
         factor = float((over_scatters - prior[:, None] - LOG_SHARES).max())
-        return factor, _total(self.log_mass[at]) - waited + max(waited, math.log(_A_WEEK_YEARS))
+        return factor, _total(self.log_mass[at]) - waited + max(
+            waited, math.log(LIMITS.a_week_years)
+        )
 
     def by_direction(self) -> FloatArray:
         """Probability (D,) of each direction, given a change."""
         return np.asarray(self.shares.sum(axis=(0, 1, 2, 4)))
 
     def draw(
-        self, part: BoolArray, loadings: FloatArray, *, is_last_counted: bool = True
+        self,
+        part: BoolArray | None = None,
+        loadings: FloatArray | None = None,
+        *,
+        is_last_counted: bool = True,
     ) -> tuple[FloatArray, FloatArray]:
         """Draw changes (SAMPLES, n + q) by the last test, and the null's parameters with each.
 
@@ -144,10 +149,12 @@ class Evidence:
         the directions of `part` (D,); where there is none, none is drawn. Unless `is_last_counted`,
         changes that begin at the last test are left out. Draws come in pairs about the mean.
         """
-        log_mass = np.where(part[:, None], self.log_mass, -np.inf)
+        loadings = np.zeros((0, self.null_mean.shape[1])) if loadings is None else loadings
+        chosen = np.ones(len(self.directions), bool) if part is None else part
+        log_mass = np.where(chosen[:, None], self.log_mass, -np.inf)
         if not is_last_counted:
             log_mass[-1:] = -np.inf
-        leading = np.argsort(log_mass.ravel())[-_LEADING:]
+        leading = np.argsort(log_mass.ravel())[-LIMITS.change_point_leading :]
         leading = leading[np.isfinite(log_mass.ravel()[leading])]
         if not len(leading):
             return np.zeros((0, self.layout.n + self.layout.q)), np.zeros((0, len(loadings)))
@@ -235,13 +242,6 @@ def evidence_of(
     log_null = log_null - _total(log_null)
     first = max([baseline_tests, *(each.first + 1 for each in called)])
     beginnings = _chosen(np.arange(first, len(years)), most_beginnings)
-    if not len(beginnings):
-        nothing = np.zeros((0, len(log_null), 2, len(directions), len(SIZES)))
-        empty = np.zeros((2, 0))
-        return Evidence(
-            layout, tuple(directions), years, beginnings, tuple(called),
-            log_null, nothing, mean, covariance, (empty, empty, empty),
-        )  # fmt: skip
     seen = null.seen(years, beginnings, mean, covariance)
     waited = np.log(np.maximum(_onset_interval_years(years, beginnings), 1e-12))
     log_mass = _log_factors(directions, seen) + log_null[None, :, None, None, None]
@@ -250,6 +250,18 @@ def evidence_of(
         layout, tuple(directions), years, beginnings, tuple(called),
         log_null, log_mass, mean, covariance, seen,
     )  # fmt: skip
+
+
+def select_null(years: FloatArray, layout: Layout, called: Sequence[DetectedChange]) -> FloatArray:
+    """Return what makes the columns of tests those of the null (T, z, p), called changes in it."""
+    every = np.eye(len(layout.prior_sd))
+    columns = [np.tile(every[:, layout.null], (len(years), 1, 1))]
+    for each in called:
+        since = (np.arange(len(years)) >= each.first)[:, None, None] * every[:, layout.change]
+        columns.append(since)
+        if each.is_ramp:
+            columns.append((years - each.years)[:, None, None] * since)
+    return np.concatenate(columns, axis=2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,16 +285,11 @@ class _NullSums:
     def of(
         cls, sums: Sums, years: FloatArray, layout: Layout, called: Sequence[DetectedChange]
     ) -> _NullSums:
-        part, every = layout.change, np.eye(sums.square.shape[-1])
-        columns = [np.tile(every[:, layout.null], (len(years), 1, 1))]
+        part = layout.change
         priors = [np.diag(layout.prior_sd[layout.null] ** -2.0)]
         for each in called:
-            since = (np.arange(len(years)) >= each.first)[:, None, None] * every[:, part]
-            columns.append(since)
-            if each.is_ramp:
-                columns.append((years - each.years)[:, None, None] * since)
             priors += [each.precision] * (2 if each.is_ramp else 1)
-        taken = np.concatenate(columns, axis=2)[:, None]
+        taken = select_null(years, layout, called)[:, None]
         turned = np.swapaxes(taken, 2, 3)
         weighted = turned @ sums.square
         return cls(

@@ -10,41 +10,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime
-from functools import cached_property
 
 import numpy as np
 import scipy
 
 from shm.assumptions import DEFAULTS
 from shm.errors import BadInput
-from shm.values import FREQUENCY, FloatArray, ModalTest, ModeReading, Reading, WatchedQuantity
+from shm.values import FREQUENCY, ModalTest, ModeReading, Reading, WatchedQuantity
 from shm.watch.causes import UNEXPLAINED, Columns, Direction, Layout, Structure
-from shm.watch.change_point import Evidence
-from shm.watch.options import DAYS_PER_YEAR, Warmth, WatchOptions, reference_of
+from shm.watch.limits import LIMITS
+from shm.watch.options import DAYS_PER_YEAR, WatchOptions, reference_of
 from shm.watch.quantities import MeasuredMode
-from shm.watch.state_sums import StateSums, WatchState
-from shm.watch.watcher import Watcher
 
 POOLED_DAYS = 3.0  # judgement: short beside three weeks in which an owner wants to know, and cheap
-# Of a frequency. Half of what stiffens concrete and asphalt by 1e-3 / K is that of the frequency:
-# 2 to 5e-4 / K of many bridges in mild weather (Peeters and De Roeck 2001; Magalhaes et al. 2012).
-_PER_KELVIN_SD = 5e-4
-# Below 0 C: bridge Z24 gained 1e-2 / K as its asphalt stiffened (Peeters and De Roeck 2001).
-_PER_KELVIN_OF_FROST_SD = 5e-3
-_CREEP_PER_YEAR_SD = 1e-3  # judgement: concrete stiffens, settlement goes on
-_STEP = 0.01  # judgement: of a frequency, what may not be missed
-_WANDER, _WANDER_OF_A_MODE = 1e-3, 5e-4  # judgement: moisture; Magalhaes et al. 2012 leave 1e-3
-_WANDER_DAYS = 45.0  # judgement: as long as a deck takes to dry
-_SCATTER, _SCATTER_OF_A_MODE = 5e-4, 5e-4  # before any test: traffic; the identification
-_ALLOWANCE = 1e-4  # as of a hanger's tests (`readings`)
-_FROST_SPREAD_K = 2.0  # of frost where no thermometer was read: judgement, a mild winter's days
-# Judgement: of what lasts, loads, stiffness of the whole and clocks are half; a local damage moves
-# several modes, each by its own amount, more often than one alone.
-_ALIKE_SHARE, _ALONE_SHARE, _EACH_SHARE = 0.5, 0.2, 0.3
-# Of a log frequency: a mode has another name only where that brings all nearer by as much in sum.
-_RENAMED = 0.02
 
 
 class FrequencyReader:
@@ -83,7 +62,7 @@ class FrequencyReader:
                 # The median of m has pi / 2 times the variance of the mean, of up to two the same.
                 wider = math.pi / 2 if len(seen) > 2 else 1.0
                 its = wider * float(np.mean([sd**2 for _, sd in seen])) / len(seen)
-                variances[j] = its + _ALLOWANCE**2
+                variances[j] = its + LIMITS.frequency_allowance**2
         levels = [math.log(test.amplitude) for test in tests if test.amplitude > 0]
         return Reading(
             test=tests[-1].id,
@@ -107,9 +86,9 @@ class FrequencyReader:
         log_hz = np.log([hz for hz, _ in seen.values()])
         cost = np.abs(log_hz[:, None] - self._level)
         named = np.array([[key == mode for mode in self.modes] for key in seen])
-        cost = cost + np.where(named, 0.0, _RENAMED)
+        cost = cost + np.where(named, 0.0, LIMITS.renamed)
         # A name that the baseline does not know may be none of its modes.
-        nearby = np.where(named.any(axis=1), np.inf, _RENAMED + 0.5 * _RENAMED)
+        nearby = np.where(named.any(axis=1), np.inf, LIMITS.renamed + 0.5 * LIMITS.renamed)
         nothing = np.where(np.eye(len(seen), dtype=bool), nearby[:, None], 1e6)
         nothing[~np.isfinite(nothing)] = 1e3
         at, to = scipy.optimize.linear_sum_assignment(np.hstack([cost, nothing]))
@@ -137,7 +116,12 @@ def _quantity(mode: MeasuredMode, level: float) -> WatchedQuantity:
     reach = np.linspace(-2.0, 2.0, 5)  # technical: a frequency sevenfold or a seventh
     hz = math.exp(level)
     return WatchedQuantity(
-        f"{FREQUENCY}{plane} {order}", hz, reach, hz * np.exp(reach), _STEP, plane=plane
+        f"{FREQUENCY}{plane} {order}",
+        hz,
+        reach,
+        hz * np.exp(reach),
+        LIMITS.frequencies_step,
+        plane=plane,
     )
 
 
@@ -147,79 +131,40 @@ def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
     prior_sd = np.concatenate(
         [
             ones,
-            _STEP * ones,
-            _PER_KELVIN_SD * ones,
-            _PER_KELVIN_OF_FROST_SD * ones,
+            LIMITS.frequencies_step * ones,
+            LIMITS.per_kelvin_sd * ones,
+            LIMITS.per_kelvin_of_frost_sd * ones,
             options.tension_per_amplitude_sd * ones,
-            [1.0, _CREEP_PER_YEAR_SD],  # nothing stiffens with the excitation beside the modes
+            [
+                1.0,
+                LIMITS.creep_per_year_sd,
+            ],  # nothing stiffens with the excitation beside the modes
         ]
     )
-    its = np.vstack([np.zeros((n, n)), _STEP * np.eye(n)])
-    each = np.vstack([_STEP * np.eye(n), np.zeros((n, n))])
+    its = np.vstack([np.zeros((n, n)), LIMITS.frequencies_step * np.eye(n)])
+    each = np.vstack([LIMITS.frequencies_step * np.eye(n), np.zeros((n, n))])
     directions = [
-        Direction("alike", its.sum(axis=1, keepdims=True), tuple(range(n)), math.log(_ALIKE_SHARE))
+        Direction(
+            "alike", its.sum(axis=1, keepdims=True), tuple(range(n)), math.log(LIMITS.alike_share)
+        )
     ]
     if n > 1:
         directions += [
-            Direction("alone", its[:, [j]], (j,), math.log(_ALONE_SHARE / n)) for j in range(n)
+            Direction("alone", its[:, [j]], (j,), math.log(LIMITS.alone_share / n))
+            for j in range(n)
         ]
-        directions.append(Direction(UNEXPLAINED, each, (), math.log(_EACH_SHARE)))
-    wander = np.hstack([_WANDER * ones[:, None], _WANDER_OF_A_MODE * np.eye(n)])
+        directions.append(Direction(UNEXPLAINED, each, (), math.log(LIMITS.each_share)))
+    wander = np.hstack([LIMITS.wander * ones[:, None], LIMITS.wander_of_a_mode * np.eye(n)])
     return Structure(
         layout=Layout(n, n, prior_sd),
         directions=tuple(directions),
         scattering=ones[:, None],
-        scatter_variance=np.append(np.full(n, _SCATTER_OF_A_MODE), _SCATTER) ** 2,
+        scatter_variance=np.append(np.full(n, LIMITS.scatter_of_a_mode), LIMITS.frequencies_scatter)
+        ** 2,
         scales=np.array(options.scatter_scales),
         stiffening=np.zeros(n),
         wander=wander,
-        wander_years=_WANDER_DAYS / DAYS_PER_YEAR,
+        wander_years=LIMITS.wander_days / DAYS_PER_YEAR,
         thermal_laws=2,
+        is_modelled=False,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class FrequencySums(StateSums):
-    """The sums of tests of such a structure."""
-
-    def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
-        return self._warmth(state), frost_of(state.temperature_c, self.options.thermometer_sd_k)
-
-    def effects(self, state: WatchState) -> tuple[FloatArray, FloatArray]:
-        """Each frequency counts: which of them matters no model says."""
-        n = self.structure.layout.n
-        every = np.hstack([np.eye(n), np.eye(n)])
-        return every, every
-
-
-@dataclass(frozen=True, eq=False)
-class FrequencyWatcher(Watcher):
-    """Watches the frequencies of one structure."""
-
-    @cached_property
-    def structure(self) -> Structure:
-        """The hypotheses."""
-        return structure_of_frequencies(len(self.quantities), self.options)
-
-    @cached_property
-    def sums(self) -> StateSums:
-        """Return what the tests of a state are to the evidence."""
-        return FrequencySums(self.quantities, self.columns.modes, self.structure, self.options)
-
-    def _creep(self, evidence: Evidence) -> None:
-        """It is allowed for, and of no interest."""
-
-
-def frost_of(temperatures_c: FloatArray, thermometer_sd_k: float) -> Warmth:
-    """Kelvin below 0 C of tests at `temperatures_c` (T,), 0 above it, as far as one knows.
-
-    The deck follows the air in its own time, so that near 0 C its mean is what counts.
-    """
-    known = np.isfinite(temperatures_c)
-    scaled = np.where(known, temperatures_c, 0.0) / thermometer_sd_k
-    below = scipy.special.ndtr(-scaled)
-    density = np.exp(-(scaled**2) / 2) / math.sqrt(2 * math.pi)
-    kelvin = thermometer_sd_k * (scaled * below - density)
-    kelvin = np.where(known, kelvin, kelvin[known].mean() if known.any() else 0.0)
-    sd = np.where(known, thermometer_sd_k * below, _FROST_SPREAD_K)
-    return Warmth(kelvin, sd, np.ones(len(known)))

@@ -15,11 +15,12 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.values import WITHOUT_MODEL, Alert, Hanger, ModalTest, Posterior, Reading, WatchedTest
-from shm.watch.frequencies import POOLED_DAYS, FrequencyReader, FrequencyWatcher
+from shm.watch.frequencies import POOLED_DAYS, FrequencyReader
 from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import posterior_at
 from shm.watch.state_sums import WatchState
+from shm.watch.watcher import Watcher
 from shm.watch.watching import AlertState, DatedTest, Newest, after, options_of
 
 _POOL = timedelta(days=POOLED_DAYS)
@@ -56,7 +57,7 @@ class FrequencyWatch:
         self._hanger, self._pools = hanger, _pooled(baseline)
         self._reader = FrequencyReader([test for test, _ in baseline])
         self._since = max(time for _, time in baseline)
-        self._watcher = FrequencyWatcher(
+        self._watcher = Watcher(
             self._reader.quantities,
             self._reader.columns,
             hanger,

@@ -15,9 +15,7 @@ import numpy as np
 
 from shm.models import is_adopted
 from shm.values import Alert, Hanger, Posterior
-
-_GROWN = 3.0  # judgement: beyond the scatter of a misfit of a dozen modes from test to test
-_VISIBLE_PERCENT = 0.1  # three times the sd of a frequency, 3e-4
+from shm.watch.limits import LIMITS
 
 
 def gap_percent(posterior: Posterior) -> float:
@@ -34,7 +32,7 @@ def has_grown(before_percent: float, now_percent: float) -> bool:
     apart by a factor of three once in 370 tests, by two once in 30 (F distribution). Below 0.1 % a
     kelvin or a logger's clock makes as much.
     """
-    return now_percent > max(_GROWN * before_percent, _VISIBLE_PERCENT)
+    return now_percent > max(LIMITS.grown * before_percent, LIMITS.visible_percent)
 
 
 def watch_gap(

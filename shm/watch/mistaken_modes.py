@@ -15,28 +15,23 @@ from itertools import combinations
 import numpy as np
 
 from shm.values import BoolArray, FloatArray
+from shm.watch.limits import LIMITS
 
-# Of routine modes so many are mistaken: judgement, of hammer tests that were checked by hand.
-MISTAKEN = 0.04
-# What a mistaken one may be off by, in log frequency: two neighbouring orders of a low mode.
-MISTAKEN_RANGE = 0.7
 MOST_MISTAKEN = 1 / 3  # judgement: where more modes fit no state, it is the test that does not
-_SMALL_SETS = 2
-# Of tests so many are of a bar that its class does not describe, all of whose modes lie off by a
-# little: judgement, a joint or a fitting that is new. By how much, from a percent on: technical.
-_MISFIT, _MISFIT_SDS = 0.001, (0.01, 0.02, 0.04)
 
 
 def log_mixture(off: FloatArray, variance: FloatArray | float) -> FloatArray:
     """Return the log density of modes `off` by so much, of which a few are mistaken; NaN stays."""
     with np.errstate(invalid="ignore"):
-        mixed = np.logaddexp(_log_good(off, variance), math.log(MISTAKEN / MISTAKEN_RANGE))
+        mixed = np.logaddexp(
+            _log_good(off, variance), math.log(LIMITS.mistaken / LIMITS.mistaken_range)
+        )
     return np.asarray(mixed)
 
 
 def _log_good(off: FloatArray, variance: FloatArray | float) -> FloatArray:
     return np.asarray(
-        math.log(1 - MISTAKEN) - off**2 / variance / 2 - np.log(2 * np.pi * variance) / 2
+        math.log(1 - LIMITS.mistaken) - off**2 / variance / 2 - np.log(2 * np.pi * variance) / 2
     )
 
 
@@ -64,7 +59,7 @@ def sound_modes(
     """
     problem = _Problem.of(off, slopes, variance, precision)
     count = len(off)
-    sets = _small_sets(count, min(int(MOST_MISTAKEN * count), _SMALL_SETS))
+    sets = _small_sets(count, min(int(MOST_MISTAKEN * count), LIMITS.small_sets))
     scores = problem.scores(sets)
     best, size = int(scores.argmax()), int(sets[int(scores.argmax())].sum())
     # On beyond what callers believe: stopped there, a test of another state would seem to have just
@@ -76,10 +71,10 @@ def sound_modes(
     weight = np.exp(scores - scores[best])
     log_evidence = float(scores[best] + np.log(weight.sum()))
     mistaken = weight @ sets / weight.sum() >= 0.5
-    wide = [_Problem.of(off, slopes, variance + sd**2, precision) for sd in _MISFIT_SDS]
+    wide = [_Problem.of(off, slopes, variance + sd**2, precision) for sd in LIMITS.misfit_sds]
     none = np.zeros((1, count), bool)
     misfit = np.array([each.scores(none)[0] for each in wide])
-    odds = math.log(_MISFIT / (1 - _MISFIT) / len(wide))
+    odds = math.log(LIMITS.misfit / (1 - LIMITS.misfit) / len(wide))
     if mistaken.sum() > MOST_MISTAKEN * count or np.logaddexp.reduce(misfit) + odds > log_evidence:
         # Who goes on from there may find that it fits: mistakes must not pull at it.
         few = np.where(sets.sum(axis=1) <= MOST_MISTAKEN * count, scores, -np.inf)
@@ -112,7 +107,7 @@ class _Problem:
         cls, off: FloatArray, slopes: FloatArray, variance: FloatArray, precision: FloatArray
     ) -> _Problem:
         over = slopes / variance[:, None]
-        log = _log_good(off, variance) - math.log(MISTAKEN / MISTAKEN_RANGE)
+        log = _log_good(off, variance) - math.log(LIMITS.mistaken / LIMITS.mistaken_range)
         return cls(over[:, :, None] * slopes[:, None, :], over * off[:, None], log, precision)
 
     def scores(self, sets: BoolArray) -> FloatArray:

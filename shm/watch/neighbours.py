@@ -22,6 +22,7 @@ import scipy
 from shm.errors import NothingThere
 from shm.values import NAN, TENSION, Drift, FloatArray, IntArray
 from shm.values.rounding import NINETY_PERCENT
+from shm.watch.limits import LIMITS
 
 ExplanationName = Literal[
     "no change", "load redistribution", "load gain", "common shift", "independent shifts"
@@ -29,8 +30,6 @@ ExplanationName = Literal[
 Way = Literal["gained", "lost", "unchanged"]
 
 REACH = 2  # places: what hangers further off take up is below 5 % of a loss
-_FEWEST = 3  # hangers: of two, either may be the one that moved
-_SUSPECTS = 3  # listed, and tried in pairs
 
 
 @dataclass(frozen=True)
@@ -222,18 +221,16 @@ def _is_known(drift: Drift) -> bool:
     return drift.quantity == TENSION and usable
 
 
-def bridge_pattern(
+def weigh_pattern(
     shifts: Sequence[HangerShift],
     order: Sequence[int] = (),
     options: NeighbourOptions | None = None,
 ) -> BridgePattern:
-    """Return what moved over the bridge; shifts whose tests are older than the window are left out.
+    """Weigh what moved over the bridge; shifts whose tests are older than the window are left out.
 
     `order` names all hangers along the bridge (index: place), so that those without a shift are
     listed. Raises NothingThere where fewer than three hangers can be compared.
     """
-    from shm.watch.neighbours_words import remarks_of, sentence_of
-
     options = options or NeighbourOptions()
     compared, left_out = _compared(shifts, order, options.window_days)
     bridge, groups = _Bridge.of(compared, options), _weigh(compared, options)
@@ -254,7 +251,7 @@ def bridge_pattern(
             for values in ([each.mean_n for each in alike], [each.sd_n for each in alike])
         ),
     )
-    pattern = BridgePattern(
+    return BridgePattern(
         newest=max(each.time for each in compared),
         explanations=tuple(Explanation(*each) for each in ranked),
         suspects=suspects,
@@ -266,8 +263,6 @@ def bridge_pattern(
         not_compared=left_out,
         sentence="",
     )
-    sentence = sentence_of(pattern, options.named_from)
-    return replace(pattern, sentence=sentence, remarks=remarks_of(pattern))
 
 
 def _compared(
@@ -277,14 +272,14 @@ def _compared(
     oldest = max((s.time for s in shifts), default=datetime.max) - timedelta(days=days)
     by_place = sorted(shifts, key=lambda each: each.place)
     recent = [each for each in by_place if each.time >= oldest]
-    if len(recent) < _FEWEST:
+    if len(recent) < LIMITS.neighbours_fewest:
         few = (
             f"{len(shifts)} of the hangers have a shift from a baseline"
-            if len(shifts) < _FEWEST
+            if len(shifts) < LIMITS.neighbours_fewest
             else f"{len(recent)} of the hangers have a test of the last {days:g} days"
         )
         raise NothingThere(
-            f"only {few}; a pattern over the bridge needs {_FEWEST}.",
+            f"only {few}; a pattern over the bridge needs {LIMITS.neighbours_fewest}.",
             remedy="Test more hangers, in one campaign: the first tests of each form its baseline.",
         )
     old = f"its latest test is more than {days:g} days older than the newest"
@@ -375,7 +370,7 @@ def _at_one_scale(bridge: _Bridge, options: NeighbourOptions) -> list[_Group]:
     loss = prior["load redistribution"]
     one = normal("load redistribution", loss * (1 - of_two), shed, each, sign=-1)
     # Both of two equal losses are among the most probable single ones.
-    first = scipy.special.logsumexp(one.weight.reshape(-1, n), axis=0).argsort()[-_SUSPECTS:]
+    first = scipy.special.logsumexp(one.weight.reshape(-1, n), axis=0).argsort()[-LIMITS.suspects :]
     pairs = np.array([(i, j) for i in first for j in range(n) if i < j or j not in first])
     both = np.concatenate([shed[pairs[:, 0]], shed[pairs[:, 1]]], axis=2)
     of_two *= 2 * len(pairs) / (n * (n - 1))
@@ -493,7 +488,7 @@ def _suspects(shifts: Sequence[HangerShift], groups: Sequence[_Group]) -> tuple[
         hangers = tuple(shifts[index].hanger for index in members)
         size = tuple(mean.tolist()), tuple(sd.tolist())
         suspects.append(Suspect(name, hangers, float(weight.sum()), *size))
-    return tuple(sorted(suspects, key=lambda each: -each.probability)[:_SUSPECTS])
+    return tuple(sorted(suspects, key=lambda each: -each.probability)[: LIMITS.suspects])
 
 
 def _mix(weight: FloatArray, mean: FloatArray, sd: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -3,11 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded, rounded_percent
-from shm.watch.neighbours import REACH, BridgePattern, HangerRow
+from shm.watch.limits import LIMITS
+from shm.watch.neighbours import (
+    REACH,
+    BridgePattern,
+    HangerRow,
+    HangerShift,
+    NeighbourOptions,
+    weigh_pattern,
+)
 
-_SURE_WHICH = 0.8  # judgement: four to one
+
+def bridge_pattern(
+    shifts: Sequence[HangerShift],
+    order: Sequence[int] = (),
+    options: NeighbourOptions | None = None,
+) -> BridgePattern:
+    """Return what moved over the bridge, as `weigh_pattern` does, with sentence and remarks."""
+    options = options or NeighbourOptions()
+    pattern = weigh_pattern(shifts, order, options)
+    sentence = sentence_of(pattern, options.named_from)
+    return replace(pattern, sentence=sentence, remarks=remarks_of(pattern))
 
 
 def sentence_of(pattern: BridgePattern, named_from: float) -> str:
@@ -84,7 +103,9 @@ def _moved(pattern: BridgePattern) -> str:
         )
     else:
         words.append(f"{'Its' if one else 'Their'} neighbours have no test to compare.")
-    if len(suspects) > 1 and suspects[0].probability <= _SURE_WHICH * pattern.probability(name):
+    if len(suspects) > 1 and suspects[0].probability <= LIMITS.sure_which * pattern.probability(
+        name
+    ):
         words.append(
             f"It may also be {_hangers(suspects[1].hangers).lower()} (probability "
             f"{suspects[1].probability:.2f})."

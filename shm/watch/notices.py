@@ -31,23 +31,22 @@ from shm.values.drift import ENOUGH_FITS
 from shm.values.messages import WEEK
 from shm.values.rounding import listed
 from shm.values.stream import StreamEvent
-from shm.watch.agreement import BY_A_LOAD
+from shm.watch.agreement import BY_A_LOAD, Agreement, way_of
 from shm.watch.alert_text import (
     against_baseline_words,
     alert_of,
     is_stiffness,
     look_again,
+    message_of_agreeing,
     quantity_words,
     size_words,
     structure_words,
 )
+from shm.watch.limits import LIMITS
 from shm.watch.mistaken_modes import MOST_MISTAKEN
 from shm.watch.quantities import MeasuredMode
 
 _CHECK: AlertKind = "check the baseline"
-_CLEAR_DRIFT = 2.0  # judgement: that tests and baseline disagree is known by then
-# Of a log frequency: more than sensors, joints and traffic do to a mode by itself (judgement).
-_OFF = 0.01
 
 
 # ---------------------------------------------------------------- the baseline
@@ -58,7 +57,7 @@ def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
 
     One mistaken mode of the only test before passes for an end that moved.
     """
-    clear = [each for each in test.drifts if _deviations(each) > _CLEAR_DRIFT]
+    clear = [each for each in test.drifts if _deviations(each) > LIMITS.clear_drift]
     lead = max(clear, key=_deviations, default=None)
     kind, drifts = _CHECK, tuple[Drift, ...]()
     if lead is None or not hanger.is_modelled:
@@ -87,6 +86,15 @@ def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
 
 def _deviations(drift: Drift) -> float:
     return abs(drift.shift_mean) / drift.shift_sd if drift.shift_sd > 0 else 0.0
+
+
+def alert_of_agreement(found: Agreement, hanger: Hanger) -> Alert:
+    """Return the alert of two tests that agree."""
+    drift = found.drift
+    what = f"two-tests-agree:{drift.quantity}-{way_of(drift.shift_mean)}"
+    words = message_of_agreeing(drift, hanger, found.tests, is_held=found.is_held)
+    of_test = drift.test, drift.time
+    return alert_of(hanger, of_test, what, words, ("beyond threshold",), (drift,))
 
 
 # ---------------------------------------------------------------- tests that agree with none
@@ -152,7 +160,7 @@ def off_the_baseline(reading: Reading) -> BoolArray:
     if modes is None:
         return np.zeros(0, bool)
     measured = np.isfinite(modes.variances)
-    off = measured & (np.abs(modes.values - modes.slopes @ reading.mean) > _OFF)
+    off = measured & (np.abs(modes.values - modes.slopes @ reading.mean) > LIMITS.notices_off)
     can_tell = measured.sum() > len(reading.mean) + 1
     are_too_many = can_tell and off.sum() > MOST_MISTAKEN * measured.sum()
     return off if are_too_many else np.zeros(len(off), bool)

@@ -6,18 +6,31 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from datetime import datetime
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+import scipy
 
 from shm.assumptions import DEFAULTS, Assumptions
 from shm.errors import UsageError
 from shm.values import NAN, FloatArray
 from shm.values.drift import OF_ONE_VISIT
+from shm.watch.limits import LIMITS
 
 
 @dataclass(frozen=True)
-class WatchOptions:
+class Assumed:
+    """Options, some of which are rows of the table of assumptions."""
+
+    @classmethod
+    def of(cls, assumed: Assumptions, **given: Any) -> Self:
+        """Return options with what is assumed of a hanger, but for those that are given."""
+        rows = {each.name: assumed[each.name].value for each in fields(cls) if each.name in assumed}
+        return cls(**{**rows, **given})
+
+
+@dataclass(frozen=True)
+class WatchOptions(Assumed):
     """Limits and priors of the sequential test.
 
     `limit_years` is the mean time to a false call of one hanger, or less than it. The `scatter`
@@ -52,12 +65,6 @@ class WatchOptions:
     most_of_one_test: float = 0.2
     baseline_tests: int = 1
     beginnings: int = 60
-
-    @classmethod
-    def of(cls, assumed: Assumptions, **given: Any) -> WatchOptions:
-        """Return options with what is assumed of a hanger, but for those that are given."""
-        rows = {each.name: assumed[each.name].value for each in fields(cls) if each.name in assumed}
-        return cls(**{**rows, **given})
 
     def __post_init__(self) -> None:
         if not self.scatter_scales:
@@ -108,6 +115,21 @@ def temperature_offsets(
     lately = (years[:, None] >= years) & (years > years[:, None] - _SEASON_YEARS) & ~known
     in_order = np.tril(lately)  # of tests at the very same time those before
     return Warmth(kelvin, of_each, np.where(known, 1.0, in_order.sum(axis=1)))
+
+
+def frost_of(temperatures_c: FloatArray, thermometer_sd_k: float) -> Warmth:
+    """Kelvin below 0 C of tests at `temperatures_c` (T,), 0 above it, as far as one knows.
+
+    The deck follows the air in its own time, so that near 0 C its mean is what counts.
+    """
+    known = np.isfinite(temperatures_c)
+    scaled = np.where(known, temperatures_c, 0.0) / thermometer_sd_k
+    below = scipy.special.ndtr(-scaled)
+    density = np.exp(-(scaled**2) / 2) / math.sqrt(2 * math.pi)
+    kelvin = thermometer_sd_k * (scaled * below - density)
+    kelvin = np.where(known, kelvin, kelvin[known].mean() if known.any() else 0.0)
+    sd = np.where(known, thermometer_sd_k * below, LIMITS.frost_spread_k)
+    return Warmth(kelvin, sd, np.ones(len(known)))
 
 
 def years_between(first: datetime, second: datetime) -> float:

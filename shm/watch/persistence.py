@@ -22,14 +22,7 @@ import scipy
 from shm.values import BoolArray, FloatArray
 from shm.watch.causes import BENDING_STIFFNESS, SPRINGS
 from shm.watch.change_point import RAMP, Evidence
-
-_SELDOM = 1e-3  # of tests that agree so many are taken for such that do not
-_NEAR = 2  # tests to each side: a blunder may lie between two that agree
-_BEFORE = 5  # counted tests that say where the hanger was
-_AGREEING = 0.4  # judgement: of those before; two of five
-# Of a log frequency (judgement): further off than by any load, and nearer than orders are.
-_STRAYS, _SAME = 0.04, 0.02
-_WIDER, _TAIL = 10.0, 2.0  # judgement: how a blunder lies, ten times as wide and with heavy tails
+from shm.watch.limits import LIMITS
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +55,7 @@ class Seen:
     def agree(self, one: int, other: int) -> bool:
         """Return True if two tests may be of one state."""
         square, modes = self.distance(one, other)
-        return modes > 0 and square < float(scipy.special.chdtri(modes, _SELDOM))
+        return modes > 0 and square < float(scipy.special.chdtri(modes, LIMITS.seldom))
 
 
 def select_consistent_tests(seen: Seen, known: BoolArray, baseline_tests: int) -> BoolArray:
@@ -73,20 +66,22 @@ def select_consistent_tests(seen: Seen, known: BoolArray, baseline_tests: int) -
     """
     tests = len(seen.values)
     found = np.zeros(tests, bool)
-    settled = max(len(known) - _NEAR, 0)
+    settled = max(len(known) - LIMITS.near, 0)
     found[:settled] = known[:settled]
     first = min(baseline_tests, tests)
     if settled < first:
         found[:first] = _of_baseline(seen, first)
         settled = first
     for test in range(settled, tests):
-        before = np.flatnonzero(found[:test])[-_BEFORE:]
+        before = np.flatnonzero(found[:test])[-LIMITS.before :]
         agreeing = sum(seen.agree(test, int(each)) for each in before)
         near = [
-            test + step for step in range(-_NEAR, _NEAR + 1) if step and 0 <= test + step < tests
+            test + step
+            for step in range(-LIMITS.near, LIMITS.near + 1)
+            if step and 0 <= test + step < tests
         ]
         near = [each for each in near if each >= first]
-        agrees = agreeing >= _AGREEING * len(before) or any(seen.agree(test, n) for n in near)
+        agrees = agreeing >= LIMITS.agreeing * len(before) or any(seen.agree(test, n) for n in near)
         found[test] = agrees and not _has_outlying_mode(seen, found, test, near)
     return found
 
@@ -95,11 +90,11 @@ def _has_outlying_mode(seen: Seen, found: BoolArray, test: int, near: Sequence[i
     """Return True if a mode lies where no counted test before has it, and none next to it."""
     for mode in np.flatnonzero(np.isfinite(seen.variances[test])):
         measured = np.isfinite(seen.variances[:, mode])
-        before = np.flatnonzero(found[:test] & measured[:test])[-_BEFORE:]
+        before = np.flatnonzero(found[:test] & measured[:test])[-LIMITS.before :]
         its, others = seen.values[test, mode], seen.values[:, mode]
-        if not len(before) or abs(its - np.median(others[before])) <= _STRAYS:
+        if not len(before) or abs(its - np.median(others[before])) <= LIMITS.large:
             continue
-        if not any(measured[each] and abs(its - others[each]) < _SAME for each in near):
+        if not any(measured[each] and abs(its - others[each]) < LIMITS.same for each in near):
             return True
     return False
 
@@ -122,39 +117,23 @@ def outlier_probability(seen: Seen, known: BoolArray, test: int, prior: float) -
     """Return the probability that a test is a blunder, by the nearest of the last that count."""
     odds = np.log(prior / (1 - prior))
     against = []
-    for before in np.flatnonzero(known[:test])[-_BEFORE:]:
+    for before in np.flatnonzero(known[:test])[-LIMITS.before :]:
         square, d = seen.distance(test, int(before))
         if d:
-            wide = -(_TAIL + d) / 2 * np.log1p(square / _TAIL / _WIDER**2) - d * np.log(_WIDER)
+            wide = -(LIMITS.persistence_tail + d) / 2 * np.log1p(
+                square / LIMITS.persistence_tail / LIMITS.wider**2
+            ) - d * np.log(LIMITS.wider)
             against.append(wide + square / 2)
     if not against:
         return prior
     return float(1 / (1 + np.exp(-np.clip(odds + min(against), -700, 700))))
 
 
-_SHOWN = 0.5  # of a change: half of it or more is nearer to it than to none
-_SHOWING = 0.9  # judgement: of the tests after a change; one in ten is disturbed itself
 # Before any test, of tests without a change so many lie as far as one, as if from so many tests.
 # Judgement: joints give and wires slip on one windy day in seven, which ten calm tests do not
 # disprove; heavy vehicles, sensors and mistakes together are one test in thirty, which no number
 # of tests disproves.
 _SLIPPING = (SPRINGS, BENDING_STIFFNESS)
-_SLIPPED, _SLIPPED_AS_FROM = 0.15, 20.0
-_SEEM, _AS_FROM = 0.03, 5.0
-LARGE = 0.04
-"""Of a log frequency (judgement): no load that passes does as much, but a blunder may."""
-_LARGE_SEEM = 0.01
-# Of a log frequency: what only another hanger's test does, if it is no change; one in 10,000 first
-# tests, since it fitted the description.
-_GROSS, _GROSS_BEFORE = 0.08, 1e-4
-# Judgement: tests that are odd for other reasons agree with each other by chance.
-_ODD_ALIKE = 0.03
-# Years: vans come with tests, not with time; a long wait before two tests makes them no surer, and
-# visits in haste make a change that stays no less likely.
-_LEAST_WAITED, _MOST_WAITED = 7 / 365.25, 1 / 12
-# Hypotheses that are asked: none that others beat by 20 to 1 (technical: of so many at most).
-_LEADING, _BEATEN_NATS = 12, 3.0
-_TELLING = 0.5  # of a change: a test that is less sure of it by itself says nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +165,7 @@ def bound_by_recurrence(
     leading = float(evidence.log_mass.max(initial=-math.inf))
     for n, index in enumerate(_likeliest(evidence)):
         mass = float(evidence.log_mass[index])
-        if mass < leading - _BEATEN_NATS:
+        if mass < leading - LIMITS.alike_nats:
             break
         log_years, is_of_those_before, showing = _of_change(evidence, course, index)
         found = max(found, min(mass, log_years))
@@ -199,7 +178,7 @@ def bound_by_recurrence(
 def _likeliest(evidence: Evidence) -> list[tuple[int, ...]]:
     """Return the likeliest changes of different beginning, kind and cause."""
     by_cause = evidence.log_mass.max(axis=(1, 4), initial=-math.inf)
-    order = np.argsort(by_cause.ravel())[::-1][:_LEADING]
+    order = np.argsort(by_cause.ravel())[::-1][: LIMITS.persistence_leading]
     chosen: list[tuple[int, ...]] = []
     for at, kind, d in np.array(np.unravel_index(order, by_cause.shape)).T.tolist():
         of_one = evidence.log_mass[at, :, kind, d]
@@ -222,26 +201,26 @@ def _of_change(
         since = evidence.years - float(evidence.years[first - 1])
         expected = since / max(evidence.progress(at), 1e-12)
     is_after = np.arange(len(shown)) >= first
-    before = shown[begun:first][sd[begun:first] < _TELLING]
-    after = is_after & (sd < _TELLING * expected) & (expected >= _SHOWN)
-    least = _LARGE_SEEM if largest > LARGE else _SEEM
+    before = shown[begun:first][sd[begun:first] < LIMITS.telling]
+    after = is_after & (sd < LIMITS.telling * expected) & (expected >= LIMITS.shown)
+    least = LIMITS.large_seem if largest > LIMITS.large else LIMITS.seem
     slips = evidence.directions[d].name in _SLIPPING
-    seem, as_from = (_SLIPPED, _SLIPPED_AS_FROM) if slips else (least, _AS_FROM)
-    does = shown[after] >= _SHOWN * expected[after]
-    as_far = (before[:, None] >= _SHOWN * expected[after]).sum(axis=0)
+    seem, as_from = (LIMITS.slipped, LIMITS.slipped_as_from) if slips else (least, LIMITS.as_from)
+    does = shown[after] >= LIMITS.shown * expected[after]
+    as_far = (before[:, None] >= LIMITS.shown * expected[after]).sum(axis=0)
     odd = np.maximum((as_far + seem * as_from) / (len(before) + as_from), least)
-    showing, not_showing = _SHOWING * _AS_FROM, (1 - _SHOWING) * _AS_FROM
+    showing, not_showing = LIMITS.showing * LIMITS.as_from, (1 - LIMITS.showing) * LIMITS.as_from
     likely = scipy.special.betaln(showing + does.sum(), not_showing + (~does).sum())
     likely -= scipy.special.betaln(showing, not_showing)
     those_after = np.where(does, np.log(odd), np.log1p(-odd)).sum()
-    early = before >= _SHOWN
-    odd_before = _GROSS_BEFORE if largest > _GROSS else max(seem, _SEEM)
-    those_before = np.where(early, math.log1p(-_SEEM), math.log(odd_before)).sum()
-    those_before += max(int((~early).sum()) - 1, 0) * math.log(_ODD_ALIKE)
-    each = np.clip(evidence.waited, _LEAST_WAITED, _MOST_WAITED)
+    early = before >= LIMITS.shown
+    odd_before = LIMITS.gross_before if largest > LIMITS.gross else max(seem, LIMITS.seem)
+    those_before = np.where(early, math.log1p(-LIMITS.seem), math.log(odd_before)).sum()
+    those_before += max(int((~early).sum()) - 1, 0) * math.log(LIMITS.odd_alike)
+    each = np.clip(evidence.waited, LIMITS.least_waited, LIMITS.most_waited)
     waited = float(each @ evidence.shares.sum(axis=(1, 2, 3, 4)))
     log_years = math.log(waited) + float(likely - np.logaddexp(those_after, those_before))
-    is_baseline_odd = largest <= _GROSS and bool(those_before > those_after)
+    is_baseline_odd = largest <= LIMITS.gross and bool(those_before > those_after)
     return log_years, is_baseline_odd, int(does.sum())
 
 

@@ -29,14 +29,9 @@ from shm.values import (
 )
 from shm.values.drift import threshold_of
 from shm.watch.change_point import LOG_SHARES, SAMPLES, SIZES, STEP, Evidence
+from shm.watch.limits import LIMITS
 from shm.watch.options import DAYS_PER_YEAR, WatchOptions
 from shm.watch.quantities import shift_of, value_at
-
-_ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
-_TAIL = 0.05  # 90 % lie between
-_DIGITS = 3  # probabilities that read alike are ordered by tension first
-_TRADED = 0.25  # judgement: of what an end does, that looks like another tension
-_BEYOND_DOUBT = 1e4  # judgement: times what a detection takes
 
 
 @cache
@@ -77,7 +72,7 @@ class SummaryContext:
             of_ends = np.abs(shifts[:, ~is_tension]).sum(axis=1, keepdims=True)
             first = len(self.effects.T) - len(self.quantities)
             of_tension = self.effects[1::2, first:][:, is_tension].mean()
-            its[:, is_tension] = np.hypot(its[:, is_tension], _TRADED * of_ends / of_tension)
+            its[:, is_tension] = np.hypot(its[:, is_tension], LIMITS.traded * of_ends / of_tension)
         return np.asarray(its)
 
     def with_model(self, shifts: FloatArray) -> FloatArray:
@@ -111,7 +106,7 @@ def summarize_change(
         evidence_years=math.exp(min(evidence.log_evidence, 700.0)),
         limit_years=subject.options.limit_years,
         probability=1 - (1 - before) * (1 - now),
-        sudden=_sudden(causes),
+        sudden=float(causes.shares[:, :, STEP].sum()) if len(causes.beginnings) else NAN,
         began_after=began_after,
         began_by=began_by,
         moved=rank_causes(subject, causes),
@@ -124,31 +119,16 @@ def summarize_change(
 def _material(subject: SummaryContext, evidence: Evidence) -> float:
     """The probability that a change, if there is one, moves one of the frequencies that owners look
     at by more than what is to be told."""
-    changes, _ = evidence.draw(_everything(evidence), _nothing(evidence))
+    changes, _ = evidence.draw()
     return float(_are_material(subject, evidence, changes).mean()) if len(changes) else 0.0
 
 
 def _are_material(subject: SummaryContext, evidence: Evidence, changes: FloatArray) -> BoolArray:
     """The same (draws,) of each; of any mode, where no doubt is left that something changed."""
     effects, least = subject.effects, subject.options.least_frequency_shift
-    if evidence.log_evidence > math.log(_BEYOND_DOUBT * subject.options.limit_years):
+    if evidence.log_evidence > math.log(LIMITS.beyond_doubt * subject.options.limit_years):
         effects = np.vstack([effects, subject.by_mode])
     return np.asarray((np.abs(changes @ effects.T) > least).any(axis=1))
-
-
-def _everything(evidence: Evidence) -> BoolArray:
-    return np.ones(len(evidence.directions), bool)
-
-
-def _nothing(evidence: Evidence) -> FloatArray:
-    """Return loadings that ask nothing of the null's parameters."""
-    return np.zeros((0, evidence.null_mean.shape[1]))
-
-
-def _sudden(evidence: Evidence) -> float:
-    if not len(evidence.beginnings):
-        return NAN
-    return float(evidence.shares[:, :, STEP].sum())
 
 
 def _began(
@@ -160,7 +140,10 @@ def _began(
         return reading.time, reading.time
     reached = np.cumsum(evidence.shares.sum(axis=(1, 2, 3, 4)))
     last = len(beginnings) - 1
-    first, final = (min(int(np.searchsorted(reached, p)), last) for p in (_TAIL, 1 - _TAIL))
+    first, final = (
+        min(int(np.searchsorted(reached, p)), last)
+        for p in (LIMITS.posterior_summary_tail, 1 - LIMITS.posterior_summary_tail)
+    )
     return (
         subject.at(float(years[beginnings[first] - 1])),
         subject.at(float(years[beginnings[final]])),
@@ -186,7 +169,9 @@ def rank_causes(subject: SummaryContext, evidence: Evidence) -> tuple[Moved, ...
     names = [*(each.name for each in subject.quantities), *causes]
     probability = np.array([min(float(by_direction[part].sum()), 1.0) for part in parts])
     is_tension = [name == TENSION for name in names]
-    order = np.lexsort([np.array(is_tension), -probability.round(_DIGITS)]).tolist()
+    order = np.lexsort(
+        [np.array(is_tension), -probability.round(LIMITS.posterior_summary_digits)]
+    ).tolist()
     return tuple(
         _as_changed(subject, evidence, names, j, parts[j], float(probability[j])) for j in order
     )
@@ -204,7 +189,7 @@ def _as_changed(
 
     Of a cause that is no quantity the shift is that of the frequencies' mean, a fraction.
     """
-    changes, _ = evidence.draw(part, _nothing(evidence))
+    changes, _ = evidence.draw(part)
     n = evidence.layout.n
     together, similar = _find_company(evidence, part, names, names[j])
     shift, end, plane = changes[:, :n].mean(axis=1), None, None
@@ -244,7 +229,7 @@ def _find_company(
     close = [
         each
         for each, log_mass in joined.items()
-        if joined[best] - log_mass < _ALIKE_NATS and not each & best
+        if joined[best] - log_mass < LIMITS.alike_nats and not each & best
     ]
     fewest = [each for each in close if not any(other < each for other in close)]
     its = {n for j, n in enumerate(names) if n in best}
@@ -273,7 +258,7 @@ def summarize_drifts(
     evidence = causes
     loadings = _of_null(evidence, subject)
     unmoved = subject.with_model(evidence.draw_null(loadings))
-    moved, changes = _draw_shifts(subject, evidence, _everything(evidence), loadings)
+    moved, changes = _draw_shifts(subject, evidence, None, loadings)
     probability = probability if len(moved) else 0.0
     is_material = np.ones(len(moved), bool)
     if len(moved) and not evidence.called:
@@ -332,14 +317,12 @@ def _of_null(evidence: Evidence, subject: SummaryContext) -> FloatArray:
 def _draw_shifts(
     subject: SummaryContext,
     evidence: Evidence,
-    part: BoolArray,
+    part: BoolArray | None,
     loadings: FloatArray,
     *,
     is_last_counted: bool = True,
 ) -> tuple[FloatArray, FloatArray]:
     """Draw the quantities' shifts (draws, q), given one change of `part`, and the changes."""
-    if not len(evidence.beginnings):
-        return np.zeros((0, evidence.layout.q)), np.zeros((0, 0))
     changes, before = evidence.draw(part, loadings, is_last_counted=is_last_counted)
     return subject.with_model(changes[:, evidence.layout.n :] + before), changes
 

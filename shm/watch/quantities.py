@@ -30,6 +30,7 @@ from shm.values import (
     WatchedQuantity,
     is_ratio,
 )
+from shm.watch.limits import LIMITS
 
 MeasuredMode = tuple[Plane, int]
 """Plane and order, which counts from 1."""
@@ -38,16 +39,6 @@ _X = TypeVar("_X", float, FloatArray)
 
 _TENSION_RATIO = "theta_F"
 _STIFFNESS = "log10_k"
-_TENSION_STEP = 0.05  # the default threshold: what an owner is told of
-_STIFFNESS_STEP_DECADES = 0.3  # a factor of 2
-_INVISIBLE = 1e-5  # of a frequency: a thirtieth of the best identification's sd
-_FINER = 10  # technical: points between two nodes
-# Judgement: bars with forks and turnbuckles go otherwise than their description, and how far their
-# frequencies go with a change is known to a tenth at best.
-_MODEL_OFF = 0.1
-_SLACK = 0.02  # judgement: of the baseline's tension, below it only its own weight strains it
-# Below this a rise is the model's rounding: nodes as near as that are one.
-_ROUNDING = 1e-10
 
 _ENDS: dict[str, End] = {
     **dict.fromkeys(("k1", "k2"), "deck"),
@@ -105,7 +96,7 @@ def _exchangeable(
         theta = np.tile(base, (2, 1))
         theta[:, columns] = [[softer, softer + 1], [softer + 1, softer]]
         one, other = log_frequencies(model, theta, modes)
-        if np.abs(one - other).max() < _INVISIBLE:
+        if np.abs(one - other).max() < LIMITS.invisible:
             pairs.append(pair)
     return pairs
 
@@ -185,7 +176,7 @@ def _tension(baseline: Posterior, model: Model, base: FloatArray) -> WatchedQuan
     """Return the tension, as far as the class's prior reaches, and down to a slack hanger."""
     column = model.parameter_names.index(_TENSION_RATIO)
     lower, upper = (ends[column] / base[column] for ends in (model.prior.lower, model.prior.upper))
-    lower = min(lower, _SLACK)
+    lower = min(lower, LIMITS.slack)
     # Technical: interpolated between
     between = np.linspace(min(np.log(lower), 0.0), max(np.log(upper), 0.0), 201)
     coordinates = np.union1d(between, 0.0)
@@ -197,7 +188,7 @@ def _tension(baseline: Posterior, model: Model, base: FloatArray) -> WatchedQuan
         mean_n,
         coordinates,
         values,
-        _TENSION_STEP,
+        LIMITS.quantities_tension_step,
         parameters=(_TENSION_RATIO,),
         scale_sd=_off_by(at_base_n / baseline.tension_n),
         unit="N",
@@ -249,25 +240,27 @@ def _spring(
     # A node so near the base that both would be one by rounding gives way to it.
     grid = np.sort(np.append(nodes[np.abs(nodes - centre) > 0.01], centre))
     found = log_frequencies(model, moved(model, base, columns, grid - centre), modes)
-    if np.ptp(found, axis=0).max() <= _INVISIBLE:
+    if np.ptp(found, axis=0).max() <= LIMITS.invisible:
         return None
     at = int(np.searchsorted(grid, centre))
     # Users go straight from node to node. Towards the clamped end the response falls tenfold in a
     # decade: at 40 nodes a decade the slope is right within 3 %, at two within 70 %.
     rising = np.maximum.accumulate((found - found[at]).mean(axis=1))
-    log10_k = np.interp(np.arange((len(grid) - 1) * _FINER + 1) / _FINER, range(len(grid)), grid)
+    log10_k = np.interp(
+        np.arange((len(grid) - 1) * LIMITS.finer + 1) / LIMITS.finer, range(len(grid)), grid
+    )
     mean = np.asarray(scipy.interpolate.PchipInterpolator(grid, rising)(log10_k))
-    mean = mean - mean[at * _FINER]
+    mean = mean - mean[at * LIMITS.finer]
 
     def step_at(stiffness: FloatArray) -> FloatArray:
         """Return what 0.3 decades do, the larger of up and down."""
-        steps = (0.0, -_STIFFNESS_STEP_DECADES, _STIFFNESS_STEP_DECADES)
+        steps = (0.0, -LIMITS.stiffness_step_decades, LIMITS.stiffness_step_decades)
         here, down, up = (np.interp(stiffness + step, log10_k, mean) for step in steps)
         return np.asarray(np.maximum(here - down, up - here))
 
     samples = step_at(common_stiffness(np.column_stack([baseline.parameter(n) for n in names])))
     at_base = step_at(np.array([centre]))
-    chosen = _rising(mean, at * _FINER)
+    chosen = _rising(mean, at * LIMITS.finer)
     planes = _PLANES | _PLANES_OF_BEAMS if _is_beam(model) else _PLANES
     bare, alone = names[0].removeprefix("log10_"), len(names) == 1
     plane = planes.get(bare)
@@ -280,7 +273,7 @@ def _spring(
         end=_ENDS.get(bare) if alone else None,
         plane=plane,
         parameters=names,
-        scale_sd=_off_by(at_base / np.maximum(samples, _INVISIBLE)),
+        scale_sd=_off_by(at_base / np.maximum(samples, LIMITS.invisible)),
         unit=model.units.get(names[0], ""),
     )
 
@@ -299,14 +292,16 @@ def _rising(mean: FloatArray, at: int) -> list[int]:
     """Return the nodes to keep so that coordinates rise strictly, that of the base `at` always."""
     above, below = [at], [at]
     for index in range(at + 1, len(mean)):
-        if mean[index] > mean[above[-1]] + _ROUNDING:
+        if mean[index] > mean[above[-1]] + LIMITS.rounding:
             above.append(index)
     for index in range(at - 1, -1, -1):
-        if mean[index] < mean[below[-1]] - _ROUNDING:
+        if mean[index] < mean[below[-1]] - LIMITS.rounding:
             below.append(index)
     return [*below[:0:-1], *above]
 
 
 def _off_by(ratios: FloatArray) -> float:
     """Root mean square of ratios (n,) less 1; off by all of itself is not known at all."""
-    return min(math.hypot(float(np.sqrt(np.mean((ratios - 1) ** 2))), _MODEL_OFF), 1.0)
+    return min(
+        math.hypot(float(np.sqrt(np.mean((ratios - 1) ** 2))), LIMITS.quantities_model_off), 1.0
+    )

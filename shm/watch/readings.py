@@ -39,6 +39,7 @@ from shm.values import (
     WatchedQuantity,
 )
 from shm.watch.causes import columns_of, mounted_kg
+from shm.watch.limits import LIMITS
 from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
 from shm.watch.quantities import (
     MeasuredMode,
@@ -48,21 +49,6 @@ from shm.watch.quantities import (
     shift_of,
     watched_quantities,
 )
-
-_SELDOM = 1e-3
-"""Of good tests, by their misfit (judgement): a worse one has larger errors than stated."""
-# Far above the rounding of a log frequency, far below what a test can tell.
-_LEAST_SLOPE_STEP = 1e-7
-_PULL_SD_IN_STEPS = 10.0
-_MOST_STEPS = 12
-_STARTS = 24  # technical: of a tension from a fiftieth to five times the nominal one
-# In units of the reading's variance: a last step of a tenth of its standard deviation is taken
-# along with the reading, which is linear about the place before it.
-_SETTLED = 1e-2
-# Information, per step_sd, of which 10,000 tests together say as much as the prior of a change.
-_UNSEEN = 1e-4
-# How far a search leaves the tables, in log frequency: more than noise, less than a blunder.
-_BEYOND = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,11 +104,11 @@ class LinearReading:
 def _error_inflation(misfit: FloatArray, fitted: int) -> float:
     """Return by what the stated variances of a test are too small, at least 1.
 
-    By its `misfit` over sd (n,), as far as that can tell: a prior is worth `_PRIOR_FREEDOM` modes
+    By its `misfit` over sd (n,), as far as that can tell: a prior is worth a few modes
     (Birge 1932).
     """
     free = max(len(misfit) - fitted, 0)
-    return max(1.0, (_PRIOR_FREEDOM + float(misfit @ misfit)) / (_PRIOR_FREEDOM + free))
+    return max(1.0, (LIMITS.prior_freedom + float(misfit @ misfit)) / (LIMITS.prior_freedom + free))
 
 
 class Likelihood:
@@ -142,18 +128,18 @@ class Likelihood:
         names = model.parameter_names
         self._columns = [[names.index(name) for name in each.parameters] for each in quantities]
         self._scale: FloatArray = np.array([each.step_sd for each in quantities])
-        self.pull: FloatArray = 1 / (_PULL_SD_IN_STEPS * self._scale) ** 2
+        self.pull: FloatArray = 1 / (LIMITS.pull_steps * self._scale) ** 2
         self._lowest = np.array([each.coordinates[0] for each in quantities])
         self._highest = np.array([each.coordinates[-1] for each in quantities])
 
     def inside(self, x: FloatArray) -> FloatArray:
         """Coordinates (q,) no further beyond the tables than a search may go."""
-        return np.clip(x, self._lowest - _BEYOND, self._highest + _BEYOND)
+        return np.clip(x, self._lowest - LIMITS.beyond, self._highest + LIMITS.beyond)
 
     def far_start(self, seen: SeenModes) -> FloatArray:
         """Return where the tension alone fits best: half of the modes may be anywhere."""
-        first = np.linspace(self._lowest[0], self._highest[0], _STARTS)
-        places = np.zeros((_STARTS, len(self._quantities)))
+        first = np.linspace(self._lowest[0], self._highest[0], LIMITS.starts)
+        places = np.zeros((LIMITS.starts, len(self._quantities)))
         places[:, 0] = first
         off = np.abs(seen.log_frequency - self.predicted(places, seen))
         return np.asarray(places[int(np.median(off, axis=1).argmin())])
@@ -166,7 +152,7 @@ class Likelihood:
         """
         near = self._descended(np.zeros(len(self._quantities)), seen)
         misfit = float(near.residual @ near.residual)
-        if misfit <= scipy.special.chdtri(len(near.residual), _SELDOM):
+        if misfit <= scipy.special.chdtri(len(near.residual), LIMITS.seldom):
             return near
         far = self._descended(self.far_start(seen), seen)
         return far if far.cost < near.cost else near
@@ -175,8 +161,8 @@ class Likelihood:
         """Return the same from `start` (q,) on; steps that overshoot halve."""
         best = self.linear(start, seen)
         step = best.step
-        for _ in range(_MOST_STEPS):
-            if best.gain(step) < _SETTLED:
+        for _ in range(LIMITS.most_steps):
+            if best.gain(step) < LIMITS.settled:
                 break
             near = self.inside(best.x + step)
             tried = self.linear(near, seen)
@@ -193,7 +179,7 @@ class Likelihood:
         """
         count, inside = len(x), np.clip(x, self._lowest, self._highest)
         # Technical: of a quantity's step, over which frequencies go nearly straight
-        half = np.maximum(0.1 * self._scale, _LEAST_SLOPE_STEP)
+        half = np.maximum(0.1 * self._scale, LIMITS.least_slope_step)
         low = np.maximum(inside - half, self._lowest)
         high = np.minimum(inside + half, self._highest)
         places = np.vstack([inside, *(_with_diagonal(inside, ends) for ends in (low, high))])
@@ -205,15 +191,15 @@ class Likelihood:
         return LinearReading(x, residual / sd, slopes / sd[:, None], self.pull)
 
     def read(self, linear: LinearReading, off: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return what moves of the modes `off` (k, n), over sd, make of the coordinates (k, q).
+        """Return what moves of the modes `off` (n,), over sd, make of the coordinates (q,).
 
         And the information (q, q) of the likelihood alone, 0 along what is not seen.
         """
         slopes = linear.slopes * self._scale
         shares, axes = np.linalg.eigh(slopes.T @ slopes)
         shares = shares / _error_inflation(linear.residual, len(linear.x))
-        seen = shares > _UNSEEN
-        steps = (off @ slopes @ axes)[:, seen] / np.linalg.norm(slopes @ axes[:, seen], axis=0) ** 2
+        seen = shares > LIMITS.unseen
+        steps = (off @ slopes @ axes)[seen] / np.linalg.norm(slopes @ axes[:, seen], axis=0) ** 2
         information = (axes[:, seen] * shares[seen]) @ axes[:, seen].T
         information = information / np.outer(self._scale, self._scale)
         return self._scale * (steps @ axes[:, seen].T), (information + information.T) / 2
@@ -236,7 +222,6 @@ def _with_diagonal(row: FloatArray, diagonal: FloatArray) -> FloatArray:
     return np.where(np.eye(len(row), dtype=bool), diagonal, row)
 
 
-_STIFFER = 0.01
 _CLAMPED = "beam1"
 
 
@@ -258,17 +243,15 @@ def softening(
         known = dict(zip(model.parameter_names, base.tolist(), strict=True))
         model = described(_CLAMPED, hanger)
         base = np.array([known.get(each, 1.0) for each in model.parameter_names])
-    stiffer = replace(hanger, elastic_modulus_pa=hanger.elastic_modulus_pa * (1 + _STIFFER))
+    stiffer = replace(
+        hanger, elastic_modulus_pa=hanger.elastic_modulus_pa * (1 + LIMITS.readings_stiffer)
+    )
     stiff = described(model.name, stiffer, model.priors)
     change = log_frequencies(stiff, base[None], modes)
     change = change - log_frequencies(model, base[None], modes)
-    return np.asarray(hanger.assumptions.modulus_per_kelvin.value * change[0] / _STIFFER)
-
-
-# Judgement: how stiff an end may be that is found to be stiffer, in units of the bending stiffness
-# over its length of decay, sqrt(EI / T): a clamp is infinite, and at 1 an end is half way.
-_MAY_BE = (20.0, 7.0, 2.5, 1.0)
-_SEEN = 1e-6  # of a mean log frequency: below it a pattern is rounding
+    return np.asarray(
+        hanger.assumptions.modulus_per_kelvin.value * change[0] / LIMITS.readings_stiffer
+    )
 
 
 def loosening_of(
@@ -284,7 +267,7 @@ def loosening_of(
     """
     tension_n = base[model.parameter_names.index("theta_F")] * hanger.nominal_tension_n
     of_decay = math.log10(math.sqrt(hanger.bending_stiffness_n_m2 * tension_n))
-    levels = [of_decay + math.log10(each) for each in _MAY_BE]
+    levels = [of_decay + math.log10(each) for each in LIMITS.may_be]
     return tuple(
         np.zeros((0, len(modes)))
         if each.name == TENSION
@@ -313,29 +296,15 @@ def _patterns(
     shifts = log_frequencies(model, np.array(after), modes)
     shifts = shifts - log_frequencies(model, np.array(before), modes)
     mean = shifts.mean(axis=1, keepdims=True)
-    if abs(mean[0, 0]) < _SEEN:
+    if abs(mean[0, 0]) < LIMITS.seen:
         return np.zeros((0, len(modes)))
-    is_seen = np.abs(mean[:, 0]) > _SEEN
+    is_seen = np.abs(mean[:, 0]) > LIMITS.seen
     like = quantity.step_sd * shifts[is_seen] / mean[is_seen]
     _, strength, axes = np.linalg.svd(like[1:] - like[0], full_matrices=False)
     strength = strength / math.sqrt(max(len(like) - 1, 1))
     # Technical: patterns that add less are within a mode's own scatter
     chosen = strength > 0.05 * np.linalg.norm(like[0])
     return np.asarray(strength[chosen, None] * axes[chosen])
-
-
-# Of a frequency: what tests differ by beyond their errors, a logger's clock, a tenth of a kelvin.
-_FREQUENCY_ALLOWANCE = 1e-4
-
-# Mode by mode two tests of one state differ by more than is stated: the sensors' mass and place, a
-# joint that gives. Judgement, the better end of what repeated tests of real hangers show.
-_MODE_SCATTER = 1e-3
-_LOOSENED_STEPS = 6.0  # judgement: of the largest change of an end that is looked for
-_LOOSENED = 0.5  # of tests with a mode that seems mistaken, judgement: an end has loosened
-# Of a log frequency: a mode that is off by less may be so by its joint or its sensor.
-_LEAST_MISTAKE = 0.006
-_ROUNDS = 3  # technical: of "which modes are sound" and "where they lie"
-_PRIOR_FREEDOM = 4.0  # judgement: stated sds are off by a factor of up to two
 
 
 class Reader:
@@ -369,11 +338,20 @@ class Reader:
         mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
         self._unstated_sd = hanger.assumptions.unstated_frequency_sd.value
         sensors_kg = mounted_kg(hanger)
-        self._scatter = math.hypot(_MODE_SCATTER, sensors_kg / mass_kg / math.sqrt(8))
+        self._scatter = math.hypot(LIMITS.mode_scatter, sensors_kg / mass_kg / math.sqrt(8))
         self._loosening = np.vstack(self.columns.loosening).T
         self._known: dict[int, tuple[ModalTest, Reading]] = {}
         self._residual = np.zeros(len(self.modes))
         self._residual = self._own_residual([self._seen(test) for test in usable])
+
+    @property
+    def slopes(self) -> FloatArray:
+        """Return how the log frequencies of the modes go with the quantities, at the baseline."""
+        planes = np.array([PLANES.index(plane) for plane, _ in self.modes], dtype=int)
+        orders = np.array([order - 1 for _, order in self.modes], dtype=int)
+        n = len(self.modes)
+        its = SeenModes(Conditions(), planes, orders, np.arange(n), np.zeros(n), np.ones(n))
+        return self._likelihood.linear(np.zeros(len(self.quantities)), its).slopes
 
     def reading(self, test: ModalTest, time: datetime) -> Reading:
         """Return what a test by itself states of the quantities; it was made at `time`.
@@ -395,41 +373,23 @@ class Reader:
         blind = Reading(test.id, time, test.temperature_c, np.zeros(count), np.zeros((count,) * 2))
         if not (_is_described(test, self._model) and len((seen := self._seen(test)).own)):
             return blind
-        sound = self._sound(seen)
-        mistaken, seen = seen.own[~sound], seen.taken(sound)
-        linear = self._likelihood.settled(seen)
-        misfit = linear.residual + linear.slopes @ linear.x
-        softer = self._per_kelvin[seen.own] / np.sqrt(seen.variance)
-        (mean, per_kelvin), information = self._likelihood.read(linear, np.array([misfit, softer]))
-        left = None if self._is_warmth_known(test) else per_kelvin
-        modes = self._by_mode(seen, linear, mistaken, is_warmth_known=left is None)
-        return replace(
-            blind,
-            mean=mean,
-            information=information,
-            per_kelvin=left,
-            modes=modes,
-            amplitude=test.amplitude,
-        )
-
-    def _by_mode(
-        self, seen: SeenModes, linear: LinearReading, mistaken: IntArray, *, is_warmth_known: bool
-    ) -> ModeReading:
-        """Return the same for each of the baseline's modes.
-
-        Stated errors are taken to be off by a factor that the misfit tells, as far as it can.
-        """
-        sd, n = np.sqrt(seen.variance), len(self.modes)
-        larger = _error_inflation(linear.residual, len(linear.x))
-        values, variances = np.zeros(n), np.full(n, np.inf)
-        slopes = np.zeros((n, len(linear.x)))
-        values[seen.own] = sd * (linear.residual + linear.slopes @ linear.x)
-        variances[seen.own] = larger * seen.variance
-        slopes[seen.own] = sd[:, None] * linear.slopes
+        sound, n = self._sound(seen), len(self.modes)
         wrong = np.zeros(n, bool)
-        wrong[mistaken] = True
-        softer = np.zeros(n) if is_warmth_known else self._per_kelvin
-        return ModeReading(values, variances, slopes, softer, wrong)
+        wrong[seen.own[~sound]] = True
+        seen = seen.taken(sound)
+        linear, sd = self._likelihood.settled(seen), np.sqrt(seen.variance)
+        moved_by = linear.residual + linear.slopes @ linear.x
+        mean, information = self._likelihood.read(linear, moved_by)
+        values, variances, slopes = np.zeros(n), np.full(n, np.inf), np.zeros((n, count))
+        values[seen.own] = sd * moved_by
+        # Stated errors are taken to be off by a factor that the misfit tells, as far as it can.
+        variances[seen.own] = _error_inflation(linear.residual, count) * seen.variance
+        slopes[seen.own] = sd[:, None] * linear.slopes
+        softer = np.zeros(n) if self._is_warmth_known(test) else self._per_kelvin
+        modes = ModeReading(values, variances, slopes, softer, wrong)
+        return replace(
+            blind, mean=mean, information=information, modes=modes, amplitude=test.amplitude
+        )
 
     def _sound(self, seen: SeenModes) -> BoolArray:
         """Return which modes (n,) are not mistaken: more probably good than off by anything.
@@ -446,11 +406,10 @@ class Reader:
         if found.sound.all():
             return every
         slack = self._sound_by(seen, none, self._likelihood.far_start(seen))
-        if slack.log_evidence > found.log_evidence:
-            found = slack
+        found = max(found, slack, key=lambda each: each.log_evidence)
         if self._loosening.size:
             loose = self._sound_by(seen, self._loosening, still)
-            if loose.log_evidence + math.log(_LOOSENED) > found.log_evidence:
+            if loose.log_evidence + math.log(LIMITS.loosened) > found.log_evidence:
                 found = loose
         return found.sound if (~found.sound).sum() <= MOST_MISTAKEN * len(every) else every
 
@@ -461,15 +420,17 @@ class Reader:
         """
         variance, more = seen.variance + self._scatter**2, more[seen.own]
         wide, sd = replace(seen, variance=variance), np.sqrt(variance)
-        pull = np.append(self._likelihood.pull, np.full(more.shape[1], 1 / _LOOSENED_STEPS**2))
+        pull = np.append(
+            self._likelihood.pull, np.full(more.shape[1], 1 / LIMITS.loosened_steps**2)
+        )
         x = start
-        for _ in range(_ROUNDS):
+        for _ in range(LIMITS.rounds):
             linear = self._likelihood.linear(x, wide)
             off = sd * (linear.residual + linear.slopes @ x)
             slopes = np.hstack([sd[:, None] * linear.slopes, more])
             found = sound_modes(off, slopes, variance, pull)
             x = self._likelihood.inside(found.x[: len(x)])
-        is_near = np.abs(off - slopes @ found.x) < _LEAST_MISTAKE
+        is_near = np.abs(off - slopes @ found.x) < LIMITS.least_mistake
         return replace(found, sound=found.sound | is_near)
 
     def _is_warmth_known(self, test: ModalTest) -> bool:
@@ -484,7 +445,7 @@ class Reader:
         its = np.concatenate([seen.own for seen in tests])
         base = np.zeros((1, len(self.quantities)))
         off = [seen.log_frequency - self._likelihood.predicted(base, seen)[0] for seen in tests]
-        if len(tests) < _ROUNDS:
+        if len(tests) < LIMITS.rounds:
             weight = 1 / np.concatenate([seen.variance for seen in tests])
             total = np.bincount(its, weight * np.concatenate(off), len(self.modes))
             return np.asarray(total / np.bincount(its, weight, len(self.modes)))
@@ -492,7 +453,7 @@ class Reader:
         for row, seen, each in zip(table, tests, off, strict=True):
             row[seen.own] = each
         residual = np.nanmedian(table, axis=0)
-        for _ in range(_ROUNDS):
+        for _ in range(LIMITS.rounds):
             common = np.nanmedian(table - residual, axis=1)
             residual = np.nanmedian(table - common[:, None], axis=0)
         return np.asarray(residual)
@@ -515,7 +476,7 @@ class Reader:
             order=np.array([mode.order - 1 for mode in modes], dtype=int),
             own=its,
             log_frequency=np.log(frequency_hz) - self._residual[its] - variation,
-            variance=sd**2 + _FREQUENCY_ALLOWANCE**2,
+            variance=sd**2 + LIMITS.frequency_allowance**2,
         )
 
 

@@ -18,9 +18,8 @@ from shm.values.rounding import NINETY_PERCENT
 from shm.watch.agreement import drifts_of
 from shm.watch.alert_text import is_stiffness, probable_groups, quantity_words, size_words
 from shm.watch.baseline_check import known_modes
+from shm.watch.limits import LIMITS
 from shm.watch.readings import Reader
-
-_HALF = 0.5  # judgement: of what was told, so much may be left where it is repaired
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ def unrepaired(
         elif alert.change is not None and test is not None:
             share = share_left(of_baseline, test, [each for each, _ in since])
             words = [f"{100 * share:.0f} % of what the frequencies had moved by is left"]
-            words = [] if share < _HALF else words  # NaN is not known to be gone
+            words = [] if share < LIMITS.half else words  # NaN is not known to be gone
         else:
             continue
         if words:
@@ -74,7 +73,7 @@ def _stands(told: Drift, now: Drift, hanger: Hanger, *, restores: bool) -> bool:
         apart = abs(now.shift_mean - told.shift_mean)
         return apart <= NINETY_PERCENT * math.hypot(told.shift_sd, now.shift_sd)
     way = math.copysign(1, told.shift_mean)
-    off = way * now.shift_mean - _HALF * abs(told.shift_mean)
+    off = way * now.shift_mean - LIMITS.half * abs(told.shift_mean)
     left = 0.5 * math.erfc(-off / (math.sqrt(2) * now.shift_sd))
     return not left < hanger.thresholds.end_probability
 

@@ -11,27 +11,21 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
 import numpy as np
 import scipy
 
-from shm.assumptions import DEFAULTS, Assumptions
+from shm.assumptions import DEFAULTS
 from shm.errors import NothingThere, UsageError
 from shm.values import FloatArray
 from shm.values.drift import TENSION, Change, Reading, TemperatureCoefficient, WatchedQuantity
 from shm.values.kinds import NAN
 from shm.values.rounding import NINETY_PERCENT
-from shm.watch.options import reference_of
+from shm.watch.limits import LIMITS
+from shm.watch.options import Assumed, reference_of
 from shm.watch.quantities import value_at
-
-_SECONDS_A_YEAR = 365.25 * 86400  # Julian
-_FEW = 5  # fewer give an sd no better than to a third
-_A_STEP, _CLEAR = 0.5, 3  # likelier a step than a ramp; tests: judgement, see `set_free`
-_WIDEST = 4.0  # prior sds: beyond lies 1 in 16,000
-_SLOPE_STEP = 1e-4  # technical: rounding and curvature then each spoil a slope by some 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +46,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class StateOptions:
+class StateOptions(Assumed):
     """Weak priors of the state over time; one to three tests leave them as they are.
 
     `reference_temperature_c` NaN is the mean of the known ones. In units of a quantity's `step_sd`:
@@ -73,12 +67,6 @@ class StateOptions:
     unknown_temperature_sd_k: float = DEFAULTS.unknown_temperature_sd_k.value
     jump_of_step: float = 3.0
     largest_inflation: float = 1e4
-
-    @classmethod
-    def of(cls, assumed: Assumptions, **given: Any) -> StateOptions:
-        """Return options with what is assumed of a hanger, but for those that are given."""
-        rows = {each.name: assumed[each.name].value for each in fields(cls) if each.name in assumed}
-        return cls(**{**rows, **given})
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,8 +207,8 @@ def set_free(calls: Sequence[Change], readings: Sequence[Reading]) -> tuple[date
     free: list[datetime] = []
     for call in calls:
         times = [each.time for each in readings if call.began_after < each.time <= call.began_by]
-        if call.sudden > _A_STEP:
-            free += times if len(times) <= _CLEAR else times[-1:]
+        if call.sudden > LIMITS.a_step:
+            free += times if len(times) <= LIMITS.state_clear else times[-1:]
     return tuple(sorted(set(free)))
 
 
@@ -279,7 +267,7 @@ class LocalLevels:
         reference_c = options.reference_temperature_c
         if not math.isfinite(reference_c):
             reference_c = reference_of(temperature_c.tolist())
-        spread_k = known.std() if len(known) >= _FEW else options.unknown_temperature_sd_k
+        spread_k = known.std() if len(known) >= LIMITS.few else options.unknown_temperature_sd_k
         seconds = [reading.time.timestamp() for reading in readings]
         times, jump = [reading.time for reading in readings], np.zeros(len(readings))
         free = [0, *(bisect_left(times, change) for change in changes)]
@@ -290,7 +278,7 @@ class LocalLevels:
             np.nan_to_num(temperature_c - reference_c),
             np.where(np.isfinite(temperature_c), 0.0, spread_k),
             1 / np.clip(1 - outlier, 1 / options.largest_inflation, 1.0),
-            np.diff(seconds, prepend=seconds[0]) / _SECONDS_A_YEAR,
+            np.diff(seconds, prepend=seconds[0]) / LIMITS.seconds_a_year,
             jump,
             coefficient_sd,
             step,
@@ -317,19 +305,19 @@ class LocalLevels:
 
     def fitted(self) -> FloatArray:
         """Return z (2 q,) of the largest posterior density: the likelihood times the weak prior."""
-        steps = _SLOPE_STEP * np.eye(2 * self.q)
+        steps = LIMITS.slope_step * np.eye(2 * self.q)
 
         def misfit_and_slope(z: FloatArray) -> tuple[float, FloatArray]:
             here, *nearby = self.misfit(z + np.vstack([0 * steps[:1], steps, -steps]))
             ahead, behind = np.split(np.array(nearby), 2)
-            return float(here), (ahead - behind) / (2 * _SLOPE_STEP)
+            return float(here), (ahead - behind) / (2 * LIMITS.slope_step)
 
         found = scipy.optimize.minimize(
             misfit_and_slope,
             np.zeros(2 * self.q),
             jac=True,
             method="L-BFGS-B",
-            bounds=[(-_WIDEST, _WIDEST)] * 2 * self.q,
+            bounds=[(-LIMITS.widest, LIMITS.widest)] * 2 * self.q,
             options={"ftol": 1e-7, "maxiter": 60},
         )
         return np.asarray(found.x)

@@ -8,60 +8,84 @@ maximisation (Dempster, Laird and Rubin 1977), about a prior worth a few tests.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from datetime import datetime
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 
 import numpy as np
 
-from shm.values import BoolArray, Change, FloatArray, IntArray, WatchedQuantity, is_ratio
+from shm.values import (
+    BoolArray,
+    Change,
+    FloatArray,
+    IntArray,
+    ModeReading,
+    Reading,
+    WatchedQuantity,
+    is_ratio,
+)
 from shm.watch.causes import DetectedChange, Structure
-from shm.watch.change_point import SIZES, Evidence, Sums, sums_of
-from shm.watch.options import OF_ONE_VISIT_YEARS, Warmth, WatchOptions, temperature_offsets
+from shm.watch.change_point import SIZES, Evidence, Sums, select_null, sums_of
+from shm.watch.limits import LIMITS
+from shm.watch.options import (
+    OF_ONE_VISIT_YEARS,
+    Warmth,
+    WatchOptions,
+    frost_of,
+    temperature_offsets,
+    years_between,
+)
 from shm.watch.persistence import Course, Seen
 from shm.watch.quantities import MeasuredMode
 
 
 @dataclass(frozen=True, eq=False)
 class WatchState:
-    """All that the next result rests on, of T tests so far, in plain arrays.
+    """All that the next result rests on: T readings so far, and what was made of them.
 
     It goes on only where `key` is that of the watch which is to go on. `still_same` is the
     probability that nothing had changed before the last call.
     `weight` (T,) is what is left of tests that alone would say more than one test may.
-    `called` (calls, 3) are the first test, years, and whether it is a ramp, `called_precision`
-    (calls, n + q, n + q) what called it. `scatter_variance` is what tests scatter by.
+    `called` are the changes that were called, by numbers of tests. `scatter_variance` is what tests
+    scatter by.
     """
 
     key: str
-    start: datetime
-    last_time: datetime
     reference_c: float
-    values: FloatArray
-    variances: FloatArray
-    slopes: FloatArray
-    per_kelvin: FloatArray
-    years: FloatArray
-    temperature_c: FloatArray
-    log_amplitude: FloatArray
-    weight: FloatArray
-    counted: BoolArray
     coefficients: FloatArray
     coefficient_sd: FloatArray
     scatter_variance: FloatArray
-    called: FloatArray
-    called_precision: FloatArray
+    readings: tuple[Reading, ...] = ()
+    weight: FloatArray = field(default_factory=lambda: np.zeros(0))
+    counted: BoolArray = field(default_factory=lambda: np.zeros(0, bool))
+    called: tuple[DetectedChange, ...] = ()
     still_same: float = 1.0
 
     @property
     def tests(self) -> int:
-        return len(self.years)
+        return len(self.readings)
 
+    @cached_property
+    def modes(self) -> ModeReading:
+        """Return the readings mode by mode in one: arrays (T, ...)."""
+        rows = [each.modes for each in self.readings]
+        names = [each.name for each in fields(ModeReading)]
+        return ModeReading(*(np.array([getattr(row, name) for row in rows]) for name in names))
 
-_LEAST_SHARE = 1e-6  # judgement: of a cause in a call, which later tests may yet speak for
-_PRIOR_TESTS = 6.0  # judgement: a dozen tests say more than what was assumed of any hanger
-# Of a difference, in its own sds: up to the first all counts, from the second on nothing: what lies
-# that far is a change, and no scatter (Hampel 1974). One good one in 370 is beyond the first.
-_SCATTER_UP_TO, _CHANGE_FROM = 3.0, 6.0
+    @cached_property
+    def years(self) -> FloatArray:
+        """Times (T,) since the first."""
+        start = self.readings[0].time
+        return np.array([years_between(start, each.time) for each in self.readings])
+
+    @property
+    def temperature_c(self) -> FloatArray:
+        return np.array([each.temperature_c for each in self.readings])
+
+    @property
+    def log_amplitude(self) -> FloatArray:
+        """Logarithms (T,), NaN where an amplitude is not known."""
+        amplitude = np.array([each.amplitude for each in self.readings])
+        return np.log(np.where(amplitude > 0, amplitude, np.nan))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +102,7 @@ class StateSums:
         fixed = np.broadcast_to(
             self.structure.scattering, (state.tests, *self.structure.scattering.shape)
         )
-        return np.concatenate([state.slopes, fixed], axis=2)
+        return np.concatenate([state.modes.slopes, fixed], axis=2)
 
     def _warmth(self, state: WatchState) -> Warmth:
         return temperature_offsets(
@@ -86,8 +110,9 @@ class StateSums:
         )
 
     def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
-        """Return the kelvin that quantities go with, and as many further laws as there are."""
-        return (self._warmth(state),)
+        """Return the kelvin that quantities go with, and those of frost where they are a law."""
+        frost = frost_of(state.temperature_c, self.options.thermometer_sd_k)
+        return (self._warmth(state), frost)[: self.structure.thermal_laws]
 
     def _by_law(self, values: FloatArray) -> FloatArray:
         """Coefficients (laws q,), or their sds, by law (laws, q)."""
@@ -98,10 +123,10 @@ class StateSums:
         open: what a kelvin does as far as that is known, and as far as it is not. Tests `of_season`
         share what they miss."""
         its, sds = self._by_law(state.coefficients), self._by_law(state.coefficient_sd)
-        softening, parts = state.per_kelvin, []
+        softening, parts = state.modes.per_kelvin, []
         for law, mean, sd in zip(self._thermal(state), its, sds, strict=True):
-            known = softening + state.slopes @ mean
-            per_kelvin = np.concatenate([known[:, :, None], state.slopes * sd], axis=2)
+            known = softening + state.modes.slopes @ mean
+            per_kelvin = np.concatenate([known[:, :, None], state.modes.slopes * sd], axis=2)
             off = law.sd * np.sqrt(law.shared) if of_season else law.sd
             parts.append(off[:, None, None] * per_kelvin)
             softening = np.zeros_like(softening)  # steel's goes with the first law
@@ -110,11 +135,11 @@ class StateSums:
     def seen(self, state: WatchState) -> Seen:
         """All tests so far, their swing with the temperature taken off as far as it is known."""
         factors = self._factors(state)
-        measured = np.flatnonzero(np.isfinite(state.variances).any(axis=1))
+        measured = np.flatnonzero(np.isfinite(state.modes.variances).any(axis=1))
         variance = np.maximum(state.scatter_variance, self.structure.scatter_variance)
         return Seen(
             values=self._at_rest(state),
-            variances=state.variances,
+            variances=state.modes.variances,
             doubt=self._doubt(state),
             factors=factors[measured[-1]] if len(measured) else factors[-1],
             sds=np.sqrt(variance),
@@ -122,10 +147,10 @@ class StateSums:
 
     def _at_rest(self, state: WatchState) -> FloatArray:
         laws, its = self._thermal(state), self._by_law(state.coefficients)
-        variation = laws[0].kelvin[:, None] * state.per_kelvin
+        variation = laws[0].kelvin[:, None] * state.modes.per_kelvin
         for law, mean in zip(laws, its, strict=True):
-            variation = variation + law.kelvin[:, None] * (state.slopes @ mean)
-        return np.asarray(state.values - variation)
+            variation = variation + law.kelvin[:, None] * (state.modes.slopes @ mean)
+        return np.asarray(state.modes.values - variation)
 
     def scatter(self, state: WatchState) -> FloatArray:
         """Return the variances (q + c,) along each factor by the counted tests, one of each day.
@@ -137,7 +162,7 @@ class StateSums:
         prior = self.structure.scatter_variance
         if len(rows) < 2:
             return prior
-        variances, doubt = state.variances[rows], self._doubt(state)[rows]
+        variances, doubt = state.modes.variances[rows], self._doubt(state)[rows]
         spread = variances[1:] + variances[:-1]
         known = np.isfinite(spread)[:, :, None]
         values = np.where(known, np.diff(self._at_rest(state)[rows], axis=0)[:, :, None], 0.0)
@@ -157,18 +182,20 @@ class StateSums:
             along = (weighted * values).sum(axis=1)
             explained = (scaled * weighted).sum(axis=1)
             far = np.abs(along) / np.sqrt(np.maximum(explained, 1e-12))
-            left = np.clip((_CHANGE_FROM - far) / (_CHANGE_FROM - _SCATTER_UP_TO), 0.0, 1.0)
-            square = explained * np.minimum(far, _SCATTER_UP_TO) ** 2
+            left = np.clip(
+                (LIMITS.change_from - far) / (LIMITS.change_from - LIMITS.scatter_up_to), 0.0, 1.0
+            )
+            square = explained * np.minimum(far, LIMITS.scatter_up_to) ** 2
             expected = there * (left * square + (1 - left) * explained + 1 - explained)
-            variance = (_PRIOR_TESTS * prior + variance * expected.sum(axis=0)) / (
-                _PRIOR_TESTS + there.sum(axis=0)
+            variance = (LIMITS.prior_tests * prior + variance * expected.sum(axis=0)) / (
+                LIMITS.prior_tests + there.sum(axis=0)
             )
         return np.asarray(variance)
 
     def _columns(self, state: WatchState, rows: IntArray) -> FloatArray:
         """Of the tests `rows` (T, n, columns): modes, quantities, covariates."""
         layout = self.structure.layout
-        slopes, level = state.slopes[rows], _levels(state.log_amplitude[rows])
+        slopes, level = state.modes.slopes[rows], _levels(state.log_amplitude[rows])
         creeping = [is_ratio(each.name) for each in self.quantities]
         return np.concatenate(
             [
@@ -185,7 +212,9 @@ class StateSums:
     def _softened(self, state: WatchState, rows: IntArray) -> FloatArray:
         """Log frequencies (T, n) less what a softer steel does."""
         kelvin = self._warmth(state).kelvin
-        return np.asarray(state.values[rows] - kelvin[rows, None] * state.per_kelvin[rows])
+        return np.asarray(
+            state.modes.values[rows] - kelvin[rows, None] * state.modes.per_kelvin[rows]
+        )
 
     def sums(self, state: WatchState, rows: IntArray) -> Sums:
         """Of the tests `rows`; those of one day scatter together, and say no more than one."""
@@ -195,7 +224,7 @@ class StateSums:
         of_a_day = (apart < OF_ONE_VISIT_YEARS).sum(axis=1)
         of_level = layout.prior_sd[-2 - layout.q : -1]  # before creep
         stiffening = np.broadcast_to(structure.stiffening[:, None], (len(rows), layout.n, 1))
-        moving = np.concatenate([state.slopes[rows], stiffening], axis=2)
+        moving = np.concatenate([state.modes.slopes[rows], stiffening], axis=2)
         unknown = moving * (self.options.unknown_log_amplitude_sd * of_level)
         unknown[np.isfinite(state.log_amplitude[rows])] = 0.0
         doubt = self._doubt(state, of_season=True)[rows]
@@ -213,35 +242,30 @@ class StateSums:
         return sums_of(
             self._columns(state, rows),
             self._softened(state, rows),
-            wider[:, None] * state.variances[rows],
+            wider[:, None] * state.modes.variances[rows],
             wider[:, None, None, None] * covariance,
         )
 
     def course(self, state: WatchState, rows: IntArray, called: Sequence[DetectedChange]) -> Course:
         """Return the tests `rows` with what the null says of each, called changes included."""
-        layout = self.structure.layout
-        columns = self._columns(state, rows)
-        changing, years = columns[:, :, layout.change], state.years[rows]
-        parts = [columns[:, :, layout.null]]
-        for each in called:
-            since = np.where(np.arange(len(rows)) >= each.first, 1.0, 0.0)
-            for _ in range(2 if each.is_ramp else 1):
-                parts.append(changing * since[:, None, None])
-                since = since * (years - each.years)
+        layout, columns = self.structure.layout, self._columns(state, rows)
         its = self.options.mode_scatter**2
         return Course(
-            np.concatenate(parts, axis=2),
-            changing,
+            columns @ select_null(state.years[rows], layout, called),
+            columns[:, :, layout.change],
             self._softened(state, rows),
-            state.variances[rows] + its,
+            state.modes.variances[rows] + its,
             int((rows < self.options.baseline_tests).sum()),
         )
 
     def effects(self, state: WatchState) -> tuple[FloatArray, FloatArray]:
         """Return what a change does to what owners look at, and to every mode (`effects_of`)."""
-        measured = np.isfinite(state.variances)
+        if not self.structure.is_modelled:
+            every = np.eye(self.structure.layout.n)
+            return np.hstack([every, every]), np.hstack([every, every])
+        measured = np.isfinite(state.modes.variances)
         count = np.maximum(measured.sum(axis=0), 1)[:, None]
-        slopes = np.where(measured[:, :, None], state.slopes, 0.0).sum(axis=0) / count
+        slopes = np.where(measured[:, :, None], state.modes.slopes, 0.0).sum(axis=0) / count
         return effects_of(self.modes, slopes)
 
 
@@ -263,23 +287,17 @@ def _levels(log_amplitude: FloatArray) -> FloatArray:
     return log_amplitude - (float(np.median(log_amplitude[known])) if known.any() else 0.0)
 
 
-def begun_of(evidence: Evidence, rows: IntArray, change: Change) -> list[float]:
-    """Return the likeliest first test of a called change, when it began, and whether it goes on."""
-    share = evidence.shares.sum(axis=(1, 2, 3, 4))
-    first = int(evidence.beginnings[int(share.argmax())])
-    is_ramp = bool(change.sudden < 0.5)
-    return [float(rows[first]), float(evidence.years[first - 1]), float(is_ramp)]
-
-
-def size_of(evidence: Evidence) -> FloatArray:
-    """Precision (n + q, n + q) of a called change's size: each cause as probable as it was then."""
+def detected_change(evidence: Evidence, rows: IntArray, change: Change) -> DetectedChange:
+    """Return a called change: the likeliest beginning, each cause as probable as it was then."""
     layout = evidence.layout
     least = np.concatenate(
         [np.full(layout.n, 1e-5), 1e-3 * layout.prior_sd[layout.n :][: layout.q]]
     )
     covariance = np.diag(least**2)
-    shares = np.maximum(evidence.shares.sum(axis=(0, 1, 2)), _LEAST_SHARE)
+    shares = np.maximum(evidence.shares.sum(axis=(0, 1, 2)), LIMITS.state_sums_least_share)
     for direction, by_size in zip(evidence.directions, shares, strict=True):
         for share, size in zip(by_size, SIZES, strict=True):
             covariance += share * size**2 * direction.factor @ direction.factor.T
-    return np.asarray(np.linalg.inv(covariance))
+    first = int(evidence.beginnings[int(evidence.shares.sum(axis=(1, 2, 3, 4)).argmax())])
+    years, is_ramp = float(evidence.years[first - 1]), bool(change.sudden < 0.5)
+    return DetectedChange(int(rows[first]), years, is_ramp, np.linalg.inv(covariance))

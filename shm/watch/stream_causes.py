@@ -15,13 +15,14 @@ import numpy as np
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode, Moved, Plane, Posterior
 from shm.watch.causes import SENSOR_MASS, TIMEBASE, UNEXPLAINED, structure_of
 from shm.watch.change_point import evidence_of, sums_of
+from shm.watch.limits import LIMITS
 from shm.watch.options import WatchOptions
 from shm.watch.posterior_summary import SummaryContext, rank_causes
+from shm.watch.quantities import MeasuredMode
 from shm.watch.readings import Reader
 from shm.watch.state_sums import effects_of
 from shm.watch.stream_reading import ModeTable, baseline_of
 
-_DAY_SD = 3e-4  # of ln f: joints that slip by another level, each mode by its own. Judgement
 EXCHANGED = "exchanged planes"
 """A cause that no hammer test has: the cables of the sensors are exchanged. Record 0002."""
 _NEVER = datetime(2000, 1, 1, tzinfo=UTC)  # technical: these readings need no time
@@ -54,35 +55,39 @@ class StreamCause:
 
 
 def find_cause(
-    moved: FloatArray, table: ModeTable, baseline: Posterior | None, hanger: Hanger
+    moved: FloatArray,
+    table: ModeTable,
+    baseline: Posterior | None,
+    hanger: Hanger,
+    wander_sd: float = 0.0,
 ) -> StreamCause:
-    """Find the cause of mean log frequencies that `moved` (n,), NaN where that is not known."""
+    """Find the cause of mean log frequencies that `moved` (n,), NaN where that is not known.
+
+    Whatever the cause, ln T has wandered by `wander_sd` from the hours before to those since.
+    """
     known = np.isfinite(moved)
     nothing = StreamCause((Moved(UNEXPLAINED, 1.0, np.nan, np.nan),), moved, None)
     if not known.any():
         return nothing
-    keys = [key for key, its in zip(table.modes, known, strict=True) if its]
-    level, sd = table.level[known], np.sqrt(table.spread[known] + _DAY_SD**2)
+    own = sorted(np.flatnonzero(known).tolist(), key=lambda each: table.modes[each])
+    keys, level = tuple(table.modes[each] for each in own), table.level[own]
     posterior, bar = baseline_of(baseline, hanger, keys, level)
-    before = _as_test("before", keys, level, np.full(len(keys), _DAY_SD))
-    reader = Reader(posterior, [before], bar)
-    after = _as_test("after", keys, level + moved[known], sd)
-    rows = [reader.reading(each, _NEVER).modes for each in (before, after)]
-    modes = [each for each in rows if each is not None]
-    options = WatchOptions.of(hanger.assumptions)
+    reader = Reader(posterior, [_as_test(keys, level)], bar)
+    slopes, options = reader.slopes, WatchOptions.of(hanger.assumptions)
     structure = structure_of(reader.quantities, reader.columns, options)
     n = structure.layout.n
     columns = np.zeros((2, n, len(structure.layout.prior_sd)))
-    columns[:, :, :n] = np.eye(n)
-    columns[:, :, structure.layout.change][..., n:] = [each.slopes for each in modes]
+    columns[:, :, :n], columns[:, :, n : n + len(slopes.T)] = np.eye(n), slopes
+    of_day = np.full(n, LIMITS.day_sd**2)
+    wander = wander_sd * slopes[:, 0]
     sums = sums_of(
         columns,
-        np.array([each.values for each in modes]),
-        np.array([each.variances for each in modes]),
-        np.zeros((2, 1, n, n)),
+        np.array([np.zeros(n), moved[own]]),
+        np.array([of_day, table.spread[own] + of_day]),
+        np.tile(np.outer(wander, wander) / 2, (2, 1, 1, 1)),
     )
     evidence = evidence_of(sums, np.array([0.0, 1.0]), 1, structure.layout, structure.directions)
-    effects = effects_of(reader.modes, modes[1].slopes)
+    effects = effects_of(keys, slopes)
     subject = SummaryContext(reader.quantities, hanger, options, _NEVER, 0.0, *effects)
     found = rank_causes(subject, evidence)
     first = {found[0].quantity, *found[0].together}
@@ -127,15 +132,6 @@ def _is_clock(moved: Sequence[Moved]) -> bool:
     return moved[0].quantity == TIMEBASE
 
 
-def _as_test(
-    name: str, keys: Sequence[tuple[Plane, int]], log_hz: FloatArray, sd: FloatArray
-) -> ModalTest:
-    return ModalTest(
-        name,
-        tuple(
-            Mode(plane, order, hz, its * hz)
-            for (plane, order), hz, its in zip(
-                keys, np.exp(log_hz).tolist(), sd.tolist(), strict=True
-            )
-        ),
-    )
+def _as_test(keys: Sequence[MeasuredMode], log_hz: FloatArray) -> ModalTest:
+    modes = zip(keys, np.exp(log_hz).tolist(), strict=True)
+    return ModalTest("before", tuple(Mode(*key, hz, LIMITS.day_sd * hz) for key, hz in modes))

@@ -24,38 +24,15 @@ import numpy as np
 import scipy
 
 from shm.values import FloatArray, IntArray
+from shm.watch.limits import LIMITS
 from shm.watch.options import DAYS_PER_YEAR
 
-_OVERSTATED = 100.0
-"""By what evidence is too large where nobody records a hanger's warmth: in 52 quiet hanger-years of
-the living bridge it reached 100 years in 6, 1,000 in 4 and 10,000 in none, where one was to be
-(`tests/benchmarks/stream_trial.py --seed` 4000, 6000, 6100; 2026-11-25)."""
 CLIP = 3.5
 """Sds: a reading then adds 4.5 to a log likelihood ratio, of the 13.7 that 100 years take."""
 LEVEL, SLOPE, SLOW, FAST, _RATE, FEATURES = range(6)
 """Where the state has what; the coefficients of the conditions begin at FEATURES."""
-# The tension's wander is a fraction of it. Season: a deck's bearings and joints, relaxation of
-# 0.2 % a year (`WatchOptions.creep_per_year_sd`) and as much again. Days: weather, moisture, loads
-# that stay. Hours: sun on one side, traffic. Judgement, after the worlds of `tests/worlds`.
-_SEASON_PER_ROOT_YEAR = 3e-3
-_FAST_DAYS, _SLOW_DAYS = 1.3 / 24, 1.5
 _FAST_SD = np.geomspace(2e-4, 1e-2, 8)
 _SLOW_SD = 0.25 * _FAST_SD
-_UNSTEADY = (
-    0.2  # judgement: of the hours' wander, by what each reading is off on its own: live load
-)
-_SLOPE_DAYS = 60.0  # judgement: how long a loss goes on at one rate
-_WITHIN_A_YEAR = 0.3  # judgement: of a coefficient's prior sd, by what it wanders in a year
-_FIRST_SD = 0.01  # of the level at the first reading, against the table made of that very reading
-_MEMORY_DAYS = 60.0  # judgement: over which the bank forgets which of its filters held
-# Judgement: a change of 2 % a step, or of 0.15 % a day; ten times more or less costs it log 10.
-_STEP_SD, _SLOPE_SD = 0.02, 1.5e-3
-# No model of the wander is right at all ages: what the scores of changes that never came have
-# been is learnt beside it. Ages (technical), memory, weight of the model itself, and a bound, that
-# a change may not make itself incredible: judgement.
-_AGES_DAYS, _EXCESS_READINGS, _MODEL_READINGS, _LARGEST_SQUARE = (0.25, 1.0, 4.0), 1440, 120, 12.0
-_MOST, _RECENT = 32, 10  # technical: beginnings kept, the newest all, older ones ever farther apart
-_OLDEST_DAYS = 180.0  # judgement: what is slower is the season's
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +54,14 @@ class Bank:
     after_day: FloatArray
     by_day: FloatArray
     span_days: FloatArray
-    excess: FloatArray = field(default_factory=lambda: np.ones(len(_AGES_DAYS)))
+    excess: FloatArray = field(default_factory=lambda: np.ones(len(LIMITS.ages_days)))
     watched: float = 0.0
 
     @classmethod
     def begun(cls, day: float, coefficient_sd: FloatArray) -> Bank:
         m, p = len(_FAST_SD), FEATURES + len(coefficient_sd)
         variance = np.zeros((m, p))
-        variance[:, LEVEL] = _FIRST_SD**2
+        variance[:, LEVEL] = LIMITS.first_sd**2
         variance[:, SLOW] = _SLOW_SD**2
         variance[:, FAST] = variance[:, _RATE] = _FAST_SD**2
         variance[:, FEATURES:] = coefficient_sd**2
@@ -114,14 +91,14 @@ class Bank:
         days = round(day - self.day, 9)
         step, back, noise = _transition(days, self.mean.shape[1])
         covariance = step @ self.covariance @ np.swapaxes(step, 1, 2) + noise
-        wandered = (_WITHIN_A_YEAR * coefficient_sd) ** 2 * days / DAYS_PER_YEAR
+        wandered = (LIMITS.within_a_year * coefficient_sd) ** 2 * days / DAYS_PER_YEAR
         covariance[:, range(FEATURES, len(step[0])), range(FEATURES, len(step[0]))] += wandered
         return replace(
             self,
             day=day,
             mean=np.einsum("mij,mj->mi", step, self.mean),
             covariance=covariance,
-            log_weight=self.log_weight * math.exp(-days / _MEMORY_DAYS),
+            log_weight=self.log_weight * math.exp(-days / LIMITS.memory_days),
             effect=self.effect @ back,
         )
 
@@ -145,11 +122,11 @@ class Bank:
 
     def _thinned(self) -> Bank:
         """Without the oldest, or that beginning which lies nearest to the next for its age."""
-        if self.day - self.by_day[0] > _OLDEST_DAYS:
+        if self.day - self.by_day[0] > LIMITS.oldest_days:
             return self._kept(np.arange(1, len(self.by_day)))
-        if len(self.by_day) <= _MOST:
+        if len(self.by_day) <= LIMITS.most:
             return self
-        old = self.by_day[: len(self.by_day) - _RECENT]
+        old = self.by_day[: len(self.by_day) - LIMITS.recent]
         drop = int(np.argmin(np.diff(old) / (self.day - old[1:])))
         spans = self.span_days.copy()
         spans[drop + 1] += spans[drop]
@@ -173,7 +150,7 @@ class Bank:
         """After a reading `value` of ln T's shift under `conditions` (p - FEATURES,)."""
         design = self.design(conditions)
         missed = value - self.mean @ design
-        its = variance + (_UNSTEADY * _FAST_SD) ** 2
+        its = variance + (LIMITS.unsteady * _FAST_SD) ** 2
         spread = np.einsum("i,mij,j->m", design, self.covariance, design) + its
         clipped = np.maximum(spread, missed**2 / CLIP**2)
         gain = self.covariance @ design / clipped[:, None]
@@ -190,16 +167,16 @@ class Bank:
             score=self.score + foreseen * (missed / clipped)[:, None, None],
             information=self.information + foreseen**2 / clipped[:, None, None],
         )
-        return bank._with_excess() if len(self.by_day) > _RECENT else bank
+        return bank._with_excess() if len(self.by_day) > LIMITS.recent else bank
 
     def _with_excess(self) -> Bank:
         """Having learnt from the scores of steps that may have begun a quarter, one, four days ago.
         A wander that the model lacks shows in them as if there were changes all the time."""
         age = self.day - self.by_day
-        at = [int(np.abs(np.log(age[:-1] / each)).argmin()) for each in _AGES_DAYS]
+        at = [int(np.abs(np.log(age[:-1] / each)).argmin()) for each in LIMITS.ages_days]
         square = self.weight @ (self.score[:, at, 0] ** 2 / self.information[:, at, 0])
-        share = 1 / min(self.watched + _MODEL_READINGS, _EXCESS_READINGS)
-        excess = self.excess + share * (np.minimum(square, _LARGEST_SQUARE) - self.excess)
+        share = 1 / min(self.watched + LIMITS.model_readings, LIMITS.excess_readings)
+        excess = self.excess + share * (np.minimum(square, LIMITS.largest_square) - self.excess)
         return replace(self, excess=excess, watched=self.watched + 1)
 
     def design(self, conditions: FloatArray) -> FloatArray:
@@ -209,14 +186,14 @@ class Bank:
     @property
     def _tempered(self) -> FloatArray:
         """By what the evidence of each beginning is divided (c, 1)."""
-        age = np.log(np.maximum(self.day - self.by_day, _AGES_DAYS[0]))
-        return np.maximum(np.interp(age, np.log(_AGES_DAYS), self.excess), 1.0)[:, None]
+        age = np.log(np.maximum(self.day - self.by_day, LIMITS.ages_days[0]))
+        return np.maximum(np.interp(age, np.log(LIMITS.ages_days), self.excess), 1.0)[:, None]
 
     def evidence(self, least_shift: float) -> Evidence:
         """Return what all readings say of a change; material is one by more than `least_shift`."""
         if not len(self.by_day):
             return NOTHING
-        prior = 1 / np.array([_STEP_SD, _SLOPE_SD]) ** 2
+        prior = 1 / np.array([LIMITS.step_sd, LIMITS.slope_sd]) ** 2
         score, precision = self.score / self._tempered, self.information / self._tempered + prior
         size = score / precision
         log_ratio = (score * size + np.log(prior / precision)) / 2
@@ -236,7 +213,7 @@ class Bank:
         share = share / share.sum()
         mean = float(share @ each)
         return Evidence(
-            years=math.exp(min(total, 100.0)) / DAYS_PER_YEAR / _OVERSTATED,
+            years=math.exp(min(total, 100.0)) / DAYS_PER_YEAR / LIMITS.overstated,
             shift=mean,
             shift_sd=math.sqrt(float(share @ (its_sd**2 + (each - mean) ** 2))),
             material=float((chance * beyond).sum()),
@@ -277,16 +254,16 @@ class Bank:
 @lru_cache(maxsize=64)
 def _transition(days: float, p: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Of states (m, p, p) over some days; transposed, for effects; and the noise that they add."""
-    m, slow = len(_FAST_SD), math.exp(-days / _SLOW_DAYS)
+    m, slow = len(_FAST_SD), math.exp(-days / LIMITS.slow_days)
     step = np.tile(np.eye(p), (m, 1, 1))
-    step[:, LEVEL, SLOPE], step[:, SLOPE, SLOPE] = days, math.exp(-days / _SLOPE_DAYS)
+    step[:, LEVEL, SLOPE], step[:, SLOPE, SLOPE] = days, math.exp(-days / LIMITS.slope_days)
     step[:, SLOW, SLOW] = slow
     # A Matern process of order 3/2: what the weather does comes smoothly.
-    past = days / _FAST_DAYS
+    past = days / LIMITS.fast_days
     fast = math.exp(-past) * np.array([[1 + past, past], [-past, 1 - past]])
     step[:, FAST:FEATURES, FAST:FEATURES] = fast
     noise = np.zeros((m, p, p))
-    noise[:, LEVEL, LEVEL] = _SEASON_PER_ROOT_YEAR**2 * days / DAYS_PER_YEAR
+    noise[:, LEVEL, LEVEL] = LIMITS.season_per_root_year**2 * days / DAYS_PER_YEAR
     noise[:, SLOW, SLOW] = _SLOW_SD**2 * (1 - slow**2)
     lost = np.eye(2) - fast @ fast.T
     noise[:, FAST:FEATURES, FAST:FEATURES] = _FAST_SD[:, None, None] ** 2 * lost

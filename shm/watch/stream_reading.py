@@ -22,21 +22,13 @@ from shm.models import class_of
 from shm.models.tensioned_beam import frequencies_hz
 from shm.values import PLANES, BoolArray, FloatArray, Hanger, Mode, Posterior
 from shm.values.stream import PooledReading
+from shm.watch.limits import LIMITS
 from shm.watch.quantities import MeasuredMode, base_point, log_frequencies, posterior_at
 
-LEAST_SD = 3e-5
-"""Of an hourly log frequency: 1 Hz is read to 1/30 mHz at best, and clocks wander by as much."""
-_MEMORY_READINGS = 120.0  # judgement: five days of what modes differ by, ten times a night's
-_DEGREES = 4.0  # judgement: of Student's t, as robust regressions take (Lange et al. 1989)
 _HALVES = np.array([0.5, -0.5])  # by definition: of a contrast, in each of PLANES
-_CLIP = 4.0  # sds: what a mode may add to its spread at once
-_STEP = 0.01  # technical: of the tension, for a slope by central differences
 # What is tried where there is no baseline: xi = L sqrt(T/EI) from slack to a slender cable, springs
 # k L/EI from pinned to clamped, and the share of the solid stiffness that a strand may have.
 _XI = np.geomspace(0.5, 300.0, 240)
-_N_SPRINGS, _N_SHARES = 10, 4
-# Of a sum of misfits: modes fit a beam to 0.3 % each, nominal tensions are good to 15 %. Judgement.
-_NOMINAL = 0.003 * 3 / 0.15
 
 
 def baseline_of(
@@ -51,8 +43,8 @@ def baseline_of(
         return baseline, hanger
     order = np.array([each for _, each in keys]) - 1
     assumed = hanger.assumptions
-    stiffness = np.geomspace(*assumed.end_restraint.bounds, _N_SPRINGS)
-    factors = np.geomspace(*assumed.strand_bending_factor.bounds, _N_SHARES)
+    stiffness = np.geomspace(*assumed.end_restraint.bounds, LIMITS.n_springs)
+    factors = np.geomspace(*assumed.strand_bending_factor.bounds, LIMITS.n_shares)
     shares = factors if hanger.kind == "strand" else np.ones(1)
     length_m, mass = np.asarray(hanger.length_m), np.asarray(hanger.mass_per_length_kg_m)
     xi, k, share = np.meshgrid(_XI, stiffness, shares, indexing="ij")
@@ -63,7 +55,7 @@ def baseline_of(
     by_plane = {plane: misfit[..., its].sum(axis=-1) for plane, its in planes_of(keys).items()}
     total = sum(each.min(axis=1) for each in by_plane.values())
     if hanger.nominal_tension_n > 0:
-        total = total + _NOMINAL * np.abs(np.log(tension_n[:, 0] / hanger.nominal_tension_n))
+        total = total + LIMITS.nominal * np.abs(np.log(tension_n[:, 0] / hanger.nominal_tension_n))
     at, of = np.unravel_index(int(np.argmin(total)), total.shape)
     found = {plane: each[at, :, of].argmin() for plane, each in by_plane.items()}
     across, along = (found.get(each, next(iter(found.values()))) for each in PLANES)
@@ -97,10 +89,19 @@ class ModeTable:
         posterior, bar = baseline_of(baseline, hanger, keys, level)
         model = class_of(posterior, bar)
         theta = np.tile(base_point(posterior, model), (2, 1))
-        theta[:, model.parameter_names.index("theta_F")] *= np.exp([_STEP, -_STEP])
+        theta[:, model.parameter_names.index("theta_F")] *= np.exp(
+            [LIMITS.stream_reading_step, -LIMITS.stream_reading_step]
+        )
         up, down = log_frequencies(model, theta, keys)
         tension_n = float(posterior.tension_n.mean())
-        return cls(keys, (up - down) / (2 * _STEP), level, sd**2, np.zeros(len(keys)), tension_n)
+        return cls(
+            keys,
+            (up - down) / (2 * LIMITS.stream_reading_step),
+            level,
+            sd**2,
+            np.zeros(len(keys)),
+            tension_n,
+        )
 
     def with_new(
         self,
@@ -154,15 +155,17 @@ class ModeTable:
         """
         known = np.isfinite(seen.left)
         readings = self.readings + known
-        share = np.where(known, 1 / np.minimum(np.maximum(readings, 1), _MEMORY_READINGS), 0.0)
+        share = np.where(
+            known, 1 / np.minimum(np.maximum(readings, 1), LIMITS.memory_readings), 0.0
+        )
         sd = np.sqrt(self.spread)
-        left = np.clip(np.where(known, seen.left, 0.0), -_CLIP * sd, _CLIP * sd)
+        left = np.clip(np.where(known, seen.left, 0.0), -LIMITS.clip * sd, LIMITS.clip * sd)
         spread = self.spread + share * (left**2 - self.spread)
         return replace(
             self,
             readings=readings,
             level=self.level + share * left,
-            spread=np.maximum(spread, LEAST_SD**2),
+            spread=np.maximum(spread, LIMITS.least_sd**2),
         )
 
 
@@ -200,7 +203,7 @@ def _measured(
     unstated = assumed.unstated_frequency_sd.value
     hz = np.array([mode.frequency_hz for mode in modes])
     sd = np.array([mode.frequency_sd_hz for mode in modes]) / hz
-    return np.log(hz), np.where(sd > 0, np.maximum(sd, LEAST_SD), unstated)
+    return np.log(hz), np.where(sd > 0, np.maximum(sd, LIMITS.least_sd), unstated)
 
 
 def _read(
@@ -235,7 +238,7 @@ def _read_plane(y: FloatArray, v: FloatArray, s: FloatArray) -> tuple[float, flo
     shift = _weighted_median(y / s, s / np.sqrt(v))
     # Technical: of reweighting, from the weighted median on
     for _ in range(4):
-        weight = (_DEGREES + 1) / (_DEGREES + (y - s * shift) ** 2 / v) / v
+        weight = (LIMITS.degrees + 1) / (LIMITS.degrees + (y - s * shift) ** 2 / v) / v
         weight = np.minimum(weight, 1 / v)  # no mode is better than it says
         information = float(weight @ s**2)
         shift = float(weight @ (s * y)) / information

@@ -13,14 +13,9 @@ from datetime import datetime, timedelta
 
 from shm.values import COLDEST_C, NAN, WARMEST_C, outdoor_c
 from shm.values.stream import StreamEvent, Window, WindowReading
+from shm.watch.limits import LIMITS
 
-FASTEST_K_PER_H = 57.0
-"""Derived: of a rod of 20 mm, the thinnest hanger, that loses nothing of the 900 W/m2 of a high sun
-which fall on its diameter d: 4 x 900 / (pi rho c d), with 7850 kg/m3 and 460 J/(kg K)."""
 _WINDOW = timedelta(minutes=10)  # the least time over which two values are compared
-_STILL_K, _STILL_S, _STILL_WINDOWS = 1e-3, 86400.0, 24
-"""Judgement: no thermometer resolves less, and no sun's round leaves the air as it was from hour to
-hour; two days alike at noon are no wonder."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +39,9 @@ class Thermometer:
             return self
         step = value_c - self.seen_c
         hours = max(at_s - self.seen_s, _WINDOW.total_seconds()) / 3600
-        if abs(step) < _STILL_K:  # compared with the first of them, or a creep would be none
+        if abs(step) < LIMITS.still_k:  # compared with the first of them, or a creep would be none
             seen = replace(self, seen_s=at_s, still=self.still + 1)
-            is_stuck = at_s - self.still_s >= _STILL_S and seen.still >= _STILL_WINDOWS
+            is_stuck = at_s - self.still_s >= LIMITS.still_s and seen.still >= LIMITS.still_windows
             if self.is_doubted(at_s) or not is_stuck:
                 return seen
             return replace(seen, since_s=at_s, until_s=math.inf)
@@ -55,7 +50,7 @@ class Thermometer:
             return replace(seen, until_s=at_s)
         if abs(self.off_k + step) < abs(self.off_k) / 2:
             return replace(seen, off_k=0.0, until_s=at_s)
-        if not abs(step) > FASTEST_K_PER_H * hours:  # NaN at first
+        if not abs(step) > LIMITS.fastest_k_per_h * hours:  # NaN at first
             return seen
         since_s = self.since_s if self.off_k else at_s
         return replace(seen, off_k=self.off_k + step, since_s=since_s, until_s=math.inf)
@@ -66,6 +61,23 @@ class Thermometer:
 
     def is_doubted(self, at_s: float) -> bool:
         return self.since_s <= at_s < self.until_s
+
+    def why_doubted(self, first: Window) -> str:
+        """Return why the temperature of a window, and of those after it, is not believed."""
+        is_stuck = self.since_s - self.still_s >= LIMITS.still_s
+        began_s = self.still_s if is_stuck else self.since_s
+        since = f"{datetime.fromtimestamp(began_s, first.start.tzinfo):%Y-%m-%d %H:%M}"
+        if is_stuck:
+            return (
+                f"temperature_c has been {first.temperature_c:g} since {since}, and no day is as "
+                "even: the temperature is not known until it moves. Check the thermometer."
+            )
+        by = f" by {self.off_k:+.1f} K" if self.off_k else ""
+        return (
+            f"temperature_c jumped{by} at {since}, faster than steel warms or cools: the "
+            "temperature is not known until it jumps back. Check the thermometer; if it is right "
+            "now, set a new baseline (`shm drift rebaseline`)."
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,58 +100,29 @@ def believed(
         thermometer = thermometer.after(each.window.temperature_c, each.window.start.timestamp())
     if learning:
         thermometer = thermometer.learnt()
-    found, absurd, doubted = [], [], []
+    found: list[WindowReading] = []
+    absurd: list[Window] = []
+    doubted: list[Window] = []
     for each in readings:
-        reported = each.window.temperature_c
-        if math.isfinite(reported) and math.isnan(outdoor_c(reported)):
-            absurd.append(each)
-        elif math.isfinite(reported) and thermometer.is_doubted(each.window.start.timestamp()):
-            doubted.append(each)
-        else:
-            found.append(each)
-            continue
-        found.append(replace(each, window=replace(each.window, temperature_c=NAN)))
-    events = []
-    if absurd:
-        events = [_event(absurd, _impossible(absurd[-1].window.temperature_c))]
-    elif doubted:
-        events = [_event(doubted, _why_doubted(thermometer, doubted[0].window))]
-    return Believed(tuple(found), thermometer, tuple(events))
+        window, reported = each.window, each.window.temperature_c
+        if math.isfinite(reported):
+            is_absurd = math.isnan(outdoor_c(reported))
+            if is_absurd or thermometer.is_doubted(window.start.timestamp()):
+                (absurd if is_absurd else doubted).append(window)
+                each = replace(each, window=replace(window, temperature_c=NAN))
+        found.append(each)
+    events: tuple[StreamEvent, ...] = ()
+    if wrong := absurd or doubted:
+        last, why = wrong[-1], _impossible if absurd else thermometer.why_doubted
+        end = last.start + timedelta(seconds=last.duration_s)
+        detail = why(last if absurd else wrong[0])
+        events = (StreamEvent(last.stream, "thermometer", wrong[0].start, end, detail),)
+    return Believed(tuple(found), thermometer, events)
 
 
-def _impossible(value_c: float) -> str:
+def _impossible(window: Window) -> str:
     return (
-        f"temperature_c is {value_c:g}, and nothing outdoors is below {COLDEST_C:g} or above "
-        f"{WARMEST_C:g} °C: the temperature is not known. Check the thermometer, its cable and its "
-        "unit, or send none."
+        f"temperature_c is {window.temperature_c:g}, and nothing outdoors is below {COLDEST_C:g} "
+        f"or above {WARMEST_C:g} °C: the temperature is not known. Check the thermometer, its "
+        "cable and its unit, or send none."
     )
-
-
-def _why_doubted(thermometer: Thermometer, first: Window) -> str:
-    if thermometer.since_s - thermometer.still_s >= _STILL_S:
-        return _stuck(thermometer, first)
-    return _jumped(thermometer, first.start)
-
-
-def _stuck(thermometer: Thermometer, first: Window) -> str:
-    still = datetime.fromtimestamp(thermometer.still_s, first.start.tzinfo)
-    return (
-        f"temperature_c has been {first.temperature_c:g} since {still:%Y-%m-%d %H:%M}, and no day "
-        "is as even: the temperature is not known until it moves. Check the thermometer."
-    )
-
-
-def _jumped(thermometer: Thermometer, like: datetime) -> str:
-    since = datetime.fromtimestamp(thermometer.since_s, like.tzinfo)
-    by = f" by {thermometer.off_k:+.1f} K" if thermometer.off_k else ""
-    return (
-        f"temperature_c jumped{by} at {since:%Y-%m-%d %H:%M}, faster than steel warms or cools: "
-        "the temperature is not known until it jumps back. Check the thermometer; if it is right "
-        "now, set a new baseline (`shm drift rebaseline`)."
-    )
-
-
-def _event(of: Sequence[WindowReading], detail: str) -> StreamEvent:
-    first, last = of[0].window, of[-1].window
-    end = last.start + timedelta(seconds=last.duration_s)
-    return StreamEvent(first.stream, "thermometer", first.start, end, detail)

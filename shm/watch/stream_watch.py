@@ -43,6 +43,7 @@ from shm.values.stream import (
 )
 from shm.watch.causes import TIMEBASE
 from shm.watch.kept_state import from_bytes, to_bytes
+from shm.watch.limits import LIMITS
 from shm.watch.stream_causes import EXCHANGED, StreamCause, find_cause, find_exchange
 from shm.watch.stream_filter import CLIP, FAST, FEATURES, LEVEL, NOTHING, SLOW, Bank, Evidence
 from shm.watch.stream_reading import ModeTable, SeenReading, planes_of, usable
@@ -55,11 +56,8 @@ _LAGS_DAYS = np.array([2.0, 14.0, 240.0]) / HOURS_A_DAY
 # Judgement: by what an hour's temperature differs from ten days' mean, and that the errors of some
 # ten hours without a thermometer are one error: an hour counts for a third of what it would.
 _UNKNOWN_K, TOGETHER = 4.0, 3.0
-HOURS_EXCHANGED = 3  # judgement: until it is reported, as mistaken modes look like it for an hour
 NO_CONDITIONS = np.zeros(0)
 """Of the contrast of the planes: what the weather does to one more than the other is its wander."""
-_RING = 24  # readings: a change is told within a day or is slow
-OLD_READINGS = 120.0  # judgement: five days, as what a mode differs by is learnt over
 
 
 def condition_sd(assumed: Assumptions) -> FloatArray:
@@ -94,10 +92,11 @@ class StreamState:
 
     `lagged_c` are the temperature's exponential means, `reference` its first value, that of the
     log level and of the wind; `known_day` is the last with a temperature. `ring` (24, n) are the
-    newest readings' modes with the conditions taken off, `ring_day` their days, `old` (n,) the mean
-    of those before. Shifts count from `zero`, compensated ones from `compensated_zero`; a change
-    that was told of the tension is `called`, of one plane `apart`. `contrast` are the filters of
-    what one plane says more than the other, less what was `absorbed` into the modes' levels.
+    newest readings' modes, `ring_conditions` and `ring_day` what they are of, `old` (n,) the mean
+    of those before without what the conditions do. Shifts count from `zero`, compensated ones from
+    `compensated_zero`; a change that was told of the tension is `called`, of one plane `apart`.
+    `contrast` are the filters of what one plane says more than the other, less what was `absorbed`
+    into the modes' levels.
     The planes have looked exchanged for `exchanged_hours`. `unknown_sd` of ln T is what an unknown
     temperature may do, 0 where it is known. Up to `settled_day` readings are gone over again: no
     alert ends before.
@@ -111,6 +110,7 @@ class StreamState:
     lagged_c: FloatArray
     reference: FloatArray
     ring: FloatArray
+    ring_conditions: FloatArray
     ring_day: FloatArray
     old: FloatArray
     known_day: float = 0.0
@@ -142,6 +142,7 @@ class StreamState:
             lagged_c=np.full(3, NAN),
             reference=np.full(3, NAN),
             ring=np.zeros((0, n)),
+            ring_conditions=np.zeros((0, len(condition_sd(assumed)))),
             ring_day=np.zeros(0),
             old=np.full(n, NAN),
         )
@@ -221,24 +222,31 @@ def with_conditions(
 def with_ring(
     state: StreamState, seen: SeenReading, conditions: FloatArray, day: float
 ) -> StreamState:
-    """With the modes of one more reading, what the conditions do taken off."""
-    bank, n = state.bank, len(state.table.modes)
-    of_conditions = np.concatenate([np.zeros(len(bank.mean[0]) - len(conditions)), conditions])
-    now = seen.off - state.table.tension * bank.along(of_conditions)[0]
+    """With the modes and conditions of one more reading."""
+    n = len(state.table.modes)
     grown = np.full((len(state.ring), n), NAN)
     grown[:, : state.ring.shape[1]] = state.ring
     old = np.append(state.old, np.full(n - len(state.old), NAN))
-    ring, days = np.vstack([grown, now]), np.append(state.ring_day, day)
-    if len(ring) > _RING:
-        left, ring, days = ring[0], ring[1:], days[1:]
-        share = 1 / min(max(state.readings - _RING, 1), OLD_READINGS)
+    ring, days = np.vstack([grown, seen.off]), np.append(state.ring_day, day)
+    met = np.vstack([state.ring_conditions, conditions])
+    if len(ring) > LIMITS.ring:
+        left = _without_conditions(state.table, state.bank, ring[:1], met[:1])[0]
+        ring, met, days = ring[1:], met[1:], days[1:]
+        share = 1 / min(max(state.readings - LIMITS.ring, 1), LIMITS.memory_readings)
         mixed = np.where(np.isfinite(left), old + share * (left - old), old)
         old = np.where(np.isfinite(old), mixed, left)
-    return replace(state, ring=ring, ring_day=days, old=old)
+    return replace(state, ring=ring, ring_conditions=met, ring_day=days, old=old)
 
 
-_VERSION = "stream-watch-2"
-_MODEL_OFF = 0.2  # judgement: by what the part of bending in a sensitivity is known
+def _without_conditions(
+    table: ModeTable, bank: Bank, ring: FloatArray, conditions: FloatArray
+) -> FloatArray:
+    """Return changes of ln f (readings, n) without what the conditions (readings, k) do."""
+    coefficients = bank.weight @ bank.mean[:, FEATURES:]
+    return np.asarray(ring - np.outer(conditions @ coefficients, table.tension))
+
+
+_VERSION = "stream-watch-3"
 _CLOCK = (
     "All frequencies moved by one same fraction, {size}: the time base, not the tension. Check the "
     "logger's clock and sampling rate."
@@ -251,7 +259,6 @@ _SENSORS = (
     "Each mode moved by its own fraction: the sensors, not the tension. Check which sensors are "
     "mounted, and where."
 )
-_HOURS_OF_A_FAULT = 8  # judgement: of which a mistaken mode spoils one or two
 
 
 @dataclass(frozen=True)
@@ -396,14 +403,17 @@ class StreamWatch:
         unlike: float,
     ) -> tuple[StreamWatched, StreamState]:
         state, events = _with_exchange(state, seen, reading, end)
-        evidence, apart, is_apart = self._weigh(state)
+        evidence, of_tension, apart, is_apart = self._weigh(state)
         if state.exchanged_hours and not events:  # not known yet: no change is reported meanwhile
             evidence = NOTHING
         moved: tuple[Moved, ...] = ()
         if evidence.years > self._limit_years and evidence.material > 0.5:
-            by_mode, since = _move_of_modes(state, evidence)
-            cause = find_cause(by_mode, state.table, self.baseline, self.hanger)
-            if cause.takes_hours and since < _HOURS_OF_A_FAULT:
+            # The change itself has pulled at what the conditions seem to do.
+            bank = state.bank.changed(of_tension)
+            by_mode, since = _move_of_modes(state, bank, evidence)
+            wander_sd = _wander_sd(state, since)
+            cause = find_cause(by_mode, state.table, self.baseline, self.hanger, wander_sd)
+            if cause.takes_hours and since < LIMITS.hours_of_a_fault:
                 evidence = NOTHING
             elif cause.is_measurement:
                 events += (_event(cause, state, evidence, reading, end),)
@@ -417,7 +427,7 @@ class StreamWatch:
                 state = replace(state, apart=state.apart.after(before, _contrast(state)[0]))
                 moved, unlike, is_apart = cause.moved, 0.0, True
             else:
-                evidence = _sized(evidence, cause, state, since)
+                evidence = _sized(evidence, cause)
                 state, unlike = replace(state, bank=state.bank.changed(evidence)), 0.0
                 now = _shift(state)[0]
                 state = replace(state, called=state.called.after(now - evidence.shift, now))
@@ -442,14 +452,15 @@ class StreamWatch:
         its, its_sd = shift_of_reading(state, seen)
         return StreamWatched(b"", its, its_sd, shift, sd, test, alert, events, ended, ""), state
 
-    def _weigh(self, state: StreamState) -> tuple[Evidence, Evidence, bool]:
-        """Return the evidence of any change, that of one plane's, and whether it is mostly that."""
+    def _weigh(self, state: StreamState) -> tuple[Evidence, Evidence, Evidence, bool]:
+        """Return the evidence of any change, the tension's, one plane's, and if it is that."""
         of_tension = state.bank.evidence(self.options.least_shift)
         apart = state.contrast.evidence(self.options.least_shift)
         share = self.options.share_of_one_plane
         shares = (1 - share) * of_tension.years, share * apart.years
         is_apart = shares[1] > shares[0]
-        return replace(apart if is_apart else of_tension, years=sum(shares)), apart, is_apart
+        either = replace(apart if is_apart else of_tension, years=sum(shares))
+        return either, of_tension, apart, is_apart
 
     @property
     def _limit_years(self) -> float:
@@ -557,40 +568,50 @@ def shift_of_reading(state: StreamState, seen: SeenReading) -> tuple[float, floa
 
 def fraction_of(log_shift: float, sd: float, table: ModeTable) -> tuple[float, float]:
     """A shift is off by what the sensitivities are: the share of bending is known to a fifth."""
-    off = _MODEL_OFF * float(np.mean(0.5 - table.tension) / np.mean(table.tension))
+    off = LIMITS.stream_watch_model_off * float(
+        np.mean(0.5 - table.tension) / np.mean(table.tension)
+    )
     return math.expm1(log_shift), math.hypot(sd, off * log_shift)
 
 
 # ---------------------------------------------------------------- what changed
 
 
-def _move_of_modes(state: StreamState, evidence: Evidence) -> tuple[FloatArray, int]:
+def _move_of_modes(state: StreamState, bank: Bank, evidence: Evidence) -> tuple[FloatArray, int]:
     """Return how the modes (n,) moved when a change began, NaN where that is not known.
 
-    And the number of readings since.
+    And the number of readings since. What the conditions do is by `bank`.
     """
+    ring = _without_conditions(state.table, bank, state.ring, state.ring_conditions)
     later = state.ring_day >= evidence.by_day
     later[-1] = True
     earlier = state.ring_day <= evidence.after_day
-    before = np.vstack([state.old, state.ring[earlier]])
-    weight = np.append(OLD_READINGS, np.ones(earlier.sum()))[:, None] * np.isfinite(before)
+    before = np.vstack([state.old, ring[earlier]])
+    weight = np.append(LIMITS.memory_readings, np.ones(earlier.sum()))[:, None] * np.isfinite(
+        before
+    )
     moved = np.full(before.shape[1], np.nan)
-    known = (weight.sum(axis=0) > 0) & np.isfinite(state.ring[later]).any(axis=0)
+    known = (weight.sum(axis=0) > 0) & np.isfinite(ring[later]).any(axis=0)
     weight, before = weight[:, known], np.nan_to_num(before[:, known])
     first = np.sum(weight * before, axis=0) / weight.sum(axis=0)
     # One of them may be mistaken for a neighbour.
-    moved[known] = np.nanmedian(state.ring[later][:, known], axis=0) - first
+    moved[known] = np.nanmedian(ring[later][:, known], axis=0) - first
     return moved, int((state.ring_day >= evidence.by_day).sum())
 
 
-def _sized(evidence: Evidence, cause: StreamCause, state: StreamState, since: int) -> Evidence:
+def _wander_sd(state: StreamState, since: int) -> float:
+    """Return by what the mean of ln T over `since` hours wanders, and goes with what is unknown."""
+    later = max(since / TOGETHER, 1.0)
+    return math.hypot(state.bank.wander_sd / math.sqrt(later), state.unknown_sd)
+
+
+def _sized(evidence: Evidence, cause: StreamCause) -> Evidence:
     """A step of the tension by the readings' means before and after it: that no reading adds more
     to the evidence than it may makes the evidence's own size too small."""
     if cause.name != TENSION or evidence.kind:
         return evidence
-    its, later = cause.moved[0], max(since / TOGETHER, 1.0)
-    sd = math.hypot(its.shift_sd, state.bank.wander_sd / math.sqrt(later), state.unknown_sd)
-    return replace(evidence, shift=math.log1p(its.shift_mean), shift_sd=sd)
+    its = cause.moved[0]
+    return replace(evidence, shift=math.log1p(its.shift_mean), shift_sd=its.shift_sd)
 
 
 def _absorb_plane(
@@ -628,7 +649,7 @@ def _with_exchange(
     """Count the hours that the planes look exchanged; after a few it is an event."""
     exchange = find_exchange(seen.off, state.table)
     state = replace(state, exchanged_hours=state.exchanged_hours + 1 if exchange else 0)
-    if exchange is None or state.exchanged_hours < HOURS_EXCHANGED:
+    if exchange is None or state.exchanged_hours < LIMITS.hours_exchanged:
         return state, ()
     return _absorb_fault(state, exchange), (_event(exchange, state, NOTHING, reading, end),)
 
@@ -641,8 +662,9 @@ def _absorb_fault(state: StreamState, cause: StreamCause) -> StreamState:
         table=replace(state.table, level=level),
         bank=state.bank.without_beginnings(),
         contrast=state.contrast.without_beginnings(),
-        ring=np.zeros((0, len(level))),
-        ring_day=np.zeros(0),
+        ring=state.ring[:0],
+        ring_conditions=state.ring_conditions[:0],
+        ring_day=state.ring_day[:0],
     )
 
 

@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from shm.values import (
     FloatArray,
     Hanger,
     IntArray,
+    ModeReading,
     Reading,
     WatchedQuantity,
     WatchedTest,
@@ -28,8 +28,10 @@ from shm.values import (
 from shm.values.drift import ENOUGH_AGAINST
 from shm.watch.causes import Columns, DetectedChange, Structure, structure_of
 from shm.watch.change_point import Evidence, evidence_of
+from shm.watch.frequencies import structure_of_frequencies
 from shm.watch.kept_state import to_bytes
-from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of, years_between
+from shm.watch.limits import LIMITS
+from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of
 from shm.watch.persistence import bound_by_recurrence, outlier_probability, select_consistent_tests
 from shm.watch.posterior_summary import (
     SummaryContext,
@@ -37,12 +39,7 @@ from shm.watch.posterior_summary import (
     summarize_change,
     summarize_drifts,
 )
-from shm.watch.state_sums import StateSums, WatchState, begun_of, size_of
-
-# To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 15
-# Technical: what a test says goes nearly in proportion to its weight.
-_MOST_REPEATS, _NEARLY = 6, 0.5
+from shm.watch.state_sums import StateSums, WatchState, detected_change
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +82,14 @@ class Watcher:
     @cached_property
     def key(self) -> str:
         """Return a digest of what a state rests on but the readings: rules, options, quantities."""
-        given = to_bytes((_VERSION, self.options, self.quantities))
+        given = to_bytes((LIMITS.version, self.options, self.quantities))
         return hashlib.sha256(given).hexdigest()
 
     @cached_property
     def structure(self) -> Structure:
         """The hypotheses."""
+        if not self.hanger.is_modelled:
+            return structure_of_frequencies(len(self.quantities), self.options)
         return structure_of(self.quantities, self.columns, self.options)
 
     @cached_property
@@ -105,23 +104,12 @@ class Watcher:
         """
         n, q = self.structure.layout.n, self.structure.layout.q
         coefficients = q * self.structure.thermal_laws
-        none: dict[str, Any] = {
-            **dict.fromkeys(("values", "variances", "per_kelvin"), np.zeros((0, n))),
-            **dict.fromkeys(("years", "temperature_c", "log_amplitude", "weight"), np.zeros(0)),
-        }
         state = WatchState(
-            key=self.key,
-            start=readings[0].time,
-            last_time=readings[0].time,
-            reference_c=reference_of([reading.temperature_c for reading in readings]),
-            slopes=np.zeros((0, n, q)),
-            **none,
-            counted=np.zeros(0, bool),
-            coefficients=np.zeros(coefficients),
-            coefficient_sd=self.structure.layout.prior_sd[n + q :][:coefficients],
-            scatter_variance=self.structure.scatter_variance,
-            called=np.zeros((0, 3)),
-            called_precision=np.zeros((0, n + q, n + q)),
+            self.key,
+            reference_of([reading.temperature_c for reading in readings]),
+            np.zeros(coefficients),
+            self.structure.layout.prior_sd[n + q :][:coefficients],
+            self.structure.scatter_variance,
         )
         return self.watch(state, readings)
 
@@ -138,7 +126,7 @@ class Watcher:
 
         Raises BadInput where the reading is older than the last, or of other quantities.
         """
-        if reading.time < state.last_time:
+        if state.tests and reading.time < state.readings[-1].time:
             raise BadInput(
                 f"The watch was given test {reading.test} after one that is later.",
                 remedy="Sort the tests by time.",
@@ -153,7 +141,7 @@ class Watcher:
             evidence, causes, _ = self._bounded(state)
         its = slice(self.options.baseline_tests)
         since, all_causes = evidence, causes
-        if np.isfinite(state.variances[its]).any() and not state.counted[its].any():
+        if np.isfinite(state.modes.variances[its]).any() and not state.counted[its].any():
             against = int(state.counted.sum())
             # How far it is since the baseline stays open all the same.
             since, all_causes, _ = self._bounded(self._with_baseline(state, counts=True))
@@ -161,10 +149,8 @@ class Watcher:
         coefficients, coefficient_sd = self._coefficients(evidence)
         if found.change.called and state.counted[-1]:
             still = state.still_same * (1 - probability_of_change(evidence, self.options))
-            call = begun_of(causes, _counting(state), found.change)
-            begun = np.append(state.called, [call], axis=0)
-            sizes = np.append(state.called_precision, [size_of(causes)], axis=0)
-            state = replace(state, called=begun, called_precision=sizes, still_same=still)
+            call = detected_change(causes, _counting(state), found.change)
+            state = replace(state, called=(*state.called, call), still_same=still)
         state = replace(state, coefficients=coefficients, coefficient_sd=coefficient_sd)
         return state, found
 
@@ -192,10 +178,7 @@ class Watcher:
         """Return the state in which the baseline counts, no change being called; or does not."""
         counted = state.counted.copy()
         counted[: self.options.baseline_tests] = counts
-        if not counts:
-            return replace(state, counted=counted)
-        none = state.called[:0], state.called_precision[:0]
-        return replace(state, counted=counted, called=none[0], called_precision=none[1])
+        return replace(state, counted=counted, called=() if counts else state.called)
 
     def _summarize(
         self,
@@ -215,7 +198,7 @@ class Watcher:
             self.quantities,
             self.hanger,
             self.options,
-            state.start,
+            state.readings[0].time,
             of_baseline,
             *self.sums.effects(state),
         )
@@ -252,12 +235,12 @@ class Watcher:
         rows = np.union1d(np.flatnonzero(state.counted), [state.tests - 1])
         most = math.log(self.options.most_of_one_test * self.options.limit_years)
         evidence = self._evidence(state, rows)
-        for _ in range(_MOST_REPEATS):
+        for _ in range(LIMITS.most_repeats):
             factor, mass = evidence.of_last_visit
-            if mass <= most + _NEARLY or factor <= 0:  # the latter at a limit of days
+            if mass <= most + LIMITS.nearly or factor <= 0:  # the latter at a limit of days
                 break
             weight = state.weight.copy()
-            weight[visit] *= max(factor - (mass - most), _NEARLY) / factor
+            weight[visit] *= max(factor - (mass - most), LIMITS.nearly) / factor
             state = replace(state, weight=weight)
             evidence = self._evidence(state, rows)
         return state, evidence
@@ -267,30 +250,17 @@ class Watcher:
         n, q = self.structure.layout.n, self.structure.layout.q
         if reading.mean.shape != (q,):
             raise BadInput(f"The reading of test {reading.test} is not of {q} quantities.")
-        years = years_between(state.start, reading.time)
-        known = [value for value in (state.reference_c, reading.temperature_c) if value == value]
-        modes = reading.modes
-        values = np.zeros(n) if modes is None else modes.values
-        variances = np.full(n, np.inf) if modes is None else modes.variances
-        slopes = np.zeros((n, q)) if modes is None else modes.slopes
-        softening = np.zeros(n) if modes is None else modes.per_kelvin
-        level = math.log(reading.amplitude) if reading.amplitude > 0 else math.nan
-        rows = {
-            "values": values,
-            "variances": variances,
-            "slopes": slopes,
-            "per_kelvin": softening,
-            "years": years,
-            "temperature_c": reading.temperature_c,
-            "log_amplitude": level,
-            "weight": 1.0,
-        }
-        grown: dict[str, Any] = {
-            name: np.concatenate([getattr(state, name), np.asarray(row)[None]])
-            for name, row in rows.items()
-        }
-        reference_c = known[0] if known else math.nan
-        later = replace(state, last_time=reading.time, reference_c=reference_c, **grown)
+        if reading.modes is None:
+            nothing, unknown = np.zeros(n), np.full(n, np.inf)
+            blind = ModeReading(nothing, unknown, np.zeros((n, q)), nothing, np.zeros(n, bool))
+            reading = replace(reading, modes=blind)
+        is_known = state.reference_c == state.reference_c
+        later = replace(
+            state,
+            readings=(*state.readings, reading),
+            weight=np.append(state.weight, 1.0),
+            reference_c=state.reference_c if is_known else reading.temperature_c,
+        )
         counts = select_consistent_tests(
             self.sums.seen(later), state.counted, self.options.baseline_tests
         )
@@ -322,7 +292,8 @@ class Watcher:
 
         It is the last covariate of the null, before the called changes.
         """
-        if probability_of_change(evidence, self.options) > 0.5:
+        is_likely = probability_of_change(evidence, self.options) > 0.5
+        if is_likely or not self.hanger.is_modelled:
             return None
         at, weights = len(self.structure.layout.null) - 1, np.exp(evidence.log_null)
         means, variances = evidence.null_mean[:, at], evidence.null_covariance[:, at, at]
@@ -359,9 +330,4 @@ def _counting(state: WatchState) -> IntArray:
 
 def _called(state: WatchState, rows: IntArray) -> list[DetectedChange]:
     """Return the called changes, as the tests `rows` see them."""
-    return [
-        DetectedChange(int(np.searchsorted(rows, first)), years, bool(is_ramp), precision)
-        for (first, years, is_ramp), precision in zip(
-            state.called.tolist(), state.called_precision, strict=True
-        )
-    ]
+    return [replace(c, first=int(np.searchsorted(rows, c.first))) for c in state.called]

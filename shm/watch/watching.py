@@ -33,7 +33,9 @@ from shm.values.drift import OF_ONE_VISIT
 from shm.watch.agreement import Way, agreement, way_of
 from shm.watch.alert_text import CAUSES, alert_of, message_of, suspects
 from shm.watch.kept_state import from_bytes, to_bytes
+from shm.watch.limits import LIMITS
 from shm.watch.notices import (
+    alert_of_agreement,
     alert_of_baseline,
     message_of_odd,
     news_of,
@@ -52,8 +54,6 @@ DatedTest = tuple[ModalTest, datetime]
 """A test, and its time or that of its receipt."""
 _BEYOND: AlertKind = "beyond threshold"
 _REPEAT: AlertKind = "repeat the test"
-_ODD = 0.9  # nine to one: a notice that is wrong costs a test
-_ODD_IN_A_ROW = 3  # tests that fit nothing: no longer bad luck
 
 
 def condition_of(each: Drift | Moved) -> Condition:
@@ -229,8 +229,9 @@ def watch_newest(
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
         agreed = agreement(reader, later[-1], beside, hanger, options, reported.beyond)
         if agreed is not None:
-            alert, reported = agreed, reported.with_beyond(agreed.drifts, agreed.time)
-            both = reported.agreed.union(map(condition_of, agreed.drifts))
+            alert = alert_of_agreement(agreed, hanger)
+            reported = reported.with_beyond(alert.drifts, alert.time)
+            both = reported.agreed.union(map(condition_of, alert.drifts))
             reported = replace(reported, agreed=both)
     return Newest(found, alert, to_bytes((state, reported)))
 
@@ -259,8 +260,8 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     if alert is None and test.change.is_baseline_alone and not (alone or standing.beyond):
         alert, alone = alert_of_baseline(test, hanger), True
         since_baseline = alert.drifts
-    odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
-    if alert is None and odd in (1, _ODD_IN_A_ROW):
+    odd = standing.odd + 1 if test.change.outlier_probability > LIMITS.odd else 0
+    if alert is None and odd in (1, LIMITS.odd_in_a_row):
         kind: AlertKind = _REPEAT if odd == 1 else "tests disagree"
         words, key = message_of_odd(test, hanger, odd), kind.replace(" ", "-")
         alert = alert_of(hanger, (test.test, test.time), key, words, (kind,))

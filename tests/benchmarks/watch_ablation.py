@@ -44,6 +44,7 @@ from shm.watch import (  # noqa: E402
     watching,
 )
 from shm.watch.change_point import Evidence  # noqa: E402
+from shm.watch.limits import LIMITS  # noqa: E402
 from shm.watch.readings import Likelihood  # noqa: E402
 from shm.watch.state_sums import StateSums, WatchState  # noqa: E402
 from shm.watch.watcher import Watcher  # noqa: E402
@@ -70,6 +71,11 @@ def with_options(**changed: Any) -> Change:
     return watching, "options_of", lambda *given: replace(as_it_is(*given), **changed)
 
 
+def with_limits(module: Any, **changed: Any) -> Change:
+    """Return the change of some of the limits that a module reads."""
+    return module, "LIMITS", replace(LIMITS, **changed)
+
+
 def count_all(seen: Any, *_: Any) -> Any:
     """Count every test that has a mode."""
     return np.isfinite(seen.variances).any(axis=1)
@@ -93,12 +99,11 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
         (Watcher, "_apply_recurrence_bound", lambda _, state, found: (found, found, 0))
     ],
     "persistence: joints that give": [(persistence, "_SLIPPING", ())],
-    "persistence: large changes": [(persistence, "_LARGE_SEEM", persistence._SEEM)],
-    "persistence: gross changes": [(persistence, "_GROSS", np.inf)],
-    "persistence: odd tests differ": [(persistence, "_ODD_ALIKE", 1.0)],
+    "persistence: large changes": [with_limits(persistence, large_seem=LIMITS.seem)],
+    "persistence: gross changes": [with_limits(persistence, gross=np.inf)],
+    "persistence: odd tests differ": [with_limits(persistence, odd_alike=1.0)],
     "persistence: bounds of waiting": [
-        (persistence, "_LEAST_WAITED", 0.0),
-        (persistence, "_MOST_WAITED", np.inf),
+        with_limits(persistence, least_waited=0.0, most_waited=np.inf)
     ],
     "bound on one visit": [(Watcher, "_limit_last_visit", weigh_all)],
     "tests that stand alone": [(watcher, "select_consistent_tests", count_all)],
@@ -114,14 +119,14 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
     "a start from slack": [
         (Likelihood, "far_start", lambda self, _: np.zeros(len(self._quantities)))
     ],
-    "mistaken modes: loosened ends": [(readings, "_LOOSENED", 1e-300)],
-    "mistaken modes: tests of another bar": [(mistaken_modes, "_MISFIT", 1e-300)],
-    "stated errors by the misfit": [(readings, "_PRIOR_FREEDOM", 1e12)],
+    "mistaken modes: loosened ends": [with_limits(readings, loosened=1e-300)],
+    "mistaken modes: tests of another bar": [with_limits(mistaken_modes, misfit=1e-300)],
+    "stated errors by the misfit": [with_limits(readings, prior_freedom=1e12)],
     "patterns of loosening": [(readings, "loosening_of", find_no_pattern)],
     "creep": [with_options(creep_per_year_sd=1e-9)],
     "unknown temperatures of a season": [(options, "_SEASON_YEARS", 1e-9)],
     "tests of one day": [(state_sums, "OF_ONE_VISIT_YEARS", 1e-9)],
-    "springs that move together": [(causes, "_CORRELATION", 0.0)],
+    "springs that move together": [with_limits(causes, correlation=0.0)],
     "least shift of a frequency": [with_options(least_frequency_shift=0.0)],
     "check of the baseline": [(watch_worlds, "check_baseline", give(BaselineCheck()))],
 }

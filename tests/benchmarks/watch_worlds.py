@@ -43,6 +43,7 @@ from shm.values import TENSION, Alert, Beside, Hanger, ModalTest, Posterior  # n
 from shm.watch import DatedTest, Watched, WatchOptions, watch_hanger  # noqa: E402
 from shm.watch.agreement import agreement  # noqa: E402
 from shm.watch.baseline_check import check_baseline  # noqa: E402
+from shm.watch.notices import alert_of_agreement  # noqa: E402
 from shm.watch.watching import alerts_of  # noqa: E402
 from tests.benchmarks.watch_trial.outcomes import BEGINS  # noqa: E402
 from tests.benchmarks.watch_trial.report import HEADS, events, save_figure, tables  # noqa: E402
@@ -202,7 +203,7 @@ def agreeing(
         beside = Beside(came=(before[:3], ()))
         found = agreement(watched.reader, dated[n], beside, hanger, options, ())
         if found is not None:
-            return [found]
+            return [alert_of_agreement(found, hanger)]
     return []
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from shm.identify import IdentifyOptions, identify
 from shm.monitor import read_window, tracking
+from shm.monitor.limits import LIMITS
 from shm.values import PLANES, Channel, FloatArray, Hanger, Mode, Plane, Recording
 from shm.values.stream import Piece, Stream, StreamChannel, WindowReading
 from tests.helpers.ambient_stream import (
@@ -89,7 +90,7 @@ def test_modes_that_were_missed_at_first_join_the_others_once(
     minute: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Sought each hour here, by this stream in the window at half past."""
-    monkeypatch.setattr(tracking, "_REVIEW_S", 3600)
+    monkeypatch.setattr(tracking, "LIMITS", replace(LIMITS, review_s=3600))
     rng = np.random.default_rng(7)
     motion = drawn(rng, orders=4)
     missed = {("transverse", 3), ("longitudinal", 4)}

@@ -19,7 +19,8 @@ from shm.report.hanger_report import hanger_paper
 from shm.report.hanger_status import Status
 from shm.report.modal_test_report import modal_test_paper
 from shm.report.paper import Paper, Section, Table
-from shm.watch.neighbours import HangerShift, bridge_pattern
+from shm.watch.neighbours import HangerShift
+from shm.watch.neighbours_words import bridge_pattern
 from tests.helpers.nouns import a_summary
 from tests.report.conftest import START
 from tests.report.diagnoses import CASES, sheet

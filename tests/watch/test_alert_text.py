@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 from datetime import UTC, datetime, timedelta
-from typing import Literal
 
 import pytest
 
@@ -14,15 +13,13 @@ from shm.values import (
     Drift,
     MonitoredHanger,
     Moved,
-    Plane,
     Thresholds,
     WatchedTest,
 )
 from shm.values.messages import Lead
 from shm.watch.alert_text import shift_words
-from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.notices import message_of_odd
-from shm.watch.watching import AlertState, after, alerts_of
+from shm.watch.watching import alerts_of
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_drift, a_watched_test
 
@@ -246,38 +243,6 @@ def test_beyond_the_threshold_after_a_call_speaks_of_the_called_change() -> None
 )  # fmt: skip
 def test_shifts_read_as_people_say_them(quantity: str, mean: float, sd: float, words: str) -> None:
     assert shift_words(quantity, mean, sd) == words
-
-
-# ---------------------------------------------------------------- what moved together
-
-
-def _joint(*names: str, shift: float = -0.155, **of_first: object) -> tuple[Moved, ...]:
-    places: dict[str, tuple[Literal["deck", "arch"], Plane]] = {
-        "log10_k1": ("deck", "transverse"),
-        "log10_k2": ("deck", "longitudinal"),
-        "log10_k3": ("arch", "transverse"),
-        "log10_k4": ("arch", "longitudinal"),
-    }
-    moved = [
-        Moved(name, 0.96, shift, 0.02, *places[name], together=tuple(n for n in names if n != name))
-        for name in names
-    ]
-    return replace(moved[0], **of_first), *moved[1:]  # type: ignore[arg-type]
-
-
-# ---------------------------------------------------------------- kept between tests
-
-
-def test_kept_alert_state_gives_the_alerts_of_the_history() -> None:
-    joint = change(called=True, moved=_joint("log10_k1", "log10_k2"))
-    history = [day(1), day(2, joint), day(3, probability=0.99), day(4), day(5)]
-    told, alerts = AlertState(), []
-    for test in history:
-        told, alert = after(from_bytes(AlertState, to_bytes(told)), test, HANGER_3)
-        alerts += [alert] if alert else []
-        assert from_bytes(AlertState, to_bytes(told)) == told
-    assert tuple(alerts) == alerts_of(history, HANGER_3)
-    assert len(alerts) == 2
 
 
 def test_of_a_called_change_all_tell_the_probability_that_its_alert_tells() -> None:

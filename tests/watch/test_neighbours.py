@@ -11,13 +11,8 @@ import pytest
 
 from shm.errors import NothingThere
 from shm.values import Drift, FloatArray
-from shm.watch.neighbours import (
-    BridgePattern,
-    HangerShift,
-    NeighbourOptions,
-    bridge_pattern,
-    shifts_of,
-)
+from shm.watch.neighbours import BridgePattern, HangerShift, NeighbourOptions, shifts_of
+from shm.watch.neighbours_words import bridge_pattern
 
 NOW = datetime(2026, 5, 1, tzinfo=UTC)
 NOISE = 0.003

@@ -36,7 +36,8 @@ def _test(number: int, theta: tuple[float, ...], rng: np.random.Generator) -> Mo
         for order, hz in enumerate(row)
     )
     time = BEGIN + timedelta(weeks=2 * number)
-    return ModalTest(id=f"t{number}", hanger=3, modes=modes, time=time, temperature_c=10.0)
+    warmth_c = np.nan if number == BASELINE_TESTS + 1 else 10.0
+    return ModalTest(id=f"t{number}", hanger=3, modes=modes, time=time, temperature_c=warmth_c)
 
 
 @cache
