@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from shm.errors import NotIdentifiable
-from shm.identify.contract import Finding, FoundMode, Measurement, Poles
+from shm.identify.contract import Finding, FoundMode, Measurement
 from shm.identify.measuring.setups import measure_recordings
 from shm.identify.measuring.signal_faults import KNOCK
 from shm.identify.quality import CHECKS, Inspection, assess, refusal, tones
@@ -24,6 +24,7 @@ from tests.identify.planted import (
     changed,
     check_of,
     inspection,
+    none_found,
     tone,
 )
 from tests.identify.signals import (
@@ -313,9 +314,9 @@ def test_measured_responses_are_judged_by_their_coherence(coherence: float, verd
 
 
 def _finding(*frequencies_hz: float) -> Finding:
-    nothing = np.empty(0)
-    modes = tuple(FoundMode(f, 0.0, 0.001, 0.0, np.ones(2), np.zeros(2)) for f in frequencies_hz)
-    return Finding(modes, (), Poles(nothing, nothing, nothing, np.empty(0, dtype=bool)))
+    return none_found(
+        *(FoundMode(f, 0.0, 0.001, 0.0, np.ones(2), np.zeros(2)) for f in frequencies_hz)
+    )
 
 
 def test_two_identifiers_are_compared_mode_by_mode() -> None:
