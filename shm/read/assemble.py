@@ -301,9 +301,9 @@ def _peek_channel(header: Header, name: str, attempt: Attempt) -> PeekChannel:
         quantity=attempt(lambda: header.quantity_and_unit(name)[0], None),
         unit=header.unit_text(name),
         plane=attempt(partial(header.plane, name), None),
-        x_m=attempt(partial(header.x_m, name), NAN),
-        calibration=attempt(partial(header.calibration, name), NAN),
-        full_scale=attempt(partial(header.full_scale, name), NAN),
+        x_m=attempt(partial(header.number, "x_m", name), NAN),
+        calibration=attempt(partial(header.number, "calibration", name), NAN),
+        full_scale=attempt(partial(header.number, "full_scale", name), NAN),
     )
 
 
@@ -316,7 +316,7 @@ def _look_at_response(found: Description, file_format: str, attempt: Attempt) ->
     for name in header.channels:
         attempt(partial(header.accelerance_si, name), NAN)
         plane = attempt(partial(header.plane, name), None)
-        x_m = attempt(partial(header.x_m, name), NAN)
+        x_m = attempt(partial(header.number, "x_m", name), NAN)
         unit = header.unit_text(name) or ACCELERANCE
         channels.append(PeekChannel(name, "acceleration", unit, plane, x_m))
     frequency = attempt(lambda: _grid(_listed_hz(found), path)[1], np.zeros(0))

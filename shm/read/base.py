@@ -102,48 +102,18 @@ def names_in(described: Recording | FrequencyResponse) -> list[str]:
 
 
 @dataclass(frozen=True, eq=False)
-class SurveyedColumn:
+class SurveyedColumn(PeekChannel):
     """A column of a file, and what is known of it.
 
     `values` (samples,) are as recorded, in `unit` ("" where the file says none), None where the
     file is none of time records; `overloads` of them were beyond the range. `quantity` is what it
-    counts as, None where it is left out, `meant` what its name alone suggests. `calibration` is in
-    `unit` per recorded unit.
+    counts as, None where it is left out, `meant` what its name alone suggests.
     """
 
-    name: str
-    unit: str
-    values: FloatArray | None
+    values: FloatArray | None = None
     overloads: int = 0
-    quantity: Quantity | None = None
     meant: Quantity | None = None
-    plane: Plane | None = None
-    x_m: float = NAN
-    calibration: float = NAN
-    full_scale: float = NAN
     described_unit: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Survey:
-    """A file as found: NaN and None where it does not say.
-
-    `problems` are what would be refused as it is; `lines` counts those of frequency responses.
-    """
-
-    source: str
-    format: str
-    columns: tuple[SurveyedColumn, ...]
-    samples: int
-    sampling_rate_hz: float
-    hanger: int | None
-    time: datetime | None
-    temperature_c: float
-    layout: Layout
-    lines: int = 0
-    remarks: tuple[str, ...] = ()
-    problems: tuple[str, ...] = ()
-    operator: str = ""
 
 
 @dataclass(frozen=True)
@@ -162,3 +132,12 @@ class Layout:
     day_order: DayOrder | None = None
     possible_times: tuple[PossibleTime, ...] = ()
     local_time: datetime | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Survey(Peek):
+    """A file as found, with all its columns and the layout of its logger."""
+
+    columns: tuple[SurveyedColumn, ...]
+    layout: Layout
+    remarks: tuple[str, ...] = ()

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from shm.errors import BadInput
 from shm.read.base import Format, at_once
-from shm.read.header import Entry, is_measured, stated_entries
+from shm.read.extras import import_extra
+from shm.read.header import Entry
 from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples, too_large
 from shm.read.logger_heading import distinct_names
 from shm.read.logger_words import hanger_numbered, name_and_unit
-from shm.read.table import Column, Role, Table
+from shm.read.table import Column, Table
 from shm.values import FloatArray
 
 _NAME = "Campbell"
@@ -35,7 +35,7 @@ def open_tables(path: Path) -> tuple[Table, ...]:
     """Return the columns of a table; raises BadInput where it is damaged."""
     if path.stat().st_size > limits().bytes_at_once:
         raise too_large(path)
-    library = _library(path)
+    library = import_extra("csiio", path)
     with guarded(path, "the table"), redirect_stdout(io.StringIO()):  # it prints what is damaged
         frame = library.read_csi_files(str(path), quiet=True, sortindex=False)
         frame = frame[0] if isinstance(frame, tuple) else frame
@@ -48,7 +48,7 @@ def open_tables(path: Path) -> tuple[Table, ...]:
     split = [name_and_unit(named[place]) for place in places[:_MOST_COLUMNS]]
     names = distinct_names([name for name, _ in split])
     columns = [
-        _column(name, unit, _values(frame.iloc[:, place]), path)
+        Column.of_logger(name, unit, _values(frame.iloc[:, place]), path)
         for name, (_, unit), place in zip(names, split, places, strict=False)
     ]
     with path.open("rb") as stream:
@@ -61,30 +61,12 @@ def open_tables(path: Path) -> tuple[Table, ...]:
     return (Table(path, (times, *columns), entries, layout),)
 
 
-def _column(name: str, unit: str, values: FloatArray, path: Path) -> Column:
-    role: Role = "channel" if is_measured(name, unit) else "other"
-    stated = stated_entries(name, unit, path)
-    return Column(name, len(values), values.copy, unit, role, stated)
-
-
 def _values(series: Any) -> FloatArray:
     """Return numbers, NaN where a cell holds none."""
     kind = series.dtype.kind
     if kind in "iufb":
         return np.asarray(series.to_numpy(), float)
     return np.full(len(series), np.nan)
-
-
-def _library(path: Path) -> Any:
-    try:
-        import csiio
-    except ImportError:
-        raise BadInput(
-            "binary tables of Campbell loggers need the extra `campbell`, which is not installed.",
-            file=path,
-            remedy="Install it (pip install 'shm[campbell]'), or have the logger write TOA5.",
-        ) from None
-    return csiio
 
 
 FORMAT = Format(

@@ -10,13 +10,14 @@ import gzip
 import re
 import stat
 import tempfile
+import tomllib
 import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shm.errors import BadInput
 from shm.read.limits import guarded, limits, too_large
@@ -64,6 +65,17 @@ def unreadable(path: Path, error: OSError) -> BadInput:
     """Return the refusal of a file that the system does not hand out."""
     reason = error.strerror or str(error)
     return BadInput(f"cannot be read: {reason}.", file=path, remedy="Check path and permissions.")
+
+
+def read_toml(path: Path, remedy: str) -> dict[str, Any]:
+    """Return what a TOML file says; raises BadInput where it cannot be read."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise unreadable(path, error) from error
+    except (ValueError, RecursionError) as error:
+        what = f"not a readable TOML file: {error}."
+        raise BadInput(what, file=path, remedy=remedy) from error
 
 
 def refuse_unreadable_suffix(

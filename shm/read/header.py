@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from shm.documents import format_time, parse_time
 from shm.errors import BadInput
@@ -47,6 +47,48 @@ KEYS = (
 )
 CHANNEL_KEYS = ("unit", "x_m", "plane", "calibration", "full_scale", "leave_out", "coherence")
 _OF_ALL_CHANNELS = ("unit", "calibration", "full_scale")
+_OF_MASS = ("added_mass_kg", "added_mass_at_m", "added_mass_radius_m")
+_BOTH = "Give both added_mass_kg and added_mass_at_m, from the deck end, or neither."
+
+
+class _Rule(NamedTuple):
+    """Say which numbers a key may have, what is said of others, and what to do about it."""
+
+    fits: Callable[[float], bool]
+    fault: str
+    remedy: str
+
+
+_NUMBERS: Mapping[str, _Rule] = {
+    "hanger": _Rule(
+        lambda n: n.is_integer() and n >= 0, "is not a whole number",
+        "Give the hanger's number, as in hanger: 3.",
+    ),
+    "temperature_c": _Rule(
+        lambda n: math.isnan(n) or not math.isnan(outdoor_c(n)), "is no temperature outdoors",
+        "Give degrees Celsius, or leave it out.",
+    ),
+    "added_mass_kg": _Rule(lambda n: n > 0, "is not positive", _BOTH),
+    "added_mass_at_m": _Rule(lambda n: n >= 0, "is below the deck end", _BOTH),
+    "added_mass_radius_m": _Rule(
+        lambda n: n >= 0, "is negative",
+        "Give its radius of gyration in m, 0 of a point, or leave it out.",
+    ),
+    "sampling_rate_hz": _Rule(
+        lambda n: n > 0, "is not positive",
+        "Give the samples a second, as in sampling_rate_hz: 512.",
+    ),
+    "x_m": _Rule(lambda n: True, "", "Give metres from the deck end, or leave it empty."),
+    "calibration": _Rule(
+        lambda n: bool(n) and not math.isnan(n), "is no factor",
+        "Give a number other than 0: units of `unit` per recorded volt or count.",
+    ),
+    "full_scale": _Rule(
+        lambda n: not n <= 0, "is not positive",
+        "Give the largest value that can be recorded, in the channel's unit.",
+    ),
+}  # fmt: skip
+"""Values are recorded in `unit` where no `calibration` is given."""
 
 
 @dataclass(frozen=True)
@@ -88,14 +130,8 @@ class Header:
 
     @property
     def hanger(self) -> int | None:
-        number, entry = self._number("hanger", "Give the hanger's number, as in hanger: 3.")
-        if entry is None:
-            return None
-        if not number.is_integer() or number < 0:
-            raise entry.refusal(
-                f"hanger = {entry.text} is not a whole number.", "Give the hanger's number."
-            )
-        return int(number)
+        number = self.number("hanger")
+        return None if math.isnan(number) else int(number)
 
     @property
     def time(self) -> datetime | None:
@@ -112,31 +148,18 @@ class Header:
 
     @property
     def temperature_c(self) -> float:
-        remedy = "Give degrees Celsius, or leave it out."
-        number, entry = self._number("temperature_c", remedy)
-        if entry is not None and not math.isnan(number) and math.isnan(outdoor_c(number)):
-            raise entry.refusal(f"temperature_c = {entry.text} is no temperature outdoors.", remedy)
-        return number
+        return self.number("temperature_c")
 
     @property
     def added_mass(self) -> AddedMass | None:
         """The known mass that was clamped on; None where nothing says one."""
-        remedy = "Give both added_mass_kg and added_mass_at_m, from the deck end, or neither."
-        mass_kg, mass = self._number("added_mass_kg", remedy)
-        x_m, place = self._number("added_mass_at_m", remedy)
-        of_radius = "Give its radius of gyration in m, 0 of a point, or leave it out."
-        radius_m, radius = self._number("added_mass_radius_m", of_radius)
+        mass, place, radius = map(self._given, _OF_MASS)
         only = mass or place or radius
         if only is None:
             return None
         if mass is None or place is None:
-            raise only.refusal("a known mass needs its size and its place.", remedy)
-        if not mass_kg > 0:
-            raise mass.refusal(f"added_mass_kg = {mass.text} is not positive.", remedy)
-        if not x_m >= 0:
-            raise place.refusal(f"added_mass_at_m = {place.text} is below the deck end.", remedy)
-        if radius is not None and not radius_m >= 0:
-            raise radius.refusal(f"added_mass_radius_m = {radius.text} is negative.", of_radius)
+            raise only.refusal("a known mass needs its size and its place.", _BOTH)
+        mass_kg, x_m, radius_m = map(self.number, _OF_MASS)
         return AddedMass(mass_kg, x_m, None if radius is None else radius_m)
 
     @property
@@ -148,11 +171,7 @@ class Header:
     @property
     def sampling_rate_hz(self) -> float:
         """NaN where nothing says it."""
-        remedy = "Give the samples a second, as in sampling_rate_hz: 512."
-        rate, entry = self._number("sampling_rate_hz", remedy)
-        if entry is not None and not rate > 0:
-            raise entry.refusal(f"sampling_rate_hz = {entry.text} is not positive.", remedy)
-        return rate
+        return self.number("sampling_rate_hz")
 
     def quantity_and_unit(self, name: str) -> tuple[Quantity, Unit]:
         """Return the quantity and unit of a channel: by its unit, else by its name, in SI."""
@@ -195,22 +214,6 @@ class Header:
             )
         return factor
 
-    def calibration(self, name: str) -> float:
-        """Return the units of `unit` per recorded unit, NaN where values are recorded in `unit`."""
-        remedy = "Give a number other than 0: units of `unit` per recorded volt or count."
-        factor, entry = self._number("calibration", remedy, name)
-        if entry is not None and (factor == 0 or math.isnan(factor)):
-            raise entry.refusal(f"calibration = {entry.text} is no factor.", remedy, name)
-        return factor
-
-    def full_scale(self, name: str) -> float:
-        """Return the largest value that can be recorded, in `unit`; NaN if unknown."""
-        remedy = "Give the largest value that can be recorded, in the channel's unit."
-        largest, entry = self._number("full_scale", remedy, name)
-        if entry is not None and largest <= 0:
-            raise entry.refusal(f"full_scale = {entry.text} is not positive.", remedy, name)
-        return largest
-
     def leaves_out(self, name: str) -> bool:
         """Return whether a channel is not to be used."""
         return self.has_entry(name, "leave_out") and is_true(self.channels[name]["leave_out"])
@@ -218,9 +221,6 @@ class Header:
     def has_entry(self, name: str, key: str) -> bool:
         """Return whether anything is given for a key of a channel."""
         return self._given(key, name) is not None
-
-    def x_m(self, name: str) -> float:
-        return self._number("x_m", "Give metres from the deck end, or leave it empty.", name)[0]
 
     def plane(self, name: str) -> Plane | None:
         entry = self._given("plane", name)
@@ -237,11 +237,11 @@ class Header:
         entry = (self.channels[channel] if channel else self.entries).get(key)
         return entry if entry is not None and entry.text else None
 
-    def _number(self, key: str, remedy: str, channel: str = "") -> tuple[float, Entry | None]:
-        """Return a finite number and its entry; NaN where it is written as such, or none is."""
-        entry = self._given(key, channel)
+    def number(self, key: str, channel: str = "") -> float:
+        """Return the number of a key of `_NUMBERS`; NaN where it is written so, or none is."""
+        entry, rule = self._given(key, channel), _NUMBERS[key]
         if entry is None:
-            return NAN, None
+            return NAN
         text = entry.text
         if "," in text and "." not in text:
             text = text.replace(",", ".")
@@ -250,8 +250,10 @@ class Header:
         except ValueError:
             number = math.inf
         if math.isinf(number):
-            raise entry.refusal(f"{key} = {entry.text!r} is not a number.", remedy, channel)
-        return number, entry
+            raise entry.refusal(f"{key} = {entry.text!r} is not a number.", rule.remedy, channel)
+        if not rule.fits(number):
+            raise entry.refusal(f"{key} = {entry.text} {rule.fault}.", rule.remedy, channel)
+        return number
 
 
 def quantity_named(name: str) -> Quantity | None:

@@ -16,11 +16,11 @@ import numpy as np
 
 from shm.documents import format_time
 from shm.errors import BadInput
-from shm.read.header import entries_of, is_measured, stated_entries
+from shm.read.header import entries_of
 from shm.read.limits import guarded, refuse_large, refuse_long_header, refuse_many_samples
 from shm.read.logger_heading import distinct_names, unrounded
 from shm.read.stamps import moment
-from shm.read.table import Column, Role, Table
+from shm.read.table import Column, Table
 from shm.read.time_axis import rate_of
 from shm.values import NAN, FloatArray
 
@@ -149,15 +149,8 @@ def _columns(
         missing = int(np.isnan(values).sum())
         if missing:
             remarks.append(f"{missing} values of {name} are no numbers; taken as missing.")
-        columns.append(_column(name, str(unit), values, path))
+        columns.append(Column.of_logger(name, str(unit), values, path))
     return tuple(columns), tuple(remarks)
-
-
-def _column(name: str, unit: str, values: FloatArray, path: Path) -> Column:
-    measured = is_measured(name, unit)
-    stated = stated_entries(name, unit, path)
-    role: Role = "channel" if measured else "other"
-    return Column(name, len(values), lambda: values, unit, role, stated)
 
 
 def _of_channels(record: Mapping[str, Any], key: str, places: Sequence[int]) -> list[Any]:

@@ -24,14 +24,7 @@ from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read import logger_words as words
 from shm.read.content import LINE_BREAK, cells_of, mark_between
-from shm.read.header import (
-    CHANNEL_KEYS,
-    KEYS,
-    entries_of,
-    is_measured,
-    quantity_named,
-    stated_entries,
-)
+from shm.read.header import CHANNEL_KEYS, KEYS, entries_of, quantity_named
 from shm.read.limits import refuse_long_header
 from shm.read.logger_heading import (
     Heading,
@@ -209,15 +202,7 @@ def _column(heading: Heading, block: DataRows, place: int, line: int | None, pat
     values, overloads = values_of(block, place, path)
     name = heading.names[place]
     unit = heading.units[place] or ("" if heading.names_line else _unit_of_one(heading))
-    return Column(
-        name,
-        len(values),
-        lambda: values,
-        unit,
-        "channel" if is_measured(name, unit) else "other",
-        stated_entries(name, unit, path, line),
-        overloads=overloads,
-    )
+    return Column.of_logger(name, unit, values, path, line, overloads=overloads)
 
 
 def _refuse_split_decimals(heading: Heading, block: DataRows, path: Path) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read.base import Format, at_once
+from shm.read.extras import import_extra
 from shm.read.header import Entry
 from shm.read.limits import guarded, refuse_large, refuse_many_samples
 from shm.read.table import Column, Table
@@ -83,7 +84,7 @@ def _fill(row: FloatArray, values: np.ndarray) -> None:
 
 def _traces(path: Path) -> list[_Trace]:
     """Return all traces by time; nothing is unpacked before its size is known."""
-    library = _library(path)
+    library = import_extra("pymseed", path)
     with guarded(path):
         counts: dict[str, int] = {}
         for record in library.MS3Record.from_file(str(path)):  # also finds a file that is cut off
@@ -121,18 +122,6 @@ def _name(library: Any, source_id: str) -> str:
     except (ValueError, library.PymseedError):  # an id that no network has given out
         parts = [source_id.removeprefix("FDSN:")]
     return "_".join(part for part in parts if part).replace(".", "_").replace(":", "_")
-
-
-def _library(path: Path) -> Any:
-    try:
-        import pymseed
-    except ImportError:
-        raise BadInput(
-            "miniSEED needs the extra `miniseed`, which is not installed.",
-            file=path,
-            remedy="Install it (pip install 'shm[miniseed]'), or export as CSV.",
-        ) from None
-    return pymseed
 
 
 FORMAT = Format(

@@ -24,7 +24,6 @@ hanger: each file must say its own.
 from __future__ import annotations
 
 import re
-import tomllib
 from dataclasses import dataclass
 from datetime import UTC, tzinfo
 from pathlib import Path
@@ -33,7 +32,7 @@ from typing import Any
 from shm.errors import BadInput
 from shm.read.atomic import replace_text
 from shm.read.base import Layout
-from shm.read.content import unreadable
+from shm.read.content import read_toml
 from shm.read.header import CHANNEL_KEYS
 from shm.read.logger_words import hanger_numbered
 from shm.read.sidecar import Described, sidecar_text
@@ -177,13 +176,7 @@ def _free_path(layout: Layout, workspace: Path) -> Path:
 
 
 def _load(path: Path) -> Profile:
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise unreadable(path, error) from error
-    except (ValueError, RecursionError) as error:
-        what = f"not a readable TOML file: {error}."
-        raise BadInput(what, file=path, remedy=_REWRITE) from error
+    document = read_toml(path, _REWRITE)
     channels = document.get("channel", {})
     if not isinstance(document.get("fingerprint"), str) or not isinstance(channels, dict):
         raise BadInput("is no profile of a logger.", file=path, remedy=_REWRITE)

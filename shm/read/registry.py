@@ -48,7 +48,7 @@ from shm.read.header import CHANNEL_KEYS, Header, known_values
 from shm.read.mini_seed_file import FORMAT as MINI_SEED
 from shm.read.modal_sets import foreign_modes
 from shm.read.sidecar import sidecar_document, sidecar_path
-from shm.read.table import Column, Table
+from shm.read.table import Column, Description, Table
 from shm.read.universal_file import FORMAT as UFF
 from shm.read.wave_file import FORMAT as WAVE
 from shm.values import NAN, FrequencyResponse, ModalTest, Recording
@@ -219,7 +219,8 @@ def libraries_for(path: Path) -> tuple[str, ...]:
 
 
 T = TypeVar("T")
-Found = TypeVar("Found", bound=Recording | FrequencyResponse | Peek | ModalTest | Survey)
+Found = TypeVar("Found", bound=Recording | FrequencyResponse | Peek | ModalTest)
+OfFile = TypeVar("OfFile", bound=Recording | FrequencyResponse | Peek)
 
 
 def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
@@ -227,15 +228,7 @@ def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
     if not holds_test(path):
         return _records(path)
     head_of(path)
-    stated = entries_of_test(path).of_test
-    read_all = (
-        _with_stated(each, stated) for found in each_member(path, _read_member) for each in found
-    )
-    return tuple(read_all)
-
-
-def _read_member(file: Path, name: str) -> tuple[Recording | FrequencyResponse, ...]:
-    return tuple(replace(each, source=name) for each in _named(_records, file, name))
+    return _of_members(path, _records, entries_of_test(path).of_test)
 
 
 def peek_test(path: Path) -> tuple[Peek, ...]:
@@ -248,17 +241,35 @@ def peek_test(path: Path) -> tuple[Peek, ...]:
     head_of(path)
     problems: list[str] = []
     stated = read_of_test(entries_of_test(path), collecting(problems))
-    looks = (
-        _with_stated(each, stated) for found in each_member(path, _peek_member) for each in found
-    )
+    looks = _of_members(path, _looks, stated, _unreadable)
     return tuple(replace(each, problems=(*each.problems, *problems)) for each in looks)
 
 
-def _peek_member(file: Path, name: str) -> tuple[Peek, ...]:
-    try:
-        return tuple(replace(each, source=name) for each in _named(_looks, file, name))
-    except BadInput as refusal:
-        return (Peek(name, "not readable", (), 0, problems=(str(refusal),)),)
+def _unreadable(name: str, refusal: BadInput) -> tuple[Peek, ...]:
+    return (Peek(name, "not readable", (), 0, problems=(str(refusal),)),)
+
+
+def _of_members(
+    path: Path,
+    verb: Callable[[Path], Sequence[OfFile]],
+    stated: Mapping[str, Any],
+    otherwise: Callable[[str, BadInput], Sequence[OfFile]] | None = None,
+) -> tuple[OfFile, ...]:
+    """Return what a verb finds in each file of an archive, and `stated` of all of it.
+
+    `otherwise` stands for a file that is refused.
+    """
+
+    def of_member(file: Path, name: str) -> Sequence[OfFile]:
+        try:
+            return [replace(each, source=name) for each in _named(verb, file, name)]
+        except BadInput as refusal:
+            if otherwise is None:
+                raise
+            return otherwise(name, refusal)
+
+    found = each_member(path, of_member)
+    return tuple(_with_stated(each, stated) for of_file in found for each in of_file)
 
 
 def _named(verb: Callable[[Path], T], file: Path, name: str) -> T:
@@ -327,15 +338,15 @@ def survey(path: Path) -> Survey:
     if not holds_test(path):
         return _survey_file(path)
     head_of(path)
-    found = each_member(path, lambda file, name: _named(_survey_file, file, name))
+    entries = entries_of_test(path)
+    found = _of_members(path, lambda file: [_survey_file(file)], entries.of_test)
     if len({each.layout.fingerprint for each in found}) > 1:
         raise BadInput(
             "is an archive of files of several loggers.",
             file=path,
             remedy="Unpack it and import one of its files of each.",
         )
-    entries, several = entries_of_test(path), f"the first of {len(found)} files is shown"
-    first, remarks = _with_stated(found[0], entries.of_test), [several] if len(found) > 1 else []
+    first, several = found[0], f"the first of {len(found)} files is shown"
     orders = {each.layout.day_order for each in found} - {None}
     layout = replace(
         first.layout,
@@ -343,7 +354,8 @@ def survey(path: Path) -> Survey:
         day_order=orders.pop() if len(orders) == 1 else None,
         local_time=first.layout.local_time if len(found) == 1 and entries.time is None else None,
     )
-    return replace(first, source=str(path), layout=layout, remarks=(*first.remarks, *remarks))
+    remarks = (*first.remarks, *([several] if len(found) > 1 else []))
+    return replace(first, source=str(path), layout=layout, remarks=remarks)
 
 
 def _survey_file(path: Path) -> Survey:
@@ -354,31 +366,25 @@ def _survey_file(path: Path) -> Survey:
 
 def _surveyed(tables: Sequence[Table], file_format: str, path: Path) -> Survey:
     table = tables[0]
-    seen, is_response = look(table, file_format), describe(table, with_sidecars=False).is_response
-    channels = {channel.name: channel for channel in seen.channels}
-    columns: list[SurveyedColumn] = []
+    seen, plain = look(table, file_format), describe(table, with_sidecars=False)
     problems = list(seen.problems)
-    if seen.lines or is_response:
-        columns = [_bare(channel) for channel in seen.channels]
+    if seen.lines or plain.is_response:
+        columns = [
+            SurveyedColumn(**vars(channel), meant=channel.quantity, described_unit=channel.unit)
+            for channel in seen.channels
+        ]
     else:
-        shown = _may_be_chosen(table)
-        attempt = collecting(problems)
-        columns = attempt(lambda: [_column(each, channels.get(each.name)) for each in shown], [])
+        columns = collecting(problems)(lambda: _columns(table, seen), [])
+    if not columns and seen.left_out:
+        problems.append(f"it holds {', '.join(seen.left_out)[:200]}, which is not read.")
     several = f"holds {len(tables)} records of one test; the first is shown"
-    return Survey(
+    length = next((len(c.values) for c in columns if c.values is not None), 0)
+    return replace(
+        Survey(**vars(seen), columns=tuple(columns), layout=_layout(plain, file_format, columns)),
         source=str(path),
-        format=file_format,
-        columns=tuple(columns),
-        samples=seen.samples or next((len(c.values) for c in columns if c.values is not None), 0),
-        sampling_rate_hz=seen.sampling_rate_hz,
-        hanger=seen.hanger,
-        time=seen.time,
-        temperature_c=seen.temperature_c,
-        operator=seen.operator,
-        layout=_layout(table, file_format, columns),
-        lines=seen.lines,
+        samples=seen.samples or length,
         remarks=(*table.remarks, *([several] if len(tables) > 1 else [])),
-        problems=(*problems, *_left_out(seen, columns)),
+        problems=tuple(problems),
     )
 
 
@@ -396,47 +402,33 @@ def layout_of(path: Path) -> Layout:
     return survey(path).layout
 
 
-def _left_out(seen: Peek, columns: Sequence[SurveyedColumn]) -> tuple[str, ...]:
-    """Return what a file holds that is not read, where that is all that it holds."""
-    if columns or not seen.left_out:
-        return ()
-    return (f"it holds {', '.join(seen.left_out)[:200]}, which is not read.",)
+def _columns(table: Table, seen: Peek) -> list[SurveyedColumn]:
+    """Return the columns of a table of time records, with what is said of those that are used."""
+    known = {channel.name: channel for channel in seen.channels}
+    return [_column(each, known.get(each.name)) for each in _may_be_chosen(table)]
 
 
 def _column(column: Column, known: PeekChannel | None) -> SurveyedColumn:
     meant, plane = words.quantity_meant(column.name), words.plane_meant(column.name)
-    found = SurveyedColumn(
-        column.name, column.unit, np.asarray(column.load(), float), column.overloads, meant=meant,
-        plane=plane,
-    )  # fmt: skip
-    if known is None:
-        return found
-    return replace(
-        found,
-        quantity=known.quantity,
-        plane=known.plane or (plane if known.quantity == "acceleration" else None),
-        x_m=known.x_m,
-        calibration=known.calibration,
-        full_scale=known.full_scale,
-        described_unit=known.unit,
-    )
-
-
-def _bare(channel: PeekChannel) -> SurveyedColumn:
+    values = np.asarray(column.load(), float)
+    found = known or PeekChannel(column.name, None, plane=plane)
+    if known is not None and known.plane is None and known.quantity == "acceleration":
+        found = replace(known, plane=plane)
+    described_unit = known.unit if known else ""
     return SurveyedColumn(
-        channel.name, channel.unit, None, 0, channel.quantity, channel.quantity, channel.plane,
-        channel.x_m, channel.calibration, channel.full_scale, channel.unit,
+        **{**vars(found), "unit": column.unit}, values=values, overloads=column.overloads,
+        meant=meant, described_unit=described_unit,
     )  # fmt: skip
 
 
-def _layout(table: Table, file_format: str, columns: Sequence[SurveyedColumn]) -> Layout:
+def _layout(plain: Description, file_format: str, columns: Sequence[SurveyedColumn]) -> Layout:
     """Return the layout by what the file itself says, whatever a sidecar adds."""
+    table, attempt = plain.table, collecting([])
     is_response = bool(columns) and columns[0].values is None
-    names = tuple(column.name for column in columns)
+    names = tuple(f"{c.name} [{c.unit}]" if c.unit and not is_response else c.name for c in columns)
     stated = names if is_response else table.layout
     digest = hashlib.sha256("\n".join((file_format, *stated)).encode()).hexdigest()
-    attempt, in_file = collecting([]), table.file_header
-    plain = describe(table, with_sidecars=False)
+    in_file = table.file_header
     rates = (
         attempt(lambda: in_file.sampling_rate_hz, NAN),
         attempt(lambda: sampling_rate(plain), NAN),
@@ -444,9 +436,7 @@ def _layout(table: Table, file_format: str, columns: Sequence[SurveyedColumn]) -
     return Layout(
         digest[:_FINGERPRINT_DIGITS],
         file_format,
-        names
-        if is_response
-        else tuple(f"{c.name} [{c.unit}]" if c.unit else c.name for c in columns),
+        names,
         attempt(lambda: in_file.hanger, None),
         any(rate > 0 for rate in rates),
         table.day_order,

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +18,10 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read.base import Format, at_once
-from shm.read.header import (
-    KEYS,
-    Entry,
-    entries_of,
-    is_measured,
-    known_values,
-    stated_entries,
-)
+from shm.read.header import KEYS, Entry, entries_of, known_values
 from shm.read.limits import guarded, refuse_large, refuse_many_samples
 from shm.read.logger_words import name_and_unit
-from shm.read.table import Column, Role, Table
+from shm.read.table import Column, Table
 from shm.values import NAN, FloatArray
 
 NAME = "SEP005"
@@ -126,7 +120,7 @@ def _columns(channel: Any, path: Path) -> list[Column]:
     missing += ["fs or time"] if channel.get("fs") is None and channel.get("time") is None else []
     if missing:
         raise BadInput(f"it has no {missing[0]}.", file=path, channel=name, remedy=_REMEDY)
-    unit = name_and_unit(f"x [{channel['unit_str']}]")
+    _, unit = name_and_unit(f"x [{channel['unit_str']}]")
     fs, timed = channel.get("fs"), channel.get("time") is not None
     try:
         values = np.asarray(channel["data"], float)
@@ -143,11 +137,10 @@ def _columns(channel: Any, path: Path) -> list[Column]:
     if len(times) != len(values):
         what = f"its data have {len(values)} values, its time {len(times)}."
         raise BadInput(what, file=path, channel=name, remedy="Give one time for each value.")
-    role: Role = "channel" if is_measured(name, unit[1]) else "other"
-    stated = dict(stated_entries(name, unit[1], path))
-    stated |= {key: Entry(channel[key], path) for key in _OF_CHANNEL if key in channel}
     facts = entries_of({"sampling_rate_hz": fs}, path)
-    found = [Column(name, len(values), values.copy, unit[1], role, stated, facts, rate, label=name)]
+    column = Column.of_logger(name, unit, values, path, facts=facts, rate_hz=rate, label=name)
+    stated = {key: Entry(channel[key], path) for key in _OF_CHANNEL if key in channel}
+    found = [replace(column, stated={**column.stated, **stated})]
     if timed:
         found.append(Column(f"time of {name}", len(times), times.copy, "s", "times"))
     return found

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import json
 import os
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -30,7 +29,7 @@ from shm.documents import format_time, key_meant
 from shm.errors import BadInput
 from shm.read.atomic import replace_text
 from shm.read.base import PeekChannel
-from shm.read.content import unreadable
+from shm.read.content import read_toml
 from shm.read.header import (
     CHANNEL_KEYS,
     KEYS,
@@ -111,20 +110,11 @@ def _entries(table: dict[str, Any], sidecar: Path) -> dict[str, Entry]:
 def sidecar_document(path: Path) -> dict[str, Any]:
     """Return the content of a file's sidecar; empty without a sidecar."""
     sidecar = sidecar_path(path)
-    return _document(sidecar) if sidecar != path and sidecar.is_file() else {}
-
-
-def _document(sidecar: Path) -> dict[str, Any]:
+    if sidecar == path or not sidecar.is_file():
+        return {}
     _refuse_link_outside(sidecar)
-    try:
-        refuse_long_header(sidecar.stat().st_size, sidecar)
-        return tomllib.loads(sidecar.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise unreadable(sidecar, error) from error
-    except (ValueError, RecursionError) as error:
-        raise BadInput(
-            f"not a readable TOML file: {error}.", file=sidecar, remedy="Correct the sidecar."
-        ) from error
+    refuse_long_header(sidecar.stat().st_size, sidecar)
+    return read_toml(sidecar, "Correct the sidecar.")
 
 
 def _refuse_link_outside(sidecar: Path) -> None:

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from shm.errors import BadInput
 from shm.read import logger_words as words
-from shm.read.header import Entry, Header
+from shm.read.header import Entry, Header, is_measured, stated_entries
 from shm.read.stamps import DayOrder, PossibleTime
 from shm.read.time_axis import REMEDY, Refusal
 from shm.values import NAN
@@ -47,6 +47,15 @@ class Column:
     label: str = ""
     is_complex: bool = False
     may_be_chosen: bool = True
+
+    @classmethod
+    def of_logger(
+        cls, name: str, unit: str, values: Any, path: Path, line: int | None = None, **more: Any
+    ) -> Column:
+        """Return a column of values, a channel where name and unit say what it measures."""
+        role: Role = "channel" if is_measured(name, unit) else "other"
+        stated = stated_entries(name, unit, path, line)
+        return cls(name, len(values), lambda: values, unit, role, stated, **more)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,4 +138,4 @@ def is_raw(column: Column, header: Header) -> bool:
     """Return whether nobody says what a recorder's count, or its full scale, is worth."""
     if column.name not in header.channels:
         return column.unit in RAW_UNITS
-    return column.unit in RAW_UNITS and math.isnan(header.calibration(column.name))
+    return column.unit in RAW_UNITS and math.isnan(header.number("calibration", column.name))

@@ -16,6 +16,7 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read.arrays import Arrays, Variable, attributes_of, unique_names
+from shm.read.extras import import_extra
 from shm.read.limits import guarded, refuse_large
 
 _MAGIC = b"TDSm"
@@ -24,29 +25,16 @@ _MOST_CHANNELS = 2000  # judgement: a hundred times what a recording has
 
 @contextmanager
 def opened(path: Path) -> Iterator[Arrays]:
-    tdms_file = _library(path)
+    library = import_extra("nptdms", path)
+    log = import_extra("nptdms.log", path)
+    log.log_manager.set_level(logging.CRITICAL)  # it writes to stderr what we refuse in words
     # As a stream, so that no index file beside it is opened.
     with path.open("rb") as stream:
         with guarded(path):
-            file = tdms_file.open(stream)
+            file = library.TdmsFile.open(stream)
             _refuse_cut_off(file, path)
             arrays = _arrays(file, path)
         yield arrays
-
-
-def _library(path: Path) -> Any:
-    """Return the class that opens files, of npTDMS, which is LGPL and therefore an extra."""
-    try:
-        from nptdms import TdmsFile
-        from nptdms.log import log_manager
-    except ImportError:
-        raise BadInput(
-            "TDMS needs the extra `tdms`, which is not installed.",
-            file=path,
-            remedy="Install it (pip install 'shm[tdms]'), or export as CSV or UFF.",
-        ) from None
-    log_manager.set_level(logging.CRITICAL)  # it writes to stderr what we refuse in words
-    return TdmsFile
 
 
 def _refuse_cut_off(file: Any, path: Path) -> None:

@@ -311,53 +311,54 @@ def _write(described: Recording | FrequencyResponse, path: Path) -> None:
     replace_file(path, lambda temporary: save(temporary, sets))
 
 
+_EACH = {
+    "type": 58, "id2": "hammer test of a hanger", "id4": "NONE", "ref_node": 0, "ref_dir": 0,
+    "abscissa_spacing": _EVEN,
+}  # fmt: skip
+_OVER_TIME = {
+    "func_type": TIME_RESPONSE, "ord_data_type": _DOUBLE, "abscissa_spec_data_type": _TIME,
+    "abscissa_axis_lab": "Time", "abscissa_axis_units_lab": "s", "orddenom_spec_data_type": 0,
+}  # fmt: skip
+_OVER_FREQUENCY = {
+    "func_type": FREQUENCY_RESPONSE, "abscissa_spec_data_type": _FREQUENCY,
+    "abscissa_axis_lab": "Frequency", "abscissa_axis_units_lab": "Hz",
+    "orddenom_spec_data_type": _CODES["force"], "orddenom_axis_lab": "Force",
+    "orddenom_axis_units_lab": SI["force"],
+}  # fmt: skip
+_SHARE = {
+    "func_type": COHERENCE, "ordinate_spec_data_type": 0, "ordinate_axis_units_lab": "NONE",
+}  # fmt: skip
+
+
 def _sets_of_record(recording: Recording) -> list[dict[str, Any]]:
     times = np.arange(recording.samples) / recording.sampling_rate_hz
-    sets = _node_set(recording.channels)
-    for channel, common in zip(
-        recording.channels, _common(recording, recording.channels), strict=True
-    ):
-        measured = {
-            "func_type": TIME_RESPONSE,
-            "ord_data_type": _DOUBLE,
-            "abscissa_spec_data_type": _TIME,
-            "abscissa_axis_lab": "Time",
-            "abscissa_axis_units_lab": "s",
-            "ordinate_spec_data_type": _CODES[channel.quantity],
-            "ordinate_axis_lab": channel.quantity.title(),
-            "ordinate_axis_units_lab": SI[channel.quantity],
-            "orddenom_spec_data_type": 0,
-            "x": times,
-            "data": channel.values.copy(),
-        }
-        sets.append({**common, **measured})
-    return sets
+    channels, common = recording.channels, _common(recording, recording.channels)
+    return [
+        *_node_set(channels),
+        *(
+            {**each, **_OVER_TIME, **_measured(c.quantity), "x": times, "data": c.values.copy()}
+            for c, each in zip(channels, common, strict=True)
+        ),
+    ]
 
 
 def _sets_of_response(response: FrequencyResponse) -> list[dict[str, Any]]:
     sets = _node_set(response.points)
     step = f" {_STEP}={float(response.frequency_hz[1] - response.frequency_hz[0])}"
-    for row, common in enumerate(_common(response, response.points, step)):
-        measured = {
-            **common,
-            "func_type": FREQUENCY_RESPONSE,
-            "abscissa_spec_data_type": _FREQUENCY,
-            "abscissa_axis_lab": "Frequency",
-            "abscissa_axis_units_lab": "Hz",
-            "ordinate_spec_data_type": _CODES["acceleration"],
-            "ordinate_axis_lab": "Acceleration",
-            "ordinate_axis_units_lab": SI["acceleration"],
-            "orddenom_spec_data_type": _CODES["force"],
-            "orddenom_axis_lab": "Force",
-            "orddenom_axis_units_lab": SI["force"],
-            "x": response.frequency_hz,
-        }
-        sets.append({**measured, "data": response.accelerance[row]})
+    over = {**_OVER_FREQUENCY, **_measured("acceleration"), "x": response.frequency_hz}
+    for row, each in enumerate(_common(response, response.points, step)):
+        sets.append({**each, **over, "data": response.accelerance[row]})
         if response.coherence is not None:
-            share = {"func_type": COHERENCE, "ordinate_axis_units_lab": "NONE"}
-            data = response.coherence[row].copy()
-            sets.append({**measured, **share, "ordinate_spec_data_type": 0, "data": data})
+            sets.append({**each, **over, **_SHARE, "data": response.coherence[row].copy()})
     return sets
+
+
+def _measured(quantity: Quantity) -> dict[str, Any]:
+    return {
+        "ordinate_spec_data_type": _CODES[quantity],
+        "ordinate_axis_lab": quantity.title(),
+        "ordinate_axis_units_lab": SI[quantity],
+    }
 
 
 def _common(
@@ -368,20 +369,14 @@ def _common(
     """Return what the sets of channels or points begin with."""
     time = described.time
     date = f"{time.astimezone(UTC):%d-%b-%y %H:%M:%S}" if time else "NONE"
+    stated = {**_EACH, "id3": date, "id5": f"{_MARK}format=1{more}"}
     return [
         {
-            "type": 58,
+            **stated,
             "id1": point.name,
-            "id2": "hammer test of a hanger",
-            "id3": date,
-            "id4": "NONE",
-            "id5": f"{_MARK}format=1{more}",
             "rsp_ent_name": point.name[:10],
             "rsp_node": node,
             "rsp_dir": _DIRECTIONS[point.plane],
-            "ref_node": 0,
-            "ref_dir": 0,
-            "abscissa_spacing": _EVEN,
         }
         for point, node in zip(points, _nodes(points), strict=True)
     ]

@@ -48,6 +48,7 @@ from shm.identify.estimation import (  # noqa: E402
     amplitude_dependence,
     courses,
     postprocess,
+    spread,
     ssi,
 )
 from shm.identify.measuring import screening  # noqa: E402
@@ -60,7 +61,7 @@ from tests.worlds import struck_bar  # noqa: E402
 CONSTANTS: Mapping[str, tuple[Any, str, float] | None] = {
     "all as they are": None,
     "the error of the law": (amplitude_dependence, "_LAW_ERROR", 0.0),
-    "others' shifts when unsure": (amplitude_dependence, "_BY_CHANCE", -1.0),
+    "others' shifts when unsure": (spread, "_BY_CHANCE", -1.0),
     "the overlap of stretches": (amplitude_dependence, "OVERLAP", 1.0),
     "half as sure a phase": (courses, "_LEAST_RATIO", 4.0),
     "stretches twice as long": (courses, "_STRETCH_SECONDS", 1.0),

@@ -22,7 +22,8 @@ import scipy.io.wavfile
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 from pymseed import MS3TraceList, nslc2sourceid
 
-from shm.read import FORMATS, Format
+from shm.errors import BadInput
+from shm.read import FORMATS, Format, read
 from shm.read import write as write_ours
 from shm.read.array_reading import facts_about
 from shm.read.base import PeekChannel
@@ -46,6 +47,29 @@ def write(described: Recording | FrequencyResponse, path: Path) -> None:
     if known and all(each.write is None for each in known):
         pytest.fail(f"shm only reads {path.suffix}: add a writer to _WRITERS of {__file__}.")
     write_ours(described, path)
+
+
+def recorded(path: Path) -> Recording:
+    """Return the time record that a file holds."""
+    found = read(path)
+    assert isinstance(found, Recording)
+    return found
+
+
+def responded(path: Path) -> FrequencyResponse:
+    """Return the frequency responses that a file holds."""
+    found = read(path)
+    assert isinstance(found, FrequencyResponse)
+    return found
+
+
+def refused(path: Path, words: str, *verbs: Callable[[Path], object]) -> BadInput:
+    """Return the refusal of a file by each of the verbs, `read` by default, in these words."""
+    for verb in verbs or (read,):
+        with pytest.raises(BadInput, match=words) as caught:
+            verb(path)
+        assert caught.value.remedy
+    return caught.value
 
 
 NUMBERED = ("WAV", "miniSEED", "Campbell")

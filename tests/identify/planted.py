@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.identify import IdentifyOptions
+from shm.identify.contract import Finding, FoundMode, Poles
 from shm.identify.measuring.setups import measure_recordings
 from shm.identify.quality import Inspection, assess, tones
 from shm.values import FloatArray, QualityCheck, Recording
@@ -30,6 +31,17 @@ def changed(
             change(values)
         channels.append(replace(channel, values=values))
     return replace(record, channels=tuple(channels))
+
+
+def with_samples(name: str, where: slice, value: float, record: Recording = SOUND) -> Recording:
+    """Return the record with some samples of a channel set to a value."""
+    return changed(name, lambda values: values.__setitem__(where, value), record)
+
+
+def none_found(*modes: FoundMode) -> Finding:
+    """Return a finding of these modes and no pole."""
+    none = np.empty(0)
+    return Finding(modes, (), Poles(none, none, none, none.astype(bool)))
 
 
 def inspection(record: Recording, options: IdentifyOptions = OPTIONS) -> Inspection:

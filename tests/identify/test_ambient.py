@@ -11,6 +11,7 @@ from shm.errors import NotIdentifiable
 from shm.identify import Identification, IdentifyOptions, identify
 from shm.identify.measuring.ambient import ambient_measurement
 from shm.values import Recording
+from tests.identify.planted import with_samples
 from tests.identify.signals import Planted, Sensor, as_recording, response
 
 RATE_HZ = 128.0
@@ -24,11 +25,14 @@ MODES = (
 SENSORS = (Sensor("transverse", 2.0), Sensor("longitudinal", 2.0), Sensor("transverse", 3.5))
 
 
-def _record(seconds: float = 900.0, seed: int = 0, noise: float = 0.02) -> Recording:
+def record_of(
+    modes: tuple[Planted, ...] = MODES, seconds: float = 900.0, seed: int = 0, noise: float = 0.02
+) -> Recording:
+    """Return a record of modes that wind moves, each by a noise of its own."""
     rng = np.random.default_rng(seed)
     samples = round(seconds * RATE_HZ)
     total = np.zeros((3, samples))
-    for mode in MODES:
+    for mode in modes:
         wind = rng.standard_normal(samples)
         total += response([mode], wind, RATE_HZ) - np.outer(mode.shape, wind)
     total += noise * np.std(total) * rng.standard_normal(total.shape)
@@ -36,15 +40,7 @@ def _record(seconds: float = 900.0, seed: int = 0, noise: float = 0.02) -> Recor
     return replace(record, channels=record.channels[1:])
 
 
-RECORD = _record()
-
-
-def _with(record: Recording, row: int, first: int, last: int, value: float) -> Recording:
-    channels = list(record.channels)
-    values = channels[row].values.copy()
-    values[first:last] = value
-    channels[row] = replace(channels[row], values=values)
-    return replace(record, channels=tuple(channels))
+RECORD = record_of()
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +58,7 @@ def test_what_needs_a_hit_is_unknown(identified: Identification) -> None:
 
 def test_a_dead_or_mostly_unknown_channel_is_dropped() -> None:
     for value, reason in ((0.3, "never changes"), (np.nan, "not-a-number")):
-        record = _with(RECORD, 2, 0, RECORD.samples, value)
+        record = with_samples("acc_3", slice(None), value, RECORD)
         measurement = ambient_measurement([record], OPTIONS)
         assert [point.name for point in measurement.points] == ["acc_1", "acc_2"]
         assert reason in measurement.dropped[0].reason
@@ -70,7 +66,7 @@ def test_a_dead_or_mostly_unknown_channel_is_dropped() -> None:
 
 def test_a_short_record_is_not_identifiable_and_says_how_long_it_must_be() -> None:
     with pytest.raises(NotIdentifiable, match="too short") as caught:
-        identify([_record(20.0)], OPTIONS, test_id="t")
+        identify([record_of(seconds=20.0)], OPTIONS, test_id="t")
     assert "minutes" in caught.value.remedy
 
 
@@ -78,7 +74,7 @@ def test_set_ups_are_joined_by_the_sensor_that_they_share() -> None:
     """Sensors 1 and 2, then 1 and 3: three points of one shape."""
     parts = [
         replace(record, channels=(record.channels[0], record.channels[row]))
-        for row, record in ((1, RECORD), (2, _record(seed=1)))
+        for row, record in ((1, RECORD), (2, record_of(seed=1)))
     ]
     result = identify(parts, OPTIONS, test_id="t")
     assert any("sensors that they share" in note for note in result.notes)

@@ -7,30 +7,19 @@ from dataclasses import replace
 import numpy as np
 
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.identify.contract import Finding, FoundMode, Poles
+from shm.identify.contract import FoundMode
 from shm.identify.measuring.ambient import ambient_measurement
 from shm.identify.quality import Inspection
 from shm.identify.quality.of_ambient import ROWS
 from shm.values import Hanger, QualityCheck, Recording
-from tests.identify.signals import Planted, as_recording, response
-from tests.identify.test_ambient import OPTIONS, RATE_HZ, RECORD, SENSORS
+from tests.identify.planted import none_found
+from tests.identify.signals import Planted
+from tests.identify.test_ambient import OPTIONS, RECORD, record_of
 
 _, _HEIGHT = ROWS
 
 DECK = Hanger.without_model(100, "Deck")
 WIDE = (Planted(5.0, 0.02, (1.0, 0.3, 0.6)), Planted(11.0, 0.02, (0.5, 0.2, -1.0)))
-
-
-def _moved(modes: tuple[Planted, ...], seconds: float, noise: float = 0.02) -> Recording:
-    rng = np.random.default_rng(3)
-    samples = round(seconds * RATE_HZ)
-    total = np.zeros((3, samples))
-    for mode in modes:
-        wind = rng.standard_normal(samples)
-        total += response([mode], wind, RATE_HZ) - np.outer(mode.shape, wind)
-    total += noise * np.std(total) * rng.standard_normal(total.shape)
-    record = as_recording(np.zeros(samples), total, RATE_HZ, SENSORS)
-    return replace(record, channels=record.channels[1:])
 
 
 def _with_truck(record: Recording) -> Recording:
@@ -67,7 +56,7 @@ def test_a_truck_is_set_apart_and_told() -> None:
 def test_wide_modes_are_kept_with_their_deviations() -> None:
     """Of 2 % damping and six minutes: sqrt(z / (w T)) is 0.0013 at 5 Hz, and SSI has more."""
     options = IdentifyOptions(2.0, 40.0)
-    result = identify([_moved(WIDE, 400.0)], options, test_id="t", hanger=DECK)
+    result = identify([record_of(WIDE, 400.0, seed=3)], options, test_id="t", hanger=DECK)
     modes = {round(mode.frequency_hz): mode for mode in result.test.modes}
     for planted in WIDE:
         mode = modes[round(planted.frequency_hz)]
@@ -76,9 +65,8 @@ def test_wide_modes_are_kept_with_their_deviations() -> None:
 
 
 def _inspection(known_hz: tuple[float, ...]) -> Inspection:
-    nothing = np.empty(0)
-    modes = tuple(FoundMode(f, 0.01, 0.003, 1e-4, np.ones(3), nothing) for f in known_hz)
-    finding = Finding(modes, (), Poles(nothing, nothing, nothing, nothing.astype(bool)))
+    modes = (FoundMode(f, 0.01, 0.003, 1e-4, np.ones(3), np.empty(0)) for f in known_hz)
+    finding = none_found(*modes)
     return Inspection([RECORD], [ambient_measurement([RECORD], OPTIONS)], OPTIONS, (), finding)
 
 

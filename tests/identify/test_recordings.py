@@ -11,6 +11,7 @@ from shm.errors import BadInput, NotIdentifiable
 from shm.identify import Dropped, IdentifyOptions, identify
 from shm.identify.measuring.setups import measure_recordings, measure_set_ups
 from shm.values import Channel, Recording
+from tests.identify.planted import with_samples
 from tests.identify.signals import BIAXIAL, Sensor, half_sine, hanger_modes, recording
 
 OPTIONS = IdentifyOptions(2.0, 50.0)
@@ -18,24 +19,12 @@ RECORD = recording(hanger_modes(), noise=0.01)
 SLOT = 8 * 1024
 
 
-def _with(record: Recording, name: str, **spans: float) -> Recording:
-    """Return the record with samples `first` to `last` of a channel set to `value`."""
-    first, last, value = (int(spans["first"]), int(spans["last"]), spans["value"])
-    channels = []
-    for channel in record.channels:
-        values = channel.values.copy()
-        if channel.name == name:
-            values[first:last] = value
-        channels.append(replace(channel, values=values))
-    return replace(record, channels=tuple(channels))
-
-
 def _channels(record: Recording, *channels: Channel) -> Recording:
     return replace(record, channels=channels)
 
 
 def test_a_not_a_number_sample_of_the_force_drops_its_hit_alone() -> None:
-    record = _with(RECORD, "force", first=SLOT + 4000, last=SLOT + 4001, value=np.nan)
+    record = with_samples("force", slice(SLOT + 4000, SLOT + 4001), np.nan, RECORD)
     measurement = measure_recordings([record], OPTIONS)[0]
     assert [hit.used for hit in measurement.hits] == [True, False, True, True, True]
     assert measurement.hits[1].reason == "not-a-number samples"
@@ -45,7 +34,7 @@ def test_a_not_a_number_sample_of_the_force_drops_its_hit_alone() -> None:
 
 @pytest.mark.parametrize("late", [4000, 500])
 def test_a_gap_of_one_channel_ends_the_ring_down_or_drops_its_hit(late: int) -> None:
-    record = _with(RECORD, "acc_2", first=SLOT + late, last=SLOT + late + 1, value=np.nan)
+    record = with_samples("acc_2", slice(SLOT + late, SLOT + late + 1), np.nan, RECORD)
     measurement = measure_recordings([record], OPTIONS)[0]
     whole = late == 4000
     assert [hit.used for hit in measurement.hits] == [True, whole, True, True, True]
@@ -55,53 +44,55 @@ def test_a_gap_of_one_channel_ends_the_ring_down_or_drops_its_hit(late: int) -> 
 
 
 def test_a_channel_that_is_mostly_not_a_number_is_dropped_instead_of_the_hits() -> None:
-    record = _with(RECORD, "acc_1", first=0, last=4 * SLOT, value=np.nan)
+    record = with_samples("acc_1", slice(0, 4 * SLOT), np.nan, RECORD)
     measurement = measure_recordings([record], OPTIONS)[0]
     assert [point.name for point in measurement.points] == ["acc_2"]
     assert sum(hit.used for hit in measurement.hits) == 5
     assert measurement.dropped[0].what == "channel acc_1"
 
 
-def test_a_dead_channel_is_dropped() -> None:
-    record = _with(RECORD, "acc_2", first=0, last=5 * SLOT, value=0.07)
+@pytest.mark.parametrize(
+    ("record", "reason"),
+    [
+        (with_samples("acc_2", slice(None), 0.07, RECORD), "never changes"),
+        (recording(hanger_modes(), (BIAXIAL[0], Sensor(None, 2.0))), "plane"),
+    ],
+)
+def test_a_dead_channel_and_one_without_plane_among_others_are_dropped(
+    record: Recording, reason: str
+) -> None:
     (dropped,) = measure_recordings([record], OPTIONS)[0].dropped
-    assert (dropped.what, "never changes" in dropped.reason) == ("channel acc_2", True)
-
-
-def test_a_channel_without_plane_among_others_with_is_dropped() -> None:
-    record = recording(hanger_modes(), (BIAXIAL[0], Sensor(None, 2.0)))
-    (dropped,) = measure_recordings([record], OPTIONS)[0].dropped
-    assert (dropped.what, "plane" in dropped.reason) == ("channel acc_2", True)
+    assert dropped.what == "channel acc_2"
+    assert reason in dropped.reason
 
 
 def test_no_usable_hit_is_not_identifiable_and_says_why() -> None:
-    record = _with(RECORD, "acc_1", first=0, last=5 * SLOT, value=np.nan)
-    record = _with(record, "acc_2", first=0, last=5 * SLOT, value=np.nan)
+    record = with_samples("acc_1", slice(0, 5 * SLOT), np.nan, RECORD)
+    record = with_samples("acc_2", slice(0, 5 * SLOT), np.nan, record)
     with pytest.raises(NotIdentifiable, match="not-a-number"):
         measure_recordings([record], OPTIONS)[0]
-    silent = _with(RECORD, "force", first=0, last=5 * SLOT, value=0.0)
+    silent = with_samples("force", slice(0, 5 * SLOT), 0.0, RECORD)
     with pytest.raises(NotIdentifiable, match="no hammer hit") as caught:
         measure_recordings([silent], OPTIONS)[0]
     assert (caught.value.file, caught.value.channel) == ("test.csv", "force")
     assert caught.value.remedy
 
 
-def test_a_record_without_force_among_others_or_without_acceleration_is_refused() -> None:
-    with pytest.raises(BadInput, match="no force channel") as caught:
-        measure_set_ups([RECORD, _channels(RECORD, *RECORD.accelerations)], OPTIONS)
-    assert "N for the hammer" in caught.value.remedy
-    with pytest.raises(BadInput, match="no acceleration channel"):
-        measure_set_ups([_channels(RECORD, RECORD.channels[0])], OPTIONS)
-
-
-def test_a_record_too_slow_for_the_band_is_refused() -> None:
-    with pytest.raises(BadInput, match="too slow"):
-        measure_set_ups([RECORD], IdentifyOptions(2.0, 600.0))
-
-
-def test_records_of_different_sampling_rates_are_refused() -> None:
-    with pytest.raises(BadInput, match="sampling rate differs"):
-        measure_set_ups([RECORD, recording(hanger_modes(), rate_hz=2048.0)], OPTIONS)
+@pytest.mark.parametrize(
+    ("records", "high_hz", "words"),
+    [
+        ([RECORD, _channels(RECORD, *RECORD.accelerations)], 50.0, "no force channel"),
+        ([_channels(RECORD, RECORD.channels[0])], 50.0, "no acceleration channel"),
+        ([RECORD], 600.0, "too slow"),
+        ([RECORD, recording(hanger_modes(), rate_hz=2048.0)], 50.0, "sampling rate differs"),
+    ],
+)
+def test_records_that_cannot_be_used_together_are_refused(
+    records: list[Recording], high_hz: float, words: str
+) -> None:
+    with pytest.raises(BadInput, match=words) as caught:
+        measure_set_ups(records, IdentifyOptions(2.0, high_hz))
+    assert "channel" not in words or "N for the hammer" in caught.value.remedy
 
 
 def test_rates_read_off_rounded_times_are_one_rate() -> None:

@@ -9,13 +9,14 @@ import pytest
 
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.identify.contract import Finding, FoundMode, Poles
+from shm.identify.contract import FoundMode
 from shm.identify.quality import Inspection
 from shm.identify.quality.of_sensors import DIRECTIONS, PLACES
 from shm.simulate import HammerPlan, HangerState
 from shm.values import NAN, PLANES, Mode, QualityCheck, Recording, ResponsePoint, ShapePoint
 from tests.helpers.beam_shapes import mode_shape
 from tests.helpers.hangers import HANGER_3
+from tests.identify.planted import none_found
 from tests.worlds.simulated.hammer import hammer_test
 
 HANGER = replace(HANGER_3, plate=None)
@@ -137,8 +138,7 @@ def turned(degrees: float, amplitude: float = 1.0) -> list[FoundMode]:
 
 @pytest.mark.parametrize(("degrees", "verdict"), [(3, "good"), (-30, "warning"), (88, "refused")])
 def test_the_angle_between_places_decides(degrees: float, verdict: str) -> None:
-    none = np.empty(0)
-    finding = Finding(tuple(turned(degrees)), (), Poles(none, none, none, none.astype(bool)))
+    finding = none_found(*turned(degrees))
     check = DIRECTIONS.check(
         Inspection([], [], IdentifyOptions(), finding=finding, points=TWO_PLACES)
     )

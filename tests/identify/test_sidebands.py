@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.identify.contract import Finding, FoundMode, Poles
+from shm.identify.contract import FoundMode
 from shm.identify.estimation.postprocess import without_sidebands
+from tests.identify.planted import none_found
 
-NOTHING = Poles(np.empty(0), np.empty(0), np.empty(0), np.empty(0, dtype=bool))
 RATE = 0.8  # of decay, in rad/s
 ALONG, ACROSS = np.array([1.0, 0.6, 0.02]), np.array([0.1, -0.5, 1.0])
 
@@ -25,7 +25,7 @@ def _mode(frequency_hz: float, share: float = 1.0, rate: float = RATE) -> FoundM
 
 
 def _kept(*modes: FoundMode) -> list[float]:
-    found = without_sidebands(Finding(modes, (), NOTHING))
+    found = without_sidebands(none_found(*modes))
     assert len(found.modes) + len(found.dropped) == len(modes)
     return [mode.frequency_hz for mode in found.modes]
 
@@ -33,7 +33,7 @@ def _kept(*modes: FoundMode) -> list[float]:
 def test_two_equal_lines_about_a_mode_are_its_sidebands() -> None:
     lines = _mode(28.5, 0.1), _mode(30.0), _mode(31.5, 0.1)
     assert _kept(*lines) == [30.0]
-    (first, _) = without_sidebands(Finding(lines, (), NOTHING)).dropped
+    (first, _) = without_sidebands(none_found(*lines)).dropped
     assert "sideband of the mode at 30 Hz" in first.reason
 
 

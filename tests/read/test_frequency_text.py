@@ -11,6 +11,7 @@ import pytest
 from shm.errors import BadInput
 from shm.read import peek, read, sidecar_path, write
 from shm.values import FrequencyResponse, Recording
+from tests.helpers.written import recorded, refused, responded
 
 LINES = 40
 VALUES = np.arange(LINES) - 1j * np.arange(LINES)[::-1]
@@ -31,9 +32,7 @@ def rows(columns: int = 2, step: float = 0.5, first: float = 0.0, mark: str = ",
 
 def response_in(path: Path, text: str) -> FrequencyResponse:
     path.write_bytes(text.encode("latin-1"))
-    found = read(path)
-    assert isinstance(found, FrequencyResponse)
-    return found
+    return responded(path)
 
 
 def test_an_analysers_export_is_read_through_its_free_lines(tmp_path: Path) -> None:
@@ -127,8 +126,7 @@ def test_a_point_can_be_left_out(response: FrequencyResponse, tmp_path: Path) ->
         write(response, path)
         with sidecar_path(path).open("w") as sidecar:
             sidecar.write("[channel.low]\nleave_out = true\n")
-        found = read(path)
-        assert isinstance(found, FrequencyResponse)
+        found = responded(path)
         assert [point.name for point in found.points] == ["high"]
         np.testing.assert_allclose(found.accelerance, response.accelerance[1:], rtol=1e-9)
 
@@ -146,8 +144,7 @@ def test_gzipped_text_is_read_with_the_sidecar_of_its_plain_name(
     packed.write_bytes(gzip.compress(plain.read_bytes()))
     plain.unlink()
     sidecar_path(plain).write_text("hanger = 11\n")
-    found = read(packed)
-    assert isinstance(found, Recording)
+    found = recorded(packed)
     assert (found.hanger, found.source) == (11, str(packed))
     np.testing.assert_allclose(found.channels[0].values, recording.channels[0].values)
     assert peek(packed).problems == ()
@@ -174,7 +171,4 @@ def test_gzipped_files_that_cannot_be_used_are_refused(
     tmp_path: Path, name: str, content: bytes, words: str
 ) -> None:
     (tmp_path / name).write_bytes(content)
-    for verb in (read, peek):
-        with pytest.raises(BadInput, match=words) as refusal:
-            verb(tmp_path / name)
-        assert refusal.value.remedy
+    refused(tmp_path / name, words, read, peek)

@@ -9,24 +9,18 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput
-from shm.read import peek, read
+from shm.read import peek
 from shm.read.logger_words import hanger_numbered, name_and_unit, sensitivity_of
 from shm.read.registry import survey
 from shm.read.stamps import moment, stamp_of
-from shm.values import Recording
 from tests.helpers.logger_texts import ACC, FORCE, PLAIN, RATE, SHAPES, german, rows
+from tests.helpers.written import recorded, refused
 
 
 def written(folder: Path, content: str | bytes, name: str = "export.csv") -> Path:
     path = folder / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return path
-
-
-def recorded(path: Path) -> Recording:
-    found = read(path)
-    assert isinstance(found, Recording)
-    return found
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -84,9 +78,7 @@ def test_preamble_and_name_say_hanger_time_temperature_and_plane(tmp_path: Path)
     ],
 )
 def test_what_must_not_be_guessed_is_refused(tmp_path: Path, text: str, words: str) -> None:
-    with pytest.raises(BadInput, match=words) as refusal:
-        read(written(tmp_path, text))
-    assert refusal.value.remedy
+    refused(written(tmp_path, text), words)
 
 
 @pytest.mark.parametrize(
@@ -123,8 +115,7 @@ def test_what_c_libraries_write_for_no_number_are_missing_samples(tmp_path: Path
         lines[place] = f"{place / RATE:.3f},{FORCE[place]:.3f},{token}"
     path = tmp_path / "test.csv"
     path.write_text("Time [s],Force [N],Acc [m/s2]\n" + "\n".join(lines) + "\n")
-    found = read(path)
-    assert isinstance(found, Recording)
+    found = recorded(path)
     assert np.flatnonzero(np.isnan(found.channels[1].values)).tolist() == [*range(50, 55)]
 
 

@@ -16,6 +16,7 @@ from shm.read.header import CHANNEL_KEYS, KEYS
 from shm.read.limits import Limits
 from shm.read.logger_words import unit_of
 from shm.values import FrequencyResponse, Recording
+from tests.helpers.written import recorded
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text(encoding="utf-8")
 
@@ -45,8 +46,7 @@ def test_the_sidecars_are_read(tmp_path: Path, recording: Recording) -> None:
     path.write_text(head + "1,2,3,4\n" * 20)
     sidecar_path(path).write_text(whole)
     assert peek(path).problems == ()
-    found = read(path)
-    assert isinstance(found, Recording)
+    found = recorded(path)
     assert found.hanger == 3
     assert [c.name for c in found.channels] == ["force", "acc_1", "acc_2"]
     assert [c.plane for c in found.channels[1:]] == ["transverse", "longitudinal"]

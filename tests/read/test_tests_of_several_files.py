@@ -16,7 +16,7 @@ from shm.errors import BadInput, UsageError
 from shm.read import bundle, holds_test, peek, peek_test, read, read_test, sidecar_path
 from shm.read.limits import Limits, limited
 from shm.values import Recording
-from tests.helpers.written import write
+from tests.helpers.written import refused, write
 
 SUFFIXES = (".csv", ".uff", ".h5", ".mat", ".tdms", ".npz")
 
@@ -136,9 +136,12 @@ def test_a_faulty_member_is_named(files: list[Path], tmp_path: Path) -> None:
 
 
 def test_a_test_is_not_read_as_one_file(files: list[Path], tmp_path: Path) -> None:
-    for verb in (read, peek):
-        with pytest.raises(BadInput, match="the files of a test, where one file is read"):
-            verb(bundle(files, tmp_path / "test.zip"))
+    refused(
+        bundle(files, tmp_path / "test.zip"),
+        "the files of a test, where one file is read",
+        read,
+        peek,
+    )
 
 
 @pytest.mark.parametrize(
@@ -218,9 +221,7 @@ def test_too_many_members_are_refused(tmp_path: Path) -> None:
 )
 def test_what_is_no_archive_is_refused(tmp_path: Path, content: bytes, words: str) -> None:
     (tmp_path / "test.zip").write_bytes(content)
-    for verb in (read_test, peek_test):
-        with pytest.raises(BadInput, match=words):
-            verb(tmp_path / "test.zip")
+    refused(tmp_path / "test.zip", words, read_test, peek_test)
 
 
 def test_hidden_files_of_systems_are_passed_over_and_folders_opened(tmp_path: Path) -> None:

@@ -32,11 +32,8 @@ from shm.identify.estimation.courses import (
 )
 from shm.identify.estimation.spread import are_sure, widening
 from shm.values import NAN, FloatArray
-from shm.values.modes import MOST_SLOPE, SURE_SDS
+from shm.values.modes import MOST_SLOPE
 
-_TO_ZERO = 0.01
-"""Of a slope: by how much the frequency of small amplitude is off by the law's form at most; 1 % of
-1e-3 is four standard deviations of all else in tests/identify/test_amplitude_dependence.py."""
 _SLOPE_ERROR = 0.05
 """Of a slope: how the law looks in the first instants is carried back from later ones (judgement).
 It is in the slope's standard deviation alone."""
@@ -45,12 +42,8 @@ It is in the slope's standard deviation alone."""
 # identify_ablation.py --seeds 9510:9522, as what is said of other constants
 _LAW_ERROR = 0.2
 """Of the change that is left where ring-downs end: what no law here foretells (judgement)."""
-_SHIFT_ERROR = 0.02
-"""Of a shift: the phase of a stretch is that of its middle, the amplitude is smoothed."""
 _HALVES = (0.1, 0.3, 1.0)
 """Of A_hit: h. Above, it is friction; below, ring-downs end before it shows (judgement)."""
-_ALONE = 1e-3
-"""A shift beyond that of one mode while the others stay: no joint does it. It only widens."""
 _INDEPENDENT = 8.0
 """Values among the phases, at most: what no law here explains is alike in all ring-downs."""
 _UNLIKE = 0.17
@@ -103,8 +96,8 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
     # A joint that slips lowers all frequencies, stretching raises all.
     expected = float(np.median(shifts)) if len(shifts) > 1 else 0.0
     modes = tuple(
-        _unlike(_with_slope(mode, fit, bool(is_sure), expected, usual), index, courses, mode)
-        for index, (mode, fit, is_sure) in enumerate(zip(found.modes, fits, sure, strict=True))
+        _with_slope(mode, fit, bool(is_sure), expected, usual)
+        for mode, fit, is_sure in zip(found.modes, fits, sure, strict=True)
     )
     return replace(found, modes=modes)
 
@@ -118,24 +111,20 @@ def _with_slope(
     """
     slope = (fit.slope, fit.slope_sd) if fit is not None else (NAN, NAN)
     known = replace(mode, amplitude_slope=slope[0], amplitude_slope_sd=slope[1])
+    prior_hz = usual * mode.frequency_hz
     if fit is None or abs(fit.slope) > MOST_SLOPE:
         # A line that is as broad as the frequency moves looks damped by as much.
-        known = replace(known, damping_sd=math.hypot(mode.damping_sd, usual))
-    prior_hz = usual * mode.frequency_hz
-    beyond_hz = max(_ALONE * mode.frequency_hz, SURE_SDS * fit.shift_sd_hz) if fit else math.inf
-    if fit is not None and not usual and abs(fit.shift_hz) > beyond_hz:
-        return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, fit.shift_hz))
-    if fit is None or abs(fit.slope) > MOST_SLOPE:
-        return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, prior_hz))
+        return replace(
+            known,
+            frequency_sd_hz=math.hypot(mode.frequency_sd_hz, prior_hz),
+            damping_sd=math.hypot(mode.damping_sd, usual),
+        )
     # Beside what the other modes shift, a shift that is not sure by itself counts by its share.
     vague = 0.0 if is_sure else fit.shift_sd_hz**2
     share = 1.0 if is_sure else prior_hz**2 / (prior_hz**2 + vague + TINY)
     shift_hz = share * fit.shift_hz + (1 - share) * expected * mode.frequency_hz
     by_phase = math.hypot(
-        math.sqrt(share) * fit.shift_sd_hz,
-        _SHIFT_ERROR * shift_hz,
-        share * _LAW_ERROR * fit.left * mode.frequency_hz,
-        share * _TO_ZERO * fit.slope * mode.frequency_hz,
+        math.sqrt(share) * fit.shift_sd_hz, share * _LAW_ERROR * fit.left * mode.frequency_hz
     )
     as_found = mode.frequency_sd_hz if math.isnan(mode.damping_sd) else 0.0
     remaining_sd = (1 - share) * mode.frequency_sd_hz
@@ -185,30 +174,6 @@ def _unlike_hz(rows: Sequence[Row]) -> float:
     """Return how far the decay of the amplitudes differs from the pole's, in Hz."""
     off = [math.log(size[-1] / size[0]) / (time_s[-1] - time_s[0]) for time_s, _, _, size in rows]
     return abs(float(np.median(off))) / (2 * math.pi)
-
-
-def _unlike(
-    mode: FoundMode, index: int, courses: Sequence[RingDownCourse], as_found: FoundMode
-) -> FoundMode:
-    """Widen the mode's intervals where its amplitudes decay otherwise than its pole does.
-
-    A clipped beginning causes that, for example.
-    """
-    decay = 2 * math.pi * as_found.frequency_hz * as_found.damping_ratio
-    late = [_from_largest(course, index, decay) for course in courses]
-    seen = [row for course in late if (row := phases_of(course, index, decay)) is not None]
-    off_hz = _unlike_hz(seen) if seen else 0.0
-    return replace(
-        mode,
-        damping_sd=math.hypot(mode.damping_sd, off_hz / mode.frequency_hz),
-        frequency_sd_hz=math.hypot(mode.frequency_sd_hz, _UNLIKE * off_hz),
-    )
-
-
-def _from_largest(course: RingDownCourse, index: int, decay: float) -> RingDownCourse:
-    now = np.abs(course.motion[:, index]) * np.exp(-decay * course.middle_s)
-    first = int(np.argmax(now[: max(1, len(now) // 2)]))
-    return RingDownCourse(course.middle_s[first:], course.motion[first:], course.sd[first:])
 
 
 def _averaged(laws: Sequence[_Fit]) -> _Fit | None:

@@ -83,13 +83,3 @@ def remove_delays(poles: PoleSet, late_s: FloatArray) -> PoleSet:
     """Return the poles with the shapes that channels without delays have."""
     turns = np.exp(2j * np.pi * np.outer(late_s, poles.frequency_hz))
     return replace(poles, shapes=poles.shapes * turns)
-
-
-def remove_candidate_delays(candidate: Candidate, late_s: FloatArray) -> Candidate:
-    """Return the candidate with the shapes that channels without delays have."""
-    track = tuple(
-        replace(pole, shape=pole.shape * np.exp(2j * np.pi * pole.frequency_hz * late_s))
-        for pole in candidate.track
-    )
-    orders = {pole.order for pole in candidate.poles}
-    return replace(candidate, track=track, poles=tuple(p for p in track if p.order in orders))

@@ -20,7 +20,7 @@ import numpy as np
 
 from shm.identify.contract import LEAST_HITS, Dropped, Finding, FoundMode, Measurement, Poles
 from shm.identify.estimation.close_pairs import split_close_pairs
-from shm.identify.estimation.delays import delays_s, remove_candidate_delays, remove_delays
+from shm.identify.estimation.delays import delays_s, remove_delays
 from shm.identify.estimation.hankel import STOPPED, Window, hankel, references, windows
 from shm.identify.estimation.poles import PoleSet, diagram, find_again, resolved, stable_candidates
 from shm.identify.estimation.pyoma import poles_of_orders
@@ -220,7 +220,7 @@ def stabilised(
     if late_s is not None:
         sets = [remove_delays(poles, late_s) for poles in sets]
         without_each_hit = [[remove_delays(p, late_s) for p in of] for of in without_each_hit]
-        candidates = [remove_candidate_delays(candidate, late_s) for candidate in candidates]
+        candidates, unstable = stable_candidates(sets, orders, options, gaps=gaps)
     single, doubles = resolved(candidates, seconds)
     again = find_again(single, without_each_hit)
     final = [poles for poles in sets if poles.order in orders]

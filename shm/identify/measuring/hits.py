@@ -92,7 +92,7 @@ def find_pulses(force: FloatArray, sampling_rate_hz: float) -> list[Pulse]:
     peaks = peaks[push[peaks] >= level]
     if not len(peaks):
         return []
-    groups = _grouped(peaks.tolist(), int(GROUP_SECONDS * sampling_rate_hz))
+    groups = grouped(peaks.tolist(), int(GROUP_SECONDS * sampling_rate_hz))
     starts = [_start(push, group[0], noise) for group in groups]
     margin = int(PULSE_SECONDS * sampling_rate_hz) + RINGING_SAMPLES
     stops = [*(start - margin for start in starts[1:]), len(push)]
@@ -125,7 +125,8 @@ def _baseline(signal: FloatArray, sampling_rate_hz: float) -> FloatArray:
     return np.asarray(np.interp(np.arange(len(signal)), knots, [ends[0], *levels, ends[1]]))
 
 
-def _grouped(peaks: list[int], distance: int) -> list[list[int]]:
+def grouped(peaks: list[int], distance: float) -> list[list[int]]:
+    """Return rising samples in groups, each nearer than `distance` to the one before it."""
     groups: list[list[int]] = []
     for peak in peaks:
         if groups and peak - groups[-1][-1] < distance:

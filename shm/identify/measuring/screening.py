@@ -37,6 +37,7 @@ from shm.identify.measuring.signal_faults import (
     MOST_UNLIKE,
     NOT_A_NUMBER,
     OUTLIER,
+    Faults,
     clipped_ends,
     faults_of_channels,
     until_disturbed,
@@ -81,8 +82,8 @@ def screen(records: Sequence[Recording], options: IdentifyOptions) -> Screening:
     chosen = {id(r.accelerations): r.accelerations[rows] for r in ring_downs}
     ring_downs = [replace(r, accelerations=chosen[id(r.accelerations)]) for r in ring_downs]
     reasons = [
-        _hit_fault(ring_down, [names[row] for row in rows], least)
-        for ring_down, names in zip(ring_downs, faults, strict=True)
+        _hit_fault(ring_down, names, least)
+        for ring_down, names in zip(ring_downs, faults[:, rows].tolist(), strict=True)
     ]
     apart = np.full(len(reasons), NAN)
     if records[0].force is not None:
@@ -145,13 +146,13 @@ def _cut(ring_down: HitRecord, clipped_channels: Sequence[str]) -> str:
 
 
 def _usable_channels(
-    channels: Sequence[Channel], faults: Sequence[Sequence[str]]
+    channels: Sequence[Channel], faults: Faults
 ) -> tuple[list[int], tuple[Dropped, ...]]:
     """Return the rows of usable accelerations, and the dropped ones with the reason.
 
     Where every channel has a fault after most hits, those stay that have one hit without.
     """
-    columns = [[each[row] for each in faults] for row in range(len(channels))]
+    columns = faults.T.tolist()
     some_plane = any(channel.plane for channel in channels)
     reasons: list[str] = []
     for most in (0.5, 1.0):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shm.identify.measuring.band import RATE_OVER_BAND, thinned
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
@@ -33,6 +34,8 @@ FEWEST_TO_COMPARE = 3
 MOST_UNLIKE = 0.05
 """Midway: how unlike hits are to each other, 0 alike, 1 unlike."""
 
+Faults = NDArray[np.object_]
+"""Of each channel after each hit, (hits, channels); an empty text where none."""
 _SURPRISE = 5.0
 """Of 7,114 ring-downs of 110 sound simulated tests, 20 to 60 dB above noise, none was above 3.1; of
 92 with a cable fault in 23 tests, none below 9."""
@@ -63,18 +66,28 @@ def faults_of_channels(
     ring_downs: Sequence[HitRecord],
     sampling_rate_hz: float,
     options: IdentifyOptions,
-) -> list[list[str]]:
-    """Return the fault of each channel after each hit, [hit][channel]; empty where none."""
+) -> Faults:
+    """Return the fault of each channel after each hit, (hits, channels); empty where none.
+
+    The first that is found takes precedence, and what has one is not asked for the next.
+    """
+    faults = np.full((len(ring_downs), len(channels)), "", dtype=object)
     if not ring_downs:
-        return []
+        return faults
     cuts = [r.accelerations[:, r.clipped_end or r.pulse.start : r.pulse.stop] for r in ring_downs]
-    faults = [_plain_faults(cut) for cut in cuts]
     rings = [r.accelerations[:, r.free : r.pulse.stop] for r in ring_downs]
-    _add(faults, _copies(cuts, faults))
-    _add(faults, _clipped(channels, rings, faults))
     free, step = _thin(ring_downs, sampling_rate_hz, options)
-    _add(faults, _wanders(free, faults, sampling_rate_hz / step))
-    _add(faults, _surprises(free, faults, [channel.plane for channel in channels]))
+
+    def add(fault: str, found: BoolArray) -> None:
+        faults[found & (faults == "")] = fault
+
+    for fault, is_found in _PLAIN_FAULTS.items():
+        add(fault, np.array([is_found(cut) for cut in cuts]))
+    add(CLIPPED, _clipped(channels, rings, faults == ""))
+    add(WANDERS, np.array([_wanders(part, sampling_rate_hz / step) for part in free]))
+    knocks, wild = _surprises(free, faults == "", [channel.plane for channel in channels])
+    add(KNOCK, wild & knocks[:, np.newaxis])
+    add(CABLE, wild)
     return faults
 
 
@@ -94,11 +107,11 @@ def _thin(
 def until_disturbed(
     channels: Sequence[Channel],
     ring_downs: Sequence[HitRecord],
-    faults: list[list[str]],
+    faults: Faults,
     least_samples: float,
     sampling_rate_hz: float,
     options: IdentifyOptions,
-) -> tuple[list[HitRecord], list[list[str]]]:
+) -> tuple[list[HitRecord], Faults]:
     """Cut ring-downs at an impact or a drop-out of one channel, and return them and their faults.
 
     They are cut only if that leaves `least_samples`; a channel that mostly drops out is no
@@ -106,15 +119,17 @@ def until_disturbed(
     """
     free, step = _thin(ring_downs, sampling_rate_hz, options)
     cut_down = list(ring_downs)
-    for number, (r, names) in enumerate(zip(ring_downs, faults, strict=True)):
-        heard = [name == KNOCK for name in names]
-        gaps = [row for row in range(len(names)) if _drops_out(row, number, faults)]
+    drops_out = np.isin(faults, (NOT_A_NUMBER, FROZEN))
+    drops_out &= 2 * np.sum(faults != "", axis=0) <= len(faults)  # it has no fault after most hits
+    for number, r in enumerate(ring_downs):
+        heard, gaps = faults[number] == KNOCK, np.flatnonzero(drops_out[number])
         if any(heard):
             at = knocked_at([part[heard] for part in free], number, _SURPRISE)
             cut, stop = KNOCK, r.free + RINGING_SAMPLES + at * step
-        elif gaps:
+        elif len(gaps):
             rings = r.accelerations[gaps, r.free : r.pulse.stop]
-            cut, stop = names[gaps[0]], r.free + min(map(_gap_in, rings)) - RINGING_SAMPLES
+            cut = faults[number, gaps[0]]
+            stop = r.free + min(map(_gap_in, rings)) - RINGING_SAMPLES
         else:
             continue
         if stop - r.free >= least_samples:
@@ -124,12 +139,6 @@ def until_disturbed(
     return cut_down, faults_of_channels(channels, cut_down, sampling_rate_hz, options)
 
 
-def _drops_out(row: int, number: int, faults: Sequence[Sequence[str]]) -> bool:
-    """Return whether a channel drops out after that hit, and has no fault after most others."""
-    faulty = sum(bool(names[row]) for names in faults)
-    return faults[number][row] in (NOT_A_NUMBER, FROZEN) and 2 * faulty <= len(faults)
-
-
 def _gap_in(signal: FloatArray) -> int:
     """Return the sample from which a signal is missing or frozen; 0 where neither is."""
     if not np.all(np.isfinite(signal)):
@@ -137,53 +146,42 @@ def _gap_in(signal: FloatArray) -> int:
     return next((first for first, _ in _still_runs(signal)), 0)
 
 
-Faults = list[list[str]]
-
-
-def _add(faults: Faults, more: Faults) -> None:
-    """Add faults in place; a channel's first fault takes precedence."""
-    for row, new in zip(faults, more, strict=True):
-        row[:] = [old or fault for old, fault in zip(row, new, strict=True)]
-
-
-def _plain_faults(cut: FloatArray) -> list[str]:
-    """Return the faults that each signal of one hit, (channels, samples), shows individually."""
-    good = np.isfinite(cut.sum(axis=1))
+def _is_silent(cut: FloatArray) -> BoolArray:
     moves = np.ptp(cut, axis=1)
-    still = frozen(cut)
-    level = np.median(moves[good & (moves > 0)]) if np.any(good & (moves > 0)) else 0.0
-    tests = (
-        (~good, NOT_A_NUMBER),
-        (moves == 0, DEAD),
-        (moves < _SILENT_SHARE * level, SILENT),
-        (still, FROZEN),
-    )
-    return [next((name for found, name in tests if found[row]), "") for row in range(len(cut))]
+    sound = np.isfinite(moves) & (moves > 0)
+    return np.asarray(moves < _SILENT_SHARE * (np.median(moves[sound]) if sound.any() else 0.0))
 
 
-def _clipped(channels: Sequence[Channel], cuts: Sequence[FloatArray], known: Faults) -> Faults:
+def _is_copy(cut: FloatArray) -> BoolArray:
+    """Return the channels with the samples of another; the first of two stays without fault."""
+    begins = [row[:_COPY_SAMPLES].tobytes() for row in cut]
+    return np.array([begin in begins[:row] for row, begin in enumerate(begins)])
+
+
+def frozen(signals: FloatArray) -> BoolArray:
+    """Return which signals, (channels, samples), are constant for 16 samples while others move."""
+    return np.array([bool(_still_runs(signal)) for signal in signals], dtype=bool)
+
+
+_PLAIN_FAULTS: dict[str, Callable[[FloatArray], BoolArray]] = {
+    NOT_A_NUMBER: lambda cut: ~np.isfinite(cut.sum(axis=1)),
+    DEAD: lambda cut: np.ptp(cut, axis=1) == 0,
+    SILENT: _is_silent,
+    FROZEN: frozen,
+    COPY: _is_copy,
+}
+"""What the signals of one hit, (channels, samples), show by themselves: which channels have it."""
+
+
+def _clipped(
+    channels: Sequence[Channel], rings: Sequence[FloatArray], sound: BoolArray
+) -> BoolArray:
     """Return signals clipped in the free ring-down; in the pulse only the response is spoilt."""
-    faults = [[""] * len(channels) for _ in cuts]
+    found = np.zeros(sound.shape, dtype=bool)
     for row, channel in enumerate(channels):
-        sound = [hit for hit in range(len(cuts)) if not known[hit][row]]
-        found = clipped([cuts[hit][row] for hit in sound], channel.full_scale)
-        for hit, is_clipped in zip(sound, found, strict=True):
-            faults[hit][row] = CLIPPED if is_clipped else ""
-    return faults
-
-
-def _copies(cuts: Sequence[FloatArray], known: Faults) -> Faults:
-    """Return channels with the samples of another; the first of two stays without fault."""
-    faults = []
-    for cut, names in zip(cuts, known, strict=True):
-        seen: set[bytes] = set()
-        row_faults = []
-        for row in range(len(cut)):
-            samples = cut[row, :_COPY_SAMPLES].tobytes()
-            row_faults.append(COPY if samples in seen and not names[row] else "")
-            seen.add(samples)
-        faults.append(row_faults)
-    return faults
+        hits = np.flatnonzero(sound[:, row]).tolist()
+        found[hits, row] = clipped([rings[hit][row] for hit in hits], channel.full_scale)
+    return found
 
 
 def _drift(signals: FloatArray, sampling_rate_hz: float) -> FloatArray:
@@ -199,48 +197,38 @@ def _drift(signals: FloatArray, sampling_rate_hz: float) -> FloatArray:
     return np.asarray(signals @ basis @ basis.T)
 
 
-def _wanders(free: Sequence[FloatArray], known: Faults, rate_hz: float) -> Faults:
-    """Return signals whose means over 0.5 s move by more than twice the level of the ringing.
+def _wanders(part: FloatArray, rate_hz: float) -> BoolArray:
+    """Return the channels whose means over 0.5 s move by more than twice the level of the ringing.
 
     What drifts slowly is no fault: it is taken off.
     """
     block = max(1, int(_OFFSET_SECONDS * rate_hz))
-    faults = []
-    for part, names in zip(free, known, strict=True):
-        blocks = part.shape[1] // block
-        if blocks < 2:
-            faults.append([""] * len(part))
-            continue
-        rest = np.nan_to_num(part) - _drift(np.nan_to_num(part), rate_hz)
-        parts = rest[:, : blocks * block].reshape(len(part), blocks, block)
-        moves = np.ptp(parts.mean(axis=2), axis=1)
-        level = parts.std(axis=2).max(axis=1)
-        wild = moves > _OFFSET_MOVES * level
-        faults.append([WANDERS if w and not n else "" for w, n in zip(wild, names, strict=True)])
-    return faults
+    blocks = part.shape[1] // block
+    if blocks < 2:
+        return np.zeros(len(part), dtype=bool)
+    rest = np.nan_to_num(part) - _drift(np.nan_to_num(part), rate_hz)
+    parts = rest[:, : blocks * block].reshape(len(part), blocks, block)
+    moves, level = np.ptp(parts.mean(axis=2), axis=1), parts.std(axis=2).max(axis=1)
+    return np.asarray(moves > _OFFSET_MOVES * level)
 
 
-def _surprises(free: Sequence[FloatArray], known: Faults, planes: Sequence[Plane | None]) -> Faults:
-    """Return jumps, bursts and loose contacts.
+def _surprises(
+    free: Sequence[FloatArray], sound: BoolArray, planes: Sequence[Plane | None]
+) -> tuple[BoolArray, BoolArray]:
+    """Return the hits after which something knocked (hits,), and jumps, bursts, loose contacts.
 
-    A knock where more than half the channels have them, or those of a plane.
+    A knock is where more than half the channels have them, or those of a plane.
     """
-    channels = len(free[0])
-    found = np.zeros((len(free), channels))
-    for row in range(channels):
-        sound = [hit for hit in range(len(free)) if not known[hit][row]]
-        if sound:
-            found[sound, row] = surprise([free[hit][row] for hit in sound])
+    found = np.zeros(sound.shape)
+    for row in range(sound.shape[1]):
+        hits = np.flatnonzero(sound[:, row]).tolist()
+        if hits:
+            found[hits, row] = surprise([free[hit][row] for hit in hits])
     wild = found > _SURPRISE
     groups = [np.array([plane == each for each in planes]) for plane in PLANES]
-    groups = [group for group in (*groups, np.full(channels, True)) if group.sum() > 1]
-    knocks = np.full(len(free), False)
-    for group in groups:
-        knocks |= 2 * wild[:, group].sum(axis=1) > group.sum()
-    return [
-        [(KNOCK if knock else CABLE) if is_wild else "" for is_wild in row]
-        for row, knock in zip(wild, knocks, strict=True)
-    ]
+    groups = [group for group in (*groups, np.full(len(planes), True)) if group.sum() > 1]
+    most = [2 * wild[:, group].sum(axis=1) > group.sum() for group in groups]
+    return np.any(most, axis=0) if most else np.zeros(len(free), dtype=bool), wild
 
 
 def clipped(parts: Sequence[FloatArray], full_scale: float) -> BoolArray:
@@ -325,11 +313,6 @@ def same_peaks(parts: Sequence[FloatArray]) -> BoolArray:
         return np.zeros(len(parts), dtype=bool)
     steps = np.diff(np.unique(np.concatenate(parts)))
     return np.asarray(reaches & (top > _FINE * float(steps.min(initial=np.inf))))
-
-
-def frozen(signals: FloatArray) -> BoolArray:
-    """Return which signals, (channels, samples), are constant for 16 samples while others move."""
-    return np.array([bool(_still_runs(signal)) for signal in signals], dtype=bool)
 
 
 def _still_runs(signal: FloatArray) -> list[tuple[int, int]]:

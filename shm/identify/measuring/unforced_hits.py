@@ -15,6 +15,7 @@ from shm.identify.measuring.hits import (
     PULSE_SECONDS,
     RINGING_SAMPLES,
     Pulse,
+    grouped,
 )
 from shm.values import NAN, FloatArray
 
@@ -42,12 +43,7 @@ def find_unforced(
     )
     # The window that follows holds the blow, where the fast motion is largest.
     onsets = [(top + int(np.argmax(power[top : top + width + 2]))) * step for top in tops.tolist()]
-    groups: list[list[int]] = []
-    for onset in onsets:
-        if groups and onset - groups[-1][-1] < GROUP_SECONDS * sampling_rate_hz:
-            groups[-1].append(onset)
-        else:
-            groups.append([onset])
+    groups = grouped(onsets, GROUP_SECONDS * sampling_rate_hz)
     if not groups:
         return []
     margin = int(PULSE_SECONDS * sampling_rate_hz) + RINGING_SAMPLES

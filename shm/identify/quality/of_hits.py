@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 
 import numpy as np
 
-from shm.identify.contract import LEAST_HITS, Hit
+from shm.identify.contract import LEAST_HITS, Measurement
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES
 from shm.identify.measuring.signal_faults import (
     CUT_OFF,
@@ -17,6 +18,7 @@ from shm.identify.measuring.signal_faults import (
     MOST_UNLIKE,
     OUTLIER,
 )
+from shm.identify.options import IdentifyOptions
 from shm.identify.quality.table import (
     Inspection,
     Reading,
@@ -34,8 +36,6 @@ _DIES_AWAY_DB = -10.0
 """Of stationary motion hardly a tenth is above another by so much, if it is of ten values."""
 _LEAST_FORCE_DB = -20.0
 """Usual in impact testing (Ewins 2000, 3.4): a tenth of the force still excites."""
-_LONGEST_PULSE_S = 0.05  # judgement: ten soft pulses; what follows is noise in the spectrum
-_TRANSFORM_S = 1.0
 
 
 def _hits_used(inspection: Inspection) -> Reading | None:
@@ -142,10 +142,9 @@ def _repeatability(inspection: Inspection) -> Reading | None:
 
 def _force_spectrum(inspection: Inspection) -> Reading | None:
     """Return the force at the band's upper end over its largest in it, in dB, the hits' median."""
-    used = [hit for hit in hits_of(inspection) if hit.used]
-    if not used or _unforced(inspection):
+    curves = [each for m in inspection.measurements for each in _force_db(m, inspection.options)]
+    if not curves:
         return None
-    curves = [_spectrum_db(inspection, hit) for hit in used]
     # A zero between lobes of the spectrum is as bad as its end: the lowest value counts.
     value = float(np.median([float(np.min(db)) for _, db in curves]))
     below = [np.flatnonzero(db < _LEAST_FORCE_DB) for _, db in curves]
@@ -157,24 +156,17 @@ def _force_spectrum(inspection: Inspection) -> Reading | None:
     )
 
 
-def _spectrum_db(inspection: Inspection, hit: Hit) -> tuple[FloatArray, FloatArray]:
-    """Return the lines (lines,) in the band and the pulse's relative level at them in dB."""
-    record, options = inspection.records[hit.record], inspection.options
-    force, rate = record.force, record.sampling_rate_hz
-    assert force is not None
-    first = max(0, hit.start - RINGING_SAMPLES)
-    stop = hit.start + int(_LONGEST_PULSE_S * rate)
-    cut = force.values[first : stop + 1] - np.median(force.values[first : hit.start + int(rate)])
-    fade = np.ones(len(cut))
-    tail = int(PULSE_SECONDS * rate)
-    fade[len(cut) - tail :] = np.linspace(1, 0, tail)
-    length = max(len(cut), int(_TRANSFORM_S * rate))
-    level = np.abs(np.fft.rfft(cut * fade, n=length))
-    frequency = np.fft.rfftfreq(length, 1 / rate)
-    lines = (frequency >= options.band_low_hz) & (frequency <= options.band_high_hz)
-    top = max(float(level[lines].max(initial=0.0)), np.finfo(float).tiny)
-    decibels = 20 * np.log10(np.maximum(level[lines] / top, 1e-6))
-    return np.asarray(frequency[lines]), np.asarray(decibels)
+def _force_db(
+    measurement: Measurement, options: IdentifyOptions
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield the lines in the band and each used pulse's relative level at them in dB."""
+    if measurement.spectra is None or measurement.frequency_response is None:
+        return
+    hz: FloatArray = measurement.frequency_response.frequency_hz
+    lines = (hz >= options.band_low_hz) & (hz <= options.band_high_hz)
+    for level in np.abs(measurement.spectra[:, 0, lines]):
+        top = max(float(level.max(initial=0.0)), np.finfo(float).tiny)
+        yield hz[lines], np.asarray(20 * np.log10(np.maximum(level / top, 1e-6)))
 
 
 _HIT_MORE = "Hit at least three times, better five, with time to ring down."
