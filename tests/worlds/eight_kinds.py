@@ -4,19 +4,9 @@ Each case is a hanger whose tension is known, described as its drawing describes
 and measured as a field team measures it (one test, "shm.modes/1"). Nothing is shared with the
 program under test: neither the equations' solution nor the draws nor the nuisances.
 
-Physics, one plane, x from the deck end. The bar is straight but for the sag of its own weight:
-
-* bending and shear by elements of two nodes whose shape functions solve the unloaded Timoshenko
-  beam (Friedman & Kosmatka, Computers & Structures 47, 1993); rotary inertia; no shear
-  flexibility for strands. Shear coefficient of rounds and tubes: Cowper (J. Appl. Mech. 33, 1966);
-* the tension works on the slope of the axis (the Engesser form). It grows upwards by the weight of
-  what hangs below; the tension of a case is that at mid-length;
-* in the plane of the weight the static shape y under tension, bending and weight is computed on
-  the same mesh. Each mode then stretches the bar by the integral of y' w', which the axial
-  stiffness of bar and supports in series resists (Irvine, Cable Structures, 1981);
-* zones (forks, sockets, end plates, turnbuckles) have another bending stiffness in each plane, and
-  another mass, which their axial and shear stiffness follow;
-* at both ends a rotational spring and a lateral one; sensors are point masses.
+Physics, one plane, by `bars.py`: shear and rotary inertia but for strands, own weight, sag in the
+plane of the weight, zones (forks, sockets, end plates, turnbuckles), a rotational and a lateral
+spring at both ends, sensors as point masses.
 
 The fork of a bar turns about its pin softly in one plane and stiffly in the other. Rotational
 springs are given as multiples of EI/L, those of strands as multiples of sqrt(EI T).
@@ -29,208 +19,18 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import csc_matrix, diags
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-Array = NDArray[np.float64]
+from tests.worlds.bars import GRAVITY_M_S2, POISSON, Zone, cowper, natural_frequencies_hz
+from tests.worlds.bars import Bar as Member
+
+__all__ = ["Member", "Zone", "natural_frequencies_hz"]
 
 PLANES = ("transverse", "longitudinal")  # the weight of a leaning hanger acts in the second
-GRAVITY_M_S2 = 9.81
-POISSON = 0.3  # EN 1993-1-1, 3.2.6
 STEEL_DENSITY_KG_M3 = 7850.0
 STRAND_DENSITY_KG_M3 = 83e3 / GRAVITY_M_S2  # EN 1993-1-11, table 2.2: of the metallic section
-
-
-def cowper(inner_over_outer: float) -> float:
-    """Return the shear coefficient of a round tube; 0 is the solid bar (Cowper, 1966)."""
-    square = inner_over_outer**2
-    upper = 6 * (1 + POISSON) * (1 + square) ** 2
-    return upper / ((7 + 6 * POISSON) * (1 + square) ** 2 + (20 + 12 * POISSON) * square)
-
-
-@dataclass(frozen=True)
-class Zone:
-    """A stretch that is stiffer and heavier than the bar."""
-
-    start_m: float
-    end_m: float
-    bending_factor: float
-    mass_factor: float
-
-
-@dataclass(frozen=True)
-class Member:
-    """One plane of a hanger as it really is. Infinite stiffness is a constraint."""
-
-    length_m: float
-    tension_n: float  # at mid-length
-    bending_stiffness_n_m2: float
-    mass_per_length_kg_m: float
-    shear_stiffness_n: float = math.inf  # coefficient x G x A
-    rotary_inertia_kg_m: float = 0.0
-    axial_stiffness_n: float = math.inf  # E A, for the stretching by sag
-    zones: tuple[Zone, ...] = ()
-    masses: tuple[tuple[float, float], ...] = ()  # (place_m, mass_kg)
-    rotation_n_m_rad: tuple[float, float] = (0.0, 0.0)  # (deck, arch)
-    lateral_n_m: tuple[float, float] = (math.inf, math.inf)
-    axial_n_m: tuple[float, float] = (math.inf, math.inf)
-    gravity_along_m_s2: float = 0.0  # towards the deck end
-    gravity_across_m_s2: float = 0.0  # in this plane
-
-
-def build_mesh(member: Member, elements: int) -> Array:
-    """Return the nodes, dense where bending decays away from an end or a zone."""
-    length, size = member.length_m, member.length_m / elements
-    stations = {0.0, length, *(x for x, _ in member.masses)}
-    edges = {0.0, length, *(x for z in member.zones for x in (z.start_m, z.end_m))}
-    layer = math.inf
-    if member.tension_n > 0:
-        layer = math.sqrt(member.bending_stiffness_n_m2 / member.tension_n)
-    fine = min(size, 80 / elements * layer)  # a fifth of the layer by 400 elements
-    stations |= edges
-    if fine < size:
-        stations |= {min(max(x + s * 6 * layer, 0.0), length) for x in edges for s in (-1, 1)}
-    nodes = [0.0]
-    for start, end in pairwise(sorted(stations)):
-        if end - start < 1e-9 * length:
-            continue
-        middle = (start + end) / 2
-        near = any(abs(middle - x) < 6 * layer for x in edges)
-        in_zone = any(z.start_m < middle < z.end_m for z in member.zones)
-        parts = max(4 if in_zone else 1, math.ceil((end - start) / (fine if near else size)))
-        nodes.extend(start + (end - start) * i / parts for i in range(1, parts + 1))
-    return np.array(nodes)
-
-
-@dataclass(frozen=True)
-class _Matrices:
-    """Stiffness, mass, unit-tension stiffness and weight of one plane, unconstrained."""
-
-    stiffness: csc_matrix
-    mass: csc_matrix
-    slope: csc_matrix  # integral of N' N'^T
-    weight: Array  # integral of m N
-    stretch_m_n: float  # shortening of bar and supports under a unit force
-
-
-def _assemble(member: Member, x: Array) -> _Matrices:
-    h, middle = np.diff(x), (x[:-1] + x[1:]) / 2
-    bending, mass = np.ones_like(h), np.ones_like(h)
-    for zone in member.zones:
-        inside = (middle > zone.start_m) & (middle < zone.end_m)
-        bending[inside], mass[inside] = zone.bending_factor, zone.mass_factor
-    stiff = bending * member.bending_stiffness_n_m2
-    inertia = bending * member.rotary_inertia_kg_m  # same material: as the second moment
-    phi = 12 * stiff / (mass * member.shear_stiffness_n * h**2)
-    per_length = mass * member.mass_per_length_kg_m
-
-    # Shape functions at the Gauss points, [element, point, unknown]; unknowns w1, r1, w2, r2.
-    points, weights = np.polynomial.legendre.leggauss(5)
-    s, p, hh = (points[None, :] + 1) / 2, phi[:, None], h[:, None]
-
-    def stack(*rows: Array) -> Array:
-        return np.stack(np.broadcast_arrays(*rows), axis=-1) / (1 + p)[..., None]
-
-    w = stack(
-        2 * s**3 - 3 * s**2 - p * s + 1 + p,
-        hh * (s**3 - (2 + p / 2) * s**2 + (1 + p / 2) * s),
-        -(2 * s**3) + 3 * s**2 + p * s,
-        hh * (s**3 - (1 - p / 2) * s**2 - p / 2 * s),
-    )
-    slope = stack(
-        (6 * s**2 - 6 * s - p) / hh,
-        3 * s**2 - 2 * (2 + p / 2) * s + 1 + p / 2,
-        (-(6 * s**2) + 6 * s + p) / hh,
-        3 * s**2 - 2 * (1 - p / 2) * s - p / 2,
-    )
-    rotation = stack(
-        6 * (s**2 - s) / hh,
-        3 * s**2 - (4 + p) * s + 1 + p,
-        -6 * (s**2 - s) / hh,
-        3 * s**2 - (2 - p) * s,
-    )
-    curvature = stack(
-        6 * (2 * s - 1) / hh**2,
-        (6 * s - 4 - p) / hh,
-        -6 * (2 * s - 1) / hh**2,
-        (6 * s - 2 + p) / hh,
-    )
-    measure = hh * weights[None, :] / 2
-    # The tension at a Gauss point is that at mid-length and the weight hanging in between.
-    hanging = np.concatenate(([0.0], np.cumsum(per_length * h)))
-    at = x[:-1, None] + hh * s
-    below = np.interp(at, x, hanging) - np.interp(member.length_m / 2, x, hanging)
-    tension = member.tension_n + member.gravity_along_m_s2 * below
-
-    def gram(shape: Array, factor: Array) -> Array:
-        parts: Array = np.einsum("eq,eqi,eqj->eij", measure * factor, shape, shape)
-        return parts
-
-    stiffness = gram(curvature, stiff[:, None]) + gram(slope, tension)
-    if math.isfinite(member.shear_stiffness_n):
-        stiffness += gram(slope - rotation, (mass * member.shear_stiffness_n)[:, None])
-    inertial = gram(w, per_length[:, None]) + gram(rotation, inertia[:, None])
-    unit, load = gram(slope, np.ones((1, 1))), np.einsum("eq,e,eqi->ei", measure, per_length, w)
-
-    size = 2 * len(x)
-    index = 2 * np.arange(len(h))[:, None] + np.arange(4)
-    rows, columns = np.repeat(index, 4, axis=1).ravel(), np.tile(index, 4).ravel()
-
-    def add_up(parts: Array) -> csc_matrix:
-        return csc_matrix((parts.ravel(), (rows, columns)), shape=(size, size))
-
-    weight = np.zeros(size)
-    np.add.at(weight, index, load)
-    stretch = float(np.sum(h / (mass * member.axial_stiffness_n)))
-    stretch += sum(1 / k for k in member.axial_n_m)
-    return _Matrices(add_up(stiffness), add_up(inertial), add_up(unit), weight, stretch)
-
-
-def natural_frequencies_hz(member: Member, count: int, elements: int = 400) -> Array:
-    """Return the first `count` natural frequencies of one plane.
-
-    The shear strain is constant in an element, so that the error falls with the square of its
-    length: by 400 elements 1e-5 in the eighth mode of the stoutest bar.
-    """
-    x = build_mesh(member, elements)
-    parts = _assemble(member, x)
-    springs, lumps, fixed = np.zeros(2 * len(x)), np.zeros(2 * len(x)), []
-    for end, node in enumerate((0, len(x) - 1)):
-        for unknown, k in ((0, member.lateral_n_m[end]), (1, member.rotation_n_m_rad[end])):
-            if math.isinf(k):
-                fixed.append(2 * node + unknown)
-            else:
-                springs[2 * node + unknown] += k
-    for place, kilograms in member.masses:
-        lumps[2 * int(np.argmin(np.abs(x - place)))] += kilograms
-    free = np.setdiff1d(np.arange(2 * len(x)), fixed)
-    stiffness = csc_matrix((parts.stiffness + diags(springs))[free][:, free])
-    mass = csc_matrix((parts.mass + diags(lumps))[free][:, free])
-    solve = splu(stiffness).solve
-    sag = np.zeros(len(free))
-    if member.gravity_across_m_s2 and parts.stretch_m_n > 0:
-        shape = solve(member.gravity_across_m_s2 * parts.weight[free])
-        pull = parts.slope[free][:, free] @ shape  # integral of y' N'
-        # K + pull pull^T / stretch has the inverse K^-1 - sag sag^T (Sherman & Morrison, 1950).
-        sag = solve(pull)
-        sag /= math.sqrt(parts.stretch_m_n + pull @ sag)
-
-    def invert(force: Array) -> Array:
-        return np.asarray(solve(force) - sag * (sag @ force))
-
-    values = eigsh(
-        *(stiffness, count, mass),
-        sigma=0.0,
-        OPinv=LinearOperator(stiffness.shape, matvec=invert, dtype=np.float64),
-        v0=np.ones(len(free)) + np.arange(len(free)) / len(free),  # the same result every time
-        return_eigenvectors=False,
-    )
-    return np.asarray(np.sqrt(np.sort(values)) / (2 * math.pi))
 
 
 # ---------------------------------------------------------------- what is drawn

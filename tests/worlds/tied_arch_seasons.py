@@ -25,13 +25,13 @@ faces lit); tie with concrete deck 14 h, 12 K, plus a top-bottom difference (3 h
 it (EN 1991-1-5, table 6.1 allows 15 K); hanger rho c D/(4 h) with h = 30 W/m2K - 15 to 65 minutes
 -, 6 K (a round bar shows the sun 1/pi of its skin).
 
-Hanger.  A Timoshenko bar (shear factor Cowper 1966) under tension (Engesser's form, T w'^2/2) that
-grows with own weight; forks at the ends; rotational springs, other ones in either plane, stated as
-fixity r = k/(k + sqrt(T EI)): sqrt(T EI) is the rotational stiffness of the end of a long tensioned
-bar, hence r says how much of the end's stiffening a spring gives, whatever its size.  The modulus
-falls by 3.5e-4 per K (Ledbetter and Reed, J. Phys. Chem. Ref. Data 2, 1973).  Spectral elements of
-degree 8 (w and rotation apart); each season projects them once on modes of its extreme states and
-solves all visits in that basis, which is checked against the full matrices at run time (1e-5).
+Hanger.  A round bar of `bars.py` that grows taut by own weight; forks at the ends; rotational
+springs, other ones in either plane, stated as fixity r = k/(k + sqrt(T EI)): sqrt(T EI) is the
+rotational stiffness of the end of a long tensioned bar, hence r says how much of the end's
+stiffening a spring gives, whatever its size.  The modulus falls by 3.5e-4 per K (Ledbetter and
+Reed, J. Phys. Chem. Ref. Data 2, 1973).  Each season projects the bar once on modes of its extreme
+states and solves all visits in that basis, which is checked against the full matrices at run time
+(1e-5).
 
 Measurement.  The random sd of a frequency is f sqrt(zeta/(2 pi f duration)), the long-data law of
 modal identification (Au, Mech. Syst. Signal Process. 48, 2014): 0.1 % at 6 Hz, zeta 0.3 % and 60 s.
@@ -54,12 +54,21 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 from scipy.signal import lfilter
 
-Array = NDArray[np.float64]
+from tests.worlds import bars
+from tests.worlds.bars import (
+    POISSON,
+    Array,
+    Matrices,
+    Zone,
+    cowper,
+    reduced_basis,
+    solve,
+    solve_many,
+)
+
 PLANES = ("transverse", "longitudinal")
 ENDS = ("deck", "arch")
 KINDS = (
@@ -73,14 +82,10 @@ KINDS = (
     "clock",  # size: 0.002 reads all frequencies of all hangers 0.2 % high
 )
 REFERENCE_C = 10.0
-GRAVITY = 9.81
-POISSON = 0.3
-COWPER = 6 * (1 + POISSON) / (7 + 6 * POISSON)
 EXPANSION = 1.2e-5  # 1/K, steel (EN 1991-1-5, table C.1; concrete 1.0e-5 there, 0.95 to 1.2 built)
 MODULUS_PER_K = -3.5e-4
 ORDERS = 5  # reported
 SOLVED = ORDERS + 1  # one more, for whom mistakes the order
-DEGREE = 8
 DAY_H = 24.0
 STEP_H = 0.25  # of the temperature record
 LEAD_D = 20  # days of weather before the first visit, so that the lags have settled
@@ -211,176 +216,83 @@ class State:
         return State(*(value[which] for value in vars(self).values()))
 
 
-@lru_cache(maxsize=1)
-def _reference() -> tuple[Any, ...]:
-    """Lobatto nodes' Lagrange basis: Gauss points, weights, values, slopes, Legendre transform."""
-    inner = legendre.Legendre.basis(DEGREE).deriv().roots()
-    nodes = np.concatenate(([-1.0], np.sort(inner.real), [1.0]))
-    points, weights = legendre.leggauss(DEGREE + 2)
-    to_legendre = np.linalg.inv(legendre.legvander(nodes, DEGREE))
-    values = legendre.legvander(points, DEGREE) @ to_legendre
-    slopes = legendre.legval(points, legendre.legder(np.eye(DEGREE + 1))).T @ to_legendre
-    return points, weights, values, np.asarray(slopes), to_legendre
+def _matrices(bar: Bar, elements: int) -> Matrices:
+    """A bar of `bars.py` at 10 deg C, without springs at its ends."""
+    length, (fork, stiffer, heavier) = bar.length_m, bar.fork
+    ends = Zone(0.0, fork, stiffer, heavier, math.sqrt(stiffer))
+    zones = [ends, replace(ends, start_m=length - fork, end_m=length)] if fork else []
+    low, high, lost = bar.loss
+    if lost:
+        zones.append(Zone(low, high, (1 - lost) ** 2, 1 - lost))
+    shear = cowper() * bar.modulus_pa / (2 * (1 + POISSON)) * bar.area_m2
+    lateral = [1 / each if each else math.inf for each in bar.flexibility_m_per_n]
+    made = bars.Bar(
+        length, 0.0, bar.bending_nm2, bar.mass_kg_m, shear,
+        bar.density_kg_m3 * bar.area_m2**2 / (4 * math.pi),
+        zones=tuple(zones),
+        masses=(bar.lamp,) if bar.lamp[1] else (),
+        lateral_n_m=(lateral[0], lateral[1]),
+        gravity_along_m_s2=bars.GRAVITY_M_S2 * bar.own_weight,
+    )  # fmt: skip
+    return Matrices(made, elements=elements)
 
 
-class Matrices:
-    """Stiffness and mass of a bar: elastic, per newton of tension, from own weight, mass."""
+def _factors(temperature_c: Array) -> tuple[Array, Array]:
+    """On the elastic stiffness, and on what the tension and the weight do."""
+    strain = EXPANSION * (temperature_c - REFERENCE_C)
+    return (1 + MODULUS_PER_K * (temperature_c - REFERENCE_C)) * (1 + strain), 1 / (1 + strain)
 
-    def __init__(self, bar: Bar, elements: int = 5) -> None:
-        self.bar, length = bar, bar.length_m
-        points, weights, value, slope, self._to_legendre = _reference()
-        fork, stiffer, heavier = bar.fork
-        marks = {0.0, length, fork, length - fork}
-        if bar.loss[2] > 0:
-            marks |= {*bar.loss[:2]}
-        if bar.lamp[1] > 0:
-            marks |= {bar.lamp[0]}
-        fine = sorted(marks)
-        breaks = [0.0]
-        for start, end in pairwise(fine):
-            parts = max(1, math.ceil((end - start) / length * elements - 1e-9))
-            breaks += [start + (end - start) * (i + 1) / parts for i in range(parts)]
-        self.breaks = np.array(breaks)
-        self.count = n = (len(breaks) - 1) * DEGREE + 1  # deflections, then as many rotations
-        elastic, mass = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 2 * n))
-        string, weight = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 2 * n))
-        shear = COWPER * bar.modulus_pa / (2 * (1 + POISSON)) * bar.area_m2
-        rotary = bar.density_kg_m3 * bar.area_m2**2 / (4 * math.pi)
-        for e, (start, end) in enumerate(pairwise(breaks)):
-            half, middle = (end - start) / 2, (start + end) / 2
-            x = start + half * (points + 1)
-            inside = middle < fork or middle > length - fork
-            area = 1 - bar.loss[2] if bar.loss[0] < middle < bar.loss[1] else 1.0
-            bend = area**2 * (stiffer if inside else 1.0)
-            dx, slope_x = half * weights, slope / half
-            w = slice(e * DEGREE, (e + 1) * DEGREE + 1)
-            turn = slice(n + e * DEGREE, n + (e + 1) * DEGREE + 1)
-            slopes, values = (slope_x.T * dx) @ slope_x, (value.T * dx) @ value
-            cross = (slope_x.T * dx) @ value
-            stiff = shear * area * (math.sqrt(stiffer) if inside else 1.0)
-            elastic[w, w] += stiff * slopes
-            elastic[w, turn] -= stiff * cross
-            elastic[turn, w] -= stiff * cross.T
-            elastic[turn, turn] += stiff * values + bend * bar.bending_nm2 * slopes
-            string[w, w] += slopes
-            if bar.own_weight:
-                pull = bar.mass_kg_m * GRAVITY * (x - length / 2)
-                weight[w, w] += (slope_x.T * (dx * pull)) @ slope_x
-            per_m = area * (heavier if inside else 1.0)
-            mass[w, w] += bar.mass_kg_m * per_m * values
-            mass[turn, turn] += rotary * bend * values
-        free = np.ones(2 * n, dtype=bool)
-        for node, flexibility in zip((0, n - 1), bar.flexibility_m_per_n, strict=True):
-            if flexibility > 0:
-                elastic[node, node] += 1 / flexibility
-            else:
-                free[node] = False
-        self._free = free
-        keep = np.ix_(free, free)
-        self.elastic, self.string = elastic[keep], string[keep]
-        self.weight, self.mass = weight[keep], mass[keep]
-        if bar.lamp[1] > 0:
-            row = self.shape(np.array([bar.lamp[0]]))[0]
-            self.mass = self.mass + bar.lamp[1] * np.outer(row, row)
-        size = self.elastic.shape[0]
-        place = np.cumsum(free) - 1
-        self.turns = np.zeros((2, size))  # rows that pick the rotation of the ends
-        self.turns[0, place[n]] = self.turns[1, place[2 * n - 1]] = 1.0
 
-    def shape(self, places_m: Array) -> Array:
-        """Rows that give the deflection at the places."""
-        rows = np.zeros((len(places_m), 2 * self.count))
-        for row, place in zip(rows, places_m, strict=True):
-            e = int(np.clip(np.searchsorted(self.breaks, place) - 1, 0, len(self.breaks) - 2))
-            start, end = self.breaks[e], self.breaks[e + 1]
-            local = 2 * (place - start) / (end - start) - 1
-            row[e * DEGREE : (e + 1) * DEGREE + 1] = (
-                legendre.legvander(np.array([local]), DEGREE)[0] @ self._to_legendre
-            )
-        return rows[:, self._free]
-
-    def stiffness(self, tension: float, springs: Array, temperature_c: float) -> Array:
-        """Sum of the parts in one state, one plane (springs of its two ends)."""
-        strain = EXPANSION * (temperature_c - REFERENCE_C)
-        soft = (1 + MODULUS_PER_K * (temperature_c - REFERENCE_C)) * (1 + strain)
-        total = soft * self.elastic + (tension * self.string + self.weight) / (1 + strain)
-        return np.asarray(total + (self.turns.T * springs) @ self.turns)
-
-    def solve(
-        self,
-        tension: float,
-        springs: Array,
-        temperature_c: float,
-        kg: float,
-        at_m: float,
-        count: int,
-    ) -> tuple[Array, Array]:
-        """Frequencies (Hz) and shapes from the full matrices, one state and plane."""
-        row = self.shape(np.array([at_m]))[0]
-        mass = self.mass + kg * np.outer(row, row)
-        size = len(mass)
-        # M v = (1/omega^2) K v: the low modes are the large values, which rounding spares.
-        values, shapes = eigh(
-            mass,
-            self.stiffness(tension, springs, temperature_c),
-            subset_by_index=[size - count, size - 1],
-            check_finite=False,
-        )
-        return 1 / (2 * math.pi * np.sqrt(values[::-1])), shapes[:, ::-1]
+def _stiffness(m: Matrices, tension: float, springs: Array, temperature_c: Any) -> Array:
+    """Sum of the parts in one state, one plane (springs of its two ends)."""
+    soft, pulled = _factors(temperature_c)
+    total = soft * (m.stiffness(0.0, (0.0, 0.0)) - m.weight)
+    total += pulled * (tension * m.pull + m.weight)
+    return np.asarray(total + (m.turns.T * springs) @ m.turns)
 
 
 def frequencies_full(bar: Bar, state: State, index: int, count: int = SOLVED) -> Array:
     """Frequencies (plane, order) of one visit from the full matrices, eight elements."""
-    matrices, one = Matrices(bar, elements=8), state.part(index)
-    common = (float(one.temperature_c), float(one.sensor_kg), float(one.sensor_at_m), count)
-    return np.array([matrices.solve(float(one.tension_n), k, *common)[0] for k in one.springs])
+    m, one = _matrices(bar, 8), state.part(index)
+    mass = m.with_masses([(float(one.sensor_at_m), float(one.sensor_kg))])
+    both = [_stiffness(m, float(one.tension_n), k, one.temperature_c) for k in one.springs]
+    return np.array([solve(each, mass, count)[0] for each in both])
 
 
 def frequencies(bar: Bar, state: State, count: int = SOLVED) -> tuple[Array, Array]:
     """Frequencies (visit, plane, order) of all visits and how well the sensor saw each mode.
 
     Modes of the extreme states (least and most tension and springs, either plane) span a basis of
-    some 40 vectors, orthonormal in the bar's mass; the stiffness of a visit is a sum in it, and the
-    sensor, a rank-one mass, is taken out in closed form.
+    some 40 vectors, orthonormal in the bar's mass; the stiffness of a visit is a sum in it.
     """
-    m = Matrices(bar)
-    number = count + 4
+    m = _matrices(bar, 5)
     span: list[Array] = []
     warm = float(np.median(state.temperature_c))
     tensions = (float(state.tension_n.min()), float(state.tension_n.max()))
+    heavy = m.with_masses([(float(state.sensor_at_m.mean()), float(state.sensor_kg.mean()))])
     seen: set[tuple[float, ...]] = set()
     for plane in range(2):
         springs = state.springs[:, plane]
         for tension, k in zip(tensions, (springs.min(axis=0), springs.max(axis=0)), strict=True):
             if (key := (tension, *k.tolist())) not in seen:
                 seen.add(key)
-                heavy = float(state.sensor_kg.mean()), float(state.sensor_at_m.mean())
-                span.append(m.solve(tension, k, warm, *heavy, number)[1])
+                span.append(solve(_stiffness(m, tension, k, warm), heavy, count + 4)[1])
     # A light bar bends visibly about its sensor: the deflections under a force where it was put.
-    forces = m.shape(np.quantile(state.sensor_at_m, np.linspace(0, 1, 7))).T
-    middle = m.stiffness(sum(tensions) / 2, state.springs.mean(axis=(0, 1)), warm)
-    span.append(np.asarray(np.linalg.solve(middle, forces), dtype=float))
-    raw = np.hstack(span)
-    raw /= np.sqrt(np.einsum("ij,ij->j", raw, m.mass @ raw))
-    values, vectors = np.linalg.eigh(raw.T @ m.mass @ raw)
-    keep = values > 1e-11 * values[-1]
-    basis = raw @ (vectors[:, keep] / np.sqrt(values[keep]))
-    elastic, string, weight = (basis.T @ k @ basis for k in (m.elastic, m.string, m.weight))
+    forces = m.rows(np.quantile(state.sensor_at_m, np.linspace(0, 1, 7))).T
+    middle = _stiffness(m, sum(tensions) / 2, state.springs.mean(axis=(0, 1)), warm)
+    basis = reduced_basis(middle, m.mass, [*span, forces])
+    plain = m.stiffness(0.0, (0.0, 0.0)) - m.weight
+    elastic, string, weight = (basis.T @ k @ basis for k in (plain, m.pull, m.weight))
     turns = m.turns @ basis
-    strain = EXPANSION * (state.temperature_c - REFERENCE_C)
-    soft = (1 + MODULUS_PER_K * (state.temperature_c - REFERENCE_C)) * (1 + strain)
-    total = soft[:, None, None] * elastic
-    total = total + (state.tension_n[:, None, None] * string + weight) / (1 + strain)[:, None, None]
+    soft, pulled = (each[:, None, None] for each in _factors(state.temperature_c))
+    total = soft * elastic + pulled * (state.tension_n[:, None, None] * string + weight)
     full = total[:, None] + np.einsum("vpe,ei,ej->vpij", state.springs, turns, turns)
-    rows = m.shape(state.sensor_at_m) @ basis  # (visit, basis)
-    square = np.einsum("vi,vi->v", rows, rows)
-    lump = state.sensor_kg * square
-    part = (1 - 1 / np.sqrt(1 + lump)) / np.maximum(square, 1e-30)
-    root = np.eye(rows.shape[1]) - part[:, None, None] * rows[:, :, None] * rows[:, None, :]
-    squares, shapes = np.linalg.eigh(root[:, None] @ full @ root[:, None])
-    found = np.sqrt(squares[..., :count]) / (2 * math.pi)
-    deflection = np.einsum("vi,vij,vpjn->vpn", rows, root, shapes[..., :count])
-    seen_by = np.abs(deflection) * math.sqrt(bar.mass_kg_m * bar.length_m / 2)
+    rows = m.rows(state.sensor_at_m) @ basis  # (visit, basis)
+    mass = np.eye(rows.shape[1])
+    mass = mass + state.sensor_kg[:, None, None] * rows[:, :, None] * rows[:, None, :]
+    found, shapes = solve_many(full, mass[:, None], count)
+    seen_by = np.abs(np.einsum("vi,vpin->vpn", rows, shapes))
+    seen_by *= math.sqrt(bar.mass_kg_m * bar.length_m / 2)
     check = len(state.tension_n) // 2
     error = np.abs(found[check] / frequencies_full(bar, state, check, count) - 1).max()
     if not error < 1e-5:
