@@ -17,28 +17,20 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import pickle
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
-
-from shm.gap import GapOptions  # noqa: E402
-from shm.gap.bridge_diagnosis import diagnose_jointly, examine_hanger  # noqa: E402
-from shm.gap.shared_evidence import HangerEvidence  # noqa: E402
-from shm.values import PLANES, BridgeDiagnosis, Diagnosis, Hanger, ModalTest, Mode  # noqa: E402
-from tests.benchmarks.worlds import share  # noqa: E402
-from tests.worlds import finite_elements as world  # noqa: E402
-from tests.worlds.bars import (  # noqa: E402
+from shm.gap import GapOptions
+from shm.gap.bridge_diagnosis import diagnose_jointly, examine_hanger
+from shm.gap.shared_evidence import HangerEvidence
+from shm.values import PLANES, BridgeDiagnosis, Diagnosis, Hanger, ModalTest, Mode
+from tests.benchmarks.worlds import share
+from tests.worlds import finite_elements as world
+from tests.worlds.bars import (
     GRAVITY_M_S2,
     POISSON,
     Bar,

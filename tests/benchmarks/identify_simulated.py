@@ -19,19 +19,15 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
+from marks import COLUMNS, alarms, flags, marks, table
+from page import DOCS, put
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
+from scoring import TestScore, score_number
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(Path(__file__).resolve().parent / "identification"))
-
-from marks import COLUMNS, alarms, flags, marks, table  # noqa: E402
-from page import DOCS, put  # noqa: E402
-from scoring import TestScore, score_number  # noqa: E402
-
-from shm_cli.common import markdown  # noqa: E402
-from tests.worlds.simulated.disturbances.registry import DISTURBANCES  # noqa: E402
+from shm_cli.common import markdown
+from tests.worlds.simulated.disturbances.registry import DISTURBANCES
 
 
 def run(numbers: range, seed: int, disturbance: str | None, processes: int) -> Iterator[TestScore]:

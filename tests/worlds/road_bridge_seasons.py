@@ -140,7 +140,7 @@ class Bar:
         """Return E I of the free bar."""
         return self.modulus_pa * self.second_moment_m4
 
-    def plane(self, number: int, edges_m: Sequence[float] = ()) -> Plane:
+    def plane(self, number: int) -> Plane:
         """Return the bar in one plane; across a leaning one the weight acts in the second."""
         lean = np.deg2rad(self.inclination_deg)
         made = bars.Bar(
@@ -152,7 +152,7 @@ class Bar:
             gravity_along_m_s2=float(GRAVITY_M_S2 * np.sin(lean)),
             gravity_across_m_s2=float(GRAVITY_M_S2 * np.cos(lean)) if number == 1 else 0.0,
         )  # fmt: skip
-        return Plane(Matrices(made, edges_m, elements=5))
+        return Plane(Matrices(made, elements=5))
 
 
 @dataclass(frozen=True, eq=False)
@@ -610,14 +610,14 @@ class _Solver:
     def plane(self, number: int, plane: int, worn: bool) -> Plane:
         key = (number, plane, worn)
         if key not in self.kept:
-            bar, event = self.hangers[number].bar, self.events.get(number, Event())
-            half, middle = event.extent * bar.length_m / 2, event.place * bar.length_m
-            edges = (middle - half, middle + half)
+            bar = self.hangers[number].bar
             if worn:
-                left, bends = 1 - event.size, (1 - event.size) ** 2
-                lost = Zone(*edges, bends, left, 1 - event.size)
+                event = self.events[number]
+                half, middle = event.extent * bar.length_m / 2, event.place * bar.length_m
+                left = 1 - event.size
+                lost = Zone(middle - half, middle + half, left**2, left)
                 bar = replace(bar, zones=tuple((*own, lost) for own in bar.zones))
-            self.kept[key] = bar.plane(plane, edges if event.kind == "section_loss" else ())
+            self.kept[key] = bar.plane(plane)
         return self.kept[key]
 
     def frequencies(
