@@ -19,14 +19,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from pathlib import Path
-
-import numpy as np
 
 from tests.worlds.bars import GRAVITY_M_S2, POISSON, Zone, cowper, natural_frequencies_hz
 from tests.worlds.bars import Bar as Member
+from tests.worlds.cases import Case, Draws
 
-__all__ = ["Member", "Zone", "natural_frequencies_hz"]
+__all__ = ["Member", "Zone", "natural_frequencies_hz"]  # by which models are held against it
 
 PLANES = ("transverse", "longitudinal")  # the weight of a leaning hanger acts in the second
 STEEL_DENSITY_KG_M3 = 7850.0
@@ -34,38 +32,6 @@ STRAND_DENSITY_KG_M3 = 83e3 / GRAVITY_M_S2  # EN 1993-1-11, table 2.2: of the me
 
 
 # ---------------------------------------------------------------- what is drawn
-
-
-class Draws:
-    """Random numbers of one case."""
-
-    def __init__(self, seed: int, index: int) -> None:
-        """Seed the draws by (seed, index) alone."""
-        self.rng = np.random.default_rng([seed, index, 8])
-
-    def uniform(self, low: float, high: float) -> float:
-        """Return a number from `low` to `high`."""
-        return float(self.rng.uniform(low, high))
-
-    def log_uniform(self, low: float, high: float) -> float:
-        """Return a number whose logarithm is uniform."""
-        return low * math.exp(math.log(high / low) * float(self.rng.random()))
-
-    def normal(self, sd: float) -> float:
-        """Return a normal number of mean 0."""
-        return sd * float(self.rng.standard_normal())
-
-    def lognormal(self, sd: float) -> float:
-        """Return a factor about 1."""
-        return math.exp(self.normal(sd))
-
-    def chance(self, probability: float) -> bool:
-        """Return True with a probability."""
-        return bool(self.rng.random() < probability)
-
-    def choose(self, *values: str) -> str:
-        """Return one of the values."""
-        return values[int(self.rng.integers(len(values)))]
 
 
 @dataclass(frozen=True)
@@ -122,8 +88,8 @@ class Design:
 
 def draw_bar(draws: Draws, low_m: float, high_m: float) -> Section:
     """Draw a solid round bar."""
-    d = round(draws.log_uniform(low_m, high_m), 3)
-    area, modulus = math.pi * d**2 / 4, float(draws.choose("205e9", "210e9"))
+    d = round(draws.log(low_m, high_m), 3)
+    area, modulus = math.pi * d**2 / 4, float(draws.pick("205e9", "210e9"))
     stated = {
         "diameter_m": d,
         "elastic_modulus_pa": modulus,
@@ -138,8 +104,8 @@ def draw_bar(draws: Draws, low_m: float, high_m: float) -> Section:
 
 def draw_tube(draws: Draws) -> Section:
     """Draw a circular hollow section."""
-    outer = round(draws.log_uniform(0.060, 0.140), 3)
-    wall = round(draws.log_uniform(0.004, 0.010), 3)
+    outer = round(draws.log(0.060, 0.140), 3)
+    wall = round(draws.log(0.004, 0.010), 3)
     inner, modulus = outer - 2 * wall, 210e9
     area = math.pi / 4 * (outer**2 - inner**2)
     moment = math.pi / 64 * (outer**4 - inner**4)
@@ -161,14 +127,14 @@ def draw_strand(
     draws: Draws, diameter_m: tuple[float, float], locked: bool, bending: tuple[float, float]
 ) -> Section:
     """Draw a strand; fill factors and moduli of EN 1993-1-11, tables 2.2 and 3.1."""
-    d = round(draws.log_uniform(*diameter_m), 3)
-    fill = draws.uniform(0.81, 0.88) if locked else draws.uniform(0.73, 0.77)
+    d = round(draws.log(*diameter_m), 3)
+    fill = draws.between(0.81, 0.88) if locked else draws.between(0.73, 0.77)
     modulus = 160e9 if locked else 150e9
     area, moment = fill * math.pi * d**2 / 4, fill * math.pi * d**4 / 64
     per_length = STRAND_DENSITY_KG_M3 * area
     return Section(
         *(area, moment, per_length, modulus, d),
-        bending_factor=draws.uniform(*bending),
+        bending_factor=draws.between(*bending),
         described={
             "kind": "strand",
             "elastic_modulus_pa": modulus,
@@ -187,7 +153,7 @@ def draw_springs(
 
     Half of the time the ends of a plane differ by their details only, likewise the planes.
     """
-    k = [[draws.log_uniform(low, high) for _ in range(2)] for _ in range(2)]  # [end][plane]
+    k = [[draws.log(low, high) for _ in range(2)] for _ in range(2)]  # [end][plane]
     if draws.chance(0.5):
         k[1] = [value * draws.lognormal(between_ends) for value in k[0]]
     if draws.chance(0.5):
@@ -199,7 +165,7 @@ def draw_springs(
 
 def draw_forks(draws: Draws) -> Ends:
     """Draw two forks; each turns softly about its pin and stiffly across it."""
-    soft, stiff = draws.log_uniform(0.05, 3.0), draws.log_uniform(20.0, 500.0)
+    soft, stiff = draws.log(0.05, 3.0), draws.log(20.0, 500.0)
     deck_soft_plane = int(draws.rng.integers(2))
     arch_soft_plane = deck_soft_plane if draws.chance(0.7) else 1 - deck_soft_plane
     k1, k2, k3, k4 = (
@@ -207,10 +173,10 @@ def draw_forks(draws: Draws) -> Ends:
         for soft_plane in (deck_soft_plane, arch_soft_plane)
         for plane in range(2)
     )
-    size, base = draws.uniform(0.15, 0.35), draws.log_uniform(4.0, 16.0)
+    size, base = draws.between(0.15, 0.35), draws.log(4.0, 16.0)
     factors = base * draws.lognormal(0.3), base * draws.lognormal(0.3)
     fittings = round(size, 2), round(min(0.35, max(0.15, size * draws.lognormal(0.1))), 2)
-    return Ends("fork", (k1, k2, k3, k4), "EI/L", fittings, factors, draws.uniform(2.5, 5.0))
+    return Ends("fork", (k1, k2, k3, k4), "EI/L", fittings, factors, draws.between(2.5, 5.0))
 
 
 def draw_plates(draws: Draws, name: str) -> Ends:
@@ -220,13 +186,13 @@ def draw_plates(draws: Draws, name: str) -> Ends:
     """
     stiff = draw_springs(draws, 20.0, 1000.0)
     weak = draw_springs(draws, 3.0, 100.0)
-    factors = [draws.log_uniform(1.5, 8.0), draws.log_uniform(0.7, 3.0)]
+    factors = [draws.log(1.5, 8.0), draws.log(0.7, 3.0)]
     springs = [stiff[0], weak[1], stiff[2], weak[3]]
     if draws.chance(0.5):  # the plates lie along the bridge
         factors, springs = factors[::-1], [weak[0], stiff[1], weak[2], stiff[3]]
-    length = round(draws.uniform(0.1, 0.3), 2)
+    length = round(draws.between(0.1, 0.3), 2)
     k1, k2, k3, k4 = springs
-    mass = draws.uniform(1.3, 3.5)
+    mass = draws.between(1.3, 3.5)
     return Ends(name, (k1, k2, k3, k4), "EI/L", (length, length), (factors[0], factors[1]), mass)
 
 
@@ -244,10 +210,10 @@ def draw_sockets(
 ) -> Ends:
     """Draw sockets, three in ten of them clamped."""
     springs = (1e4, 1e4, 1e4, 1e4) if draws.chance(0.3) else draw_springs(draws, 1.5, 60.0)
-    length = round(draws.uniform(*diameters) * diameter_m, 2)
-    factor = draws.log_uniform(*stiffness)
+    length = round(draws.between(*diameters) * diameter_m, 2)
+    factor = draws.log(*stiffness)
     other_plane = min(stiffness[1], max(stiffness[0], factor * draws.lognormal(0.1)))
-    weight = draws.uniform(*mass)
+    weight = draws.between(*mass)
     return Ends("socket", springs, "sqrt(EI T)", (length, length), (factor, other_plane), weight)
 
 
@@ -256,15 +222,15 @@ def _draw_ratio(draws: Draws) -> float:
 
 
 def _length(draws: Draws, low: float, high: float) -> float:
-    return round(draws.log_uniform(low, high), 2)
+    return round(draws.log(low, high), 2)
 
 
 def _bar_stress(draws: Draws) -> float:
-    return draws.uniform(50e6, 180e6)  # of the permanent loads
+    return draws.between(50e6, 180e6)  # of the permanent loads
 
 
 def _strand_stress(draws: Draws) -> float:
-    return draws.uniform(200e6, 500e6)
+    return draws.between(200e6, 500e6)
 
 
 def draw_fork_bar(draws: Draws) -> Design:
@@ -285,12 +251,12 @@ def draw_slack_bar(draws: Draws) -> Design:
     tube = draws.chance(0.4)
     section = draw_tube(draws) if tube else draw_bar(draws, 0.040, 0.100)
     ends = draw_plates(draws, "plate") if tube or draws.chance(0.5) else draw_forks(draws)
-    lean = draws.uniform(0.0, 25.0)
+    lean = draws.between(0.0, 25.0)
     return Design(
         section,
         _length(draws, 4.0, 16.0),
         _bar_stress(draws),
-        draws.log_uniform(0.02, 0.20),
+        draws.log(0.02, 0.20),
         ends,
         inclination_deg=90.0 - lean,
         leaning=lean > 2.0,
@@ -301,14 +267,14 @@ def draw_turnbuckle_bar(draws: Draws) -> Design:
     """Draw a bar with one or two turnbuckles of 3 to 8 diameters, most of them below 5."""
     section, length = draw_bar(draws, 0.040, 0.100), _length(draws, 4.0, 16.0)
     ends = draw_forks(draws) if draws.chance(0.5) else draw_threads(draws, 5.0, 300.0)
-    first, error = draws.uniform(0.12, 0.35), draws.uniform(0.1, 0.3)
-    places = [first] if draws.chance(0.6) else [first, draws.uniform(0.6, 0.88)]
-    size = draws.uniform(3.0, 5.0) if draws.chance(0.7) else draws.uniform(5.0, 8.0)
+    first, error = draws.between(0.12, 0.35), draws.between(0.1, 0.3)
+    places = [first] if draws.chance(0.6) else [first, draws.between(0.6, 0.88)]
+    size = draws.between(3.0, 5.0) if draws.chance(0.7) else draws.between(5.0, 8.0)
     one = Turnbuckle(
         0.0,
         round(size * section.outer_m, 2),
-        draws.log_uniform(3.0, 15.0),
-        draws.uniform(2.0, 5.0),
+        draws.log(3.0, 15.0),
+        draws.between(2.0, 5.0),
         error,
     )
     couplers = tuple(replace(one, x_m=round(place * length, 2)) for place in places)
@@ -327,7 +293,7 @@ def draw_network_hanger(draws: Draws) -> Design:
         section = draw_strand(draws, (0.030, 0.070), True, (0.3, 0.8))
         length, stress = _length(draws, 10.0, 35.0), _strand_stress(draws)
         ends = draw_sockets(draws, section.outer_m, (4.0, 8.0), (5.0, 25.0), (3.0, 8.0))
-    ratio, inclination = _draw_ratio(draws), draws.uniform(45.0, 75.0)
+    ratio, inclination = _draw_ratio(draws), draws.between(45.0, 75.0)
     return Design(section, length, stress, ratio, ends, inclination, leaning=True)
 
 
@@ -381,30 +347,6 @@ class Tolerances:
     turnbuckle_place_m: float = 0.01
 
 
-@dataclass(frozen=True)
-class Case:
-    """A hanger as described and as measured, and the truth about it."""
-
-    index: int
-    hanger_toml: str
-    modes: dict[str, object]
-    truth: dict[str, float | str]
-    groups: tuple[str, ...]
-    extra: dict[str, float | str]  # keys of the description that a reader may not know yet
-
-    def write(self, folder: Path, *, with_new_keys: bool = False) -> tuple[Path, Path]:
-        """Write hanger.toml and case.modes.json into the folder; `extra` only on request."""
-        folder.mkdir(parents=True, exist_ok=True)
-        hanger, modes = folder / "hanger.toml", folder / "case.modes.json"
-        text = self.hanger_toml
-        if with_new_keys:  # above the tables of the hanger
-            lines = "".join(f"{key} = {json.dumps(value)}\n" for key, value in self.extra.items())
-            text = text.replace("id = 1\n", "id = 1\n" + lines, 1)
-        hanger.write_text(text, encoding="utf-8")
-        modes.write_text(json.dumps(self.modes, indent=1) + "\n", encoding="utf-8")
-        return hanger, modes
-
-
 def describe(draws: Draws, design: Design) -> str:
     """Return the hanger as its drawing states it."""
     section = design.section
@@ -447,10 +389,10 @@ def make_members(
     lean = math.radians(inclination)
     unit = bending / length if ends.unit == "EI/L" else math.sqrt(bending * tension)
     k1, k2, k3, k4 = (k * unit for k in ends.springs)
-    lateral = [draws.log_uniform(1e8, 1e9) for _ in range(4)]  # as k1 to k4
-    axial = draws.log_uniform(1e8, 1e9), draws.log_uniform(1e8, 1e9)
-    places = sorted(draws.uniform(1.0, 2.5) for _ in range(int(draws.rng.integers(1, 4))))
-    sensors = tuple((min(x, 0.45 * length), draws.uniform(0.020, 0.090)) for x in places)
+    lateral = [draws.log(1e8, 1e9) for _ in range(4)]  # as k1 to k4
+    axial = draws.log(1e8, 1e9), draws.log(1e8, 1e9)
+    places = sorted(draws.between(1.0, 2.5) for _ in range(int(draws.rng.integers(1, 4))))
+    sensors = tuple((min(x, 0.45 * length), draws.between(0.020, 0.090)) for x in places)
     couplers = []
     for coupler in design.turnbuckles:
         middle = coupler.x_m + draws.normal(tolerances.turnbuckle_place_m)
@@ -509,10 +451,8 @@ def measure(
     draws: Draws, members: tuple[Member, Member], missing: float = 0.1
 ) -> tuple[dict[str, object], dict[str, float | str]]:
     """Return the document of one test, and the truth about its errors."""
-    planes = PLANES
-    if draws.chance(0.45):
-        planes = (draws.choose(*PLANES),)  # type: ignore[assignment]
-    real = draws.log_uniform(1e-4, 1e-3)
+    planes = (draws.pick(*PLANES),) if draws.chance(0.45) else PLANES
+    real = draws.log(1e-4, 1e-3)
     stated = real * draws.lognormal(0.2)
     modes: list[dict[str, object]] = []
     for plane, member in zip(PLANES, members, strict=True):
@@ -541,7 +481,7 @@ def measure(
 @lru_cache(maxsize=4096)
 def make_hanger(seed: int, index: int) -> Case:
     """Make one case; its kind follows from the index, so that all kinds are equally many."""
-    draws = Draws(seed, index)
+    draws = Draws(seed, index, 8)
     kind = list(KINDS)[index % len(KINDS)]
     design = KINDS[kind](draws)
     toml = describe(draws, design)

@@ -8,15 +8,14 @@ Physics, one plane: a round bar by `bars.py`, held sideways at both ends on rota
 weight lets the tension of a vertical hanger grow; the stated tension is the one at mid-length.
 """
 
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from tests.worlds.bars import GRAVITY_M_S2, POISSON, Array, Bar, cowper, natural_frequencies_hz
+from tests.worlds.cases import Case
 
 PLANES = ("transverse", "longitudinal")
 STEEL_DENSITY_KG_M3 = 7850.0
@@ -64,25 +63,6 @@ class Nuisances:
             missing_order=0.0,
             absent_sd=0.0,
         )
-
-
-@dataclass(frozen=True)
-class Case:
-    """A hanger as described and as measured, and the truth about it."""
-
-    index: int
-    hanger_toml: str
-    modes: dict[str, object]
-    truth: dict[str, float | str]
-    groups: tuple[str, ...]
-
-    def write(self, folder: Path) -> tuple[Path, Path]:
-        """Write hanger.toml and case.modes.json into the folder (made if need be)."""
-        folder.mkdir(parents=True, exist_ok=True)
-        hanger, modes = folder / "hanger.toml", folder / "case.modes.json"
-        hanger.write_text(self.hanger_toml, encoding="utf-8")
-        modes.write_text(json.dumps(self.modes, indent=1) + "\n", encoding="utf-8")
-        return hanger, modes
 
 
 @dataclass(frozen=True)

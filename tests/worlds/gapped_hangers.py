@@ -27,13 +27,13 @@ import json
 import math
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
 
 from tests.worlds.bars import POISSON, Array, Bar, Modes, Zone, cowper, solve_modes
+from tests.worlds.cases import Case, Draws
 
 PLANES = ("transverse", "longitudinal")  # the weight of a leaning hanger acts in the second
 GRAVITY_M_S2 = 9.81
@@ -423,34 +423,6 @@ def find_inherent(hanger: Hanger, sound: Data, slopes: Array) -> dict[str, float
 # ---------------------------------------------------------------- what is drawn
 
 
-class Draws:
-    """Random numbers of one case."""
-
-    def __init__(self, *entropy: int) -> None:
-        """Seed the draws by whole numbers."""
-        self.rng = np.random.default_rng([*entropy, 1847])
-
-    def between(self, low: float, high: float) -> float:
-        """Return a number from `low` to `high`."""
-        return float(self.rng.uniform(low, high))
-
-    def log(self, low: float, high: float) -> float:
-        """Return a number whose logarithm is uniform."""
-        return low * math.exp(math.log(high / low) * float(self.rng.random()))
-
-    def normal(self, sd: float) -> float:
-        """Return a normal number of mean 0."""
-        return sd * float(self.rng.standard_normal())
-
-    def chance(self, probability: float) -> bool:
-        """Return True with a probability."""
-        return bool(self.rng.random() < probability)
-
-    def pick(self, *values: Any) -> Any:
-        """Return one of the values."""
-        return values[int(self.rng.integers(len(values)))]
-
-
 @dataclass(frozen=True)
 class _Section:
     kind: str
@@ -674,24 +646,6 @@ def _size_fault(
 # ---------------------------------------------------------------- a case
 
 
-@dataclass(frozen=True)
-class Case:
-    """A hanger as described and as measured, and the truth about it."""
-
-    index: int
-    hanger_toml: str
-    modes: dict[str, Any]
-    truth: dict[str, Any]
-
-    def write(self, folder: Path) -> tuple[Path, Path]:
-        """Write hanger.toml and case.modes.json into the folder (made if need be)."""
-        folder.mkdir(parents=True, exist_ok=True)
-        hanger, modes = folder / "hanger.toml", folder / "case.modes.json"
-        hanger.write_text(self.hanger_toml, encoding="utf-8")
-        modes.write_text(json.dumps(self.modes, indent=1) + "\n", encoding="utf-8")
-        return hanger, modes
-
-
 def describe(hanger: Hanger) -> str:
     """Return the hanger as its owner states it."""
     lines = ["[[hanger]]", "id = 1"]
@@ -794,7 +748,7 @@ def make_case(
     n = nuisances or Nuisances()
     needs = frozenset(need for name in causes for need in CAUSES[name].needs)
     for attempt in range(200):
-        draws = Draws(seed, index, attempt + 1)
+        draws = Draws(seed, index, attempt + 1, 1847)
         hanger = draw_hanger(draws, needs, n)
         quiet = replace(
             hanger, visits=tuple(replace(visit, tension_factor=1.0) for visit in hanger.visits)

@@ -13,7 +13,6 @@ from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import lfilter
 
 from tests.worlds.bars import (
     GRAVITY_M_S2,
@@ -24,15 +23,13 @@ from tests.worlds.bars import (
     natural_frequencies_hz,
     solve_modes,
 )
+from tests.worlds.seasons import ENDS, PLANES, REFERENCE_C, lagged
 
-PLANES = ("transverse", "longitudinal")
-ENDS = ("deck", "arch")
 KINDS = ("tension_loss", "end_loosened", "ice", "sensor_remounted")
 EPOCH = datetime(2020, 1, 1, tzinfo=UTC)
 DAY_S, YEAR_S = 86400.0, 365.25 * 86400.0
 EXPANSION = 1.2e-5
 MODULUS_PER_K = -3.0e-4
-REFERENCE_C = 10.0
 AIR_KG_M3 = 1.25
 HIGHEST_HZ = 85.0
 MOST_MODES = 12  # per plane
@@ -311,11 +308,6 @@ def lines(r: np.random.Generator, shortest_s: float, longest_s: float, count: in
     return Lines(2 * np.pi / period, r.uniform(0, 2 * np.pi, count), weight)
 
 
-def _lag(x: Array, lag_s: float) -> Array:
-    a = math.exp(-STEP_S / lag_s)
-    return np.asarray(lfilter([1 - a], [1, -a], x, zi=[a * x[0]])[0])
-
-
 @dataclass(frozen=True, eq=False)
 class Weather:
     """On a grid of half hours; `of` interpolates."""
@@ -352,21 +344,21 @@ class Bridge:
         side = np.clip(0.5 - 0.9 * np.sin(angle), 0.05, 1.0)  # row 0 looks east
         air = 10 - 9.5 * np.cos(year - 2 * np.pi * 18 / 365.25)
         air += 3.6 * lines(rng(s, "synoptic"), 2 * DAY_S, 22 * DAY_S)(t)
-        air += _lag(14 * sun, 3.5 * 3600) - 4 * up.clip(0, 0.4) - 1.5 * clear * (high < 0)
+        air += lagged(14 * sun, 3.5 * 3600, STEP_S) - 4 * up.clip(0, 0.4) - 1.5 * clear * (high < 0)
         speed = math.log(3.0) + 0.22 * np.cos(year) + 0.45 * np.clip(high, -0.3, 0.6)
         speed += 0.50 * lines(rng(s, "wind"), 1.5 * DAY_S, 22 * DAY_S, 50)(t)
         speed += 0.22 * lines(rng(s, "breeze"), 3600.0, 10 * 3600.0, 40)(t)
         speed -= 0.55 * clear * (high < -0.1)
-        deck = _lag(air + 12 * sun, 14 * 3600)
+        deck = lagged(air + 12 * sun, 14 * 3600, STEP_S)
         columns = {
             "air": air,
             "sun": sun,
             "wind": np.exp(speed),
             "deck": deck,
-            "arch0": _lag(air + 13 * sun * side * 1.4, 2 * 3600),
-            "arch1": _lag(air + 13 * sun * (1.05 - side) * 1.4, 2 * 3600),
-            "rod0": _lag(air + 6 * sun * side * 1.4, 2400),
-            "rod1": _lag(air + 6 * sun * (1.05 - side) * 1.4, 2400),
+            "arch0": lagged(air + 13 * sun * side * 1.4, 2 * 3600, STEP_S),
+            "arch1": lagged(air + 13 * sun * (1.05 - side) * 1.4, 2 * 3600, STEP_S),
+            "rod0": lagged(air + 6 * sun * side * 1.4, 2400, STEP_S),
+            "rod1": lagged(air + 6 * sun * (1.05 - side) * 1.4, 2400, STEP_S),
         }
         return Weather(t, columns)
 

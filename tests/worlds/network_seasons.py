@@ -28,7 +28,6 @@ the full one (tested).
 Every law draws from its own stream (seed, law, hanger), the same number of times on or off.
 """
 
-import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
@@ -38,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from tests.worlds import seasons
 from tests.worlds.bars import (
     GRAVITY_M_S2,
     POISSON,
@@ -50,19 +50,13 @@ from tests.worlds.bars import (
     solve,
     solve_many,
 )
+from tests.worlds.seasons import PLANES, REFERENCE_C, lagged, mode, stream
 
 EXPANSION_PER_K = 1.2e-5  # EN 1991-1-5, annex C
 MODULUS_PER_K = -3.0e-4  # steel near room temperature
-REFERENCE_C = 10.0
-PLANES = ("transverse", "longitudinal")
-ENDS = ("deck", "arch")
 STEP_H = 0.5  # of the weather
 START = datetime(2026, 5, 1, tzinfo=UTC)
 MACHINE_HZ = (8.33, 16.67, 25.0)  # 500, 1000 and 1500 turns a minute; overtones of it
-EVENTS = (
-    "none", "tension_step", "tension_ramp", "springs", "lamp", "clock", "section_loss",
-    "sensor_moved",
-)  # fmt: skip
 
 
 # --------------------------------------------------------------------------------------- beam
@@ -173,7 +167,7 @@ class Reduced:
 
 
 @dataclass(frozen=True)
-class Nuisances:
+class Nuisances(seasons.Switched):
     """What separates a field record from the textbook; each is off at 0 and scales by its value.
 
     `none()` switches all off; `replace(Nuisances(), wind=0.0)` one.  Scales (default 1) multiply
@@ -222,47 +216,14 @@ class Nuisances:
     persistent: float = 0.12  # share of hangers where one mistake comes back
     swapped: float = 0.005  # share of visits under another hanger's name
 
-    @classmethod
-    def none(cls) -> "Nuisances":
-        """The textbook: uniform hanger as described, constant state, exact frequencies."""
-        off: dict[str, Any] = {
-            name: (0.0, 0.0) if isinstance(value, tuple) else 0.0
-            for name, value in vars(cls()).items()
-        }
-        return cls(**off)
-
 
 @dataclass(frozen=True)
-class Event:
-    """A change planted at a day (from `START`) in one hanger.
+class Event(seasons.Event):
+    """An event; a moved sensor sits at a new place, `size` of the length."""
 
-    kind          size
-    tension_step  fraction of the tension, sign kept; neighbours carry the rest
-    tension_ramp  fraction a year
-    springs       end stiffness becomes this fraction, at `end` ("deck", "arch", "both") and in
-                  `plane` ("transverse", "longitudinal", "both")
-    lamp          kg at `at_share` of the length
-    clock         ALL hangers and operators: the time base reads 1 + size times every frequency
-    section_loss  fraction of the area over `length_share` about `at_share`, tension kept
-    sensor_moved  new place of the sensor as a share of the length, for this hanger
-    """
-
-    kind: str = "none"
-    hanger: int = 0
     day: float = 540.0
-    size: float = 0.0
-    end: str = "deck"
-    plane: str = "both"
-    at_share: float = 0.3
-    length_share: float = 0.08
-
-    def __post_init__(self) -> None:
-        if self.kind not in EVENTS:
-            raise ValueError(f"no event {self.kind!r}: one of {EVENTS}")
-        if self.size == 0.0 and self.kind not in ("none", "springs"):
-            raise ValueError(f"{self.kind} of size 0 is no event")
-        if self.kind == "sensor_moved" and not 0.0 < self.size < 1.0:
-            raise ValueError("a sensor sits between the ends")
+    place: float = 0.3
+    extent: float = 0.08
 
     def after(self, days: Array) -> NDArray[np.bool_]:
         return np.asarray(days) >= self.day
@@ -313,7 +274,7 @@ class Hanger:
         )
         worn = bar
         if event.kind == "section_loss":
-            half, middle = event.length_share * length / 2, event.at_share * length
+            half, middle = event.extent * length / 2, event.place * length
             ends = max(middle - half, 0.0), min(middle + half, length)
             kept = 1 - event.size
             worn = replace(bar, zones=(*bar.zones, Zone(*ends, kept**2, kept, 1.0)))
@@ -329,23 +290,19 @@ class Hanger:
         return self.stick_factor - (self.stick_factor - self.slip_factor) * sliding * slip
 
 
-def _stream(seed: int, law: str, *keys: int) -> np.random.Generator:
-    return np.random.default_rng([seed, zlib.crc32(law.encode()), *keys])
-
-
 def bridge(seed: int, count: int, nuisances: Nuisances) -> list[Hanger]:
     """Hangers of one side of a network arch: a parabola of lengths, some rods, some strands."""
     n = nuisances
-    places = _stream(seed, "sensor place").uniform(1.3, 2.3, 3)  # above the deck, by operator
-    style = _stream(seed, "bridge")
+    places = stream(seed, "sensor place").uniform(1.3, 2.3, 3)  # above the deck, by operator
+    style = stream(seed, "bridge")
     rise, rods = style.uniform(10.0, 22.0), style.uniform(0.3, 0.9)
     partners: dict[int, tuple[int, float, float, float]] = {}
-    crossings = _stream(seed, "crossing")
+    crossings = stream(seed, "crossing")
     draws = crossings.uniform(size=(count, 4))
     hangers = []
     for i in range(count):
         along = (i + 0.7) / (count + 0.4)
-        design, true = _stream(seed, "design", i), _stream(seed, "true", i)
+        design, true = stream(seed, "design", i), stream(seed, "true", i)
         u, z = design.uniform(size=12), true.standard_normal(24)
         length = float(max(rise * 4 * along * (1 - along) * (0.9 + 0.2 * u[0]), 3.5 + u[1]))
         rod = u[2] < rods
@@ -379,7 +336,7 @@ def bridge(seed: int, count: int, nuisances: Nuisances) -> list[Hanger]:
             zones.append(Zone(0.0, float(lengths[0]), bend, heavy, np.sqrt(bend)))
             zones.append(Zone(length - float(lengths[1]), length, bend, heavy, np.sqrt(bend)))
         known: dict[str, float] = {}
-        sleeve = _stream(seed, "sleeve", i).uniform(size=4)
+        sleeve = stream(seed, "sleeve", i).uniform(size=4)
         if sleeve[0] < n.sleeve_share:
             start = 0.12 * length + 0.1 * sleeve[1] * length
             long = (4 + 3 * sleeve[2]) * diameter
@@ -408,7 +365,7 @@ def bridge(seed: int, count: int, nuisances: Nuisances) -> list[Hanger]:
             name=f"H{i + 1:02d}", kind="rod" if rod else "strand", diameter_m=diameter,
             area_m2=area * grown, second_moment_m4=moment * grown**2, modulus_pa=true_modulus,
             density_kg_m3=true_density, mass_kg_m=true_density * area * grown, length_m=length,
-            inclination_rad=float(np.deg2rad(55 + 30 * _stream(seed, "slope", i).uniform())),
+            inclination_rad=float(np.deg2rad(55 + 30 * stream(seed, "slope", i).uniform())),
             tension_n=tension, springs_nm=((k[0], k[1]), (k[2], k[3])),
             flexibility_m_n=((limp[0], limp[1]), (limp[2], limp[3])),
             zones=tuple(zones), stick_factor=stick, slip_factor=slide,
@@ -429,16 +386,11 @@ def _ar1(rng: np.random.Generator, count: int, step: float, memory: float) -> Ar
     return np.asarray(lfilter([1.0], [1.0, -a], z))
 
 
-def _lagged(series: Array, hours: float) -> Array:
-    a = np.exp(-STEP_H / hours)
-    return np.asarray(lfilter([1 - a], [1, -a], series, zi=[a * series[0]])[0])
-
-
 class Weather:
     """Half-hourly air temperature and sun (0 to 1); days count from `START`, 1 May."""
 
     def __init__(self, seed: int, days: float) -> None:
-        rng = _stream(seed, "weather")
+        rng = stream(seed, "weather")
         count = int(days * 24 / STEP_H) + 2
         hours = np.arange(count) * STEP_H
         self.hours = hours
@@ -452,7 +404,7 @@ class Weather:
         self.air = 9.5 + 9.5 * np.cos(year - 2 * np.pi * 6 / 365.25) + weather + day
 
     def member(self, hours: float, gain_k: float) -> Array:
-        return _lagged(self.air + gain_k * self.sun, hours)
+        return lagged(self.air + gain_k * self.sun, hours, STEP_H)
 
 
 class World:
@@ -462,17 +414,17 @@ class World:
         self.days = 365.25 * years
         self.weather = weather = Weather(seed, self.days)
         grid = len(weather.hours)
-        rng = _stream(seed, "influence")
+        rng = stream(seed, "influence")
         far = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
         shape = np.exp(-far / 1.5) * (1 + 0.4 * rng.standard_normal((count, count)))
         np.fill_diagonal(shape, 0.0)
         # what one hanger gives up, its neighbours carry: at most 0.15 each
         self.influence = np.eye(count) - 0.2 * n.redistribution * np.clip(shape, 0, 1.1)
-        lags = np.exp(_stream(seed, "lags").uniform(np.log(0.3), np.log(1.2), count))
-        gains = 3.0 + 5.0 * _stream(seed, "gains").uniform(size=count)
+        lags = np.exp(stream(seed, "lags").uniform(np.log(0.3), np.log(1.2), count))
+        gains = 3.0 + 5.0 * stream(seed, "gains").uniform(size=count)
         arch, deck = weather.member(3.0, 9.0), weather.member(8.0, 8.0)
         self.own = np.array([weather.member(lag, g) for lag, g in zip(lags, gains, strict=True)])
-        pick = _stream(seed, "sensitivity")
+        pick = stream(seed, "sensitivity")
         restraint = 1e-3 * pick.uniform(0.6, 2.2, count)  # per K hanger over arch
         smooth = np.exp(-((far / 4.0) ** 2))
         smooth /= np.sqrt((smooth**2).sum(1, keepdims=True))
@@ -483,10 +435,10 @@ class World:
         total += 6e-4 * uniform[:, None] * (arch - REFERENCE_C)  # bearings, unlike expansions
         self.thermal = n.temperature * total
         self.warm = n.temperature
-        settle = _stream(seed, "settlement")
+        settle = stream(seed, "settlement")
         self.rates = n.settlement_sd_per_year * (smooth @ settle.standard_normal(count))
         self.rates += 0.3 * n.settlement_sd_per_year * settle.standard_normal(count)
-        load = _stream(seed, "traffic")
+        load = stream(seed, "traffic")
         kinds, sizes = load.uniform(size=grid), load.uniform(size=grid)
         where = load.uniform(0, count, grid)
         some = -0.003 * np.log(np.clip(sizes, 1e-9, 1))  # vehicles: exponential, mean 0.3 %
@@ -494,7 +446,7 @@ class World:
             kinds < 0.80, 2e-4 * sizes, np.where(kinds < 0.97, some, 0.01 + 0.05 * sizes)
         )
         self.where = where
-        gust = _stream(seed, "wind")
+        gust = stream(seed, "wind")
         days = int(self.days) + 2
         # daily wind, unit: a breezy day; Student-t of 3 degrees, so a gale a year or two
         self.gusts = n.wind * np.abs(gust.standard_t(3, days)) * 0.6
@@ -549,7 +501,7 @@ class Operator:
 def _operators(seed: int, n: Nuisances) -> list[Operator]:
     people = []
     for i in range(3):
-        rng = _stream(seed, "operator", i)
+        rng = stream(seed, "operator", i)
         z, u = rng.standard_normal(6), rng.uniform(size=5)
         habit = n.operators
         people.append(Operator(
@@ -577,7 +529,7 @@ class _Visit:
 def _schedule(seed: int, count: int, days: float, n: Nuisances) -> list[_Visit]:
     visits: list[_Visit] = []
     for i in range(count):
-        rng = _stream(seed, "schedule", i)
+        rng = stream(seed, "schedule", i)
         every = (7.0, 30.4, 91.3)[int(np.searchsorted([0.2, 0.5], rng.uniform()))]
         own = int(rng.integers(3))  # who usually comes
         planned = np.arange(3.0 + every * 0.5 * rng.uniform(), days - 2, every)
@@ -590,7 +542,7 @@ def _schedule(seed: int, count: int, days: float, n: Nuisances) -> list[_Visit]:
             if not skip[k] and 0 <= day < days - 1:
                 comes = int(who[k]) if other[k] < 0.25 else own
                 visits.append(_Visit(float(day + hours[k] / 24), comes, i, i))
-    batch = _stream(seed, "campaigns")
+    batch = stream(seed, "campaigns")
     for year in range(int(np.ceil(days / 365.25))):  # spring and autumn, every hanger in a day
         for start in (15.0, 150.0):
             late, person = 20 * n.irregular * batch.uniform(), int(batch.integers(3))
@@ -599,13 +551,13 @@ def _schedule(seed: int, count: int, days: float, n: Nuisances) -> list[_Visit]:
                 if day < days - 1:
                     time = float(day + (8 + 9 * i / count) / 24)
                     visits.append(_Visit(time, person, i, i))
-    rng = _stream(seed, "winter")
+    rng = stream(seed, "winter")
     kept = []
     for visit in sorted(visits, key=lambda v: (v.day, v.named)):
         winter = 230 < visit.day % 365.25 < 291  # 17 December to 16 February
         if not (rng.uniform() < n.winter_gap and winter):
             kept.append(visit)
-    mix = _stream(seed, "names")
+    mix = stream(seed, "names")
     for visit in kept:
         draw, side = mix.uniform(), int(mix.integers(2))
         if draw < n.swapped and count > 1:
@@ -647,10 +599,9 @@ def _states(
         soft = 1 - 0.03 * min(visit.truth["wind"], 8.0)  # loose joints rattle
         soft *= max(1 - n.joint_amplitude * np.log(visit.truth["amplitude"]), 0.3)
         springs = [soft, soft]
-        if changed and event.kind == "springs" and event.plane in (plane, "both"):
-            for e, end in enumerate(ENDS):
-                if event.end in (end, "both"):
-                    springs[e] *= event.size
+        if changed and event.kind == "springs" and plane in event.planes:
+            for e in event.at_ends:
+                springs[e] *= event.size
         masses = []
         if not quiet and people[visit.operator].sensor_kg > 0:
             place = h.sensor_places_m[visit.operator]
@@ -658,7 +609,7 @@ def _states(
                 place = event.size * h.length_m
             masses.append((people[visit.operator].sensor_kg, place))
         if changed and event.kind == "lamp":
-            masses.append((event.size, event.at_share * h.length_m))
+            masses.append((event.size, event.place * h.length_m))
         states.append(State(
             visit.truth["tension_n"] if not quiet else visit.truth["partner_n"], float(factor),
             (springs[0], springs[1]), visit.truth["warmer_k"], tuple(masses),
@@ -672,7 +623,7 @@ def _marks(h: Hanger, event: Event, mine: bool) -> tuple[float, ...]:
     if h.crossing:
         marks.append(h.crossing[1] * h.length_m)
     if mine and event.kind == "lamp":
-        marks.append(event.at_share * h.length_m)
+        marks.append(event.place * h.length_m)
     if mine and event.kind == "sensor_moved":
         marks.append(event.size * h.length_m)
     return tuple(sorted({round(m, 9) for m in marks}))
@@ -692,7 +643,7 @@ def reduced(h: Hanger, plane: str, event: Event, mine: bool, count: int) -> Redu
         states.append(State(t, (low + high) / 2, lost=True))
         states.append(State(0.8 * t, low, (0.3, 0.3), lost=True))
     if mine and event.kind == "lamp":
-        states.append(State(t, high, masses=((event.size, event.at_share * h.length_m),)))
+        states.append(State(t, high, masses=((event.size, event.place * h.length_m),)))
     if mine and event.kind == "springs":
         states.append(State(t, high, (max(event.size, 1e-3),) * 2))
     return Reduced(beam, states, count)
@@ -762,7 +713,7 @@ def _mistakes(
     seed: int, i: int, table: Array, days: Array, deck_hz: Array, n: Nuisances
 ) -> tuple[Array, dict[tuple[int, int, int], str]]:
     """Frequencies with the wrong ones in, and their causes by (visit, plane, order - 1)."""
-    rng = _stream(seed, "mistakes", i)
+    rng = stream(seed, "mistakes", i)
     share = n.mistaken[0] + (n.mistaken[1] - n.mistaken[0]) * rng.uniform()
     draws = rng.uniform(size=(*table.shape, 3))
     comes, start, length = rng.uniform(size=3)
@@ -828,7 +779,7 @@ def season(
         raise ValueError("the event's hanger is not on this bridge")
     world, people = World(seed, count, years, n), _operators(seed, n)
     visits = _schedule(seed, count, world.days, n)
-    deck_hz = np.sort(_stream(seed, "deck").uniform(2.0, 6.0, 4))
+    deck_hz = np.sort(stream(seed, "deck").uniform(2.0, 6.0, 4))
 
     def tension(i: int, days: Array) -> tuple[Array, Array]:
         base = beams[i].tension_n * world.lasting(i, days, event, relaxation_per_year)
@@ -850,7 +801,7 @@ def _measure(
 ) -> None:  # fmt: skip
     """Fill in the truth and the modes of every visit at one hanger."""
     size, days = len(visits), np.array([v.day for v in visits])
-    rng = _stream(seed, "visit", i)
+    rng = stream(seed, "visit", i)
     hit, rate, air = rng.standard_normal(size), rng.uniform(size=size), rng.standard_normal(size)
     noted, told, known = rng.uniform(size=(3, size))
     amplitude_error = rng.standard_normal(size)
@@ -870,7 +821,7 @@ def _measure(
         }  # fmt: skip
     hz, seen = true_frequencies(i, beams, visits, event, people, n, orders)
     table, causes = _mistakes(seed, i, hz, days, deck_hz, n)
-    draws = _stream(seed, "scatter", i)
+    draws = stream(seed, "scatter", i)
     errors, stated = _scatter(draws, hz.shape, n), draws.standard_normal(hz.shape)
     lost, damping = draws.uniform(size=hz.shape), draws.standard_normal(hz.shape)
     for k, visit in enumerate(visits):
@@ -891,11 +842,8 @@ def _measure(
                 read *= 1 + n.scatter * relative * float(np.clip(errors[k, p, o], -12, 12))
                 believed = relative * person.optimism * np.exp(0.2 * n.operators * stated[k, p, o])
                 ratio = 0.004 * truth["amplitude"] ** 0.2 * np.exp(0.35 * damping[k, p, o])
-                modes.append({
-                    "plane": plane, "order": o + 1, "frequency_hz": float(read),
-                    "frequency_sd_hz": float(table[k, p, o] * believed),
-                    "damping_ratio": float(ratio),
-                })  # fmt: skip
+                sd = table[k, p, o] * believed
+                modes.append(mode(plane, o + 1, read, sd, ratio))
                 if (k, p, o) in causes:
                     cause = causes[k, p, o]
                     wrong.append({"plane": plane, "order": o + 1, "cause": cause,

@@ -53,27 +53,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tests.worlds import bars
+from tests.worlds import bars, seasons
 from tests.worlds.bars import GRAVITY_M_S2, POISSON, Array, Matrices, Zone
+from tests.worlds.seasons import KINDS, PLANES, REFERENCE_C, YEAR_D, lagged, mode
 
-PLANES = ("transverse", "longitudinal")
-KINDS = (
-    "none",
-    "tension_step",  # size: fraction of the tension, -0.05; neighbours take their parts
-    "tension_ramp",  # size: fraction a year
-    "retensioned",  # size: fraction; by the owner, `told` or not; the deck end sits otherwise
-    "neighbour_lost",  # size: the fraction that this hanger gains
-    "springs",  # size: factor on the springs of `end`
-    "lamp",  # size: kg at `place`
-    "section_loss",  # size: fraction of the area about `place` over `extent`; tension kept
-    "clock",  # size: fraction by which all frequencies of all hangers read too high
-    "sensor_moved",  # size: the new place as a fraction of the length
-)
 SIDE = 12
 START = datetime(2019, 1, 1, tzinfo=UTC)
-REFERENCE_C = 10.0
 SETTLING_DAYS = 40  # of weather before the first test, so that the deck's lag has settled
-YEAR_DAYS = 365.25
 GAINED = 0.3  # of a lost tension, by either neighbour
 SOFTENING_PER_K = -3e-4  # of steel's modulus; EN 1993-1-2 has more, from 100 deg C on
 STREAMS = (
@@ -83,25 +69,14 @@ STREAMS = (
 
 
 @dataclass(frozen=True)
-class Event:
-    """One thing that happens to a hanger on a day, counted from the first of the season."""
+class Event(seasons.Event):
+    """An event; a moved sensor sits at a new place, `size` of the length."""
 
-    kind: str = "none"
-    hanger: int = 0
-    day: float = 0.0
-    size: float = 0.0
     place: float = 0.35
-    extent: float = 0.1
-    end: str = "deck"
-    told: bool = False
-
-    def __post_init__(self) -> None:
-        if self.kind not in KINDS or self.end not in ("deck", "arch", "both"):
-            raise ValueError(f"no such event: {self}")
 
 
 @dataclass(frozen=True)
-class Nuisances:
+class Nuisances(seasons.Switched):
     """Everything of the field that separates a test from the tension; each can be left out."""
 
     temperature: bool = True
@@ -114,12 +89,6 @@ class Nuisances:
     ice: bool = True
     faults: bool = True
     missing: bool = True
-
-    @classmethod
-    def none(cls, **on: bool) -> Nuisances:
-        """Return no nuisance but those named."""
-        names = cls.__dataclass_fields__
-        return cls(**{name: on.get(name, False) for name in names})
 
 
 @dataclass(frozen=True)
@@ -406,25 +375,18 @@ class Weather:
 def weather(seed: int, begin_day: float, years: float) -> Weather:
     """Return the weather of a season that begins `begin_day` days after New Year."""
     rng = draws(seed, "weather")
-    count = math.ceil(years * YEAR_DAYS) + SETTLING_DAYS + 3
+    count = math.ceil(years * YEAR_D) + SETTLING_DAYS + 3
     daily = lfilter([1.0], [1.0, -0.75], rng.normal(0, 4 * math.sqrt(1 - 0.75**2), count))
     clear = np.clip(0.5 + 0.35 * lfilter([1.0], [1.0, -0.5], rng.normal(size=count)), 0, 1)
     hours = np.arange(24 * (count - 1))
     day = hours / 24 + begin_day - SETTLING_DAYS
-    season = -np.cos(2 * np.pi * (day - 20) / YEAR_DAYS)
+    season = -np.cos(2 * np.pi * (day - 20) / YEAR_D)
     sky = np.interp(hours / 24, np.arange(count), clear)
     sun = np.clip(np.sin(2 * np.pi * (hours % 24 - 6) / 24), 0, None) * sky
     sun = sun * (0.65 + 0.35 * season)
     swing = (1.5 + 3.5 * sky) * np.cos(2 * np.pi * (hours % 24 - 15) / 24)
     air = 9.5 + 10.5 * season + np.interp(hours / 24, np.arange(count), daily) + swing
-    return Weather(air, _lag(air + 7 * sun, 40 / 60), _lag(air + 4 * sun, 30.0))
-
-
-def _lag(drive: Array, lag_h: float) -> Array:
-    """Return the response of first order to an hourly drive."""
-    kept = math.exp(-1 / lag_h)
-    found, _ = lfilter([1 - kept], [1.0, -kept], drive, zi=[kept * drive[0]])
-    return np.asarray(found)
+    return Weather(air, lagged(air + 7 * sun, 40 / 60), lagged(air + 4 * sun, 30.0))
 
 
 # --------------------------------------------------------------------------------------- tension
@@ -435,13 +397,13 @@ def lasting(
 ) -> Array:
     """Return the tension in N that lasts, without what comes and goes; (hangers, days)."""
     built = np.array([each.tension_n for each in hangers])
-    slowing = 6 * (1 - np.exp(-days / YEAR_DAYS / 6))  # years of the first rate
-    tension = built[:, None] * (1 + creep[:, None] * slowing - relaxation * days / YEAR_DAYS)
+    slowing = 6 * (1 - np.exp(-days / YEAR_D / 6))  # years of the first rate
+    tension = built[:, None] * (1 + creep[:, None] * slowing - relaxation * days / YEAR_D)
     for event in events:
         since = np.clip(days - event.day, 0, None)
         after = (days >= event.day).astype(float)
         sizes = {
-            "tension_step": after, "retensioned": after, "tension_ramp": since / YEAR_DAYS,
+            "tension_step": after, "retensioned": after, "tension_ramp": since / YEAR_D,
         }  # fmt: skip
         if event.kind in sizes:
             change = event.size * built[event.hanger] * sizes[event.kind]
@@ -495,7 +457,7 @@ def drawn_events(seed: int, years: float) -> list[Event]:
         }[kind]
         found.append(
             Event(
-                kind, number, float(rng.uniform(0.35, 0.7) * years * YEAR_DAYS), size,
+                kind, number, float(rng.uniform(0.35, 0.7) * years * YEAR_D), size,
                 place=float(rng.uniform(0.1, 0.5)), extent=float(rng.uniform(0.05, 0.2)),
                 end=str(rng.choice(["deck", "arch"])), told=bool(rng.uniform() < 0.5),
             )
@@ -510,7 +472,7 @@ def visit_days(seed: int, number: int, years: float) -> Array:
     """Return the days of a hanger's tests, with the hour as their fraction."""
     rng = draws(seed, "plan", number)
     step = float(rng.choice([30.4, 91.3, 365.25], p=[0.4, 0.4, 0.2]))
-    end, first = years * YEAR_DAYS, float(rng.uniform(0, 20))
+    end, first = years * YEAR_D, float(rng.uniform(0, 20))
     days = [first]
     if rng.uniform() < 0.6:
         days += np.sort(first + rng.uniform(10, 340, 9)).tolist()
@@ -634,8 +596,7 @@ class _Solver:
         place = min(float(seen.sensor_m[at]), 0.9 * hanger.bar.length_m)
         masses = [(place, float(seen.sensor_kg[at]))]
         if event is not None and kind == "springs":
-            ends = {"deck": [0], "arch": [1], "both": [0, 1]}[event.end]
-            springs[:, ends] *= event.size
+            springs[:, event.at_ends] *= event.size
         elif event is not None and kind == "retensioned":
             springs[:, 0] *= 0.85
         elif event is not None and kind == "lamp":
@@ -737,11 +698,7 @@ def _record(
         if seen.tested[at] != number:
             mistakes.append({"test": name, "cause": "neighbour"})
         modes = [
-            {
-                "plane": PLANES[p], "order": o + 1, "frequency_hz": float(measured[p, o]),
-                "frequency_sd_hz": float(stated[p, o] * measured[p, o]),
-                "damping_ratio": float(decay[p, o]),
-            }
+            mode(PLANES[p], o + 1, measured[p, o], stated[p, o] * measured[p, o], decay[p, o])
             for p in range(2) for o in range(orders) if not (n.missing and missing[p, o])
         ]  # fmt: skip
         moment = START + timedelta(days=begin + float(seen.days[at]))

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the
 
 
 def _rebuild(seed: int, index: int) -> tuple[Design, tuple[Member, Member]]:
-    draws = Draws(seed, index)
+    draws = Draws(seed, index, 8)
     design = list(KINDS.values())[index % len(KINDS)](draws)
     describe(draws, design)
     members, _ = make_members(draws, design, Tolerances())

@@ -46,7 +46,7 @@ def test_measure_errors_are_as_stated() -> None:
 
 
 def _hanger(*needs: str) -> Hanger:
-    return draw_hanger(Draws(12, 1), frozenset(needs), Nuisances())
+    return draw_hanger(Draws(12, 1, 1847), frozenset(needs), Nuisances())
 
 
 @pytest.mark.parametrize("cause", CAUSES)

@@ -45,7 +45,6 @@ seed differ only by what was switched, and by the event.
 """
 
 import math
-import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
@@ -57,7 +56,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tests.worlds import bars
+from tests.worlds import bars, seasons
 from tests.worlds.bars import (
     POISSON,
     Array,
@@ -68,20 +67,8 @@ from tests.worlds.bars import (
     solve,
     solve_many,
 )
+from tests.worlds.seasons import ENDS, PLANES, REFERENCE_C, YEAR_D, lagged, mode, stream
 
-PLANES = ("transverse", "longitudinal")
-ENDS = ("deck", "arch")
-KINDS = (
-    "none",
-    "tension_step",  # size: fraction of its tension at 10 deg C, e.g. -0.03
-    "tension_ramp",  # size: fraction a year
-    "springs",  # size: factor on the spring constant, at `end`, in `planes`
-    "lamp",  # size: kg, at `place`
-    "section_loss",  # size: lost part of the area, around `place` over `extent`; tension kept
-    "sensor_moved",  # size: kg of the new sensor, at `place`
-    "clock",  # size: 0.002 reads all frequencies of all hangers 0.2 % high
-)
-REFERENCE_C = 10.0
 EXPANSION = 1.2e-5  # 1/K, steel (EN 1991-1-5, table C.1; concrete 1.0e-5 there, 0.95 to 1.2 built)
 MODULUS_PER_K = -3.5e-4
 ORDERS = 5  # reported
@@ -89,15 +76,10 @@ SOLVED = ORDERS + 1  # one more, for whom mistakes the order
 DAY_H = 24.0
 STEP_H = 0.25  # of the temperature record
 LEAD_D = 20  # days of weather before the first visit, so that the lags have settled
-YEAR_D = 365.25
-
-
-def _rng(seed: int, what: str, number: int = 0) -> np.random.Generator:
-    return np.random.default_rng([seed, zlib.crc32(what.encode()), number])
 
 
 @dataclass(frozen=True)
-class Nuisances:
+class Nuisances(seasons.Switched):
     """What separates the field from the textbook.  A scale is 1 as found in the field, 0 for off.
 
     Tolerances: JCSS Probabilistic Model Code, part 3 (area 1 %, modulus 1.5 %, density 0.3 %), the
@@ -136,36 +118,12 @@ class Nuisances:
     mistaken: tuple[float, float] = (0.02, 0.05)  # share of modes, drawn for the season
     wrong_hanger: float = 0.005  # share of tests that were done on the neighbour
 
-    @classmethod
-    def none(cls, **on: Any) -> "Nuisances":
-        """Textbook: all off, but for what is named."""
-        off: dict[str, Any] = {
-            name: (0.0, 0.0) if isinstance(value, tuple) else type(value)()
-            for name, value in vars(cls()).items()
-        }
-        return cls(**(off | on))
-
 
 @dataclass(frozen=True)
-class Event:
-    """One thing that happens on a day (counted from the first day of the season)."""
+class Event(seasons.Event):
+    """An event; a moved sensor is a new one of `size` kg at `place`."""
 
-    kind: str = "none"
     hanger: int = 1
-    day: float = 0.0
-    size: float = 0.0
-    place: float = 0.4  # share of the length from the deck end
-    extent: float = 0.1  # share of the length
-    end: str = "deck"  # or arch, both
-    planes: tuple[str, ...] = PLANES
-
-    def __post_init__(self) -> None:
-        if (
-            self.kind not in KINDS
-            or self.end not in (*ENDS, "both")
-            or set(self.planes) - {*PLANES}
-        ):
-            raise ValueError(f"no such event: {self}")
 
 
 # ---------------------------------------------------------------------------------------- hanger
@@ -537,7 +495,7 @@ def bridge(seed: int, hangers: int, nuisances: Nuisances) -> Bridge:
     """A road bridge of 60 to 100 m: 4 to 15 m of hanger, 40 to 130 mm, 100 to 900 kN."""
     if hangers < 4:
         raise ValueError("a bridge has four hangers at least")
-    rng, off = _rng(seed, "bridge"), _rng(seed, "tolerances")
+    rng, off = stream(seed, "bridge"), stream(seed, "tolerances")
     sides = (hangers - hangers // 2, hangers // 2)
     n = sides[0]
     span = float(np.clip(rng.uniform(5.5, 8.0) * (n - 1) / 0.78, 60, 100))
@@ -573,7 +531,7 @@ def bridge(seed: int, hangers: int, nuisances: Nuisances) -> Bridge:
         bars: list[Bar] = []
         for i in range(count):
             number = len(made) + 1
-            one = _rng(seed, "hanger", number)
+            one = stream(seed, "hanger", number)
             nominal = mean * (1 + 0.06 * float(one.standard_normal()))
             if i in (0, count - 1):
                 nominal *= float(one.uniform(0.75, 1.05))
@@ -658,17 +616,12 @@ class Weather:
     def hanger(self, diameter_m: float, side: int) -> Array:
         """Temperature of a bar: rho c D/(4 h), 470 J/kgK, 30 W/m2K; 6 K of sun."""
         lag_h = 7850 * 470 * diameter_m / (4 * 30) / 3600
-        return _lag(self.air + 6e-3 * self.sun_w_m2[side], lag_h)
-
-
-def _lag(drive: Array, lag_h: float) -> Array:
-    a = math.exp(-STEP_H / lag_h)
-    return np.asarray(lfilter([1 - a], [1, -a], drive, zi=[a * drive[0]])[0])
+        return lagged(self.air + 6e-3 * self.sun_w_m2[side], lag_h, STEP_H)
 
 
 def weather(seed: int, start_day: float, years: float, heading: float, n: Nuisances) -> Weather:
     """Middle Europe, 50 deg north: 10 deg C +- 9.5 over the year, +- 4 weather, 2 to 6 the day."""
-    rng = _rng(seed, "weather")
+    rng = stream(seed, "weather")
     days = LEAD_D + math.ceil(years * YEAR_D) + 3
     hours = np.arange(round(days * DAY_H / STEP_H)) * STEP_H
     whole = (hours // DAY_H).astype(int)
@@ -701,15 +654,16 @@ def weather(seed: int, start_day: float, years: float, heading: float, n: Nuisan
     for side in range(2):
         normal = math.radians(heading + 180 * side)
         face = np.maximum(np.cos(azimuth - normal), 0.0) * flat  # the outer web
-        arch.append(_lag(air + 14e-3 * beam * (0.6 * up + 0.7 * face), 1.5))
+        arch.append(lagged(air + 14e-3 * beam * (0.6 * up + 0.7 * face), 1.5, STEP_H))
         lit.append(
             beam * flat * np.where(np.cos(azimuth - normal) > -0.7, 1.0, 0.6)
         )  # arch's shade
-    tie = _lag(air + 12e-3 * beam * up, 14.0)
+    tie = lagged(air + 12e-3 * beam * up, 14.0, STEP_H)
     difference = (
-        _lag(8e-3 * beam * up, 3.0) * 1.6 - n.temperature * 0.5 * (_lag(air, 14.0) - air) / 4
+        lagged(8e-3 * beam * up, 3.0, STEP_H) * 1.6
+        - n.temperature * 0.5 * (lagged(air, 14.0, STEP_H) - air) / 4
     )
-    return Weather(air, _lag(air, 1.5), np.array(arch), tie, difference, np.array(lit))
+    return Weather(air, lagged(air, 1.5, STEP_H), np.array(arch), tie, difference, np.array(lit))
 
 
 # ---------------------------------------------------------------------------------------- season
@@ -750,7 +704,7 @@ def _rounds(seed: int, years: float, n: Nuisances) -> _Rounds:
     The long gap (60 to 92 days: a contract ends, the next one starts) parts the season into two
     stretches; nobody is told.
     """
-    rng, total = _rng(seed, "rounds"), years * YEAR_D
+    rng, total = stream(seed, "rounds"), years * YEAR_D
     if n.irregular == 0:
         day = np.floor(np.arange(0.0, total, 14.0)) + 10 / DAY_H
         zero = np.zeros(len(day), dtype=np.int64)
@@ -824,7 +778,7 @@ def season(
     if not 1 <= event.hanger <= hangers:
         raise ValueError(f"no hanger {event.hanger}")
     influences = [_influence(frame) for frame in b.frames]
-    start = int(_rng(seed, "start").integers(0, 365))
+    start = int(stream(seed, "start").integers(0, 365))
     sky = weather(seed, float(start), years, b.heading_deg, n)
     rounds = _rounds(seed, years, n)
     count = len(rounds.day)
@@ -842,8 +796,8 @@ def season(
         plan |= {"exact": np.zeros(shape), "seen": np.ones(shape)}
     for h in b.hangers:
         _solve(seed, h, plans, event, n)
-    share = float(_rng(seed, "mistaken").uniform(*n.mistaken))
-    tones = np.sort(_rng(seed, "tones").uniform(4, 60, 4))  # pumps, fans, a crossing line
+    share = float(stream(seed, "mistaken").uniform(*n.mistaken))
+    tones = np.sort(stream(seed, "tones").uniform(4, 60, 4))  # pumps, fans, a crossing line
     first = datetime(2022, 1, 1, tzinfo=UTC) + timedelta(days=start)
     concerned = _concerned(b, influences, event)
     out = {
@@ -863,7 +817,7 @@ def season(
 
 def _common(seed: int, rounds: _Rounds, n: Nuisances) -> dict[str, Array]:
     """What all hangers of a round, or of a date, or of an operator, have in common."""
-    rng, count = _rng(seed, "common"), len(rounds.day)
+    rng, count = stream(seed, "common"), len(rounds.day)
     soft = _by_date(rounds, rng.random(count)) < n.softening_days
     wind = _by_date(rounds, rng.exponential(0.5, count))
     kits = np.array(n.sensor_kg)[0] + np.ptp(n.sensor_kg) * rng.random(
@@ -893,7 +847,7 @@ def _plan(
     seed: int, h: Hanger, rounds: _Rounds, common: dict[str, Array], n: Nuisances
 ) -> dict[str, Any]:
     """When and how this hanger is tested in each round (all rounds; `done` says which)."""
-    rng, count = _rng(seed, "plan", h.number), len(rounds.day)
+    rng, count = stream(seed, "plan", h.number), len(rounds.day)
     minutes = 9.0 * h.number + rng.uniform(0, 6, count)
     day = rounds.day + (minutes / 60 / DAY_H if n.irregular else 0.0)
     amplitude = np.exp(n.amplitude_sd * rng.standard_normal(count))
@@ -1050,7 +1004,7 @@ def _record(
 ) -> HangerSeason:
     """What the team hands in for one hanger, and the truth about it."""
     share, tones, first = season_wide
-    rng, count = _rng(seed, "identification", h.number), len(rounds.day)
+    rng, count = stream(seed, "identification", h.number), len(rounds.day)
     shape = (count, 2, ORDERS)
     test_error, mode_error = rng.standard_normal(count), rng.standard_normal(shape)
     guess, rub = rng.standard_normal(shape), rng.standard_normal(shape)
@@ -1102,15 +1056,7 @@ def _record(
                 read = truth_hz * clock * (1 + float(error[p, k]))
                 sd = read * float(stated[p, k])
                 damping = float(zeta[p, k]) * math.exp(0.25 * n.scatter * float(rub[v, p, k]))
-                modes.append(
-                    {
-                        "plane": plane,
-                        "order": k + 1,
-                        "frequency_hz": read,
-                        "frequency_sd_hz": sd,
-                        "damping_ratio": damping,
-                    }
-                )
+                modes.append(mode(plane, k + 1, read, sd, damping))
                 if kind:
                     off = truth_hz / float(exact[p, k]) - 1
                     place = {"test": name, "plane": plane, "order": k + 1}
