@@ -17,8 +17,8 @@ from typing import Any
 import begin
 import numpy as np
 from cases import Case, random_case
-from page import DOCS, put
 
+from docs.filling import fill_in
 from shm.errors import NotIdentifiable
 from shm.identify import identify
 from shm.identify.measuring import screening, signal_faults
@@ -191,7 +191,7 @@ def main() -> None:
     head = f"{given.sound} sound tests and {given.faulty} with each fault, seed {SEED}."
     print(f"{head}\n\n{text}")
     if given.write_docs:
-        put(DOCS, "limits", f"{head}\n\n{text}")
+        fill_in(begin.TRIALS / "identification_benchmarks.md", "limits", f"{head}\n\n{text}")
 
 
 if __name__ == "__main__":

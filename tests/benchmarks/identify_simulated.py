@@ -19,13 +19,14 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
+import begin
 from marks import COLUMNS, alarms, flags, marks, table
-from page import DOCS, put
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 from scoring import TestScore, score_number
 
+from docs.filling import fill_in
 from shm_cli.common import markdown
 from tests.worlds.simulated.disturbances.registry import DISTURBANCES
 
@@ -90,7 +91,11 @@ def main() -> int:
     if arguments.json:
         arguments.json.write_text(json.dumps([asdict(score) for score in scores], indent=1))
     if arguments.write_docs:
-        put(DOCS, "simulated", fragment(scores, arguments.seed))
+        fill_in(
+            begin.TRIALS / "identification_benchmarks.md",
+            "simulated",
+            fragment(scores, arguments.seed),
+        )
     return int(not all(mark.met for mark in marks(scores)))
 
 

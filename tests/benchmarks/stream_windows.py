@@ -110,8 +110,9 @@ class Score:
         return float(np.sqrt(max(0.0, usual**2 - np.median(chance) ** 2)))
 
 
-def described(entry: dict[str, Any]) -> tuple[Hanger, Stream]:
-    hanger = Hanger(
+def hanger_of(entry: dict[str, Any]) -> Hanger:
+    """The hanger as its owner describes it."""
+    return Hanger(
         id=entry["id"],
         length_m=entry["length_m"],
         elastic_modulus_pa=entry["elastic_modulus_pa"],
@@ -122,10 +123,13 @@ def described(entry: dict[str, Any]) -> tuple[Hanger, Stream]:
         diameter_m=entry["diameter_m"],
         kind=entry["kind"],
     )
+
+
+def described(entry: dict[str, Any]) -> tuple[Hanger, Stream]:
     channels = tuple(
         StreamChannel(each["channel"], each["plane"], each["x_m"]) for each in entry["sensors"]
     )
-    return hanger, Stream(entry["stream"], entry["id"], world.RATE_HZ, channels)
+    return hanger_of(entry), Stream(entry["stream"], entry["id"], world.RATE_HZ, channels)
 
 
 def windows(

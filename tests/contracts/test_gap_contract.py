@@ -27,6 +27,8 @@ from tests.contracts import gap_calls as calls
 from tests.contracts.golden_files import assert_signature
 from tests.contracts.inference_calls import ROD, call
 
+pytestmark = pytest.mark.usefixtures("outside")
+
 TOLERANCES = {
     r"(.*_)?probability|share|fit_p_value|acts_alone|scatter": {"abs": 0.05},
     r"log_.*|.*_log_.*": {"abs": 1.0},
@@ -46,13 +48,6 @@ Of 200 effective draws, two means differ by 0.03, two quantiles of 2.5 % by 0.08
 """
 TEXTS = {"summary", "details", "remarks", "what"}
 """Keys of texts that state numbers, which are passed over."""
-
-
-@pytest.fixture(autouse=True)
-def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run each call in an empty folder, so that no workspace is at hand."""
-    monkeypatch.delenv("SHM_WORKSPACE", raising=False)
-    monkeypatch.chdir(tmp_path)
 
 
 @cache

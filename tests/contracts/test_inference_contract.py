@@ -47,6 +47,8 @@ from shm.values import PLANES, Posterior, Recording
 from tests.contracts import inference_calls as calls
 from tests.contracts.golden_files import assert_signature
 
+pytestmark = pytest.mark.usefixtures("outside")
+
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = 200
 OF_THE_CLOCK = {"seconds": 0}
@@ -66,13 +68,6 @@ ADDED = {
     "ends_share_of_variance", "inclination_share_of_variance",
 }  # fmt: skip
 """Keys that documents have had since version 1.0.0 and its golden files."""
-
-
-@pytest.fixture(autouse=True)
-def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run each call in an empty folder, so that no workspace is at hand."""
-    monkeypatch.delenv("SHM_WORKSPACE", raising=False)
-    monkeypatch.chdir(tmp_path)
 
 
 @cache
