@@ -34,7 +34,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import begin
 
 from shm.pipeline import utc_now
 from shm.store import DeliveryState, Workspace
@@ -102,15 +102,16 @@ def states(workspace: Workspace) -> Counter[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--alerts", type=int, default=1000)
-    parser.add_argument("--kills", type=int, default=20)
-    parser.add_argument("--longest", type=float, default=2.0, help="longest life, in s")
-    parser.add_argument("--hook", choices=("webhook", "command"), default="webhook")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--alike", type=int, default=0, help="hangers that move alike")
-    parser.add_argument("--escalation", type=float, default=120.0, help="in s")
-    options = parser.parse_args()
+    options = begin.options(
+        __doc__,
+        alerts=1000,
+        kills=20,
+        longest=begin.Told(2.0, "longest life, in s"),
+        hook=("webhook", "command"),
+        seed=1,
+        alike=begin.Told(0, "hangers that move alike"),
+        escalation=begin.Told(120.0, "in s"),
+    )
     if options.alike:
         alike(options)
         return

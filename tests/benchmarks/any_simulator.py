@@ -8,16 +8,12 @@ the true effect taken out of the catalogue. Marks: named first or in its group >
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.gap.any_simulator import SimulatorDiagnosis, diagnose_simulator
 from shm.gap.simulator_problem import Reading, Simulator

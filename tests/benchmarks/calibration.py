@@ -40,19 +40,15 @@ sampler that swaps by chance. theta_F is the tension.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from rich.progress import track
 from scipy.stats import chisquare, cramervonmises
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.inference import UpdateOptions, update
 from shm.inference.thesis_noise import ThesisLikelihood

@@ -7,11 +7,8 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.helpers import quick_update
 from tests.helpers.clock_faults import FAULTS, one_case

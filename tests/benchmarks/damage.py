@@ -13,11 +13,9 @@ Now and then the daemon runs on the damaged copy, with a new file in its spool.
 
 from __future__ import annotations
 
-import argparse
 import random
 import shutil
 import sqlite3
-import sys
 import tempfile
 import time
 import traceback
@@ -25,7 +23,7 @@ from collections import Counter
 from contextlib import closing
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import begin
 
 import shm_daemon
 from shm.errors import ShmError
@@ -106,13 +104,9 @@ def lives(workspace: Workspace) -> bool:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument(
-        "--every", type=int, default=10, help="the daemon runs after one in so many"
+    options = begin.options(
+        __doc__, minutes=10.0, every=begin.Told(10, "the daemon runs after one in so many"), seed=1
     )
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
     began, rng, counts = time.monotonic(), random.Random(options.seed), Counter[str]()
     quick_update.stand_in(setattr)
     memory = "/dev/shm" if Path("/dev/shm").is_dir() else None

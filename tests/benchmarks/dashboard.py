@@ -13,7 +13,6 @@ of the two was judged.
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import socket
@@ -28,15 +27,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
-from shm.store.tests import list_test_rows
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
+import begin
 import httpx
 from fastapi.routing import APIRoute
 
 from docs.filling import fill_in, write_csv
 from shm.store import Workspace
+from shm.store.tests import list_test_rows
 from shm_cli.common import markdown
 from shm_daemon.web.address import Address
 from shm_daemon.web.app import make_pages
@@ -50,7 +47,7 @@ from tests.benchmarks.dashboard_filling import (
 )
 from tests.helpers.footprint import resident_mb
 
-TRIALS = Path(__file__).resolve().parents[2] / "docs" / "trials"
+TRIALS = begin.TRIALS
 SHOWN = 5
 """Addresses in the page; the others are in the table beside it."""
 LIMIT_MS = 300.0
@@ -298,14 +295,15 @@ def _on_what(load: float, is_busy: bool, held_mb: float) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--hangers", type=int, default=200)
-    parser.add_argument("--tests", type=int, default=250, help="of each hanger")
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--warm-only", action="store_true", help="no first answers after a start")
-    parser.add_argument("--folder", type=Path, help="keep the workspace here, or take it from here")
-    parser.add_argument("--write-docs", action="store_true")
-    options = parser.parse_args()
+    options = begin.options(
+        __doc__,
+        hangers=200,
+        tests=begin.Told(250, "of each hanger"),
+        rounds=5,
+        warm_only=begin.Told(False, "no first answers after a start"),
+        folder=begin.Told(Path, "keep the workspace here, or take it from here"),
+        write_docs=False,
+    )
     with tempfile.TemporaryDirectory() as name:
         folder = options.folder or Path(name) / "bridge"
         began = time.monotonic()

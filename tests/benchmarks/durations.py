@@ -10,7 +10,6 @@ is missed.
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
 import tempfile
@@ -18,21 +17,16 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
+import begin
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
-
-from shm.identify import IdentifyOptions  # noqa: E402
-from shm.monitor import read_window  # noqa: E402
-from shm.read import read, write  # noqa: E402
-from shm.simulate import HammerPlan, HangerState, hammer_test  # noqa: E402
-from shm.values import Channel, Hanger, Recording  # noqa: E402
-from tests.helpers.ambient_stream import LENGTH_M, drawn, piece, stream, values  # noqa: E402
-from tests.worlds.network_seasons import season  # noqa: E402
+from shm.identify import IdentifyOptions
+from shm.monitor import read_window
+from shm.read import read, write
+from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.values import Channel, Hanger, Recording
+from tests.helpers.ambient_stream import LENGTH_M, drawn, piece, stream, values
+from tests.worlds.network_seasons import season
 
 
 def steps(folder: Path) -> Iterator[tuple[str, float, Callable[[], float]]]:
@@ -83,7 +77,7 @@ def import_shm() -> float:
     """Return the seconds that `import shm` takes in a process of its own."""
     code = "import time; t = time.process_time(); import shm; print(time.process_time() - t)"
     ran = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+        [sys.executable, "-c", code], cwd=begin.ROOT, capture_output=True, text=True, check=True
     )
     return float(ran.stdout)
 

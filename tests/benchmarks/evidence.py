@@ -11,18 +11,15 @@ time in the median. Run:
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
 
+import begin
 import numpy as np
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.inference import UpdateOptions, update
 from shm.models import THESIS, build
@@ -129,11 +126,7 @@ def compare(method: str, seeds: int, shown: Table) -> tuple[list[Runs], list[str
 
 def main() -> None:
     """Prints the table; exits with 1 where a bound fails."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--textbook-seeds", type=int, default=6)
-    parser.add_argument("--oracle", action="store_true")
-    arguments = parser.parse_args()
+    arguments = begin.options(__doc__, seeds=20, textbook_seeds=6, oracle=False)
     if arguments.oracle:
         evidence_oracle.main()
         return

@@ -10,22 +10,14 @@ ends are zones of that stiffness and length. A per cent of a frequency is two of
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 from dataclasses import replace
-from pathlib import Path
-
-os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
-
-from shm.models import tensioned_beam  # noqa: E402
-from shm.models.end_effects import EndWaves  # noqa: E402
-from shm.models.hanger import PhysicalHanger, Zone, solve  # noqa: E402
-from shm.values import Hanger  # noqa: E402
+from shm.models import tensioned_beam
+from shm.models.end_effects import EndWaves
+from shm.models.hanger import PhysicalHanger, Zone, solve
+from shm.values import Hanger
 
 MODES = 6
 CLAMPED = 1e6

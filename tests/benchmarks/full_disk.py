@@ -7,22 +7,18 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
 import tempfile
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import begin
 
 from tests.helpers.full_disks import fill_at_calls
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--files", type=int, default=8)
-    parser.add_argument("--every", type=int, default=1, help="at each so-many-th call")
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
+    options = begin.options(
+        __doc__, files=8, every=begin.Told(1, "at each so-many-th call"), seed=1
+    )
     memory = "/dev/shm" if Path("/dev/shm").is_dir() else None
     with tempfile.TemporaryDirectory(dir=memory) as folder:
         print(fill_at_calls(Path(folder), options.files, options.every, options.seed))

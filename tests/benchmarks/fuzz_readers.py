@@ -10,11 +10,9 @@ of the sample that goes through a flow, every refused one in quarantine with its
 
 from __future__ import annotations
 
-import argparse
 import json
 import multiprocessing
 import resource
-import sys
 import tempfile
 import time
 from collections import Counter
@@ -23,10 +21,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from shm.store.recordings import list_recordings
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
+import begin
 import numpy as np
 
 from docs.filling import fill_in
@@ -34,12 +29,13 @@ from shm.errors import BadInput
 from shm.read import sandbox, sidecar_path
 from shm.read.sandbox import reading_process
 from shm.store import Stage
+from shm.store.recordings import list_recordings
 from shm_daemon.execution import process_pool
 from tests.helpers.flows import a_flow
 from tests.helpers.mutations import Sample, damaged, harmful_samples, light, whole_samples
 from tests.helpers.workspaces import make_workspace
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "trials" / "load.md"
+PAGE = begin.TRIALS / "load.md"
 BOMB_BYTES = 300_000_000
 SHARE = 500
 
@@ -210,13 +206,7 @@ def table_of(tally: Tally, flow: Counter[str]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--files", type=int, default=20_000)
-    parser.add_argument("--flow", type=int, default=500)
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--write-docs", action="store_true")
-    options = parser.parse_args()
+    options = begin.options(__doc__, files=20_000, flow=500, processes=2, seed=1, write_docs=False)
     tally = read_all(options.files, options.processes, options.seed)
     print("\n".join([*tally.faults, *tally.crashes]))
     flow = through_a_flow(options.flow, options.seed) if options.flow else Counter()

@@ -13,7 +13,6 @@ mechanism that changes none of these is to be left out. Half a minute a row and 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -23,9 +22,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
-
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 

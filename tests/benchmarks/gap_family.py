@@ -16,27 +16,28 @@ hanger.
 from __future__ import annotations
 
 import argparse
-import os
+import math
 import pickle
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
-
-from shm.gap import GapOptions  # noqa: E402
-from shm.gap.bridge_diagnosis import diagnose_jointly, examine_hanger  # noqa: E402
-from shm.gap.shared_evidence import HangerEvidence  # noqa: E402
-from shm.values import PLANES, BridgeDiagnosis, Diagnosis, Hanger, ModalTest, Mode  # noqa: E402
-from tests.benchmarks.worlds import share  # noqa: E402
-from tests.worlds import finite_elements as world  # noqa: E402
+from shm.gap import GapOptions
+from shm.gap.bridge_diagnosis import diagnose_jointly, examine_hanger
+from shm.gap.shared_evidence import HangerEvidence
+from shm.values import PLANES, BridgeDiagnosis, Diagnosis, Hanger, ModalTest, Mode
+from tests.benchmarks.worlds import share
+from tests.worlds import finite_elements as world
+from tests.worlds.bars import (
+    GRAVITY_M_S2,
+    POISSON,
+    Bar,
+    Zone,
+    cowper,
+    natural_frequencies_hz,
+)
 
 SCATTER = 0.15
 OWN_CAUSES = 0.2
@@ -117,15 +118,14 @@ def member(
     tension_n = nominal_n * rng.uniform(0.7, 1.3)
     sensor = min(rng.uniform(1.0, 2.5), 0.45 * length_m), rng.uniform(*nuisances.sensor_mass_kg)
     clamp = CLAMP * bending / length_m
-    bar = world.Bar(
+    bar = Bar(
         length_m=length_m * (1 + nuisances.length_sd * off[3]), tension_n=tension_n,
-        bending_stiffness_n_m2=bending, mass_per_length_kg_m=mass, spring_deck_n_m_rad=clamp,
-        spring_arch_n_m_rad=clamp, tension_gradient_n_m=mass * world.GRAVITY_M_S2,
-        masses=(sensor,),
+        bending_stiffness_n_m2=bending, mass_per_length_kg_m=mass, rotation_n_m_rad=(clamp, clamp),
+        gravity_along_m_s2=GRAVITY_M_S2, masses=(sensor,),
     )  # fmt: skip
     bar = with_cause(bar, cause, size, place_m, mean_m, made)
     clock = 1 + size if cause == "timebase" else 1.0
-    exact_hz = clock * world.natural_frequencies_hz(bar, int(max(modes)))
+    exact_hz = clock * natural_frequencies_hz(bar, int(max(modes)))
     repeat = np.exp(rng.uniform(*np.log(nuisances.repeat_sd)))
     bias = repeat * rng.standard_normal((2, len(exact_hz)))
     tests = []
@@ -142,17 +142,19 @@ def member(
 
 
 def with_cause(
-    bar: world.Bar, cause: str, size: float, place_m: float, mean_m: float, area: float
-) -> world.Bar:
+    bar: Bar, cause: str, size: float, place_m: float, mean_m: float, area: float
+) -> Bar:
     """The bar with its cause; a spring and a length are the same whatever the hanger's length."""
     bending, length_m = bar.bending_stiffness_n_m2, bar.length_m
     if cause == "rotational_end_flexibility":
-        return replace(bar, spring_deck_n_m_rad=size * bending / mean_m)
+        return replace(bar, rotation_n_m_rad=(size * bending / mean_m, bar.rotation_n_m_rad[1]))
     if cause == "point_mass":
         return replace(bar, masses=(*bar.masses, (place_m, size)))
     if cause == "section_loss":
         half_m = 0.03 * mean_m
-        return replace(bar, loss=(place_m - half_m, place_m + half_m, min(size, 0.7)))
+        left = 1 - min(size, 0.7)  # a round thinned all around: I ~ A^2
+        worn = Zone(place_m - half_m, place_m + half_m, left, math.sqrt(left))
+        return replace(bar, zones=(worn,))
     if cause == "distributed_mass":
         return replace(bar, mass_per_length_kg_m=bar.mass_per_length_kg_m * (1 + size))
     if cause == "effective_length":
@@ -160,9 +162,9 @@ def with_cause(
     if cause == "intermediate_support":
         across = length_m / (place_m * (length_m - place_m))
         own = bar.tension_n * across + 3 * bending / length_m * across**2
-        return replace(bar, supports=((place_m, size * own),))
+        return replace(bar, springs=((place_m, size * own),))
     if cause == "shear_and_rotary_inertia":
-        shear = world.COWPER_ROUND * MODULUS_PA / (2 * (1 + world.POISSON)) * area
+        shear = cowper() * MODULUS_PA / (2 * (1 + POISSON)) * area
         inertia = DENSITY_KG_M3 * area**2 / (4 * np.pi)
         return replace(bar, shear_stiffness_n=shear, rotary_inertia_kg_m=inertia)
     return bar

@@ -12,28 +12,19 @@ with it and without it.
 
 from __future__ import annotations
 
-import argparse
-import os
-import sys
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-
+import begin
 import numpy as np
-
-HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1]), str(HERE), str(HERE / "identification")]
-
-from cases import random_case  # noqa: E402
-from gap_dynamics import drawn  # noqa: E402
-from recordings_trial import (  # noqa: E402
+from cases import random_case
+from gap_dynamics import drawn
+from recordings_trial import (
     LEAST_SNR_DB,
     NINETY,
     SAME_MODE,
@@ -41,22 +32,22 @@ from recordings_trial import (  # noqa: E402
     described,
 )
 
-from shm.errors import ShmError  # noqa: E402
-from shm.identify import IdentifyOptions, identification, identify  # noqa: E402
-from shm.identify.contract import Finding  # noqa: E402
-from shm.identify.estimation import (  # noqa: E402
+from shm.errors import ShmError
+from shm.identify import IdentifyOptions, identification, identify
+from shm.identify.contract import Finding
+from shm.identify.estimation import (
     amplitude_dependence,
     courses,
     postprocess,
     spread,
     ssi,
 )
-from shm.identify.measuring import screening  # noqa: E402
-from shm.identify.mode_ordering import placement  # noqa: E402
-from shm.values import Hanger, Recording  # noqa: E402
-from tests.helpers.struck import STRUCK, recordings  # noqa: E402
-from tests.worlds import recordings as world  # noqa: E402
-from tests.worlds import struck_bar  # noqa: E402
+from shm.identify.measuring import screening
+from shm.identify.mode_ordering import placement
+from shm.values import Hanger, Recording
+from tests.helpers.struck import STRUCK, recordings
+from tests.worlds import recordings as world
+from tests.worlds import struck_bar
 
 CONSTANTS: Mapping[str, tuple[Any, str, float] | None] = {
     "all as they are": None,
@@ -278,11 +269,12 @@ def _identified(case: world.Recording, options: Mapping[str, Any]) -> Sequence[A
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kinds", default="softening,hardening", help="parted by commas")
-    parser.add_argument("--seeds", default="3:11", help="first:end")
-    parser.add_argument("--steps", help="names of steps, parted by commas, or all")
-    arguments = parser.parse_args()
+    arguments = begin.options(
+        __doc__,
+        kinds=begin.Told("softening,hardening", "parted by commas"),
+        seeds=begin.Told("3:11", "first:end"),
+        steps=begin.Told(str, "names of steps, parted by commas, or all"),
+    )
     seeds = range(*map(int, arguments.seeds.split(":")))
     if arguments.steps:
         names = list(STEPS) if arguments.steps == "all" else arguments.steps.split(",")

@@ -9,28 +9,22 @@ same of the worst values of tests with the fault it is there for.
 
 from __future__ import annotations
 
-import argparse
 import importlib
-import sys
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
+import begin
 import numpy as np
+from cases import Case, random_case
 
-HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1]), str(HERE / "identification")]
-
-from cases import Case, random_case  # noqa: E402
-from page import DOCS, put  # noqa: E402
-
-from shm.errors import NotIdentifiable  # noqa: E402
-from shm.identify import identify  # noqa: E402
-from shm.identify.measuring import screening, signal_faults  # noqa: E402
-from shm.identify.mode_ordering import foreign  # noqa: E402
-from shm.identify.quality import of_hits, of_modes, of_signals  # noqa: E402
-from shm_cli.common import markdown  # noqa: E402
+from docs.filling import fill_in
+from shm.errors import NotIdentifiable
+from shm.identify import identify
+from shm.identify.measuring import screening, signal_faults
+from shm.identify.mode_ordering import foreign
+from shm.identify.quality import of_hits, of_modes, of_signals
+from shm_cli.common import markdown
 
 tones = importlib.import_module("shm.identify.quality.tones")  # the name is also a function's
 FAULTS = ("clipping", "overload", "outlier_hit", "mains", "machine", "soft_hit")
@@ -163,11 +157,9 @@ def told(values: Sequence[float], above: bool) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sound", type=int, default=60)
-    parser.add_argument("--faulty", type=int, default=10, help="tests with each fault")
-    parser.add_argument("--write-docs", action="store_true")
-    given = parser.parse_args()
+    given = begin.options(
+        __doc__, sound=60, faulty=begin.Told(10, "tests with each fault"), write_docs=False
+    )
     watch, by_fault = Watch(), defaultdict[str, list[Seen]](list)
     sound = [number for number in range(2 * given.sound) if number % 10 not in (3, 8)]
     for number in sound[: given.sound]:
@@ -199,7 +191,7 @@ def main() -> None:
     head = f"{given.sound} sound tests and {given.faulty} with each fault, seed {SEED}."
     print(f"{head}\n\n{text}")
     if given.write_docs:
-        put(DOCS, "limits", f"{head}\n\n{text}")
+        fill_in(begin.TRIALS / "identification_benchmarks.md", "limits", f"{head}\n\n{text}")
 
 
 if __name__ == "__main__":

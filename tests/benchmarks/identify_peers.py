@@ -19,21 +19,17 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import begin
+from comparing import COLUMNS, TITLES, give, rows, sound_case
+from peers import environment
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-RUNS = HERE / "identification" / "runs"
-sys.path[:0] = [str(HERE / "identification"), str(HERE)]
+from docs.filling import fill_in
+from shm_cli.common import markdown
 
-from comparing import COLUMNS, TITLES, give, rows, sound_case  # noqa: E402
-from page import DOCS, put  # noqa: E402
-from peers import environment  # noqa: E402
-
-from shm_cli.common import markdown  # noqa: E402
-
+RUNS = begin.HERE / "identification" / "runs"
 ENVIRONMENTS = {
     "shm": "",
     "pyoma2": "",
@@ -50,7 +46,7 @@ def run(peer: str, python: Path, given: Path, limit: int) -> dict[str, Any]:
     single = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     done = subprocess.run(
         command,
-        env=os.environ | single | {"PYTHONPATH": str(ROOT)},
+        env=os.environ | single | {"PYTHONPATH": str(begin.ROOT)},
         capture_output=True,
         text=True,
         check=False,
@@ -69,7 +65,8 @@ def answers_of(
     peers: list[str], tests: int, seed: int, limit: int, folder: Path
 ) -> dict[str, dict[int, dict[str, Any]]]:
     """Every peer's line for every test, those of earlier runs included."""
-    pythons = {peer: environment(ENVIRONMENTS[peer], ROOT / "build" / "peers") for peer in peers}
+    kept = begin.ROOT / "build" / "peers"
+    pythons = {peer: environment(ENVIRONMENTS[peer], kept) for peer in peers}
     found: dict[str, dict[int, dict[str, Any]]] = {peer: {} for peer in peers}
     with Progress(console=Console(stderr=True)) as progress:
         task = progress.add_task("runs", total=tests * len(peers))
@@ -99,7 +96,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--peers", default=",".join(ENVIRONMENTS))
     parser.add_argument("--limit", type=int, default=60, help="processor time of a run in s")
-    parser.add_argument("--folder", type=Path, default=ROOT / "build" / "identification")
+    parser.add_argument("--folder", type=Path, default=begin.ROOT / "build" / "identification")
     parser.add_argument("--anew", action="store_true", help="forget what is kept")
     parser.add_argument("--write-docs", action="store_true")
     arguments = parser.parse_args()
@@ -122,7 +119,7 @@ def main() -> int:
     console.print(grid)
     console.print("\n".join(failures), markup=False)
     if arguments.write_docs:
-        put(DOCS, "peers", fragment(lines, failures))
+        fill_in(begin.TRIALS / "identification_benchmarks.md", "peers", fragment(lines, failures))
     return 0
 
 

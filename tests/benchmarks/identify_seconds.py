@@ -8,7 +8,6 @@ median of five runs; exits 1 at 2 s or more. Set OMP_NUM_THREADS=1 and OPENBLAS_
 
 from __future__ import annotations
 
-import argparse
 import cProfile
 import math
 import pstats
@@ -16,6 +15,7 @@ import sys
 import time
 from pathlib import Path
 
+import begin
 import numpy as np
 from rich.console import Console
 from rich.progress import track
@@ -97,9 +97,7 @@ def _name(file: str) -> str:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=5)
-    arguments = parser.parse_args()
+    arguments = begin.options(__doc__, runs=5)
     record, console = recording(), Console(highlight=False)
     found = identified(record)  # the first run imports what is imported late
     progress = Console(stderr=True)

@@ -19,19 +19,16 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
+import begin
+from marks import COLUMNS, alarms, flags, marks, table
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
+from scoring import TestScore, score_number
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(Path(__file__).resolve().parent / "identification"))
-
-from marks import COLUMNS, alarms, flags, marks, table  # noqa: E402
-from page import DOCS, put  # noqa: E402
-from scoring import TestScore, score_number  # noqa: E402
-
-from shm_cli.common import markdown  # noqa: E402
-from tests.worlds.simulated.disturbances.registry import DISTURBANCES  # noqa: E402
+from docs.filling import fill_in
+from shm_cli.common import markdown
+from tests.worlds.simulated.disturbances.registry import DISTURBANCES
 
 
 def run(numbers: range, seed: int, disturbance: str | None, processes: int) -> Iterator[TestScore]:
@@ -94,7 +91,11 @@ def main() -> int:
     if arguments.json:
         arguments.json.write_text(json.dumps([asdict(score) for score in scores], indent=1))
     if arguments.write_docs:
-        put(DOCS, "simulated", fragment(scores, arguments.seed))
+        fill_in(
+            begin.TRIALS / "identification_benchmarks.md",
+            "simulated",
+            fragment(scores, arguments.seed),
+        )
     return int(not all(mark.met for mark in marks(scores)))
 
 

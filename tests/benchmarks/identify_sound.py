@@ -10,20 +10,13 @@ is of the crew's work (`OF_THE_CREW`).
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.errors import ShmError
 from shm.identify import Identification, IdentifyOptions, identify

@@ -10,16 +10,14 @@ short form.
 
 from __future__ import annotations
 
-import argparse
 import random
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import begin
 
 from tests.helpers.killing import (
     assert_nothing_lost_doubled_or_half_written,
@@ -41,13 +39,14 @@ def a_store(kind: str) -> Iterator[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--files", type=int, default=300)
-    parser.add_argument("--store", choices=("file", "server"), default="file")
-    parser.add_argument("--longest", type=float, default=0.5, help="longest life at work, in s")
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
+    options = begin.options(
+        __doc__,
+        kills=200,
+        files=300,
+        store=("file", "server"),
+        longest=begin.Told(0.5, "longest life at work, in s"),
+        seed=1,
+    )
     began, rng = time.monotonic(), random.Random(options.seed)
     with tempfile.TemporaryDirectory() as folder, a_store(options.store) as url:
         undisturbed = unfinished_uploads(Path(folder) / "quiet", options.files)

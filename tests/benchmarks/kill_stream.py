@@ -5,23 +5,19 @@ python tests/benchmarks/kill_stream.py --kills 100 --seed 1
 
 from __future__ import annotations
 
-import argparse
 import random
 import sys
 import tempfile
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import begin
 
 from tests.helpers.stream_killing import assert_none_lost_none_doubled, killed_again_and_again
 
 
 def main() -> int:
     """Run the trial and print its figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kills", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
+    options = begin.options(__doc__, kills=100, seed=1)
     with tempfile.TemporaryDirectory() as folder:
         ring = Path(folder) / "ring"
         acknowledged = killed_again_and_again(ring, options.kills, random.Random(options.seed))

@@ -7,13 +7,11 @@ results of one undisturbed daemon to the bit?
 
 from __future__ import annotations
 
-import argparse
-import sys
 import tempfile
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import begin
 
 from shm_daemon import run
 from tests.helpers.feeds import Feed
@@ -24,9 +22,7 @@ from tests.helpers.workspaces import make_workspace
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--files", type=int, default=60)
-    options = parser.parse_args()
+    options = begin.options(__doc__, files=60)
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as folder, postgresql_server() as databases:
         quiet = make_workspace(Path(folder) / "quiet")

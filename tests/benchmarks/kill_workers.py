@@ -8,35 +8,29 @@ each step is slowed down so that the kills strike it. `tests/faults` holds the s
 
 from __future__ import annotations
 
-import argparse
 import logging
 import random
-import sys
 import tempfile
 import time
 from collections import Counter
 from pathlib import Path
 
+import begin
+
 from shm.store.journal import list_events
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
-from shm.resources import one_thread_a_process
-
-one_thread_a_process()
-
-from tests.helpers.worker_killing import kill_workers, stage_counts  # noqa: E402
-from tests.helpers.workspaces import make_workspace  # noqa: E402
+from tests.helpers.worker_killing import kill_workers, stage_counts
+from tests.helpers.workspaces import make_workspace
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kills", type=int, default=1000)
-    parser.add_argument("--files", type=int, default=200)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--longest", type=float, default=14_400.0, help="in s, before it gives up")
-    options = parser.parse_args()
+    options = begin.options(
+        __doc__,
+        kills=1000,
+        files=200,
+        workers=2,
+        seed=1,
+        longest=begin.Told(14_400.0, "in s, before it gives up"),
+    )
     logging.basicConfig(level=logging.ERROR)
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:

@@ -25,10 +25,7 @@ from datetime import datetime, timedelta
 from functools import cache
 from pathlib import Path
 
-from shm.store.recordings import count_stages
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
+import begin
 import numpy as np
 
 from docs.filling import fill_in
@@ -37,13 +34,14 @@ from shm.modes_document import modes_document
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import ENDED, Stage, Store, Workspace
+from shm.store.recordings import count_stages
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode
 from tests.helpers.daemons import real_daemon
 from tests.helpers.footprint import descendants, resident_mb, trend
 from tests.helpers.workspaces import START, make_workspace, put
 from tests.worlds.simulated.elements import natural_frequencies
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "trials" / "load.md"
+PAGE = begin.TRIALS / "load.md"
 PLATE = """nominal_tension_n = 711e3
 [hanger.plate]
 length_m = 1.0915
@@ -232,15 +230,16 @@ def told(row: str) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--queue", type=int, default=2000)
-    parser.add_argument("--hangers", type=int, default=20)
-    parser.add_argument("--alerts", type=int, default=100, help="0: only the queues")
-    parser.add_argument("--models", default="beam2,solid2")
-    parser.add_argument("--kinds", default=",".join(KINDS))
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--write-docs", action="store_true")
-    options = parser.parse_args()
+    options = begin.options(
+        __doc__,
+        queue=2000,
+        hangers=20,
+        alerts=begin.Told(100, "0: only the queues"),
+        models="beam2,solid2",
+        kinds=",".join(KINDS),
+        seed=1,
+        write_docs=False,
+    )
     cases = [(m, kind) for m in options.models.split(",") for kind in options.kinds.split(",")]
     lines = [
         "| queue | minutes | files a minute | memory of the daemon, MB | of its workers, MB |",

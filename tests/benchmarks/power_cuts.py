@@ -10,26 +10,21 @@ goes on to its end. `tests/faults/test_power_cuts.py` holds the short form, and
 
 from __future__ import annotations
 
-import argparse
 import random
-import sys
 import tempfile
 import time
 from collections import Counter
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import begin
 
 from tests.helpers.power_cuts import cut_at, record
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--files", type=int, default=12)
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--cuts", type=int, default=400, help="cuts a round")
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
+    options = begin.options(
+        __doc__, files=12, minutes=10.0, cuts=begin.Told(400, "cuts a round"), seed=1
+    )
     began, rng, rounds = time.monotonic(), random.Random(options.seed), 0
     total: Counter[str] = Counter()
     until = began + 60 * options.minutes

@@ -17,7 +17,6 @@ Of the modes to be found, those that anybody could identify (`recordings_limit`)
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import sys
@@ -26,6 +25,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
+
+from tests.benchmarks import begin
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -265,11 +266,12 @@ def _coverage(z: Sequence[float]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kinds", default=",".join(KINDS), help="names, parted by commas")
-    parser.add_argument("--seeds", default="0:6", help="first:end")
-    parser.add_argument("--answers", type=Path, help="a line of JSON for each recording")
-    arguments = parser.parse_args()
+    arguments = begin.options(
+        __doc__,
+        kinds=begin.Told(",".join(KINDS), "names, parted by commas"),
+        seeds=begin.Told("0:6", "first:end"),
+        answers=begin.Told(Path, "a line of JSON for each recording"),
+    )
     first, end = (int(part) for part in arguments.seeds.split(":"))
     answers = []
     lines = arguments.answers.open("w") if arguments.answers else None

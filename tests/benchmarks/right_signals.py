@@ -8,18 +8,11 @@ along and askew, double and soft hits, mains hum, a bridge that moves along).
 
 from __future__ import annotations
 
-import argparse
-import os
-import sys
 from collections import defaultdict
 from dataclasses import replace
-from pathlib import Path
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-
+import begin
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.identify.plausibility import apparent_mass_kg, ringing, signal_doubts
 from shm.simulate.state import HammerPlan, HangerState
@@ -70,10 +63,7 @@ def drawn(rng: np.random.Generator) -> tuple[Hanger, HangerState, HammerPlan]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tests", type=int, default=10)
-    parser.add_argument("--seed", type=int, default=1)
-    args = parser.parse_args()
+    args = begin.options(__doc__, tests=10, seed=1)
     rng = np.random.default_rng(args.seed)
     masses, apart, found = [], [], defaultdict(list)
     for number in range(args.tests):

@@ -9,18 +9,11 @@ case in which frequencies tell a soft spring from tension worst (docs/trials/val
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
-
-os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.inference import UpdateOptions, select
 from shm.models import THESIS, build

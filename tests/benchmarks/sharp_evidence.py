@@ -9,16 +9,12 @@ the pairs, and 84 % or more of the 90 % intervals hold the planted tension. Run:
 
 from __future__ import annotations
 
-import argparse
-import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
 
+import begin
 import numpy as np
 from rich.progress import track
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.inference import UpdateOptions, update
 from shm.models import THESIS, Model, build
@@ -97,9 +93,7 @@ def faults(error: float, cases: int) -> list[str]:
 
 def main() -> None:
     """Runs the trial; exit code 1 where a bound fails."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", type=int, default=32)
-    arguments = parser.parse_args()
+    arguments = begin.options(__doc__, cases=32)
     failed = [fault for error in ERRORS for fault in faults(error, arguments.cases)]
     if failed:
         raise SystemExit("; ".join(failed))

@@ -12,11 +12,9 @@ the same bridge.
 
 from __future__ import annotations
 
-import argparse
 import json
 import multiprocessing
 import os
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -25,29 +23,23 @@ from datetime import UTC, datetime, timedelta
 from itertools import groupby
 from pathlib import Path
 
-from shm.store.streams import find_progress, list_pooled, list_stream_events
-from shm.store.tests import list_test_rows
-
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
+import begin
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
-
-from shm.read.chunk_document import chunk_document  # noqa: E402
-from shm.store import Workspace  # noqa: E402
-from shm.store.ring import ring_of  # noqa: E402
-from shm.values import Hanger  # noqa: E402
-from shm.values.stream import Chunk, PooledReading, Stream  # noqa: E402
-from shm.watch.stream_watch import StreamOptions, StreamWatch  # noqa: E402
-from shm_daemon.loop import run  # noqa: E402
-from tests.benchmarks.stream_load import processor_s  # noqa: E402
-from tests.benchmarks.stream_trial import as_reading, daily_shift  # noqa: E402
-from tests.benchmarks.stream_windows import described  # noqa: E402
-from tests.helpers.workspaces import QUICK  # noqa: E402
-from tests.worlds import living_bridge as world  # noqa: E402
+from shm.read.chunk_document import chunk_document
+from shm.store import Workspace
+from shm.store.ring import ring_of
+from shm.store.streams import find_progress, list_pooled, list_stream_events
+from shm.store.tests import list_test_rows
+from shm.values import Hanger
+from shm.values.stream import Chunk, PooledReading, Stream
+from shm.watch.stream_watch import StreamOptions, StreamWatch
+from shm_daemon.loop import run
+from tests.benchmarks.stream_load import processor_s
+from tests.benchmarks.stream_trial import as_reading, daily_shift
+from tests.benchmarks.stream_windows import described
+from tests.helpers.workspaces import QUICK
+from tests.worlds import living_bridge as world
 
 START = datetime(2026, 5, 4, tzinfo=UTC)
 HOUR, SENT_H = timedelta(hours=1), 0.15
@@ -109,15 +101,16 @@ def daily(
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--seed", type=int, default=3200)
-    parser.add_argument("--hangers", default="4")
-    parser.add_argument("--days", type=int, default=7)
-    parser.add_argument("--loss-day", type=float, default=4.0)
-    parser.add_argument("--loss", type=float, default=0.02)
-    parser.add_argument("--processor-s", type=float, default=900.0, help="ends after so many")
-    parser.add_argument("--wall-s", type=float, default=36000.0, help="likewise")
-    asked = parser.parse_args()
+    asked = begin.options(
+        __doc__,
+        seed=3200,
+        hangers="4",
+        days=7,
+        loss_day=4.0,
+        loss=0.02,
+        processor_s=begin.Told(900.0, "ends after so many"),
+        wall_s=begin.Told(36000.0, "likewise"),
+    )
     numbers = [int(each) for each in asked.hangers.split(",")]
     sites = [described(each) for each in world.describe(asked.seed, numbers)]
     at = START + timedelta(days=asked.loss_day, hours=7.4)

@@ -11,7 +11,6 @@ is the share of two cores that 100 hangers need.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import tempfile
@@ -22,6 +21,7 @@ from itertools import islice
 from pathlib import Path
 
 from shm.store.streams import find_progress
+from tests.benchmarks import begin
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
@@ -64,11 +64,9 @@ def is_read(store: Store, workspace: Workspace, until: datetime) -> bool:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--hangers", type=int, default=20)
-    parser.add_argument("--hours", type=float, default=2.0)
-    parser.add_argument("--wall-s", type=float, default=7200.0, help="ends after so many")
-    asked = parser.parse_args()
+    asked = begin.options(
+        __doc__, hangers=20, hours=2.0, wall_s=begin.Told(7200.0, "ends after so many")
+    )
     first = datetime.now(UTC).replace(minute=0, second=0, microsecond=0)
     first -= timedelta(hours=1 + int(asked.hours))
     begun, memory_mb, took_s = time.monotonic(), 0.0, 0.0

@@ -37,7 +37,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from shm.monitor.sensor_health import SEEN_BEFORE, find_lost_planes  # noqa: E402
-from shm.values import PLANES, Hanger, Mode  # noqa: E402
+from shm.values import PLANES, Mode  # noqa: E402
 from shm.values.rounding import NINETY_PERCENT  # noqa: E402
 from shm.values.stream import (  # noqa: E402
     PooledReading,
@@ -58,6 +58,7 @@ from shm.watch.stream_watch import (  # noqa: E402
     compensated,
     fraction_of,
 )
+from tests.benchmarks.stream_windows import hanger_of  # noqa: E402
 
 WORLDS = ("living_bridge", "road_bridge_hours")
 DAYS_A_YEAR = 365.25
@@ -112,21 +113,6 @@ SCENARIOS = {
 }  # fmt: skip
 
 
-def described(world: ModuleType, seed: int, number: int) -> Hanger:
-    own = world.describe(seed, [number])[0]
-    return Hanger(
-        id=number,
-        length_m=own["length_m"],
-        elastic_modulus_pa=own["elastic_modulus_pa"],
-        area_m2=own["area_m2"],
-        second_moment_m4=own["second_moment_m4"],
-        mass_per_length_kg_m=own["mass_kg_m"],
-        nominal_tension_n=own["nominal_tension_n"],
-        diameter_m=own["diameter_m"],
-        kind=own["kind"],
-    )
-
-
 def as_reading(own: dict[str, Any]) -> PooledReading:
     modes = tuple(
         Mode(m["plane"], m["order"], m["frequency_hz"], m["frequency_sd_hz"], m["damping_ratio"])
@@ -172,7 +158,7 @@ def solved(world: ModuleType, name: str, seed: int, years: float) -> dict[str, A
         logged["logger"] = world.Logger(scenario.minutes, silent_from, scenario.silent_days)
     plain = world.hourly(seed, number, years, changes, start=start, **logged)
     readings = list(with_fault(list(map(as_reading, plain)), scenario, at, size))
-    watch = StreamWatch(None, described(world, seed, number), StreamOptions())
+    watch = StreamWatch(None, hanger_of(world.describe(seed, [number])[0]), StreamOptions())
     alerts, events, worst, state = [], [], 0.0, None
     windows: list[WindowReading] = []
     daily: list[tuple[datetime, float, float]] = []

@@ -11,7 +11,6 @@ of cars and lorries: softening joints are part of the bias that is printed.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import time
@@ -21,6 +20,8 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
+
+from tests.benchmarks import begin
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -109,8 +110,9 @@ class Score:
         return float(np.sqrt(max(0.0, usual**2 - np.median(chance) ** 2)))
 
 
-def described(entry: dict[str, Any]) -> tuple[Hanger, Stream]:
-    hanger = Hanger(
+def hanger_of(entry: dict[str, Any]) -> Hanger:
+    """The hanger as its owner describes it."""
+    return Hanger(
         id=entry["id"],
         length_m=entry["length_m"],
         elastic_modulus_pa=entry["elastic_modulus_pa"],
@@ -121,10 +123,13 @@ def described(entry: dict[str, Any]) -> tuple[Hanger, Stream]:
         diameter_m=entry["diameter_m"],
         kind=entry["kind"],
     )
+
+
+def described(entry: dict[str, Any]) -> tuple[Hanger, Stream]:
     channels = tuple(
         StreamChannel(each["channel"], each["plane"], each["x_m"]) for each in entry["sensors"]
     )
-    return hanger, Stream(entry["stream"], entry["id"], world.RATE_HZ, channels)
+    return hanger_of(entry), Stream(entry["stream"], entry["id"], world.RATE_HZ, channels)
 
 
 def windows(
@@ -221,11 +226,7 @@ def pool(seed: int, readings: dict[int, list[WindowReading]], score: Score, hour
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--hours", type=float, default=2.0)
-    given = parser.parse_args()
+    given = begin.options(__doc__, seeds=2, seed=0, hours=2.0)
     score = Score()
     for seed in range(given.seed, given.seed + given.seeds):
         draw = np.random.default_rng([seed, 32])

@@ -9,9 +9,9 @@ updates Beam 2. Run:
 
 from __future__ import annotations
 
-import argparse
 import time
 
+import begin
 import numpy as np
 from rich.progress import track
 
@@ -54,11 +54,7 @@ def posterior_of(case: int, samples: int) -> tuple[HangerState, Posterior]:
 
 def main() -> None:
     """Runs the trial and prints its figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=100)
-    parser.add_argument("--first", type=int, default=1000)
-    parser.add_argument("--samples", type=int, default=500)
-    arguments = parser.parse_args()
+    arguments = begin.options(__doc__, cases=100, first=1000, samples=500)
     started = time.perf_counter()
     covered, errors, widths, effective = 0, [], [], []
     for case in track(range(arguments.first, arguments.first + arguments.cases), "tests"):

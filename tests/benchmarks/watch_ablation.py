@@ -15,8 +15,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -24,16 +22,10 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
-
-from shm.values import BaselineCheck  # noqa: E402
-from shm.watch import (  # noqa: E402
+from shm.values import BaselineCheck
+from shm.watch import (
     causes,
     mistaken_modes,
     options,
@@ -43,17 +35,17 @@ from shm.watch import (  # noqa: E402
     watcher,
     watching,
 )
-from shm.watch.change_point import Evidence  # noqa: E402
-from shm.watch.limits import LIMITS  # noqa: E402
-from shm.watch.readings import Likelihood  # noqa: E402
-from shm.watch.state_sums import StateSums, WatchState  # noqa: E402
-from shm.watch.watcher import Watcher  # noqa: E402
-from tests.benchmarks import watch_worlds  # noqa: E402
-from tests.benchmarks.watch_trial import outcomes  # noqa: E402
-from tests.contracts import watch_calls  # noqa: E402
-from tests.contracts.test_watch_contract import differ  # noqa: E402
-from tests.contracts.watch_scenarios import SCENARIOS  # noqa: E402
-from tests.helpers.synthetic_readings import watch_of  # noqa: E402
+from shm.watch.change_point import Evidence
+from shm.watch.limits import LIMITS
+from shm.watch.readings import Likelihood
+from shm.watch.state_sums import StateSums, WatchState
+from shm.watch.watcher import Watcher
+from tests.benchmarks import watch_worlds
+from tests.benchmarks.watch_trial import outcomes
+from tests.contracts import watch_calls
+from tests.contracts.test_watch_contract import differ
+from tests.contracts.watch_scenarios import SCENARIOS
+from tests.helpers.synthetic_readings import watch_of
 
 Row = dict[str, Any]
 Change = tuple[Any, str, Any]

@@ -9,7 +9,6 @@ noise; on each day one hanger loses a tenth of its tension, which must be told.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import tempfile
@@ -21,10 +20,7 @@ from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
 
-from shm.store.recordings import count_stages
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
+import begin
 import numpy as np
 
 from docs.filling import fill_in
@@ -33,6 +29,7 @@ from shm.documents import dump
 from shm.modes_document import modes_document
 from shm.resources import one_thread_a_process
 from shm.store import ENDED, Stage, Store, Workspace
+from shm.store.recordings import count_stages
 from shm.values import Alert, ModalTest, Mode
 from shm_daemon.loop import run
 from shm_daemon.wakeup import Wakeup
@@ -40,7 +37,7 @@ from tests.helpers.flows import Clock
 from tests.helpers.footprint import Trend, descendants, open_files, resident_mb, trend
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "trials" / "load.md"
+PAGE = begin.TRIALS / "load.md"
 WEEK_S = 7 * 86400.0
 BATCH = 100
 FREQUENCY_SD = 3e-4
@@ -179,16 +176,17 @@ def faults(week: Week, told: list[tuple[str, object]]) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tests", type=int, default=10_000)
-    parser.add_argument("--hangers", type=int, default=20)
-    parser.add_argument("--every", type=int, default=500, help="tests between two looks")
-    parser.add_argument("--samples", type=int, default=1000, help="kept of a posterior")
-    parser.add_argument("--model", default="beam1")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--write-docs", action="store_true")
-    options = parser.parse_args()
+    options = begin.options(
+        __doc__,
+        tests=10_000,
+        hangers=20,
+        every=begin.Told(500, "tests between two looks"),
+        samples=begin.Told(1000, "kept of a posterior"),
+        model="beam1",
+        workers=2,
+        seed=1,
+        write_docs=False,
+    )
     one_thread_a_process()
     settings = {"models": options.model, "samples": options.samples, "workers": options.workers}
     with tempfile.TemporaryDirectory() as folder:

@@ -9,16 +9,8 @@ deviations (docs/trials/validation.md).
 
 from __future__ import annotations
 
-import argparse
-import os
-import sys
-from pathlib import Path
-
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-
+import begin
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import shm
 from shm.inference import UpdateOptions, select
@@ -66,10 +58,7 @@ def case(seed: int, factor: float) -> tuple[float, float, float, bool]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--hangers", type=int, default=24)
-    parser.add_argument("--seed", type=int, default=5000)
-    asked = parser.parse_args()
+    asked = begin.options(__doc__, hangers=24, seed=5000)
     for name, factor in DESCRIBED.items():
         said = held = 0
         for seed in range(asked.seed, asked.seed + asked.hangers):

@@ -7,7 +7,6 @@ what a sampler gives, within tolerances that other seeds meet as well.
 from __future__ import annotations
 
 import importlib
-import inspect
 import re
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -25,7 +24,10 @@ from shm.pipeline.adopting import adopted_name
 from shm.store import Lineage
 from shm.store.rows import StoredDiagnosis
 from tests.contracts import gap_calls as calls
+from tests.contracts.golden_files import assert_signature
 from tests.contracts.inference_calls import ROD, call
+
+pytestmark = pytest.mark.usefixtures("outside")
 
 TOLERANCES = {
     r"(.*_)?probability|share|fit_p_value|acts_alone|scatter": {"abs": 0.05},
@@ -46,13 +48,6 @@ Of 200 effective draws, two means differ by 0.03, two quantiles of 2.5 % by 0.08
 """
 TEXTS = {"summary", "details", "remarks", "what"}
 """Keys of texts that state numbers, which are passed over."""
-
-
-@pytest.fixture(autouse=True)
-def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run each call in an empty folder, so that no workspace is at hand."""
-    monkeypatch.delenv("SHM_WORKSPACE", raising=False)
-    monkeypatch.chdir(tmp_path)
 
 
 @cache
@@ -207,13 +202,8 @@ def test_public_names_are_there() -> None:
 
 @pytest.mark.parametrize("path", SIGNATURES)
 def test_a_signature_is_as_it_was(path: str) -> None:
-    """Compare the parameters of today; more may follow, each with a default."""
     module, _, name = path.rpartition(".")
-    found = getattr(importlib.import_module(module), name)
-    parameters = [bare(each) for each in inspect.signature(found).parameters.values()]
-    count = len(re.sub(r"\*, ", "", SIGNATURES[path]).split(", "))
-    assert str(inspect.Signature(parameters[:count])) == f"({SIGNATURES[path]})"
-    assert inspect.Parameter.empty not in [each.default for each in parameters[count:]]
+    assert_signature(getattr(importlib.import_module(module), name), SIGNATURES[path])
 
 
 def test_outcomes_have_their_names() -> None:
@@ -242,14 +232,3 @@ def test_bad_input_is_refused_with_its_exit_code(code: int, words: tuple[object,
     ended = call("gap", "diagnose", *words)
     assert (ended.code, ended.out) == (code, ""), ended.err
     assert ended.err
-
-
-def bare(parameter: inspect.Parameter) -> inspect.Parameter:
-    """Return a parameter without its type; a default that is a function becomes its name."""
-
-    class Named:
-        def __repr__(self) -> str:
-            return str(parameter.default.__name__)
-
-    default = Named() if inspect.isfunction(parameter.default) else parameter.default
-    return parameter.replace(annotation=inspect.Parameter.empty, default=default)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import base64
 import importlib
-import inspect
 import json
 import math
 import os
@@ -46,6 +45,9 @@ from shm.simulate import (
 from shm.store.blobs import posterior_from
 from shm.values import PLANES, Posterior, Recording
 from tests.contracts import inference_calls as calls
+from tests.contracts.golden_files import assert_signature
+
+pytestmark = pytest.mark.usefixtures("outside")
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = 200
@@ -66,13 +68,6 @@ ADDED = {
     "ends_share_of_variance", "inclination_share_of_variance",
 }  # fmt: skip
 """Keys that documents have had since version 1.0.0 and its golden files."""
-
-
-@pytest.fixture(autouse=True)
-def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run each call in an empty folder, so that no workspace is at hand."""
-    monkeypatch.delenv("SHM_WORKSPACE", raising=False)
-    monkeypatch.chdir(tmp_path)
 
 
 @cache
@@ -429,25 +424,9 @@ def test_public_names_are_there(module: str) -> None:
     assert [name for name in NAMES[module] if not hasattr(found, name)] == []
 
 
-def bare(parameter: inspect.Parameter) -> inspect.Parameter:
-    """Return a parameter without its type; a default that is a function becomes its name."""
-
-    class Named:
-        def __repr__(self) -> str:
-            return str(parameter.default.__name__)
-
-    default = Named() if inspect.isfunction(parameter.default) else parameter.default
-    return parameter.replace(annotation=inspect.Parameter.empty, default=default)
-
-
 @pytest.mark.parametrize("name", SIGNATURES)
 def test_a_signature_of_the_front_is_as_it_was(name: str) -> None:
-    """Compare names, order and defaults; what follows has a default."""
-    parameters = [bare(each) for each in inspect.signature(getattr(shm, name)).parameters.values()]
-    count = len(SIGNATURES[name].replace("*, ", "").split(", "))
-    assert str(inspect.Signature(parameters[:count])) == f"({SIGNATURES[name]})"
-    new = parameters[count:]
-    assert [each.name for each in new if each.default is inspect.Parameter.empty] == []
+    assert_signature(getattr(shm, name), SIGNATURES[name])
 
 
 @pytest.mark.parametrize("name", calls.golden("classes"))

@@ -6,7 +6,6 @@ are compared as they are; numbers, within three standard errors of 500 samples.
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import re
 from collections.abc import Iterator
@@ -22,6 +21,7 @@ from shm.store.blobs import watch_document, watch_in
 from shm.values import Alert, AlertKind, Change, Drift, Fingerprint, WatchedTest
 from shm.watch.neighbours import BridgePattern
 from tests.contracts import watch_calls as calls
+from tests.contracts.golden_files import assert_signature
 from tests.contracts.watch_scenarios import SCENARIOS, Scenario, load
 from tests.helpers.nouns import a_watched_test, an_alert
 from tests.helpers.synthetic_readings import watch_of
@@ -211,15 +211,7 @@ SIGNATURES = {
 
 @pytest.mark.parametrize("name", SIGNATURES)
 def test_a_signature_is_as_it_was(name: str) -> None:
-    """Compare the parameters of today; more may follow, each with a default."""
-    found = getattr(importlib.import_module("shm.watch"), name)
-    parameters = [
-        each.replace(annotation=inspect.Parameter.empty)
-        for each in inspect.signature(found).parameters.values()
-    ]
-    count = len(re.sub(r"\*, ", "", SIGNATURES[name]).split(", "))
-    assert str(inspect.Signature(parameters[:count])) == f"({SIGNATURES[name]})"
-    assert inspect.Parameter.empty not in [each.default for each in parameters[count:]]
+    assert_signature(getattr(shm.watch, name), SIGNATURES[name])
 
 
 def test_public_names_are_there() -> None:

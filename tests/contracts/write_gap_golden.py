@@ -24,8 +24,8 @@ from shm.modes_document import modes_document  # noqa: E402
 from shm.simulate import HangerState, PlantedEffect  # noqa: E402
 from shm.values import NAN, ModalTest  # noqa: E402
 from tests.contracts import gap_calls as calls  # noqa: E402
+from tests.contracts.golden_files import compress, shorten, write_missing  # noqa: E402
 from tests.contracts.inference_calls import ROD  # noqa: E402
-from tests.contracts.write_inference_golden import compress, shorten  # noqa: E402
 from tests.worlds.simulated.campaign import CampaignPlan, campaign  # noqa: E402
 
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
@@ -63,10 +63,12 @@ def main() -> None:
         calls.FOLDER / f"{name}.json": partial(f, calls.SEED) for name, f in calls.CASES.items()
     }
     made[calls.FOLDER / "effects.json"] = partial(calls.list_effects)
-    for path, make in made.items():
-        if not path.exists():
-            path.write_text(compress(dump(shorten(calls.read_back(make())))), encoding="utf-8")
-            print(f"{path.name}: {path.stat().st_size / 1000:.1f} kB")
+    write_missing(
+        {
+            path: lambda m=make: compress(dump(shorten(calls.read_back(m()))))
+            for path, make in made.items()
+        }
+    )
 
 
 if __name__ == "__main__":

@@ -20,21 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "cli")]
 
 from tests.contracts import identify_calls as calls  # noqa: E402
-
-
-def shorten(value: Any) -> Any:
-    """Return a document with its numbers to six digits."""
-    if isinstance(value, dict):
-        return {key: shorten(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [shorten(each) for each in value]
-    return float(f"{value:.6g}") if isinstance(value, float) else value
-
-
-def compress(document: Any) -> str:
-    """Return a document in few lines: one for each part of its first level."""
-    parts = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in document.items()]
-    return "{\n" + ",\n".join(parts) + "\n}\n"
+from tests.contracts.golden_files import compress, shorten, write_missing  # noqa: E402
 
 
 def commanded(name: str) -> Any:
@@ -53,11 +39,10 @@ FILES: dict[str, Callable[[], Any]] = {
 
 def main() -> None:
     """Write each golden file that is missing."""
-    for name, make in FILES.items():
-        path = calls.FOLDER / f"{name}.json"
-        if not path.exists():
-            path.write_text(compress(shorten(make())), encoding="utf-8")
-            print(f"{path.name}: {path.stat().st_size / 1000:.1f} kB", flush=True)
+    made = {calls.FOLDER / f"{name}.json": make for name, make in FILES.items()}
+    write_missing(
+        {path: lambda m=make: compress(json.dumps(shorten(m()))) for path, make in made.items()}
+    )
 
 
 if __name__ == "__main__":

@@ -15,12 +15,10 @@ the tolerances; a golden file that is there is left as it is.
 from __future__ import annotations
 
 import base64
-import json
 import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "cli")]
@@ -44,6 +42,7 @@ from shm.modes_document import load_modes, modes_document  # noqa: E402
 from shm.store.blobs import pack_samples  # noqa: E402
 from shm.values import PLANES, ModalTest, Mode  # noqa: E402
 from tests.contracts import inference_calls as calls  # noqa: E402
+from tests.contracts.golden_files import compress, shorten, write_missing  # noqa: E402
 
 
 def measure(model: Model, values: dict[str, float], modes: int, seed: int) -> str:
@@ -138,15 +137,6 @@ def updated(name: str) -> Callable[[], str]:
     return lambda: dump(shorten(calls.update(name, 10_000, seed)))
 
 
-def shorten(value: Any) -> Any:
-    """Return a document with its numbers to six digits."""
-    if isinstance(value, dict):
-        return {key: shorten(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [shorten(each) for each in value]
-    return float(f"{value:.6g}") if isinstance(value, float) else value
-
-
 FILES: dict[str, Callable[[], str]] = {
     calls.SPRUNG.name: lambda: sprung(3),
     calls.SPRUNG_HIGHER.name: lambda: sprung(5),
@@ -161,20 +151,11 @@ FILES: dict[str, Callable[[], str]] = {
 }
 
 
-def compress(text: str) -> Any:
-    """Return a document in few lines: one for each part of its first level."""
-    document = json.loads(text)
-    parts = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in document.items()]
-    return "{\n" + ",\n".join(parts) + "\n}\n"
-
-
 def main() -> None:
     """Write each golden file that is missing."""
-    for name, make in FILES.items():
-        path = calls.GOLDEN / name
-        if not path.exists():
-            path.write_text(compress(make()), encoding="utf-8")
-            print(f"{path.name}: {path.stat().st_size / 1000:.1f} kB")
+    write_missing(
+        {calls.GOLDEN / name: lambda m=make: compress(m()) for name, make in FILES.items()}
+    )
 
 
 if __name__ == "__main__":

@@ -19,18 +19,19 @@ sys.path[:0] = [str(ROOT), str(ROOT / "cli"), str(ROOT / "daemon")]
 
 from shm.documents import dump  # noqa: E402
 from tests.contracts import read_calls as calls  # noqa: E402
+from tests.contracts.golden_files import write_missing  # noqa: E402
 
 
 def main() -> None:
     """Write each golden file that is missing."""
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         made = calls.run_all(Path(folder), patch)
-    calls.FOLDER.mkdir(exist_ok=True)
-    for name, document in made.items():
-        path = calls.FOLDER / f"{name}.json"
-        if not path.exists():
-            path.write_text(dump(document), encoding="utf-8")
-            print(f"{path.name}: {path.stat().st_size / 1000:.1f} kB")
+    write_missing(
+        {
+            calls.FOLDER / f"{name}.json": lambda d=document: dump(d)
+            for name, document in made.items()
+        }
+    )
 
 
 if __name__ == "__main__":

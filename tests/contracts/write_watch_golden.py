@@ -18,7 +18,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "cli")]
 from shm.documents import dump  # noqa: E402
 from shm.modes_document import modes_document  # noqa: E402
 from tests.contracts import watch_calls as calls  # noqa: E402
-from tests.contracts.write_inference_golden import compress, shorten  # noqa: E402
+from tests.contracts.golden_files import compress, shorten, write_missing  # noqa: E402
 
 
 def main() -> None:
@@ -31,10 +31,12 @@ def main() -> None:
         calls.FOLDER / "deck.modes.json": partial(modes_document, calls.make_deck()),
         **{calls.FOLDER / f"{name}.json": make for name, make in calls.CASES.items()},
     }
-    for path, make in made.items():
-        if not path.exists():
-            path.write_text(compress(dump(shorten(calls.read_back(make())))), encoding="utf-8")
-            print(f"{path.name}: {path.stat().st_size / 1000:.1f} kB")
+    write_missing(
+        {
+            path: lambda m=make: compress(dump(shorten(calls.read_back(m()))))
+            for path, make in made.items()
+        }
+    )
 
 
 if __name__ == "__main__":

@@ -11,23 +11,13 @@ from shm.errors import BadInput
 from shm.models.effects import check_effect_priors
 from shm.values import NAN, EffectPrior, Hanger, Scatter
 from tests.helpers.comparing import assert_same
+from tests.spine.test_bridge import ROUND, written
 
-ROUND = """
-[[hanger]]
-id = 3
-diameter_m = 0.130
-length_m = 12.0
-elastic_modulus_pa = 200e9
-density_kg_m3 = 7800
-nominal_tension_n = 711e3
-"""
 HANGERS_PAGE = Path(__file__).resolve().parents[2] / "docs" / "hangers.md"
 
 
 def loaded(folder: Path, text: str) -> Hanger:
-    path = folder / "bridge.toml"
-    path.write_text(ROUND + text, encoding="utf-8")
-    return load_hanger(path)
+    return load_hanger(written(folder, ROUND + text))
 
 
 def test_without_tables_the_catalogue_and_the_usual_scatter_hold(tmp_path: Path) -> None:

@@ -10,21 +10,11 @@ import pytest
 from shm.bridge import load_hanger
 from shm.errors import BadInput
 from shm.values import Hanger, Supports
-
-ROUND = """
-[[hanger]]
-id = 3
-diameter_m = 0.130
-length_m = 12.0
-elastic_modulus_pa = 200e9
-density_kg_m3 = 7800
-"""
+from tests.spine.test_bridge import ROUND, written
 
 
 def loaded(folder: Path, text: str, tension_n: str = "711e3") -> Hanger:
-    path = folder / "bridge.toml"
-    path.write_text(f"{ROUND}nominal_tension_n = {tension_n}\n{text}", encoding="utf-8")
-    return load_hanger(path)
+    return load_hanger(written(folder, ROUND.replace("711e3", tension_n) + text))
 
 
 def test_ends_are_clamped_unless_said_otherwise(tmp_path: Path) -> None:

@@ -4,19 +4,9 @@ Each case is a hanger whose tension is known, described as its drawing describes
 and measured as a field team measures it (one test, "shm.modes/1"). Nothing is shared with the
 program under test: neither the equations' solution nor the draws nor the nuisances.
 
-Physics, one plane, x from the deck end. The bar is straight but for the sag of its own weight:
-
-* bending and shear by elements of two nodes whose shape functions solve the unloaded Timoshenko
-  beam (Friedman & Kosmatka, Computers & Structures 47, 1993); rotary inertia; no shear
-  flexibility for strands. Shear coefficient of rounds and tubes: Cowper (J. Appl. Mech. 33, 1966);
-* the tension works on the slope of the axis (the Engesser form). It grows upwards by the weight of
-  what hangs below; the tension of a case is that at mid-length;
-* in the plane of the weight the static shape y under tension, bending and weight is computed on
-  the same mesh. Each mode then stretches the bar by the integral of y' w', which the axial
-  stiffness of bar and supports in series resists (Irvine, Cable Structures, 1981);
-* zones (forks, sockets, end plates, turnbuckles) have another bending stiffness in each plane, and
-  another mass, which their axial and shear stiffness follow;
-* at both ends a rotational spring and a lateral one; sensors are point masses.
+Physics, one plane, by `bars.py`: shear and rotary inertia but for strands, own weight, sag in the
+plane of the weight, zones (forks, sockets, end plates, turnbuckles), a rotational and a lateral
+spring at both ends, sensors as point masses.
 
 The fork of a bar turns about its pin softly in one plane and stiffly in the other. Rotational
 springs are given as multiples of EI/L, those of strands as multiples of sqrt(EI T).
@@ -29,243 +19,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import pairwise
-from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import csc_matrix, diags
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from tests.worlds.bars import GRAVITY_M_S2, POISSON, Zone, cowper, natural_frequencies_hz
+from tests.worlds.bars import Bar as Member
+from tests.worlds.cases import Case, Draws
 
-Array = NDArray[np.float64]
+__all__ = ["Member", "Zone", "natural_frequencies_hz"]  # by which models are held against it
 
 PLANES = ("transverse", "longitudinal")  # the weight of a leaning hanger acts in the second
-GRAVITY_M_S2 = 9.81
-POISSON = 0.3  # EN 1993-1-1, 3.2.6
 STEEL_DENSITY_KG_M3 = 7850.0
 STRAND_DENSITY_KG_M3 = 83e3 / GRAVITY_M_S2  # EN 1993-1-11, table 2.2: of the metallic section
 
 
-def cowper(inner_over_outer: float) -> float:
-    """Return the shear coefficient of a round tube; 0 is the solid bar (Cowper, 1966)."""
-    square = inner_over_outer**2
-    upper = 6 * (1 + POISSON) * (1 + square) ** 2
-    return upper / ((7 + 6 * POISSON) * (1 + square) ** 2 + (20 + 12 * POISSON) * square)
-
-
-@dataclass(frozen=True)
-class Zone:
-    """A stretch that is stiffer and heavier than the bar."""
-
-    start_m: float
-    end_m: float
-    bending_factor: float
-    mass_factor: float
-
-
-@dataclass(frozen=True)
-class Member:
-    """One plane of a hanger as it really is. Infinite stiffness is a constraint."""
-
-    length_m: float
-    tension_n: float  # at mid-length
-    bending_stiffness_n_m2: float
-    mass_per_length_kg_m: float
-    shear_stiffness_n: float = math.inf  # coefficient x G x A
-    rotary_inertia_kg_m: float = 0.0
-    axial_stiffness_n: float = math.inf  # E A, for the stretching by sag
-    zones: tuple[Zone, ...] = ()
-    masses: tuple[tuple[float, float], ...] = ()  # (place_m, mass_kg)
-    rotation_n_m_rad: tuple[float, float] = (0.0, 0.0)  # (deck, arch)
-    lateral_n_m: tuple[float, float] = (math.inf, math.inf)
-    axial_n_m: tuple[float, float] = (math.inf, math.inf)
-    gravity_along_m_s2: float = 0.0  # towards the deck end
-    gravity_across_m_s2: float = 0.0  # in this plane
-
-
-def build_mesh(member: Member, elements: int) -> Array:
-    """Return the nodes, dense where bending decays away from an end or a zone."""
-    length, size = member.length_m, member.length_m / elements
-    stations = {0.0, length, *(x for x, _ in member.masses)}
-    edges = {0.0, length, *(x for z in member.zones for x in (z.start_m, z.end_m))}
-    layer = math.inf
-    if member.tension_n > 0:
-        layer = math.sqrt(member.bending_stiffness_n_m2 / member.tension_n)
-    fine = min(size, 80 / elements * layer)  # a fifth of the layer by 400 elements
-    stations |= edges
-    if fine < size:
-        stations |= {min(max(x + s * 6 * layer, 0.0), length) for x in edges for s in (-1, 1)}
-    nodes = [0.0]
-    for start, end in pairwise(sorted(stations)):
-        if end - start < 1e-9 * length:
-            continue
-        middle = (start + end) / 2
-        near = any(abs(middle - x) < 6 * layer for x in edges)
-        in_zone = any(z.start_m < middle < z.end_m for z in member.zones)
-        parts = max(4 if in_zone else 1, math.ceil((end - start) / (fine if near else size)))
-        nodes.extend(start + (end - start) * i / parts for i in range(1, parts + 1))
-    return np.array(nodes)
-
-
-@dataclass(frozen=True)
-class _Matrices:
-    """Stiffness, mass, unit-tension stiffness and weight of one plane, unconstrained."""
-
-    stiffness: csc_matrix
-    mass: csc_matrix
-    slope: csc_matrix  # integral of N' N'^T
-    weight: Array  # integral of m N
-    stretch_m_n: float  # shortening of bar and supports under a unit force
-
-
-def _assemble(member: Member, x: Array) -> _Matrices:
-    h, middle = np.diff(x), (x[:-1] + x[1:]) / 2
-    bending, mass = np.ones_like(h), np.ones_like(h)
-    for zone in member.zones:
-        inside = (middle > zone.start_m) & (middle < zone.end_m)
-        bending[inside], mass[inside] = zone.bending_factor, zone.mass_factor
-    stiff = bending * member.bending_stiffness_n_m2
-    inertia = bending * member.rotary_inertia_kg_m  # same material: as the second moment
-    phi = 12 * stiff / (mass * member.shear_stiffness_n * h**2)
-    per_length = mass * member.mass_per_length_kg_m
-
-    # Shape functions at the Gauss points, [element, point, unknown]; unknowns w1, r1, w2, r2.
-    points, weights = np.polynomial.legendre.leggauss(5)
-    s, p, hh = (points[None, :] + 1) / 2, phi[:, None], h[:, None]
-
-    def stack(*rows: Array) -> Array:
-        return np.stack(np.broadcast_arrays(*rows), axis=-1) / (1 + p)[..., None]
-
-    w = stack(
-        2 * s**3 - 3 * s**2 - p * s + 1 + p,
-        hh * (s**3 - (2 + p / 2) * s**2 + (1 + p / 2) * s),
-        -(2 * s**3) + 3 * s**2 + p * s,
-        hh * (s**3 - (1 - p / 2) * s**2 - p / 2 * s),
-    )
-    slope = stack(
-        (6 * s**2 - 6 * s - p) / hh,
-        3 * s**2 - 2 * (2 + p / 2) * s + 1 + p / 2,
-        (-(6 * s**2) + 6 * s + p) / hh,
-        3 * s**2 - 2 * (1 - p / 2) * s - p / 2,
-    )
-    rotation = stack(
-        6 * (s**2 - s) / hh,
-        3 * s**2 - (4 + p) * s + 1 + p,
-        -6 * (s**2 - s) / hh,
-        3 * s**2 - (2 - p) * s,
-    )
-    curvature = stack(
-        6 * (2 * s - 1) / hh**2,
-        (6 * s - 4 - p) / hh,
-        -6 * (2 * s - 1) / hh**2,
-        (6 * s - 2 + p) / hh,
-    )
-    measure = hh * weights[None, :] / 2
-    # The tension at a Gauss point is that at mid-length and the weight hanging in between.
-    hanging = np.concatenate(([0.0], np.cumsum(per_length * h)))
-    at = x[:-1, None] + hh * s
-    below = np.interp(at, x, hanging) - np.interp(member.length_m / 2, x, hanging)
-    tension = member.tension_n + member.gravity_along_m_s2 * below
-
-    def gram(shape: Array, factor: Array) -> Array:
-        parts: Array = np.einsum("eq,eqi,eqj->eij", measure * factor, shape, shape)
-        return parts
-
-    stiffness = gram(curvature, stiff[:, None]) + gram(slope, tension)
-    if math.isfinite(member.shear_stiffness_n):
-        stiffness += gram(slope - rotation, (mass * member.shear_stiffness_n)[:, None])
-    inertial = gram(w, per_length[:, None]) + gram(rotation, inertia[:, None])
-    unit, load = gram(slope, np.ones((1, 1))), np.einsum("eq,e,eqi->ei", measure, per_length, w)
-
-    size = 2 * len(x)
-    index = 2 * np.arange(len(h))[:, None] + np.arange(4)
-    rows, columns = np.repeat(index, 4, axis=1).ravel(), np.tile(index, 4).ravel()
-
-    def add_up(parts: Array) -> csc_matrix:
-        return csc_matrix((parts.ravel(), (rows, columns)), shape=(size, size))
-
-    weight = np.zeros(size)
-    np.add.at(weight, index, load)
-    stretch = float(np.sum(h / (mass * member.axial_stiffness_n)))
-    stretch += sum(1 / k for k in member.axial_n_m)
-    return _Matrices(add_up(stiffness), add_up(inertial), add_up(unit), weight, stretch)
-
-
-def natural_frequencies_hz(member: Member, count: int, elements: int = 400) -> Array:
-    """Return the first `count` natural frequencies of one plane.
-
-    The shear strain is constant in an element, so that the error falls with the square of its
-    length: by 400 elements 1e-5 in the eighth mode of the stoutest bar.
-    """
-    x = build_mesh(member, elements)
-    parts = _assemble(member, x)
-    springs, lumps, fixed = np.zeros(2 * len(x)), np.zeros(2 * len(x)), []
-    for end, node in enumerate((0, len(x) - 1)):
-        for unknown, k in ((0, member.lateral_n_m[end]), (1, member.rotation_n_m_rad[end])):
-            if math.isinf(k):
-                fixed.append(2 * node + unknown)
-            else:
-                springs[2 * node + unknown] += k
-    for place, kilograms in member.masses:
-        lumps[2 * int(np.argmin(np.abs(x - place)))] += kilograms
-    free = np.setdiff1d(np.arange(2 * len(x)), fixed)
-    stiffness = csc_matrix((parts.stiffness + diags(springs))[free][:, free])
-    mass = csc_matrix((parts.mass + diags(lumps))[free][:, free])
-    solve = splu(stiffness).solve
-    sag = np.zeros(len(free))
-    if member.gravity_across_m_s2 and parts.stretch_m_n > 0:
-        shape = solve(member.gravity_across_m_s2 * parts.weight[free])
-        pull = parts.slope[free][:, free] @ shape  # integral of y' N'
-        # K + pull pull^T / stretch has the inverse K^-1 - sag sag^T (Sherman & Morrison, 1950).
-        sag = solve(pull)
-        sag /= math.sqrt(parts.stretch_m_n + pull @ sag)
-
-    def invert(force: Array) -> Array:
-        return np.asarray(solve(force) - sag * (sag @ force))
-
-    values = eigsh(
-        *(stiffness, count, mass),
-        sigma=0.0,
-        OPinv=LinearOperator(stiffness.shape, matvec=invert, dtype=np.float64),
-        v0=np.ones(len(free)) + np.arange(len(free)) / len(free),  # the same result every time
-        return_eigenvectors=False,
-    )
-    return np.asarray(np.sqrt(np.sort(values)) / (2 * math.pi))
-
-
 # ---------------------------------------------------------------- what is drawn
-
-
-class Draws:
-    """Random numbers of one case."""
-
-    def __init__(self, seed: int, index: int) -> None:
-        """Seed the draws by (seed, index) alone."""
-        self.rng = np.random.default_rng([seed, index, 8])
-
-    def uniform(self, low: float, high: float) -> float:
-        """Return a number from `low` to `high`."""
-        return float(self.rng.uniform(low, high))
-
-    def log_uniform(self, low: float, high: float) -> float:
-        """Return a number whose logarithm is uniform."""
-        return low * math.exp(math.log(high / low) * float(self.rng.random()))
-
-    def normal(self, sd: float) -> float:
-        """Return a normal number of mean 0."""
-        return sd * float(self.rng.standard_normal())
-
-    def lognormal(self, sd: float) -> float:
-        """Return a factor about 1."""
-        return math.exp(self.normal(sd))
-
-    def chance(self, probability: float) -> bool:
-        """Return True with a probability."""
-        return bool(self.rng.random() < probability)
-
-    def choose(self, *values: str) -> str:
-        """Return one of the values."""
-        return values[int(self.rng.integers(len(values)))]
 
 
 @dataclass(frozen=True)
@@ -322,8 +88,8 @@ class Design:
 
 def draw_bar(draws: Draws, low_m: float, high_m: float) -> Section:
     """Draw a solid round bar."""
-    d = round(draws.log_uniform(low_m, high_m), 3)
-    area, modulus = math.pi * d**2 / 4, float(draws.choose("205e9", "210e9"))
+    d = round(draws.log(low_m, high_m), 3)
+    area, modulus = math.pi * d**2 / 4, float(draws.pick("205e9", "210e9"))
     stated = {
         "diameter_m": d,
         "elastic_modulus_pa": modulus,
@@ -338,8 +104,8 @@ def draw_bar(draws: Draws, low_m: float, high_m: float) -> Section:
 
 def draw_tube(draws: Draws) -> Section:
     """Draw a circular hollow section."""
-    outer = round(draws.log_uniform(0.060, 0.140), 3)
-    wall = round(draws.log_uniform(0.004, 0.010), 3)
+    outer = round(draws.log(0.060, 0.140), 3)
+    wall = round(draws.log(0.004, 0.010), 3)
     inner, modulus = outer - 2 * wall, 210e9
     area = math.pi / 4 * (outer**2 - inner**2)
     moment = math.pi / 64 * (outer**4 - inner**4)
@@ -361,14 +127,14 @@ def draw_strand(
     draws: Draws, diameter_m: tuple[float, float], locked: bool, bending: tuple[float, float]
 ) -> Section:
     """Draw a strand; fill factors and moduli of EN 1993-1-11, tables 2.2 and 3.1."""
-    d = round(draws.log_uniform(*diameter_m), 3)
-    fill = draws.uniform(0.81, 0.88) if locked else draws.uniform(0.73, 0.77)
+    d = round(draws.log(*diameter_m), 3)
+    fill = draws.between(0.81, 0.88) if locked else draws.between(0.73, 0.77)
     modulus = 160e9 if locked else 150e9
     area, moment = fill * math.pi * d**2 / 4, fill * math.pi * d**4 / 64
     per_length = STRAND_DENSITY_KG_M3 * area
     return Section(
         *(area, moment, per_length, modulus, d),
-        bending_factor=draws.uniform(*bending),
+        bending_factor=draws.between(*bending),
         described={
             "kind": "strand",
             "elastic_modulus_pa": modulus,
@@ -387,7 +153,7 @@ def draw_springs(
 
     Half of the time the ends of a plane differ by their details only, likewise the planes.
     """
-    k = [[draws.log_uniform(low, high) for _ in range(2)] for _ in range(2)]  # [end][plane]
+    k = [[draws.log(low, high) for _ in range(2)] for _ in range(2)]  # [end][plane]
     if draws.chance(0.5):
         k[1] = [value * draws.lognormal(between_ends) for value in k[0]]
     if draws.chance(0.5):
@@ -399,7 +165,7 @@ def draw_springs(
 
 def draw_forks(draws: Draws) -> Ends:
     """Draw two forks; each turns softly about its pin and stiffly across it."""
-    soft, stiff = draws.log_uniform(0.05, 3.0), draws.log_uniform(20.0, 500.0)
+    soft, stiff = draws.log(0.05, 3.0), draws.log(20.0, 500.0)
     deck_soft_plane = int(draws.rng.integers(2))
     arch_soft_plane = deck_soft_plane if draws.chance(0.7) else 1 - deck_soft_plane
     k1, k2, k3, k4 = (
@@ -407,10 +173,10 @@ def draw_forks(draws: Draws) -> Ends:
         for soft_plane in (deck_soft_plane, arch_soft_plane)
         for plane in range(2)
     )
-    size, base = draws.uniform(0.15, 0.35), draws.log_uniform(4.0, 16.0)
+    size, base = draws.between(0.15, 0.35), draws.log(4.0, 16.0)
     factors = base * draws.lognormal(0.3), base * draws.lognormal(0.3)
     fittings = round(size, 2), round(min(0.35, max(0.15, size * draws.lognormal(0.1))), 2)
-    return Ends("fork", (k1, k2, k3, k4), "EI/L", fittings, factors, draws.uniform(2.5, 5.0))
+    return Ends("fork", (k1, k2, k3, k4), "EI/L", fittings, factors, draws.between(2.5, 5.0))
 
 
 def draw_plates(draws: Draws, name: str) -> Ends:
@@ -420,13 +186,13 @@ def draw_plates(draws: Draws, name: str) -> Ends:
     """
     stiff = draw_springs(draws, 20.0, 1000.0)
     weak = draw_springs(draws, 3.0, 100.0)
-    factors = [draws.log_uniform(1.5, 8.0), draws.log_uniform(0.7, 3.0)]
+    factors = [draws.log(1.5, 8.0), draws.log(0.7, 3.0)]
     springs = [stiff[0], weak[1], stiff[2], weak[3]]
     if draws.chance(0.5):  # the plates lie along the bridge
         factors, springs = factors[::-1], [weak[0], stiff[1], weak[2], stiff[3]]
-    length = round(draws.uniform(0.1, 0.3), 2)
+    length = round(draws.between(0.1, 0.3), 2)
     k1, k2, k3, k4 = springs
-    mass = draws.uniform(1.3, 3.5)
+    mass = draws.between(1.3, 3.5)
     return Ends(name, (k1, k2, k3, k4), "EI/L", (length, length), (factors[0], factors[1]), mass)
 
 
@@ -444,10 +210,10 @@ def draw_sockets(
 ) -> Ends:
     """Draw sockets, three in ten of them clamped."""
     springs = (1e4, 1e4, 1e4, 1e4) if draws.chance(0.3) else draw_springs(draws, 1.5, 60.0)
-    length = round(draws.uniform(*diameters) * diameter_m, 2)
-    factor = draws.log_uniform(*stiffness)
+    length = round(draws.between(*diameters) * diameter_m, 2)
+    factor = draws.log(*stiffness)
     other_plane = min(stiffness[1], max(stiffness[0], factor * draws.lognormal(0.1)))
-    weight = draws.uniform(*mass)
+    weight = draws.between(*mass)
     return Ends("socket", springs, "sqrt(EI T)", (length, length), (factor, other_plane), weight)
 
 
@@ -456,15 +222,15 @@ def _draw_ratio(draws: Draws) -> float:
 
 
 def _length(draws: Draws, low: float, high: float) -> float:
-    return round(draws.log_uniform(low, high), 2)
+    return round(draws.log(low, high), 2)
 
 
 def _bar_stress(draws: Draws) -> float:
-    return draws.uniform(50e6, 180e6)  # of the permanent loads
+    return draws.between(50e6, 180e6)  # of the permanent loads
 
 
 def _strand_stress(draws: Draws) -> float:
-    return draws.uniform(200e6, 500e6)
+    return draws.between(200e6, 500e6)
 
 
 def draw_fork_bar(draws: Draws) -> Design:
@@ -485,12 +251,12 @@ def draw_slack_bar(draws: Draws) -> Design:
     tube = draws.chance(0.4)
     section = draw_tube(draws) if tube else draw_bar(draws, 0.040, 0.100)
     ends = draw_plates(draws, "plate") if tube or draws.chance(0.5) else draw_forks(draws)
-    lean = draws.uniform(0.0, 25.0)
+    lean = draws.between(0.0, 25.0)
     return Design(
         section,
         _length(draws, 4.0, 16.0),
         _bar_stress(draws),
-        draws.log_uniform(0.02, 0.20),
+        draws.log(0.02, 0.20),
         ends,
         inclination_deg=90.0 - lean,
         leaning=lean > 2.0,
@@ -501,14 +267,14 @@ def draw_turnbuckle_bar(draws: Draws) -> Design:
     """Draw a bar with one or two turnbuckles of 3 to 8 diameters, most of them below 5."""
     section, length = draw_bar(draws, 0.040, 0.100), _length(draws, 4.0, 16.0)
     ends = draw_forks(draws) if draws.chance(0.5) else draw_threads(draws, 5.0, 300.0)
-    first, error = draws.uniform(0.12, 0.35), draws.uniform(0.1, 0.3)
-    places = [first] if draws.chance(0.6) else [first, draws.uniform(0.6, 0.88)]
-    size = draws.uniform(3.0, 5.0) if draws.chance(0.7) else draws.uniform(5.0, 8.0)
+    first, error = draws.between(0.12, 0.35), draws.between(0.1, 0.3)
+    places = [first] if draws.chance(0.6) else [first, draws.between(0.6, 0.88)]
+    size = draws.between(3.0, 5.0) if draws.chance(0.7) else draws.between(5.0, 8.0)
     one = Turnbuckle(
         0.0,
         round(size * section.outer_m, 2),
-        draws.log_uniform(3.0, 15.0),
-        draws.uniform(2.0, 5.0),
+        draws.log(3.0, 15.0),
+        draws.between(2.0, 5.0),
         error,
     )
     couplers = tuple(replace(one, x_m=round(place * length, 2)) for place in places)
@@ -527,7 +293,7 @@ def draw_network_hanger(draws: Draws) -> Design:
         section = draw_strand(draws, (0.030, 0.070), True, (0.3, 0.8))
         length, stress = _length(draws, 10.0, 35.0), _strand_stress(draws)
         ends = draw_sockets(draws, section.outer_m, (4.0, 8.0), (5.0, 25.0), (3.0, 8.0))
-    ratio, inclination = _draw_ratio(draws), draws.uniform(45.0, 75.0)
+    ratio, inclination = _draw_ratio(draws), draws.between(45.0, 75.0)
     return Design(section, length, stress, ratio, ends, inclination, leaning=True)
 
 
@@ -581,30 +347,6 @@ class Tolerances:
     turnbuckle_place_m: float = 0.01
 
 
-@dataclass(frozen=True)
-class Case:
-    """A hanger as described and as measured, and the truth about it."""
-
-    index: int
-    hanger_toml: str
-    modes: dict[str, object]
-    truth: dict[str, float | str]
-    groups: tuple[str, ...]
-    extra: dict[str, float | str]  # keys of the description that a reader may not know yet
-
-    def write(self, folder: Path, *, with_new_keys: bool = False) -> tuple[Path, Path]:
-        """Write hanger.toml and case.modes.json into the folder; `extra` only on request."""
-        folder.mkdir(parents=True, exist_ok=True)
-        hanger, modes = folder / "hanger.toml", folder / "case.modes.json"
-        text = self.hanger_toml
-        if with_new_keys:  # above the tables of the hanger
-            lines = "".join(f"{key} = {json.dumps(value)}\n" for key, value in self.extra.items())
-            text = text.replace("id = 1\n", "id = 1\n" + lines, 1)
-        hanger.write_text(text, encoding="utf-8")
-        modes.write_text(json.dumps(self.modes, indent=1) + "\n", encoding="utf-8")
-        return hanger, modes
-
-
 def describe(draws: Draws, design: Design) -> str:
     """Return the hanger as its drawing states it."""
     section = design.section
@@ -647,10 +389,10 @@ def make_members(
     lean = math.radians(inclination)
     unit = bending / length if ends.unit == "EI/L" else math.sqrt(bending * tension)
     k1, k2, k3, k4 = (k * unit for k in ends.springs)
-    lateral = [draws.log_uniform(1e8, 1e9) for _ in range(4)]  # as k1 to k4
-    axial = draws.log_uniform(1e8, 1e9), draws.log_uniform(1e8, 1e9)
-    places = sorted(draws.uniform(1.0, 2.5) for _ in range(int(draws.rng.integers(1, 4))))
-    sensors = tuple((min(x, 0.45 * length), draws.uniform(0.020, 0.090)) for x in places)
+    lateral = [draws.log(1e8, 1e9) for _ in range(4)]  # as k1 to k4
+    axial = draws.log(1e8, 1e9), draws.log(1e8, 1e9)
+    places = sorted(draws.between(1.0, 2.5) for _ in range(int(draws.rng.integers(1, 4))))
+    sensors = tuple((min(x, 0.45 * length), draws.between(0.020, 0.090)) for x in places)
     couplers = []
     for coupler in design.turnbuckles:
         middle = coupler.x_m + draws.normal(tolerances.turnbuckle_place_m)
@@ -709,10 +451,8 @@ def measure(
     draws: Draws, members: tuple[Member, Member], missing: float = 0.1
 ) -> tuple[dict[str, object], dict[str, float | str]]:
     """Return the document of one test, and the truth about its errors."""
-    planes = PLANES
-    if draws.chance(0.45):
-        planes = (draws.choose(*PLANES),)  # type: ignore[assignment]
-    real = draws.log_uniform(1e-4, 1e-3)
+    planes = (draws.pick(*PLANES),) if draws.chance(0.45) else PLANES
+    real = draws.log(1e-4, 1e-3)
     stated = real * draws.lognormal(0.2)
     modes: list[dict[str, object]] = []
     for plane, member in zip(PLANES, members, strict=True):
@@ -741,7 +481,7 @@ def measure(
 @lru_cache(maxsize=4096)
 def make_hanger(seed: int, index: int) -> Case:
     """Make one case; its kind follows from the index, so that all kinds are equally many."""
-    draws = Draws(seed, index)
+    draws = Draws(seed, index, 8)
     kind = list(KINDS)[index % len(KINDS)]
     design = KINDS[kind](draws)
     toml = describe(draws, design)

@@ -4,172 +4,25 @@ Each case is a hanger with a known tension, described the way a drawing describe
 and measured the way a field team measures it (modes, "shm.modes/1"). Nothing here is shared with
 the program under test: not the equations' solution, not the random draws, not the nuisances.
 
-Physics, one plane. A straight bar between two supports that do not deflect, x from the deck end:
-
-* Timoshenko bending and rotary inertia (Timoshenko, Phil. Mag. 41, 1921), shear coefficient of the
-  solid round 6(1 + nu)/(7 + 6 nu) (Cowper, J. Appl. Mech. 33, 1966);
-* the tension works on the slope of the axis, T w'^2/2 (Timoshenko & Gere, Theory of Elastic
-  Stability, the Engesser form); with own weight it grows upwards by m g per metre (a vertical
-  hanger) and the stated tension is the one at mid-length;
-* rotational springs on the rotation of the end sections; point masses, lateral springs and a
-  stretch of reduced section anywhere.
-
-Elements. The deflection is split as w = b + s, where b' is the rotation of the section and s' the
-shear strain. b is C1 (Hermite cubic plus bubbles from Legendre polynomials integrated twice), s is
-C0 (linear plus Legendre polynomials integrated once; Szabo & Babuska, Finite Element Analysis,
-1991), both of degree 8. Zero shear strain is s = 0, so nothing can lock, and leaving s out gives
-the bar without shear flexibility exactly. Nodes lie on every mass, support and change of section.
+Physics, one plane: a round bar by `bars.py`, held sideways at both ends on rotational springs. Own
+weight lets the tension of a vertical hanger grow; the stated tension is the one at mid-length.
 """
 
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
-from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
-from numpy.polynomial import legendre
-from numpy.typing import NDArray
-from scipy.linalg import eigh
 
-Array = NDArray[np.float64]
+from tests.worlds.bars import GRAVITY_M_S2, POISSON, Array, Bar, cowper, natural_frequencies_hz
+from tests.worlds.cases import Case
 
 PLANES = ("transverse", "longitudinal")
-GRAVITY_M_S2 = 9.81
-POISSON = 0.3  # EN 1993-1-1, 3.2.6
-COWPER_ROUND = 6 * (1 + POISSON) / (7 + 6 * POISSON)  # Cowper (1966), solid circle: 0.8864
 STEEL_DENSITY_KG_M3 = 7850.0
 # EN 1993-1-11, table 2.2: fill factor 0.73 (spiral strand, many layers) to 0.88 (locked coil), and
 # 83 kN/m3 of metallic section, which carries the lay of the wires and the corrosion protection.
 STRAND_FILL = (0.73, 0.88)
 STRAND_DENSITY_KG_M3 = 83e3 / GRAVITY_M_S2
-DEGREE = 8  # of the deflection inside an element
-
-
-@dataclass(frozen=True)
-class Bar:
-    """One plane of a hanger as it really is."""
-
-    length_m: float
-    tension_n: float  # at mid-length
-    bending_stiffness_n_m2: float
-    mass_per_length_kg_m: float
-    shear_stiffness_n: float = math.inf  # coefficient x G x A; inf: no shear flexibility
-    rotary_inertia_kg_m: float = 0.0  # density x second moment; 0: none
-    spring_deck_n_m_rad: float = 0.0
-    spring_arch_n_m_rad: float = 0.0
-    tension_gradient_n_m: float = 0.0  # growth of the tension towards the arch
-    masses: tuple[tuple[float, float], ...] = ()  # (place_m, mass_kg)
-    supports: tuple[tuple[float, float], ...] = ()  # (place_m, stiffness_n_m)
-    loss: tuple[float, float, float] = (0.0, 0.0, 0.0)  # from_m, to_m, lost part of EI
-
-
-@cache
-def _reference() -> dict[str, Array]:
-    """Integrals of the shape functions over the element -1..1, rows [b functions, s functions].
-
-    The two slope functions of b are those for a unit slope in the coordinate -1..1; the element
-    of length h scales them by h/2.
-    """
-    hermite = ([2, -3, 0, 1], [1, -1, -1, 1], [2, 3, 0, -1], [-1, -1, 1, 1])
-    bending = [legendre.poly2leg(c) / 4 for c in hermite]
-    bending += [legendre.legint(np.eye(j + 1)[j], m=2, lbnd=-1) for j in range(2, DEGREE - 1)]
-    shear = [np.array([0.5, -0.5]), np.array([0.5, 0.5])]
-    shear += [legendre.legint(np.eye(j + 1)[j], lbnd=-1) for j in range(1, DEGREE)]
-    point, weight = legendre.leggauss(DEGREE + 2)  # exact to degree 19; 17 is needed
-
-    def values(order: int, with_b: bool = True, with_s: bool = True) -> Array:
-        rows = [(c, with_b) for c in bending] + [(c, with_s) for c in shear]
-        return np.array([on * legendre.legval(point, legendre.legder(c, order)) for c, on in rows])
-
-    def gram(rows: Array, factor: Array) -> Array:
-        return (rows * (weight * factor)) @ rows.T
-
-    one = np.ones_like(point)
-    return {
-        "curvature": gram(values(2, with_s=False), one),
-        "rotation": gram(values(1, with_s=False), one),
-        "strain": gram(values(1, with_b=False), one),
-        "slope": gram(values(1), one),
-        "slope_x": gram(values(1), point),
-        "deflection": gram(values(0), one),
-    }
-
-
-def _mesh(bar: Bar, elements: int) -> Array:
-    stations = {0.0, bar.length_m, *(x for x, _ in bar.masses), *(x for x, _ in bar.supports)}
-    if bar.loss[2] > 0:
-        stations |= {bar.loss[0], bar.loss[1]}
-    if bar.tension_n > 0:  # elements of their own for the end layers, exp(-x sqrt(T/EI))
-        layer = 5 * math.sqrt(bar.bending_stiffness_n_m2 / bar.tension_n)
-        if layer < bar.length_m / elements:
-            stations |= {layer, bar.length_m - layer}
-    marks = sorted(stations)
-    nodes = [0.0]
-    for start, end in pairwise(marks):
-        parts = max(1, math.ceil((end - start) / bar.length_m * elements - 1e-9))
-        nodes.extend(start + (end - start) * i / parts for i in range(1, parts + 1))
-    return np.array(nodes)
-
-
-def natural_frequencies_hz(bar: Bar, count: int, elements: int | None = None) -> Array:
-    """Return the first `count` natural frequencies of the bar in one plane.
-
-    By default one element of degree 8 a mode: half a wave each, far below 1e-6 (see the tests).
-    """
-    x = _mesh(bar, elements or max(8, count))
-    reference, parts = _reference(), len(x) - 1
-    with_shear = math.isfinite(bar.shear_stiffness_n)
-    b_inner, s_inner = DEGREE - 3, DEGREE - 1
-    local = 4 + b_inner + (2 + s_inner if with_shear else 0)
-    # Unknowns: deflection b, rotation b' and deflection s of each node, then the inner ones.
-    node = np.arange(3 * (parts + 1)).reshape(-1, 3)
-    inner = 3 * (parts + 1) + np.arange(parts * (b_inner + s_inner)).reshape(parts, -1)
-    size = 3 * (parts + 1) + inner.size
-    stiffness, mass = np.zeros((size, size)), np.zeros((size, size))
-    for e in range(parts):
-        h, middle = x[e + 1] - x[e], (x[e] + x[e + 1]) / 2
-        lost = bar.loss[2] if bar.loss[0] <= middle <= bar.loss[1] else 0.0
-        second_moment, area = 1 - lost, math.sqrt(1 - lost)  # a round thinned all around: I ~ A^2
-        tension = bar.tension_n + bar.tension_gradient_n_m * (middle - bar.length_m / 2)
-        half = h / 2
-        k = second_moment * bar.bending_stiffness_n_m2 / half**3 * reference["curvature"]
-        k += tension / half * reference["slope"] + bar.tension_gradient_n_m * reference["slope_x"]
-        m = area * bar.mass_per_length_kg_m * half * reference["deflection"]
-        m += second_moment * bar.rotary_inertia_kg_m / half * reference["rotation"]
-        if with_shear:
-            k += area * bar.shear_stiffness_n / half * reference["strain"]
-        scale = np.ones(local)
-        scale[[1, 3]] = half
-        where = np.concatenate(
-            (node[e, :2], node[e + 1, :2], inner[e, :b_inner])
-            + ((node[e : e + 2, 2], inner[e, b_inner:]) if with_shear else ())
-        )
-        block = np.ix_(where, where)
-        stiffness[block] += scale[:, None] * k[:local, :local] * scale
-        mass[block] += scale[:, None] * m[:local, :local] * scale
-    stiffness[node[0, 1], node[0, 1]] += bar.spring_deck_n_m_rad
-    stiffness[node[-1, 1], node[-1, 1]] += bar.spring_arch_n_m_rad
-    for matrix, lumps in ((mass, bar.masses), (stiffness, bar.supports)):
-        for place, amount in lumps:
-            at = node[int(np.argmin(np.abs(x - place)))][[0, 2]]  # the deflection is b + s
-            matrix[np.ix_(at, at)] += amount
-    # No deflection at the ends: b = s = 0 at the deck (which also settles how a constant is shared
-    # between b and s), b + s = 0 at the arch.
-    fixed = {int(node[0, 0]), int(node[0, 2]), int(node[-1, 2])}
-    if with_shear:
-        for matrix in (stiffness, mass):
-            matrix[node[-1, 0], :] -= matrix[node[-1, 2], :]
-            matrix[:, node[-1, 0]] -= matrix[:, node[-1, 2]]
-    else:
-        fixed |= {int(node[-1, 0]), *node[:, 2].tolist(), *inner[:, b_inner:].ravel().tolist()}
-    free = np.array([i for i in range(size) if i not in fixed])
-    keep = np.ix_(free, free)
-    # M v = (1/omega^2) K v: the low modes are the large values, the ones that rounding spares.
-    values = eigh(mass[keep], stiffness[keep], eigvals_only=True, check_finite=False)
-    return 1 / (2 * math.pi * np.sqrt(values[::-1][:count]))
 
 
 @dataclass(frozen=True)
@@ -210,25 +63,6 @@ class Nuisances:
             missing_order=0.0,
             absent_sd=0.0,
         )
-
-
-@dataclass(frozen=True)
-class Case:
-    """A hanger as described and as measured, and the truth about it."""
-
-    index: int
-    hanger_toml: str
-    modes: dict[str, object]
-    truth: dict[str, float | str]
-    groups: tuple[str, ...]
-
-    def write(self, folder: Path) -> tuple[Path, Path]:
-        """Write hanger.toml and case.modes.json into the folder (made if need be)."""
-        folder.mkdir(parents=True, exist_ok=True)
-        hanger, modes = folder / "hanger.toml", folder / "case.modes.json"
-        hanger.write_text(self.hanger_toml, encoding="utf-8")
-        modes.write_text(json.dumps(self.modes, indent=1) + "\n", encoding="utf-8")
-        return hanger, modes
 
 
 @dataclass(frozen=True)
@@ -351,7 +185,7 @@ def _case(rng: np.random.Generator, index: int, draw: _Draw, nuisances: Nuisance
     factor = float(rng.uniform(*nuisances.bending_factor))
     second_moment = true_area**2 / (4 * math.pi)  # a round
     bending = (factor if draw.strand else 1.0) * true_modulus * second_moment
-    shear = COWPER_ROUND * true_modulus / (2 * (1 + POISSON)) * true_area
+    shear = cowper() * true_modulus / (2 * (1 + POISSON)) * true_area
     mass, tension = true_density * true_area, draw.ratio * nominal
     # The accelerometer sits where a person on the deck reaches: 1 to 2.5 m up.
     sensor_kg = float(rng.uniform(*nuisances.sensor_mass_kg))
@@ -363,7 +197,7 @@ def _case(rng: np.random.Generator, index: int, draw: _Draw, nuisances: Nuisance
         mass_per_length_kg_m=mass,
         shear_stiffness_n=math.inf if draw.strand else shear,
         rotary_inertia_kg_m=true_density * second_moment,
-        tension_gradient_n_m=mass * GRAVITY_M_S2 if nuisances.own_weight else 0.0,
+        gravity_along_m_s2=GRAVITY_M_S2 if nuisances.own_weight else 0.0,
         masses=((sensor_m, sensor_kg),),
     )
     diameter = draw.diameter_m * math.sqrt(true_area / area)  # overall, for a strand
@@ -371,7 +205,7 @@ def _case(rng: np.random.Generator, index: int, draw: _Draw, nuisances: Nuisance
     exact: dict[str, Array] = {}
     for plane, ends, count in zip(PLANES, ((0, 2), (1, 3)), draw.modes, strict=True):
         deck, arch = (draw.springs[i] * bending / true_length for i in ends)
-        bar = replace(bare, spring_deck_n_m_rad=deck, spring_arch_n_m_rad=arch)
+        bar = replace(bare, rotation_n_m_rad=(deck, arch))
         if plane in draw.planes:
             exact[plane] = natural_frequencies_hz(bar, count)
     modes, measured = _measure(rng, draw, exact, nuisances)

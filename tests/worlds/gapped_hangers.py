@@ -2,7 +2,7 @@
 
 Each case is a hanger as its drawing describes it (hanger.toml), hammer tests as a field team gives
 them ("shm.modes/1"), and the truth: tension, causes, their sizes. Nothing is shared with the
-program under test: neither the equations (`hermite_bars.py`) nor the draws nor the nuisances.
+program under test: neither the equations (`bars.py`) nor the draws nor the nuisances.
 
 Hangers are round bars, tubes and strands with sockets; three in ten lean. Ends are clamped, as
 described (springs of 10,000 to 1,000,000 EI/L), but where a cause says otherwise. Tension 0.5 to
@@ -27,17 +27,16 @@ import json
 import math
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
 
-from tests.worlds.hermite_bars import Array, Bar, Modes, Stretch, solve_modes
+from tests.worlds.bars import POISSON, Array, Bar, Modes, Zone, cowper, solve_modes
+from tests.worlds.cases import Case, Draws
 
 PLANES = ("transverse", "longitudinal")  # the weight of a leaning hanger acts in the second
 GRAVITY_M_S2 = 9.81
-POISSON = 0.3
 STEEL_KG_M3 = 7850.0
 STRAND_KG_M3 = 8460.0  # of the metallic section, with the filler
 SENSOR_PLACE_SD_M = 0.01
@@ -167,17 +166,17 @@ def lateral_stiffness(bar: Bar, x: float) -> float:
     """Return the stiffness of a pinned bar in tension against a force across, roughly."""
     a, b = x, bar.length_m - x
     length = bar.length_m
-    return bar.tension_n * length / (a * b) + 3 * bar.bending_n_m2 * length / (a * b) ** 2
+    return bar.tension_n * length / (a * b) + 3 * bar.bending_stiffness_n_m2 * length / (a * b) ** 2
 
 
 def _soften(bar: Bar, ends: tuple[int, ...], compliance: float) -> Bar:
     """Add the compliance, in L/EI, to the rotational springs of some ends."""
-    unit = bar.length_m / bar.bending_n_m2
+    unit = bar.length_m / bar.bending_stiffness_n_m2
     springs = [
         1 / (1 / k + compliance * unit) if end in ends else k
-        for end, k in enumerate(bar.rotation_n_m)
+        for end, k in enumerate(bar.rotation_n_m_rad)
     ]
-    return replace(bar, rotation_n_m=(springs[0], springs[1]))
+    return replace(bar, rotation_n_m_rad=(springs[0], springs[1]))
 
 
 def plant(fault: Fault, bar: Bar, plane: int, number: int, hanger: Hanger) -> Bar:
@@ -185,7 +184,7 @@ def plant(fault: Fault, bar: Bar, plane: int, number: int, hanger: Hanger) -> Ba
     if plane not in fault.planes:
         return bar
     size, length, x = fault.size, bar.length_m, fault.place * bar.length_m
-    visit, mass = hanger.visits[number], bar.mass_kg_m * bar.length_m
+    visit, mass = hanger.visits[number], bar.mass_per_length_kg_m * bar.length_m
     span = (max(0.0, x - fault.extent * length / 2), min(length, x + fault.extent * length / 2))
     match fault.cause:
         case "mass at a point":
@@ -197,7 +196,7 @@ def plant(fault: Fault, bar: Bar, plane: int, number: int, hanger: Hanger) -> Ba
         case "joints that soften":  # c ~ level^p, p from 0.5 to 1
             return _soften(bar, fault.ends, size * visit.level ** (0.5 + fault.detail / 2))
         case "end that gives":
-            give = size / (bar.tension_n / length + 12 * bar.bending_n_m2 / length**3)
+            give = size / (bar.tension_n / length + 12 * bar.bending_stiffness_n_m2 / length**3)
             both = [
                 1 / (1 / k + give) if end in fault.ends else k
                 for end, k in enumerate(bar.lateral_n_m)
@@ -205,21 +204,24 @@ def plant(fault: Fault, bar: Bar, plane: int, number: int, hanger: Hanger) -> Ba
             return replace(bar, lateral_n_m=(both[0], both[1]))
         case "corroded stretch":
             rest = 1 - size
-            lost = Stretch(*span, bending=rest**hanger.area_power, mass=rest, area=rest)
-            return replace(bar, stretches=(*bar.stretches, lost))
+            lost = Zone(*span, rest**hanger.area_power, rest)
+            return replace(bar, zones=(*bar.zones, lost))
         case "other stiffness":
-            return replace(bar, bending_n_m2=bar.bending_n_m2 * (1 + fault.sign * size))
+            return replace(
+                bar, bending_stiffness_n_m2=bar.bending_stiffness_n_m2 * (1 + fault.sign * size)
+            )
         case "mass all along":
-            return replace(bar, mass_kg_m=bar.mass_kg_m * (1 + size))
+            return replace(bar, mass_per_length_kg_m=bar.mass_per_length_kg_m * (1 + size))
         case "mass over a stretch":
-            return replace(bar, stretches=(*bar.stretches, Stretch(*span, mass=1 + size)))
+            return replace(bar, zones=(*bar.zones, Zone(*span, 1.0, 1 + size, 1.0)))
         case "other length":
             return _lengthen(bar, fault.sign * size * length)
         case "stiff end":
-            zones = [Stretch(0.0, size * length), Stretch(length * (1 - size), length)]
-            factors = {"bending": 5 + 15 * fault.detail, "mass": 1 + fault.more}
-            put_on = [replace(zones[end], **factors) for end in fault.ends]
-            return replace(bar, stretches=(*bar.stretches, *put_on))
+            factors = 5 + 15 * fault.detail, 1 + fault.more, 1.0
+            zones = [Zone(0.0, size * length, *factors)]
+            zones += [Zone(length * (1 - size), length, *factors)]
+            put_on = [zones[end] for end in fault.ends]
+            return replace(bar, zones=(*bar.zones, *put_on))
         case "tension with temperature":
             change = fault.sign * size * (visit.temperature_c - hanger.reference_c)
             return replace(bar, tension_n=bar.tension_n * (1 + change))
@@ -233,7 +235,7 @@ def plant(fault: Fault, bar: Bar, plane: int, number: int, hanger: Hanger) -> Ba
             tuned = solve_modes(bar, order).frequencies_hz[-1] * (0.92 + 0.16 * fault.more)
             return replace(bar, absorbers=((x, size * mass, float(tuned)),))
         case "crack":
-            return replace(bar, cracks=((x, bar.bending_n_m2 / (size * length)),))
+            return replace(bar, cracks=((x, bar.bending_stiffness_n_m2 / (size * length)),))
         case "clamp to a neighbour":
             longer, tauter = 0.9 + 0.2 * fault.detail, 0.8 + 0.4 * fault.more
             other = replace(
@@ -241,7 +243,7 @@ def plant(fault: Fault, bar: Bar, plane: int, number: int, hanger: Hanger) -> Ba
                 length_m=length * longer,
                 tension_n=bar.tension_n * tauter,
                 masses=(),
-                stretches=(),
+                zones=(),
             )
             return replace(bar, neighbour=other, clamp=(x, size * lateral_stiffness(bar, x)))
     return bar
@@ -253,10 +255,10 @@ def _lengthen(bar: Bar, metres: float) -> Bar:
     def move(x: float) -> float:
         return x + metres if x > bar.length_m / 2 else x
 
-    stretches = tuple(
-        replace(each, start_m=move(each.start_m), end_m=move(each.end_m)) for each in bar.stretches
+    zones = tuple(
+        replace(each, start_m=move(each.start_m), end_m=move(each.end_m)) for each in bar.zones
     )
-    return replace(bar, length_m=bar.length_m + metres, stretches=stretches)
+    return replace(bar, length_m=bar.length_m + metres, zones=zones)
 
 
 @dataclass(frozen=True)
@@ -274,7 +276,7 @@ class Data:
 def _hit_wire(fault: Fault, bar: Bar, hanger: Hanger, number: int, count: int) -> Modes:
     """Return the modes while a wire with play is hit: a stiffness by the describing function."""
     place, many = fault.place * bar.length_m, 40
-    free = solve_modes(bar, many, (*hanger.sensors_m, place))
+    free = solve_modes(bar, many, (*hanger.sensors_m, place), many // 2)
     at = free.shapes[-1]
     reach = np.abs(at[:count]) / np.abs(at[:count]).max() / np.arange(1, count + 1)
     top = max(visit.level for visit in hanger.visits)
@@ -334,14 +336,14 @@ def find_slopes(hanger: Hanger, sound: Data, n: Nuisances) -> Array:
     step = 0.01
 
     def stiffen(bar: Bar) -> Bar:
-        return replace(bar, bending_n_m2=bar.bending_n_m2 * (1 + step))
+        return replace(bar, bending_stiffness_n_m2=bar.bending_stiffness_n_m2 * (1 + step))
 
     def weigh(bar: Bar) -> Bar:
-        return replace(bar, mass_kg_m=bar.mass_kg_m * (1 + step))
+        return replace(bar, mass_per_length_kg_m=bar.mass_per_length_kg_m * (1 + step))
 
     def thicken(bar: Bar) -> Bar:
-        bending = bar.bending_n_m2 * (1 + step) ** hanger.area_power
-        return weigh(replace(bar, bending_n_m2=bending))
+        bending = bar.bending_stiffness_n_m2 * (1 + step) ** hanger.area_power
+        return weigh(replace(bar, bending_stiffness_n_m2=bending))
 
     def lengthen(bar: Bar) -> Bar:
         return _lengthen(bar, step * bar.length_m)
@@ -400,11 +402,11 @@ def find_inherent(hanger: Hanger, sound: Data, slopes: Array) -> dict[str, float
     """
     plain = {
         "stiff_end_zones": [
-            replace(bar, stretches=tuple(each for each in bar.stretches if each.bending < 2))
+            replace(bar, zones=tuple(each for each in bar.zones if each.bending_factor < 2))
             for bar in hanger.bars
         ],
         "shear_and_rotary_inertia": [
-            replace(bar, shear_n=math.inf, rotary_kg_m=0.0) for bar in hanger.bars
+            replace(bar, shear_stiffness_n=math.inf, rotary_inertia_kg_m=0.0) for bar in hanger.bars
         ],
         "sag": [replace(bar, gravity_across_m_s2=0.0) for bar in hanger.bars],
     }
@@ -419,34 +421,6 @@ def find_inherent(hanger: Hanger, sound: Data, slopes: Array) -> dict[str, float
 
 
 # ---------------------------------------------------------------- what is drawn
-
-
-class Draws:
-    """Random numbers of one case."""
-
-    def __init__(self, *entropy: int) -> None:
-        """Seed the draws by whole numbers."""
-        self.rng = np.random.default_rng([*entropy, 1847])
-
-    def between(self, low: float, high: float) -> float:
-        """Return a number from `low` to `high`."""
-        return float(self.rng.uniform(low, high))
-
-    def log(self, low: float, high: float) -> float:
-        """Return a number whose logarithm is uniform."""
-        return low * math.exp(math.log(high / low) * float(self.rng.random()))
-
-    def normal(self, sd: float) -> float:
-        """Return a normal number of mean 0."""
-        return sd * float(self.rng.standard_normal())
-
-    def chance(self, probability: float) -> bool:
-        """Return True with a probability."""
-        return bool(self.rng.random() < probability)
-
-    def pick(self, *values: Any) -> Any:
-        """Return one of the values."""
-        return values[int(self.rng.integers(len(values)))]
 
 
 @dataclass(frozen=True)
@@ -470,17 +444,13 @@ def _draw_section(draws: Draws, slack: bool) -> _Section:
         d = round(draws.log(0.030, 0.050) if slack else draws.log(0.030, 0.140), 3)
         area, modulus = math.pi * d**2 / 4, draws.pick(205e9, 210e9)
         stated = {"diameter_m": d, "elastic_modulus_pa": modulus, "density_kg_m3": STEEL_KG_M3}
-        coefficient = 6 * (1 + POISSON) / (7 + 6 * POISSON)  # Cowper (1966), round
         mass, second = STEEL_KG_M3 * area, math.pi * d**4 / 64
-        return _Section(kind, area, second, mass, modulus, d, 2.0, coefficient, stated)
+        return _Section(kind, area, second, mass, modulus, d, 2.0, cowper(), stated)
     if kind == "tube":
         outer = round(draws.log(0.060, 0.140), 3)
         inner = outer - 2 * round(draws.log(0.004, 0.010), 3)
         area, second = math.pi / 4 * (outer**2 - inner**2), math.pi / 64 * (outer**4 - inner**4)
-        q = (inner / outer) ** 2  # Cowper (1966), hollow circle
-        below = (7 + 6 * POISSON) * (1 + q) ** 2 + (20 + 12 * POISSON) * q
-        coefficient = 6 * (1 + POISSON) * (1 + q) ** 2 / below
-        modulus, mass, power = 210e9, STEEL_KG_M3 * area, 1.0
+        modulus, mass, power, coefficient = 210e9, STEEL_KG_M3 * area, 1.0, cowper(inner / outer)
     else:
         outer, locked = round(draws.log(0.030, 0.090), 3), draws.chance(0.5)
         fill = draws.between(0.81, 0.88) if locked else draws.between(0.73, 0.77)
@@ -533,13 +503,13 @@ def draw_hanger(draws: Draws, needs: frozenset[str], n: Nuisances) -> Hanger:
         described["inclination_deg"] = 90.0 - lean_deg
     lean = math.radians(lean_deg + draws.normal(n.lean_deg))
 
-    stretches: list[Stretch] = []
+    stretches: list[Zone] = []
     edges = np.linspace(0.0, true_length, 7)
     factors = 1 + n.along * draws.rng.standard_normal(6)
     factors /= factors.mean()
     for (start, end), f in zip(pairwise(edges.tolist()), factors.tolist(), strict=True):
-        stretches.append(Stretch(start, end, f**section.power, f, f))
-    fittings: list[list[Stretch]] = [[], []]
+        stretches.append(Zone(start, end, f**section.power, f))
+    fittings: list[list[Zone]] = [[], []]
     if draws.chance(0.6 if strand else 0.3):  # else taped between the fittings' faces
         share = draws.between(4.0, 8.0) * section.outer_m if strand else draws.between(0.15, 0.35)
         share = round(share, 2)
@@ -549,7 +519,7 @@ def draw_hanger(draws: Draws, needs: frozenset[str], n: Nuisances) -> Hanger:
         for zones in fittings:
             factor = stiffer * math.exp(draws.normal(0.1))
             for start, end in ((0.0, share), (true_length - share, true_length)):
-                zones.append(Stretch(start, end, factor, heavier, heavier))
+                zones.append(Zone(start, end, factor, heavier))
 
     has_shapes = "shapes" in needs or draws.chance(0.5)
     two_planes = bool({"shapes", "slack"} & needs) or draws.chance(0.75)
@@ -567,12 +537,14 @@ def draw_hanger(draws: Draws, needs: frozenset[str], n: Nuisances) -> Hanger:
     base = Bar(
         length_m=true_length,
         tension_n=tension,
-        bending_n_m2=bending,
-        mass_kg_m=per_length,
-        shear_n=section.shear * modulus / (2 * (1 + POISSON)) * area if bar_like else math.inf,
-        rotary_kg_m=per_length / area * second if bar_like else 0.0,
-        axial_n=modulus * area,
-        supports_axial_n_m=draws.log(1e8, 1e9),
+        bending_stiffness_n_m2=bending,
+        mass_per_length_kg_m=per_length,
+        shear_stiffness_n=section.shear * modulus / (2 * (1 + POISSON)) * area
+        if bar_like
+        else math.inf,
+        rotary_inertia_kg_m=per_length / area * second if bar_like else 0.0,
+        axial_stiffness_n=modulus * area,
+        axial_n_m=(draws.log(1e8, 1e9), math.inf),
         masses=tuple((x, real_kg) for x in there.tolist()),
         gravity_along_m_s2=GRAVITY_M_S2 * math.cos(lean),
     )
@@ -587,8 +559,8 @@ def draw_hanger(draws: Draws, needs: frozenset[str], n: Nuisances) -> Hanger:
         bars.append(
             replace(
                 base,
-                stretches=(*stretches, *fittings[plane]),
-                rotation_n_m=(turn[0], turn[1]),
+                zones=(*stretches, *fittings[plane]),
+                rotation_n_m_rad=(turn[0], turn[1]),
                 lateral_n_m=(give[0], give[1]),
                 gravity_across_m_s2=GRAVITY_M_S2 * math.sin(lean) if plane == 1 else 0.0,
             )
@@ -672,24 +644,6 @@ def _size_fault(
 
 
 # ---------------------------------------------------------------- a case
-
-
-@dataclass(frozen=True)
-class Case:
-    """A hanger as described and as measured, and the truth about it."""
-
-    index: int
-    hanger_toml: str
-    modes: dict[str, Any]
-    truth: dict[str, Any]
-
-    def write(self, folder: Path) -> tuple[Path, Path]:
-        """Write hanger.toml and case.modes.json into the folder (made if need be)."""
-        folder.mkdir(parents=True, exist_ok=True)
-        hanger, modes = folder / "hanger.toml", folder / "case.modes.json"
-        hanger.write_text(self.hanger_toml, encoding="utf-8")
-        modes.write_text(json.dumps(self.modes, indent=1) + "\n", encoding="utf-8")
-        return hanger, modes
 
 
 def describe(hanger: Hanger) -> str:
@@ -794,7 +748,7 @@ def make_case(
     n = nuisances or Nuisances()
     needs = frozenset(need for name in causes for need in CAUSES[name].needs)
     for attempt in range(200):
-        draws = Draws(seed, index, attempt + 1)
+        draws = Draws(seed, index, attempt + 1, 1847)
         hanger = draw_hanger(draws, needs, n)
         quiet = replace(
             hanger, visits=tuple(replace(visit, tension_factor=1.0) for visit in hanger.visits)
@@ -829,7 +783,7 @@ def _finish(
         "tension_n": bar.tension_n,
         "tension_ratio": bar.tension_n / hanger.described["nominal_tension_n"],
         "kind": hanger.kind,
-        "xi": bar.length_m * math.sqrt(bar.tension_n / bar.bending_n_m2),
+        "xi": bar.length_m * math.sqrt(bar.tension_n / bar.bending_stiffness_n_m2),
         "length_m": bar.length_m,
         "counts": list(hanger.counts),
         "tests": len(hanger.visits),

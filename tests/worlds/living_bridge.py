@@ -7,9 +7,8 @@ All is a function of the seed; it shares nothing with the program under trial.
 
 Physics
 -------
-Hanger.  Timoshenko bar (shear factor Cowper 1966) under tension in Engesser's form, T w'^2/2,
-growing upwards by own weight; rotational springs at both ends, others in either plane; the boxes of
-the sensors are point masses.  Galerkin in integrated Legendre polynomials of degree 36.  Rods 60 to
+Hanger.  Bar of `bars.py`, growing taut upwards by own weight; rotational springs at both ends,
+others in either plane; the boxes of the sensors are point masses.  Rods 60 to
 130 mm; strands E 160 GPa, fill 0.86, 83 kN/m3 (EN 1993-1-11, tables 2.2 and 3.1), with 0.35 to
 0.85 of the bending stiffness of the full section (Papailiou 1997: between slipping and sticking).
 Steel E falls by 3e-4 per K, springs with it.  ln f is a polynomial of ln T, so T may move.
@@ -53,14 +52,13 @@ from tests.worlds.living_hourly import (
     hourly_arrays,
     true_tension,
 )
-from tests.worlds.living_physics import PLANES, Beam, Change
+from tests.worlds.living_physics import PLANES, Change
 from tests.worlds.living_raw import CHANNELS, RATE_HZ, Flags, describe, raw, truth
 
 __all__ = [
     "CHANNELS",
     "PLANES",
     "RATE_HZ",
-    "Beam",
     "Change",
     "Flags",
     "Hourly",

@@ -12,26 +12,25 @@ from datetime import UTC, datetime, timedelta
 from functools import cache, lru_cache
 
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eigh
-from scipy.signal import lfilter
 
-Array = NDArray[np.float64]
+from tests.worlds.bars import (
+    GRAVITY_M_S2,
+    POISSON,
+    Array,
+    Bar,
+    cowper,
+    natural_frequencies_hz,
+    solve_modes,
+)
+from tests.worlds.seasons import ENDS, PLANES, REFERENCE_C, lagged
 
-PLANES = ("transverse", "longitudinal")
-ENDS = ("deck", "arch")
 KINDS = ("tension_loss", "end_loosened", "ice", "sensor_remounted")
 EPOCH = datetime(2020, 1, 1, tzinfo=UTC)
 DAY_S, YEAR_S = 86400.0, 365.25 * 86400.0
-GRAVITY = 9.81
-POISSON = 0.3
-COWPER = 6 * (1 + POISSON) / (7 + 6 * POISSON)
 EXPANSION = 1.2e-5
 MODULUS_PER_K = -3.0e-4
-REFERENCE_C = 10.0
 AIR_KG_M3 = 1.25
-DEGREE = 36
 HIGHEST_HZ = 85.0
 MOST_MODES = 12  # per plane
 STEP_S = 1800.0  # of the weather
@@ -90,83 +89,7 @@ class Change:
         return np.asarray(grown)
 
 
-# --------------------------------------------------------------------------------------- beam
-
-
-@cache
-def _integrals() -> tuple[Array, ...]:
-    """Over -1..1: w from integrated Legendre polynomials 1..DEGREE, theta from those 0..DEGREE."""
-    point, weight = legendre.leggauss(DEGREE + 3)
-    theta = legendre.legvander(point, DEGREE).T
-    slope = np.array([legendre.legval(point, legendre.legder(row)) for row in np.eye(DEGREE + 1)])
-    w = np.array(
-        [legendre.legval(point, legendre.legint(r, lbnd=-1)) for r in np.eye(DEGREE + 1)[1:]]
-    )
-    dw = theta[1:]
-    return (
-        (dw * weight) @ dw.T,
-        (dw * weight * point) @ dw.T,
-        (dw * weight) @ theta.T,
-        (theta * weight) @ theta.T,
-        (slope * weight) @ slope.T,
-        (w * weight) @ w.T,
-    )
-
-
-@lru_cache(maxsize=512)
-def _deflection(at: tuple[float, ...]) -> Array:
-    """w basis at places -1..1, (basis, places): int P_j = (P_j+1 - P_j-1)/(2j + 1)."""
-    all_of = legendre.legvander(np.array(at), DEGREE + 1)
-    rows = (all_of[:, 2:] - all_of[:, :-2]) / (2 * np.arange(1, DEGREE + 1) + 1)
-    return np.asarray(rows.T)
-
-
-GRID = tuple(np.linspace(-1, 1, 201).tolist())
-
-
-@dataclass(frozen=True)
-class Beam:
-    """A tensioned Timoshenko bar between rotational springs, one plane; x from the deck up."""
-
-    length_m: float
-    mass_kg_m: float
-    bending_nm2: float
-    tension_n: float  # at mid-length
-    springs_nm: tuple[float, float] = (0.0, 0.0)
-    shear_n: float = math.inf
-    rotary_kg_m: float = 0.0
-    weight_n_m: float = 0.0
-    masses: tuple[tuple[float, float], ...] = ()  # (part of the length, kg)
-
-    def modes(self, count: int) -> tuple[Array, Array]:
-        """Frequencies (count,) and shapes on GRID (201, count), largest value 1."""
-        slope, sloped, mixed, theta, curved, w = _integrals()
-        half = self.length_m / 2
-        rigid = not math.isfinite(self.shear_n)
-        shear = 0.0 if rigid else self.shear_n
-        n = DEGREE
-        k, m = np.zeros((2 * n + 1, 2 * n + 1)), np.zeros((2 * n + 1, 2 * n + 1))
-        k[:n, :n] = (self.tension_n + shear) * slope / half + self.weight_n_m * sloped
-        k[:n, n:] = -shear * mixed
-        k[n:, :n] = k[:n, n:].T
-        k[n:, n:] = shear * half * theta + self.bending_nm2 / half * curved
-        low, high = (-1.0) ** np.arange(n + 1), np.ones(n + 1)
-        k[n:, n:] += self.springs_nm[0] * np.outer(low, low) + self.springs_nm[1] * np.outer(
-            high, high
-        )
-        m[:n, :n] = self.mass_kg_m * half * w
-        m[n:, n:] = self.rotary_kg_m * half * theta
-        for place, kg in self.masses:
-            row = _deflection((2 * place - 1,))[:, 0]
-            m[:n, :n] += kg * np.outer(row, row)
-        if rigid:  # no shear flexibility: theta is w'
-            tie = np.vstack([np.eye(n), np.zeros((1, n)), np.eye(n) / half])
-            k, m = tie.T @ k @ tie, tie.T @ m @ tie
-        value, vector = eigh(k, m, subset_by_index=[0, count - 1])
-        shape = _deflection(GRID).T @ vector[:n]
-        top = np.argmax(np.abs(shape), axis=0)
-        shape /= shape[top, np.arange(count)]
-        return np.sqrt(value) / (2 * np.pi), shape
+# ---------------------------------------------------------------------------------------- bar
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +98,7 @@ class Modes:
 
     hz: Array  # (2, orders), at T0 and 10 deg C
     polynomial: Array  # (powers, 2, orders) of ln f by ln T/T0, highest power first
-    shape: Array  # (2, orders, 201), at T0
+    shape: Array  # (2, orders, 201), at T0, largest value 1
     mass_kg: Array  # (2, orders)
     push: Array  # (2, orders): part of the deck's lateral acceleration that drives the mode
 
@@ -259,7 +182,7 @@ def _sections(r: np.random.Generator, kind: str) -> tuple[float, float, float, f
     modulus = 1.6e11 * (1 + 0.03 * r.standard_normal())
     area = fill * math.pi * d**2 / 4
     stick = r.uniform(0.35, 0.85)  # sticking part of the bending stiffness of the full section
-    return d, area, stick * modulus * fill * math.pi * d**4 / 64, modulus, 83e3 / GRAVITY
+    return d, area, stick * modulus * fill * math.pi * d**4 / 64, modulus, 83e3 / GRAVITY_M_S2
 
 
 def _draw(seed: int, number: int, count: int) -> Hanger:
@@ -318,9 +241,9 @@ def _draw(seed: int, number: int, count: int) -> Hanger:
         sensor_kg=kg,
         mount_rad=tuple(np.radians(r.standard_normal(2)).tolist()),
         gain=1 + 0.01 * r.standard_normal(4),
-        noise=r.uniform(20e-6, 60e-6) * GRAVITY * r.uniform(0.85, 1.2, 4),
+        noise=r.uniform(20e-6, 60e-6) * GRAVITY_M_S2 * r.uniform(0.85, 1.2, 4),
         bits=int(r.choice([16, 24])),
-        full_scale=float(r.choice([2.0, 2.5, 5.0])) * GRAVITY,
+        full_scale=float(r.choice([2.0, 2.5, 5.0])) * GRAVITY_M_S2,
         ppm=float(r.choice([-1, 1]) * np.exp(r.uniform(0, math.log(20)))),
         road=np.exp(r.uniform(math.log(1.5e-4), math.log(1.2e-3), 2)),
         tremor=np.exp(r.uniform(math.log(1.5e-6), math.log(8e-6), 2)),
@@ -329,29 +252,28 @@ def _draw(seed: int, number: int, count: int) -> Hanger:
         leak=np.exp(r.uniform(math.log(0.002), math.log(0.02), (2, 6))),
         temperature_lag_s=float(np.clip(2.7e4 * diameter, 1500, 4000)),
     )
-    hz = np.array([beam(hanger, p).modes(MOST_MODES)[0] for p in (0, 1)])
+    hz = np.array([natural_frequencies_hz(bar(hanger, p), MOST_MODES) for p in (0, 1)])
     orders = max(2, int(np.sum(hz.max(axis=0) < HIGHEST_HZ)))
     cut = {k: getattr(hanger, k)[:, :orders] for k in ("zeta", "softening", "rubbing")}
     return Hanger(**{**hanger.__dict__, **cut, "orders": orders})
 
 
-def beam(h: Hanger, plane: int, state: State = SOUND, ratio: float = 1.0) -> Beam:
+def bar(h: Hanger, plane: int, state: State = SOUND, ratio: float = 1.0) -> Bar:
     """The hanger's bar in one plane, with the boxes of its sensors."""
-    loosened = state[plane]
-    spring = h.springs_nm[plane]
-    masses = [(x / h.length_m, h.sensor_kg) for x in h.sensors_m]
+    loosened, spring = state[plane], h.springs_nm[plane]
+    masses = [(x, h.sensor_kg) for x in h.sensors_m]
     if state[2] > 0:
-        masses.append((state[3], state[2]))
+        masses.append((state[3] * h.length_m, state[2]))
     inertia = math.pi * h.diameter_m**4 / 64
-    return Beam(
+    return Bar(
         length_m=h.length_m,
-        mass_kg_m=h.mass_kg_m,
-        bending_nm2=h.bending_nm2,
         tension_n=h.tension_n * ratio,
-        springs_nm=(spring[0] * (1 - loosened[0]), spring[1] * (1 - loosened[1])),
-        shear_n=COWPER * h.modulus_pa / (2 * (1 + POISSON)) * h.area_m2,
-        rotary_kg_m=h.density_kg_m3 * inertia * h.area_m2 / (math.pi * h.diameter_m**2 / 4),
-        weight_n_m=h.mass_kg_m * GRAVITY,
+        bending_stiffness_n_m2=h.bending_nm2,
+        mass_per_length_kg_m=h.mass_kg_m,
+        shear_stiffness_n=cowper() * h.modulus_pa / (2 * (1 + POISSON)) * h.area_m2,
+        rotary_inertia_kg_m=h.density_kg_m3 * inertia * h.area_m2 / (math.pi * h.diameter_m**2 / 4),
+        rotation_n_m_rad=(spring[0] * (1 - loosened[0]), spring[1] * (1 - loosened[1])),
+        gravity_along_m_s2=GRAVITY_M_S2,
         masses=tuple(masses),
     )
 
@@ -384,11 +306,6 @@ def lines(r: np.random.Generator, shortest_s: float, longest_s: float, count: in
     weight = r.rayleigh(1.0, count)
     weight *= math.sqrt(2) / np.linalg.norm(weight)
     return Lines(2 * np.pi / period, r.uniform(0, 2 * np.pi, count), weight)
-
-
-def _lag(x: Array, lag_s: float) -> Array:
-    a = math.exp(-STEP_S / lag_s)
-    return np.asarray(lfilter([1 - a], [1, -a], x, zi=[a * x[0]])[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -427,21 +344,21 @@ class Bridge:
         side = np.clip(0.5 - 0.9 * np.sin(angle), 0.05, 1.0)  # row 0 looks east
         air = 10 - 9.5 * np.cos(year - 2 * np.pi * 18 / 365.25)
         air += 3.6 * lines(rng(s, "synoptic"), 2 * DAY_S, 22 * DAY_S)(t)
-        air += _lag(14 * sun, 3.5 * 3600) - 4 * up.clip(0, 0.4) - 1.5 * clear * (high < 0)
+        air += lagged(14 * sun, 3.5 * 3600, STEP_S) - 4 * up.clip(0, 0.4) - 1.5 * clear * (high < 0)
         speed = math.log(3.0) + 0.22 * np.cos(year) + 0.45 * np.clip(high, -0.3, 0.6)
         speed += 0.50 * lines(rng(s, "wind"), 1.5 * DAY_S, 22 * DAY_S, 50)(t)
         speed += 0.22 * lines(rng(s, "breeze"), 3600.0, 10 * 3600.0, 40)(t)
         speed -= 0.55 * clear * (high < -0.1)
-        deck = _lag(air + 12 * sun, 14 * 3600)
+        deck = lagged(air + 12 * sun, 14 * 3600, STEP_S)
         columns = {
             "air": air,
             "sun": sun,
             "wind": np.exp(speed),
             "deck": deck,
-            "arch0": _lag(air + 13 * sun * side * 1.4, 2 * 3600),
-            "arch1": _lag(air + 13 * sun * (1.05 - side) * 1.4, 2 * 3600),
-            "rod0": _lag(air + 6 * sun * side * 1.4, 2400),
-            "rod1": _lag(air + 6 * sun * (1.05 - side) * 1.4, 2400),
+            "arch0": lagged(air + 13 * sun * side * 1.4, 2 * 3600, STEP_S),
+            "arch1": lagged(air + 13 * sun * (1.05 - side) * 1.4, 2 * 3600, STEP_S),
+            "rod0": lagged(air + 6 * sun * side * 1.4, 2400, STEP_S),
+            "rod1": lagged(air + 6 * sun * (1.05 - side) * 1.4, 2400, STEP_S),
         }
         return Weather(t, columns)
 
@@ -458,17 +375,19 @@ class Bridge:
         x = np.log(RATIOS)
         hz, shapes, coefficients = [], [], []
         for p in (0, 1):
-            f, shape = beam(h, p, state).modes(h.orders)
-            table = [beam(h, p, state, float(q)).modes(h.orders)[0] for q in RATIOS]
-            coefficients.append(np.polyfit(x, np.log(np.array(table)), len(x) - 1))
-            hz.append(f)
-            shapes.append(shape.T)
+            found = solve_modes(bar(h, p, state), h.orders, np.linspace(0, h.length_m, 201))
+            rows = [natural_frequencies_hz(bar(h, p, state, float(q)), h.orders) for q in RATIOS]
+            coefficients.append(np.polyfit(x, np.log(np.array(rows)), len(x) - 1))
+            hz.append(found.frequencies_hz)
+            shapes.append(found.shapes.T)
         shape = np.array(shapes)
+        top = np.abs(shape).argmax(axis=-1)[..., None]
+        shape /= np.take_along_axis(shape, top, axis=-1)  # largest value 1
         part = np.linspace(0, 1, 201)
         dx = h.length_m / 200
         mass = h.mass_kg_m * np.trapezoid(shape**2, dx=dx, axis=-1)
-        for place, kg in beam(h, 0, state).masses:
-            mass = mass + kg * shape[..., round(place * 200)] ** 2
+        for place, kg in bar(h, 0, state).masses:
+            mass = mass + kg * shape[..., round(place / h.length_m * 200)] ** 2
         push = h.mass_kg_m * np.trapezoid(shape * (1 - part), dx=dx, axis=-1) / mass
         return Modes(
             hz=np.array(hz),

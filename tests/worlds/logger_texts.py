@@ -6,6 +6,8 @@ manual), Pico PicoLog, phyphox, Data Translation QuickDAQ.  Preambles differ by 
 a user ticks; what is invented is the wording, not the structure.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
 from datetime import timedelta, timezone
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.worlds.logger_tables import (
+    Array,
     Held,
     held,
     placed,
@@ -25,83 +28,110 @@ from tests.worlds.logger_tables import (
 from tests.worlds.recordings import Recording
 
 
+def units_of(record: Recording, spelling: str = "m/s²") -> list[str]:
+    """The units of the channels, with that of accelerations in a spelling."""
+    return [spelt(c, spelling) for c in record.channels]
+
+
+def with_units(record: Recording, pattern: str, spelling: str = "m/s²") -> list[str]:
+    """Names and units in one cell, `{n} [{u}]`."""
+    pairs = zip(record.names, units_of(record, spelling), strict=True)
+    return [pattern.format(n=name, u=unit) for name, unit in pairs]
+
+
+def table(
+    record: Recording, form: str, separator: str, time: str = "", missing: str = ""
+) -> list[str]:
+    """Lines of the samples in one format, with the time in s before them where it has one."""
+    columns, formats = record.data, [form] * len(record.channels)
+    if time:
+        columns, formats = np.column_stack([record.time_s, columns]), [time, *formats]
+    return rows(columns, formats, separator, missing)
+
+
+def save(
+    path: Path,
+    record: Recording,
+    lines: Sequence[str],
+    ends: str,
+    encoding: str,
+    *,
+    names: Sequence[str] | None = None,
+    units: Sequence[str | None] | str = "m/s²",
+    values: Array | None = None,
+    dated: bool = False,
+    digits: int = 0,
+    within: float = 0.0,
+    rate_within: float = 1e-9,
+) -> Held:
+    """Write the lines; `dated` files say when, by a clock without a zone.
+
+    `units` are a spelling of accelerations or all units; numbers have so many significant `digits`,
+    or are `within` of the values.
+    """
+    path.write_bytes(ends.join([*lines, ""]).encode(encoding))
+    kept = record.data if values is None else values
+    return held(
+        record,
+        names=names,
+        units=units_of(record, units) if isinstance(units, str) else units,
+        rate_hz=record.rate_hz,
+        start=record.start.replace(tzinfo=None) if dated else None,
+        values=values,
+        tolerance=relative(kept, digits) if digits else within,
+        rate_within=rate_within,
+    )
+
+
 def catman(path: Path, record: Recording) -> Held:
     """HBK catman ASCII, German: 30 lines of preamble, names with units in brackets, `;`, comma.
 
     Latin-1.  The time column has six digits of a second; the rate stands in the preamble too.
     """
-    units = [spelt(c) for c in record.channels]
     names = [placed(c) for c in record.channels]
+    titles = [f"{n} [{u}]" for n, u in zip(names, units_of(record), strict=True)]
     head = [
         "catmanEasy/AP",
         "DateiID;5012",
         f"Datum;{record.start:%d.%m.%Y}",
         f"Zeit;{record.start:%H:%M:%S}",
         "Kommentar;Hängermessung; Impulshammer",
-        f"Anzahl Kanäle;{len(units) + 1}",
+        f"Anzahl Kanäle;{len(names) + 1}",
         f"Anzahl Werte;{len(record.data)}",
         f"Messrate [Hz];{record.rate_hz:g}".replace(".", ","),
         *[f"Kanal {i + 1};{n};MX840B;Filter: Bessel 10%;Offset 0,0" for i, n in enumerate(names)],
         *[f"Kommentar {i};" for i in range(1, 22 - len(names))],
         "",
-        ";".join(["Zeit [s]", *(f"{n} [{u}]" for n, u in zip(names, units, strict=True))]),
+        ";".join(["Zeit [s]", *titles]),
     ]
-    columns = np.column_stack([record.time_s, record.data])
-    body = with_comma(rows(columns, ["%.6f", *["%.6E"] * len(units)], ";", ""))
-    path.write_bytes(("\r\n".join([*head, *body]) + "\r\n").encode("latin-1"))
-    return held(
-        record,
-        names=names,
-        units=units,
-        rate_hz=record.rate_hz,
-        start=record.start.replace(tzinfo=None, microsecond=0),
-        tolerance=relative(record.data, 7),
-    )
+    lines = [*head, *with_comma(table(record, "%.6E", ";", "%.6f"))]
+    found = save(path, record, lines, "\r\n", "latin-1", names=names, dated=True, digits=7)
+    return replace(found, start=record.start.replace(tzinfo=None, microsecond=0))
 
 
 def famos(path: Path, record: Recording) -> Held:
     """imc FAMOS ASCII: tab, names and units in quotes, comma; no rate but the time."""
-    units = [spelt(c) for c in record.channels]
-    head = [
-        "\t".join(['"Zeit"', *(f'"{n}"' for n in record.names)]),
-        "\t".join(['"s"', *(f'"{u}"' for u in units)]),
-    ]
-    columns = np.column_stack([record.time_s, record.data])
-    body = with_comma(rows(columns, ["%.7g", *["%.7g"] * len(units)], "\t", ""))
-    path.write_bytes("\r\n".join([*head, *body, ""]).encode("cp1252"))
-    return held(
-        record,
-        units=units,
-        rate_hz=record.rate_hz,
-        tolerance=relative(record.data, 7),
-        rate_within=1e-5,
-    )
+    head = [("Zeit", *record.names), ("s", *units_of(record))]
+    lines = ["\t".join(f'"{cell}"' for cell in cells) for cells in head]
+    lines += with_comma(table(record, "%.7g", "\t", "%.7g"))
+    return save(path, record, lines, "\r\n", "cp1252", digits=7, rate_within=1e-5)
 
 
 def dewesoft(path: Path, record: Recording) -> Held:
     """DEWESoft X text: setup lines, names with the unit in brackets; tab; UTF-8 with its mark."""
-    units = [spelt(c) for c in record.channels]
-    head = [
+    lines = [
         "Data file\tHanger_03.dxd",
         f"Start time\t{record.start:%m/%d/%Y %H:%M:%S}.000",
-        f"Number of channels\t{len(units)}",
+        f"Number of channels\t{len(record.channels)}",
         f"Sample rate\t{record.rate_hz:g}",
         "Store type\talways fast",
         "Post time\t0",
         "",
         "Data1",
-        "\t".join(["Time (s)", *(f"{n} ({u})" for n, u in zip(record.names, units, strict=True))]),
+        "\t".join(["Time (s)", *with_units(record, "{n} ({u})")]),
+        *table(record, "%.6f", "\t", "%.6f"),
     ]
-    columns = np.column_stack([record.time_s, record.data])
-    body = rows(columns, ["%.6f", *["%.6f"] * len(units)], "\t", "")
-    path.write_text("\r\n".join([*head, *body, ""]), "utf-8-sig", newline="")
-    return held(
-        record,
-        units=units,
-        rate_hz=record.rate_hz,
-        start=record.start.replace(tzinfo=None),
-        tolerance=5e-7,
-    )
+    return save(path, record, lines, "\r\n", "utf-8-sig", dated=True, within=5e-7)
 
 
 def _lvm_head(record: Recording, comma: bool, x_columns: str) -> list[str]:
@@ -147,17 +177,9 @@ def _lvm_segment(record: Recording, first: int, last: int, comma: bool) -> list[
 
 def lvm(path: Path, record: Recording) -> Held:
     """NI LVM without an x column: the first cell of each line is empty; rate from Delta_X."""
-    body = rows(record.data, ["%.6f"] * len(record.channels), "\t", "NaN")
     lines = _lvm_head(record, False, "No") + _lvm_segment(record, 0, len(record.data), False)
-    path.write_text("\r\n".join([*lines, *("\t" + r for r in body), ""]), "ascii", newline="")
-    return held(
-        record,
-        units=[spelt(c, "m/s^2") for c in record.channels],
-        rate_hz=record.rate_hz,
-        start=record.start.replace(tzinfo=None),
-        tolerance=5e-7,
-        rate_within=1e-5,
-    )
+    lines += ["\t" + row for row in table(record, "%.6f", "\t", missing="NaN")]
+    return _save_lvm(path, record, lines)
 
 
 def lvm_segments(path: Path, record: Recording) -> Held:
@@ -166,50 +188,30 @@ def lvm_segments(path: Path, record: Recording) -> Held:
     The segments are contiguous: X0 says where each begins.
     """
     count = len(record.data)
-    cuts = [0, count // 3, 2 * count // 3, count]
+    body = with_comma(table(record, "%.6f", "\t", "%.6f", "NaN"))
     lines = _lvm_head(record, True, "One")
-    for first, last in pairwise(cuts):
-        columns = np.column_stack([record.time_s[first:last], record.data[first:last]])
-        lines += _lvm_segment(record, first, last, True)
-        lines += with_comma(rows(columns, ["%.6f"] * columns.shape[1], "\t", "NaN"))
-        lines.append("")
-    path.write_text("\r\n".join(lines), "ascii", newline="")
-    return held(
-        record,
-        units=[spelt(c, "m/s^2") for c in record.channels],
-        rate_hz=record.rate_hz,
-        start=record.start.replace(tzinfo=None),
-        tolerance=5e-7,
-        rate_within=1e-5,
-    )
+    for first, last in pairwise([0, count // 3, 2 * count // 3, count]):
+        lines += [*_lvm_segment(record, first, last, True), *body[first:last], ""]
+    return _save_lvm(path, record, lines[:-1])
+
+
+def _save_lvm(path: Path, record: Recording, lines: Sequence[str]) -> Held:
+    known = {"units": "m/s^2", "dated": True, "within": 5e-7, "rate_within": 1e-5}
+    return save(path, record, lines, "\r\n", "ascii", **known)
 
 
 def signal_express(path: Path, record: Recording) -> Held:
     """NI SignalExpress text: blocks of `key`, names, t0 and delta t, then the columns; no units."""
     names = [f"Dev1_ai{i} - {n}" for i, n in enumerate(record.names)]
-    t0 = f"{record.start:%d/%m/%Y %H:%M:%S}.000000"
-    step = f"{1 / record.rate_hz:.6E}"
-    lines = [
-        "channel names:",
-        "\t".join(names),
-        "start times:",
-        "\t".join([t0] * len(names)),
-        "dt:",
-        "\t".join([step] * len(names)),
-        "data:",
-        *rows(record.data, ["%.6E"] * len(names), "\t", "NaN"),
-        "",
-    ]
-    path.write_text("\r\n".join(lines), "ascii", newline="")
-    return held(
-        record,
-        names=names,
-        units=[None] * len(names),
-        rate_hz=record.rate_hz,
-        start=record.start.replace(tzinfo=None),
-        tolerance=relative(record.data, 7),
-        rate_within=1e-6,
-    )
+    blocks = {
+        "channel names:": names,
+        "start times:": [f"{record.start:%d/%m/%Y %H:%M:%S}.000000"] * len(names),
+        "dt:": [f"{1 / record.rate_hz:.6E}"] * len(names),
+    }
+    lines = [line for key, cells in blocks.items() for line in (key, "\t".join(cells))]
+    lines += ["data:", *table(record, "%.6E", "\t", missing="NaN")]
+    known = {"names": names, "units": [None] * len(names), "dated": True}
+    return save(path, record, lines, "\r\n", "ascii", **known, digits=7, rate_within=1e-6)
 
 
 def pulse(path: Path, record: Recording) -> Held:
@@ -236,14 +238,7 @@ def pulse(path: Path, record: Recording) -> Held:
         values = record.data[:, i].tolist()
         step = 1 / record.rate_hz
         lines += [f"{n + 1}\t{n * step:.8e}\t{v:.6e}" for n, v in enumerate(values)]
-    path.write_text("\r\n".join([*lines, ""]), "latin-1", newline="")
-    return held(
-        record,
-        units=[spelt(c) for c in record.channels],
-        rate_hz=record.rate_hz,
-        start=record.start.replace(tzinfo=None),
-        tolerance=relative(record.data, 7),
-    )
+    return save(path, record, lines, "\r\n", "latin-1", dated=True, digits=7)
 
 
 def testlab(path: Path, record: Recording) -> Held:
@@ -253,23 +248,10 @@ def testlab(path: Path, record: Recording) -> Held:
         f"hang:{i}:{axis[c.plane]}" if c.plane else "hang:900:S"
         for i, c in enumerate(record.channels)
     ]
-    units = [spelt(c, "m/s^2") for c in record.channels]
-    columns = np.column_stack([record.time_s, record.data])
-    lines = [
-        ",".join(["Time", *names]),
-        ",".join(["s", *units]),
-        *rows(columns, ["%.9g", *["%.7g"] * len(names)], ",", ""),
-        "",
-    ]
-    path.write_text("\n".join(lines), "ascii", newline="")
-    return held(
-        record,
-        names=names,
-        units=units,
-        rate_hz=record.rate_hz,
-        tolerance=relative(record.data, 7),
-        rate_within=1e-5,
-    )
+    lines = [",".join(["Time", *names]), ",".join(["s", *units_of(record, "m/s^2")])]
+    lines += table(record, "%.7g", ",", "%.9g")
+    known = {"names": names, "units": "m/s^2", "digits": 7, "rate_within": 1e-5}
+    return save(path, record, lines, "\n", "ascii", **known)
 
 
 def toa5(path: Path, record: Recording) -> Held:
@@ -277,50 +259,35 @@ def toa5(path: Path, record: Recording) -> Held:
 
     Times have a thousandth of a second at most here: the rate only follows over the whole column.
     """
-    units = [spelt(c, "m/s^2") for c in record.channels]
-    quoted = [f'"{n}"' for n in record.names]
-    lines = [
-        '"TOA5","HANGER","CR6","1142","CR6.Std.13","CPU:hammer.CR6","1958","Fast"',
-        ",".join(['"TIMESTAMP"', '"RECORD"', *quoted]),
-        ",".join(['"TS"', '"RN"', *(f'"{u}"' for u in units)]),
-        ",".join(['""', '""', *['"Smp"'] * len(units)]),
+    units = units_of(record, "m/s^2")
+    head = [
+        ["TOA5", "HANGER", "CR6", "1142", "CR6.Std.13", "CPU:hammer.CR6", "1958", "Fast"],
+        ["TIMESTAMP", "RECORD", *record.names],
+        ["TS", "RN", *units],
+        ["", "", *["Smp"] * len(units)],
     ]
-    body = rows(record.data, ["%.7g"] * len(units), ",", '"NAN"')
+    lines = [",".join(f'"{cell}"' for cell in cells) for cells in head]
+    body = table(record, "%.7g", ",", missing='"NAN"')
     for i, (when, row) in enumerate(zip(stamps(record), body, strict=True)):
         fraction = f".{when.microsecond // 1000:03d}".rstrip("0").rstrip(".")
         lines.append(f'"{when:%Y-%m-%d %H:%M:%S}{fraction}",{i},{row}')
-    path.write_text("\r\n".join([*lines, ""]), "ascii", newline="")
-    return held(
-        record,
-        units=units,
-        rate_hz=record.rate_hz,
-        start=record.start.replace(tzinfo=None),
-        tolerance=relative(record.data, 7),
-        rate_within=2e-3 * record.rate_hz / len(record.data),
-    )
+    known = {"units": units, "dated": True, "digits": 7}
+    off = 2e-3 * record.rate_hz / len(record.data)
+    return save(path, record, lines, "\r\n", "ascii", **known, rate_within=off)
 
 
 def picolog(path: Path, record: Recording) -> Held:
     """Pico CSV: names, units in brackets, an empty line; time in ms; `******` is overrange."""
-    units = [f"({spelt(c, 'm/s²')})" for c in record.channels]
     full = np.array([c.full_scale for c in record.channels])
     values = np.where(np.abs(record.data) >= 0.9999 * full, np.nan, record.data)
     columns = np.column_stack([1e3 * record.time_s, values])
     lines = [
         ",".join(["Time", *record.names]),
-        ",".join(["(ms)", *units]),
+        ",".join(["(ms)", *(f"({u})" for u in units_of(record))]),
         "",
-        *rows(columns, ["%.8f", *["%.8f"] * len(units)], ",", "******"),
-        "",
+        *rows(columns, ["%.8f"] * columns.shape[1], ",", "******"),
     ]
-    path.write_text("\r\n".join(lines), "utf-8", newline="")
-    return held(
-        record,
-        units=[u[1:-1] for u in units],
-        rate_hz=record.rate_hz,
-        values=values,
-        tolerance=5e-9,
-    )
+    return save(path, record, lines, "\r\n", "utf-8", values=values, within=5e-9)
 
 
 def phyphox(path: Path, record: Recording) -> Held:
@@ -340,17 +307,10 @@ def phyphox(path: Path, record: Recording) -> Held:
     lines = [
         ",".join(f'"{n}"' for n in ["Time (s)", *names]),
         *rows(columns, ["%.9E"] * 4, ",", "NaN"),
-        "",
     ]
-    path.write_text("\n".join(lines), "utf-8", newline="")
-    return held(
-        record,
-        names=names,
-        units=["m/s^2"] * 3,
-        rate_hz=record.rate_hz,
-        values=values,
-        tolerance=relative(values, 9),
-        rate_within=0.3 / len(values),
+    known = {"names": names, "units": ["m/s^2"] * 3, "values": values}
+    return save(
+        path, record, lines, "\n", "utf-8", **known, digits=9, rate_within=0.3 / len(values)
     )
 
 
@@ -373,123 +333,64 @@ def quickdaq(path: Path, record: Recording) -> Held:
         "",
         ",".join(["Sample", "Time (s)", *(f"{n} (V)" for n in names)]),
         *rows(columns, ["%d", "%.6f", *["%.7g"] * len(names)], ",", ""),
-        "",
     ]
-    path.write_text("\r\n".join(lines), "ascii", newline="")
-    return held(
-        record,
-        names=names,
-        units=["V"] * len(names),
-        rate_hz=record.rate_hz,
-        start=record.start.replace(tzinfo=None),
-        values=values,
-        tolerance=relative(values, 7),
-    )
+    known = {"names": names, "units": ["V"] * len(names), "values": values}
+    return save(path, record, lines, "\r\n", "ascii", **known, dated=True, digits=7)
 
 
 def iso_times(path: Path, record: Recording) -> Held:
     """A CSV whose first column are ISO times with a time zone of two hours, to the microsecond."""
-    units = [spelt(c, "m/s2") for c in record.channels]
-    body = rows(record.data, ["%.7g"] * len(units), ",", "")
-    lines = [
-        ",".join(["timestamp", *(f"{n} [{u}]" for n, u in zip(record.names, units, strict=True))])
-    ]
-    there = timezone(timedelta(hours=2))
+    there, body = timezone(timedelta(hours=2)), table(record, "%.7g", ",")
+    lines = [",".join(["timestamp", *with_units(record, "{n} [{u}]", "m/s2")])]
     for when, row in zip(stamps(record), body, strict=True):
         lines.append(f"{when.astimezone(there).isoformat(timespec='microseconds')},{row}")
-    path.write_text("\n".join([*lines, ""]), "utf-8", newline="")
-    return held(
-        record,
-        units=units,
-        rate_hz=record.rate_hz,
-        start=record.start,
-        tolerance=relative(record.data, 7),
-        rate_within=2e-6 * record.rate_hz / len(record.data),
-    )
+    off = 2e-6 * record.rate_hz / len(record.data)
+    found = save(path, record, lines, "\n", "utf-8", units="m/s2", digits=7, rate_within=off)
+    return replace(found, start=record.start)
 
 
 def german_times(path: Path, record: Recording) -> Held:
     """`dd.mm.yyyy hh:mm:ss,fff`, comma, semicolon: day before month, whoever reads."""
-    units = [spelt(c) for c in record.channels]
-    body = with_comma(rows(record.data, ["%.7g"] * len(units), ";", "---"))
-    lines = [";".join(["Datum/Uhrzeit", *record.names]), ";".join(["", *units])]
+    body = with_comma(table(record, "%.7g", ";", missing="---"))
+    lines = [";".join(["Datum/Uhrzeit", *record.names]), ";".join(["", *units_of(record)])]
     for when, row in zip(stamps(record), body, strict=True):
         lines.append(f"{when:%d.%m.%Y %H:%M:%S},{when.microsecond // 1000:03d};{row}")
-    path.write_bytes("\r\n".join([*lines, ""]).encode("latin-1"))
-    return held(
-        record,
-        units=units,
-        rate_hz=record.rate_hz,
-        start=record.start.replace(tzinfo=None),
-        tolerance=relative(record.data, 7),
-        rate_within=2e-3 * record.rate_hz / len(record.data),
-    )
+    off = 2e-3 * record.rate_hz / len(record.data)
+    return save(path, record, lines, "\r\n", "latin-1", dated=True, digits=7, rate_within=off)
 
 
 def utf16(path: Path, record: Recording) -> Held:
     """Excel's Unicode text: UTF-16 with its mark, tab, a separator too many at each line's end."""
-    units = [spelt(c) for c in record.channels]
-    columns = np.column_stack([record.time_s, record.data])
-    lines = [
-        "\t".join(
-            ["Time [s]", *(f"{n} [{u}]" for n, u in zip(record.names, units, strict=True)), ""]
-        ),
-        *(r + "\t" for r in rows(columns, ["%.6f", *["%.6f"] * len(units)], "\t", "")),
-        "",
-    ]
-    path.write_text("\r\n".join(lines), "utf-16", newline="")
-    return held(record, units=units, rate_hz=record.rate_hz, tolerance=5e-7, rate_within=1e-5)
+    lines = ["\t".join(["Time [s]", *with_units(record, "{n} [{u}]"), ""])]
+    lines += [row + "\t" for row in table(record, "%.6f", "\t", "%.6f")]
+    return save(path, record, lines, "\r\n", "utf-16", within=5e-7, rate_within=1e-5)
 
 
 def thousands(path: Path, record: Recording) -> Held:
     """Quoted numbers, a comma every three digits: "1,968.230"; the rate in a comment, no time."""
-    units = [spelt(c, "m/s2") for c in record.channels]
-    lines = [
-        f"# Sampling rate: {record.rate_hz:,.1f} Hz",
-        ",".join(f'"{n} ({u})"' for n, u in zip(record.names, units, strict=True)),
-    ]
+    titles = with_units(record, '"{n} ({u})"', "m/s2")
+    lines = [f"# Sampling rate: {record.rate_hz:,.1f} Hz", ",".join(titles)]
     for row in record.data.tolist():
         lines.append(",".join('""' if v != v else f'"{v:,.5f}"' for v in row))
-    path.write_text("\n".join([*lines, ""]), "utf-8", newline="")
-    return held(record, units=units, rate_hz=record.rate_hz, tolerance=5e-6)
+    return save(path, record, lines, "\n", "utf-8", units="m/s2", within=5e-6)
 
 
 def statistics_tail(path: Path, record: Recording) -> Held:
     """Statistics below the data: minimum, maximum, mean, RMS as lines that look like numbers."""
-    units = [spelt(c) for c in record.channels]
-    columns = np.column_stack([record.time_s, record.data])
-    formats = ["%.6f", *["%.7g"] * len(units)]
-    lines = [
-        ";".join(["t", *record.names]),
-        ";".join(["s", *units]),
-        *rows(columns, formats, ";", ""),
-        "",
-    ]
+    lines = [";".join(["t", *record.names]), ";".join(["s", *units_of(record)])]
+    lines += [*table(record, "%.7g", ";", "%.6f"), ""]
     for label, of in (("Min", np.nanmin), ("Max", np.nanmax), ("Mean", np.nanmean)):
         lines.append(";".join([label, *(f"{v:.7g}" for v in of(record.data, axis=0))]))
-    lines += [f"Number of samples;{len(record.data)}", "End of file", ""]
-    path.write_text("\n".join(lines), "utf-8", newline="")
-    return held(
-        record,
-        units=units,
-        rate_hz=record.rate_hz,
-        tolerance=relative(record.data, 7),
-        rate_within=1e-5,
-    )
+    lines += [f"Number of samples;{len(record.data)}", "End of file"]
+    return save(path, record, lines, "\n", "utf-8", digits=7, rate_within=1e-5)
 
 
 def spectrum(path: Path, record: Recording) -> None:
     """An FFT export: amplitude over frequency.  No time record is in it: to be refused."""
-    units = [spelt(c) for c in record.channels]
     size = 2 * (min(len(record.data), 4096) // 2)
     amplitude = np.abs(np.fft.rfft(np.nan_to_num(record.data[:size]), axis=0)) * 2 / size
     columns = np.column_stack([np.fft.rfftfreq(size, 1 / record.rate_hz), amplitude])
-    lines = [
-        "FFT Spectrum;Window: Hanning;Averages: 1",
-        ";".join(
-            ["Frequency [Hz]", *(f"{n} [{u}]" for n, u in zip(record.names, units, strict=True))]
-        ),
-        *rows(columns, ["%.4f", *["%.6e"] * len(units)], ";", ""),
-        "",
-    ]
-    path.write_text("\n".join(lines), "utf-8", newline="")
+    lines = ["FFT Spectrum;Window: Hanning;Averages: 1"]
+    lines += [";".join(["Frequency [Hz]", *with_units(record, "{n} [{u}]")])]
+    lines += rows(columns, ["%.4f", *["%.6e"] * len(record.channels)], ";", "")
+    save(path, record, lines, "\n", "utf-8")

@@ -1,14 +1,6 @@
 """Three years of hammer tests on the hangers of a network arch: frequencies of known truth.
 
-**Beam.** Each hanger is a Timoshenko beam under tension (Engesser's axial force, along the axis)
-with piecewise properties, x from the pin at the deck up.  Potential energy
-
-    V = 1/2 int EI th'^2 + kGA (w' - th)^2 + T(x) w'^2 dx + 1/2 springs + 1/2 sag term,
-
-T(x) = T + m g sin(a) (x - L/2) by the hanger's own weight.  Weak form on Chebyshev-Lobatto nodes,
-Clenshaw-Curtis quadrature (Trefethen: Spectral Methods in MATLAB, 2000), domains graded to the
-bending length sqrt(EI/T).  `dynamic_stiffness_hz` finds the same frequencies from the matrix
-exponential of the first-order system; the two share nothing but the description of the beam.
+**Beam.** Each hanger is a bar of `bars.py`, x from the pin at the deck up, on a mesh of its own.
 
 Features: fork plates (a stiff, heavy length at each end, between a rotation spring at the pin and
 the free hanger), lateral flexibility of each support, a turnbuckle or sleeve, a soft clamp where
@@ -36,169 +28,49 @@ the full one (tested).
 Every law draws from its own stream (seed, law, hanger), the same number of times on or off.
 """
 
-import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
-from functools import lru_cache
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, eigh, expm
-from scipy.optimize import brentq
 from scipy.signal import lfilter
 
-Array = NDArray[np.float64]
-GRAVITY_M_S2 = 9.81
+from tests.worlds import seasons
+from tests.worlds.bars import (
+    GRAVITY_M_S2,
+    POISSON,
+    Array,
+    Bar,
+    Matrices,
+    Zone,
+    cowper,
+    reduced_basis,
+    solve,
+    solve_many,
+)
+from tests.worlds.seasons import PLANES, REFERENCE_C, lagged, mode, stream
+
 EXPANSION_PER_K = 1.2e-5  # EN 1991-1-5, annex C
 MODULUS_PER_K = -3.0e-4  # steel near room temperature
-REFERENCE_C = 10.0
-SHEAR_FACTOR = 6 * 1.3 / (7 + 6 * 0.3)  # Cowper 1966, solid circle
-PLANES = ("transverse", "longitudinal")
-ENDS = ("deck", "arch")
 STEP_H = 0.5  # of the weather
 START = datetime(2026, 5, 1, tzinfo=UTC)
 MACHINE_HZ = (8.33, 16.67, 25.0)  # 500, 1000 and 1500 turns a minute; overtones of it
-EVENTS = (
-    "none", "tension_step", "tension_ramp", "springs", "lamp", "clock", "section_loss",
-    "sensor_moved",
-)  # fmt: skip
 
 
 # --------------------------------------------------------------------------------------- beam
 
 
 @dataclass(frozen=True)
-class Zone:
-    """Length with ratios to the plain hanger (fork plate, sleeve); a ratio of 1 changes nothing."""
-
-    start_m: float
-    end_m: float
-    bending_ratio: float
-    mass_ratio: float
-    shear_ratio: float = 1.0
-
-
-@dataclass(frozen=True)
 class Beam:
-    """One hanger in one plane; springs and flexibilities at (deck, arch)."""
+    """One hanger in one plane, sound and worn; its own springs stand at (deck, arch)."""
 
-    length_m: float
-    mass_kg_m: float
-    bending_nm2: float
-    shear_n: float
-    rotary_kg_m: float
-    rotation_nm: tuple[float, float]
-    flexibility_m_n: tuple[float, float] = (0.0, 0.0)
-    zones: tuple[Zone, ...] = ()
-    loss: Zone | None = None  # corroded length, ratios below 1
-    weight_n_m: float = 0.0  # along the axis
+    bar: Bar
+    worn: Bar
+    springs_nm: tuple[float, float]
     sag_n_m3: float = 0.0  # (EA/L)(m g cos)^2, over T^2 it is the stiffness per (int w)^2
     marks_m: tuple[float, ...] = ()  # where a point mass or a clamp may sit
-
-
-@lru_cache(maxsize=32)
-def _chebyshev(degree: int) -> tuple[Array, Array, Array, Array]:
-    """Clenshaw-Curtis points and weights on [-1, 1]; Lagrange basis on Lobatto nodes, slopes."""
-    nodes = -np.cos(np.pi * np.arange(degree + 1) / degree)
-    n = 2 * degree + 2
-    points = -np.cos(np.pi * np.arange(n + 1) / n)
-    moments = np.array([0.0 if k % 2 else 2.0 / (1 - k * k) for k in range(n + 1)])
-    weights = np.linalg.solve(chebyshev.chebvander(points, n).T, moments)
-    back = np.linalg.inv(chebyshev.chebvander(nodes, degree))
-    slopes = chebyshev.chebval(points, chebyshev.chebder(np.eye(degree + 1))).T
-    return points, weights, chebyshev.chebvander(points, degree) @ back, slopes @ back
-
-
-def _breaks(beam: Beam, tension_n: float) -> Array:
-    """Domain borders: zones, marks, and a grading at the layers of bending."""
-    length, layer = beam.length_m, np.sqrt(beam.bending_nm2 / max(tension_n, 1.0))
-    layer = float(np.clip(layer, length / 400, length / 20))
-    ends = [0.0, length]
-    for zone in beam.zones:
-        ends += [zone.start_m, zone.end_m]
-    soft = [e + s * layer for e in ends for s in (-6.0, -2.0, 2.0, 6.0)]
-    hard = [e for e in [*ends, *beam.marks_m] if 0 < e < length]
-    if beam.loss is not None:
-        hard += [beam.loss.start_m, beam.loss.end_m]
-    marks = sorted({0.0, length, *np.round(hard, 9)})
-    for mark in [*soft, *np.linspace(0, length, 6)[1:-1]]:
-        if 0 < mark < length and min(abs(mark - other) for other in marks) > 1.5 * layer:
-            marks.append(mark)
-    return np.unique(marks)
-
-
-class Discrete:
-    """Separate stiffness and mass matrices of a beam: deflections first, rotations after."""
-
-    def __init__(self, beam: Beam, tension_n: float) -> None:
-        self.beam, self.breaks = beam, _breaks(beam, tension_n)
-        spans = np.diff(self.breaks)
-        # six half waves and more have to be resolved
-        degrees = [int(np.clip(np.ceil(5 + 26 * s / beam.length_m), 5, 12)) for s in spans]
-        starts = np.concatenate(([0], np.cumsum(degrees)))
-        n = self.size = int(starts[-1]) + 1
-        names = ("bend", "fit", "tension", "weight", "lost", "spring0", "spring1", "lateral")
-        self.k = {name: np.zeros((2 * n, 2 * n)) for name in names}
-        self.m = {name: np.zeros((2 * n, 2 * n)) for name in ("base", "lost")}
-        self.integral = np.zeros(2 * n)
-        self.starts = starts
-        for at, (low, span, degree) in enumerate(zip(self.breaks, spans, degrees, strict=False)):
-            self._domain(int(starts[at]), degree, float(low), float(span))
-        self.free = np.ones(2 * n, dtype=bool)
-        for end, node in enumerate((0, n - 1)):
-            self.k[f"spring{end}"][n + node, n + node] = 1.0
-            if beam.flexibility_m_n[end] > 0:
-                self.k["lateral"][node, node] += 1 / beam.flexibility_m_n[end]
-            else:
-                self.free[node] = False
-
-    def _domain(self, first: int, degree: int, low: float, span: float) -> None:
-        beam, n = self.beam, self.size
-        points, weights, value, slope = _chebyshev(degree)
-        half = span / 2
-        x, dx, slope = low + half * (points + 1), weights * half, slope / half
-        middle = low + half
-        bend = mass = shear = 1.0
-        kind = "bend"
-        for zone in beam.zones:
-            if zone.start_m <= middle <= zone.end_m:
-                bend, mass, shear = zone.bending_ratio, zone.mass_ratio, zone.shear_ratio
-                kind = "fit"
-        w = slice(first, first + degree + 1)
-        r = slice(n + first, n + first + degree + 1)
-        vv, ss, sv = (a.T @ (dx[:, None] * b) for a, b in
-                      ((value, value), (slope, slope), (slope, value)))  # fmt: skip
-        ei, ga = beam.bending_nm2 * bend, beam.shear_n * shear
-        # bending scales with the slip of a strand, shear does not: it sits in "fit"
-        self.k[kind][r, r] += ei * ss
-        fixed = self.k["fit"]
-        fixed[w, w] += ga * ss
-        fixed[w, r] -= ga * sv
-        fixed[r, w] -= ga * sv.T
-        fixed[r, r] += ga * vv
-        self.k["tension"][w, w] += ss
-        along = beam.weight_n_m * (x - beam.length_m / 2)
-        self.k["weight"][w, w] += slope.T @ ((dx * along)[:, None] * slope)
-        self.m["base"][w, w] += beam.mass_kg_m * mass * vv
-        self.m["base"][r, r] += beam.rotary_kg_m * bend * vv
-        self.integral[w] += dx @ value
-        if beam.loss is not None and beam.loss.start_m <= middle <= beam.loss.end_m:
-            lost = beam.loss
-            self.k["lost"][r, r] -= ei * (1 - lost.bending_ratio) * ss
-            self.m["lost"][w, w] -= beam.mass_kg_m * mass * (1 - lost.mass_ratio) * vv
-
-    def at(self, place_m: float) -> Array:
-        """The vector whose product with the unknowns is the deflection at a mark."""
-        near = int(np.argmin(np.abs(self.breaks - place_m)))
-        if abs(self.breaks[near] - place_m) > 1e-6:
-            raise ValueError("a point has to sit on a mark of the beam")
-        vector = np.zeros(2 * self.size)
-        vector[self.starts[near]] = 1.0
-        return vector
 
 
 @dataclass(frozen=True)
@@ -213,164 +85,89 @@ class State:
     lost: bool = False
 
 
-def _coefficients(beam: Beam, state: State) -> dict[str, float]:
-    grown = 1 + EXPANSION_PER_K * state.warmer_k
-    modulus = (1 + MODULUS_PER_K * state.warmer_k) * grown  # EI / L^3 with I as L^4
-    return {
-        "bend": modulus * state.bending_factor,
-        "fit": modulus,
-        "tension": state.tension_n / grown,
-        "weight": 1 / grown,
-        "lost": modulus * state.bending_factor * state.lost,
-        "spring0": beam.rotation_nm[0] * state.spring_factors[0],
-        "spring1": beam.rotation_nm[1] * state.spring_factors[1],
-        "lateral": 1.0,
-        "sag": beam.sag_n_m3 / state.tension_n**2,
-    }
+class Parts:
+    """Matrices whose sum is a state's, of a whole bar or in a basis."""
+
+    def __init__(self, beam: Beam, matrices: Matrices, basis: Array | None = None) -> None:
+        self.beam, m = beam, matrices
+        turned = np.eye(len(m.mass)) if basis is None else basis
+        deck, arch = m.turns @ turned
+        sagging = m.area @ turned
+        stiff = {
+            "slips": m.bending, "fit": m.zone_bending + m.shear, "pull": m.pull,
+            "weight": m.weight, "held": m.held,
+        }  # fmt: skip
+        self.stiff = {name: turned.T @ part @ turned for name, part in stiff.items()}
+        self.stiff["deck"], self.stiff["arch"] = np.outer(deck, deck), np.outer(arch, arch)
+        self.stiff["sag"] = np.outer(sagging, sagging)
+        self.mass = turned.T @ m.mass @ turned
+        self.points = dict(zip(beam.marks_m, m.rows(beam.marks_m) @ turned, strict=True))
+
+    def of(self, states: Sequence[State]) -> tuple[Array, Array]:
+        """Stiffness and mass (visit, n, n)."""
+        tension, slip, warm = (
+            np.array([getattr(state, name) for state in states])
+            for name in ("tension_n", "bending_factor", "warmer_k")
+        )
+        springs = self.beam.springs_nm * np.array([state.spring_factors for state in states])
+        grown = 1 + EXPANSION_PER_K * warm
+        modulus = (1 + MODULUS_PER_K * warm) * grown  # EI / L^3 with I as L^4
+        factors = {
+            "slips": modulus * slip, "fit": modulus, "pull": tension / grown, "weight": 1 / grown,
+            "held": np.ones_like(tension), "deck": springs[:, 0], "arch": springs[:, 1],
+            "sag": self.beam.sag_n_m3 / tension**2,
+        }  # fmt: skip
+        parts = np.array([self.stiff[name] for name in factors])
+        stiff = np.tensordot(np.array(list(factors.values())).T, parts, axes=1)
+        mass = np.repeat(self.mass[None], len(states), axis=0)
+        for i, state in enumerate(states):
+            for kg, place in state.masses:
+                point = self.points[round(place, 9)]
+                mass[i] += kg * np.outer(point, point)
+        return stiff, mass
 
 
-def full_modes(discrete: Discrete, state: State, count: int) -> tuple[Array, Array]:
-    """Frequencies (Hz) and shapes of the whole discretised beam."""
-    factors = _coefficients(discrete.beam, state)
-    stiff = sum(factors[name] * part for name, part in discrete.k.items())
-    stiff = stiff + factors["sag"] * np.outer(discrete.integral, discrete.integral)
-    mass = discrete.m["base"] + state.lost * discrete.m["lost"]
-    for kg, place in state.masses:
-        at = int(np.argmax(discrete.at(place)))
-        mass[at, at] += kg
-    free = discrete.free
-    n = int(free.sum())
-    inverse, vectors = eigh(
-        mass[np.ix_(free, free)], stiff[np.ix_(free, free)], subset_by_index=(n - count, n - 1)
-    )
-    shapes = np.zeros((len(free), count))
-    shapes[free] = vectors[:, ::-1]
-    return 1 / np.sqrt(inverse[::-1]) / (2 * np.pi), shapes
-
-
-def natural_frequencies_hz(beam: Beam, state: State, count: int) -> Array:
-    """The full solve: first frequencies of a beam in a state (masses at marks)."""
-    marks = tuple(place for _, place in state.masses)
-    beam = replace(beam, marks_m=(*beam.marks_m, *marks))
-    return full_modes(Discrete(beam, state.tension_n), state, count)[0]
-
-
-def dynamic_stiffness_hz(
-    beam: Beam, state: State, near_hz: float, pieces: int = 60, window: float = 2e-3
-) -> float:
-    """The frequency near a guess by another route: no discretisation but steps of the weight.
-
-    State (w, th, F, M) with F = kGA (w' - th) + T w':  u' = A(omega) u per piece, transfer
-    matrix exp(A h), folded into dynamic stiffness; the root of its smallest eigenvalue.
-    """
-    length, factors = beam.length_m, _coefficients(beam, state)
-    cuts = {0.0, length, *np.linspace(0, length, pieces + 1), *(p for _, p in state.masses)}
-    for zone in [*beam.zones, *([beam.loss] if beam.loss and state.lost else [])]:
-        cuts |= {zone.start_m, zone.end_m}
-    x = np.unique(np.round(sorted(cuts), 9))
-    x = np.concatenate((x[:1], x[1:][np.diff(x) > 1e-8]))
-    grown = 1 + EXPANSION_PER_K * state.warmer_k
-
-    def smallest(hz: float) -> float:
-        square = (2 * np.pi * hz) ** 2
-        total = np.zeros((2 * len(x), 2 * len(x)))
-        for i, (low, high) in enumerate(pairwise(x)):
-            middle, h = (low + high) / 2, high - low
-            ei = beam.bending_nm2 * factors["bend"]
-            mass, ga = beam.mass_kg_m, beam.shear_n * factors["fit"]
-            rotary = beam.rotary_kg_m
-            for zone in beam.zones:
-                if zone.start_m < middle < zone.end_m:
-                    ei = beam.bending_nm2 * factors["fit"] * zone.bending_ratio
-                    mass, ga = mass * zone.mass_ratio, ga * zone.shear_ratio
-                    rotary *= zone.bending_ratio
-            if beam.loss and state.lost and beam.loss.start_m < middle < beam.loss.end_m:
-                ei, mass = ei * beam.loss.bending_ratio, mass * beam.loss.mass_ratio
-            pull = (state.tension_n + beam.weight_n_m * (middle - length / 2)) / grown
-            a = np.array([
-                [0, ga / (ga + pull), 1 / (ga + pull), 0],
-                [0, 0, 0, 1 / ei],
-                [-mass * square, 0, 0, 0],
-                [0, ga - ga * ga / (ga + pull) - rotary * square, -ga / (ga + pull), 0],
-            ])  # fmt: skip
-            t = expm(a * h)
-            uu, uf, fu, ff = t[:2, :2], t[:2, 2:], t[2:, :2], t[2:, 2:]
-            inverse = np.linalg.inv(uf)
-            s = slice(2 * i, 2 * i + 4)
-            total[s, s] += np.block([
-                [inverse @ uu, -inverse], [fu - ff @ inverse @ uu, ff @ inverse],
-            ])  # fmt: skip
-        for end, node in enumerate((0, len(x) - 1)):
-            total[2 * node + 1, 2 * node + 1] += factors[f"spring{end}"]
-            flexible = beam.flexibility_m_n[end]
-            total[2 * node, 2 * node] += 1 / flexible if flexible > 0 else 1e14
-        for kg, place in state.masses:
-            at = 2 * int(np.argmin(np.abs(x - place)))
-            total[at, at] -= kg * square
-        scale = np.sqrt(np.abs(np.diag(total)))
-        values = np.linalg.eigvalsh((total + total.T) / 2 / np.outer(scale, scale))
-        return float(values[np.argmin(np.abs(values))])
-
-    low, high = near_hz * (1 - window), near_hz * (1 + window)
-    return float(brentq(smallest, low, high, xtol=1e-9 * near_hz, rtol=1e-12))
+def full_modes(beam: Beam, state: State, count: int) -> tuple[Array, Array]:
+    """Frequencies (Hz) and shapes of the whole bar."""
+    bar = beam.worn if state.lost else beam.bar
+    stiff, mass = Parts(beam, Matrices(bar, beam.marks_m)).of([state])
+    return solve(stiff[0], mass[0], count)
 
 
 class Reduced:
     """Small matrices of one hanger in one plane, and the map from a state to its modes."""
 
     def __init__(self, beam: Beam, states: Sequence[State], count: int) -> None:
-        self.beam = beam
-        discrete = Discrete(beam, states[0].tension_n)
-        shapes = [full_modes(discrete, state, count)[1] for state in states]
-        factors = _coefficients(beam, states[0])
-        stiff = np.asarray(sum(factors[name] * part for name, part in discrete.k.items()))
-        free = discrete.free
-        loads = [discrete.at(place) for place in beam.marks_m]
-        for node in (0, discrete.size - 1):
-            loads += list(np.eye(2 * discrete.size)[[node, discrete.size + node]])
-        inner = stiff[np.ix_(free, free)]
-        static = np.zeros((len(free), len(loads)))
-        static[free] = cho_solve(cho_factor(inner), np.array(loads).T[free])
-        basis = np.hstack([*shapes, static[:, np.any(static != 0, axis=0)]])
-        basis /= np.sqrt(np.einsum("ij,ij->j", basis, stiff @ basis))
-        size, turn = np.linalg.eigh(basis.T @ stiff @ basis)
-        keep = size > 1e-10 * size[-1]
-        basis = basis @ (turn[:, keep] / np.sqrt(size[keep]))
-        self.k = {name: basis.T @ part @ basis for name, part in discrete.k.items()}
-        sagging = discrete.integral @ basis
-        self.k["sag"] = np.outer(sagging, sagging)
-        self.m = {name: basis.T @ part @ basis for name, part in discrete.m.items()}
-        self.points = {round(p, 9): discrete.at(p) @ basis for p in beam.marks_m}
+        self.parts: dict[bool, Parts] = {}
+        for lost in {state.lost for state in states}:
+            matrices = Matrices(beam.worn if lost else beam.bar, beam.marks_m)
+            whole = Parts(beam, matrices)
+            stiff, mass = whole.of([state for state in states if not lost or state.lost])
+            shapes = [solve(k, m, count)[1] for k, m in zip(stiff, mass, strict=True)]
+            ends = matrices.rows([0.0, beam.bar.length_m])
+            loads = np.vstack([*whole.points.values(), *ends, *matrices.turns]).T
+            basis = reduced_basis(stiff[0], stiff[0], [*shapes, loads])
+            self.parts[lost] = Parts(beam, matrices, basis)
 
-    def modes(self, states: Sequence[State], count: int | None = None) -> tuple[Array, Array]:
-        """Frequencies (visit, mode) and mass-normalised shapes (visit, coordinate, mode)."""
-        rows = [_coefficients(self.beam, state) for state in states]
-        names = list(self.k)
-        weights = np.array([[row[name] for name in names] for row in rows])
-        stiff = np.tensordot(weights, np.array([self.k[name] for name in names]), axes=1)
-        mass = np.repeat(self.m["base"][None], len(states), axis=0)
-        for i, state in enumerate(states):
-            if state.lost:
-                mass[i] += self.m["lost"]
-            for kg, place in state.masses:
-                point = self.points[round(place, 9)]
-                mass[i] += kg * np.outer(point, point)
-        lower = np.linalg.cholesky(mass)
-        inverse = np.linalg.inv(lower)
-        squares, vectors = np.linalg.eigh(inverse @ stiff @ inverse.transpose(0, 2, 1))
-        shapes = inverse.transpose(0, 2, 1) @ vectors
-        return np.sqrt(squares[:, :count]) / (2 * np.pi), shapes[:, :, :count]
-
-    def at(self, place_m: float, shapes: Array) -> Array:
-        """Deflection of each mode at a mark (visit, mode)."""
-        return np.asarray(np.einsum("i,vim->vm", self.points[round(place_m, 9)], shapes))
+    def modes(self, states: Sequence[State], count: int) -> tuple[Array, dict[float, Array]]:
+        """Frequencies (visit, mode) and deflections (visit, mode) of unit modal mass at marks."""
+        hz = np.zeros((len(states), count))
+        seen = {place: np.zeros_like(hz) for place in self.parts[False].points}
+        for lost, parts in self.parts.items():
+            rows = np.array([state.lost == lost for state in states])
+            if rows.any():
+                own = [state for state in states if state.lost == lost]
+                hz[rows], shapes = solve_many(*parts.of(own), count)
+                for place, point in parts.points.items():
+                    seen[place][rows] = np.einsum("i,vim->vm", point, shapes)
+        return hz, seen
 
 
 # ------------------------------------------------------------------------------------- nuisances
 
 
 @dataclass(frozen=True)
-class Nuisances:
+class Nuisances(seasons.Switched):
     """What separates a field record from the textbook; each is off at 0 and scales by its value.
 
     `none()` switches all off; `replace(Nuisances(), wind=0.0)` one.  Scales (default 1) multiply
@@ -419,47 +216,14 @@ class Nuisances:
     persistent: float = 0.12  # share of hangers where one mistake comes back
     swapped: float = 0.005  # share of visits under another hanger's name
 
-    @classmethod
-    def none(cls) -> "Nuisances":
-        """The textbook: uniform hanger as described, constant state, exact frequencies."""
-        off: dict[str, Any] = {
-            name: (0.0, 0.0) if isinstance(value, tuple) else 0.0
-            for name, value in vars(cls()).items()
-        }
-        return cls(**off)
-
 
 @dataclass(frozen=True)
-class Event:
-    """A change planted at a day (from `START`) in one hanger.
+class Event(seasons.Event):
+    """An event; a moved sensor sits at a new place, `size` of the length."""
 
-    kind          size
-    tension_step  fraction of the tension, sign kept; neighbours carry the rest
-    tension_ramp  fraction a year
-    springs       end stiffness becomes this fraction, at `end` ("deck", "arch", "both") and in
-                  `plane` ("transverse", "longitudinal", "both")
-    lamp          kg at `at_share` of the length
-    clock         ALL hangers and operators: the time base reads 1 + size times every frequency
-    section_loss  fraction of the area over `length_share` about `at_share`, tension kept
-    sensor_moved  new place of the sensor as a share of the length, for this hanger
-    """
-
-    kind: str = "none"
-    hanger: int = 0
     day: float = 540.0
-    size: float = 0.0
-    end: str = "deck"
-    plane: str = "both"
-    at_share: float = 0.3
-    length_share: float = 0.08
-
-    def __post_init__(self) -> None:
-        if self.kind not in EVENTS:
-            raise ValueError(f"no event {self.kind!r}: one of {EVENTS}")
-        if self.size == 0.0 and self.kind not in ("none", "springs"):
-            raise ValueError(f"{self.kind} of size 0 is no event")
-        if self.kind == "sensor_moved" and not 0.0 < self.size < 1.0:
-            raise ValueError("a sensor sits between the ends")
+    place: float = 0.3
+    extent: float = 0.08
 
     def after(self, days: Array) -> NDArray[np.bool_]:
         return np.asarray(days) >= self.day
@@ -492,29 +256,30 @@ class Hanger:
     description: dict[str, Any]
 
     def beam(self, plane: str, event: Event, marks: tuple[float, ...]) -> Beam:
-        p = PLANES.index(plane)
-        length, loss = self.length_m, None
-        if event.kind == "section_loss":
-            half, middle = event.length_share * length / 2, event.at_share * length
-            kept = 1 - event.size
-            loss = Zone(max(middle - half, 0.0), min(middle + half, length), kept**2, kept)
+        p, length = PLANES.index(plane), self.length_m
         gravity = GRAVITY_M_S2 * self.mass_kg_m
         sag = 0.3 * self.modulus_pa * self.area_m2 / length  # deck and arch give way
         sag *= (gravity * np.cos(self.inclination_rad)) ** 2 * self.sag
-        return Beam(
+        deck, arch = (1 / each if each else np.inf for each in self.flexibility_m_n[p])
+        bar = Bar(
             length_m=length,
-            mass_kg_m=self.mass_kg_m,
-            bending_nm2=self.modulus_pa * self.second_moment_m4,
-            shear_n=SHEAR_FACTOR * self.modulus_pa / 2.6 * self.area_m2,
-            rotary_kg_m=self.density_kg_m3 * self.second_moment_m4,
-            rotation_nm=self.springs_nm[p],
-            flexibility_m_n=self.flexibility_m_n[p],
+            tension_n=self.tension_n,
+            bending_stiffness_n_m2=self.modulus_pa * self.second_moment_m4,
+            mass_per_length_kg_m=self.mass_kg_m,
+            shear_stiffness_n=cowper() * self.modulus_pa / (2 + 2 * POISSON) * self.area_m2,
+            rotary_inertia_kg_m=self.density_kg_m3 * self.second_moment_m4,
             zones=self.zones,
-            loss=loss,
-            weight_n_m=gravity * np.sin(self.inclination_rad) * self.own_weight,
-            sag_n_m3=float(sag) if plane == "longitudinal" else 0.0,
-            marks_m=marks,
+            lateral_n_m=(deck, arch),
+            gravity_along_m_s2=GRAVITY_M_S2 * np.sin(self.inclination_rad) * self.own_weight,
         )
+        worn = bar
+        if event.kind == "section_loss":
+            half, middle = event.extent * length / 2, event.place * length
+            ends = max(middle - half, 0.0), min(middle + half, length)
+            kept = 1 - event.size
+            worn = replace(bar, zones=(*bar.zones, Zone(*ends, kept**2, kept, 1.0)))
+        known = self.springs_nm[p]
+        return Beam(bar, worn, known, float(sag) if plane == "longitudinal" else 0.0, marks)
 
     def bending_factor(self, amplitude: Array, slip: float) -> Array:
         """Share of the second moment that acts, at a relative amplitude (1: a usual blow).
@@ -525,23 +290,19 @@ class Hanger:
         return self.stick_factor - (self.stick_factor - self.slip_factor) * sliding * slip
 
 
-def _stream(seed: int, law: str, *keys: int) -> np.random.Generator:
-    return np.random.default_rng([seed, zlib.crc32(law.encode()), *keys])
-
-
 def bridge(seed: int, count: int, nuisances: Nuisances) -> list[Hanger]:
     """Hangers of one side of a network arch: a parabola of lengths, some rods, some strands."""
     n = nuisances
-    places = _stream(seed, "sensor place").uniform(1.3, 2.3, 3)  # above the deck, by operator
-    style = _stream(seed, "bridge")
+    places = stream(seed, "sensor place").uniform(1.3, 2.3, 3)  # above the deck, by operator
+    style = stream(seed, "bridge")
     rise, rods = style.uniform(10.0, 22.0), style.uniform(0.3, 0.9)
     partners: dict[int, tuple[int, float, float, float]] = {}
-    crossings = _stream(seed, "crossing")
+    crossings = stream(seed, "crossing")
     draws = crossings.uniform(size=(count, 4))
     hangers = []
     for i in range(count):
         along = (i + 0.7) / (count + 0.4)
-        design, true = _stream(seed, "design", i), _stream(seed, "true", i)
+        design, true = stream(seed, "design", i), stream(seed, "true", i)
         u, z = design.uniform(size=12), true.standard_normal(24)
         length = float(max(rise * 4 * along * (1 - along) * (0.9 + 0.2 * u[0]), 3.5 + u[1]))
         rod = u[2] < rods
@@ -575,7 +336,7 @@ def bridge(seed: int, count: int, nuisances: Nuisances) -> list[Hanger]:
             zones.append(Zone(0.0, float(lengths[0]), bend, heavy, np.sqrt(bend)))
             zones.append(Zone(length - float(lengths[1]), length, bend, heavy, np.sqrt(bend)))
         known: dict[str, float] = {}
-        sleeve = _stream(seed, "sleeve", i).uniform(size=4)
+        sleeve = stream(seed, "sleeve", i).uniform(size=4)
         if sleeve[0] < n.sleeve_share:
             start = 0.12 * length + 0.1 * sleeve[1] * length
             long = (4 + 3 * sleeve[2]) * diameter
@@ -604,7 +365,7 @@ def bridge(seed: int, count: int, nuisances: Nuisances) -> list[Hanger]:
             name=f"H{i + 1:02d}", kind="rod" if rod else "strand", diameter_m=diameter,
             area_m2=area * grown, second_moment_m4=moment * grown**2, modulus_pa=true_modulus,
             density_kg_m3=true_density, mass_kg_m=true_density * area * grown, length_m=length,
-            inclination_rad=float(np.deg2rad(55 + 30 * _stream(seed, "slope", i).uniform())),
+            inclination_rad=float(np.deg2rad(55 + 30 * stream(seed, "slope", i).uniform())),
             tension_n=tension, springs_nm=((k[0], k[1]), (k[2], k[3])),
             flexibility_m_n=((limp[0], limp[1]), (limp[2], limp[3])),
             zones=tuple(zones), stick_factor=stick, slip_factor=slide,
@@ -625,16 +386,11 @@ def _ar1(rng: np.random.Generator, count: int, step: float, memory: float) -> Ar
     return np.asarray(lfilter([1.0], [1.0, -a], z))
 
 
-def _lagged(series: Array, hours: float) -> Array:
-    a = np.exp(-STEP_H / hours)
-    return np.asarray(lfilter([1 - a], [1, -a], series, zi=[a * series[0]])[0])
-
-
 class Weather:
     """Half-hourly air temperature and sun (0 to 1); days count from `START`, 1 May."""
 
     def __init__(self, seed: int, days: float) -> None:
-        rng = _stream(seed, "weather")
+        rng = stream(seed, "weather")
         count = int(days * 24 / STEP_H) + 2
         hours = np.arange(count) * STEP_H
         self.hours = hours
@@ -648,7 +404,7 @@ class Weather:
         self.air = 9.5 + 9.5 * np.cos(year - 2 * np.pi * 6 / 365.25) + weather + day
 
     def member(self, hours: float, gain_k: float) -> Array:
-        return _lagged(self.air + gain_k * self.sun, hours)
+        return lagged(self.air + gain_k * self.sun, hours, STEP_H)
 
 
 class World:
@@ -658,17 +414,17 @@ class World:
         self.days = 365.25 * years
         self.weather = weather = Weather(seed, self.days)
         grid = len(weather.hours)
-        rng = _stream(seed, "influence")
+        rng = stream(seed, "influence")
         far = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
         shape = np.exp(-far / 1.5) * (1 + 0.4 * rng.standard_normal((count, count)))
         np.fill_diagonal(shape, 0.0)
         # what one hanger gives up, its neighbours carry: at most 0.15 each
         self.influence = np.eye(count) - 0.2 * n.redistribution * np.clip(shape, 0, 1.1)
-        lags = np.exp(_stream(seed, "lags").uniform(np.log(0.3), np.log(1.2), count))
-        gains = 3.0 + 5.0 * _stream(seed, "gains").uniform(size=count)
+        lags = np.exp(stream(seed, "lags").uniform(np.log(0.3), np.log(1.2), count))
+        gains = 3.0 + 5.0 * stream(seed, "gains").uniform(size=count)
         arch, deck = weather.member(3.0, 9.0), weather.member(8.0, 8.0)
         self.own = np.array([weather.member(lag, g) for lag, g in zip(lags, gains, strict=True)])
-        pick = _stream(seed, "sensitivity")
+        pick = stream(seed, "sensitivity")
         restraint = 1e-3 * pick.uniform(0.6, 2.2, count)  # per K hanger over arch
         smooth = np.exp(-((far / 4.0) ** 2))
         smooth /= np.sqrt((smooth**2).sum(1, keepdims=True))
@@ -679,10 +435,10 @@ class World:
         total += 6e-4 * uniform[:, None] * (arch - REFERENCE_C)  # bearings, unlike expansions
         self.thermal = n.temperature * total
         self.warm = n.temperature
-        settle = _stream(seed, "settlement")
+        settle = stream(seed, "settlement")
         self.rates = n.settlement_sd_per_year * (smooth @ settle.standard_normal(count))
         self.rates += 0.3 * n.settlement_sd_per_year * settle.standard_normal(count)
-        load = _stream(seed, "traffic")
+        load = stream(seed, "traffic")
         kinds, sizes = load.uniform(size=grid), load.uniform(size=grid)
         where = load.uniform(0, count, grid)
         some = -0.003 * np.log(np.clip(sizes, 1e-9, 1))  # vehicles: exponential, mean 0.3 %
@@ -690,7 +446,7 @@ class World:
             kinds < 0.80, 2e-4 * sizes, np.where(kinds < 0.97, some, 0.01 + 0.05 * sizes)
         )
         self.where = where
-        gust = _stream(seed, "wind")
+        gust = stream(seed, "wind")
         days = int(self.days) + 2
         # daily wind, unit: a breezy day; Student-t of 3 degrees, so a gale a year or two
         self.gusts = n.wind * np.abs(gust.standard_t(3, days)) * 0.6
@@ -745,7 +501,7 @@ class Operator:
 def _operators(seed: int, n: Nuisances) -> list[Operator]:
     people = []
     for i in range(3):
-        rng = _stream(seed, "operator", i)
+        rng = stream(seed, "operator", i)
         z, u = rng.standard_normal(6), rng.uniform(size=5)
         habit = n.operators
         people.append(Operator(
@@ -773,7 +529,7 @@ class _Visit:
 def _schedule(seed: int, count: int, days: float, n: Nuisances) -> list[_Visit]:
     visits: list[_Visit] = []
     for i in range(count):
-        rng = _stream(seed, "schedule", i)
+        rng = stream(seed, "schedule", i)
         every = (7.0, 30.4, 91.3)[int(np.searchsorted([0.2, 0.5], rng.uniform()))]
         own = int(rng.integers(3))  # who usually comes
         planned = np.arange(3.0 + every * 0.5 * rng.uniform(), days - 2, every)
@@ -786,7 +542,7 @@ def _schedule(seed: int, count: int, days: float, n: Nuisances) -> list[_Visit]:
             if not skip[k] and 0 <= day < days - 1:
                 comes = int(who[k]) if other[k] < 0.25 else own
                 visits.append(_Visit(float(day + hours[k] / 24), comes, i, i))
-    batch = _stream(seed, "campaigns")
+    batch = stream(seed, "campaigns")
     for year in range(int(np.ceil(days / 365.25))):  # spring and autumn, every hanger in a day
         for start in (15.0, 150.0):
             late, person = 20 * n.irregular * batch.uniform(), int(batch.integers(3))
@@ -795,13 +551,13 @@ def _schedule(seed: int, count: int, days: float, n: Nuisances) -> list[_Visit]:
                 if day < days - 1:
                     time = float(day + (8 + 9 * i / count) / 24)
                     visits.append(_Visit(time, person, i, i))
-    rng = _stream(seed, "winter")
+    rng = stream(seed, "winter")
     kept = []
     for visit in sorted(visits, key=lambda v: (v.day, v.named)):
         winter = 230 < visit.day % 365.25 < 291  # 17 December to 16 February
         if not (rng.uniform() < n.winter_gap and winter):
             kept.append(visit)
-    mix = _stream(seed, "names")
+    mix = stream(seed, "names")
     for visit in kept:
         draw, side = mix.uniform(), int(mix.integers(2))
         if draw < n.swapped and count > 1:
@@ -843,10 +599,9 @@ def _states(
         soft = 1 - 0.03 * min(visit.truth["wind"], 8.0)  # loose joints rattle
         soft *= max(1 - n.joint_amplitude * np.log(visit.truth["amplitude"]), 0.3)
         springs = [soft, soft]
-        if changed and event.kind == "springs" and event.plane in (plane, "both"):
-            for e, end in enumerate(ENDS):
-                if event.end in (end, "both"):
-                    springs[e] *= event.size
+        if changed and event.kind == "springs" and plane in event.planes:
+            for e in event.at_ends:
+                springs[e] *= event.size
         masses = []
         if not quiet and people[visit.operator].sensor_kg > 0:
             place = h.sensor_places_m[visit.operator]
@@ -854,7 +609,7 @@ def _states(
                 place = event.size * h.length_m
             masses.append((people[visit.operator].sensor_kg, place))
         if changed and event.kind == "lamp":
-            masses.append((event.size, event.at_share * h.length_m))
+            masses.append((event.size, event.place * h.length_m))
         states.append(State(
             visit.truth["tension_n"] if not quiet else visit.truth["partner_n"], float(factor),
             (springs[0], springs[1]), visit.truth["warmer_k"], tuple(masses),
@@ -868,7 +623,7 @@ def _marks(h: Hanger, event: Event, mine: bool) -> tuple[float, ...]:
     if h.crossing:
         marks.append(h.crossing[1] * h.length_m)
     if mine and event.kind == "lamp":
-        marks.append(event.at_share * h.length_m)
+        marks.append(event.place * h.length_m)
     if mine and event.kind == "sensor_moved":
         marks.append(event.size * h.length_m)
     return tuple(sorted({round(m, 9) for m in marks}))
@@ -888,7 +643,7 @@ def reduced(h: Hanger, plane: str, event: Event, mine: bool, count: int) -> Redu
         states.append(State(t, (low + high) / 2, lost=True))
         states.append(State(0.8 * t, low, (0.3, 0.3), lost=True))
     if mine and event.kind == "lamp":
-        states.append(State(t, high, masses=((event.size, event.at_share * h.length_m),)))
+        states.append(State(t, high, masses=((event.size, event.place * h.length_m),)))
     if mine and event.kind == "springs":
         states.append(State(t, high, (max(event.size, 1e-3),) * 2))
     return Reduced(beam, states, count)
@@ -921,26 +676,21 @@ def true_frequencies(
     for plane in PLANES:
         own = reduced(h, plane, event, mine, orders + 2)
         states = _states(h, plane, visits, event, mine, people, n)
-        hz, shapes = own.modes(states, count)
+        hz, at = own.modes(states, count)
         places = np.array([h.sensor_places_m[v.operator] for v in visits])
-        seen = np.zeros((len(visits), orders))
-        for place in set(places):
-            rows = places == place
-            seen[rows] = np.abs(own.at(place, shapes[rows]))[:, :orders]
-        seen *= np.sqrt(h.mass_kg_m * h.length_m / 2)  # 1 at an antinode
         if mine and event.kind == "sensor_moved":
-            rows = np.array([v.day >= event.day for v in visits])
-            moved = np.abs(own.at(event.size * h.length_m, shapes[rows]))[:, :orders]
-            seen[rows] = moved * np.sqrt(h.mass_kg_m * h.length_m / 2)
+            places[[v.day >= event.day for v in visits]] = event.size * h.length_m
+        seen = np.array([at[round(place, 9)][v, :orders] for v, place in enumerate(places)])
+        seen = np.abs(seen) * np.sqrt(h.mass_kg_m * h.length_m / 2)  # 1 at an antinode
         squares, ties = [(2 * np.pi * hz) ** 2], []
         if h.crossing:
             other, place, its, soft = h.crossing
             partner, theirs_too = hangers[other], other == event.hanger
             theirs = reduced(partner, plane, event, theirs_too, orders + 2)
             quiet = _states(partner, plane, visits, event, theirs_too, people, n, quiet=True)
-            his, shaped = theirs.modes(quiet, count)
-            here = own.at(place * h.length_m, shapes)
-            there = theirs.at(its * partner.length_m, shaped)
+            his, at_his = theirs.modes(quiet, count)
+            here = at[round(place * h.length_m, 9)]
+            there = at_his[round(its * partner.length_m, 9)]
             squares.append((2 * np.pi * his) ** 2)
             ties.append((soft, np.concatenate((here, -there), axis=1)))
         result = hz[:, :orders]
@@ -963,7 +713,7 @@ def _mistakes(
     seed: int, i: int, table: Array, days: Array, deck_hz: Array, n: Nuisances
 ) -> tuple[Array, dict[tuple[int, int, int], str]]:
     """Frequencies with the wrong ones in, and their causes by (visit, plane, order - 1)."""
-    rng = _stream(seed, "mistakes", i)
+    rng = stream(seed, "mistakes", i)
     share = n.mistaken[0] + (n.mistaken[1] - n.mistaken[0]) * rng.uniform()
     draws = rng.uniform(size=(*table.shape, 3))
     comes, start, length = rng.uniform(size=3)
@@ -1029,7 +779,7 @@ def season(
         raise ValueError("the event's hanger is not on this bridge")
     world, people = World(seed, count, years, n), _operators(seed, n)
     visits = _schedule(seed, count, world.days, n)
-    deck_hz = np.sort(_stream(seed, "deck").uniform(2.0, 6.0, 4))
+    deck_hz = np.sort(stream(seed, "deck").uniform(2.0, 6.0, 4))
 
     def tension(i: int, days: Array) -> tuple[Array, Array]:
         base = beams[i].tension_n * world.lasting(i, days, event, relaxation_per_year)
@@ -1051,7 +801,7 @@ def _measure(
 ) -> None:  # fmt: skip
     """Fill in the truth and the modes of every visit at one hanger."""
     size, days = len(visits), np.array([v.day for v in visits])
-    rng = _stream(seed, "visit", i)
+    rng = stream(seed, "visit", i)
     hit, rate, air = rng.standard_normal(size), rng.uniform(size=size), rng.standard_normal(size)
     noted, told, known = rng.uniform(size=(3, size))
     amplitude_error = rng.standard_normal(size)
@@ -1071,7 +821,7 @@ def _measure(
         }  # fmt: skip
     hz, seen = true_frequencies(i, beams, visits, event, people, n, orders)
     table, causes = _mistakes(seed, i, hz, days, deck_hz, n)
-    draws = _stream(seed, "scatter", i)
+    draws = stream(seed, "scatter", i)
     errors, stated = _scatter(draws, hz.shape, n), draws.standard_normal(hz.shape)
     lost, damping = draws.uniform(size=hz.shape), draws.standard_normal(hz.shape)
     for k, visit in enumerate(visits):
@@ -1092,11 +842,8 @@ def _measure(
                 read *= 1 + n.scatter * relative * float(np.clip(errors[k, p, o], -12, 12))
                 believed = relative * person.optimism * np.exp(0.2 * n.operators * stated[k, p, o])
                 ratio = 0.004 * truth["amplitude"] ** 0.2 * np.exp(0.35 * damping[k, p, o])
-                modes.append({
-                    "plane": plane, "order": o + 1, "frequency_hz": float(read),
-                    "frequency_sd_hz": float(table[k, p, o] * believed),
-                    "damping_ratio": float(ratio),
-                })  # fmt: skip
+                sd = table[k, p, o] * believed
+                modes.append(mode(plane, o + 1, read, sd, ratio))
                 if (k, p, o) in causes:
                     cause = causes[k, p, o]
                     wrong.append({"plane": plane, "order": o + 1, "cause": cause,

@@ -31,8 +31,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tests.worlds.road_bridge_seasons import REFERENCE_C, SOFTENING_PER_K, Hanger, bridge, weather
-from tests.worlds.tensioned_bars import PLANES, Masses, Plane
+from tests.worlds.road_bridge_seasons import (
+    PLANES,
+    REFERENCE_C,
+    SOFTENING_PER_K,
+    Hanger,
+    bridge,
+    weather,
+)
 
 Array = NDArray[np.float64]
 EPOCH = datetime(2024, 1, 1, tzinfo=UTC)
@@ -124,16 +130,16 @@ def _wander(rng: np.random.Generator, size: int, hours: float) -> Array:
     return np.asarray(lfilter([1.0], [1.0, -kept], steps))
 
 
-def _masses(hanger: Hanger) -> Masses:
+def _masses(hanger: Hanger) -> list[tuple[float, float]]:
     place = min(0.3 * hanger.bar.length_m, 3.5)
-    return Masses((2 * SENSOR_KG,), (place,))
+    return [(place, 2 * SENSOR_KG)]
 
 
 @lru_cache(maxsize=256)
 def _laws(seed: int, number: int, plane: str, springs: tuple[float, float]) -> tuple[Array, Array]:
     """Return cubics of ln f in ln (T/T0), (4, orders), and d ln f / d ln E."""
     hanger = bridge(seed)[number]
-    solver = Plane(hanger.bar, plane)
+    solver = hanger.bar.plane(PLANES.index(plane))
     tensions = np.linspace(0.7, 1.3, 7)
 
     def solved(part: float, stiffer: float = 1.0) -> Array:
@@ -155,7 +161,7 @@ def loosened(seed: int, number: int, plane: str, end: str, size: float) -> tuple
     hanger = bridge(seed)[number]
     held = hanger.springs[PLANES.index(plane)].tolist()
     at = ("deck", "arch").index(end)
-    solver = Plane(hanger.bar, plane)
+    solver = hanger.bar.plane(PLANES.index(plane))
 
     def first(factor: float) -> float:
         springs = [each * factor if n == at else each for n, each in enumerate(held)]
@@ -182,7 +188,7 @@ def largest_loosening(seed: int, number: int, plane: str, end: str) -> float:
     p, at = PLANES.index(plane), ("deck", "arch").index(end)
     held, hinged = hanger.springs[p].copy(), hanger.springs[p].copy()
     hinged[at] = 0.0
-    solver = Plane(hanger.bar, plane)
+    solver = hanger.bar.plane(PLANES.index(plane))
     with_end, without = (
         solver.solve(hanger.tension_n, (s[0], s[1]), masses=_masses(hanger), count=1)[0]
         for s in (held, hinged)

@@ -8,7 +8,7 @@ parabola).
 Round bars between forks, two of them with a turnbuckle; spiral strands between sockets; tubes
 welded to plates that lie along the bridge or across it.  Four in ten lean by 2 to 10 degrees.
 
-Hanger.  Timoshenko bar of `tensioned_bars.py`: tension growing with own weight, sag, fittings and
+Hanger.  Bar of `bars.py`: tension growing with own weight, sag, fittings and
 plates as stiff or heavy stretches, rotational springs, other ones at either end and in either
 plane.  A spring is drawn as fixity k / (k + sqrt(T EI)), sqrt(T EI) being what the end of a long
 taut bar resists with.  The modulus of steel falls by 3e-4 per K.
@@ -45,7 +45,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -53,26 +53,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tests.worlds.tensioned_bars import PLANES, Bar, Masses, Plane, Stretch
+from tests.worlds import bars, seasons
+from tests.worlds.bars import GRAVITY_M_S2, POISSON, Array, Matrices, Zone
+from tests.worlds.seasons import KINDS, PLANES, REFERENCE_C, YEAR_D, lagged, mode
 
-Array = NDArray[np.float64]
-KINDS = (
-    "none",
-    "tension_step",  # size: fraction of the tension, -0.05; neighbours take their parts
-    "tension_ramp",  # size: fraction a year
-    "retensioned",  # size: fraction; by the owner, `told` or not; the deck end sits otherwise
-    "neighbour_lost",  # size: the fraction that this hanger gains
-    "springs",  # size: factor on the springs of `end`
-    "lamp",  # size: kg at `place`
-    "section_loss",  # size: fraction of the area about `place` over `extent`; tension kept
-    "clock",  # size: fraction by which all frequencies of all hangers read too high
-    "sensor_moved",  # size: the new place as a fraction of the length
-)
 SIDE = 12
 START = datetime(2019, 1, 1, tzinfo=UTC)
-REFERENCE_C = 10.0
 SETTLING_DAYS = 40  # of weather before the first test, so that the deck's lag has settled
-YEAR_DAYS = 365.25
 GAINED = 0.3  # of a lost tension, by either neighbour
 SOFTENING_PER_K = -3e-4  # of steel's modulus; EN 1993-1-2 has more, from 100 deg C on
 STREAMS = (
@@ -82,25 +69,14 @@ STREAMS = (
 
 
 @dataclass(frozen=True)
-class Event:
-    """One thing that happens to a hanger on a day, counted from the first of the season."""
+class Event(seasons.Event):
+    """An event; a moved sensor sits at a new place, `size` of the length."""
 
-    kind: str = "none"
-    hanger: int = 0
-    day: float = 0.0
-    size: float = 0.0
     place: float = 0.35
-    extent: float = 0.1
-    end: str = "deck"
-    told: bool = False
-
-    def __post_init__(self) -> None:
-        if self.kind not in KINDS or self.end not in ("deck", "arch", "both"):
-            raise ValueError(f"no such event: {self}")
 
 
 @dataclass(frozen=True)
-class Nuisances:
+class Nuisances(seasons.Switched):
     """Everything of the field that separates a test from the tension; each can be left out."""
 
     temperature: bool = True
@@ -114,11 +90,64 @@ class Nuisances:
     faults: bool = True
     missing: bool = True
 
-    @classmethod
-    def none(cls, **on: bool) -> Nuisances:
-        """Return no nuisance but those named."""
-        names = cls.__dataclass_fields__
-        return cls(**{name: on.get(name, False) for name in names})
+
+@dataclass(frozen=True)
+class Bar:
+    """A bar in both planes; `zones` are those of each, `shear_area_m2` has the coefficient."""
+
+    length_m: float
+    modulus_pa: float
+    area_m2: float
+    second_moment_m4: float
+    mass_kg_m: float
+    shear_area_m2: float
+    inclination_deg: float = 90.0
+    zones: tuple[tuple[Zone, ...], ...] = ((), ())
+
+    @property
+    def bending_nm2(self) -> float:
+        """Return E I of the free bar."""
+        return self.modulus_pa * self.second_moment_m4
+
+    def plane(self, number: int) -> Plane:
+        """Return the bar in one plane; across a leaning one the weight acts in the second."""
+        lean = np.deg2rad(self.inclination_deg)
+        made = bars.Bar(
+            self.length_m, 0.0, self.bending_nm2, self.mass_kg_m,
+            self.modulus_pa / (2 * (1 + POISSON)) * self.shear_area_m2,
+            self.mass_kg_m * self.second_moment_m4 / self.area_m2,
+            self.modulus_pa * self.area_m2,
+            zones=self.zones[number],
+            gravity_along_m_s2=float(GRAVITY_M_S2 * np.sin(lean)),
+            gravity_across_m_s2=float(GRAVITY_M_S2 * np.cos(lean)) if number == 1 else 0.0,
+        )  # fmt: skip
+        return Plane(Matrices(made, elements=5))
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """A bar in one plane, of which any visit's frequencies are solved."""
+
+    matrices: Matrices
+
+    def solve(
+        self,
+        tension_n: float,
+        springs: tuple[float, float],
+        *,
+        stiffer: float = 1.0,
+        masses: Sequence[tuple[float, float]] = (),
+        coating_kg_m: float = 0.0,
+        count: int = 6,
+    ) -> Array:
+        """Return the lowest frequencies in Hz.
+
+        `springs` are in N m/rad at the deck and arch end, `stiffer` a factor on Young's modulus,
+        `masses` in kg at places.
+        """
+        inertia = self.matrices.with_masses(masses) + coating_kg_m * self.matrices.coating
+        stiffness = self.matrices.stiffness(tension_n, springs, stiffer)
+        return bars.solve(stiffness, inertia, count)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +260,7 @@ def _hanger(seed: int, number: int, kind: str, length_m: float, turnbuckle: bool
     leans = rng.uniform() < 0.4
     inclination = float(rng.uniform(80, 88)) if leans else 90.0
     bends = rng.uniform(0.4, 0.95) if kind == "strand" else 1.0
-    stretches, fittings, ends = _fittings(kind, rng, d, length_m)
+    zones, fittings, ends = _fittings(kind, rng, d, length_m)
     description: dict[str, Any] = {
         "id": number + 1, "kind": "strand" if kind == "strand" else "rod",
         "length_m": round(length_m, 2), "elastic_modulus_pa": drawn["modulus_pa"],
@@ -252,7 +281,9 @@ def _hanger(seed: int, number: int, kind: str, length_m: float, turnbuckle: bool
     if turnbuckle:
         at, sleeve = float(rng.uniform(1.2, 1.7)), float(rng.uniform(0.3, 0.45))
         stiffer, heavier = rng.uniform(3, 7), rng.uniform(2.5, 4)
-        stretches.append(Stretch(at - sleeve / 2, at + sleeve / 2, (stiffer, stiffer), heavier))
+        for own in zones:
+            root = math.sqrt(stiffer)
+            own.append(Zone(at - sleeve / 2, at + sleeve / 2, stiffer, heavier, root))
         description["turnbuckle"] = [{
             "x_m": round(at, 2), "length_m": round(sleeve, 2),
             "mass_kg": round(heavier * drawn["mass_kg_m"] * sleeve * rng.normal(1, 0.05), 1),
@@ -268,7 +299,7 @@ def _hanger(seed: int, number: int, kind: str, length_m: float, turnbuckle: bool
         mass_kg_m=drawn["mass_kg_m"] * wider**2 * rng.normal(1, 0.003),
         shear_area_m2=drawn["shear_area_m2"] * wider**2,
         inclination_deg=inclination,
-        stretches=tuple(stretches),
+        zones=tuple(map(tuple, zones)),
     )
     tension = drawn["tension_n"]
     return Hanger(
@@ -285,8 +316,8 @@ def _hanger(seed: int, number: int, kind: str, length_m: float, turnbuckle: bool
 
 def _fittings(
     kind: str, rng: np.random.Generator, diameter_m: float, length_m: float
-) -> tuple[list[Stretch], list[float], str]:
-    """Draw the stretches at both ends, their stated lengths and the kind of the ends."""
+) -> tuple[list[list[Zone]], list[float], str]:
+    """Draw the zones of each plane at both ends, their stated lengths and the kind of the ends."""
     if kind == "bar":
         lengths = [rng.uniform(2, 3.5) * diameter_m] * 2
         both = [(rng.uniform(3, 8),) * 2] * 2
@@ -301,11 +332,15 @@ def _fittings(
         both = [plate, plate if rng.uniform() < 0.5 else plate[::-1]]
         mass, ends = rng.uniform(1.2, 2.0), "plate"
     starts = (0.0, length_m - lengths[1])
-    stretches = [
-        Stretch(start, start + length, bending, mass)
-        for start, length, bending in zip(starts, lengths, both, strict=True)
+    # A fitting that is stiffer in bending is thicker: its shear area grows by the root.
+    zones = [
+        [
+            Zone(start, start + length, bending[plane], mass, math.sqrt(bending[plane]))
+            for start, length, bending in zip(starts, lengths, both, strict=True)
+        ]
+        for plane in range(2)
     ]
-    return stretches, [round(length, 2) for length in lengths], ends
+    return zones, [round(length, 2) for length in lengths], ends
 
 
 def _springs(seed: int, number: int, kind: str, taut: float) -> Array:
@@ -340,25 +375,18 @@ class Weather:
 def weather(seed: int, begin_day: float, years: float) -> Weather:
     """Return the weather of a season that begins `begin_day` days after New Year."""
     rng = draws(seed, "weather")
-    count = math.ceil(years * YEAR_DAYS) + SETTLING_DAYS + 3
+    count = math.ceil(years * YEAR_D) + SETTLING_DAYS + 3
     daily = lfilter([1.0], [1.0, -0.75], rng.normal(0, 4 * math.sqrt(1 - 0.75**2), count))
     clear = np.clip(0.5 + 0.35 * lfilter([1.0], [1.0, -0.5], rng.normal(size=count)), 0, 1)
     hours = np.arange(24 * (count - 1))
     day = hours / 24 + begin_day - SETTLING_DAYS
-    season = -np.cos(2 * np.pi * (day - 20) / YEAR_DAYS)
+    season = -np.cos(2 * np.pi * (day - 20) / YEAR_D)
     sky = np.interp(hours / 24, np.arange(count), clear)
     sun = np.clip(np.sin(2 * np.pi * (hours % 24 - 6) / 24), 0, None) * sky
     sun = sun * (0.65 + 0.35 * season)
     swing = (1.5 + 3.5 * sky) * np.cos(2 * np.pi * (hours % 24 - 15) / 24)
     air = 9.5 + 10.5 * season + np.interp(hours / 24, np.arange(count), daily) + swing
-    return Weather(air, _lag(air + 7 * sun, 40 / 60), _lag(air + 4 * sun, 30.0))
-
-
-def _lag(drive: Array, lag_h: float) -> Array:
-    """Return the response of first order to an hourly drive."""
-    kept = math.exp(-1 / lag_h)
-    found, _ = lfilter([1 - kept], [1.0, -kept], drive, zi=[kept * drive[0]])
-    return np.asarray(found)
+    return Weather(air, lagged(air + 7 * sun, 40 / 60), lagged(air + 4 * sun, 30.0))
 
 
 # --------------------------------------------------------------------------------------- tension
@@ -369,13 +397,13 @@ def lasting(
 ) -> Array:
     """Return the tension in N that lasts, without what comes and goes; (hangers, days)."""
     built = np.array([each.tension_n for each in hangers])
-    slowing = 6 * (1 - np.exp(-days / YEAR_DAYS / 6))  # years of the first rate
-    tension = built[:, None] * (1 + creep[:, None] * slowing - relaxation * days / YEAR_DAYS)
+    slowing = 6 * (1 - np.exp(-days / YEAR_D / 6))  # years of the first rate
+    tension = built[:, None] * (1 + creep[:, None] * slowing - relaxation * days / YEAR_D)
     for event in events:
         since = np.clip(days - event.day, 0, None)
         after = (days >= event.day).astype(float)
         sizes = {
-            "tension_step": after, "retensioned": after, "tension_ramp": since / YEAR_DAYS,
+            "tension_step": after, "retensioned": after, "tension_ramp": since / YEAR_D,
         }  # fmt: skip
         if event.kind in sizes:
             change = event.size * built[event.hanger] * sizes[event.kind]
@@ -429,7 +457,7 @@ def drawn_events(seed: int, years: float) -> list[Event]:
         }[kind]
         found.append(
             Event(
-                kind, number, float(rng.uniform(0.35, 0.7) * years * YEAR_DAYS), size,
+                kind, number, float(rng.uniform(0.35, 0.7) * years * YEAR_D), size,
                 place=float(rng.uniform(0.1, 0.5)), extent=float(rng.uniform(0.05, 0.2)),
                 end=str(rng.choice(["deck", "arch"])), told=bool(rng.uniform() < 0.5),
             )
@@ -444,7 +472,7 @@ def visit_days(seed: int, number: int, years: float) -> Array:
     """Return the days of a hanger's tests, with the hour as their fraction."""
     rng = draws(seed, "plan", number)
     step = float(rng.choice([30.4, 91.3, 365.25], p=[0.4, 0.4, 0.2]))
-    end, first = years * YEAR_DAYS, float(rng.uniform(0, 20))
+    end, first = years * YEAR_D, float(rng.uniform(0, 20))
     days = [first]
     if rng.uniform() < 0.6:
         days += np.sort(first + rng.uniform(10, 340, 9)).tolist()
@@ -539,20 +567,19 @@ class _Solver:
     def __init__(self, hangers: Sequence[Hanger], events: Sequence[Event]) -> None:
         self.hangers = hangers
         self.events = {event.hanger: event for event in events if event.kind != "none"}
-        self.kept: dict[tuple[int, str, bool], Plane] = {}
+        self.kept: dict[tuple[int, int, bool], Plane] = {}
 
-    def plane(self, number: int, plane: str, worn: bool) -> Plane:
+    def plane(self, number: int, plane: int, worn: bool) -> Plane:
         key = (number, plane, worn)
         if key not in self.kept:
             bar = self.hangers[number].bar
             if worn:
                 event = self.events[number]
                 half, middle = event.extent * bar.length_m / 2, event.place * bar.length_m
-                left, bends = 1 - event.size, (1 - event.size) ** 2
-                bar = bar.with_stretch(
-                    Stretch(middle - half, middle + half, (bends, bends), left, joins_mesh=False)
-                )
-            self.kept[key] = Plane(bar, plane)
+                left = 1 - event.size
+                lost = Zone(middle - half, middle + half, left**2, left)
+                bar = replace(bar, zones=tuple((*own, lost) for own in bar.zones))
+            self.kept[key] = bar.plane(plane)
         return self.kept[key]
 
     def frequencies(
@@ -566,25 +593,23 @@ class _Solver:
         end, gives = hanger.gives
         springs[:, end] /= 1 + gives * (seen.amplitude[at] - 1)
         # The sensor of a test at the neighbour may not find its height on a shorter bar.
-        masses = [float(seen.sensor_kg[at])]
-        places = [min(float(seen.sensor_m[at]), 0.9 * hanger.bar.length_m)]
+        place = min(float(seen.sensor_m[at]), 0.9 * hanger.bar.length_m)
+        masses = [(place, float(seen.sensor_kg[at]))]
         if event is not None and kind == "springs":
-            ends = {"deck": [0], "arch": [1], "both": [0, 1]}[event.end]
-            springs[:, ends] *= event.size
+            springs[:, event.at_ends] *= event.size
         elif event is not None and kind == "retensioned":
             springs[:, 0] *= 0.85
         elif event is not None and kind == "lamp":
-            masses.append(event.size)
-            places.append(event.place * hanger.bar.length_m)
+            masses.append((event.place * hanger.bar.length_m, event.size))
         warmer = seen.hanger_c[at] - REFERENCE_C if n.temperature else 0.0
         return np.array([
-            self.plane(number, plane, kind == "section_loss").solve(
+            self.plane(number, p, kind == "section_loss").solve(
                 tension_n, (springs[p, 0], springs[p, 1]),
                 stiffer=1 + SOFTENING_PER_K * warmer,
-                masses=Masses(tuple(masses), tuple(places)),
+                masses=masses,
                 coating_kg_m=float(seen.coating_kg_m[at]), count=count,
             )
-            for p, plane in enumerate(PLANES)
+            for p in range(2)
         ])  # fmt: skip
 
 
@@ -673,11 +698,7 @@ def _record(
         if seen.tested[at] != number:
             mistakes.append({"test": name, "cause": "neighbour"})
         modes = [
-            {
-                "plane": PLANES[p], "order": o + 1, "frequency_hz": float(measured[p, o]),
-                "frequency_sd_hz": float(stated[p, o] * measured[p, o]),
-                "damping_ratio": float(decay[p, o]),
-            }
+            mode(PLANES[p], o + 1, measured[p, o], stated[p, o] * measured[p, o], decay[p, o])
             for p in range(2) for o in range(orders) if not (n.missing and missing[p, o])
         ]  # fmt: skip
         moment = START + timedelta(days=begin + float(seen.days[at]))

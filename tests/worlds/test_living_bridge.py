@@ -9,7 +9,6 @@ from scipy.signal import welch
 from tests.worlds.living_bridge import (
     PLANES,
     RATE_HZ,
-    Beam,
     Change,
     Flags,
     HourlyFlags,
@@ -25,19 +24,6 @@ pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the
 
 START = datetime(2026, 5, 4, 9, tzinfo=UTC)
 QUIET = HourlyFlags(**{n: False for n in HourlyFlags.__dataclass_fields__ if n != "scatter"})
-
-
-def test_pinned_timoshenko_bar_under_tension() -> None:
-    """One sine of w and one cosine of theta: two equations."""
-    length, mass, bending, tension, shear, rotary = 4.0, 80.0, 1.5e6, 6e5, 7e8, 0.06
-    hz, _ = Beam(length, mass, bending, tension, shear_n=shear, rotary_kg_m=rotary).modes(3)
-    for n in (1, 2, 3):
-        k = n * np.pi / length
-        stiff = np.array(
-            [[(tension + shear) * k**2, -shear * k], [-shear * k, shear + bending * k**2]]
-        )
-        lowest = np.linalg.eigvals(np.diag([1 / mass, 1 / rotary]) @ stiff).real.min()
-        assert hz[n - 1] == pytest.approx(np.sqrt(lowest) / (2 * np.pi), rel=1e-7)
 
 
 def test_spectrum_peaks_at_the_truth() -> None:

@@ -14,8 +14,7 @@ from tests.worlds.road_bridge_hours import (
     Logger,
     hourly,
 )
-from tests.worlds.road_bridge_seasons import bridge
-from tests.worlds.tensioned_bars import PLANES, Masses, Plane
+from tests.worlds.road_bridge_seasons import PLANES, bridge
 
 pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
 
@@ -49,8 +48,8 @@ def test_a_loss_of_tension_lowers_all_modes_as_the_bar_does() -> None:
     for p, plane in enumerate(PLANES):
         before, after = _ratio(changed, quiet, plane)
         assert before == pytest.approx(1.0, abs=1e-12)
-        solver, springs = Plane(hanger.bar, plane), tuple(hanger.springs[p])
-        masses = Masses((0.6,), (min(0.3 * hanger.bar.length_m, 3.5),))
+        solver, springs = hanger.bar.plane(p), tuple(hanger.springs[p])
+        masses = [(min(0.3 * hanger.bar.length_m, 3.5), 0.6)]
         wanted = [
             solver.solve(hanger.tension_n * part, springs, masses=masses, count=1)[0]
             for part in (0.99, 1.0)

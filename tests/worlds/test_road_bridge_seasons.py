@@ -9,6 +9,7 @@ import pytest
 
 from tests.worlds.road_bridge_seasons import (
     GAINED,
+    PLANES,
     Event,
     Nuisances,
     Season,
@@ -16,7 +17,6 @@ from tests.worlds.road_bridge_seasons import (
     neighbours,
     season,
 )
-from tests.worlds.tensioned_bars import PLANES, Plane
 
 pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
 
@@ -46,10 +46,10 @@ def test_frequencies_without_nuisances_are_those_of_the_bar() -> None:
     for each in _quiet().hangers[:6]:
         truth = each.truth
         wanted = [
-            Plane(truth["bar"], plane).solve(
-                truth["built_tension_n"], tuple(truth["springs_nm_rad"][p]), count=5
-            )
-            for p, plane in enumerate(PLANES)
+            truth["bar"]
+            .plane(p)
+            .solve(truth["built_tension_n"], tuple(truth["springs_nm_rad"][p]), count=5)
+            for p in range(len(PLANES))
         ]
         assert truth["exact_hz"] == pytest.approx(
             np.broadcast_to(wanted, truth["exact_hz"].shape), rel=1e-6

@@ -1,6 +1,5 @@
-"""The proof of the seasons' world: bar and frame against closed forms and statics, then events."""
+"""The proof of the seasons' world: frame against statics, then events."""
 
-import math
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -8,10 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.worlds import finite_elements
 from tests.worlds.tied_arch_seasons import (
-    COWPER,
-    GRAVITY,
     ORDERS,
     PLANES,
     Array,
@@ -29,7 +25,6 @@ from tests.worlds.tied_arch_seasons import (
 pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
 
 BAR = Bar(9.0, 0.08, 2.05e11, 7850.0, own_weight=False)
-SIX = np.arange(1, 7)
 
 
 def _state(tension: float, springs: Any = 0.0, kg: float = 0.0, at_m: float = 1.8) -> State:
@@ -54,38 +49,6 @@ def _rows(s: Season, number: int, name: str) -> Array:
 
 
 # ------------------------------------------------------------------------------------------- bar
-
-
-def test_hinged_timoshenko_bar_under_tension_has_its_closed_form() -> None:
-    """w = sin qx, th = cos qx solve both equations; omega^2 is the root of a quadratic."""
-    tension, q = 4e5, SIX * math.pi / BAR.length_m
-    shear = COWPER * BAR.modulus_pa / 2.6 * BAR.area_m2
-    m, rotary = BAR.mass_kg_m, BAR.density_kg_m3 * BAR.area_m2**2 / (4 * math.pi)
-    a, b = (shear + tension) * q**2, BAR.bending_nm2 * q**2 + shear
-    linear, constant = a * rotary + b * m, a * b - (shear * q) ** 2
-    low = (linear - np.sqrt(linear**2 - 4 * m * rotary * constant)) / (2 * m * rotary)
-    found = frequencies_full(BAR, _state(tension), 0)
-    assert found[0] == pytest.approx(np.sqrt(low) / (2 * math.pi), rel=1e-7)
-
-
-def test_agrees_with_the_other_finite_elements() -> None:
-    """Weight, springs of two ends, a sensor and a loss of section, by elements of another kind."""
-    bar = replace(BAR, own_weight=True, loss=(3.0, 4.0, 0.2))
-    springs = (5e5, 6e5)
-    found = frequencies_full(bar, _state(4e5, [springs, springs], kg=0.4), 0)[0]
-    other = finite_elements.Bar(
-        9.0,
-        4e5,
-        bar.bending_nm2,
-        bar.mass_kg_m,
-        COWPER * bar.modulus_pa / 2.6 * bar.area_m2,
-        bar.density_kg_m3 * bar.area_m2**2 / (4 * math.pi),
-        *springs,
-        bar.mass_kg_m * GRAVITY,
-        masses=((1.8, 0.4),),
-        loss=(3.0, 4.0, 1 - 0.8**2),
-    )
-    assert found == pytest.approx(finite_elements.natural_frequencies_hz(other, 6), rel=1e-7)
 
 
 def test_basis_of_a_season_gives_the_full_solution_at_every_visit() -> None:

@@ -25,13 +25,13 @@ faces lit); tie with concrete deck 14 h, 12 K, plus a top-bottom difference (3 h
 it (EN 1991-1-5, table 6.1 allows 15 K); hanger rho c D/(4 h) with h = 30 W/m2K - 15 to 65 minutes
 -, 6 K (a round bar shows the sun 1/pi of its skin).
 
-Hanger.  A Timoshenko bar (shear factor Cowper 1966) under tension (Engesser's form, T w'^2/2) that
-grows with own weight; forks at the ends; rotational springs, other ones in either plane, stated as
-fixity r = k/(k + sqrt(T EI)): sqrt(T EI) is the rotational stiffness of the end of a long tensioned
-bar, hence r says how much of the end's stiffening a spring gives, whatever its size.  The modulus
-falls by 3.5e-4 per K (Ledbetter and Reed, J. Phys. Chem. Ref. Data 2, 1973).  Spectral elements of
-degree 8 (w and rotation apart); each season projects them once on modes of its extreme states and
-solves all visits in that basis, which is checked against the full matrices at run time (1e-5).
+Hanger.  A round bar of `bars.py` that grows taut by own weight; forks at the ends; rotational
+springs, other ones in either plane, stated as fixity r = k/(k + sqrt(T EI)): sqrt(T EI) is the
+rotational stiffness of the end of a long tensioned bar, hence r says how much of the end's
+stiffening a spring gives, whatever its size.  The modulus falls by 3.5e-4 per K (Ledbetter and
+Reed, J. Phys. Chem. Ref. Data 2, 1973).  Each season projects the bar once on modes of its extreme
+states and solves all visits in that basis, which is checked against the full matrices at run time
+(1e-5).
 
 Measurement.  The random sd of a frequency is f sqrt(zeta/(2 pi f duration)), the long-data law of
 modal identification (Au, Mech. Syst. Signal Process. 48, 2014): 0.1 % at 6 Hz, zeta 0.3 % and 60 s.
@@ -45,7 +45,6 @@ seed differ only by what was switched, and by the event.
 """
 
 import math
-import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
@@ -54,45 +53,33 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 from scipy.signal import lfilter
 
-Array = NDArray[np.float64]
-PLANES = ("transverse", "longitudinal")
-ENDS = ("deck", "arch")
-KINDS = (
-    "none",
-    "tension_step",  # size: fraction of its tension at 10 deg C, e.g. -0.03
-    "tension_ramp",  # size: fraction a year
-    "springs",  # size: factor on the spring constant, at `end`, in `planes`
-    "lamp",  # size: kg, at `place`
-    "section_loss",  # size: lost part of the area, around `place` over `extent`; tension kept
-    "sensor_moved",  # size: kg of the new sensor, at `place`
-    "clock",  # size: 0.002 reads all frequencies of all hangers 0.2 % high
+from tests.worlds import bars, seasons
+from tests.worlds.bars import (
+    POISSON,
+    Array,
+    Matrices,
+    Zone,
+    cowper,
+    reduced_basis,
+    solve,
+    solve_many,
 )
-REFERENCE_C = 10.0
-GRAVITY = 9.81
-POISSON = 0.3
-COWPER = 6 * (1 + POISSON) / (7 + 6 * POISSON)
+from tests.worlds.seasons import ENDS, PLANES, REFERENCE_C, YEAR_D, lagged, mode, stream
+
 EXPANSION = 1.2e-5  # 1/K, steel (EN 1991-1-5, table C.1; concrete 1.0e-5 there, 0.95 to 1.2 built)
 MODULUS_PER_K = -3.5e-4
 ORDERS = 5  # reported
 SOLVED = ORDERS + 1  # one more, for whom mistakes the order
-DEGREE = 8
 DAY_H = 24.0
 STEP_H = 0.25  # of the temperature record
 LEAD_D = 20  # days of weather before the first visit, so that the lags have settled
-YEAR_D = 365.25
-
-
-def _rng(seed: int, what: str, number: int = 0) -> np.random.Generator:
-    return np.random.default_rng([seed, zlib.crc32(what.encode()), number])
 
 
 @dataclass(frozen=True)
-class Nuisances:
+class Nuisances(seasons.Switched):
     """What separates the field from the textbook.  A scale is 1 as found in the field, 0 for off.
 
     Tolerances: JCSS Probabilistic Model Code, part 3 (area 1 %, modulus 1.5 %, density 0.3 %), the
@@ -131,36 +118,12 @@ class Nuisances:
     mistaken: tuple[float, float] = (0.02, 0.05)  # share of modes, drawn for the season
     wrong_hanger: float = 0.005  # share of tests that were done on the neighbour
 
-    @classmethod
-    def none(cls, **on: Any) -> "Nuisances":
-        """Textbook: all off, but for what is named."""
-        off: dict[str, Any] = {
-            name: (0.0, 0.0) if isinstance(value, tuple) else type(value)()
-            for name, value in vars(cls()).items()
-        }
-        return cls(**(off | on))
-
 
 @dataclass(frozen=True)
-class Event:
-    """One thing that happens on a day (counted from the first day of the season)."""
+class Event(seasons.Event):
+    """An event; a moved sensor is a new one of `size` kg at `place`."""
 
-    kind: str = "none"
     hanger: int = 1
-    day: float = 0.0
-    size: float = 0.0
-    place: float = 0.4  # share of the length from the deck end
-    extent: float = 0.1  # share of the length
-    end: str = "deck"  # or arch, both
-    planes: tuple[str, ...] = PLANES
-
-    def __post_init__(self) -> None:
-        if (
-            self.kind not in KINDS
-            or self.end not in (*ENDS, "both")
-            or set(self.planes) - {*PLANES}
-        ):
-            raise ValueError(f"no such event: {self}")
 
 
 # ---------------------------------------------------------------------------------------- hanger
@@ -211,176 +174,83 @@ class State:
         return State(*(value[which] for value in vars(self).values()))
 
 
-@lru_cache(maxsize=1)
-def _reference() -> tuple[Any, ...]:
-    """Lobatto nodes' Lagrange basis: Gauss points, weights, values, slopes, Legendre transform."""
-    inner = legendre.Legendre.basis(DEGREE).deriv().roots()
-    nodes = np.concatenate(([-1.0], np.sort(inner.real), [1.0]))
-    points, weights = legendre.leggauss(DEGREE + 2)
-    to_legendre = np.linalg.inv(legendre.legvander(nodes, DEGREE))
-    values = legendre.legvander(points, DEGREE) @ to_legendre
-    slopes = legendre.legval(points, legendre.legder(np.eye(DEGREE + 1))).T @ to_legendre
-    return points, weights, values, np.asarray(slopes), to_legendre
+def _matrices(bar: Bar, elements: int) -> Matrices:
+    """A bar of `bars.py` at 10 deg C, without springs at its ends."""
+    length, (fork, stiffer, heavier) = bar.length_m, bar.fork
+    ends = Zone(0.0, fork, stiffer, heavier, math.sqrt(stiffer))
+    zones = [ends, replace(ends, start_m=length - fork, end_m=length)] if fork else []
+    low, high, lost = bar.loss
+    if lost:
+        zones.append(Zone(low, high, (1 - lost) ** 2, 1 - lost))
+    shear = cowper() * bar.modulus_pa / (2 * (1 + POISSON)) * bar.area_m2
+    lateral = [1 / each if each else math.inf for each in bar.flexibility_m_per_n]
+    made = bars.Bar(
+        length, 0.0, bar.bending_nm2, bar.mass_kg_m, shear,
+        bar.density_kg_m3 * bar.area_m2**2 / (4 * math.pi),
+        zones=tuple(zones),
+        masses=(bar.lamp,) if bar.lamp[1] else (),
+        lateral_n_m=(lateral[0], lateral[1]),
+        gravity_along_m_s2=bars.GRAVITY_M_S2 * bar.own_weight,
+    )  # fmt: skip
+    return Matrices(made, elements=elements)
 
 
-class Matrices:
-    """Stiffness and mass of a bar: elastic, per newton of tension, from own weight, mass."""
+def _factors(temperature_c: Array) -> tuple[Array, Array]:
+    """On the elastic stiffness, and on what the tension and the weight do."""
+    strain = EXPANSION * (temperature_c - REFERENCE_C)
+    return (1 + MODULUS_PER_K * (temperature_c - REFERENCE_C)) * (1 + strain), 1 / (1 + strain)
 
-    def __init__(self, bar: Bar, elements: int = 5) -> None:
-        self.bar, length = bar, bar.length_m
-        points, weights, value, slope, self._to_legendre = _reference()
-        fork, stiffer, heavier = bar.fork
-        marks = {0.0, length, fork, length - fork}
-        if bar.loss[2] > 0:
-            marks |= {*bar.loss[:2]}
-        if bar.lamp[1] > 0:
-            marks |= {bar.lamp[0]}
-        fine = sorted(marks)
-        breaks = [0.0]
-        for start, end in pairwise(fine):
-            parts = max(1, math.ceil((end - start) / length * elements - 1e-9))
-            breaks += [start + (end - start) * (i + 1) / parts for i in range(parts)]
-        self.breaks = np.array(breaks)
-        self.count = n = (len(breaks) - 1) * DEGREE + 1  # deflections, then as many rotations
-        elastic, mass = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 2 * n))
-        string, weight = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 2 * n))
-        shear = COWPER * bar.modulus_pa / (2 * (1 + POISSON)) * bar.area_m2
-        rotary = bar.density_kg_m3 * bar.area_m2**2 / (4 * math.pi)
-        for e, (start, end) in enumerate(pairwise(breaks)):
-            half, middle = (end - start) / 2, (start + end) / 2
-            x = start + half * (points + 1)
-            inside = middle < fork or middle > length - fork
-            area = 1 - bar.loss[2] if bar.loss[0] < middle < bar.loss[1] else 1.0
-            bend = area**2 * (stiffer if inside else 1.0)
-            dx, slope_x = half * weights, slope / half
-            w = slice(e * DEGREE, (e + 1) * DEGREE + 1)
-            turn = slice(n + e * DEGREE, n + (e + 1) * DEGREE + 1)
-            slopes, values = (slope_x.T * dx) @ slope_x, (value.T * dx) @ value
-            cross = (slope_x.T * dx) @ value
-            stiff = shear * area * (math.sqrt(stiffer) if inside else 1.0)
-            elastic[w, w] += stiff * slopes
-            elastic[w, turn] -= stiff * cross
-            elastic[turn, w] -= stiff * cross.T
-            elastic[turn, turn] += stiff * values + bend * bar.bending_nm2 * slopes
-            string[w, w] += slopes
-            if bar.own_weight:
-                pull = bar.mass_kg_m * GRAVITY * (x - length / 2)
-                weight[w, w] += (slope_x.T * (dx * pull)) @ slope_x
-            per_m = area * (heavier if inside else 1.0)
-            mass[w, w] += bar.mass_kg_m * per_m * values
-            mass[turn, turn] += rotary * bend * values
-        free = np.ones(2 * n, dtype=bool)
-        for node, flexibility in zip((0, n - 1), bar.flexibility_m_per_n, strict=True):
-            if flexibility > 0:
-                elastic[node, node] += 1 / flexibility
-            else:
-                free[node] = False
-        self._free = free
-        keep = np.ix_(free, free)
-        self.elastic, self.string = elastic[keep], string[keep]
-        self.weight, self.mass = weight[keep], mass[keep]
-        if bar.lamp[1] > 0:
-            row = self.shape(np.array([bar.lamp[0]]))[0]
-            self.mass = self.mass + bar.lamp[1] * np.outer(row, row)
-        size = self.elastic.shape[0]
-        place = np.cumsum(free) - 1
-        self.turns = np.zeros((2, size))  # rows that pick the rotation of the ends
-        self.turns[0, place[n]] = self.turns[1, place[2 * n - 1]] = 1.0
 
-    def shape(self, places_m: Array) -> Array:
-        """Rows that give the deflection at the places."""
-        rows = np.zeros((len(places_m), 2 * self.count))
-        for row, place in zip(rows, places_m, strict=True):
-            e = int(np.clip(np.searchsorted(self.breaks, place) - 1, 0, len(self.breaks) - 2))
-            start, end = self.breaks[e], self.breaks[e + 1]
-            local = 2 * (place - start) / (end - start) - 1
-            row[e * DEGREE : (e + 1) * DEGREE + 1] = (
-                legendre.legvander(np.array([local]), DEGREE)[0] @ self._to_legendre
-            )
-        return rows[:, self._free]
-
-    def stiffness(self, tension: float, springs: Array, temperature_c: float) -> Array:
-        """Sum of the parts in one state, one plane (springs of its two ends)."""
-        strain = EXPANSION * (temperature_c - REFERENCE_C)
-        soft = (1 + MODULUS_PER_K * (temperature_c - REFERENCE_C)) * (1 + strain)
-        total = soft * self.elastic + (tension * self.string + self.weight) / (1 + strain)
-        return np.asarray(total + (self.turns.T * springs) @ self.turns)
-
-    def solve(
-        self,
-        tension: float,
-        springs: Array,
-        temperature_c: float,
-        kg: float,
-        at_m: float,
-        count: int,
-    ) -> tuple[Array, Array]:
-        """Frequencies (Hz) and shapes from the full matrices, one state and plane."""
-        row = self.shape(np.array([at_m]))[0]
-        mass = self.mass + kg * np.outer(row, row)
-        size = len(mass)
-        # M v = (1/omega^2) K v: the low modes are the large values, which rounding spares.
-        values, shapes = eigh(
-            mass,
-            self.stiffness(tension, springs, temperature_c),
-            subset_by_index=[size - count, size - 1],
-            check_finite=False,
-        )
-        return 1 / (2 * math.pi * np.sqrt(values[::-1])), shapes[:, ::-1]
+def _stiffness(m: Matrices, tension: float, springs: Array, temperature_c: Any) -> Array:
+    """Sum of the parts in one state, one plane (springs of its two ends)."""
+    soft, pulled = _factors(temperature_c)
+    total = soft * (m.stiffness(0.0, (0.0, 0.0)) - m.weight)
+    total += pulled * (tension * m.pull + m.weight)
+    return np.asarray(total + (m.turns.T * springs) @ m.turns)
 
 
 def frequencies_full(bar: Bar, state: State, index: int, count: int = SOLVED) -> Array:
     """Frequencies (plane, order) of one visit from the full matrices, eight elements."""
-    matrices, one = Matrices(bar, elements=8), state.part(index)
-    common = (float(one.temperature_c), float(one.sensor_kg), float(one.sensor_at_m), count)
-    return np.array([matrices.solve(float(one.tension_n), k, *common)[0] for k in one.springs])
+    m, one = _matrices(bar, 8), state.part(index)
+    mass = m.with_masses([(float(one.sensor_at_m), float(one.sensor_kg))])
+    both = [_stiffness(m, float(one.tension_n), k, one.temperature_c) for k in one.springs]
+    return np.array([solve(each, mass, count)[0] for each in both])
 
 
 def frequencies(bar: Bar, state: State, count: int = SOLVED) -> tuple[Array, Array]:
     """Frequencies (visit, plane, order) of all visits and how well the sensor saw each mode.
 
     Modes of the extreme states (least and most tension and springs, either plane) span a basis of
-    some 40 vectors, orthonormal in the bar's mass; the stiffness of a visit is a sum in it, and the
-    sensor, a rank-one mass, is taken out in closed form.
+    some 40 vectors, orthonormal in the bar's mass; the stiffness of a visit is a sum in it.
     """
-    m = Matrices(bar)
-    number = count + 4
+    m = _matrices(bar, 5)
     span: list[Array] = []
     warm = float(np.median(state.temperature_c))
     tensions = (float(state.tension_n.min()), float(state.tension_n.max()))
+    heavy = m.with_masses([(float(state.sensor_at_m.mean()), float(state.sensor_kg.mean()))])
     seen: set[tuple[float, ...]] = set()
     for plane in range(2):
         springs = state.springs[:, plane]
         for tension, k in zip(tensions, (springs.min(axis=0), springs.max(axis=0)), strict=True):
             if (key := (tension, *k.tolist())) not in seen:
                 seen.add(key)
-                heavy = float(state.sensor_kg.mean()), float(state.sensor_at_m.mean())
-                span.append(m.solve(tension, k, warm, *heavy, number)[1])
+                span.append(solve(_stiffness(m, tension, k, warm), heavy, count + 4)[1])
     # A light bar bends visibly about its sensor: the deflections under a force where it was put.
-    forces = m.shape(np.quantile(state.sensor_at_m, np.linspace(0, 1, 7))).T
-    middle = m.stiffness(sum(tensions) / 2, state.springs.mean(axis=(0, 1)), warm)
-    span.append(np.asarray(np.linalg.solve(middle, forces), dtype=float))
-    raw = np.hstack(span)
-    raw /= np.sqrt(np.einsum("ij,ij->j", raw, m.mass @ raw))
-    values, vectors = np.linalg.eigh(raw.T @ m.mass @ raw)
-    keep = values > 1e-11 * values[-1]
-    basis = raw @ (vectors[:, keep] / np.sqrt(values[keep]))
-    elastic, string, weight = (basis.T @ k @ basis for k in (m.elastic, m.string, m.weight))
+    forces = m.rows(np.quantile(state.sensor_at_m, np.linspace(0, 1, 7))).T
+    middle = _stiffness(m, sum(tensions) / 2, state.springs.mean(axis=(0, 1)), warm)
+    basis = reduced_basis(middle, m.mass, [*span, forces])
+    plain = m.stiffness(0.0, (0.0, 0.0)) - m.weight
+    elastic, string, weight = (basis.T @ k @ basis for k in (plain, m.pull, m.weight))
     turns = m.turns @ basis
-    strain = EXPANSION * (state.temperature_c - REFERENCE_C)
-    soft = (1 + MODULUS_PER_K * (state.temperature_c - REFERENCE_C)) * (1 + strain)
-    total = soft[:, None, None] * elastic
-    total = total + (state.tension_n[:, None, None] * string + weight) / (1 + strain)[:, None, None]
+    soft, pulled = (each[:, None, None] for each in _factors(state.temperature_c))
+    total = soft * elastic + pulled * (state.tension_n[:, None, None] * string + weight)
     full = total[:, None] + np.einsum("vpe,ei,ej->vpij", state.springs, turns, turns)
-    rows = m.shape(state.sensor_at_m) @ basis  # (visit, basis)
-    square = np.einsum("vi,vi->v", rows, rows)
-    lump = state.sensor_kg * square
-    part = (1 - 1 / np.sqrt(1 + lump)) / np.maximum(square, 1e-30)
-    root = np.eye(rows.shape[1]) - part[:, None, None] * rows[:, :, None] * rows[:, None, :]
-    squares, shapes = np.linalg.eigh(root[:, None] @ full @ root[:, None])
-    found = np.sqrt(squares[..., :count]) / (2 * math.pi)
-    deflection = np.einsum("vi,vij,vpjn->vpn", rows, root, shapes[..., :count])
-    seen_by = np.abs(deflection) * math.sqrt(bar.mass_kg_m * bar.length_m / 2)
+    rows = m.rows(state.sensor_at_m) @ basis  # (visit, basis)
+    mass = np.eye(rows.shape[1])
+    mass = mass + state.sensor_kg[:, None, None] * rows[:, :, None] * rows[:, None, :]
+    found, shapes = solve_many(full, mass[:, None], count)
+    seen_by = np.abs(np.einsum("vi,vpin->vpn", rows, shapes))
+    seen_by *= math.sqrt(bar.mass_kg_m * bar.length_m / 2)
     check = len(state.tension_n) // 2
     error = np.abs(found[check] / frequencies_full(bar, state, check, count) - 1).max()
     if not error < 1e-5:
@@ -625,7 +495,7 @@ def bridge(seed: int, hangers: int, nuisances: Nuisances) -> Bridge:
     """A road bridge of 60 to 100 m: 4 to 15 m of hanger, 40 to 130 mm, 100 to 900 kN."""
     if hangers < 4:
         raise ValueError("a bridge has four hangers at least")
-    rng, off = _rng(seed, "bridge"), _rng(seed, "tolerances")
+    rng, off = stream(seed, "bridge"), stream(seed, "tolerances")
     sides = (hangers - hangers // 2, hangers // 2)
     n = sides[0]
     span = float(np.clip(rng.uniform(5.5, 8.0) * (n - 1) / 0.78, 60, 100))
@@ -661,7 +531,7 @@ def bridge(seed: int, hangers: int, nuisances: Nuisances) -> Bridge:
         bars: list[Bar] = []
         for i in range(count):
             number = len(made) + 1
-            one = _rng(seed, "hanger", number)
+            one = stream(seed, "hanger", number)
             nominal = mean * (1 + 0.06 * float(one.standard_normal()))
             if i in (0, count - 1):
                 nominal *= float(one.uniform(0.75, 1.05))
@@ -746,17 +616,12 @@ class Weather:
     def hanger(self, diameter_m: float, side: int) -> Array:
         """Temperature of a bar: rho c D/(4 h), 470 J/kgK, 30 W/m2K; 6 K of sun."""
         lag_h = 7850 * 470 * diameter_m / (4 * 30) / 3600
-        return _lag(self.air + 6e-3 * self.sun_w_m2[side], lag_h)
-
-
-def _lag(drive: Array, lag_h: float) -> Array:
-    a = math.exp(-STEP_H / lag_h)
-    return np.asarray(lfilter([1 - a], [1, -a], drive, zi=[a * drive[0]])[0])
+        return lagged(self.air + 6e-3 * self.sun_w_m2[side], lag_h, STEP_H)
 
 
 def weather(seed: int, start_day: float, years: float, heading: float, n: Nuisances) -> Weather:
     """Middle Europe, 50 deg north: 10 deg C +- 9.5 over the year, +- 4 weather, 2 to 6 the day."""
-    rng = _rng(seed, "weather")
+    rng = stream(seed, "weather")
     days = LEAD_D + math.ceil(years * YEAR_D) + 3
     hours = np.arange(round(days * DAY_H / STEP_H)) * STEP_H
     whole = (hours // DAY_H).astype(int)
@@ -789,15 +654,16 @@ def weather(seed: int, start_day: float, years: float, heading: float, n: Nuisan
     for side in range(2):
         normal = math.radians(heading + 180 * side)
         face = np.maximum(np.cos(azimuth - normal), 0.0) * flat  # the outer web
-        arch.append(_lag(air + 14e-3 * beam * (0.6 * up + 0.7 * face), 1.5))
+        arch.append(lagged(air + 14e-3 * beam * (0.6 * up + 0.7 * face), 1.5, STEP_H))
         lit.append(
             beam * flat * np.where(np.cos(azimuth - normal) > -0.7, 1.0, 0.6)
         )  # arch's shade
-    tie = _lag(air + 12e-3 * beam * up, 14.0)
+    tie = lagged(air + 12e-3 * beam * up, 14.0, STEP_H)
     difference = (
-        _lag(8e-3 * beam * up, 3.0) * 1.6 - n.temperature * 0.5 * (_lag(air, 14.0) - air) / 4
+        lagged(8e-3 * beam * up, 3.0, STEP_H) * 1.6
+        - n.temperature * 0.5 * (lagged(air, 14.0, STEP_H) - air) / 4
     )
-    return Weather(air, _lag(air, 1.5), np.array(arch), tie, difference, np.array(lit))
+    return Weather(air, lagged(air, 1.5, STEP_H), np.array(arch), tie, difference, np.array(lit))
 
 
 # ---------------------------------------------------------------------------------------- season
@@ -838,7 +704,7 @@ def _rounds(seed: int, years: float, n: Nuisances) -> _Rounds:
     The long gap (60 to 92 days: a contract ends, the next one starts) parts the season into two
     stretches; nobody is told.
     """
-    rng, total = _rng(seed, "rounds"), years * YEAR_D
+    rng, total = stream(seed, "rounds"), years * YEAR_D
     if n.irregular == 0:
         day = np.floor(np.arange(0.0, total, 14.0)) + 10 / DAY_H
         zero = np.zeros(len(day), dtype=np.int64)
@@ -912,7 +778,7 @@ def season(
     if not 1 <= event.hanger <= hangers:
         raise ValueError(f"no hanger {event.hanger}")
     influences = [_influence(frame) for frame in b.frames]
-    start = int(_rng(seed, "start").integers(0, 365))
+    start = int(stream(seed, "start").integers(0, 365))
     sky = weather(seed, float(start), years, b.heading_deg, n)
     rounds = _rounds(seed, years, n)
     count = len(rounds.day)
@@ -930,8 +796,8 @@ def season(
         plan |= {"exact": np.zeros(shape), "seen": np.ones(shape)}
     for h in b.hangers:
         _solve(seed, h, plans, event, n)
-    share = float(_rng(seed, "mistaken").uniform(*n.mistaken))
-    tones = np.sort(_rng(seed, "tones").uniform(4, 60, 4))  # pumps, fans, a crossing line
+    share = float(stream(seed, "mistaken").uniform(*n.mistaken))
+    tones = np.sort(stream(seed, "tones").uniform(4, 60, 4))  # pumps, fans, a crossing line
     first = datetime(2022, 1, 1, tzinfo=UTC) + timedelta(days=start)
     concerned = _concerned(b, influences, event)
     out = {
@@ -951,7 +817,7 @@ def season(
 
 def _common(seed: int, rounds: _Rounds, n: Nuisances) -> dict[str, Array]:
     """What all hangers of a round, or of a date, or of an operator, have in common."""
-    rng, count = _rng(seed, "common"), len(rounds.day)
+    rng, count = stream(seed, "common"), len(rounds.day)
     soft = _by_date(rounds, rng.random(count)) < n.softening_days
     wind = _by_date(rounds, rng.exponential(0.5, count))
     kits = np.array(n.sensor_kg)[0] + np.ptp(n.sensor_kg) * rng.random(
@@ -981,7 +847,7 @@ def _plan(
     seed: int, h: Hanger, rounds: _Rounds, common: dict[str, Array], n: Nuisances
 ) -> dict[str, Any]:
     """When and how this hanger is tested in each round (all rounds; `done` says which)."""
-    rng, count = _rng(seed, "plan", h.number), len(rounds.day)
+    rng, count = stream(seed, "plan", h.number), len(rounds.day)
     minutes = 9.0 * h.number + rng.uniform(0, 6, count)
     day = rounds.day + (minutes / 60 / DAY_H if n.irregular else 0.0)
     amplitude = np.exp(n.amplitude_sd * rng.standard_normal(count))
@@ -1138,7 +1004,7 @@ def _record(
 ) -> HangerSeason:
     """What the team hands in for one hanger, and the truth about it."""
     share, tones, first = season_wide
-    rng, count = _rng(seed, "identification", h.number), len(rounds.day)
+    rng, count = stream(seed, "identification", h.number), len(rounds.day)
     shape = (count, 2, ORDERS)
     test_error, mode_error = rng.standard_normal(count), rng.standard_normal(shape)
     guess, rub = rng.standard_normal(shape), rng.standard_normal(shape)
@@ -1190,15 +1056,7 @@ def _record(
                 read = truth_hz * clock * (1 + float(error[p, k]))
                 sd = read * float(stated[p, k])
                 damping = float(zeta[p, k]) * math.exp(0.25 * n.scatter * float(rub[v, p, k]))
-                modes.append(
-                    {
-                        "plane": plane,
-                        "order": k + 1,
-                        "frequency_hz": read,
-                        "frequency_sd_hz": sd,
-                        "damping_ratio": damping,
-                    }
-                )
+                modes.append(mode(plane, k + 1, read, sd, damping))
                 if kind:
                     off = truth_hz / float(exact[p, k]) - 1
                     place = {"test": name, "plane": plane, "order": k + 1}
