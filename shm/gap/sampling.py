@@ -34,7 +34,7 @@ from shm.values import ENOUGH_EFFECTIVE, BoolArray, FloatArray, IntArray
 # Numerical, in standard deviations of a prior: no linear parameter goes farther.
 _FARTHEST_LINEAR = 12.0
 
-MOST_ROUNDS = 30
+MOST_ROUNDS = 60
 """Rounds of draws after which importance sampling gives up."""
 
 
@@ -45,9 +45,9 @@ class SamplingOptions:
     A `round` of draws comes from a mixture of at most `parts` t distributions, fitted to a
     `population` drawn again, `draws_a_part` at least; with shares of the `prior` (more of it
     `prior_at_first`) and of the `first` mixture, which has peaks at several `widths`, those within
-    `far_below` of the best log density, and `without` of it where the posterior without the last
-    effects is, by `clusters_without` parts. Linear parameters are followed `most_settled` times at
-    most.
+    `far_below` of the best log density (peaks `lobes_apart` standard deviations away are other
+    lobes), and `without` of it where the posterior without the last effects is, by
+    `clusters_without` parts. Linear parameters are followed `most_settled` times at most.
     """
 
     round: int = 150
@@ -59,6 +59,7 @@ class SamplingOptions:
     first: float = 0.2
     widths: tuple[float, ...] = (1.0, 2.0)
     far_below: float = 10.0
+    lobes_apart: float = 8.0
     without: float = 0.4
     clusters_without: int = 3
     most_settled: int = 4
@@ -171,6 +172,43 @@ class _Proposal:
         return np.asarray(np.logaddexp(log_mixture, np.log(self.of_prior) + log_normal(w)))
 
 
+class _Lobes:
+    """Hold the parts of a posterior that lie apart, each with its peak, the best first.
+
+    A place and its mirror image are two. They are alike but for size and shape, so that draws of
+    the best one, and its share, tell those of the others by normal distributions on the peaks.
+    """
+
+    def __init__(self, target: Target, peaks: Sequence[Peak]):
+        self.peaks: list[Peak] = []
+        self._normals: list[Normal] = []
+        for peak in _choose_near_best(peaks):
+            normal = _normal_of(peak, target.other)
+            if all(_measure_distance(normal, each) > _HOW.lobes_apart for each in self._normals):
+                self.peaks.append(peak)
+                self._normals.append(normal)
+        self._log = np.array([peak.log_evidence for peak in self.peaks])
+
+    @property
+    def log_beyond(self) -> float:
+        """Return the log of the whole evidence over that of the best lobe."""
+        return float(scipy.special.logsumexp(self._log - self._log[0]))
+
+    def nearest(self, w: FloatArray) -> IntArray:
+        """Return the lobe (n,) that others w (n, o) are nearest to, from 0."""
+        return _find_nearest(self._normals, w)
+
+    def spread(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return draws z (n, d) of the best lobe with their share of them moved to each other."""
+        moved, of = z.copy(), rng.choice(len(self.peaks), len(z), p=normalised(self._log))
+        best = self.peaks[0]
+        for index, peak in enumerate(self.peaks[1:], start=1):
+            here, there = (np.linalg.cholesky(each.covariance) for each in (best, peak))
+            white = np.linalg.solve(here, (z[of == index] - best.z).T)
+            moved[of == index] = peak.z + (there @ white).T
+        return moved
+
+
 def _normal_of(peak: Peak, columns: IntArray) -> Normal:
     """Return the normal distribution on a peak, of some of its columns."""
     return Normal(peak.z[columns], peak.covariance[np.ix_(columns, columns)])
@@ -182,10 +220,18 @@ def _find_nearest(normals: Sequence[Normal], w: FloatArray) -> IntArray:
     return np.asarray(np.argmin(square, axis=0))
 
 
+def _measure_distance(one: Normal, other: Normal) -> float:
+    """Return the distance of two centres in standard deviations, the shorter of both views."""
+    return min(
+        float(np.linalg.norm(one.whiten(other.mean))), float(np.linalg.norm(other.whiten(one.mean)))
+    )
+
+
 class Sampling:
     """Importance sampling of a hypothesis about `peaks`, the best first, that can be gone on with.
 
-    It is looked for also where a fit `without` its last effects has its draws.
+    It is looked for also where a fit `without` its last effects has its draws. Of lobes that lie
+    apart the best one is sampled.
     """
 
     def __init__(
@@ -196,13 +242,16 @@ class Sampling:
         without: Fit | None = None,
     ):
         self.target, self.peaks, self.rng = target, tuple(peaks), rng
-        self._collapsed = _Collapsed(target, peaks)
+        self._lobes = _Lobes(target, peaks)
+        about = self._lobes.nearest(np.array([peak.z[target.other] for peak in peaks])) == 0
+        near = [peak for peak, is_near in zip(peaks, about, strict=True) if is_near]
+        self._collapsed = _Collapsed(target, near)
         self._pool: Pool[_Proposal, _Draws] = Pool(
             lambda proposal, batch: proposal.log_density(batch.z[:, target.other])
         )
         self._rounds = 0
         if len(target.other):
-            self._first = _parts(target, peaks, without, rng)
+            self._first = _parts(target, near, without, rng)
             self._proposal = _Proposal(self._first, _HOW.prior_at_first)
 
     @property
@@ -217,7 +266,7 @@ class Sampling:
         """Return the log evidence and its standard error."""
         if len(self.target.other):
             found = self._pool.weighted
-            return found.log_evidence, found.log_evidence_sd
+            return found.log_evidence + self._lobes.log_beyond, found.log_evidence_sd
         return float(self._collapsed.settle(np.empty((1, 0)))[1][0]), 0.0
 
     def run(self, enough: float, most_rounds: int) -> None:
@@ -229,6 +278,7 @@ class Sampling:
         other = self.target.other
         w = self._proposal.draw(_HOW.round, self.rng)
         batch, log = self._collapsed.settle(w)
+        log = np.where(self._lobes.nearest(w) == 0, log, -np.inf)
         self._pool.add(self._proposal, batch, log)
         self._rounds += 1
         weights = tempered(self._pool.log_weights, 6 * len(other), 0.7, 1e-3)
@@ -248,6 +298,8 @@ class Sampling:
         else:
             chosen = self._pool.weighted.resampled(draws, self.rng)
         found = self.rng.permutation(self._collapsed.scatter(chosen, self.rng))
+        if len(self._lobes.peaks) > 1:
+            found = self._lobes.spread(found, self.rng)
         return _fit(self._collapsed, self.peaks, found, self.log_evidence, self.effective)
 
     def fit_by_chain(self, draws: int) -> Fit:

@@ -36,6 +36,13 @@ Patches = Sequence[Any]
 DIAGNOSE = import_module("shm.gap.diagnose")  # the package has a function of this name
 
 
+def one_peak(lobes: Any, target: Any, peaks: Sequence[Any]) -> None:
+    """Make lobes of which the best peak is the only one."""
+    lobes.peaks = list(peaks[:1])
+    lobes._normals = [sampling._normal_of(peaks[0], target.other)]
+    lobes._log = np.array([peaks[0].log_evidence])
+
+
 def unchanged(observations: Any) -> Any:
     """Return standard deviations as they are stated."""
     return observations.sd
@@ -44,6 +51,7 @@ def unchanged(observations: Any) -> Any:
 VARIANTS: dict[str, Callable[[], Patches]] = {
     "whole": lambda: [],
     "whole, other seed": lambda: [],
+    "no lobes": lambda: [patch.object(sampling._Lobes, "__init__", one_peak)],
     "no draws of an update": lambda: [
         patch.object(search, "_with_draws_of_update", lambda _, fit, rng: fit)
     ],
