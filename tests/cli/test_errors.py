@@ -203,6 +203,19 @@ def test_reading_command_gives_one_json_document(on_bridge: Shm, on_empty: Shm, 
     assert on_empty(line).code == on_empty(f"{line} --json").code
 
 
+def test_error_as_a_document(on_empty: Shm) -> None:
+    ended = on_empty("report --hanger 3 --json")
+    assert ended.code == 4
+    assert ended.document == {
+        "schema": "shm.error/1",
+        "error": "nothing_there",
+        "message": "no test of hanger 3 has been through updating yet.",
+        "remedy": "Take recordings in with `shm ingest FILE`, or see `shm status`.",
+        "exit_code": 4,
+    }
+    assert "shm ingest" in ended.err
+
+
 def test_file_command_gives_one_document(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
     for line in (
         f"ingest --peek {modes_file}",

@@ -5,6 +5,8 @@ Days such as 9/10/2025 are read as the logger's profile learnt, else asked of a 
 
 from __future__ import annotations
 
+import json
+import os
 import shutil
 import subprocess
 import sys
@@ -36,7 +38,14 @@ from tests.helpers.workspaces import START, make_workspace, modelled_test, put, 
 # ------------------------------------------------------------ taken in, known, refused
 
 
-def test_ingest_reports_each_file(shm: Shm, tmp_path: Path) -> None:
+def in_a_process(*words: object) -> subprocess.CompletedProcess[str]:
+    """Run the command line as it is run: in a process, whose steps have processes."""
+    program = [sys.executable, "-c", "from shm_cli.main import main; main()", *map(str, words)]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    return subprocess.run(program, capture_output=True, text=True, check=False, env=environment)
+
+
+def test_ingest_reports_each_file(tmp_path: Path) -> None:
     """A baseline, two tests with a fifth less tension, an empty file and a copy are dropped."""
     workspace = make_workspace(tmp_path / "bridge")
     for name, day, tension in (("a", 0, 1.0), ("b", 59, 0.8), ("c", 60, 0.8)):
@@ -44,9 +53,11 @@ def test_ingest_reports_each_file(shm: Shm, tmp_path: Path) -> None:
     (tmp_path / "empty.csv").write_text("")
     shutil.copy(tmp_path / "a.modes.json", tmp_path / "again.modes.json")
     names = ("a.modes.json", "b.modes.json", "c.modes.json", "empty.csv", "again.modes.json")
-    ended = shm.at(workspace)("ingest", *(tmp_path / name for name in names), "--json")
-    assert ended.code == 3, "a file was refused"
-    *taken, refused, known = ended.document["files"]
+    files = (tmp_path / name for name in names)
+    ended = in_a_process("--workspace", workspace.folder, "ingest", *files, "--json")
+    assert ended.returncode == 3, "a file was refused"
+    document = json.loads(ended.stdout)
+    *taken, refused, known = document["files"]
     assert [(row["file"], row["outcome"], row["stage"]) for row in taken] == [
         (name, "taken in", "done") for name in names[:3]
     ]
@@ -55,7 +66,7 @@ def test_ingest_reports_each_file(shm: Shm, tmp_path: Path) -> None:
     assert list(workspace.quarantine.folder.glob("*.reason.json"))
     assert known["outcome"] == "known already"
     assert (known["file"], known["known_as"]) == ("again.modes.json", "a.modes.json")
-    assert [(alert["test"], alert["kinds"]) for alert in ended.document["alerts"]] == [
+    assert [(alert["test"], alert["kinds"]) for alert in document["alerts"]] == [
         ("b", ["repeat the test"]),
         ("c", ["beyond threshold"]),
     ]
@@ -74,11 +85,7 @@ def test_ingest_beside_a_daemon_says_what_to_do(on_empty: Shm, empty: Workspace)
 @pytest.mark.slow
 def test_the_daemon_empties_the_spool_once_and_ends(empty: Workspace) -> None:
     write_test(empty.spool / "a.modes.json", empty)
-    program = [sys.executable, "-c", "from shm_cli.main import main; main()"]
-    words = ["--workspace", str(empty.folder), "daemon", "--once"]
-    ended = subprocess.run(
-        [*program, *words], capture_output=True, text=True, check=False, timeout=120
-    )
+    ended = in_a_process("--workspace", empty.folder, "daemon", "--once")
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout == ""
     assert "watching" in ended.stderr

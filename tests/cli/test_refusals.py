@@ -31,6 +31,8 @@ BRIDGE = (
     ("report --bridge --hanger 3", 2, "--bridge"),
     ("report --bridge --test t", 2, "Give --hanger N with --test"),
     ("report --hanger 3 --since 2026-07-01", 4, "t2"),
+    ("report --hanger 3 --since 2026-07-01", 4, "2026-06-30"),
+    ("report --bridge --since 2026-07-01", 4, "t2"),
     ("report --bridge --since 2026-07-01", 4, "2026-06-30"),
     ("report --hanger 3 --test t9", 4, "t2"),
     ("report --hanger 3 --test t0", 4, "t0.modes.json gave the modes"),

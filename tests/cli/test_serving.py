@@ -49,6 +49,11 @@ def test_another_fault_is_exit_code_1(shm: Shm, empty: Workspace, harm: str) -> 
     assert "fault" in ended.out
 
 
+def test_a_bridge_with_a_history_is_examined(on_bridge: Shm) -> None:
+    levels = {each["check"]: each["level"] for each in on_bridge.json("doctor")["findings"]}
+    assert (levels["store"], levels["raw files"]) == ("ok", "ok")
+
+
 def test_status_shows_the_daemon_the_queue_and_what_is_open(shm: Shm, empty: Workspace) -> None:
     call = ("--workspace", empty.folder, "status")
     document = shm(*call, "--json").document

@@ -100,7 +100,9 @@ def test_person_token_and_reason_go_on_the_record(writer: httpx.Client, alert: i
     assert "already" in again.json()["message"]
     nothing = writer.post("/api/alerts/99/acknowledgement", json={"why": "what?"})
     assert nothing.status_code == 404
-    assert 'shm_alerts{state="acknowledged"}' in writer.get("/metrics").text
+    every = writer.get("/api/alerts").json()["alerts"]
+    count = sum(bool(each["acknowledged"]) and not each["resolved"] for each in every)
+    assert f'shm_alerts{{state="acknowledged"}} {count}.0' in writer.get("/metrics").text
     page = writer.get("/alerts").text
     for said in ("No alert is open: all are acknowledged.", "Ada &lt;b&gt; (token write)",
                  "Nut tightened.", f"Resolve alert {alert}"):  # fmt: skip

@@ -45,6 +45,7 @@ from tests.report.diagnoses import (
 )
 from tests.report.outline import Outline, flat, page_words, text_words
 
+RATIO = EffectEstimate("stiffness_ratio", "times EI", 20.1, 20.0, 2.13, 80.4)
 RICH = Survey(
     tests=("t1", "t2"), planes=("transverse", "longitudinal"), sensor_places_m=(2.0, 4.0),
     biaxial=True, temperatures_c=(5.0, 25.0), amplitudes=(0.5, 2.0),
@@ -176,7 +177,7 @@ def test_a_mean_outside_its_interval_is_not_told() -> None:
         (EffectEstimate("loss", "fraction", 0.081, 0.01, 0.065, 0.098), "8.1 % (6.5 to 9.8)"),
         (EffectEstimate("log10_k1", "N m/rad", 6.8, 0.1, 6.6, 7.0), "6.3 MN m/rad (4.0 to 10)"),
         (EffectEstimate("stiffness_n_m", "N/m", 4.2e4, 3e3, 3.7e4, 4.7e4), "42 kN/m (37 to 47)"),
-        (EffectEstimate("ratio", "times EI", 20.1, 20.0, 2.13, 80.4), "20 times EI (2.1 to 80)"),
+        (RATIO, "20 times EI (2.1 to 80)"),
         (EffectEstimate("mass_kg", "kg", 12.0, NAN, NAN, NAN), "12 kg"),
         (EffectEstimate("mass_kg", "kg", NAN, NAN, NAN, NAN), "of unknown size kg"),
     ],
@@ -273,7 +274,7 @@ def test_tables_keep_no_gap_and_lead_with_an_excluded_frequency() -> None:
     assert rows.index(marked) < rows.index(others[0])
 
 
-def test_report_holds_diagnosis_or_command(bare: HangerReport, unpainted: None) -> None:
+def test_report_holds_diagnosis_or_command(bare: HangerReport) -> None:
     paper = hanger_paper(bare)
     for written in (page_words(paper), text_words(paper)):
         assert "shm gap diagnose --hanger 3" in written
@@ -281,6 +282,7 @@ def test_report_holds_diagnosis_or_command(bare: HangerReport, unpainted: None) 
     watched = "beam1 with point mass, adopted 2026-05-01: gap 2.30 % before, 0.62 % now."
     diagnosed = replace(bare, diagnosis=LED, gap_watch=watched)
     outline = Outline.of(as_html(hanger_paper(diagnosed)))
+    assert {"causes-title", "gap_map-title"} <= {each.get("id") for _, each in outline.tags}
     for written in (outline.told, text_words(hanger_paper(diagnosed))):
         assert "explained by point mass" in written
         assert watched in written
