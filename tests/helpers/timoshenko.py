@@ -1,57 +1,54 @@
-"""A clamped Timoshenko beam under tension, by Legendre polynomials."""
+"""A Timoshenko beam under tension on rotational springs, by Legendre polynomials."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.polynomial import Legendre, legendre
-from scipy.linalg import eigh
+from numpy.polynomial import legendre
+from scipy.linalg import block_diag, eigh, null_space
 
 from shm.values import FloatArray, Hanger
 
 _TERMS = 40
-_POISSONS_RATIO = 0.3
 
 
-def clamped_frequencies_hz(
-    hanger: Hanger, length_m: float, tension_n: float, modes: int
+def legendre_hz(
+    hanger: Hanger,
+    length_m: float,
+    tension_n: float,
+    modes: int,
+    springs_n_m_rad: tuple[float, float] = (np.inf, np.inf),
 ) -> FloatArray:
-    """Frequencies (modes,) with deflection and rotation held at both ends.
+    """Frequencies (modes,): deflections vanish at the ends, springs there resist rotations.
 
     The shear coefficient of a circle is that of Cowper (1966). Tension works on the deflection's
     slope.
     """
     x, weights = legendre.leggauss(2 * _TERMS)
-    value, slope = _bubbles(x)
-    slope = slope * 2 / length_m
-    weights = weights * length_m / 2
+    weights, unit = weights * length_m / 2, np.eye(_TERMS)
+    bubbles = unit[2:] - unit[:-2]
+    springs, ends = np.array(springs_n_m_rad), legendre.legval(np.array([-1.0, 1.0]), unit)
+    held = np.isinf(springs)
+    free = null_space(ends[:, held].T) if held.any() else unit
+    deflection = legendre.legval(x, bubbles.T)
+    slope = legendre.legval(x, legendre.legder(bubbles.T)) * 2 / length_m
+    turn = free.T @ legendre.legval(x, unit)
+    bend = free.T @ legendre.legval(x, legendre.legder(unit)) * 2 / length_m
+    ends = free.T @ ends
 
-    def integral(left: FloatArray, right: FloatArray) -> FloatArray:
+    def integral(left: Any, right: Any) -> FloatArray:
         return np.asarray((left * weights) @ right.T)
 
-    modulus, area = hanger.elastic_modulus_pa, hanger.area_m2
-    density = hanger.mass_per_length_kg_m / area
-    coefficient = 6 * (1 + _POISSONS_RATIO) / (7 + 6 * _POISSONS_RATIO)
-    shear = coefficient * area * modulus / (2 * (1 + _POISSONS_RATIO))
-    bending = modulus * hanger.second_moment_m4 * integral(slope, slope)
-    coupling = -shear * integral(slope, value)
+    nu, modulus, area = hanger.poissons_ratio, hanger.elastic_modulus_pa, hanger.area_m2
+    shear = 6 * (1 + nu) / (7 + 6 * nu) * modulus / (2 * (1 + nu)) * area
+    corner = -shear * integral(slope, turn)
+    whole = hanger.bending_stiffness_n_m2 * integral(bend, bend) + shear * integral(turn, turn)
+    whole += (ends * np.where(held, 0.0, springs)) @ ends.T
     stiffness = np.block(
-        [
-            [(shear + tension_n) * integral(slope, slope), coupling],
-            [coupling.T, bending + shear * integral(value, value)],
-        ]
+        [[(shear + tension_n) * integral(slope, slope), corner], [corner.T, whole]]
     )
-    mass_unit, none = integral(value, value), np.zeros((_TERMS, _TERMS))
-    mass = np.block(
-        [
-            [density * area * mass_unit, none],
-            [none, density * hanger.second_moment_m4 * mass_unit],
-        ]
-    )
-    eigenvalues = eigh(stiffness, mass, eigvals_only=True)[:modes]
-    return np.asarray(np.sqrt(eigenvalues) / (2 * np.pi))
-
-
-def _bubbles(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Values and slopes (terms, points) of polynomials that vanish at -1 and 1."""
-    pairs = [Legendre.basis(n + 2) - Legendre.basis(n) for n in range(_TERMS)]
-    return np.array([p(x) for p in pairs]), np.array([p.deriv()(x) for p in pairs])
+    square_m2 = hanger.second_moment_m4 / area
+    turning = square_m2 * integral(turn, turn)
+    mass = hanger.mass_per_length_kg_m * block_diag(integral(deflection, deflection), turning)
+    return np.asarray(np.sqrt(eigh(stiffness, mass, eigvals_only=True)[:modes]) / (2 * np.pi))
