@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+import shm
 from shm.errors import BadInput
 from shm.gap import GapOptions, diagnose
 from shm.gap.data_checks import usable
@@ -21,24 +22,10 @@ from tests.helpers.hangers import HANGER_3
 FEW = UpdateOptions(samples=300, seed=1)
 
 
-def described(length_m: float, diameter_m: float, tension_n: float, section: float = 0.0) -> Hanger:
-    """Return a round steel bar or string."""
-    area_m2 = math.pi * diameter_m**2 / 4
-    scatter = Scatter(section=section) if section else Scatter()
-    return Hanger(
-        1,
-        length_m,
-        200e9,
-        area_m2,
-        math.pi * diameter_m**4 / 64,
-        7850 * area_m2,
-        tension_n,
-        scatter=scatter,
-    )
-
-
-STRING = described(0.65, 0.0004, 14.0, section=0.05)
-BAR = described(0.9, 0.022, 8000.0)
+STEEL = {"elastic_modulus_pa": 200e9, "density_kg_m3": 7850.0}
+BAR = shm.round_bar(1, diameter_m=0.022, length_m=0.9, nominal_tension_n=8000.0, **STEEL)
+STRING = shm.round_bar(1, diameter_m=0.0004, length_m=0.65, nominal_tension_n=14.0, **STEEL)
+STRING = replace(STRING, scatter=Scatter(section=0.05))
 STAY = replace(
     STRING,
     length_m=14.0,
