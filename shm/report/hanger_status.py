@@ -17,6 +17,7 @@ from shm.report import formatting
 from shm.report.formatting import NORMAL_90, Interval
 from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedTest
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
+from shm.values.posterior import DIAGNOSE
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
 from shm.watch.alert_text import lead_of, look_again, quantity_words, size_words
 
@@ -257,6 +258,8 @@ def hanger_message(known: HangerSummary) -> HangerMessage:
     status, lead = _decide(known)
     statement = HangerMessage(status, lead, known.notes if status else ())
     caveats = known.tension.caveats if known.tension else ()
+    if known.diagnosed:
+        caveats = (*(each.replace(DIAGNOSE, "") for each in caveats), known.diagnosed)
     return replace(statement, reasons=(*statement.beyond_lead(known.warnings), *caveats))
 
 

@@ -13,7 +13,8 @@ import pytest
 
 from shm.inference import UpdateOptions, update
 from shm.models import DESCRIPTION, THESIS, build
-from shm.report.contents import HangerReport
+from shm.report.bridge_report import tables
+from shm.report.contents import BridgeReport, HangerReport
 from shm.report.formatting import Interval
 from shm.report.hanger_report import facts
 from shm.report.hanger_status import (
@@ -46,6 +47,7 @@ from shm.values import (
 )
 from shm.values.hanger import Limits
 from shm.values.messages import Lead
+from shm.values.posterior import DIAGNOSE
 from shm.watch import Watched, WatchOptions, watch_hanger
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import NOW, a_change, a_drift, a_watched_test, an_alert, averaged, with_now
@@ -221,6 +223,32 @@ def test_an_alert_stays_as_sure_as_it_was_while_it_stands() -> None:
         (newest, replace(told, test="t2"), "8.0 ± 1.6 %"),
     ):
         assert said in with_tension(drifts=[now], standing=[standing]).message.lead.state
+
+
+def test_a_diagnosis_replaces_the_advice_to_make_one() -> None:
+    misses = f"beam1 misses the frequencies. Check the description{DIAGNOSE}."
+    line = "Gap diagnosis of 2026-05-25: partly explained; the tension is 830 ± 140 kN."
+    doubted = replace(tension(702e3), caveats=(misses,))
+    assert with_tension(tension=doubted).message.reasons == (misses,)
+    reasons = with_tension(tension=doubted, diagnosed=line).message.reasons
+    assert reasons == ("beam1 misses the frequencies. Check the description.", line)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"tension": tension(702e3)}, "100.3 ± 1.4 %"),
+        ({"tension": tension(702e3, 300e3)}, "not determined"),
+        ({"hanger": replace(HANGER, nominal_tension_n=0.0)}, "no nominal"),
+        ({"latest": None}, ""),
+    ],
+)
+def test_of_nominal_reads_alike_in_every_table(changes: dict[str, Any], words: str) -> None:
+    now = with_tension(**changes, is_first=True)
+    assert now.of_nominal_words == words
+    report = BridgeReport("Bridge", (now,), None, "", NOW, "1")
+    table = next(each for each in tables(report) if each.title == "Hangers")
+    assert table.rows[0][table.headings.index("of nominal")] == words
 
 
 def test_a_detected_change_is_over_when_the_latest_test_shows_it() -> None:
