@@ -45,6 +45,7 @@ from shm.store.tests import count_tests, list_undated_names, load_frequency_resp
 from shm.store.watch import (
     find_latest_watches,
     list_detected_changes,
+    list_diagnosed_hangers,
 )
 from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest
 from shm.values.bar_description import list_sensors
@@ -152,7 +153,8 @@ class HangersNow:
     def __init__(
         self, workspace: Workspace, store: Store, hangers: Sequence[Hanger], now: datetime
     ):
-        self.workspace, self.now = workspace, now
+        self.workspace, self._store, self.now = workspace, store, now
+        self._have_diagnosis = list_diagnosed_hangers(store)
         self.latest = find_latest_trends(store, hangers)
         # Those of neighbours too: one may stand out.
         self.baselines = list_baselines_in_force(store, workspace.bridge.hangers)
@@ -196,9 +198,18 @@ class HangersNow:
             if point
             else blind,
             undated=self.undated.get(hanger.id, ()),
+            diagnosed=self._diagnosed(hanger),
             control=control,
             tests=self.tests[hanger.id].tests if hanger.id in self.tests else 0,
         )
+
+    def _diagnosed(self, hanger: Hanger) -> str:
+        if hanger.id not in self._have_diagnosis:
+            return ""
+        # Few hangers are diagnosed, and the words of a diagnosis take long to import.
+        from shm.pipeline.diagnosing import describe_diagnosis
+
+        return describe_diagnosis(self._store, hanger)
 
     def _warnings(
         self, hanger: Hanger, baseline: BaselineGlance | None, watched: WatchedTest | None
