@@ -27,6 +27,7 @@ from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table, is_loopback, web_address
 from shm.errors import BadInput, NotDescribed, suggest
 from shm.values import MEASUREMENT_HOURS, ControlHanger, Hanger, MonitoredHanger
+from shm.values.messages import TODAY
 from shm.values.stream import Stream
 
 _LETTERHEAD = ("organisation", "prepared_by", "checked_by", "logo")
@@ -316,6 +317,20 @@ def load_hanger(path: Path, hanger_id: int | None = None) -> Hanger:
             remedy="Keep one table, or say which with --hanger N.",
         )
     return bridge.bars[0]
+
+
+EXAMPLE = "example: replace by your own"
+"""Name of the hanger that `shm init` writes into bridge.toml."""
+
+
+def example_words(hanger: Hanger) -> str:
+    """Return that a hanger is still the one of the template, and what to do; else ""."""
+    if hanger.name != EXAMPLE:
+        return ""
+    return (
+        f"Hanger {hanger.id} is still the example that `shm init` wrote: do not use its tension. "
+        f"Replace its numbers and its name in bridge.toml by those of your bar {TODAY}."
+    )
 
 
 def _parse(path: Path) -> dict[str, Any]:
