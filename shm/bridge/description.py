@@ -338,7 +338,7 @@ def _parse(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
         raise BadInput(
-            f"no such file in {path.parent}.",
+            f"no such file in {path.absolute().parent}.",
             file=path,
             remedy="Make a workspace with `shm init`, name one with --workspace, or describe the "
             "hanger of a file alone with --hanger-file H.toml.",
