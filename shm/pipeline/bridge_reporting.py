@@ -13,6 +13,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
 import shm
+from shm.bridge import example_words
 from shm.errors import NothingThere
 from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.lineage import discarded_of_baselines, redescribed, settings_words, software
@@ -181,6 +182,7 @@ class HangersNow:
         standing, blind = self.standing.get(hanger.id, ()), self.blind.get(hanger.id)
         control = next((each for each in self.charts if each.hanger.id == hanger.id), None)
         days, at = self.workspace.settings.campaign_days, point.time if point else None
+        example = [words] if (words := example_words(hanger)) else []
         doubts = campaign_warnings(self.charts, hanger, at, days)
         return HangerSummary(
             hanger,
@@ -192,7 +194,7 @@ class HangersNow:
             detected="; ".join(called_words(change) for change in called),
             standing=findings(each.alert for each in standing),
             open_alerts=self.open_alerts.get(hanger.id, 0),
-            warnings=(*doubts, *self._warnings(hanger, baseline, watched)),
+            warnings=(*example, *doubts, *self._warnings(hanger, baseline, watched)),
             notes=notes_of(standing, self.silences, hanger.id, self.now),
             unwatched=unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
             if point
