@@ -14,6 +14,7 @@ from tests.helpers.physical_hangers import (
     EI,
     LENGTH,
     MASS,
+    NOWHERE,
     TENSION,
     clamped,
     frequencies_hz,
@@ -132,3 +133,15 @@ def test_each_plane_keeps_an_unbroken_family_near_45_degrees(off: float) -> None
         assert np.all(np.diff(frequency, axis=1) > 0)
         rows.append(frequency)
     assert len(rows) == 2
+
+
+def test_coupled_planes_of_different_stiffness() -> None:
+    """The frequencies do not depend on which plane is called the first."""
+    stiff = np.array([[EI, 1.7 * EI]])
+    one = replace(skewed(0.5, 2e6), bending_stiffness_n_m2=stiff)
+    other = replace(skewed(np.pi / 2 - 0.5, 2e6), bending_stiffness_n_m2=stiff[:, ::-1])
+    np.testing.assert_allclose(
+        solve(one, 6, NOWHERE).frequency_hz,
+        solve(other, 6, NOWHERE).frequency_hz[:, ::-1],
+        rtol=1e-9,
+    )

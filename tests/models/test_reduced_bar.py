@@ -246,3 +246,17 @@ def test_a_nearly_rigid_zone_at_a_hinge_is_a_rigid_link(tension: float) -> None:
 
     np.testing.assert_allclose(solved(1e6), expected, rtol=1e-5)
     assert np.abs(solved(1.0) / expected - 1).max() > 0.01
+
+
+@pytest.mark.parametrize("gradient", [0.0, 150.0, -300.0])
+def test_a_hanging_string_has_the_frequencies_of_its_equation(gradient: float) -> None:
+    """(T w')' = - omega2 w of T = T0 + g (x - 1/2), by finite differences of the second order."""
+    tension, count = 1e5, 600
+    steep = 400 * gradient  # bending is felt by 3e-3
+    bar = replace(bars(np.array([tension])), tension_gradient_n=np.array([steep]))
+    found = solve(bar, 3, np.empty(0), shapes=False).frequency_hz[0, 0] / TO_HZ
+    middles = (np.arange(count) + 0.5) / count
+    pull = (tension + steep * (middles - 0.5)) * count**2
+    difference = np.diag(pull[1:] + pull[:-1]) - np.diag(pull[1:-1], 1) - np.diag(pull[1:-1], -1)
+    expected = np.sqrt(eigh(difference, eigvals_only=True, subset_by_index=[0, 2]))
+    np.testing.assert_allclose(found, expected, rtol=2e-3)
