@@ -223,6 +223,15 @@ def test_stated_error_larger_than_any_reading_is_named() -> None:
     assert check_data([modes_of("t1", (4.339, 8.678), 0.1)], TAUT).remarks == ()
 
 
+def test_stated_error_of_zero_counts_as_not_stated() -> None:
+    zero = replace(SLIP, modes=tuple(replace(each, frequency_sd_hz=0.0) for each in SLIP.modes))
+    count = len(SLIP.modes)
+    said = f"A standard deviation of 0 counts as not stated ({count} of {count} frequencies)."
+    _, fields = check_for_update([zero], build("beam1", TAUT))
+    assert said in fields["remarks"]
+    assert said not in check_for_update([SLIP], build("beam1", TAUT))[1]["remarks"]
+
+
 def test_other_unit_is_said_first_and_no_other_orders_where_nothing_fits() -> None:
     posterior = update(TEN[:1], build("beam1", BAR), FEW)
     unit = "The frequencies look given in rad/s, not in Hz: they are 6.3 times those."
