@@ -34,7 +34,7 @@ from shm.values.messages import Lead, Urgency
 from shm.watch.alert_text import message_of
 from shm.watch.watching import alerts_of
 from shm_cli.main import cli
-from shm_daemon.web.commands import without_commands
+from shm_daemon.web.commands import set_reader, without_commands
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import NOW, a_change, a_file, a_posterior, a_test
 from tests.helpers.web_servers import Served, served
@@ -239,7 +239,7 @@ def _raise(
 Make = Callable[[Hangers, int], None]
 STATES: dict[str, tuple[Make, Status | None, Urgency]] = {
     "no test yet": (lambda of, hanger: None, None, "next_test"),
-    "first test": (_first, Status.FIRST, "next_test"),
+    "first test": (_first, Status.FIRST, "none"),
     "steady": (_steady, Status.STEADY, "none"),
     "too rough to judge": (_rough, Status.UNCLEAR, "next_test"),
     "shift not known": (_unknown, Status.UNCLEAR, "week"),
@@ -315,6 +315,7 @@ def _read(page: str) -> str:
 
 def _on_page(text: str) -> str:
     """Return a message as a page has it: a page is named where others name a shell command."""
+    set_reader(None, is_engineer=False)  # as a page does for who has not signed in
     return _flat(without_commands(text))
 
 
@@ -374,6 +375,8 @@ def test_the_bridge_leads_with_its_most_urgent_hanger(
     assert _lead(told) == _lead(home[1][NUMBER_OF["loss"]])
     assert report.message.urgency == "today"
     assert _on_page(report.message.words) in home[0]
+    named = {NUMBER_OF["loss"], *map(int, re.findall(r"\d+", report.message.others))}
+    assert named == {id_ for id_, each in home[1].items() if each["urgency"] != "none"}
     assert _flat(as_text(bridge_paper(report))).count(_flat(report.message.words)) == 1
 
 
