@@ -38,8 +38,13 @@ def bar_rows(bar: BarDescription) -> tuple[tuple[str, str], ...]:
 
 
 def bar_table(bar: BarDescription) -> Table:
-    """Return the table of one bar."""
-    return Table("The bar as described", ("what", "value"), bar_rows(bar), is_folded=True)
+    """Return the table of one bar; what is not stated is named in one row."""
+    rows = bar_rows(bar)
+    stated = [row for row in rows if row[1] != NOT_STATED]
+    missing = [label.lower() for label, value in rows if value == NOT_STATED]
+    if missing:
+        stated.append((NOT_STATED.capitalize(), formatting.listed(missing)))
+    return Table("The bar as described", ("what", "value"), tuple(stated), is_folded=True)
 
 
 def bars_table(bars: Sequence[BarDescription]) -> Table:

@@ -121,10 +121,10 @@ _MEANINGS = {
     "theta_F": "tension over nominal tension",
     "theta_L": "effective over given length",
     "sigma": "model error, as a fraction of a frequency",
-    "section": "area as made over the description's, less 1",
-    "density": "density as made over the description's, less 1",
-    "length": "length as made over the description's, less 1",
-    "modulus": "elastic modulus as made over the description's, less 1",
+    "section": "section area, as built against described",
+    "density": "density, as built against described",
+    "length": "length, as built against described",
+    "modulus": "elastic modulus, as built against described",
     "bending_factor": "bending stiffness over the solid section's",
     "shear_share": "shear over a solid bar's",
     "fitting_stiffness_transverse": "bending stiffness of fittings over the bar's, transverse",
@@ -133,7 +133,7 @@ _MEANINGS = {
     "turnbuckle_stiffness": "bending stiffness of turnbuckles over the described one",
     "turnbuckle_mass": "mass of turnbuckles over the described one",
     "inclination": "inclination from the horizontal in degrees (90 is vertical)",
-    "sag_shape": "shape in which the bar sags (0 held up by bending, 1 like a cable)",
+    "sag_shape": "sag shape (0 like a beam, 1 like a cable)",
     "sag_stiffness": "stiffness against a change of sag over EA/L",
 }
 

@@ -18,6 +18,7 @@ from shm.report.hanger_summary import (
     LATEST_TEST,
 )
 from shm.values import PredictedFrequency
+from shm.values.modes import FIRST_ORDERS
 from shm.values.posterior import MOST_R_HAT
 
 # Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
@@ -187,10 +188,15 @@ def _chosen(data: HangerReport) -> str:
 
 
 def _quality(data: HangerReport) -> str:
-    doubted = [check.name for check in data.quality if check.verdict in ("warning", "refused")]
-    if not doubted:
-        return ""
-    return f"Test quality, to improve at the next test: {formatting.listed(doubted)}."
+    doubted = [check for check in data.quality if check.verdict in ("warning", "refused")]
+    others = [check.name for check in doubted if check.name != FIRST_ORDERS]
+    requests = [
+        f"try to capture {check.found.removesuffix(' not found')}"
+        for check in doubted
+        if check.name == FIRST_ORDERS
+    ]
+    requests += [f"improve {formatting.listed(others)}"] if others else []
+    return f"At the next test, {formatting.listed(requests)}." if requests else ""
 
 
 def _sampling(data: HangerReport) -> str:

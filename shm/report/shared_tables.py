@@ -156,9 +156,9 @@ def model_classes(selection: Selection | None) -> Table:
         "Model classes",
         ("class", "probability", "log evidence", "its sd", *formatting.tension_headings(unit)),
         fold_improbable(rows, probabilities, "classes") if rows else (),
-        note=f"{compared_on}Before them all classes were equally probable, clamped ones less so "
-        "but with the thesis's priors. Evidence in natural logarithms, with the standard deviation "
-        "of its sampling.",
+        note=f"{compared_on}All classes started equally probable, except clamped ones, which "
+        "started lower unless the priors are the thesis's. Evidence in natural logarithms, with "
+        "the standard deviation of its sampling.",
     )
 
 

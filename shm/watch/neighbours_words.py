@@ -40,10 +40,13 @@ def sentence_of(pattern: BridgePattern, named_from: float) -> str:
         suspect = next((each for each in pattern.suspects if each.name == best.name), None)
         way = "from" if best.name == "load redistribution" else "of"
         of = f" {way} {_hangers(suspect.hangers).lower()}" if suspect else ""
+        explanation = f"{best.name.capitalize()}{of} is"
+        if best.name == "independent shifts":
+            explanation = "Independent changes are"
         return (
-            "It is not clear yet whether load moved between hangers. Most probable is "
-            f"{best.name}{of} (probability {best.probability:.2f}). The largest shift is "
-            f"{size}, of hanger {largest.hanger}."
+            f"It is not clear yet whether load moved between hangers. {explanation} the most "
+            f"probable explanation ({best.probability:.2f}). The largest shift is {size}, "
+            f"of hanger {largest.hanger}."
         )
     if best.name == "no change":
         return (

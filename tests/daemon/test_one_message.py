@@ -34,7 +34,7 @@ from shm.values.messages import Lead, Urgency
 from shm.watch.alert_text import message_of
 from shm.watch.watching import alerts_of
 from shm_cli.main import cli
-from shm_daemon.web.commands import without_commands
+from shm_daemon.web.commands import set_reader, without_commands
 from tests.helpers.entering import LINEAGE, identified, selected
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import NOW, a_change, a_posterior
@@ -174,7 +174,7 @@ _odd = replace(_QUIET, outlier_probability=0.97)
 _not_known = tension(*[float("nan")] * 3)
 STATES: dict[str, tuple[Make, Status | None, Urgency]] = {
     "no test yet": (lambda of, n: None, None, "next_test"),
-    "first test": (lambda of, n: of.test(n, 0), Status.FIRST, "next_test"),
+    "first test": (lambda of, n: of.test(n, 0), Status.FIRST, "none"),
     "steady": (watched(tension()), Status.STEADY, "none"),
     "too rough to judge": (watched(tension(0.01, 0.04, 0.1)), Status.UNCLEAR, "next_test"),
     "shift not known": (watched(_not_known), Status.UNCLEAR, "week"),
@@ -257,6 +257,7 @@ def _read(page: str) -> str:
 
 def _on_page(text: str) -> str:
     """Return a message as a page has it: a page is named where others name a shell command."""
+    set_reader(None, is_engineer=False)  # as a page does for who has not signed in
     return _flat(without_commands(text))
 
 
@@ -316,6 +317,8 @@ def test_the_bridge_leads_with_its_most_urgent_hanger(
     assert _lead(told) == _lead(home[1][NUMBER_OF["loss"]])
     assert report.message.urgency == "today"
     assert _on_page(report.message.words) in home[0]
+    named = {NUMBER_OF["loss"], *map(int, re.findall(r"\d+", report.message.others))}
+    assert named == {id_ for id_, each in home[1].items() if each["urgency"] != "none"}
     assert _flat(as_text(bridge_paper(report))).count(_flat(report.message.words)) == 1
 
 

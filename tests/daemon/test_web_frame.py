@@ -145,6 +145,6 @@ def test_a_command_is_of_the_hanger_and_role_of_the_reader() -> None:
     assert '<a href="/hangers/3/baseline">' in with_links(text)
     set_reader(3, is_engineer=False)
     assert with_links("set a new baseline (`shm drift rebaseline`)") == (
-        "set a new baseline (Baseline)"
+        "set a new baseline (page Baseline, for engineers)"
     )
     assert '<a href="/hangers/3/diagnosis">' in with_links("ask `shm gap diagnose`")

@@ -100,7 +100,7 @@ def test_page_agrees_with_report(
         report = hanger_report(bridge, store, 3, START)
     assert report.status is Status.ALERT
     said = _plain(words_of(page))
-    set_reader(3)  # as the page does
+    set_reader(3, is_engineer=False)  # as the page does
     assert _plain(without_commands(report.now.message.words)) in said
     assert _plain(without_commands(details(report))) in said
     assert f'<span class="status alert">{Status.ALERT.value}</span>' in page
@@ -130,6 +130,10 @@ def test_trend_is_there_in_numbers_and_marks(client: httpx.Client) -> None:
     assert {"alert", "baseline", "threshold", "nominal", "baseline set"} <= names_in(document)
     (alert,) = (trace for trace in document["data"] if trace.get("name") == "alert")
     assert alert["y"][0] == pytest.approx(0.8 * 711, rel=0.05)
+    (signs,) = (trace for trace in document["data"] if trace.get("name") == "baseline set")
+    tests = client.get("/api/hangers/3/trend").json()["points"]
+    (at,) = (each["time"] for each in tests if each["test"] == "t0")
+    assert signs["x"] == [at.replace("T", " ").removesuffix("Z")]
     (span,) = document["layout"]["shapes"]
     assert "2026-05" in span["x0"]
     assert "-2" in span["label"]["text"]

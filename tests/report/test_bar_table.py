@@ -142,6 +142,9 @@ def test_what_is_not_stated_is_said_never_invented() -> None:
         "Sensors": "not stated",
         "Bar measured by": "not stated",
     }
+    *stated, last = bar_table(describe_bar(BARE)).rows
+    assert [label for label, _ in stated] == ["Section", "Length", "Elastic modulus", "Density"]
+    assert last == ("Not stated", "length taped, fittings, ends, sensors and bar measured by")
     document = json.loads(documents.dump(bar_document(describe_bar(BARE))))
     unknown = {key for key, value in document.items() if value is None}
     assert unknown == {

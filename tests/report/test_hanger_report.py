@@ -95,8 +95,12 @@ def test_quality_stands_in_page_text_document_and_advice(bare: HangerReport) -> 
     outline = Outline.of(as_html(hanger_paper(judged)))
     for page in (outline.told, text_words(hanger_paper(judged))):
         assert "clipping ! warning 0.99 0.95 acc_1 clips Lower the gain." in page
-        assert "Test quality, to improve at the next test: clipping." in page
+        assert "At the next test, improve clipping." in page
     assert ("tr", {"class": "warning"}) in outline.tags
+    lost = replace(check, name="first orders", found="longitudinal order 1 not found")
+    assert "At the next test, try to capture longitudinal order 1 and improve clipping." in advice(
+        replace(bare, quality=(lost, check))
+    )
     (quality,) = json.loads(documents.dump(hanger_json(judged)))["quality"]
     assert (quality["name"], quality["verdict"]) == ("clipping", "warning")
 

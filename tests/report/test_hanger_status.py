@@ -49,6 +49,7 @@ from shm.values.hanger import Limits
 from shm.values.messages import Lead
 from shm.values.posterior import DIAGNOSE
 from shm.watch import Watched, WatchOptions, watch_hanger
+from tests.helpers.daemons import ROOT
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import NOW, a_change, a_drift, a_watched_test, an_alert, averaged, with_now
 
@@ -107,6 +108,14 @@ def test_status_of_hanger(said: dict[str, Any], status: Status) -> None:
     known = {"drifts": [], "is_first": False, "is_called": False, **said}
     known["standing"] = findings([*known.get("standing", ()), alert("test")])  # a trial is nothing
     assert status_of(known.pop("drifts"), HANGER, **known) is status
+
+
+def test_the_manual_explains_every_status_word() -> None:
+    page = (ROOT / "docs" / "operation.md").read_text(encoding="utf-8")
+    for status in Status:
+        assert f"`{status.name.lower()}`" in page
+    for status in (Status.UNCLEAR, Status.STEADY, Status.FIRST):
+        assert f"`{status.name.lower()}` (*{status.value}*)" in page.replace("\n", " ")
 
 
 def test_trials_of_a_hook_are_no_finding() -> None:

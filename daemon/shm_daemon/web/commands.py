@@ -74,7 +74,7 @@ def _link(verb: str, options: str, text: str) -> Markup | None:
     """Return the link to the page of a command; None where its hanger is not known."""
     address, name = next((address, name) for each, address, name in _PAGES if each == verb)
     if name in _FOR_ENGINEERS and not _IS_ENGINEER.get():
-        return escape(name)
+        return escape(f"page {name}, for engineers")
     numbered = re.match(r" (\d+)\b", options)
     address = address.replace("{number}", f"-{numbered[1]}" if numbered else "")
     if "{hanger}" in address:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
+from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
@@ -122,11 +123,19 @@ class HangerView:
             trend=tuple(replace(row, time=point.time) for row, point in rows),
             states=self.states or NOTHING_WATCHED,
             deeds=tuple(
-                Deed(_DEEDS[event.kind], event.at, f"by {event.who}: {event.why}")
+                Deed(_DEEDS[event.kind], self._shown_at(event), f"by {event.who}: {event.why}")
                 for event in self.events
                 if event.kind in _DEEDS
             ),
         )
+
+    def _shown_at(self, event: HangerEvent) -> datetime:
+        """Return where the trend shows an event: of a baseline, the time of its last test."""
+        if event.kind is not EventKind.BASELINE:
+            return event.at
+        baseline = self.store.watch.baseline(self.hanger.id, number=event.id)
+        names = baseline.posterior.tests if baseline else ()
+        return max((each.time for each in self.trend if each.test in names), default=event.at)
 
     @cached_property
     def sheet(self) -> DiagnosisSheet | None:

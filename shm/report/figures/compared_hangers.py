@@ -69,10 +69,9 @@ def _words(shift: Interval) -> str:
 def caption(courses: Sequence[TensionShifts]) -> str:
     """Explain what is seen."""
     return (
-        "Tension of each test since the hanger's own baseline, with 90 % of what a repetition of "
-        "the test would scatter. The temperature is not compensated here: "
-        "what all hangers do together is the weather, the deck's load or the logger's clock; what "
-        "one does alone is its own."
+        "Tension of each test since the hanger's own baseline; bars: 90 % repeatability. "
+        "The temperature is not compensated here: what all hangers do together is the weather, "
+        "the deck's load or the logger's clock; what one does alone is its own."
         f"{thinned_words(max(len(course.times) for course in courses))}"
     )
 

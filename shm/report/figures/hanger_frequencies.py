@@ -27,7 +27,7 @@ def specify(data: HangerReport) -> spec.Specification | None:
         return None
     half = NORMAL_90 * _sigma(data).mean
     known = [mode for mode in data.latest.modes if math.isfinite(mode.frequency_sd_hz)]
-    points = [p for plane in PLANES if (p := _points(plane, compared))]
+    points = [p for plane in PLANES if (p := _points(plane, data.misfits_percent))]
     marks: list[spec.Mark] = [
         spec.Span(low=1 - half, high=1 + half, axis="y", opacity=0.07, name="model error"),
         spec.Rule(at=1.0),
@@ -56,16 +56,17 @@ def compared_modes(data: HangerReport) -> list[PredictedFrequency]:
     return [mode for mode in data.predicted if math.isfinite(mode.measured_hz)]
 
 
-def _points(plane: Plane, compared: Sequence[PredictedFrequency]) -> spec.Points | None:
-    modes = [mode for mode in compared if mode.plane == plane]
-    if not modes:
+def _points(
+    plane: Plane, misfits: Sequence[tuple[PredictedFrequency, Interval]]
+) -> spec.Points | None:
+    of_plane = [(mode, off) for mode, off in misfits if mode.plane == plane]
+    if not of_plane:
         return None
-    measured = np.array([mode.measured_hz for mode in modes])
-    ratio = np.array([mode.mean_hz for mode in modes]) / measured
-    half = NORMAL_90 * np.array([mode.sd_hz for mode in modes]) / measured
+    modes = [mode for mode, _ in of_plane]
+    ratio, low, high = 1 + np.array([(off.mean, off.low, off.high) for _, off in of_plane]).T / 100
     return spec.Points(
-        x=[mode.order + _NEXT_TO[plane] for mode in modes], y=ratio, low=ratio - half,
-        high=ratio + half, symbol=spec.PLANE_SYMBOLS[plane], colour=spec.PLANE_HUES[plane], size=5,
+        x=[mode.order + _NEXT_TO[plane] for mode in modes], y=ratio, low=low,
+        high=high, symbol=spec.PLANE_SYMBOLS[plane], colour=spec.PLANE_HUES[plane], size=5,
         name=plane,
         texts=[
             f"{plane} {mode.order}: predicted {mode.mean_hz:.3f} ± {mode.sd_hz:.3f} Hz, measured "
@@ -92,10 +93,10 @@ def _caption(data: HangerReport) -> str:
     error = formatting.with_interval(_sigma(data).scaled(100), "%")
     return (
         f"Frequencies predicted by {formatting.model_class(data.posterior.model)} after updating, "
-        "over the measured ones of the latest test. Bars: 90 % interval that the uncertainty of "
-        "the parameters leaves; dark boxes: that of the measurement, where known; light band: "
-        f"model error (sigma {error}). A mode outside the band is one that the model does "
-        "not explain."
+        "over the measured ones of the latest test. Bars: 90 % interval of prediction and "
+        "measurement together; dark boxes: that of the measurement alone, where known; light "
+        f"band: model error (sigma {error}). A bar that does not reach 1 is a mode that the model "
+        "does not explain."
     )
 
 

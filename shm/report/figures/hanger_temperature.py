@@ -55,8 +55,8 @@ def _caption(data: HangerReport) -> str:
         f" {formatting.counted(without, 'test')} without a temperature left out." if without else ""
     )
     return (
-        "Tension by each test over its temperature, with 90 % intervals. A hanger that stays as it "
-        f"is lies along one line; what leaves it has another reason than the weather.{left}"
+        "Tension by each test over its temperature, with 90 % intervals. Points off the line are "
+        f"not explained by temperature.{left}"
         f"{time_axes.thinned_words(known)}"
     )
 
