@@ -80,7 +80,7 @@ def add_suggestion(error: click.ClickException) -> None:
     """
     if isinstance(error, click.NoSuchOption) and error.possibilities:
         name = error.option_name.strip("-")
-        error.possibilities = [
+        vars(error)["possibilities"] = [
             each for each in error.possibilities if suggest(name, [each.strip("-")])
         ]
     chosen = getattr(getattr(error, "param", None), "type", None)
