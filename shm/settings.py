@@ -172,11 +172,9 @@ class Settings:
     false_call_years: float = _row(
         100.0, "years", "mean time between false alarms of a hanger", 0.1, 1e6
     )
-    hook_timeout_seconds: float = _row(30.0, "s", "a hook is ended after so long", 0.1, 3600)
+    hook_timeout_seconds: float = _row(30.0, "s", "hook timeout", 0.1, 3600)
     hook_attempts: int = _row(16, "", "most attempts to deliver an alert to a hook", 1, 1000)
-    hook_backoff_seconds: float = _row(
-        5.0, "s", "wait after a failed delivery; each further wait is twice as long", 0, 86400
-    )
+    hook_backoff_seconds: float = _row(5.0, "s", "first retry delay (doubles each time)", 0, 86400)
     # Hangers of one bridge are hit one after the other and worked through some seconds each.
     alert_grouping_seconds: float = _row(
         60.0,

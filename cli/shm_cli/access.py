@@ -113,6 +113,8 @@ def user() -> None:
 def add(ctx: click.Context, name: str, role: str, vouched: bool) -> None:
     """Add a user; the password is asked for, or read from stdin.
 
+    A password has at least 15 characters: four or five words will do.
+
     \b
     Example: shm user add 'M. Huber' --role engineer
     """
@@ -169,6 +171,8 @@ def remove(ctx: click.Context, name: str) -> None:
 @click.pass_context
 def password(ctx: click.Context, name: str) -> None:
     """Set a new password, asked for or read from stdin; signs the user out everywhere.
+
+    It has at least 15 characters.
 
     \b
     Example: shm user password 'M. Huber'

@@ -241,8 +241,8 @@ def resend(ctx: click.Context, alert_id: int) -> None:
 def test(ctx: click.Context, name: str) -> None:
     """Send a test alert to a hook.
 
-    It goes the way of every alert, once, whether the daemon runs or not, and is kept nowhere.
-    Says what the hook answered, or what went wrong.
+    It goes the way of every alert, once, whether the daemon runs or not. Only the audit log keeps
+    it. Says what the hook answered, or what went wrong.
 
     \b
     Example: shm alerts test --hook mail

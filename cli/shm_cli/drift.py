@@ -128,7 +128,7 @@ def bridge(ctx: click.Context, figure: Path | None) -> None:
 @flags.hanger(required=True)
 @click.option(
     "--since",
-    type=flags.Day(),
+    type=flags.Time(),
     required=True,
     metavar="DAY",
     help="The first day (UTC) whose tests count, such as 2026-05-01.",

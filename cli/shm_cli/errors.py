@@ -74,7 +74,15 @@ def of_unexpected(error: Exception) -> Failure:
 
 
 def add_suggestion(error: click.ClickException) -> None:
-    """Add the nearest value to the message of an option that takes one of a list."""
+    """Add the nearest value to the message of an option that takes one of a list.
+
+    Of the options that click suggests for an unknown one, drop those that share only the dashes.
+    """
+    if isinstance(error, click.NoSuchOption) and error.possibilities:
+        name = error.option_name.strip("-")
+        vars(error)["possibilities"] = [
+            each for each in error.possibilities if suggest(name, [each.strip("-")])
+        ]
     chosen = getattr(getattr(error, "param", None), "type", None)
     given = re.match(r"'(.*?)' is not one of", error.message)
     if given and isinstance(chosen, click.Choice):

@@ -48,24 +48,8 @@ class Time(click.ParamType[datetime]):
         try:
             return parse_time(str(value))
         except (ValueError, OverflowError):
-            raise BadInput(
-                f"{value!r} is not an ISO 8601 time.",
-                remedy="Write a day as 2026-05-01, or a time as 2026-05-01T10:00Z.",
-            ) from None
-
-
-class Day(Time):
-    """The same, where a text that is none is a wrong call: it may be a word such as "today"."""
-
-    name = "day"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> datetime:
-        try:
-            return super().convert(value, param, ctx)
-        except BadInput as error:
-            self.fail(str(error), param, ctx)
+            remedy = "Write a day as 2026-05-01, or a time as 2026-05-01T10:00Z."
+            self.fail(f"{value!r} is not an ISO 8601 time. {remedy}", param, ctx)
 
 
 class ExistingFile(click.Path):

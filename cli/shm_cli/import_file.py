@@ -285,12 +285,15 @@ def _named(
             found.append((_column(name, names), rest.strip()))
         else:
             plain += [part.strip() for part in value.split(",")]
+    others = [name for name in names if name not in in_order] or ["NAME"]
+    example = f"{shlex.quote(others[0])}=..."
     if len(plain) == 1:
         plain = plain * max(1, len(in_order))
     if plain and len(plain) != len(in_order):
         raise UsageError(
             f"--{option} gives {len(plain)} values for {len(in_order)} channels.",
-            remedy=f"Give one a channel, in this order: {', '.join(in_order) or 'none is known'}.",
+            remedy=f"Give one each, in this order: {', '.join(in_order) or 'none is known'}. Name "
+            f"any other column, such as the hammer: --{option} {example}.",
         )
     return found + list(zip(in_order, plain, strict=False))
 
@@ -378,8 +381,9 @@ def _say_next(
         where = profile.path.relative_to(workspace.folder)
         roams = " It goes from hanger to hanger: each file must say its own." * profile.roams
         click.echo(f"Kept for all files of this logger: {where}.{roams}")
+    command = f"shm --workspace {shlex.quote(str(workspace.folder))} daemon --once"
     running = workspace.holder() is not None
-    then = "the daemon takes it" if running else "no daemon runs; `shm daemon --once` takes it"
+    then = "the daemon takes it" if running else f"no daemon runs; `{command}` takes it"
     click.echo(f"In the spool as {landed.path.name}: {then}.")
 
 

@@ -130,7 +130,7 @@ def _springs(function: flags.F) -> flags.F:
     show_default=False,
     help="Unknown if left out.",
 )
-@click.option("--first", type=flags.Day(), help="Time of the first test; then weekly.")
+@click.option("--first", type=flags.Time(), help="Time of the first test; then weekly.")
 @click.option("--format", "form", type=click.Choice(_SUFFIXES), default="csv")
 @click.option("--out", type=flags.FOLDER, metavar="DIR", required=True, help="Where the files go.")
 @flags.seed

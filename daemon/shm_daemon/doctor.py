@@ -199,7 +199,7 @@ def check_under_way(examined: DoctorContext) -> Iterator[Finding]:
         if each.stage is Stage.RECEIVED or each.hanger not in unready
     ]
     if not standing:
-        yield ok("recordings", "none is on its way")
+        yield ok("recordings", "none pending")
         return
     oldest, since = min(standing, key=lambda each: each[1])
     newest_at = find_newest_step(store) or now
@@ -528,7 +528,7 @@ def check_deliveries(examined: DoctorContext) -> Iterator[Finding]:
             "See `shm alerts` for what nobody was told of, and mend the hook.",
         )
     if not late and not lost:
-        yield ok("deliveries", f"{len(waiting)} on their way" if waiting else "none owed")
+        yield ok("deliveries", f"{len(waiting)} pending" if waiting else "none due")
 
 
 def _is_late(

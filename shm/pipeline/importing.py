@@ -468,7 +468,7 @@ def _of_sensor(column: SurveyedColumn, described: Described) -> list[Question]:
     said = {*described.get("channel", {}).get(name, {}), *described}
     moves = column.quantity == "acceleration"
     if column.quantity and math.isnan(column.x_m) and "x_m" not in said:
-        what = f"Where is {name}" if moves else f"Where does the hammer of {name} hit"
+        what = f"Where is {name}" if moves else f"Where did the hammer hit (column {name})"
         text = f"{what}, in m from the deck end (or 'unknown')?"
         asked.append(Question("place", name, text, f"--place {quoted}=M", needed=moves))
     if moves and column.plane is None and "plane" not in described:

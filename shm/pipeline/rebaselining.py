@@ -212,7 +212,6 @@ def _since(store: Store, hanger: Hanger, since: datetime) -> tuple[StoredTest, .
         raise NothingThere(
             f"hanger {hanger.id} has no test since {since:%Y-%m-%d} that has been worked through; "
             f"{latest}.",
-            remedy="Hit it first and take the test in with `shm ingest FILE`, or give an earlier "
-            "--since.",
+            remedy="Test it first and send in the recording, or choose an earlier day.",
         )
     return tuple(found)

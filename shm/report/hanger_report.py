@@ -112,7 +112,6 @@ def _events_part(data: HangerReport) -> Section:
 def _appendices(data: HangerReport) -> tuple[Section, ...]:
     """Return what only the page and `--full` show: figures, numbers, the gap, settings."""
     return appendices(
-        Section("Figures", figures=lambda: drawn((STIFFNESS, TEMPERATURE), data)),
         Section(
             "Numbers",
             tables=filled(
@@ -133,6 +132,7 @@ def _appendices(data: HangerReport) -> tuple[Section, ...]:
                 assumptions_table(data.hanger),
             ),
         ),
+        Section("Figures", figures=lambda: drawn((STIFFNESS, TEMPERATURE), data)),  # text has none
     )
 
 

@@ -82,8 +82,8 @@ def test_a_figure_is_drawn_on_given_axes_if_they_are_enough(
     assert left.get_xlabel() == "tension (kN)"
     assert len(left.patches) > 10
     assert not right.has_data()
-    axes = Figure().subplots()
-    with pytest.raises(UsageError, match=r"has 5 panels, and ax has 1.*plt.subplots\(5\)"):
+    axes = Figure().subplots(1, 2)
+    with pytest.raises(UsageError, match=r"has 5 panels, and ax has 2.*plt.subplots\(5\)"):
         shm.plot.recording(recording, ax=axes)
 
 

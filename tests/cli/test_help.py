@@ -72,6 +72,7 @@ def test_misspelt_word_gets_a_suggestion(shm: Shm, tmp_path: Path) -> None:
         ended = shm(line)
         assert ended.code == 2
         assert suggestion in ended.err
+    assert "Did you mean" not in shm("drift --since 2026-05-01").err  # --json is no such word
     (tmp_path / "hanger3.csv").touch()
     with pytest.MonkeyPatch.context() as real:
         real.setattr(click.Path, "convert", CONVERT)

@@ -88,6 +88,7 @@ def test_import_without_terminal(shm: Shm, refused: Callable[[], bool], tmp_path
 def test_second_file_needs_nothing(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
     first = shm("import", export(tmp_path / "a.csv"), *SAID)
     assert first.code == 0
+    assert f"`shm --workspace {workspace.folder} daemon --once` takes it" in first.told
     (profile,) = (workspace.folder / "loggers").iterdir()
     kept = tomllib.loads(profile.read_text())
     assert kept["hanger"] == 3
@@ -170,6 +171,8 @@ def test_wrong_answer_is_refused(shm: Shm, refused: Callable[[], bool], tmp_path
     path = export(tmp_path / "a.csv")
     for more, code, words in (
         ("--place 1,2,3", 2, "3 values for 2 channels"),
+        ("--place 1,2,3", 2, "Give one each, in this order: A1, A2. Name any other column,"),
+        ("--place 1,2,3", 2, "--place Kraft=..."),
         ("--plane up", 2, "'up' is no plane"),
         ("--place A9=1", 2, "no column 'A9'"),
         ("--unit A1=V", 2, "no unit that is read"),

@@ -159,7 +159,7 @@ def test_wrong_answer_is_asked_again(workspace: Workspace, tmp_path: Path) -> No
         person.answer("How warm", "very", "12,5")
         person.answer("Who measured", "Ann")
         person.answer("Which hanger", "three", "9", "3")
-        person.answer("hammer of Kraft", "1,9")
+        person.answer("Where did the hammer hit (column Kraft)", "1,9")
         person.answer("Where is A1", "high up", "2,52")
         person.answer("which plane does A1", "sideways", "quer")
         person.answer("Where is A2", "unknown")
@@ -210,7 +210,7 @@ def test_what_follows_from_an_answer_is_asked_next(workspace: Workspace, tmp_pat
             person.answer(question, answer)
         person.answer("full scale of channel_1", "loud", "2000 N")
         person.answer("full scale of channel_2", "50 g")
-        person.answer("hammer of channel_1", "unknown")
+        person.answer("Where did the hammer hit (column channel_1)", "unknown")
         person.answer("Where is channel_2", "2.52")
         person.answer("which plane does channel_2", "transverse")
         person.answer("of hanger 3, too?", "y")
@@ -224,7 +224,12 @@ def test_what_follows_from_an_answer_is_asked_next(workspace: Workspace, tmp_pat
     ids=["Ctrl-C at first", "Ctrl-D", "Ctrl-C at last"],
 )
 def test_leaving_keeps_nothing(workspace: Workspace, tmp_path: Path, key: str, at: str) -> None:
-    answers = {**OF_TEST, "Which hanger": "3", "hammer of Kraft": "2", "Where is A1": "2"}
+    answers = {
+        **OF_TEST,
+        "Which hanger": "3",
+        "Where did the hammer hit (column Kraft)": "2",
+        "Where is A1": "2",
+    }
     answers |= {"which plane does A1": "t"}
     answers |= {"Where is A2": "2", "which plane does A2": "l", "of hanger 3, too?": "y"}
     with terminal(workspace, export(tmp_path / "a.csv")) as person:

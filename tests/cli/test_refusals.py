@@ -37,6 +37,8 @@ BRIDGE = (
     ("report --hanger 3 --test t9", 4, "t2"),
     ("report --hanger 3 --test t0", 4, "t0.modes.json gave the modes"),
     ("drift --hanger 9", 4, "known: 3, 4"),
+    ("drift --since 2026-05-01", 2, "No such option"),
+    ("alerts silence --hanger 3 --until yesterday --why x", 2, "Write a day as 2026-05-01"),
     ("drift --hanger 4", 4, "no test has been compared"),
     ("alerts --hanger 9", 4, "known: 3, 4"),
     ("export --hanger 9 --out {tmp}/x.csv", 4, "known: 3, 4"),

@@ -6,7 +6,9 @@ import io
 import json
 import re
 import shutil
+import sqlite3
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -123,6 +125,7 @@ def user(on_empty: Shm, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ended]
 
 
 def test_a_user_is_made_listed_without_a_secret_and_removed(user: Callable[..., Ended]) -> None:
+    assert "at least 15 characters" in " ".join(user("add", "--help", password="").out.split())
     made = user("add", "M. Huber", "--role", "operator", "--json", password=PASSWORD)
     expected = {"schema": "shm.user_add/1", "name": "M. Huber", "role": "operator"}
     assert made.document == expected
@@ -202,10 +205,22 @@ def hooked(tmp_path: Path, listener: Listener) -> Workspace:
     return workspace
 
 
-def test_test_alert_leaves_nothing(shm: Shm, hooked: Workspace) -> None:
-    before = (hooked.folder / "shm.db").read_bytes()
+def rows_of(workspace: Workspace) -> dict[str, int]:
+    """Return how many rows each table of the store has."""
+    with closing(sqlite3.connect(workspace.folder / "shm.db")) as store:
+        names = [
+            name for (name,) in store.execute("SELECT name FROM sqlite_master WHERE type='table'")
+        ]
+        return {name: store.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in names}
+
+
+def test_test_alert_is_in_audit_log_alone(shm: Shm, hooked: Workspace) -> None:
+    before = rows_of(hooked)
     ended = shm.at(hooked).done("alerts test --hook mail")
-    assert (hooked.folder / "shm.db").read_bytes() == before
+    assert rows_of(hooked) == {**before, "journal": before["journal"] + 1}
+    (newest, *_) = shm.at(hooked).json("audit")["changes"]
+    assert (newest["action"], newest["subject"]) == ("hook tested", "mail")
+    assert (newest["detail"], newest["via"]) == ("it arrived", "command line")
     assert shm.at(hooked).json("alerts")["alerts"] == []
     assert "The hook mail took the test alert in" in ended.out
     told = json.loads((hooked.folder / "told.json").read_text())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 import tomllib
 from collections.abc import Callable
@@ -180,3 +181,10 @@ def test_note_is_written_and_listed(note: Callable[..., Ended], tmp_path: Path) 
     listed = note("list", "--hanger", 3, "--json").document["notes"]
     assert [each["text"] for each in listed] == ["storm", "new pin"]
     assert "new pin" in note("list").out
+
+
+def test_full_report_letters_its_appendices(shm: Shm, bridge: Workspace) -> None:
+    told = shm.at(bridge).done("report", "--hanger", 3, "--full").out
+    letters = re.findall(r"^Appendix ([A-Z]): ", told, re.MULTILINE)
+    assert len(letters) >= 2
+    assert "".join(letters) == "ABCDEF"[: len(letters)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -41,9 +42,12 @@ def failure(tmp_path: Path, *addresses: str, timeout_s: float = 20.0) -> str:
 
 def test_people_are_told_what_happened_and_when(tmp_path: Path, listener: Listener) -> None:
     hook = AppriseHook("people", (address(listener.url),))
-    assert a_notifier(tmp_path)(hook, an_alert()) == "taken by json"
+    alert = an_alert()
+    marked = replace(alert, message=f"{alert.message} See `shm drift`.")
+    assert a_notifier(tmp_path)(hook, marked) == "taken by json"
     told = json.loads(listener.told[0].body)
     assert told["title"] == "shm: hanger 3"
+    assert "See shm drift." in told["message"]
     assert "Hanger 3: tension moved." in told["message"]
     assert "Test t2 of 2026-05-01 12:00 UTC." in told["message"]
     assert "Key: hanger-3:tension-down" in told["message"]

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,15 @@ def test_a_hook_gets_the_alert_on_its_standard_input(tmp_path: Path) -> None:
     assert told["key"] == "hanger-3:tension-down"
     assert told["time"] == "2026-05-01T12:00:00Z"
     assert told["drifts"][0]["quantity"] == "tension"
+
+
+def test_message_to_hook_has_no_backticks(tmp_path: Path) -> None:
+    code = "import sys; open('told.json', 'w').write(sys.stdin.read())"
+    message = "Hanger 3: lost. Compare the hangers beside it (`shm drift bridge`) today."
+    a_notifier(tmp_path)(python(code), replace(an_alert(), message=message))
+    told = json.loads((tmp_path / "told.json").read_text())
+    assert told["message"] == message.replace("`", "")
+    assert told["action"] == "Compare the hangers beside it (shm drift bridge) today."
 
 
 def test_a_hooks_environment_is_bare_and_names_the_alert(tmp_path: Path) -> None:

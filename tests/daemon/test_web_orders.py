@@ -8,6 +8,7 @@ from datetime import timedelta
 import httpx
 import pytest
 
+from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm.store.watch import find_latest_diagnosis
 from tests.helpers.taken_in import with_a_slow_loss
@@ -95,9 +96,14 @@ def test_impossible_baseline_says_why(browser: httpx.Client, bridge: Workspace) 
     sign_in(browser, "engineer")
     with bridge.store() as store:
         before = store.watch.baseline(3)
-    said = outcome(browser, browser.post(BASELINE, data={"since": "2031-01-01", "why": "x"}))
+    future = browser.post(BASELINE, data={"since": "2031-01-01", "why": "x"})
+    assert future.status_code == 422
+    assert "2031-01-01 is yet to come" in future.text
+    today = f"{utc_now():%Y-%m-%d}"
+    said = outcome(browser, browser.post(BASELINE, data={"since": today, "why": "x"}))
     assert said.status_code == 404
-    assert "hanger 3 has no test since 2031-01-01" in said.text
+    assert f"hanger 3 has no test since {today}" in said.text
+    assert "Test it first" in said.text
     assert browser.get(f"{BASELINE}/outcome?order=unknown").status_code == 404
     with bridge.store() as store:
         after = store.watch.baseline(3)

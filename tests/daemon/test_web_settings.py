@@ -115,6 +115,10 @@ def test_test_alert_from_the_page(browser: httpx.Client, workspace: Workspace) -
     assert "The hook file took the test alert in" in answer.text
     assert "This is a test of the hook file" in told.read_text()
     assert browser.post("/settings/hooks/test", data={"hook": "broken"}).status_code == 409
+    with workspace.store() as store:
+        tested = [(each.subject, each.detail) for each in list_changes(store, 2)]
+    assert tested == [("broken", "it did not arrive"), ("file", "it arrived")]
+    assert "hook tested" in browser.get("/audit").text
     assert browser.post("/settings/hooks/test", data={"hook": "none"}).status_code == 404
     with workspace.store() as store:
         assert store.alerts.list_all() == ()

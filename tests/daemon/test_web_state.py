@@ -122,6 +122,7 @@ def test_refused_files_are_listed(client: httpx.Client, refused: None) -> None:
     assert by_name["torn.csv"]["message"] == "Its reason cannot be read."
     assert by_name["bad.csv"]["remedy"]
     page = client.get("/operation").text
+    assert "finished" in page
     assert "bad.csv" in page
     assert "Refused files (2)" in page
     found = client.get("/api/operation").json()

@@ -15,7 +15,7 @@ from shm.bridge import AppriseHook
 from shm.bridge.hooks import apprise_scheme
 from shm.values import Alert
 from shm_daemon.hooks.command import Processes
-from shm_daemon.hooks.contract import HookFailed, one_line, read_secret
+from shm_daemon.hooks.contract import HookFailed, one_line, read_secret, without_code
 
 _SENDER = Path(__file__).with_name("apprise_sender.py")
 
@@ -65,15 +65,14 @@ def _allowed(address: str) -> str:
 def _told(alert: Alert, addresses: Sequence[str], link: str) -> bytes:
     test, resolved = "test" in alert.kinds, "resolved" in alert.kinds
     title = f"shm: {len(alert.alerts)} hangers" if alert.alerts else f"shm: hanger {alert.hanger}"
-    body = f"{alert.message}\n\nTest {alert.test} of {alert.time:%Y-%m-%d %H:%M} UTC."
+    message = without_code(alert.message)
+    body = f"{message}\n\nTest {alert.test} of {alert.time:%Y-%m-%d %H:%M} UTC."
     document = {
         "addresses": list(addresses),
         "title": one_line(
             "shm: test of a hook" if test else f"{title}{': resolved' if resolved else ''}"
         ),
-        "body": "\n".join(
-            [alert.message if test else body, *filter(None, [link]), f"Key: {alert.key}"]
-        ),
+        "body": "\n".join([message if test else body, *filter(None, [link]), f"Key: {alert.key}"]),
         "type": "info" if test else "success" if resolved else "warning",
     }
     return json.dumps(document).encode()

@@ -14,6 +14,14 @@ from shm.values import Alert, printable
 SHOWN_CHARACTERS = 500  # technical: of a stranger's words, what a line of the log may hold
 
 
+_SENTENCES = frozenset({"message", "state", "action"})
+
+
+def without_code(text: str) -> str:
+    """Return a message with its commands bare: a telephone shows the marks of code as they are."""
+    return text.replace("`", "")
+
+
 class HookFailed(ShmError):
     """A hook could not be run, took too long, or said that it failed; another try may help."""
 
@@ -40,7 +48,9 @@ class DeliveryContext:
     def document(self, alert: Alert) -> dict[str, Any]:
         """Return `shm.alert/1` with the `link`, where it is known."""
         link = self.link(alert)
-        return {**alert_document(alert), **({"link": link} if link else {})}
+        document = {**alert_document(alert), **({"link": link} if link else {})}
+        sentences = {key: without_code(document[key]) for key in _SENTENCES & document.keys()}
+        return {**document, **sentences}
 
 
 class Deliverer(Protocol):

@@ -11,6 +11,7 @@ from shm.bridge import Bridge, Hook
 from shm.documents import format_time
 from shm.errors import NothingThere
 from shm.store import Workspace
+from shm.store.journal import Actor
 from shm.values import Alert
 from shm_daemon.hooks import HookNotifier
 
@@ -30,21 +31,31 @@ class Trial:
 
 
 def send_test_alert(
-    workspace: Workspace, hook: Hook, environment: Mapping[str, str], now: datetime
+    workspace: Workspace,
+    hook: Hook,
+    environment: Mapping[str, str],
+    now: datetime,
+    actor: Actor | None = None,
 ) -> Trial:
-    """Send a test alert once, the way of every alert, and keep it nowhere.
+    """Send a test alert once, the way of every alert, and keep it in the audit log alone.
 
-    Raises HookFailed or DeliveryRefused where it did not arrive, NothingThere without a hanger.
+    `actor` is who asked; left out, that of the workspace. Raises HookFailed or DeliveryRefused
+    where it did not arrive, NothingThere without a hanger.
     """
     alert = make_test_alert(workspace.bridge, hook, now)
     settings, began = workspace.settings, time.monotonic()
     notifier = HookNotifier(
         workspace.folder, settings.hook_timeout_seconds, environment, settings.pages_address
     )
+    outcome = "it did not arrive"
     try:
         answer = notifier(hook, alert)
+        outcome = "it arrived"
     finally:
         notifier.close()
+        with workspace.store() as store:
+            acting = store.acting_as(actor) if actor else store
+            acting.journal.note(now, "hook tested", hook.name, outcome)
     return Trial(alert, answer, time.monotonic() - began)
 
 

@@ -82,6 +82,11 @@ def order_baseline(
     since, why, kind = time_in(form, "since"), reason_in(form, "a baseline"), form.get("kind", "")
     if since is None:
         raise BadInput("a baseline has a first day.", remedy="Choose it in the form.")
+    if since > utc_now():
+        raise BadInput(
+            f"{since:%Y-%m-%d} is yet to come, and a baseline is made of tests that were done.",
+            remedy=f"Choose the day since which tests of hanger {one.id} count.",
+        )
     if kind and kind not in EVENT_KINDS:
         raise BadInput(f"{kind!r} is nothing that can be done.", remedy="Choose it in the form.")
     order = Order(since, why, engineer.actor.name, EVENT_KINDS[kind] if kind else None)

@@ -51,7 +51,7 @@ _STAGES = {
     "identified": "identified, wait for the update (or for enough tests for a baseline)",
     "updated": "updated, wait for the watch",
     "watched": "watched, wait for their alerts to be sent",
-    "done": "through",
+    "done": "finished",
     "refused": "refused",
     "held": "implausible: counts in nothing until a person decides",
 }
@@ -246,7 +246,7 @@ def _examination(request: Request, site: Site) -> Table | None:
     worst_first = sorted(findings, key=lambda each: order.index(each.level), reverse=True)
     return Table(
         "All checks",
-        ("check", "it is", "found", "what to do"),
+        ("check", "result", "found", "what to do"),
         tuple((each.check, each.level.value, each.found, each.remedy) for each in worst_first),
         marks=tuple(_MARKS[each.level] for each in worst_first),
         note="Made anew every five minutes at most; paths are those of the bridge's computer.",

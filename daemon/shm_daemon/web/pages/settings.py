@@ -114,7 +114,7 @@ def change(request: Request, site: AtSite, engineer: Engineer, form: FormOfSetti
 
 
 @router.post("/settings/hooks/test")
-def try_hook(request: Request, site: AtSite, _: Engineer, form: Form) -> Response:
+def try_hook(request: Request, site: AtSite, engineer: Engineer, form: Form) -> Response:
     """Send a test alert to one hook, and say what it answered."""
     workspace = site.workspace
     hook = next((each for each in workspace.bridge.hooks if each.name == form.get("hook")), None)
@@ -122,7 +122,7 @@ def try_hook(request: Request, site: AtSite, _: Engineer, form: Form) -> Respons
         raise Refused(404, "bridge.toml describes no such hook.", "Load the page again.")
     try:
         outcome, status = (
-            send_test_alert(workspace, hook, os.environ, utc_now()).sentence(hook),
+            send_test_alert(workspace, hook, os.environ, utc_now(), engineer.actor).sentence(hook),
             200,
         )
     except ShmError as error:
