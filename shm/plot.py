@@ -36,6 +36,7 @@ from shm.report.figures.modal_test_axes import ResponseCurves
 from shm.report.figures.modal_test_modes import SHAPES, STABILISATION
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.recording_channels import FIGURE as CHANNELS
+from shm.report.figures.recording_channels import TOGETHER
 from shm.report.figures.specification import FigureSpec, Specification
 from shm.values import Diagnosis, GapCheck, Hanger, ModalTest, Posterior, Recording
 
@@ -189,10 +190,14 @@ def gap_check(check: GapCheck, *, ax: Ax = None) -> Figure:
 def recording(recording: Recording, *, ax: Ax = None) -> Figure:
     """Draw every channel of a recording over time, in N and m/s^2.
 
+    On one `ax` all channels are drawn, each as a fraction of its largest value; on as many as the
+    recording has channels, each on its own.
+
     Example:
         >>> figure = shm.plot.recording(shm.read("hanger3.csv"))
     """
-    return _drawn(CHANNELS, recording, ax)
+    is_one = ax is not None and not isinstance(ax, Iterable)
+    return _drawn(TOGETHER if is_one else CHANNELS, recording, ax)
 
 
 def _drawn(member: FigureSpec[Data], data: Data, ax: Ax) -> Figure:

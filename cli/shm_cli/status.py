@@ -42,7 +42,7 @@ from shm.store.watch import (
     list_selected_models,
 )
 from shm.values import Hanger, Summary
-from shm.values.rounding import ForceUnit, force_unit, listed, rounded_percent
+from shm.values.rounding import ForceUnit, force_unit, rounded_percent
 from shm.watch.alert_text import watch_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
@@ -211,21 +211,12 @@ def _gap(store: Store, hanger: int) -> dict[str, Any] | None:
 
 
 def _actions(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what each hanger needs; of those with a baseline alone in one sentence."""
-    of_baseline: dict[str, dict[str, str]] = {}
-    found = []
-    for row in rows:
-        if row["urgency"] == "none" or not row["tests"]:
-            continue
-        words = " ".join((row["state"], row["action"], *row["notes"]))
-        if row["status"] == "first" and not row["notes"]:
-            of_baseline.setdefault(row["action"], {})[str(row["hanger"])] = words
-        else:
-            found.append(words)
-    for action, hangers in of_baseline.items():
-        many = f"Baseline only, hangers {listed(list(hangers))}: {action}"
-        found.append(many if len(hangers) > 1 else next(iter(hangers.values())))
-    return found
+    """Return what each hanger needs."""
+    return [
+        " ".join((row["state"], row["action"], *row["notes"]))
+        for row in rows
+        if row["urgency"] != "none" and row["tests"]
+    ]
 
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from shm import __version__
-from shm.bridge import AppriseHook, Bridge, Hook, WebhookHook
+from shm.bridge import AppriseHook, Bridge, Hook, WebhookHook, example_words
 from shm.errors import NothingThere, ShmError
 from shm.models import competing_names
 from shm.pipeline.courier import quiet_until
@@ -365,13 +365,16 @@ def check_hangers(examined: DoctorContext) -> Iterator[Finding]:
         yield warning("hangers", f"no baseline yet: {some(forming)}", "Take more tests.")
     outdated = list(_outdated_baselines(examined))
     yield from outdated
+    examples = [words for each in bridge.hangers if (words := example_words(each))]
+    for words in examples:
+        yield warning("hangers", *words.split(": ", 1))
     strangers = sorted(set(latest) - {each.id for each in bridge.watched})
     if strangers:
         names = some([str(each) for each in strangers])
         yield warning(
             "hangers", f"tests of hangers not described: {names}", "Describe them in bridge.toml."
         )
-    if not (quiet or never or forming or outdated or strangers):
+    if not (quiet or never or forming or outdated or examples or strangers):
         yield ok("hangers", f"{len(ids)}, with a baseline and recent tests")
 
 

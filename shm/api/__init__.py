@@ -8,7 +8,7 @@ and model classes as objects; these here take names and numbers.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -17,6 +17,13 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from shm import bridge
+from shm.api.arguments import (
+    check_count,
+    check_hanger,
+    check_names,
+    check_records,
+    check_tests,
+)
 from shm.api.in_python import in_python
 from shm.api.placing import Places, Planes, with_places
 from shm.api.stored import Store
@@ -121,9 +128,12 @@ Tests: TypeAlias = Test | Sequence[Test]
 """What `update`, `select` and `diagnose` take."""
 
 
-def modal_tests(tests: Tests) -> tuple[ModalTest, ...]:
-    """Return the modal tests, one or many."""
-    given = (tests,) if isinstance(tests, ModalTest | Identification) else tests
+def modal_tests(tests: Tests, name: str = "tests") -> tuple[ModalTest, ...]:
+    """Return the modal tests, one or many; raises UsageError for anything else."""
+    given: tuple[Any, ...] = (tests,)
+    if isinstance(tests, Iterable) and not isinstance(tests, str):
+        given = tuple(tests)
+    check_tests(name, given)
     return tuple(each.test if isinstance(each, Identification) else each for each in given)
 
 
@@ -138,7 +148,8 @@ def load_hanger(path: str | Path, hanger_id: int | None = None) -> Hanger:
         >>> hanger.length_m
         12.0
     """
-    return bridge.load_hanger(Path(path), hanger_id)
+    with in_python():
+        return bridge.load_hanger(Path(path), hanger_id)
 
 
 def round_bar(
@@ -216,9 +227,12 @@ def identify(
         [('transverse', 1, 5.83), ('transverse', 2, 14.17)]
     """
     with in_python():
-        given = [records] if isinstance(records, Recording | FrequencyResponse) else list(records)
-        if not given:
-            raise UsageError("no record to identify modes in.", remedy="Give at least one.")
+        given: list[Any] = [records]
+        if isinstance(records, Iterable) and not isinstance(records, str):
+            given = list(records)
+        check_records(given)
+        if hanger is not None:
+            check_hanger(hanger)
         options = IdentifyOptions(
             band_low_hz=band_hz[0],
             band_high_hz=band_hz[1],
@@ -283,6 +297,7 @@ def update(
         (711000.0, 4000.0)
     """
     with in_python():
+        check_hanger(hanger)
         chosen = build(model, hanger, priors)
         options = _options(samples, seed, sampler, calibrated_by, [chosen], progress)
         return updating.update(modal_tests(tests), chosen, options, progress)
@@ -301,8 +316,9 @@ def _options(
         raise UsageError(
             f"there is no sampler {sampler!r}.", remedy=f"Name one of {', '.join(SAMPLERS)}."
         )
+    check_count("samples", samples, UpdateOptions.samples)
     options = UpdateOptions(samples, seed, sampler=sampler)
-    return calibrate(options, modal_tests(calibrated_by), models, progress)
+    return calibrate(options, modal_tests(calibrated_by, "calibrated_by"), models, progress)
 
 
 def select(
@@ -335,6 +351,8 @@ def select(
         ('beam2', (0.98, 0.02))
     """
     with in_python():
+        check_hanger(hanger)
+        check_names("models", models, "beam2")
         usual = () if models else competing_names(hanger, load_settings().model_names)
         classes = [build(name, hanger, priors) for name in models or usual]
         if class_priors is not None:
@@ -375,6 +393,10 @@ def diagnose(
         'point_mass'
     """
     with in_python():
+        check_hanger(hanger)
+        check_names("without", without, "point_mass")
+        check_names("hold_out", hold_out, "t1")
+        check_count("draws", draws, _OF_GAP.draws)
         options = GapOptions(baseline, tuple(without), tuple(hold_out), draws, seed)
         return diagnosed(modal_tests(tests), hanger, options, progress)
 
@@ -406,6 +428,10 @@ def check_gap(
         (3.5, 'kg')
     """
     with in_python():
+        check_hanger(hanger)
+        check_names("effects", effects, "point_mass")
+        check_count("seeds", seeds, 1)
+        check_count("sound", sound, 5, least=0)
         options = CheckOptions(tuple(effects), baseline, seeds, sound, seed=seed)
         return checked(modal_tests(tests), hanger, options, progress)
 
@@ -452,6 +478,7 @@ def simulate(
         >>> len(recording.channels), recording.duration_s
         (5, 100.0)
     """
+    check_hanger(hanger)
     if not hanger.as_hanger:
         raise UsageError(
             f"hanger {hanger.id} is not clamped at both ends, or carries no tension: it cannot be "

@@ -9,6 +9,11 @@ from contextlib import contextmanager
 from shm.errors import ShmError
 
 _CALLS: tuple[tuple[str, str], ...] = (
+    (
+        r"Make a workspace with `shm init`.*",
+        "Give the path of a file with [[hanger]] tables, or of a folder with a bridge.toml; "
+        "shm.round_bar(...) describes a bar without a file.",
+    ),
     (r"`?shm import FILE`?", "shm.read(path, planes=..., places_m=...)"),
     (r"`shm gap diagnose[^`]*`", "shm.diagnose(tests, hanger)"),
     (r"`shm gap check[^`]*`", "shm.check_gap(tests, hanger)"),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
+from numbers import Real
 from typing import Any, TypeAlias, TypeVar, get_args
 
 from shm.errors import UsageError
@@ -37,15 +39,29 @@ def _by_name(
     wrong = next((each for each in by_plane.values() if each not in allowed), None)
     if wrong is not None:
         raise UsageError(f"{wrong!r} is no plane.", remedy=f"Planes: {', '.join(allowed)}.")
-    return by_plane, _spread(places_m, known, moved, "places_m")
+    by_place = _spread(places_m, known, moved, "places_m")
+    for name, place_m in by_place.items():
+        if not isinstance(place_m, Real) or place_m < 0 or math.isinf(place_m):
+            raise UsageError(
+                f"places_m puts {name} at {place_m!r}, which is no distance from the deck end.",
+                remedy=f'Give metres from the deck end: places_m={{"{name}": 2.5}}.',
+            )
+    return by_plane, by_place
 
 
 def _spread(given: Any, known: set[str], moved: set[str], what: str) -> dict[str, Any]:
     """Return what is given by channel; one value is that of all that move."""
     if given is None:
         return {}
+    if isinstance(given, Sequence | Set) and not isinstance(given, str):
+        name, value = min(moved or known), "2.5" if what == "places_m" else '"transverse"'
+        raise UsageError(
+            f"{what} is a list, which does not say what belongs to which channel.",
+            remedy=f'Give it by the names of the channels, {what}={{"{name}": {value}, ...}}, '
+            f"or one value for all accelerations. The channels are {', '.join(sorted(known))}.",
+        )
     if not isinstance(given, Mapping):
-        return dict.fromkeys(moved, given)
+        return dict.fromkeys(sorted(moved), given)
     if unknown := sorted(set(given) - known):
         raise UsageError(
             f"{what} names the channel {unknown[0]!r}, which the file does not have.",

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from shm.api.in_python import in_python
 from shm.errors import NothingThere
 from shm.read import read_test
 from shm.values import (
@@ -42,8 +43,9 @@ class Store:
         # The store's libraries take a second to load, and most notebooks open none.
         from shm.store import Workspace
 
-        self._workspace = Workspace.described(workspace)
-        self._store = self._workspace.store()
+        with in_python():
+            self._workspace = Workspace.described(workspace)
+            self._store = self._workspace.store()
 
     @property
     def hangers(self) -> tuple[Hanger, ...]:

@@ -27,6 +27,7 @@ from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table, is_loopback, web_address
 from shm.errors import BadInput, NotDescribed, suggest
 from shm.values import MEASUREMENT_HOURS, ControlHanger, Hanger, MonitoredHanger
+from shm.values.messages import TODAY
 from shm.values.stream import Stream
 
 _LETTERHEAD = ("organisation", "prepared_by", "checked_by", "logo")
@@ -318,12 +319,26 @@ def load_hanger(path: Path, hanger_id: int | None = None) -> Hanger:
     return bridge.bars[0]
 
 
+EXAMPLE = "example: replace by your own"
+"""Name of the hanger that `shm init` writes into bridge.toml."""
+
+
+def example_words(hanger: Hanger) -> str:
+    """Return that a hanger is still the one of the template, and what to do; else ""."""
+    if hanger.name != EXAMPLE:
+        return ""
+    return (
+        f"Hanger {hanger.id} is still the example that `shm init` wrote: do not use its tension. "
+        f"Replace its numbers and its name in bridge.toml by those of your bar {TODAY}."
+    )
+
+
 def _parse(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
         raise BadInput(
-            f"no such file in {path.parent}.",
+            f"no such file in {path.absolute().parent}.",
             file=path,
             remedy="Make a workspace with `shm init`, name one with --workspace, or describe the "
             "hanger of a file alone with --hanger-file H.toml.",

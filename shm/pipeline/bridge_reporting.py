@@ -13,6 +13,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
 import shm
+from shm.bridge import example_words
 from shm.errors import NothingThere
 from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.lineage import discarded_of_baselines, redescribed, settings_words, software
@@ -45,6 +46,7 @@ from shm.store.tests import count_tests, list_undated_names, load_frequency_resp
 from shm.store.watch import (
     find_latest_watches,
     list_detected_changes,
+    list_diagnosed_hangers,
 )
 from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest
 from shm.values.bar_description import list_sensors
@@ -152,7 +154,8 @@ class HangersNow:
     def __init__(
         self, workspace: Workspace, store: Store, hangers: Sequence[Hanger], now: datetime
     ):
-        self.workspace, self.now = workspace, now
+        self.workspace, self._store, self.now = workspace, store, now
+        self._have_diagnosis = list_diagnosed_hangers(store)
         self.latest = find_latest_trends(store, hangers)
         # Those of neighbours too: one may stand out.
         self.baselines = list_baselines_in_force(store, workspace.bridge.hangers)
@@ -179,6 +182,7 @@ class HangersNow:
         standing, blind = self.standing.get(hanger.id, ()), self.blind.get(hanger.id)
         control = next((each for each in self.charts if each.hanger.id == hanger.id), None)
         days, at = self.workspace.settings.campaign_days, point.time if point else None
+        example = [words] if (words := example_words(hanger)) else []
         doubts = campaign_warnings(self.charts, hanger, at, days)
         return HangerSummary(
             hanger,
@@ -190,15 +194,24 @@ class HangersNow:
             detected="; ".join(called_words(change) for change in called),
             standing=findings(each.alert for each in standing),
             open_alerts=self.open_alerts.get(hanger.id, 0),
-            warnings=(*doubts, *self._warnings(hanger, baseline, watched)),
+            warnings=(*example, *doubts, *self._warnings(hanger, baseline, watched)),
             notes=notes_of(standing, self.silences, hanger.id, self.now),
             unwatched=unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
             if point
             else blind,
             undated=self.undated.get(hanger.id, ()),
+            diagnosed=self._diagnosed(hanger),
             control=control,
             tests=self.tests[hanger.id].tests if hanger.id in self.tests else 0,
         )
+
+    def _diagnosed(self, hanger: Hanger) -> str:
+        if hanger.id not in self._have_diagnosis:
+            return ""
+        # Few hangers are diagnosed, and the words of a diagnosis take long to import.
+        from shm.pipeline.diagnosing import describe_diagnosis
+
+        return describe_diagnosis(self._store, hanger)
 
     def _warnings(
         self, hanger: Hanger, baseline: BaselineGlance | None, watched: WatchedTest | None

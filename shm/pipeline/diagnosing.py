@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from shm.errors import NothingThere
 from shm.inference.options import Progress, silent
 from shm.pipeline.lineage import diagnosis_lineage
+from shm.report.diagnosis_summary import write_line
 from shm.report.hanger_status import still_detected
 from shm.store import Store, StoredTest
 from shm.store.tests import list_test_rows
@@ -101,17 +102,32 @@ def latest_diagnosis(store: Store, hanger: Hanger) -> Diagnosis | None:
     stored = find_latest_diagnosis(store, hanger.id)
     if stored is None:
         return None
-    found, began_by = stored.diagnosis, find_last_change(store, hanger)
-    if began_by is None:
-        return found
-    times = [row.time for row in list_test_rows(store, hanger.id) if row.name in found.tests]
-    if not times or max(times) >= began_by:
+    found = stored.diagnosis
+    if (began_by := _outdated_by(store, hanger, found)) is None:
         return found
     remark = (
         f"These tests are from before {began_by:%Y-%m-%d}, when the watch reports a change. "
         f"Diagnose again: `shm gap diagnose --hanger {hanger.id}`."
     )
     return replace(found, remarks=(remark, *found.remarks))
+
+
+def _outdated_by(store: Store, hanger: Hanger, diagnosis: Diagnosis) -> datetime | None:
+    """Return by when a change began after all tests of a diagnosis; None without one."""
+    began_by = find_last_change(store, hanger)
+    if began_by is None:
+        return None
+    rows = list_test_rows(store, hanger.id)
+    times = [row.time for row in rows if row.name in diagnosis.tests]
+    return None if not times or max(times) >= began_by else began_by
+
+
+def describe_diagnosis(store: Store, hanger: Hanger) -> str:
+    """Return verdict, tension and date of the latest diagnosis; empty if a change outdates it."""
+    stored = find_latest_diagnosis(store, hanger.id)
+    if stored is None or _outdated_by(store, hanger, stored.diagnosis) is not None:
+        return ""
+    return write_line(stored.diagnosis, stored.diagnosed_at)
 
 
 def diagnose_stored(

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from shm.bridge import example_words
 from shm.documents import parse_time
 from shm.errors import BadInput, UsageError
 from shm.identify.measuring.setups import fault_of_place
@@ -173,7 +174,7 @@ class Understood:
 class Import:
     """A file as it is understood. `described` is its sidecar, `profiled` what its logger's profile
     is to say; `problems` are what nobody can answer. `of_test` asks when it was and how warm, which
-    is asked once where anything is, and of one file alone.
+    is asked once where anything is, and of one file alone. `caveat` doubts the hanger's description.
     """
 
     survey: Survey
@@ -186,6 +187,7 @@ class Import:
     questions: tuple[Question, ...]
     problems: tuple[str, ...]
     of_test: tuple[Question, ...] = ()
+    caveat: str = ""
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -196,7 +198,7 @@ class Import:
             for c in self.columns
             if c.quantity == "acceleration" and max(-c.least, c.largest) > _WILD_M_S2
         ]
-        return (*self.survey.remarks, *wild)
+        return (*([self.caveat] if self.caveat else []), *self.survey.remarks, *wild)
 
     @property
     def is_ready(self) -> bool:
@@ -252,7 +254,7 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     problems = (*problems, *((fault,) if fault else ()))
     return Import(
         found, described, profiled, profile, columns, rate, hanger, tuple(questions), problems,
-        tuple(each for each in of_test if each not in questions),
+        tuple(each for each in of_test if each not in questions), _caveat(hanger, workspace),
     )  # fmt: skip
 
 
@@ -322,6 +324,11 @@ def _hanger_problem(hanger: object, workspace: Workspace) -> tuple[str, ...]:
     except BadInput as error:
         return (str(error),)
     return ()
+
+
+def _caveat(hanger: object, workspace: Workspace) -> str:
+    tested = (each for each in workspace.bridge.hangers if each.id == hanger)
+    return next(map(example_words, tested), "")
 
 
 def _place_problems(

@@ -208,20 +208,19 @@ def _signature(paper: Paper) -> Flowable:
     signed = paper.signatures
     room = WIDTH / len(signed)
     rules: list[tuple[object, ...]] = [
-        ("LINEABOVE", (n, 0), (n, 0), 0.6, _QUIET) for n in (0, 2, 4)
+        ("LINEABOVE", (2 * n, 0), (2 * n, 0), 0.6, _QUIET) for n in range(len(signed))
     ]
     rules.append(("VALIGN", (0, 0), (-1, -1), "TOP"))
-    first, second, last = (
-        Paragraph(f"{word}<br/>{escape(name)}" if name else word, _LABEL) for word, name in signed
-    )
-    cells = [first, "", second, "", last]
     gap = 6 * mm
+    cells: list[object] = []
+    for word, name in signed:
+        cells += [Paragraph(f"{word}<br/>{escape(name)}" if name else word, _LABEL), ""]
     return KeepTogether(
         [
-            Spacer(1, 14 * mm),
-            SetTable(
-                [cells], [room - gap, 1.5 * gap, room - gap, 1.5 * gap, room - gap], style=rules
-            ),
+            Spacer(1, 6 * mm),
+            Paragraph(escape(paper.revision_line), _BODY),
+            Spacer(1, 12 * mm),
+            SetTable([cells[:-1]], ([room - gap, gap] * len(signed))[:-1], style=rules),
         ]
     )
 

@@ -196,14 +196,13 @@ def _hanger(line: HangerSummary, besides: tuple[str, ...], unit: ForceUnit) -> t
     opened = str(line.open_alerts or "")
     if line.latest is None or line.tension_n is None or line.status is None:
         return (name, "no test", *[""] * (3 + len(besides)), opened, "")
-    share = line.of_nominal
     return (
         name,
         line.status.value,
         _short_tension(line, unit),
         *besides,
         _change(line),
-        rounded_percent(share.mean / 100, share.width / 200) if share else "no nominal",
+        line.of_nominal_words,
         opened,
         _day(line.latest.time),
     )

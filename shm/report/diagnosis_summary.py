@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Mapping
+from datetime import datetime
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
@@ -17,7 +18,14 @@ from shm.report.diagnosis_wording import (
     tension_unit,
 )
 from shm.report.paper import Fact
-from shm.values import Diagnosis, GapVerdict, NextMeasurement, Outcome, TensionEstimate
+from shm.values import (
+    Diagnosis,
+    GapVerdict,
+    NextMeasurement,
+    Outcome,
+    TensionEstimate,
+    effect_label,
+)
 from shm.values.verdict import Reason
 
 _SURE = 0.9
@@ -33,8 +41,7 @@ _OUTCOMES: Mapping[Outcome, str] = {
     Outcome.NO_GAP: "{reason} (no gap, probability {chance})",
     Outcome.EXPLAINED: "the gap {due} {causes}, probability {chance}; what is left is within the "
     "stated errors",
-    Outcome.PARTLY: "{causes} explains a part of the gap, but more is left than the errors allow: "
-    "{reason}",
+    Outcome.PARTLY: "{causes} part of the gap, but more is left than the errors allow: {reason}",
     Outcome.ALIKE: "several causes fit alike, and these data cannot tell them apart: {causes}, "
     "together probability {chance}",
     Outcome.UNEXPLAINED: "not explained: {reason}",
@@ -102,7 +109,7 @@ def _list_words(diagnosis: Diagnosis, verdict: GapVerdict) -> dict[str, str]:
     words = {
         "chance": formatting.spoken_probability(verdict.probability),
         "due": "is explained by" if verdict.probability >= _SURE else "is most likely due to",
-        "causes": _list_causes(verdict),
+        "causes": _list_causes(verdict, explain=verdict.outcome is Outcome.PARTLY),
         "baseline": diagnosis.baseline,
         "modes": _count_modes(diagnosis) if verdict.is_few else "",
         "possible": _explain_misfit(diagnosis) if verdict.reason == "misses by percents" else "",
@@ -119,12 +126,30 @@ def _list_words(diagnosis: Diagnosis, verdict: GapVerdict) -> dict[str, str]:
     return words | {"reason": _REASONS[verdict.reason].format_map(words)}
 
 
-def _list_causes(verdict: GapVerdict) -> str:
-    """Return `point mass`; of several causes the first, and that there are others."""
-    names = [label(cause) for cause in verdict.claim.causes] if verdict.claim else []
+def _list_causes(verdict: GapVerdict, *, explain: bool = False) -> str:
+    """Name each effect that is claimed once, with its place where all causes agree on it.
+
+    The first few, and that there are others; with `explain` as the subject of that verb.
+    """
+    causes = verdict.claim.causes if verdict.claim else ()
+    if len(causes) < 2:
+        found = "".join(label(cause) for cause in causes)
+        return f"{found} explains" if explain else found
+    places: dict[str, set[str]] = {}
+    for cause in causes:
+        for effect, at in zip(cause.effects, cause.places, strict=True):
+            places.setdefault(effect, set()).add(at)
+    names = [effect_label(e, next(iter(at)) if len(at) == 1 else "") for e, at in places.items()]
     shown = names[:_MOST_NAMED] + ["others"] * (len(names) > _MOST_NAMED)
-    is_one_of = len(names) > 1 and verdict.outcome is Outcome.PARTLY
-    return f"{'one of ' if is_one_of else ''}{formatting.listed(shown)}" if shown else ""
+    listed = formatting.listed(shown)
+    if not explain:
+        return listed
+    is_placed = all(len(at) == 1 for at in list(places.values())[:_MOST_NAMED])
+    where = "" if is_placed else ", at a place that these data cannot tell,"
+    *first, last = shown
+    if not first:
+        return f"{last}{where} explains"
+    return f"{', '.join(first)} or {last}{where} explain"
 
 
 def _count_modes(diagnosis: Diagnosis) -> str:
@@ -155,19 +180,33 @@ def write_tension(diagnosis: Diagnosis) -> str:
     sentences = []
     if verdict.is_few and (off := _off_percent(after_n)):
         sentences.append(f"So few data decide little: the tension may be off by {off} (95 %).")
-    if math.isfinite(after_n.mean):
-        care = ""
-        if verdict.is_open:
-            care = ", not to be relied on while the gap is open"
-        elif verdict.is_doubted:
-            care = ", not to be relied on while it may be another hanger"
-        elif verdict.is_description_off:
-            care = ", not to be relied on while the description may be off"
-        wording = short_tension_words(after_n, tension_unit(diagnosis))
-        sentences.append(f"{AFTER.capitalize()}, the tension is {wording}{care}.")
+    if after := _tension_after(diagnosis):
+        sentences.append(f"{after[0].upper()}{after[1:]}.")
     if verdict.claim is not None:
         sentences.append(_HELD_OUT[verdict.holds_out])
     return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _tension_after(diagnosis: Diagnosis) -> str:
+    """Return the tension and whether to rely on it; empty where it is not known."""
+    verdict, after_n = diagnosis.verdict, diagnosis.tension_after_n
+    if not math.isfinite(after_n.mean):
+        return ""
+    care = ""
+    if verdict.is_open:
+        care = ", not to be relied on while the gap is open"
+    elif verdict.is_doubted:
+        care = ", not to be relied on while it may be another hanger"
+    elif verdict.is_description_off:
+        care = ", not to be relied on while the description may be off"
+    return f"{AFTER}, the tension is {short_tension_words(after_n, tension_unit(diagnosis))}{care}"
+
+
+def write_line(diagnosis: Diagnosis, at: datetime) -> str:
+    """Return the verdict, the tension after it and the date, in one line."""
+    verdict = diagnosis.verdict.outcome.value
+    parts = (f"{verdict[0].lower()}{verdict[1:]}", _tension_after(diagnosis))
+    return f"Gap diagnosis of {at:%Y-%m-%d}: {'; '.join(part for part in parts if part)}."
 
 
 def _off_percent(tension_n: TensionEstimate) -> str:
@@ -271,8 +310,12 @@ def _give_tension(diagnosis: Diagnosis) -> Fact | None:
     unit = tension_unit(diagnosis)
     before = short_tension_words(before_n, unit)
     if math.isnan(after_n.mean):
-        return ("Tension", before, "by the baseline alone")
-    return ("Tension", short_tension_words(after_n, unit), f"{AFTER}; baseline alone {before}")
+        return ("Tension", before, f"by {diagnosis.baseline} alone")
+    return (
+        "Tension",
+        short_tension_words(after_n, unit),
+        f"{AFTER}; {diagnosis.baseline} alone {before}",
+    )
 
 
 def _give_fit(verdict: GapVerdict) -> Fact | None:

@@ -238,13 +238,13 @@ def _of_nominal(data: HangerReport) -> Fact:
     if share is None:
         return ("Of nominal", "not known", "the hanger has no nominal tension")
     if not data.now.is_determined:
-        return ("Of nominal", "not determined", f"90 % interval {formatting.span(share)} %")
+        return (
+            "Of nominal",
+            data.now.of_nominal_words,
+            f"90 % interval {formatting.span(share)} %",
+        )
     nominal = formatting.rounded_tension(data.hanger.nominal_tension_n, data.tension_unit)
-    return (
-        "Of nominal",
-        rounded_percent(share.mean / 100, share.width / 200),
-        f"90 % interval; nominal {nominal}",
-    )
+    return ("Of nominal", data.now.of_nominal_words, f"90 % interval; nominal {nominal}")
 
 
 def _against_known(hanger: Hanger) -> Fact | None:

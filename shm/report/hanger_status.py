@@ -17,6 +17,7 @@ from shm.report import formatting
 from shm.report.formatting import NORMAL_90, Interval
 from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedTest
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
+from shm.values.posterior import DIAGNOSE
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
 from shm.watch.alert_text import lead_of, look_again, quantity_words, size_words
 
@@ -40,10 +41,7 @@ UNDETERMINED = "These modes do not determine the tension"
 
 _LEADS: dict[str, tuple[str, str]] = {
     "no hanger tested": ("No hanger has been tested yet.", f"Test all {NEXT_TEST}."),
-    "all steady": (
-        "No change detected on {many}.",
-        "No action is needed before the next planned test.",
-    ),
+    "quiet": ("{found}", "No action is needed before the next planned test."),
     "untested": ("{name}: no test yet.", f"Test it {NEXT_TEST}."),
     "waiting": (
         "{name}: {tests}, no result yet.",
@@ -68,7 +66,8 @@ _LEADS: dict[str, tuple[str, str]] = {
     ),
     "first": (
         "{name}: tension {tension}, and no test after its baseline.",
-        f"Choose a warmer or colder day {NEXT_TEST}, so that the baseline covers temperature.",
+        "No action is needed before the next planned test: choose a warmer or colder day for it, "
+        "so that the baseline covers temperature.",
     ),
     "first of sensors": (
         "{name}: tension {tension}, and no test after its baseline.",
@@ -83,7 +82,7 @@ _LEADS: dict[str, tuple[str, str]] = {
         f"{{again}} {WEEK}: it lacks modes of the baseline.",
     ),
     "rough": (
-        "{name}: no change detected, but its tests are too few or too rough to show one "
+        "{name}: no change detected, but its tests are too few or too imprecise to show one "
         "(tension {shift}).",
         f"Identify more modes {NEXT_TEST}, or test more often.",
     ),
@@ -148,8 +147,8 @@ class HangerMessage:
 
     @property
     def needs_action(self) -> bool:
-        """Beyond what is planned anyhow."""
-        return self.is_known and self.status not in QUIET
+        """Return True if the action is due by some time, or the state is not a quiet one."""
+        return self.is_known and (self.urgency != "none" or self.status not in QUIET)
 
     @property
     def is_known(self) -> bool:
@@ -216,19 +215,28 @@ def bridge_message(messages: Mapping[int, HangerMessage]) -> BridgeMessage:
         place = order.index(one.status) if one.status else len(order)
         return -URGENCIES.index(one.urgency), place, bool(one.notes)  # what nobody noted first
 
-    if needing:
-        first, *others = sorted(needing, key=rank)
-        more = _how_soon(needing, others)
-        return BridgeMessage(worst, needing[first].lead, more, needing[first].notes)
     if not known:
         return BridgeMessage(None, _lead("no hanger tested"))
     untested = [str(id_) for id_ in messages if id_ not in known]
-    many = formatting.counted(len(known), "hanger")
-    return BridgeMessage(
-        worst,
-        _lead("all steady", many=many),
-        f"Not tested yet: {listed(untested)}." if untested else "",
+    more = f"Not tested yet: {listed(untested)}." if untested else ""
+    if needing:
+        first, *others = sorted(needing, key=rank)
+        more = f"{_how_soon(needing, others)} {more}".strip()
+        return BridgeMessage(worst, needing[first].lead, more, needing[first].notes)
+    return BridgeMessage(worst, _lead("quiet", found=_found(known.values())), more)
+
+
+def _found(known: Iterable[HangerMessage]) -> str:
+    """Return on how many hangers no change was detected, and on how many none can be judged."""
+    statuses = [each.status for each in known]
+    n_first = statuses.count(Status.FIRST)
+    compared = formatting.counted(len(statuses) - n_first, "hanger")
+    first = f"{formatting.counted(n_first, 'hanger')} {'has' if n_first == 1 else 'have'}"
+    sentences = (
+        f"No change detected on {compared}." if n_first < len(statuses) else "",
+        f"{first} a baseline only: no change can be judged yet." if n_first else "",
     )
+    return " ".join(sentence for sentence in sentences if sentence)
 
 
 _SOON = {"none": "when convenient", "next_test": NEXT_TEST, "week": WEEK, "today": TODAY}
@@ -250,6 +258,8 @@ def hanger_message(known: HangerSummary) -> HangerMessage:
     status, lead = _decide(known)
     statement = HangerMessage(status, lead, known.notes if status else ())
     caveats = known.tension.caveats if known.tension else ()
+    if known.diagnosed:
+        caveats = (*(each.replace(DIAGNOSE, "") for each in caveats), known.diagnosed)
     return replace(statement, reasons=(*statement.beyond_lead(known.warnings), *caveats))
 
 

@@ -26,6 +26,7 @@ from shm.values import (
 )
 from shm.values.bar_description import BarDescription, describe_bar
 from shm.values.messages import Lead
+from shm.values.rounding import rounded_percent
 from shm.watch.control_chart import ControlChart
 
 LATEST_TEST = "the latest test"
@@ -68,8 +69,9 @@ class HangerSummary:
     first, `open_alerts` how many nobody took note of; `notes` say what people did about them.
     `unwatched` says that nothing has looked at the hanger for too long; `undated` names the tests
     dated by their receipt; `sensors` are those of the latest test, or those that stay. `course`
-    is None without a period; `control` is the chart of a control hanger, None of any other. `tests`
-    counts the stored ones, also those without a result yet.
+    is None without a period; `control` is the chart of a control hanger, None of any other.
+    `diagnosed` is the line of a gap diagnosis that no change has outdated. `tests` counts the
+    stored ones, also those without a result yet.
     """
 
     hanger: Hanger
@@ -88,6 +90,7 @@ class HangerSummary:
     sensors: tuple[ResponsePoint, ...] = ()
     course: PeriodSummary | None = None
     control: ControlChart | None = None
+    diagnosed: str = ""
     tests: int = 0
 
     @cached_property
@@ -207,6 +210,16 @@ class HangerSummary:
         """Return the tension in percent of the nominal one; None where the hanger has none."""
         nominal_n = self.hanger.nominal_tension_n
         return self.tension_n.scaled(100 / nominal_n) if self.tension_n and nominal_n > 0 else None
+
+    @property
+    def of_nominal_words(self) -> str:
+        """Return it as every face shows it; empty before the first test."""
+        fraction = self.of_nominal
+        if fraction is None:
+            return "" if self.tension_n is None else "no nominal"
+        if not self.is_determined:
+            return "not determined"
+        return rounded_percent(fraction.mean / 100, fraction.width / 200)
 
     @property
     def document(self) -> dict[str, Any]:

@@ -224,7 +224,17 @@ class Paper:
     def signatures(self) -> tuple[tuple[str, str], ...]:
         """Return who answers for it: the words, and the name as far as it is given."""
         by = self.letterhead
-        return (("Prepared by", by.prepared_by), ("Checked by", by.checked_by), ("Date", ""))
+        return (
+            ("Prepared by", by.prepared_by),
+            ("Checked by", by.checked_by),
+            ("Date", ""),
+            ("Signature", ""),
+        )
+
+    @property
+    def revision_line(self) -> str:
+        """Return the revision, as it stands above the signatures."""
+        return f"Revision: {self.revision or 'not stated'}"
 
     @property
     def name(self) -> str:

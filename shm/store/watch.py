@@ -266,6 +266,11 @@ def list_selected_models(store: Repository) -> dict[int, str]:
     return {row.hanger: row.model for row in store.rows(held)}
 
 
+def list_diagnosed_hangers(store: Repository) -> frozenset[int]:
+    """List the hangers of which a diagnosis is stored."""
+    return frozenset(store.scalars(sa.select(diagnoses.c.hanger).distinct()))
+
+
 def find_latest_diagnosis(store: Repository, hanger: int) -> StoredDiagnosis | None:
     """Return the latest diagnosis of a hanger; None without one that this version reads."""
     query = sa.select(diagnoses).where(diagnoses.c.hanger == hanger)

@@ -114,6 +114,8 @@ WITHOUT_MODEL = "frequencies"
 
 _DO_NOT_USE, _SAMPLER_FAILED = "Do not use this tension.", "The sampler failed"
 _ENDS_DECIDE, _ORDERS_DECIDE = "The ends decide", "The orders decide"
+DIAGNOSE = "; `shm gap diagnose` finds the cause"
+"""Of a caveat: what a diagnosis that was made replaces."""
 _MISSES = "misses the measured frequencies"
 _INCLINATION_DECIDES, _SAMPLED_BY_EMCEE = "The inclination decides", "Sampled by emcee"
 COUNTED_ONCE, LEFT_OUT = "Counted once", "Left out"
@@ -288,7 +290,7 @@ class Posterior(Displayable):
             found.append(
                 "The description does not fit: its section, density, modulus and length would be "
                 f"off by {self.description_off_sd:.0f} of their standard deviations. Check "
-                "diameter, length and material; `shm gap diagnose` says which would fit."
+                f"diameter, length and material{DIAGNOSE}."
             )
         found += [each for each in self.remarks if not each.startswith(_NO_FAULTS)]
         return tuple(found)
@@ -317,7 +319,7 @@ class Posterior(Displayable):
         return (
             f"{self.model} {_MISSES} by {self.misfit_percent:.1f} % (root mean square): the "
             "description or the model class does not fit this hanger. Check the "
-            f"orders of the modes and the description; `shm gap diagnose` finds the cause.{by_far}"
+            f"orders of the modes and the description{DIAGNOSE}.{by_far}"
         )
 
     def _compare_with_string(self) -> str:

@@ -391,7 +391,7 @@ def message_of_agreeing(
 
 
 def _details(sizes: str, change: Change | None, beyond: Sequence[Drift], *, is_call: bool) -> str:
-    """Return the interval of a stiffness, and how sure it is; each probability once."""
+    """Return the interval of a stiffness, and the probabilities that the document gives."""
     groups = probable_groups(change)
     lead = _gravest(beyond) if beyond else groups[0][0] if groups else None
     half = "± is half the 90 % interval"
@@ -405,15 +405,21 @@ def _details(sizes: str, change: Change | None, beyond: Sequence[Drift], *, is_c
         by_value.setdefault(_probability(each.probability), []).append(
             words + _threshold_words(each)
         )
+    sentences = [
+        "; ".join(part for part in (half, sizes) if part),
+        *(f"The probability {listed(words)} is {value}" for value, words in by_value.items()),
+    ]
     if change is not None:
-        # What is beyond its threshold has changed, whatever the newest tests add.
-        anything = max([change.probability, *(each.probability for each in beyond)])
-        by_value.setdefault(_probability(anything), []).append("that anything changed")
-    stated = ", ".join(f"{value} {listed(words)}" for value, words in by_value.items())
-    parts = [half, sizes, f"probability {stated}" if stated else ""]
+        detected = _probability(change.probability)
+        sentences.append(
+            "The change detector gives the same probability of any change"
+            if detected in by_value
+            else f"The probability of any change, by the change detector, is {detected}"
+        )
     if is_call and change is not None:
-        parts.append(f"mean time between false alarms at least {change.limit_years:.3g} years")
-    return f"Details: {'; '.join(part for part in parts if part)}."
+        years = f"{change.limit_years:.3g} years"
+        sentences.append(f"The mean time between false alarms is at least {years}")
+    return f"Details: {'. '.join(sentences)}."
 
 
 def _probability(value: float) -> str:

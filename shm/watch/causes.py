@@ -164,9 +164,8 @@ def _columns_on(
 
     def about(place: float) -> FloatArray:
         """At a place, and what the way to its neighbours adds: one sd (2, n)."""
-        low, here, high = (
-            by_mass(place + way, LIMITS.lamp_units) for way in (-LIMITS.apart, 0, LIMITS.apart)
-        )
+        ways = -LIMITS.apart, 0, LIMITS.apart
+        low, here, high = (by_mass(place + way, LIMITS.lamp_units) for way in ways)
         return np.array([here, (high - low) / 2 / math.sqrt(3)])
 
     def by_loss(place: float, extent: float) -> FloatArray:

@@ -344,15 +344,6 @@ class Reader:
         self._residual = np.zeros(len(self.modes))
         self._residual = self._own_residual([self._seen(test) for test in usable])
 
-    @property
-    def slopes(self) -> FloatArray:
-        """Return how the log frequencies of the modes go with the quantities, at the baseline."""
-        planes = np.array([PLANES.index(plane) for plane, _ in self.modes], dtype=int)
-        orders = np.array([order - 1 for _, order in self.modes], dtype=int)
-        n = len(self.modes)
-        its = SeenModes(Conditions(), planes, orders, np.arange(n), np.zeros(n), np.ones(n))
-        return self._likelihood.linear(np.zeros(len(self.quantities)), its).slopes
-
     def reading(self, test: ModalTest, time: datetime) -> Reading:
         """Return what a test by itself states of the quantities; it was made at `time`.
 

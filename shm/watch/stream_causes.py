@@ -18,7 +18,6 @@ from shm.watch.change_point import evidence_of, sums_of
 from shm.watch.limits import LIMITS
 from shm.watch.options import WatchOptions
 from shm.watch.posterior_summary import SummaryContext, rank_causes
-from shm.watch.quantities import MeasuredMode
 from shm.watch.readings import Reader
 from shm.watch.state_sums import effects_of
 from shm.watch.stream_reading import ModeTable, baseline_of
@@ -69,25 +68,29 @@ def find_cause(
     nothing = StreamCause((Moved(UNEXPLAINED, 1.0, np.nan, np.nan),), moved, None)
     if not known.any():
         return nothing
-    own = sorted(np.flatnonzero(known).tolist(), key=lambda each: table.modes[each])
-    keys, level = tuple(table.modes[each] for each in own), table.level[own]
+    keys = [key for key, its in zip(table.modes, known, strict=True) if its]
+    level, sd = table.level[known], np.sqrt(table.spread[known] + LIMITS.day_sd**2)
     posterior, bar = baseline_of(baseline, hanger, keys, level)
-    reader = Reader(posterior, [_as_test(keys, level)], bar)
-    slopes, options = reader.slopes, WatchOptions.of(hanger.assumptions)
+    before = _as_test("before", keys, level, np.full(len(keys), LIMITS.day_sd))
+    reader = Reader(posterior, [before], bar)
+    after = _as_test("after", keys, level + moved[known], sd)
+    rows = [reader.reading(each, _NEVER).modes for each in (before, after)]
+    modes = [each for each in rows if each is not None]
+    options = WatchOptions.of(hanger.assumptions)
     structure = structure_of(reader.quantities, reader.columns, options)
     n = structure.layout.n
     columns = np.zeros((2, n, len(structure.layout.prior_sd)))
-    columns[:, :, :n], columns[:, :, n : n + len(slopes.T)] = np.eye(n), slopes
-    of_day = np.full(n, LIMITS.day_sd**2)
-    wander = wander_sd * slopes[:, 0]
+    columns[:, :, :n] = np.eye(n)
+    columns[:, :, structure.layout.change][..., n:] = [each.slopes for each in modes]
+    wander = wander_sd * columns[:, :, n]
     sums = sums_of(
         columns,
-        np.array([np.zeros(n), moved[own]]),
-        np.array([of_day, table.spread[own] + of_day]),
-        np.tile(np.outer(wander, wander) / 2, (2, 1, 1, 1)),
+        np.array([each.values for each in modes]),
+        np.array([each.variances for each in modes]),
+        (wander[:, :, None] * wander[:, None] / 2)[:, None],
     )
     evidence = evidence_of(sums, np.array([0.0, 1.0]), 1, structure.layout, structure.directions)
-    effects = effects_of(keys, slopes)
+    effects = effects_of(reader.modes, modes[1].slopes)
     subject = SummaryContext(reader.quantities, hanger, options, _NEVER, 0.0, *effects)
     found = rank_causes(subject, evidence)
     first = {found[0].quantity, *found[0].together}
@@ -132,6 +135,15 @@ def _is_clock(moved: Sequence[Moved]) -> bool:
     return moved[0].quantity == TIMEBASE
 
 
-def _as_test(keys: Sequence[MeasuredMode], log_hz: FloatArray) -> ModalTest:
-    modes = zip(keys, np.exp(log_hz).tolist(), strict=True)
-    return ModalTest("before", tuple(Mode(*key, hz, LIMITS.day_sd * hz) for key, hz in modes))
+def _as_test(
+    name: str, keys: Sequence[tuple[Plane, int]], log_hz: FloatArray, sd: FloatArray
+) -> ModalTest:
+    return ModalTest(
+        name,
+        tuple(
+            Mode(plane, order, hz, its * hz)
+            for (plane, order), hz, its in zip(
+                keys, np.exp(log_hz).tolist(), sd.tolist(), strict=True
+            )
+        ),
+    )

@@ -22,10 +22,10 @@ from tests.benchmarks.blind_scores import (
     CLAIMS,
     Row,
     find_contradictions,
-    interval,
     score,
     table,
 )
+from tests.benchmarks.shares import interval
 
 TRIALS = Path(__file__).resolve().parents[2] / "docs" / "trials"
 BESIDE, SEALED = "blind_trial/hangers.csv", "blind_trial/truth.json"

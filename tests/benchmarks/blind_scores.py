@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
 
 from shm.diagnosis_document import diagnosis_of
 from shm.report.diagnosis_summary import write_lead
@@ -17,6 +16,7 @@ from shm.values import Diagnosis, Outcome
 from shm.values.leading import MIN_NO_GAP_PROBABILITY
 from shm.values.posterior import ENOUGH_EFFECTIVE
 from shm.values.verdict import MAX_RMS_Z, MIN_FIT_P_VALUE, is_excluded
+from tests.benchmarks.shares import interval
 
 SURE, STATED = 0.8, 0.9
 MANY_DATA = 60
@@ -191,13 +191,6 @@ class Mark:
     asked: str
     reached: str
     is_met: bool | None = None
-
-
-def interval(k: int, n: int) -> tuple[float, float]:
-    """Return the 90 % interval of a fraction (Clopper and Pearson)."""
-    low = float(beta.ppf(0.05, k, n - k + 1)) if k else 0.0
-    high = float(beta.ppf(0.95, k + 1, n - k)) if k < n else 1.0
-    return low, high
 
 
 def count(

@@ -1,7 +1,7 @@
 """The gap diagnosis without each of its mechanisms, on hangers that others wrote.
 
 python tests/benchmarks/gap_ablation.py --hangers 24 --seed 41
-python tests/benchmarks/gap_ablation.py --only "no mirrored places" "exact thermometers"
+python tests/benchmarks/gap_ablation.py --only "no lobes" "no mirrored places"
 
 The hangers are those of a blind trial with that seed (`blind_trial.py`), the truth in hand. Each
 row leaves out one mechanism: how many answers are right, how many causes are named first and in
@@ -15,13 +15,11 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 
@@ -31,9 +29,9 @@ from shm.values import Outcome
 from shm.values.posterior import ENOUGH_EFFECTIVE
 from tests.benchmarks.blind_scores import SURE, Row
 from tests.benchmarks.blind_trial import diagnose_hanger, make_hanger, plan_hangers
+from tests.benchmarks.left_out import Change, without
 
-Patches = Sequence[Any]
-DIAGNOSE = import_module("shm.gap.diagnose")  # the package has a function of this name
+diagnosing = import_module("shm.gap.diagnose")  # the package has a function of that name
 
 
 def one_peak(lobes: Any, target: Any, peaks: Sequence[Any]) -> None:
@@ -48,53 +46,6 @@ def unchanged(observations: Any) -> Any:
     return observations.sd
 
 
-VARIANTS: dict[str, Callable[[], Patches]] = {
-    "whole": lambda: [],
-    "whole, other seed": lambda: [],
-    "no lobes": lambda: [patch.object(sampling._Lobes, "__init__", one_peak)],
-    "no draws of an update": lambda: [
-        patch.object(search, "_with_draws_of_update", lambda _, fit, rng: fit)
-    ],
-    "no proposals without the effect": lambda: [
-        patch.object(sampling, "_HOW", replace(sampling._HOW, without=1e-9))
-    ],
-    "only exact linear terms": lambda: [
-        patch.object(problem.GapProblem, "settle", lambda of, peak: None)
-    ],
-    "stated errors not drawn together": lambda: [patch.object(noise, "drawn_together", unchanged)],
-    "planes' errors never alike": lambda: [
-        patch.object(
-            noise,
-            "_correlations",
-            lambda of: [(np.eye(of.design.frequencies), 1.0)],
-        )
-    ],
-    "shapes as certain as stated": lambda: [
-        patch.object(noise, "_factors_of_shapes", lambda of: [(1.0, 1.0)])
-    ],
-    "remainders over orders alone": lambda: [patch.object(noise, "_patterns", noise._over_orders)],
-    "no mirrored places": lambda: [
-        patch.object(search.Search, "_with_mirrored", lambda of, target, peaks: peaks)
-    ],
-    "exact thermometers": lambda: [
-        patch.object(problem.GapProblem, "settle_temperatures", lambda of, hypothesis, z: False)
-    ],
-    "no richer class afterwards": lambda: [
-        patch.object(DIAGNOSE, "find_richer", lambda of, hypothesis: None)
-    ],
-    "no gross errors": lambda: [patch.object(outliers, "_find_gross_error", lambda found: None)],
-    "laws hold": lambda: [
-        patch.object(search, "allow_for_laws", _hold_laws),
-    ],
-    "groups by evidence alone": lambda: [patch.object(search, "group", _group_near)],
-    "idle pairs in groups": lambda: [patch.object(search, "_idle", lambda pair, alone: False)],
-    "baseline is the likeliest class alone": lambda: [patch.object(baseline, "_OF_NOTE", 0.999)],
-    "Laplace's method alone": lambda: [
-        patch.object(search.Search, "sample_probable", lambda of, chance: None)
-    ],
-}
-
-
 def _hold_laws(of: Any, before: Any, fit: Any, rng: Any) -> Any:
     return ByLaws(0.0, 0.0, fit.draws)
 
@@ -104,13 +55,31 @@ def _group_near(causes: Sequence[Any], near: Sequence[bool]) -> tuple[tuple[int,
     return (members,) if len(members) > 1 else ()
 
 
-@contextmanager
-def variant(name: str) -> Iterator[None]:
-    """Run with a mechanism left out."""
-    with ExitStack() as stack:
-        for each in VARIANTS[name]():
-            stack.enter_context(each)
-        yield
+VARIANTS: dict[str, Sequence[Change]] = {
+    "whole": [],
+    "whole, other seed": [],
+    "no lobes": [(sampling._Lobes, "__init__", one_peak)],
+    "no draws of an update": [(search, "_with_draws_of_update", lambda _, fit, rng: fit)],
+    "no proposals without the effect": [(sampling, "_HOW", replace(sampling._HOW, without=1e-9))],
+    "only exact linear terms": [(problem.GapProblem, "settle", lambda of, peak: None)],
+    "stated errors not drawn together": [(noise, "drawn_together", unchanged)],
+    "planes' errors never alike": [
+        (noise, "_correlations", lambda of: [(np.eye(of.design.frequencies), 1.0)])
+    ],
+    "shapes as certain as stated": [(noise, "_factors_of_shapes", lambda of: [(1.0, 1.0)])],
+    "remainders over orders alone": [(noise, "_patterns", noise._over_orders)],
+    "no mirrored places": [(search.Search, "_with_mirrored", lambda of, target, peaks: peaks)],
+    "exact thermometers": [
+        (problem.GapProblem, "settle_temperatures", lambda of, hypothesis, z: False)
+    ],
+    "no richer class afterwards": [(diagnosing, "find_richer", lambda of, hypothesis: None)],
+    "no gross errors": [(outliers, "_find_gross_error", lambda found: None)],
+    "laws hold": [(search, "allow_for_laws", _hold_laws)],
+    "groups by evidence alone": [(search, "group", _group_near)],
+    "idle pairs in groups": [(search, "_idle", lambda pair, alone: False)],
+    "baseline is the likeliest class alone": [(baseline, "_OF_NOTE", 0.999)],
+    "Laplace's method alone": [(search.Search, "sample_probable", lambda of, chance: None)],
+}
 
 
 def describe(name: str, rows: Sequence[Row]) -> str:
@@ -155,7 +124,7 @@ def main() -> int:
         print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
         for name in given.only:
             rows = []
-            with variant(name):
+            with without(VARIANTS[name]):
                 for plan, truth in zip(plans, truths, strict=True):
                     seed = 2 if name == "whole, other seed" else 1
                     answer = diagnose_hanger(Path(folder) / plan.name, (), seed)

@@ -28,7 +28,7 @@ from shm.gap import GapOptions
 from shm.gap.bridge_diagnosis import diagnose_jointly, examine_hanger
 from shm.gap.shared_evidence import HangerEvidence
 from shm.values import PLANES, BridgeDiagnosis, Diagnosis, Hanger, ModalTest, Mode
-from tests.benchmarks.worlds import share
+from tests.benchmarks.shares import share
 from tests.worlds import finite_elements as world
 from tests.worlds.bars import (
     GRAVITY_M_S2,

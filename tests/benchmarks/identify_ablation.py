@@ -15,7 +15,6 @@ from __future__ import annotations
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 from unittest.mock import patch
@@ -39,23 +38,22 @@ from shm.identify.estimation import (
     amplitude_dependence,
     courses,
     postprocess,
-    spread,
     ssi,
 )
 from shm.identify.measuring import screening
 from shm.identify.mode_ordering import placement
 from shm.values import Hanger, Recording
+from tests.benchmarks.left_out import Change, without
 from tests.helpers.struck import STRUCK, recordings
 from tests.worlds import recordings as world
 from tests.worlds import struck_bar
 
-CONSTANTS: Mapping[str, tuple[Any, str, float] | None] = {
-    "all as they are": None,
-    "the error of the law": (amplitude_dependence, "_LAW_ERROR", 0.0),
-    "others' shifts when unsure": (spread, "_BY_CHANCE", -1.0),
-    "the overlap of stretches": (amplitude_dependence, "OVERLAP", 1.0),
-    "half as sure a phase": (courses, "_LEAST_RATIO", 4.0),
-    "stretches twice as long": (courses, "_STRETCH_SECONDS", 1.0),
+CONSTANTS: Mapping[str, Sequence[Change]] = {
+    "all as they are": (),
+    "the error of the law": [(amplitude_dependence, "_LAW_ERROR", 0.0)],
+    "the overlap of stretches": [(amplitude_dependence, "OVERLAP", 1.0)],
+    "half as sure a phase": [(courses, "_LEAST_RATIO", 4.0)],
+    "stretches twice as long": [(courses, "_STRETCH_SECONDS", 1.0)],
 }
 AS_FOUND = "any correction"
 Errors = dict[str, list[tuple[float, float]]]
@@ -99,7 +97,7 @@ def without_constants(cases: Iterator[world.Recording]) -> None:
 
         def all_ways(found: Finding, measurement: Any, hz: list[float] = truths_hz) -> Finding:
             for name, changed in CONSTANTS.items():
-                with patch.object(*changed) if changed else ExitStack():
+                with without(changed):
                     put(errors, name, hz, own(found, measurement).modes)
             put(errors, AS_FOUND, hz, found.modes)
             corrected = own(found, measurement)
@@ -186,7 +184,7 @@ def guided(seed: int) -> Iterator[Test]:
 
 
 Draw = Callable[[int], Iterator[Test]]
-STEPS: Mapping[str, tuple[tuple[tuple[Any, str, Any], ...], Draw]] = {
+STEPS: Mapping[str, tuple[Sequence[Change], Draw]] = {
     "close pairs": (
         ((ssi, "split_close_pairs", lambda one, again, *_: (one, again)),), simulated(),
     ),
@@ -226,9 +224,7 @@ def without_steps(names: Sequence[str], seeds: Sequence[int]) -> None:
         for seed in seeds:
             for test in draw(seed):
                 for is_kept, count in counts.items():
-                    with ExitStack() as stack:
-                        for each in () if is_kept else patches:
-                            stack.enter_context(patch.object(*each))
+                    with without(() if is_kept else patches):
                         count.update(_scored(test))
             for is_kept, count in counts.items():
                 side = "with" if is_kept else "without"

@@ -10,18 +10,17 @@ how many intervals hold the tension. A mechanism that changes none of these is t
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
+import begin
 import numpy as np
 
 from shm.inference import UpdateOptions, sampling, starts, update, valley
 from shm.models import build
+from tests.benchmarks.left_out import Change, without
 from tests.benchmarks.worlds import hanger_and_tests
 
 
@@ -36,50 +35,29 @@ class Run:
     holds: bool
 
 
-def set_to(module: Any, name: str, value: Any) -> Callable[[], None]:
-    """Set a module's setting and return what sets it back."""
-    before = getattr(module, name)
-    setattr(module, name, value)
-    return lambda: setattr(module, name, before)
+def with_settings(module: Any, **settings: Any) -> list[Change]:
+    return [(module, "_SET", replace(module._SET, **settings))]
 
 
-def valley_with(**settings: Any) -> Callable[[], Callable[[], None]]:
-    return lambda: set_to(valley, "_SET", replace(valley._SET, **settings))
-
-
-def sampling_with(**settings: Any) -> Callable[[], Callable[[], None]]:
-    return lambda: set_to(sampling, "_SET", replace(sampling._SET, **settings))
-
-
-def of_one_width() -> Callable[[], None]:
+def chances_of_one_width() -> np.ndarray:
     chances = np.full(len(valley._SCALES), 1e-9)
     chances[1] = 1 - chances.sum() + chances[1]
-    return set_to(valley, "_FIRST_CHANCES", chances)
+    return chances
 
 
-VARIANTS: dict[str, Callable[[], Callable[[], None]]] = {
-    "whole": lambda: lambda: None,
-    "whole, other seed": lambda: lambda: None,
-    "one attempt": sampling_with(attempts=1),
-    "three attempts": sampling_with(attempts=3),
-    "one valley": valley_with(most_valleys=1),
-    "two valleys": valley_with(most_valleys=2),
-    "one width at first": of_one_width,
-    "no draw from the prior": valley_with(from_prior=1e-6),
-    "optima by density alone": sampling_with(tempered=1.0),
-    "half the starts": lambda: set_to(starts, "_STARTS", 6),
-    "half the points along": sampling_with(along=80),
+VARIANTS: dict[str, list[Change]] = {
+    "whole": [],
+    "whole, other seed": [],
+    "one attempt": with_settings(sampling, attempts=1),
+    "three attempts": with_settings(sampling, attempts=3),
+    "one valley": with_settings(valley, most_valleys=1),
+    "two valleys": with_settings(valley, most_valleys=2),
+    "one width at first": [(valley, "_FIRST_CHANCES", chances_of_one_width())],
+    "no draw from the prior": with_settings(valley, from_prior=1e-6),
+    "optima by density alone": with_settings(sampling, tempered=1.0),
+    "half the starts": [(starts, "_STARTS", 6)],
+    "half the points along": with_settings(sampling, along=80),
 }
-
-
-@contextmanager
-def variant(name: str) -> Iterator[None]:
-    """Run with a mechanism left out."""
-    undo = VARIANTS[name]()
-    try:
-        yield
-    finally:
-        undo()
 
 
 def run(case: Any, seed: int) -> Run:
@@ -111,12 +89,9 @@ def row(name: str, runs: list[Run], whole: list[Run]) -> str:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--hangers", type=int, default=24)
-    parser.add_argument("--seed", type=int, default=31)
-    parser.add_argument("--world", default="eight_kinds")
-    parser.add_argument("--variants", nargs="*", default=list(VARIANTS))
-    asked = parser.parse_args()
+    asked = begin.options(
+        __doc__, hangers=24, seed=31, world="eight_kinds", variants=list(VARIANTS)
+    )
     world = importlib.import_module(f"tests.worlds.{asked.world}")
     cases = world.sound_hangers(asked.seed, asked.hangers)
     print("| left out | by emcee | below 200 | s | most | evidence | worst | holds |")
@@ -124,7 +99,7 @@ def main() -> None:
     whole: list[Run] = []
     for name in asked.variants:
         seed = 2 if name == "whole, other seed" else 1
-        with variant(name):
+        with without(VARIANTS[name]):
             runs = [run(case, seed) for case in cases]
         whole = whole or runs
         print(row(name, runs, whole), flush=True)

@@ -17,7 +17,7 @@ import numpy as np
 from shm.identify.plausibility import apparent_mass_kg, ringing, signal_doubts
 from shm.simulate.state import HammerPlan, HangerState
 from shm.values import Hanger, Recording
-from tests.benchmarks.worlds import share
+from tests.benchmarks.shares import share
 from tests.worlds.simulated.hammer import hammer_test
 
 DISTURBED = (["double_hit"], ["soft_hit"], ["mains"], ["deck"], [], [])

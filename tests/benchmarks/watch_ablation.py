@@ -15,12 +15,10 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 
@@ -41,6 +39,7 @@ from shm.watch.readings import Likelihood
 from shm.watch.state_sums import StateSums, WatchState
 from shm.watch.watcher import Watcher
 from tests.benchmarks import watch_worlds
+from tests.benchmarks.left_out import Change, without
 from tests.benchmarks.watch_trial import outcomes
 from tests.contracts import watch_calls
 from tests.contracts.test_watch_contract import differ
@@ -48,8 +47,6 @@ from tests.contracts.watch_scenarios import SCENARIOS
 from tests.helpers.synthetic_readings import watch_of
 
 Row = dict[str, Any]
-Change = tuple[Any, str, Any]
-"""An object, the name of its attribute, and what stands there while a mechanism is left out."""
 
 
 def give(value: Any) -> Callable[..., Any]:
@@ -124,15 +121,6 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
 }
 
 
-@contextmanager
-def without(name: str) -> Iterator[None]:
-    """Run with a mechanism left out."""
-    with ExitStack() as stack:
-        for change in MECHANISMS[name]:
-            stack.enter_context(patch.object(*change))
-        yield
-
-
 def list_differences() -> tuple[list[str], list[str]]:
     """Return the golden histories that change, and the scenarios that are not met."""
     changed = [
@@ -198,7 +186,7 @@ def main() -> None:
         parser.error(f"no mechanism {sorted(unknown)}; there are {', '.join(MECHANISMS)}")
     if given.histories:
         for name in names:
-            with without(name):
+            with without(MECHANISMS[name]):
                 changed, unmet = list_differences()
             print(f"{name}: changed {changed}, not met {unmet}", flush=True)
         return
@@ -215,7 +203,7 @@ def main() -> None:
         if (name, world, scenario, seed, int(count)) not in done
     ]
     for name, season in tasks:
-        with without(name):
+        with without(MECHANISMS[name]):
             found = [{**row, "without": name} for row in watch_worlds.solved(season)]
         rows += found
         if given.answers:

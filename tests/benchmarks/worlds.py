@@ -30,7 +30,6 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from scipy.stats import beta
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
@@ -39,6 +38,7 @@ import shm  # noqa: E402
 from docs.filling import fill_in  # noqa: E402
 from shm.inference import UpdateOptions, select  # noqa: E402
 from shm.models import applicable, build  # noqa: E402
+from tests.benchmarks.shares import share  # noqa: E402
 
 WORLDS = {
     "finite_elements": "finite elements",
@@ -85,15 +85,6 @@ def selected(task: tuple[str, int, int, int, bool]) -> dict[str, Any]:
         "caveats": list(found.averaged.caveats),
         "faults": list(found.averaged.faults),
     }
-
-
-def share(hits: int, count: int) -> str:
-    """A share with its 90 % interval (Clopper and Pearson)."""
-    if not count:
-        return "of no case"
-    low = beta.ppf(0.05, hits, count - hits + 1) if hits else 0.0
-    high = beta.ppf(0.95, hits + 1, count - hits) if hits < count else 1.0
-    return f"{hits / count:.2f} ({low:.2f} to {high:.2f})"
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:

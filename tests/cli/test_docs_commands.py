@@ -44,8 +44,17 @@ def test_what_a_sentence_calls_a_command_is_one(page: Path) -> None:
             for parameter in NAMES[name].params
             for option in parameter.opts
         } | {"--workspace", "--help", "--debug"}
-        unknown = {word for word in words if word.startswith("--") and word.isascii()} - known
-        assert not unknown, line
+        given = {word for word in words if word.startswith("--") and word.isascii()}
+        assert not given - known, line
+        called = NAMES.get(max(spoken_of, key=len, default=""))
+        if (
+            called is not None
+            and given - {"--workspace", "--help", "--debug"}
+            and "..." not in line
+        ):
+            # A command with options is there to be typed: it has all that it needs.
+            required = [p for p in called.params if isinstance(p, click.Option) and p.required]
+            assert [p.opts[0] for p in required if not given & {*p.opts}] == [], line
 
 
 def test_every_page_has_its_place_in_the_tree() -> None:

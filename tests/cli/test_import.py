@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +21,8 @@ from shm.values import Channel, Recording
 from tests.cli.conftest import Shm
 from tests.helpers.flows import ingest
 from tests.helpers.nouns import NOW
-from tests.helpers.workspaces import make_workspace
+from tests.helpers.taken_in import ingest_quickly
+from tests.helpers.workspaces import QUICK, make_workspace, write_test
 from tests.helpers.written import write_counts
 
 HEAD = "catman\nMessung;quer\nAbtastrate;{rate:.0f} Hz\n\nZeit [s];Kraft [N];A1 [m/s²];A2 [g]\n"
@@ -310,3 +312,26 @@ def test_import_column_in_seconds(shm: Shm, workspace: Workspace, tmp_path: Path
     found = found_in(workspace, "a.csv")
     assert [channel.name for channel in found.channels] == ["b", "c"]
     assert found.sampling_rate_hz == pytest.approx(512, rel=1e-5)
+
+
+def test_example_of_init_is_doubted(shm: Shm, tmp_path: Path) -> None:
+    folder = tmp_path / "arch"
+    at_example = shm.at(folder)
+    at_example.done("init", folder)
+    doubt = "Hanger 3 is still the example that `shm init` wrote: do not use its tension."
+    action = "Replace its numbers and its name in bridge.toml by those of your bar today."
+    imported = at_example("import", export(tmp_path / "a.csv"), *SAID, "--dry-run")
+    assert f"note: {doubt} {action}" in imported.told
+    workspace = Workspace.open(folder)
+    settings = "[settings]\n" + "".join(f"{k} = {json.dumps(v)}\n" for k, v in QUICK.items())
+    described = folder / "bridge.toml"
+    described.write_text(described.read_text().replace("[settings]\n", settings, 1))
+    write_test(workspace.spool / "t1.modes.json", workspace)
+    ingest_quickly(workspace)
+    assert at_example.told("report", "--hanger", 3).count(doubt) == 1
+    assert f"{doubt} {action}" in at_example.told("status")
+    assert at_example.json("status")["hangers"][0]["state"] == doubt
+    assert doubt.split(": ")[0] in at_example("doctor").told
+    described.write_text(described.read_text().replace("example: replace by your own", "north"))
+    for verb in ("report --hanger 3", "status", "doctor"):
+        assert "is still the example" not in at_example(verb).told

@@ -12,7 +12,7 @@ import csv
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,7 @@ from tests.helpers.browsers import PHONE, Browser, a_browser, faults, undrawn_ch
 from tests.helpers.daemons import real_daemon
 from tests.helpers.flows import ingest
 from tests.helpers.slow import few_of
+from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import PASSWORD, Served, in_a_thread, served
 from tests.helpers.workspaces import START, make_workspace, write_held, write_loss, write_test
 
@@ -85,6 +86,19 @@ def site(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator
         assert [each.test.id for each in store.tests.list_all(3)][-1] == RECORDED
     with in_a_thread(), real_daemon(folder), served(workspace) as running:
         yield Site(running, workspace)
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """Return a bridge of 17 hangers, of which the tenth has lost tension."""
+    folder = tmp_path_factory.mktemp("many") / "bridge"
+    workspace = make_workspace(folder, hangers=range(1, 18))
+    for day, tension in ((0, 1.0), (10, 1.0), (20, 1.0), (40, 0.8), (50, 0.8)):
+        path = workspace.spool / f"d{day}.modes.json"
+        write_test(path, workspace, hanger=10, day=day, tension=tension)
+    ingest_quickly(workspace)
+    with served(workspace) as running:
+        yield running
 
 
 @pytest.fixture(autouse=True)
@@ -143,15 +157,53 @@ def test_page_parts_are_short(signed_in: Browser, site: Site, name: str) -> None
         assert COMMANDS.findall(page.inner_text("main")) == []
 
 
-def test_a_table_is_kept_as_a_file_that_a_spreadsheet_reads(signed_in: Browser, site: Site) -> None:
+def test_hangers_are_kept_as_numbers(signed_in: Browser, site: Site) -> None:
     page = signed_in.open(site.url)
     with page.expect_download() as download:
         page.get_by_role("button", name="Keep as CSV").first.click()
     text = download.value.path().read_text(encoding="utf-8-sig")
-    heading, row = csv.reader(text.splitlines())
-    assert heading[:2] == ["hanger", "tension, kN"]
-    assert row[0] == "Hanger 3"
-    assert re.fullmatch(r"\d{4}-\d\d-\d\d .*ago.*", row[heading.index("last test")])
+    (row,) = csv.DictReader(text.splitlines())
+    assert (row["hanger"], row["state"], row["when_to_act"]) == ("3", "Alert", "today")
+    low, mean, high = (float(row[f"tension{of}_kn"]) for of in ("_q05", "", "_q95"))
+    assert 500 < low < mean < high < 640
+    assert float(row["shift_q05_percent"]) < float(row["shift_percent"]) < 0
+    assert datetime.fromisoformat(row["last_test_at"]).tzinfo is not None
+
+
+def test_another_table_is_kept_as_shown(signed_in: Browser, site: Site) -> None:
+    page = signed_in.open(f"{site.url}/hangers/3/tests")
+    table = page.locator("main table").first
+    with page.expect_download() as download:
+        table.get_by_role("button", name="Keep as CSV").click()
+    heading, *rows = csv.reader(download.value.path().read_text("utf-8-sig").splitlines())
+    assert [name for name in heading if name] == table.locator("thead th").all_inner_texts()
+    assert any("t1" in row[0] for row in rows)
+
+
+def test_hangers_are_sorted_and_chosen(signed_in: Browser, many: Served) -> None:
+    """By number, by severity, and a number finds the hanger of that number first."""
+    page = signed_in.open(many.url)
+    names, states = (
+        page.locator(f"table.hangers tbody tr:visible {of}") for of in ("th", ".status")
+    )
+    page.get_by_role("button", name="hanger", exact=True).click()
+    assert names.all_inner_texts() == [f"Hanger {number}" for number in range(1, 18)]
+    page.get_by_role("button", name="state", exact=True).click()
+    assert names.first.inner_text() == "Hanger 10"
+    assert states.all_inner_texts()[:1] == ["Alert"]
+    field = page.get_by_label("Only rows with")
+    for words, shown in (("7", ["Hanger 7"]), ("alert", ["Hanger 10"]), ("HANGER 1", ["Hanger 1"])):
+        field.fill(words)
+        assert names.all_inner_texts() == shown, words
+    field.fill("")
+    page.set_viewport_size(PHONE)  # type: ignore[arg-type]
+    arch = page.locator("svg.elevation").bounding_box()
+    assert arch
+    assert arch["x"] + arch["width"] <= PHONE["width"]
+    for heading in ("hanger", "state", "when to act", "tension"):
+        box = page.locator("table.hangers thead th", has_text=heading).first.bounding_box()
+        assert box
+        assert box["x"] + box["width"] <= PHONE["width"], heading
 
 
 def test_the_keyboard_and_tabs_reach_every_part(signed_in: Browser, site: Site) -> None:

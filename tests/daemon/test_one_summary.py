@@ -175,6 +175,7 @@ def test_status_and_home_agree(bridge: Workspace, store: Store, client: httpx.Cl
         number = with_half(now.tension_n, force_unit(now.tension_n.mean)).removesuffix(" kN")
         assert number in told
         assert number in " ".join(home.split())
+        assert now.of_nominal_words.removesuffix(" %") in " ".join(home.split())
 
 
 def test_alert_and_hook_say_the_tension_of_the_page(bridge: Workspace, store: Store) -> None:

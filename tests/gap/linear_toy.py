@@ -8,8 +8,9 @@ from scipy.special import logsumexp
 
 from shm.gap.contract import Design, Fit, Hypothesis, Observations
 from shm.inference.likelihood import Covariance, NoiseNode
-from shm.models.effects import Conditions, Survey
-from shm.values import PLANES, FloatArray
+from shm.models.effects import Conditions
+from shm.values import FloatArray
+from tests.helpers.toy_gap import design_of
 
 MODES, TESTS, PLACES = 8, 3, 4
 FREQUENCY_SD, SHAPE_SD = 1e-4, 0.005
@@ -17,20 +18,9 @@ FREQUENCY_SD, SHAPE_SD = 1e-4, 0.005
 
 def design(temperatures: tuple[float, ...] = (0.0, 0.0, 0.0)) -> Design:
     """Every mode in every test, both components of its shape at every sensor."""
-    test, plane, order = (
-        each.ravel()
-        for each in np.meshgrid(range(TESTS), [0, 1], range(1, MODES + 1), indexing="ij")
-    )
-    mode, place, component = (
-        each.ravel() for each in np.meshgrid(range(len(test)), range(PLACES), [0, 1], indexing="ij")
-    )
-    tests = tuple(f"t{k + 1}" for k in range(TESTS))
-    places = tuple(1.0 + 2.0 * k for k in range(PLACES))
-    survey = Survey(tests, PLANES, places, True, tuple(sorted(set(temperatures))), (1.0,), ())
-    conditions = tuple(
-        Conditions(name, shift) for name, shift in zip(tests, temperatures, strict=True)
-    )
-    return Design(survey, conditions, places, test, plane, order, mode, place, component)
+    modes = [(plane, order) for plane in (0, 1) for order in range(1, MODES + 1)]
+    conditions = [Conditions(f"t{k}", shift) for k, shift in enumerate(temperatures, 1)]
+    return design_of(conditions, modes, tuple(1.0 + 2.0 * k for k in range(PLACES)), True)
 
 
 def observations(value: FloatArray, of: Design | None = None) -> Observations:

@@ -48,22 +48,30 @@ def attribution(
     )
 
 
-def test_a_group_of_causes_that_were_only_screened_is_answered_by_what_is_unexplained() -> None:
-    found = attribution(cause("point_mass", 0.5, None, 0), cause("sag", 0.4, None, 0))
+MASS_FIT, SAG_FIT = a_fit("mass"), a_fit("sag")
+
+
+@pytest.mark.parametrize(
+    ("mass", "sag", "chances", "grouped", "expected"),
+    [
+        (None, None, (0.5, 0.4), True, [(1.0, UNEXPLAINED)]),  # only screened
+        (None, SAG_FIT, (0.5, 0.4), True, [(0.4, SAG_FIT)]),  # those that were fitted
+        (MASS_FIT, SAG_FIT, (0.8, 0.1), False, [(0.8, MASS_FIT)]),  # not another ungrouped one
+    ],
+)
+def test_a_leading_group_is_answered_by_its_fitted_members(
+    mass: Fit | None,
+    sag: Fit | None,
+    chances: tuple[float, float],
+    grouped: bool,
+    expected: list[tuple[float, Fit]],
+) -> None:
+    of = 0 if grouped else None
+    found = attribution(
+        cause("point_mass", chances[0], mass, of), cause("sag", chances[1], sag, of)
+    )
     assert found.leading is not None
-    assert answered(found) == [(1.0, UNEXPLAINED)]
-
-
-def test_a_leading_group_is_answered_by_those_of_its_members_that_were_fitted() -> None:
-    fit = a_fit("sag")
-    found = attribution(cause("point_mass", 0.5, None, 0), cause("sag", 0.4, fit, 0))
-    assert answered(found) == [(0.4, fit)]
-
-
-def test_a_cause_alone_is_answered_by_its_own_fit_and_not_by_another_ungrouped_one() -> None:
-    mass, sag = a_fit("mass"), a_fit("sag")
-    found = attribution(cause("point_mass", 0.8, mass), cause("sag", 0.1, sag))
-    assert answered(found) == [(0.8, mass)]
+    assert answered(found) == expected
 
 
 @pytest.mark.parametrize(
@@ -79,10 +87,9 @@ def test_where_no_cause_leads_it_is_no_gap_or_something_unknown(
 
 def test_all_that_was_fitted_is_possible_with_its_probability() -> None:
     """A tension is averaged over them; what was only screened has no draws to add."""
-    sag = a_fit("sag")
-    found = possible(attribution(cause("point_mass", 0.5, None), cause("sag", 0.4, sag)))
+    found = possible(attribution(cause("point_mass", 0.5, None), cause("sag", 0.4, SAG_FIT)))
     assert [weight for weight, _ in found] == pytest.approx([0.01, 0.05, 0.4])
-    assert [fit for _, fit in found] == [BASELINE, UNEXPLAINED, sag]
+    assert [fit for _, fit in found] == [BASELINE, UNEXPLAINED, SAG_FIT]
 
 
 @pytest.mark.parametrize(

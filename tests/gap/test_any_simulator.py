@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -55,21 +55,18 @@ def test_the_evidence_of_a_line_is_that_of_the_normal_distribution() -> None:
     assert fit.log_evidence == pytest.approx(np.logaddexp.reduce(log), abs=0.2)
 
 
-def test_one_point_at_a_time_and_all_at_once_are_the_same() -> None:
-    """A scalar function gives what a vectorised one does."""
-    one = diagnose_simulator(LINE, READINGS)
-    other = diagnose_simulator(replace(LINE, vectorised=True), READINGS)
-    assert one.named == other.named == ("offset",)
-    assert one.summary() == other.summary()
-
-
 def test_probabilities_add_to_one_and_the_summary_names_the_cause() -> None:
-    answer = diagnose_simulator(LINE, READINGS, candidates=[{"x": 0.0}, {"x": 1.7}])
+    """A scalar function gives what a vectorised one does."""
+    candidates = [{"x": 0.0}, {"x": 1.7}]
+    answer = diagnose_simulator(LINE, READINGS, candidates=candidates)
     assert sum(float(str(row["probability"])) for row in answer.to_records()) == pytest.approx(1)
     assert "offset" in answer.summary().splitlines()[0]
+    assert answer.named == ("offset",)
     assert answer.shrinkage.held_out_after < answer.shrinkage.held_out_before
     assert answer.next_readings[0].condition == {"x": 0.0}  # where the slope alone can give nothing
     assert answer.causes[0].size["offset"][0] == pytest.approx(0.4, abs=0.2)
+    other = diagnose_simulator(replace(LINE, vectorised=True), READINGS, candidates=candidates)
+    assert other.summary() == answer.summary()
 
 
 def test_without_stated_deviations_a_large_offset_is_found_all_the_same() -> None:
@@ -167,34 +164,38 @@ def test_an_effect_that_fails_is_named(predict: Predict, said: str, vectorised: 
 
 
 @pytest.mark.parametrize(
-    ("predict", "said"),
+    ("predict", "vectorised", "refused", "said"),
     [
-        (lambda p, at: p["slope"] * at["x"], "not observables by their names"),
-        (lambda p, at: {"y": math.exp(p["slope"])}, "leave out vectorised=True"),
-        (lambda p, at: {"y": np.zeros(3)}, "one number for each set"),
+        (lambda p, at: p["slope"] * at["x"], True, UsageError, "not observables by their names"),
+        (lambda p, at: {"y": math.exp(p["slope"])}, True, UsageError, "out vectorised=True"),
+        (lambda p, at: {"y": np.zeros(3)}, True, UsageError, "one number for each set"),
+        (lambda p, at: {"y": np.nan * p["slope"]}, False, BadInput,
+         "no prediction of the simulator is finite"),
     ],
-)
-def test_a_function_that_takes_no_arrays_is_refused_with_a_remedy(
-    predict: Predict, said: str
+)  # fmt: skip
+def test_a_function_without_numbers_is_refused_with_a_remedy(
+    predict: Predict, vectorised: bool, refused: type[Exception], said: str
 ) -> None:
+    with pytest.raises(refused, match=said):
+        diagnose_simulator(replace(LINE, predict=predict, vectorised=vectorised), READINGS)
+
+
+@pytest.mark.parametrize(
+    ("ask", "said"),
+    [
+        (lambda: Prior("logarithmic", -1.0, 1.0), "cannot be"),
+        (lambda: replace(LINE, effects=[SimulatorEffect("turned", LINE.parameters, line)]),
+         "Named twice in a simulator: slope"),
+        (lambda: replace(LINE, effects=[SimulatorEffect("same", {}, line)]),
+         "effect same has no parameters"),
+        (lambda: diagnose_simulator(LINE, [*READINGS, Reading({"x": 1.0}, "z", 1.0, 0.1)]),
+         "predicts no 'z'"),
+        (lambda: diagnose_simulator(LINE, READINGS[:1]), "too few"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused_with_a_remedy(ask: Callable[[], object], said: str) -> None:
     with pytest.raises(UsageError, match=said):
-        diagnose_simulator(replace(LINE, predict=predict, vectorised=True), READINGS)
-
-
-def test_what_cannot_be_is_refused_with_a_remedy() -> None:
-    with pytest.raises(UsageError, match="cannot be"):
-        Prior("logarithmic", -1.0, 1.0)
-    with pytest.raises(UsageError, match="Named twice in a simulator: slope"):
-        replace(LINE, effects=[SimulatorEffect("turned", LINE.parameters, line)])
-    with pytest.raises(UsageError, match="effect same has no parameters"):
-        replace(LINE, effects=[SimulatorEffect("same", {}, line)])
-    with pytest.raises(UsageError, match="predicts no 'z'"):
-        diagnose_simulator(LINE, [*READINGS, Reading({"x": 1.0}, "z", 1.0, 0.1)])
-    with pytest.raises(UsageError, match="too few"):
-        diagnose_simulator(LINE, READINGS[:1])
-    silent = replace(LINE, predict=lambda p, at: {"y": np.nan * p["slope"]})
-    with pytest.raises(BadInput, match="no prediction of the simulator is finite"):
-        diagnose_simulator(silent, READINGS)
+        ask()
 
 
 @pytest.mark.parametrize("other", [(), (Reading({"x": 1.0}, "z", 2.0),)])
@@ -206,6 +207,5 @@ def test_diagnose_simulator_all_zero(other: tuple[Reading, ...]) -> None:
 
 def test_diagnose_simulator_zero_with_sd() -> None:
     zeros = tuple(Reading({"x": x}, "y", 0.0, 0.1) for x in (0.0, 1.0, 2.0))
-    answer = diagnose_simulator(LINE, zeros)
-    mean, _ = answer.parameters_after["slope"]
+    mean, _ = diagnose_simulator(LINE, zeros).parameters_after["slope"]
     assert abs(mean) < 0.2

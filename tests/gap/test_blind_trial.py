@@ -36,6 +36,10 @@ NO_GAP = replace(
 )
 
 
+ALIKE = tuple(replace(each, group=0, probability=0.4) for each in (MASS, WARMTH))
+ITSELF = (("sag", "The baseline beam1 has it as parameters of its own."),)
+
+
 def make_row(
     found: Diagnosis | None,
     *planted: str,
@@ -70,22 +74,23 @@ def test_plan_hangers_quarter_sound_each_cause_once() -> None:
     assert 9 <= sum(half) < 18  # sound ones stand neither first nor last
 
 
-def test_make_hanger_sound(tmp_path: Path) -> None:
-    truth = blind_trial.make_hanger(Plan("h001", blind_trial.ELEMENTS, 1), 3, tmp_path / "h001")
-    assert (truth["causes"], truth["accepted"], truth["inherent"]) == ([], [], {})
+@pytest.mark.parametrize(
+    ("plan", "causes", "accepted"),
+    [
+        (Plan("h001", blind_trial.ELEMENTS, 1), [], []),
+        (Plan("h001", blind_trial.GAPPED, 0, ("mass all along",)),
+         ["mass all along"], ["distributed_mass"]),
+    ],
+)  # fmt: skip
+def test_make_hanger(tmp_path: Path, plan: Plan, causes: list[str], accepted: list[str]) -> None:
+    folder = tmp_path / "h001"
+    truth = blind_trial.make_hanger(plan, 3, folder)
+    assert ([each["cause"] for each in truth["causes"]], truth["accepted"]) == (causes, accepted)
+    assert all(each["visible"] >= 5 for each in truth["causes"])
+    assert causes or truth["inherent"] == {}
     assert truth["tension_n"] > 0
-    assert {each.name for each in (tmp_path / "h001").iterdir()} == {
-        "hanger.toml",
-        "case.modes.json",
-    }
-
-
-def test_make_hanger_planted(tmp_path: Path) -> None:
-    plan = Plan("h001", blind_trial.GAPPED, 0, ("mass all along",))
-    truth = blind_trial.make_hanger(plan, 3, tmp_path)
-    assert truth["accepted"] == ["distributed_mass"]
-    assert truth["causes"][0]["visible"] >= 5
-    assert "mass all along" not in (tmp_path / "hanger.toml").read_text()
+    assert {each.name for each in folder.iterdir()} == {"hanger.toml", "case.modes.json"}
+    assert "mass all along" not in (folder / "hanger.toml").read_text()
 
 
 @pytest.fixture(scope="module")
@@ -116,22 +121,17 @@ def test_run_opens_truth_when_answers_are_there(trial: Trial) -> None:
 
 @pytest.mark.parametrize("changed", ["sealed/truth.json", "complete/h001.json"])
 def test_open_truth_changed_since(trial: Trial, changed: str) -> None:
+    """Nor before the answers, nor of a former version."""
+    known = trial.read()
+    trial.write({key: known[key] for key in known if key != "answers_sha256"})
+    with pytest.raises(SystemExit, match="lacking"):
+        trial.open_truth()
+    trial.write(known)
     path = trial.folder / changed
     path.write_text(path.read_text() + " ")
     with pytest.raises(SystemExit, match="changed since"):
         trial.open_truth()
-
-
-def test_open_truth_before_answers(trial: Trial) -> None:
-    known = trial.read()
-    del known["answers_sha256"]
-    trial.write(known)
-    with pytest.raises(SystemExit, match="lacking"):
-        trial.open_truth()
-
-
-def test_read_trial_of_former_version(trial: Trial) -> None:
-    trial.write(trial.read() | {"schema": "shm.blind_trial/1"})
+    trial.write(known | {"schema": "shm.blind_trial/1"})
     with pytest.raises(SystemExit, match=r"shm\.blind_trial/1"):
         trial.read()
 
@@ -165,7 +165,7 @@ def test_guard_refuses_sealed_folder(trial: Trial, tmp_path: Path) -> None:
 
 def test_hangers_to_repeat() -> None:
     """Each planted cause must be in the catalogue, and none of them in the class itself."""
-    itself = replace(EXPLAINED, invisible=(("sag", "beam1 has it as parameters of its own."),))
+    itself = replace(EXPLAINED, invisible=ITSELF)
     rows = {
         "a": make_row(EXPLAINED, "point_mass"),
         "b": make_row(EXPLAINED, "crack", accepted=False),
@@ -197,25 +197,19 @@ def test_hangers_to_repeat() -> None:
         (make_row(UNKNOWN, "point_mass", without=("point_mass",)), True, False),
         (make_row(UNKNOWN, "point_mass"), False, False),
         (make_row(UNKNOWN), False, False),
+        (make_row(replace(EXPLAINED, causes=ALIKE), "temperature_tension"), True, False),
+        (make_row(replace(NO_GAP, invisible=ITSELF), "sag"), True, False),
     ],
 )
 def test_is_right(row: Row, right: bool, false_cause: bool) -> None:
     assert (row.is_right, row.is_false_cause) == (right, false_cause)
 
 
-def test_is_right_of_a_group() -> None:
-    alike = tuple(replace(each, group=0, probability=0.4) for each in (MASS, WARMTH))
-    row = make_row(replace(EXPLAINED, causes=alike), "temperature_tension")
-    assert row.is_right
+def test_names_of_a_group_and_of_a_cause_of_the_class() -> None:
+    row = make_row(replace(EXPLAINED, causes=ALIKE), "temperature_tension")
     assert row.first == {"point_mass"}
     assert row.named == {"point_mass", "temperature_tension"}
-
-
-def test_is_right_of_a_cause_of_the_class() -> None:
-    itself = (("sag", "The baseline beam1 has it as parameters of its own."),)
-    row = make_row(replace(NO_GAP, invisible=itself), "sag")
-    assert row.in_class
-    assert row.is_right
+    assert make_row(replace(NO_GAP, invisible=ITSELF), "sag").in_class
 
 
 def test_score_counts() -> None:
@@ -228,17 +222,20 @@ def test_score_counts() -> None:
         make_row(None, "timebase"),
     ]
     found = {mark.what: mark for mark in score(rows)}
-    assert found["refused"].reached == "1 of 6"
-    assert found["gap claimed on sound hangers"].reached.startswith("1 of 2")
+    for what, reached in {
+        "refused": "1 of 6",
+        "gap claimed on sound hangers": "1 of 2",
+        "cause named first": "1 of 2",
+        "sure (> 0.8) and wrong": "2 of 4",
+        "sure and wrong, true cause left out": "1 of 1",
+        "cause stated with 0.9 or more: right": "1 of 3",
+        "95 % interval of the tension holds": "5 of 5: 1.00 (0.55",
+        "error of the tension, median, before -> after": "1.0% -> 1.0%",
+    }.items():
+        assert found[what].reached.startswith(reached), what
     assert found["gap claimed on sound hangers"].is_met is False
-    assert found["cause named first"].reached.startswith("1 of 2")
-    assert found["sure (> 0.8) and wrong"].reached.startswith("2 of 4")
-    assert found["sure and wrong, true cause left out"].reached.startswith("1 of 1")
-    assert len(found) == len(score(rows))
-    assert found["cause stated with 0.9 or more: right"].reached.startswith("1 of 3")
-    assert found["95 % interval of the tension holds"].reached.startswith("5 of 5: 1.00 (0.55")
     assert found["answers that contradict themselves"].is_met is True
-    assert found["error of the tension, median, before -> after"].reached.startswith("1.0% -> 1.0%")
+    assert len(found) == len(score(rows))
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,27 +17,45 @@ from shm.gap.check import CheckOptions, check_gap, magnitude
 from shm.gap.twin import Twin, usual_tests
 from shm.models.effects import EFFECTS, Variant, parameters_of
 from shm.report.gap_check_report import rows
-from shm.simulate import HangerState
-from shm.values import EffectPrior, GapCheck, ModalTest
+from shm.values import EffectPrior, GapCheck, Hanger, ModalTest
 from tests.helpers.comparing import assert_same
 from tests.helpers.gap_campaigns import HANGER as PLAIN
+from tests.helpers.gap_campaigns import simulated
 from tests.helpers.gap_checks import frequencies_hz, names_from
-from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
-ONE_TEST = CampaignPlan(
-    modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, tension_spread=0.0
-)
 MASS = CheckOptions(("distributed_mass",), sound=2)
 
 
 @pytest.fixture(scope="module")
 def tests() -> tuple[ModalTest, ...]:
-    return campaign(PLAIN, HangerState(711e3), (), ONE_TEST, np.random.default_rng(101))
+    return simulated(seed=101, tension_spread=0.0)
 
 
 @pytest.fixture(scope="module")
 def twin(tests: tuple[ModalTest, ...]) -> Twin:
-    return Twin(tests, PLAIN, "beam1", 1)
+    found = Twin(tests, PLAIN, "beam1", 1)
+    assert found.tension_n == pytest.approx(711e3, rel=0.03)
+    assert found.misfit_percent < 0.1
+    return found
+
+
+@pytest.fixture
+def checked(
+    twin: Twin, tests: tuple[ModalTest, ...], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., GapCheck]:
+    """Return a check by diagnoses that name effects from a change of frequency on."""
+
+    def check(
+        *named: str, least: float = 0.01, options: CheckOptions = MASS, hanger: Hanger = PLAIN
+    ) -> GapCheck:
+        monkeypatch.setattr(module, "diagnose", names_from(twin, least, *named))
+        return check_gap(tests, hanger, options)
+
+    return check
+
+
+def unplanted(twin: Twin, seed: int = 5) -> tuple[ModalTest, ...]:
+    return twin.measure("", Variant(), np.empty(0), np.random.default_rng(seed))
 
 
 def planted(twin: Twin, effect: str, value: float) -> tuple[ModalTest, ...]:
@@ -46,35 +65,14 @@ def planted(twin: Twin, effect: str, value: float) -> tuple[ModalTest, ...]:
     return twin.measure(effect, Variant(), share, np.random.default_rng(5))
 
 
-def checked(
-    twin: Twin,
-    tests: tuple[ModalTest, ...],
-    monkeypatch: pytest.MonkeyPatch,
-    *named: str,
-    least: float = 0.01,
-    options: CheckOptions = MASS,
-) -> GapCheck:
-    monkeypatch.setattr(module, "diagnose", names_from(twin, least, *named))
-    return check_gap(tests, PLAIN, options)
-
-
-def test_a_twin_has_the_tension_of_the_tests(twin: Twin) -> None:
-    assert twin.tension_n == pytest.approx(711e3, rel=0.03)
-    assert twin.misfit_percent < 0.1
-
-
 def test_a_twin_follows_the_planted_mass(twin: Twin) -> None:
     """Frequencies of a heavier uniform bar at the same tension fall by sqrt(1 + change)."""
-    nothing = twin.measure("", Variant(), np.empty(0), np.random.default_rng(5))
-    ratio = frequencies_hz(planted(twin, "distributed_mass", 0.2)) / frequencies_hz(nothing)
-    np.testing.assert_allclose(ratio, 1.2**-0.5, rtol=1e-6)
+    heavier = frequencies_hz(planted(twin, "distributed_mass", 0.2))
+    np.testing.assert_allclose(heavier / frequencies_hz(unplanted(twin)), 1.2**-0.5, rtol=1e-6)
 
 
 def test_a_twin_errs_as_stated(twin: Twin) -> None:
-    drawn = [
-        frequencies_hz(twin.measure("", Variant(), np.empty(0), np.random.default_rng(seed)))
-        for seed in range(200)
-    ]
+    drawn = [frequencies_hz(unplanted(twin, seed)) for seed in range(200)]
     scatter = np.std(np.log(drawn), axis=0)
     assert (scatter > 0.8 * twin.frequency_sd).all()  # and what repeats comes on top
     assert (scatter < 0.01).all()
@@ -93,13 +91,11 @@ def test_a_gap_of_the_hanger_is_no_error(tests: tuple[ModalTest, ...]) -> None:
     twin = Twin([replace(tests[0], modes=off)], PLAIN, "beam1", 1)
     assert twin.misfit_percent > 1
     assert twin.frequency_sd == pytest.approx(3e-4)
-    (made,) = twin.measure("", Variant(), np.empty(0), np.random.default_rng(5))
-    assert not any(mode.frequency_sd_hz > 0 for mode in made.modes)
+    assert not any(mode.frequency_sd_hz > 0 for mode in unplanted(twin)[0].modes)
 
 
 def test_a_twin_keeps_shapes_and_conditions(twin: Twin, tests: tuple[ModalTest, ...]) -> None:
-    (made,) = twin.measure("", Variant(), np.empty(0), np.random.default_rng(5))
-    (given,) = tests
+    (made,), (given,) = unplanted(twin), tests
     assert (made.id, made.temperature_c, made.amplitude) == ("t1", given.temperature_c, 1.0)
     for own, theirs in zip(made.modes, given.modes, strict=True):
         for one, other in zip(own.shape, theirs.shape, strict=True):
@@ -108,30 +104,23 @@ def test_a_twin_keeps_shapes_and_conditions(twin: Twin, tests: tuple[ModalTest, 
 
 
 def test_a_twin_shows_hardening_within_a_test(tests: tuple[ModalTest, ...]) -> None:
-    sloped = tuple(
-        replace(
-            test,
-            modes=tuple(
-                replace(mode, amplitude_slope=0.0, amplitude_slope_sd=1e-5) for mode in test.modes
-            ),
-        )
-        for test in tests
-    )
-    twin = Twin(sloped, PLAIN, "beam1", 1)
+    flat = {"amplitude_slope": 0.0, "amplitude_slope_sd": 1e-5}
+    modes = tuple(replace(mode, **flat) for mode in tests[0].modes)
+    twin = Twin([replace(tests[0], modes=modes)], PLAIN, "beam1", 1)
     assert "geometric_hardening" in Twin(tests, PLAIN, "beam1", 1).invisible()
     assert "geometric_hardening" not in twin.invisible()
     (made,) = planted(twin, "geometric_hardening", 0.01)
-    (sound,) = twin.measure("", Variant(), np.empty(0), np.random.default_rng(5))
+    (sound,) = unplanted(twin)
     assert all(mode.depends_on_amplitude and mode.amplitude_slope > 0 for mode in made.modes[:2])
     assert not any(mode.depends_on_amplitude for mode in sound.modes)
     # The frequency is that of small amplitude, which hardening leaves alone.
     assert made.modes[0].frequency_hz == pytest.approx(sound.modes[0].frequency_hz, rel=1e-4)
 
 
-def test_the_smallest_size_is_found(
-    twin: Twin, tests: tuple[ModalTest, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found = checked(twin, tests, monkeypatch, "distributed_mass")
+def test_the_smallest_size_is_found(checked: Callable[..., GapCheck]) -> None:
+    """And a gap in a sound twin is counted."""
+    assert checked("sag", least=0.0).false_gaps == 2
+    found = checked("distributed_mass")
     (effect,) = found.effects
     assert found.is_complete
     assert found.false_gaps == 0
@@ -160,15 +149,13 @@ def test_the_smallest_size_is_found(
     ],
 )
 def test_an_outcome_names_what_leads(
-    twin: Twin,
-    tests: tuple[ModalTest, ...],
-    monkeypatch: pytest.MonkeyPatch,
+    checked: Callable[..., GapCheck],
     named: tuple[str, ...],
     outcome: str,
     others: tuple[str, ...],
     row: str,
 ) -> None:
-    found = checked(twin, tests, monkeypatch, *named)
+    found = checked(*named)
     first = found.effects[0].trials[0]
     assert (first.outcome, first.others) == (outcome, others)
     assert rows(found)[0][2] == row
@@ -187,18 +174,10 @@ def test_a_refused_twin_is_not_found(
     assert rows(found)[0][4] == "46 %: refused: nothing fits"
 
 
-def test_a_gap_in_a_sound_twin_is_counted(
-    twin: Twin, tests: tuple[ModalTest, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert checked(twin, tests, monkeypatch, "sag", least=0.0).false_gaps == 2
-
-
-def test_half_of_the_seeds_decide(
-    twin: Twin, tests: tuple[ModalTest, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_half_of_the_seeds_decide(checked: Callable[..., GapCheck]) -> None:
     """A mass is found or not by where it sits; each seed has a place and noise of its own."""
     options = CheckOptions(("point_mass",), seeds=3, sound=0, seed=7)
-    found = checked(twin, tests, monkeypatch, "point_mass", least=0.005, options=options)
+    found = checked("point_mass", least=0.005, options=options)
     (effect,) = found.effects
     from_each = sorted(
         min((t.step for t in effect.trials if t.seed == seed and t.is_found), default=4)
@@ -220,14 +199,11 @@ def test_sizes_of_an_effect_grow_away_from_nothing(twin: Twin, name: str) -> Non
     assert ((size.lower < np.array(steps)) & (np.array(steps) < size.upper)).all()
 
 
-def test_an_owners_range_bounds_the_sizes(
-    tests: tuple[ModalTest, ...], monkeypatch: pytest.MonkeyPatch, twin: Twin
-) -> None:
-    narrow = replace(
-        PLAIN, effect_priors=(EffectPrior("distributed_mass", "mass_change", 0.01, 0.02),)
-    )
-    monkeypatch.setattr(module, "diagnose", names_from(twin, 0.0, "distributed_mass"))
-    (effect,) = check_gap(tests, narrow, replace(MASS, sound=0)).effects
+def test_an_owners_range_bounds_the_sizes(checked: Callable[..., GapCheck]) -> None:
+    prior = EffectPrior("distributed_mass", "mass_change", 0.01, 0.02)
+    narrow, options = replace(PLAIN, effect_priors=(prior,)), replace(MASS, sound=0)
+    found = checked("distributed_mass", least=0.0, options=options, hanger=narrow)
+    (effect,) = found.effects
     assert 0.01 < effect.sizes[0] < effect.sizes[-1] < 0.02
 
 
@@ -236,16 +212,13 @@ def test_without_tests_a_usual_test_is_made() -> None:
     assert twin.tension_n == pytest.approx(711e3, rel=1e-6)
     assert [test.id for test in twin.tests] == [test.id for test in usual_tests(PLAIN)]
     assert twin.frequency_sd == pytest.approx(3e-4)
-    exact = replace(ONE_TEST, modes=8, as_made=False)
-    truth = campaign(PLAIN, HangerState(711e3), (), exact, np.random.default_rng(1))
+    truth = simulated(modes=8, as_made=False, tension_spread=0.0)
     np.testing.assert_allclose(frequencies_hz(twin.tests[:1]), frequencies_hz(truth), rtol=1e-3)
 
 
-def test_a_check_is_read_back(
-    twin: Twin, tests: tuple[ModalTest, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_check_is_read_back(checked: Callable[..., GapCheck]) -> None:
     options = CheckOptions(("distributed_mass", "sensor_mass", "load_scale"), sound=1)
-    found = checked(twin, tests, monkeypatch, "timebase", "distributed_mass", options=options)
+    found = checked("timebase", "distributed_mass", options=options)
     document = json.loads(dump(gap_check_document(found)))
     assert document["schema"] == "shm.gap_check/1"
     assert document["effects"][0]["others"] == ["timebase"]

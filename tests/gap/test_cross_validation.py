@@ -50,18 +50,14 @@ def shrunk(problem, after):
     return shrinkage(problem, *fits, held(problem, after))
 
 
-def test_the_right_cause_shrinks_the_gap_in_the_fit_and_on_what_was_held_out():
-    found = shrunk(toy(), RIGHT)
-    assert found.rms_before_percent > 1
-    assert found.held_out_before_percent > 1
-    assert found.rms_after_percent == pytest.approx(100 * SD, rel=0.3)
-    assert found.held_out_after_percent == pytest.approx(100 * SD, rel=0.4)
-
-
-def test_a_cause_that_only_follows_the_data_shrinks_nothing_that_was_held_out():
-    found = shrunk(toy(), WRONG)
-    assert found.rms_after_percent < 0.1 * found.rms_before_percent
-    assert found.held_out_after_percent > 0.9 * found.held_out_before_percent
+def test_only_the_right_cause_shrinks_the_gap_on_what_was_held_out():
+    right, wrong = (shrunk(toy(), each) for each in (RIGHT, WRONG))
+    assert right.rms_before_percent > 1
+    assert right.held_out_before_percent > 1
+    assert right.rms_after_percent == pytest.approx(100 * SD, rel=0.3)
+    assert right.held_out_after_percent == pytest.approx(100 * SD, rel=0.4)
+    assert wrong.rms_after_percent < 0.1 * wrong.rms_before_percent
+    assert wrong.held_out_after_percent > 0.9 * wrong.held_out_before_percent
 
 
 def test_a_held_out_residual_is_that_of_a_fit_that_never_saw_the_datum():
@@ -88,22 +84,22 @@ def test_every_order_but_the_outermost_is_held_out_once():
     assert [set(order[rows]) for rows in np.isfinite(found.before)] == [{2, 5}, {3, 6}, {4, 7}]
 
 
-def test_tests_are_held_out_only_while_the_others_still_vary_the_same_conditions():
-    """t6 alone has a known mass; without any of the others temperatures and levels still vary."""
-    problem = toy(campaign(AddedMass(25.0, 3.6)))
-    assert whole_tests_held_out(problem, RIGHT) == [[0], [1], [2], [3], [4]]
-
-
-def test_a_cause_in_one_test_alone_is_not_asked_to_predict_that_test():
-    assert whole_tests_held_out(toy(), ONE_TEST) == [[0], [1], [3], [4]]
-
-
-def whole_tests_held_out(problem, after):
-    """The tests of each fold that holds out nothing but whole tests."""
+@pytest.mark.parametrize(
+    ("conditions", "after", "expected"),
+    [
+        # t6 alone has a known mass; without any of the others temperatures and levels still vary.
+        (campaign(AddedMass(25.0, 3.6)), RIGHT, [[0], [1], [2], [3], [4]]),
+        # A cause in one test alone is not asked to predict that test.
+        (campaign(), ONE_TEST, [[0], [1], [3], [4]]),
+    ],
+)
+def test_tests_are_held_out_while_the_others_vary_the_same_conditions(conditions, after, expected):
+    problem = toy(conditions)
     test = problem.observations.design.frequency_test
     folds = np.isfinite(held(problem, after).before)
     parts = [(rows, sorted(set(test[rows].tolist()))) for rows in folds]
-    return sorted(tests for rows, tests in parts if np.array_equal(rows, np.isin(test, tests)))
+    whole = sorted(tests for rows, tests in parts if np.array_equal(rows, np.isin(test, tests)))
+    assert whole == expected
 
 
 def test_named_tests_and_orders_are_left_out_together():
@@ -114,15 +110,18 @@ def test_named_tests_and_orders_are_left_out_together():
     assert np.array_equal(rows[0], (design.frequency_test == 1) | (design.frequency_order == 4))
 
 
-@pytest.mark.parametrize("names", [("t9",), ("12",), ("4", "five")])
-def test_names_that_are_neither_tests_nor_orders_are_refused(names):
-    with pytest.raises(UsageError, match="neither a test nor an order"):
-        held(toy(), hold_out=names)
-
-
-def test_holding_out_all_but_two_frequencies_is_refused():
-    with pytest.raises(UsageError, match="left to fit"):
-        held(toy((Conditions("t1"),)), hold_out=tuple("2345678"))
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("t9",), "neither a test nor an order"),
+        (("12",), "neither a test nor an order"),
+        (("4", "five"), "neither a test nor an order"),
+        (tuple("2345678"), "left to fit"),
+    ],
+)
+def test_what_cannot_be_held_out_is_refused(names, said):
+    with pytest.raises(UsageError, match=said):
+        held(toy((Conditions("t1"),)), hold_out=names)
 
 
 @pytest.mark.parametrize("modes", [[(0, 1), (0, 2), (0, 3)], [(0, 1), (1, 1)]])

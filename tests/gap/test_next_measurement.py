@@ -11,14 +11,12 @@ from shm.gap.contract import Hypothesis, Observations
 from shm.gap.experiment_design import like_the_present, measured_already, proposals
 from shm.gap.foresight import Errors, Foresight, NewTests, divergence
 from shm.gap.measurement_plan import NO_GAP, ranked
-from shm.models.effects import EFFECTS, Conditions, Variant
-from shm.simulate import HangerState, PlantedEffect
+from shm.models.effects import Conditions, Variant
+from shm.simulate import PlantedEffect
 from shm.values import AddedMass
-from tests.helpers.gap_campaigns import fit_of, problem_of
+from tests.helpers.gap_campaigns import fit_of, problem_of, simulated
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, repeated, tension
-from tests.worlds.simulated.campaign import CampaignPlan
-from tests.worlds.simulated.campaign import campaign as simulated
 
 MODES = [(0, order) for order in range(1, 7)]
 ONE_TEST = (Conditions("t1"),)
@@ -88,24 +86,29 @@ def test_what_is_foreseen_of_a_linear_toy_is_its_exact_predictive_distribution()
     assert seen.covariance == pytest.approx(joint[6:, 6:] - gain @ joint[:6, 6:], abs=1e-10)
 
 
-def test_a_cause_of_temperature_asks_for_another_day():
-    first = ranked(problem := toy(), [problem.fit(STIFFER), problem.fit(WARMER)])[0]
-    assert "on a day 20 K" in first.what
-    assert first.separates == ("bending_stiffness", "temperature_tension")
+@pytest.mark.parametrize(
+    ("rival", "words", "only"),
+    [
+        (WARMER, "on a day 20 K", "day"),
+        (LEVEL, "hit, 3 times the usual level", "hit"),
+    ],
+)
+def test_a_cause_of_conditions_asks_for_other_ones(rival, words, only):
+    found = ranked(problem := toy(), [problem.fit(STIFFER), problem.fit(rival)])
+    first = found[0]
+    assert words in first.what
+    assert first.separates == tuple(each.effects[0][0] for each in (STIFFER, rival))
     assert first.expected_log_bayes_factor > 5
+    assert all(only in each.what for each in found)
 
 
-def test_a_cause_of_the_level_asks_for_another_hit():
-    found = ranked(problem := toy(), [problem.fit(STIFFER), problem.fit(LEVEL)])
-    assert "hit, 3 times the usual level" in found[0].what
-    assert all("hit" in each.what for each in found)
-
-
-def test_what_no_measurement_can_tell_apart_has_none_proposed():
+def test_nothing_is_asked_of_what_is_alike_or_out_of_the_race():
     twin = Hypothesis((("distributed_mass", Variant()),))
     problem = toy()
     problem.slopes = {**SLOPES, twin: with_order}
     assert ranked(problem, [problem.fit(STIFFER), problem.fit(twin)]) == ()
+    beaten = replace(problem.fit(WARMER), log_evidence=-20.0)
+    assert ranked(problem, [problem.fit(STIFFER), beaten]) == ()
 
 
 def test_no_gap_is_a_contender_by_that_name_and_flexible_fits_are_none():
@@ -118,12 +121,6 @@ def test_no_gap_is_a_contender_by_that_name_and_flexible_fits_are_none():
     assert ranked(problem, [stiffer, flexible]) == ()
 
 
-def test_an_explanation_that_is_out_of_the_race_is_not_asked_about():
-    problem = toy()
-    beaten = replace(problem.fit(WARMER), log_evidence=-20.0)
-    assert ranked(problem, [problem.fit(STIFFER), beaten]) == ()
-
-
 def test_of_measurements_that_are_as_good_as_certain_the_easier_comes_first():
     problem = toy()
     problem.slopes = {**SLOPES, LEVEL: lambda design: 50 * with_level(design)}
@@ -134,12 +131,9 @@ def test_of_measurements_that_are_as_good_as_certain_the_easier_comes_first():
     assert "hit" in found[1].what
 
 
-def test_everything_that_was_not_measured_yet_is_proposed():
+def test_what_was_not_measured_yet_is_proposed():
     kinds = {each.kind for each in proposals(design_of(ONE_TEST, MODES), HANGER_3)}
     assert kinds == {"repeat", "other plane", "more modes", "temperature", "level", "known mass"}
-
-
-def test_what_was_measured_already_is_not_proposed_again():
     both = [(plane, order) for plane in (0, 1) for order in range(1, 17)]
     design = design_of(campaign(AddedMass(25.0, 3.6)), both)
     assert set(measured_already(design)) == {"other plane", "temperature", "level", "known mass"}
@@ -147,36 +141,22 @@ def test_what_was_measured_already_is_not_proposed_again():
 
 
 def test_proposals_are_worded_for_people():
-    said = [each.what for each in proposals(design_of(ONE_TEST, MODES), HANGER_3)]
+    """A light hanger gets a light mass."""
+    design = design_of(ONE_TEST, MODES)
+    said = [each.what for each in proposals(design, HANGER_3)]
     assert "known mass of 25 kg at 3.6 m" in said
     assert "modes 7 and 8" in said
     assert "the longitudinal plane, modes 1 to 6" in said
     assert "a test on a day 20 K colder" in said
-
-
-def test_a_light_hanger_gets_a_light_mass():
     light = replace(HANGER_3, mass_per_length_kg_m=1.5)
-    said = [each.what for each in proposals(design_of(ONE_TEST, MODES), light)]
-    assert "known mass of 0.4 kg at 3.6 m" in said
-
-
-def asked(effect, others, at="everywhere"):
-    """What is asked for after one test of frequencies with `effect` planted."""
-    plan = CampaignPlan(temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, shapes=False)
-    rng = np.random.default_rng(1)
-    tests = simulated(HANGER_3, HangerState(711e3), (effect,), plan, rng)
-    problem = problem_of(tests, hanger=HANGER_3)
-    survey = problem.observations.design.survey
-    fits = []
-    for name in (effect.name, *others):
-        variants = EFFECTS[name].variants(HANGER_3, survey)
-        variant = next(each for each in variants if each.at == at)
-        fits.append(fit_of(problem, Hypothesis(((name, variant),))))
-    return ranked(problem, fits)
+    assert "known mass of 0.4 kg at 3.6 m" in [each.what for each in proposals(design, light)]
 
 
 def test_distributed_mass_against_bending_stiffness_asks_for_a_known_mass_first():
-    planted = PlantedEffect("distributed_mass", "everywhere", {"mass_change": 0.05})
-    first = asked(planted, ["bending_stiffness"])[0]
+    """After one test of frequencies with the mass planted."""
+    mass = PlantedEffect("distributed_mass", "everywhere", {"mass_change": 0.05})
+    problem = problem_of(simulated(mass, hanger=HANGER_3, modes=8, shapes=False), hanger=HANGER_3)
+    heavier = Hypothesis((("distributed_mass", Variant()),))
+    first = ranked(problem, [fit_of(problem, each) for each in (heavier, STIFFER)])[0]
     assert first.what.startswith("known mass of 25 kg at")
     assert first.expected_log_bayes_factor > 5

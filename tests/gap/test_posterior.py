@@ -169,23 +169,16 @@ def test_sampling_effective_draws() -> None:
     assert max(each.effective for each in found) <= 50  # no more than there are draws
 
 
-def test_fit_by_chain_agrees() -> None:
+def test_sample_goes_on_by_chain_which_agrees() -> None:
     of = problem(mirrored, (0, 1), truth=0.6)
     exact, _, sd = of.by_quadrature()
-    found = sampled(of).fit_by_chain(2000)
-    assert found.method == "emcee"
+    target, rng = Target(of, ALONE), np.random.default_rng(1)
+    peaks = find_peaks(target, starts(-1.5, 1.5))
+    one, found = (sample(target, peaks, n, rng, enough) for n, enough in ((4000, 400), (2000, 1e9)))
+    assert (one.method, found.method) == ("sampled", "emcee")
     assert found.log_evidence == pytest.approx(exact, abs=0.2)
-    assert np.abs(found.draws[:, -1]).mean() == pytest.approx(
-        np.abs(sampled(of).fit(4000).draws[:, -1]).mean(), abs=0.15 * sd
-    )
-
-
-def test_sample_goes_on_by_chain() -> None:
-    target = Target(problem(straight, (0, 1)), ALONE)
-    peaks = find_peaks(target, starts(1.0))
-    rng = np.random.default_rng(1)
-    assert sample(target, peaks, 50, rng, enough=50).method == "sampled"
-    assert sample(target, peaks, 50, rng, enough=1e9).method == "emcee"
+    sizes = [np.abs(each.draws[:, -1]).mean() for each in (one, found)]
+    assert sizes[1] == pytest.approx(sizes[0], abs=0.15 * sd)
 
 
 def test_approximate_peaks_by_weight() -> None:

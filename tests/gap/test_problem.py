@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from shm.gap.contract import Hypothesis
-from shm.gap.search import fit_alone
-from shm.inference.likelihood import Likelihood
+from shm.gap.coordinates import Coordinates, cut
 from shm.models.base import point_mass
-from shm.models.effects import Variant
+from shm.models.effects import Parameter, Variant
 from shm.models.hanger import solve
-from tests.helpers.gap_campaigns import HANGER, PLACES_M, campaign, problem_of
+from tests.helpers.gap_campaigns import HANGER, campaign, problem_of
 
 BASELINE = Hypothesis()
 MASS = Hypothesis((("point_mass", Variant()),))
@@ -52,31 +52,73 @@ def test_predicted_shapes_have_unit_length_and_the_measured_sign() -> None:
         assert predicted[0, rows] @ value[rows] > 0.99
 
 
-def test_settle_keeps_straight_terms_linear() -> None:
-    """What is taken as linear is so within a tenth of the likeliest errors."""
-    problem = problem_of(campaign(shape_sd=0.01))
-    fit = fit_alone(problem, np.random.default_rng(1))
-    linear = problem.linear(BASELINE)
-    assert set(problem.described.always_linear) < set(linear)
-    errors = Likelihood.of(fit.noise, fit.model_error)
-    for column in np.setdiff1d(linear, problem.described.always_linear):
-        step = np.zeros((2, len(fit.z)))
-        step[:, column] = np.sqrt(fit.covariance[column, column]) * np.array([1.0, -1.0])
-        there, back = problem.predict(BASELINE, fit.z + step) - fit.predicted
-        assert errors.squares((there + back)[None] / 2)[0, 0] < 0.1**2
+INF, NAN = np.inf, np.nan
+SIGNED = Parameter("change", "", 0.001, 0.1, 0.0, "", "logarithmic", signed=True)
+SIZE = Parameter("mass_kg", "kg", 0.01, 10.0, 0.0, "", "logarithmic")
+SPRING = Parameter("log10_k", "N m/rad", 5.0, 9.0, INF, "")
+PLACE = Parameter("x_m", "m", 0.0, 12.0, NAN, "")
 
 
-def test_another_design_has_further_sensors_behind_those_of_the_survey() -> None:
+def _coordinates(*effect: Parameter) -> Coordinates:
+    return Coordinates(problem_of(campaign(tests=1)).described, effect)
+
+
+def test_effect_values_follow_priors_and_back() -> None:
+    """Normal draws of z follow the uniform and logarithmic priors (Kolmogorov-Smirnov)."""
+    own = _coordinates(SIGNED, SIZE, SPRING, PLACE)
+    z = np.random.default_rng(1).standard_normal((2000, own.dimension))
+    change, mass, _, place = own.effect_values(z).T
+    for sample, exact in (
+        (np.log10(mass), stats.uniform(-2, 3)),
+        (np.log10(np.abs(change)), stats.uniform(-3, 2)),
+        (place, stats.uniform(0, 12)),
+    ):
+        assert stats.kstest(sample, exact.cdf).pvalue > 1e-3
+    assert abs((change > 0).mean() - 0.5) < 0.05
+    z = z[:50].clip(-2.5, 2.5)
+    found = own.effect_z(own.effect_values(z), own.baseline)
+    np.testing.assert_allclose(found, z[:, own.baseline :], atol=1e-8)
+
+
+def test_drawn_differs_in_the_unseen_alone() -> None:
+    """Frequencies at rest of what is drawn are those at its middle."""
+    problem = problem_of(campaign(tests=1))
+    own = problem.coordinates(Hypothesis())
+    z = 0.5 * np.random.default_rng(3).standard_normal((20, own.dimension))
+    middle, drawn = own.theta(z), own.drawn(z, np.random.default_rng(4))
+    assert (drawn != middle).any(axis=1).all()
+    frequency = [problem.model.frequencies_hz(each, 4) for each in (middle, drawn)]
+    np.testing.assert_allclose(frequency[1], frequency[0], rtol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "lower", "upper"),
+    [
+        (SIZE, 0.01 * 1000**0.25, 10.0),
+        (SIGNED, 0.001 * 100**0.25, 0.1),
+        (SPRING, 5.0, 8.0),
+        (PLACE, 0.0, 12.0),
+    ],
+)
+def test_cut_end_nearest_no_effect(parameter: Parameter, lower: float, upper: float) -> None:
+    """Of sizes alone, and never all of one."""
+    found = cut(parameter, 0.25)
+    assert (found.lower, found.upper) == (pytest.approx(lower), pytest.approx(upper))
+    assert cut(parameter, 1.0).lower < cut(parameter, 1.0).upper
+
+
+def test_a_part_predicts_the_same_rows_of_the_data() -> None:
     problem = problem_of(campaign(shape_sd=0.01))
-    own = problem.design
-    further = replace(
-        own,
-        places_m=(*PLACES_M, 11.0),
-        shape_mode=np.append(own.shape_mode[own.shape_mode == 0], 0),
-        shape_place=np.append(own.shape_place[own.shape_mode == 0], 4),
-        shape_component=np.append(own.shape_component[own.shape_mode == 0], 0),
-    )
-    predicted = problem.predict(BASELINE, problem.near, further)
-    shape = predicted[0, own.frequencies :]
-    assert np.linalg.norm(shape) == pytest.approx(1)
-    assert shape[-1] > 0
+    kept = problem.design.frequency_order != 3
+    part = problem.part(kept)
+    whole = np.concatenate([kept, kept[problem.design.shape_mode]])
+    z = np.random.default_rng(3).standard_normal((2, problem.dimension(MASS)))
+    np.testing.assert_array_equal(part.observations.value, problem.observations.value[whole])
+    np.testing.assert_allclose(part.predict(MASS, z), problem.predict(MASS, z)[:, whole])
+    assert part.design.survey is problem.design.survey
+
+
+def test_magnitude_from_no_effect() -> None:
+    own = _coordinates(SIGNED, SPRING)
+    np.testing.assert_allclose(own.magnitude(np.array([[-0.01, 9.0], [0.001, 6.0]])), [0.5, 0.75])
+    assert _coordinates(PLACE).magnitude(np.array([[3.0]])).tolist() == [1.0]

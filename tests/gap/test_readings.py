@@ -48,11 +48,23 @@ def loadings(frequency_hz: FloatArray, read_n: tuple[float, ...], sd_n: float) -
     ]
 
 
-def test_shifts_count_from_the_mean_of_all_readings_and_are_zero_without_one() -> None:
-    tests = loadings(frequencies_hz(np.full(3, 7e5)), (600e3, NAN, 800e3), SD_N)
+@pytest.mark.parametrize(
+    ("read_n", "sd_n", "shifts_n", "shift_sds_n"),
+    [
+        ((600e3, NAN, 800e3), SD_N, [-100e3, 0.0, 100e3], [SD_N, 0.0, SD_N]),
+        ((600e3, NAN), SD_N, [0.0, 0.0], None),  # one alone says nothing
+        ((600e3, 650e3), SD_N, [-25e3, 25e3], None),
+        ((600e3, 650e3), NAN, [-25e3, 25e3], None),
+    ],
+)
+def test_shifts_count_from_the_mean_of_all_readings(
+    read_n: tuple[float, ...], sd_n: float, shifts_n: list[float], shift_sds_n: list[float] | None
+) -> None:
+    tests = loadings(frequencies_hz(np.full(len(read_n), 7e5)), read_n, sd_n)
     conditions = observed(tests, HANGER_3).design.conditions
-    assert [each.tension_shift_n for each in conditions] == [-100e3, 0.0, 100e3]
-    assert [each.tension_shift_sd_n for each in conditions] == [SD_N, 0.0, SD_N]
+    assert [each.tension_shift_n for each in conditions] == shifts_n
+    if shift_sds_n is not None:
+        assert [each.tension_shift_sd_n for each in conditions] == shift_sds_n
 
 
 @pytest.mark.parametrize(
@@ -70,12 +82,6 @@ def test_readings_without_a_difference_are_said_to_be_unused(
     hz = frequencies_hz(np.array([7e5, 7.1e5, 7.2e5]))
     remarks = " ".join(usable(loadings(hz, read_n, SD_N), HANGER_3).remarks)
     assert ("The tension read, 600 kN, is not used" in remarks) == is_said
-
-
-def test_one_reading_alone_says_nothing() -> None:
-    tests = loadings(frequencies_hz(np.full(2, 7e5)), (600e3, NAN), SD_N)
-    conditions = observed(tests, HANGER_3).design.conditions
-    assert [each.tension_shift_n for each in conditions] == [0.0, 0.0]
 
 
 def test_a_readings_error_moves_all_modes_of_its_test_together() -> None:
@@ -152,13 +158,3 @@ def test_only_a_load_scale_parts_the_true_tension_from_the_one_at_rest() -> None
             share = 0.8 if name == "load_scale" else 1.0
             expected = share * weighed.nominal_tension_n
             assert problem.tension_n(hypothesis, z) == pytest.approx(expected), name
-
-
-def test_readings_without_a_standard_deviation_shift_the_diagnosed_tension_too() -> None:
-    stated = loadings(frequencies_hz(np.full(2, 7e5)), (600e3, 650e3), SD_N)
-    silent = [replace(test, tension_read_sd_n=NAN) for test in stated]
-    shifts = [
-        [each.tension_shift_n for each in observed(tests, HANGER_3).design.conditions]
-        for tests in (stated, silent)
-    ]
-    assert shifts[0] == shifts[1] == [-25e3, 25e3]

@@ -13,7 +13,6 @@ from shm.gap.contract import Hypothesis
 from shm.gap.problem import GapProblem
 from shm.gap.repeated_errors import (
     STRETCHES,
-    Repeated,
     ShapeScaling,
     section_loads,
     section_ways,
@@ -164,12 +163,6 @@ def test_a_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -
     _, sensors = errors_of_sensors(hanger, felt_by(ends[0]), places_m)
     own = np.hstack([sensors, loads_of_ends(ends, (0.0, 0.0), plane, order)])
     np.testing.assert_allclose(found.repeated.frequency, own @ own.T, rtol=0.1, atol=1e-12)
-
-
-def test_without_shapes_sensors_have_no_loads() -> None:
-    found = problem_of(simulated(**PLAN, shapes=False))
-    assert found.repeated.sensors.shape == Repeated.none(found.design).sensors.shape
-    assert np.isfinite(found.likelihood(Hypothesis()).log(np.zeros((1, found.design.size)))).all()
 
 
 def test_an_unstated_radius_of_a_known_mass_is_an_error_of_its_test() -> None:

@@ -12,17 +12,30 @@ import pytest
 from shm.errors import UsageError
 from shm.gap import GapOptions, diagnose_bridge
 from shm.gap.bridge_diagnosis import diagnose_jointly
+from shm.gap.probabilities import NO_GAP, SINGLE, UNKNOWN
+from shm.gap.scan import VISIBLE
+from shm.gap.search import Attribution, attribute
 from shm.gap.shared_causes import find_groups, sum_two_or_more
-from shm.gap.shared_evidence import SHARING, EffectEvidence, HangerEvidence, Place, Sizes
+from shm.gap.shared_evidence import (
+    SHARING,
+    EffectEvidence,
+    HangerEvidence,
+    Place,
+    Sizes,
+    weigh_hanger,
+)
 from shm.models.effects import EFFECTS, Variant
 from shm.report.as_text import as_text
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_paper
 from shm.report.contents import BridgeDiagnosisSheet
 from shm.report.figures.gap_causes import SHARED
 from shm.report.figures.specification import drawn
+from shm.simulate import PlantedEffect
 from shm.values import BridgeDiagnosis, Hanger, ModalTest
 from tests.helpers.diagnoses import a_diagnosis
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.effects import all_but
+from tests.helpers.gap_campaigns import problem_of, simulated
+from tests.helpers.hangers import HANGER_3, ROD
 
 MASS: Place = ("distributed_mass", "everywhere")
 CLOCK: Place = ("timebase", "all tests")
@@ -88,23 +101,22 @@ def test_what_no_hanger_shows_alone_the_family_does(family: BridgeDiagnosis) -> 
     assert family.leading.named == (1, 2, 4, 6)
     assert family.claim(family.leading) > 0.8
     assert family.leading.size.mean == pytest.approx(0.05, rel=0.1)
-
-
-def test_all_probabilities_add_to_one(family: BridgeDiagnosis) -> None:
     told = sum(cause.probability for cause in family.causes)
     told += family.each_for_itself_probability + family.unknown_probability
     assert told == pytest.approx(1.0)
 
 
-def test_sound_hangers_share_nothing() -> None:
-    found = bridge([0.3] * 8, [0.004] * 8)
+@pytest.mark.parametrize(
+    ("factors", "sizes", "least"),
+    [
+        ([0.3] * 8, [0.004] * 8, 0.7),  # sound hangers
+        ([40.0, *[0.05] * 5], [0.05, *[0.02] * 5], 0.0),  # one with a cause of its own
+    ],
+)
+def test_hangers_that_share_nothing(factors: list[float], sizes: list[float], least: float) -> None:
+    found = bridge(factors, sizes)
     assert found.leads == "each for itself"
-    assert found.each_for_itself_probability > 0.7
-
-
-def test_one_hanger_with_a_cause_of_its_own_shares_it_with_nobody() -> None:
-    found = bridge([40.0, *[0.05] * 5], [0.05, *[0.02] * 5])
-    assert found.leads == "each for itself"
+    assert found.each_for_itself_probability > least
 
 
 def test_what_none_can_see_adds_up() -> None:
@@ -157,10 +169,10 @@ def test_two_at_least_is_the_sum_over_all_such_choices() -> None:
 
 
 def test_families_are_the_hangers_alike_each_set_once() -> None:
-    made = [replace(hanger(n, {}, SOUND)) for n in range(1, 5)]
+    made = [hanger(n, {}, SOUND) for n in range(1, 5)]
     older = [
-        replace(p, hanger=replace(p.hanger, family="A" if n < 2 else "B"))
-        for n, p in enumerate(made)
+        replace(each, hanger=replace(each.hanger, family="A" if n < 2 else "B"))
+        for n, each in enumerate(made)
     ]
     found = {each.members: each.likeness for each in find_groups(older)}
     assert found[(0, 1, 2, 3)] == "all hangers"
@@ -179,3 +191,40 @@ def test_the_report_says_who_shares_what_in_plain_words(family: BridgeDiagnosis)
     assert "Distributed mass is shared by hangers 1, 2, 4 and 6 (" in " ".join(text.split())
     assert [each.name for each in drawn((SHARED,), family)] == ["shared"]
     assert max(map(len, text.splitlines())) <= 100
+
+
+EVERYWHERE = ("distributed_mass", "everywhere")
+
+
+def weigh(*planted: PlantedEffect) -> tuple[Attribution, HangerEvidence]:
+    """Weigh a hanger by a catalogue of one effect."""
+    tests = simulated(*planted, hanger=ROD, modes=5, shapes=False, as_made=False)
+    options = GapOptions(without=all_but(EVERYWHERE[0]), draws=200)
+    found = attribute(problem_of(tests, hanger=ROD), options, np.random.default_rng(1))
+    return found, weigh_hanger(ROD, tests, a_diagnosis(), found, np.random.default_rng(1))
+
+
+def test_visible_points_are_draws_of_the_size() -> None:
+    """The likelihoods give the probabilities back, and the tension follows the size."""
+    found, evidence = weigh(PlantedEffect(*EVERYWHERE, {"mass_change": 0.12}))
+    effect = evidence.effects[EVERYWHERE]
+    visible = effect.visible
+    chance = SINGLE * effect.weight[visible].sum() / np.ptp(effect.sizes.ends)
+    assert chance == pytest.approx(found.explanations[0].probability, rel=1e-6)
+    assert NO_GAP * evidence.no_gap == pytest.approx(found.no_gap_probability)
+    assert UNKNOWN * evidence.unknown == pytest.approx(found.unexplained_probability)
+    low, high = effect.sizes.ends
+    assert low <= effect.x[visible].min() <= effect.x[visible].max() <= high
+    size = effect.sizes.value(effect.x[visible])
+    assert np.quantile(size, 0.02) < 0.12 < np.quantile(size, 0.98)
+    assert np.corrcoef(effect.x[visible], effect.tension_n[visible])[0, 1] > 0.5
+    assert effect.tension_n[visible].mean() > effect.tension_n[~visible].mean()
+
+
+def test_a_smaller_size_is_less_told_from_none() -> None:
+    effect = weigh()[1].effects[EVERYWHERE]
+    small = ~effect.visible
+    order = np.argsort(effect.x[small])
+    told = np.abs(np.log(effect.weight[small] / SHARING.step)[order])
+    assert told[0] < 0.5 * told[-1]
+    assert told.max() < VISIBLE**2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from shm.values import EndPlate, Hanger
@@ -28,3 +30,7 @@ HANGER_3 = Hanger(
     ),
 )
 """The thesis's: a round steel rod of 130 mm, 12 m over all, with a plate at each end."""
+
+
+ROD = replace(HANGER_3, plate=None)
+"""The rod of hanger 3 without its plates."""

@@ -1,17 +1,14 @@
-"""Hangers for the general model, and a discretisation of another make to hold it against."""
+"""Hangers for the general model."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
 from shm.models.hanger import PhysicalHanger, solve
 from shm.values import FloatArray
 from tests.helpers.hangers import HANGER_3
-from tests.worlds.bars import Bar, Zone, natural_frequencies_hz
 
 LENGTH, TENSION = HANGER_3.length_m, HANGER_3.nominal_tension_n
 EI, MASS = HANGER_3.bending_stiffness_n_m2, HANGER_3.mass_per_length_kg_m
@@ -46,24 +43,3 @@ def on_springs(
 def frequencies_hz(hanger: PhysicalHanger, modes: int) -> FloatArray:
     """(n, 2, modes)."""
     return solve(hanger, modes, NOWHERE, shapes=False).frequency_hz
-
-
-def elements_hz(
-    stiffness: Callable[[float], float],
-    mass: Callable[[float], float],
-    breaks: Sequence[float],
-    modes: int,
-    *,
-    tension: float = TENSION,
-) -> FloatArray:
-    """Frequencies (modes,) of a clamped bar of hanger 3's length, by the bar of the worlds.
-
-    `stiffness` and `mass` per length are functions of x, constant between `breaks`.
-    """
-    zones = tuple(
-        Zone(a, b, stiffness((a + b) / 2) / EI, mass((a + b) / 2) / MASS)
-        for a, b in pairwise([0.0, *breaks, LENGTH])
-    )
-    ends = (np.inf, np.inf)
-    bar = Bar(LENGTH, tension, EI, MASS, zones=zones, rotation_n_m_rad=ends)
-    return natural_frequencies_hz(bar, modes)

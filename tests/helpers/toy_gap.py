@@ -110,38 +110,29 @@ def design_of(
     conditions: Sequence[Conditions],
     modes: Sequence[tuple[int, int]],
     places_m: tuple[float, ...] = (),
+    biaxial: bool = False,
 ) -> Design:
-    """Every mode (plane, order) in every test; every place sees the mode's plane alone."""
+    """Every mode (plane, order) in every test; a place sees the mode's plane alone, or both."""
     rows = [(t, plane, order) for t in range(len(conditions)) for plane, order in modes]
     test, plane, order = np.array(rows).T
-    shapes = [(mode, place) for mode in range(len(rows)) for place in range(len(places_m))]
-    mode, place = np.array(shapes, dtype=np.int64).reshape(-1, 2).T
-    return Design(
-        survey=_survey(conditions, sorted({plane for plane, _ in modes}), places_m),
-        conditions=tuple(conditions),
-        places_m=places_m,
-        frequency_test=test,
-        frequency_plane=plane,
-        frequency_order=order,
-        shape_mode=mode,
-        shape_place=place,
-        shape_component=plane[mode],
-    )
-
-
-def _survey(
-    conditions: Sequence[Conditions], planes: Sequence[int], places_m: tuple[float, ...]
-) -> Survey:
+    shapes = [
+        (mode, place, component)
+        for mode in range(len(rows))
+        for place in range(len(places_m))
+        for component in ((0, 1) if biaxial else (plane[mode],))
+    ]
+    mode, place, component = np.array(shapes, dtype=np.int64).reshape(-1, 3).T
     masses = {each.added_mass for each in conditions if each.added_mass is not None}
-    return Survey(
+    survey = Survey(
         tests=tuple(each.test for each in conditions),
-        planes=tuple(PLANES[plane] for plane in planes),
+        planes=tuple(PLANES[plane] for plane in sorted({plane for plane, _ in modes})),
         sensor_places_m=places_m,
-        biaxial=False,
+        biaxial=biaxial,
         temperatures_c=tuple(sorted({each.temperature_shift_k for each in conditions})),
         amplitudes=tuple(sorted({each.amplitude for each in conditions})),
         added_masses=tuple(sorted(masses, key=lambda mass: (mass.x_m, mass.mass_kg))),
     )
+    return Design(survey, tuple(conditions), places_m, test, plane, order, mode, place, component)
 
 
 def campaign(known_mass: AddedMass | None = None) -> tuple[Conditions, ...]:

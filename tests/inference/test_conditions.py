@@ -11,15 +11,12 @@ from shm.inference import UpdateOptions, update
 from shm.inference.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, Model, build
 from shm.models.base import Conditions
-from shm.simulate import HangerState
-from shm.values import NAN, PLANES, AddedMass, ModalTest, Mode
+from shm.values import NAN, AddedMass, ModalTest, Mode
+from tests.helpers.given_modes import with_modes
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.planted_modes import planted_modes
-from tests.worlds.simulated.effects.base import TestConditions
 
 WARMTH = "beam1+temperature_tension@everywhere:reference_c=10"
 SD = 1e-3
-SPRINGS = ("log10_k1", "log10_k2", "log10_k3", "log10_k4")
 
 
 def measured(
@@ -29,13 +26,8 @@ def measured(
     rng, found = np.random.default_rng(seed), []
     for test in tests:
         exact = model.frequencies_at(theta, modes, model.conditions(test))[0]
-        noisy = exact * (1 + SD * rng.standard_normal(exact.shape))
-        rows = tuple(
-            Mode(plane, order + 1, float(noisy[row, order]), float(SD * exact[row, order]))
-            for row, plane in enumerate(PLANES)
-            for order in range(modes)
-        )
-        found.append(replace(test, modes=rows))
+        noisy = with_modes(exact, SD, SD * rng.standard_normal(exact.shape))
+        found.append(replace(test, modes=noisy.modes))
     return found
 
 
@@ -90,19 +82,6 @@ def test_an_adopted_class_recovers_the_planted_tension_and_covers_it() -> None:
     assert found.parameter("stiffness_change").mean() == pytest.approx(-0.3, abs=0.08)
     assert max(abs(p.mean_hz / p.measured_hz - 1) for p in found.predicted) < 4 * SD
     assert found.r_hat < 1.1
-
-
-@pytest.mark.parametrize("name", ["beam1", "beam2"])
-def test_a_known_mass_moves_a_beam_as_finite_elements_do(name: str) -> None:
-    """Beam classes take the mass's share from the general model; the simulator has its own."""
-    model, springs = build(name, HANGER_3, THESIS), (2e7, 4e7, 8e7, 6e7)
-    given = dict(zip(SPRINGS, np.log10(springs), strict=True))
-    theta = model.pack({"theta_F": 1.0, "theta_L": 1.0, **(given if name == "beam2" else {})})
-    mass = AddedMass(25.0, 3.6, 0.0)
-    found = model.frequencies_at(theta[None], 6, Conditions(added_mass=mass))[0]
-    state = HangerState(HANGER_3.nominal_tension_n, *(springs if name == "beam2" else ()))
-    planted = planted_modes(HANGER_3, state, (), TestConditions(added_mass=mass), 6, ())
-    np.testing.assert_allclose(found, planted.frequency_hz, rtol=2e-6)
 
 
 def test_no_tension_is_inferred_from_an_irregular_mode() -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+import shm
 from shm.errors import BadInput
 from shm.gap import GapOptions, diagnose
 from shm.gap.data_checks import usable
@@ -21,24 +22,10 @@ from tests.helpers.hangers import HANGER_3
 FEW = UpdateOptions(samples=300, seed=1)
 
 
-def described(length_m: float, diameter_m: float, tension_n: float, section: float = 0.0) -> Hanger:
-    """Return a round steel bar or string."""
-    area_m2 = math.pi * diameter_m**2 / 4
-    scatter = Scatter(section=section) if section else Scatter()
-    return Hanger(
-        1,
-        length_m,
-        200e9,
-        area_m2,
-        math.pi * diameter_m**4 / 64,
-        7850 * area_m2,
-        tension_n,
-        scatter=scatter,
-    )
-
-
-STRING = described(0.65, 0.0004, 14.0, section=0.05)
-BAR = described(0.9, 0.022, 8000.0)
+STEEL = {"elastic_modulus_pa": 200e9, "density_kg_m3": 7850.0}
+BAR = shm.round_bar(1, diameter_m=0.022, length_m=0.9, nominal_tension_n=8000.0, **STEEL)
+STRING = shm.round_bar(1, diameter_m=0.0004, length_m=0.65, nominal_tension_n=14.0, **STEEL)
+STRING = replace(STRING, scatter=Scatter(section=0.05))
 STAY = replace(
     STRING,
     length_m=14.0,
@@ -234,6 +221,15 @@ def test_stated_error_larger_than_any_reading_is_named() -> None:
     (remark,) = check_data([wide], TAUT).remarks
     assert "a standard deviation of 100 Hz of transverse 1, 4.339 Hz: check its unit" in remark
     assert check_data([modes_of("t1", (4.339, 8.678), 0.1)], TAUT).remarks == ()
+
+
+def test_stated_error_of_zero_counts_as_not_stated() -> None:
+    zero = replace(SLIP, modes=tuple(replace(each, frequency_sd_hz=0.0) for each in SLIP.modes))
+    count = len(SLIP.modes)
+    said = f"A standard deviation of 0 counts as not stated ({count} of {count} frequencies)."
+    _, fields = check_for_update([zero], build("beam1", TAUT))
+    assert said in fields["remarks"]
+    assert said not in check_for_update([SLIP], build("beam1", TAUT))[1]["remarks"]
 
 
 def test_other_unit_is_said_first_and_no_other_orders_where_nothing_fits() -> None:

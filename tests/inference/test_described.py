@@ -13,7 +13,7 @@ from shm.inference.described import DescribedCoordinates
 from shm.inference.options import silent
 from shm.inference.priors import Calibration, TensionPrior, calibration_of
 from shm.inference.problem import Problem
-from shm.models import AsMade, build
+from shm.models import build
 from shm.models.base import Conditions
 from shm.values import (
     NAN,
@@ -21,15 +21,15 @@ from shm.values import (
     AddedMass,
     Hanger,
     ModalTest,
-    Mode,
     Plane,
     Posterior,
     Scatter,
     Turnbuckle,
 )
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.classes_as_made import as_made
+from tests.helpers.given_modes import with_modes
+from tests.helpers.hangers import HANGER_3, ROD
 
-ROD = replace(HANGER_3, plate=None)
 STRAND = replace(ROD, kind="strand", bending_stiffness_factor=0.7)
 STATED = replace(STRAND, scatter=Scatter(bending_factor=0.1))
 FITTED = replace(ROD, fittings_m=(0.3, 0.2))
@@ -44,8 +44,7 @@ def a_test(
     modes: int = 5,
     mass: AddedMass | None = None,
     log10_k: float = NAN,
-    tension_read_n: float = NAN,
-    tension_read_sd_n: float = NAN,
+    **reading: float,
 ) -> ModalTest:
     """Return frequencies to 0.01 % of the described bar, clamped or on four equal springs."""
     model = build("beam1" if np.isnan(log10_k) else "beam2", hanger)
@@ -53,28 +52,16 @@ def a_test(
     known |= {"bending_factor": 0.7, "inclination": 90.0}
     theta = model.pack({name: known.get(name, 0.0) for name in model.parameter_names})
     exact = model.frequencies_at(theta[None], modes, Conditions(added_mass=mass))[0]
-    rng = np.random.default_rng(3)
-    rows = tuple(
-        Mode(plane, order + 1, float(f * np.exp(1e-4 * rng.standard_normal())), float(1e-4 * f))
-        for plane in planes
-        for order, f in enumerate(exact[PLANES.index(plane)])
-    )
-    return ModalTest(
-        "t1",
-        rows,
-        hanger=3,
-        added_mass=mass,
-        tension_read_n=tension_read_n,
-        tension_read_sd_n=tension_read_sd_n,
-    )
+    exact = exact[[PLANES.index(plane) for plane in planes]]
+    noise = np.expm1(1e-4 * np.random.default_rng(3).standard_normal(exact.shape))
+    return with_modes(exact, 1e-4, noise, planes=planes, added_mass=mass, **reading)
 
 
 def coordinates_of(
     name: str, hanger: Hanger, *tests: ModalTest, calibration: Calibration | None = None
 ) -> DescribedCoordinates:
-    model = build(name, hanger)
-    assert isinstance(model, AsMade)
-    return DescribedCoordinates(model, tests or (a_test(hanger),), 3e6, calibration)
+    known = tests or (a_test(hanger),)
+    return DescribedCoordinates(as_made(name, hanger), known, 3e6, calibration)
 
 
 CASES = {
@@ -151,32 +138,6 @@ def test_effects_leave_no_deviation_unseen(case: str) -> None:
         column = model.parameter_names.index(name)
         np.testing.assert_allclose(drawn[:, column], middle[:, column], atol=1e-9)
         assert np.ptp(drawn[:, column]) > 1e-3
-
-
-def test_what_is_seen_is_as_much_as_the_class_and_the_tests_show() -> None:
-    plain = coordinates_of("beam2", ROD)
-    assert plain.dimension == 1 + 4 + 2 + 1  # tension, springs, inclination and sag's shape, c
-    assert coordinates_of("beam1", ROD).dimension == 1 + 2 + 1
-    assert coordinates_of("beam3", ROD).dimension == plain.dimension + 1  # the area by its shear
-    laden = coordinates_of("beam2", ROD, a_test(mass=CLAMP))
-    assert laden.dimension == plain.dimension + 1  # the mass
-    one_plane = coordinates_of("beam2", ROD, a_test(planes=("longitudinal",)))
-    assert one_plane.dimension == plain.dimension - 2
-    assert coordinates_of("beam2", ROD, a_test(planes=("transverse",))).dimension == 1 + 2 + 1
-    assert one_plane.names == ("theta_F",)
-    assert [name for name in one_plane.parameters if name in SPRINGS] == list(SPRINGS)
-    assert coordinates_of("beam2", HANGER_3).dimension == plain.dimension + 1  # the length
-    strand = coordinates_of("beam3", STRAND)
-    assert strand.names == ("theta_F", "bending_factor", "shear_share")
-    assert strand.dimension == 1 + 4 + 2 + 2  # the factor takes all of c
-    # Stiffness in each plane and mass of fittings.
-    fitted = coordinates_of("beam2", FITTED)
-    assert fitted.dimension == plain.dimension + 3
-    across = coordinates_of("beam2", FITTED, a_test(FITTED, planes=("transverse",)))
-    assert [term.name for term in across.terms] == ["fitting_stiffness_transverse", "fitting_mass"]
-    assert coordinates_of("beam2", COUPLED).dimension == plain.dimension + 2
-    inclined = coordinates_of("beam2", replace(ROD, inclination_deg=60.0))
-    assert inclined.dimension == plain.dimension + 1  # the stiffness against sag
 
 
 # ------------------------------------------------ what the tension rests on

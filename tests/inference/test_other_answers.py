@@ -9,7 +9,8 @@ import shm
 from shm.inference import UpdateOptions, update
 from shm.inference.other_answers import _description_off_sd
 from shm.models import THESIS, build
-from shm.values import PLANES, Hanger, ModalTest, Mode, Posterior
+from shm.values import Hanger, ModalTest, Posterior
+from tests.helpers.given_modes import with_modes
 from tests.helpers.slow import few_of
 
 STEEL = {"elastic_modulus_pa": 200e9, "density_kg_m3": 7850.0, "nominal_tension_n": 180e3}
@@ -25,7 +26,6 @@ def a_test(
     tension_n: float = TENSION_N,
     springs: tuple[float, ...] = (30, 30, 30, 30),
     sd: float = 1e-4,
-    **about: float,
 ) -> ModalTest:
     """Return exact modes of both planes, ends of k L/EI of `springs`, known to `sd`."""
     model = build(CLASS, hanger, THESIS)
@@ -33,13 +33,8 @@ def a_test(
     theta = np.array(
         [[tension_n / hanger.nominal_tension_n, 1.0, *np.log10(np.multiply(springs, unit))]]
     )
-    found = model.frequencies_hz(theta, max(orders))[0]
-    modes = tuple(
-        Mode(plane, order, float(row[order - 1]), frequency_sd_hz=sd * float(row[order - 1]))
-        for plane, row in zip(PLANES, found, strict=True)
-        for order in orders
-    )
-    return ModalTest("t", modes, hanger=3, **about)
+    found = model.frequencies_hz(theta, max(orders))[0, :, min(orders) - 1 :]
+    return with_modes(found, sd, first_order=min(orders))
 
 
 def posterior(test: ModalTest, hanger: Hanger = BAR) -> Posterior:

@@ -14,10 +14,9 @@ from shm.inference.priors import SPRINGS, Ends, TensionPrior, clamped_probabilit
 from shm.inference.updating import class_probabilities
 from shm.models import build
 from shm.values import Hanger
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.hangers import ROD
 from tests.helpers.nouns import a_posterior, a_test
 
-ROD = replace(HANGER_3, plate=None)
 KINDS = ("socket", "welded", "plate", "threaded", "fork", "unstated")
 SWAPS = (("log10_k1", "log10_k3"), ("log10_k2", "log10_k4"))
 PLANE = ("log10_k1", "log10_k3")
@@ -85,13 +84,6 @@ def test_folding_and_exchanging_keep_the_density_of_ends_normalised() -> None:
     np.testing.assert_allclose(ends.fold(folded), folded, atol=1e-9)
     for column in ends.exchanged(folded, rng).T:
         assert stats.kstest(column, "norm").pvalue > 1e-4
-
-
-def test_a_pair_of_ends_that_reaches_the_fold_is_unfolded() -> None:
-    ends, rng = Ends(ROD, PLANE, SWAPS), np.random.default_rng(4)
-    scores = ends.fold(rng.standard_normal((500, 2)))
-    ends.connect(scores, rng)
-    assert np.all(ends.log_folded(rng.standard_normal((50, 2))) == 0)
 
 
 def test_the_tension_prior_inverts_itself_and_holds_what_it_states() -> None:

@@ -11,18 +11,13 @@ from shm.errors import UsageError
 from shm.inference import UpdateOptions, refresh, select, update
 from shm.models import THESIS, Model, build, parameter_sets
 from shm.models.beam import Beam2
-from shm.values import PLANES, FloatArray, ModalTest, Mode, Posterior
+from shm.values import FloatArray, ModalTest, Posterior
 from tests.helpers.evidence_oracle import ORACLE, TABLES, modal_test
+from tests.helpers.given_modes import with_modes
 from tests.helpers.hangers import HANGER_3
 
-THETA = {
-    "theta_F": 1.0,
-    "theta_L": 0.97,
-    "log10_k1": 7.0,
-    "log10_k2": 7.5,
-    "log10_k3": 7.4,
-    "log10_k4": 8.0,
-}
+THETA = {"theta_F": 1.0, "theta_L": 0.97}
+THETA |= {"log10_k1": 7.0, "log10_k2": 7.5, "log10_k3": 7.4, "log10_k4": 8.0}
 FITTED = replace(HANGER_3, plate=None, fittings_m=(0.3, 0.3))
 
 
@@ -30,13 +25,8 @@ def measured(model: Model, seed: int, error: float = 0.01, **changes: float) -> 
     """Return twelve frequencies of the hanger above, with changes and fractional noise."""
     values = {name: value for name, value in THETA.items() if name in model.parameter_names}
     exact = model.frequencies_hz(model.pack({**values, **changes})[None], 6)[0]
-    noisy = exact * (1 + error * np.random.default_rng(seed).standard_normal(exact.shape))
-    modes = tuple(
-        Mode(plane, order + 1, float(noisy[row, order]))
-        for row, plane in enumerate(PLANES)
-        for order in range(6)
-    )
-    return ModalTest(f"t{seed}", modes, hanger=3)
+    noise = error * np.random.default_rng(seed).standard_normal(exact.shape)
+    return with_modes(exact, noise=noise, name=f"t{seed}")
 
 
 @pytest.fixture(scope="module")
@@ -132,8 +122,7 @@ class Fork(Model):
 def test_a_mode_that_the_known_posterior_has_lost_is_found_again() -> None:
     fork = Fork(HANGER_3)
     exact = fork.frequencies_hz(np.array([[0.8, 1.0]]), 6)[0]
-    noisy = exact * (1 + 0.005 * np.random.default_rng(1).standard_normal(exact.shape))
-    test = modal_test({plane: list(row) for plane, row in zip(PLANES, noisy, strict=True)})
+    test = with_modes(exact, noise=0.005 * np.random.default_rng(1).standard_normal(exact.shape))
     known = update([test], fork, UpdateOptions(400))
     lost = replace(known, samples=known.samples[known.parameter("a") > 0.5])
     found = refresh([test], fork, lost, UpdateOptions(1000, seed=2))

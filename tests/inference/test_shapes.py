@@ -10,18 +10,12 @@ from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
 from shm.inference.options import UpdateOptions
 from shm.inference.shapes import MeasuredShapes, swaps_of
 from shm.inference.updating import update
-from shm.models import AsMade, build
-from shm.values import PLANES, AddedMass, FloatArray, Hanger, ModalTest, Mode, ShapePoint
-from tests.helpers.hangers import HANGER_3
+from shm.models import AsMade
+from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, ShapePoint
+from tests.helpers.classes_as_made import as_made
+from tests.helpers.hangers import ROD
 
-ROD = replace(HANGER_3, plate=None)
 PLACES_M = (0.9, 1.9, 3.3)
-
-
-def as_made(hanger: Hanger) -> AsMade:
-    model = build("beam2", hanger)
-    assert isinstance(model, AsMade)
-    return model
 
 
 def truth(model: AsMade, **values: float) -> FloatArray:

@@ -10,7 +10,8 @@ import pytest
 from shm.inference import UpdateOptions, update
 from shm.inference.shares_of_variance import explained_share
 from shm.models import described
-from shm.values import PLANES, Hanger, ModalTest, Mode, Posterior, Selection
+from shm.values import Hanger, ModalTest, Posterior, Selection
+from tests.helpers.given_modes import with_modes
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_posterior
 
@@ -24,12 +25,7 @@ def sprung(hanger: Hanger) -> ModalTest:
     model = described("beam2", hanger, "thesis")
     springs = {f"log10_k{end}": 7.0 for end in (1, 2, 3, 4)}
     found = model.frequencies_hz(model.pack({"theta_F": 0.93, "theta_L": 1.0, **springs})[None], 3)
-    modes = tuple(
-        Mode(plane, order, float(hz), 2e-4 * float(hz))
-        for plane, row in zip(PLANES, found[0], strict=True)
-        for order, hz in enumerate(row, 1)
-    )
-    return ModalTest("t1", modes, hanger.id)
+    return with_modes(found[0], 2e-4)
 
 
 def wide(**fields: object) -> Posterior:

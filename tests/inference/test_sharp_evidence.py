@@ -7,7 +7,8 @@ import pytest
 
 from shm.inference import UpdateOptions, update
 from shm.models import THESIS, build
-from shm.values import PLANES, ModalTest, Mode, Posterior
+from shm.values import Posterior
+from tests.helpers.given_modes import with_modes
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.sharp_oracle import ORACLE, Resolution, SharpEvidence, sharp_test
 from tests.helpers.slow import few_of
@@ -51,13 +52,7 @@ def test_the_tension_of_a_needle_is_found(theta: tuple[float, ...], sd: float) -
     """Measure orders 2 to 6 of the exact beam to a fraction `sd`: a narrow, bent valley."""
     model, rng = build("beam2", HANGER_3, THESIS), np.random.default_rng(81)
     exact = model.frequencies_hz(np.array([theta]), 6)[0, :, 1:]
-    measured = exact * (1 + sd * rng.standard_normal(exact.shape))
-    modes = tuple(
-        Mode(plane, order, float(frequency), sd * float(frequency))
-        for plane, row in zip(PLANES, measured, strict=True)
-        for order, frequency in enumerate(row, start=2)
-    )
-    test = ModalTest("sharp", modes, hanger=HANGER_3.id)
+    test = with_modes(exact, sd, sd * rng.standard_normal(exact.shape), first_order=2)
     found = update([test], model, UpdateOptions(1000, seed=2))
     low, high = np.quantile(found.parameter("theta_F"), [0.005, 0.995])
     assert found.effective_sample_size > 200

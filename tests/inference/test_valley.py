@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from shm.inference.valley import Proposal, valleys_through
-from shm.values import FloatArray, IntArray
+from shm.values import FloatArray
 
 SD = 0.01
 WHITENING = np.array([[1 / SD]])
@@ -61,15 +61,6 @@ def proposal() -> Proposal:
     return Proposal.through(valleys, points, 4, rng)
 
 
-def test_the_determined_direction_is_the_one_that_the_datum_depends_on(proposal: Proposal) -> None:
-    (valley,) = proposal.valleys
-    assert valley.free.shape == (4, 3)
-    assert valley._unfelt.shape == (4, 2)  # z2 and z3
-    np.testing.assert_allclose(np.abs(valley._unfelt[:2]).max(), 0, atol=1e-9)
-    whole = np.hstack([valley.free, valley._determined])
-    np.testing.assert_allclose(whole.T @ whole, np.eye(4), atol=1e-12)
-
-
 def test_a_normal_target_in_the_bent_valley_integrates_to_one(proposal: Proposal) -> None:
     """Integrate a density over the valley, and the prior times the likelihood."""
     rng = np.random.default_rng(2)
@@ -88,33 +79,3 @@ def test_a_normal_target_in_the_bent_valley_integrates_to_one(proposal: Proposal
     log = norm(0, SD).logpdf(bent[:, 0]) + norm.logpdf(draws.z).sum(axis=1)
     found = np.exp(log - proposal.log_density(draws)).mean()
     assert np.log(found) == pytest.approx(np.log(evidence), abs=0.03)
-
-
-def test_points_in_two_valleys_make_two(proposal: Proposal) -> None:
-    class Twins(BentProblem):
-        """Give z0^2 = 1: two valleys 200 standard deviations apart."""
-
-        @staticmethod
-        def residual(z: FloatArray) -> FloatArray:
-            return 1 - z[:, :1] ** 2
-
-        @staticmethod
-        def slopes(z: FloatArray, directions: FloatArray | None = None) -> FloatArray:
-            rows = np.zeros((len(z), 1, 4))
-            rows[:, 0, 0] = 2 * z[:, 0]
-            return rows if directions is None else rows @ directions
-
-    rng = np.random.default_rng(6)
-    points = rng.standard_normal((160, 4))
-    nearest: IntArray = (np.arange(160) % 3 == 0).astype(int)
-    points[:, 0] = np.where(nearest, -1.0, 1.0)
-    valleys = valleys_through(Twins(), points, nearest, WHITENING)  # type: ignore[arg-type]
-    assert len(valleys) == 2
-    twins = Proposal.through(valleys, points, 4, rng)
-    assert twins.chances == pytest.approx([2 / 3, 1 / 3], abs=0.01)
-    draws = twins.draw(Twins(), 8000, rng)  # type: ignore[arg-type]
-    log = norm(0, SD).logpdf(draws.z[:, 0] ** 2 - 1) + norm.logpdf(draws.z).sum(axis=1)
-    weight = np.exp(log - twins.log_density(draws))
-    assert weight.mean() == pytest.approx(norm.pdf(1), rel=0.03)  # both, each with slope 2
-    assert weight[draws.z[:, 0] > 0].sum() / weight.sum() == pytest.approx(0.5, abs=0.05)
-    assert not valleys[0].follows(points[nearest == 1]).any()

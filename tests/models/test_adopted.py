@@ -19,6 +19,7 @@ from tests.helpers.workspaces import modes_of
 
 MASS = "beam1+point_mass@everywhere"
 WARMTH = "beam1+temperature_tension@everywhere:reference_c=10"
+RANGE = {"tension_per_kelvin_n_k": (-1.25e6, -1e-5)}
 ADOPTABLE = [
     (name, key)
     for name, effect in EFFECTS.items()
@@ -46,17 +47,7 @@ def parameters(model: Model, **values: float) -> np.ndarray:
                 AdoptedEffect("bending_stiffness", "everywhere.transverse"),
             ),
         ),
-        AdoptedName(
-            "beam1",
-            (
-                AdoptedEffect(
-                    "temperature_tension",
-                    "everywhere",
-                    -3.5,
-                    {"tension_per_kelvin_n_k": (-1.25e6, -1e-5)},
-                ),
-            ),
-        ),
+        AdoptedName("beam1", (AdoptedEffect("temperature_tension", "everywhere", -3.5, RANGE),)),
     ],
 )
 def test_a_name_comes_back_from_its_text(name: AdoptedName) -> None:

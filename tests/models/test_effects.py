@@ -8,16 +8,18 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from shm.errors import BadInput
 from shm.models.effects import (
     EFFECTS,
     Case,
     Conditions,
     Survey,
     Variant,
+    check_effect_priors,
     parameters_of,
 )
 from shm.models.hanger import PhysicalHanger
-from shm.values import PLANES
+from shm.values import PLANES, EffectPrior, Hanger
 from tests.helpers.hangers import HANGER_3
 
 PLACES_M = (1.2, 3.6, 5.1, 8.3)
@@ -47,11 +49,11 @@ def bar() -> PhysicalHanger:
     )
 
 
-def at_size(name: str, variant: Variant, zero: bool, shares: np.ndarray = SHARES) -> np.ndarray:
+def at_size(name: str, variant: Variant, zero: bool) -> np.ndarray:
     """Values (n, parameters), every size at its zero where asked for."""
     return np.stack(
         [
-            np.full(len(shares), one.zero) if zero and not np.isnan(one.zero) else one.value(shares)
+            np.full(3, one.zero) if zero and not np.isnan(one.zero) else one.value(SHARES)
             for one in parameters_of(name, HANGER_3, variant)
         ],
         axis=1,
@@ -59,16 +61,10 @@ def at_size(name: str, variant: Variant, zero: bool, shares: np.ndarray = SHARES
 
 
 def acting(
-    name: str,
-    variant: Variant,
-    conditions: Conditions = CONDITIONS,
-    zero: bool = False,
-    shares: np.ndarray = SHARES,
+    name: str, variant: Variant, conditions: Conditions = CONDITIONS, zero: bool = False
 ) -> PhysicalHanger:
-    test = variant.test or conditions.test
-    values = at_size(name, variant, zero, shares)
-    case = Case(HANGER_3, variant, replace(conditions, test=test))
-    return EFFECTS[name].act(bar(), values, case)
+    case = Case(HANGER_3, variant, replace(conditions, test=variant.test or conditions.test))
+    return EFFECTS[name].act(bar(), at_size(name, variant, zero), case)
 
 
 def felt(physical: PhysicalHanger) -> dict[str, np.ndarray]:
@@ -115,19 +111,11 @@ def test_an_effect_says_what_it_is_and_whence(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "variant"), CASES)
-def test_at_zero_nothing_is_changed(name: str, variant: Variant) -> None:
+def test_an_effect_changes_the_hanger_by_what_it_declares(name: str, variant: Variant) -> None:
+    """Nothing at zero; it follows the temperature or the level only where it says so."""
     assert changed(bar(), acting(name, variant, zero=True)) == set()
-
-
-@pytest.mark.parametrize(("name", "variant"), CASES)
-def test_a_size_within_its_prior_changes_the_hanger(name: str, variant: Variant) -> None:
-    assert changed(bar(), acting(name, variant)) != set()
-
-
-@pytest.mark.parametrize(("name", "variant"), CASES)
-def test_what_an_effect_follows_is_declared(name: str, variant: Variant) -> None:
-    """It may depend on the temperature or the level only where it says so."""
     usual = acting(name, variant)
+    assert changed(bar(), usual) != set()
     warmer = acting(name, variant, replace(CONDITIONS, temperature_shift_k=-4.0))
     harder = acting(name, variant, replace(CONDITIONS, amplitude=1.5))
     follows = EFFECTS[name].follows
@@ -180,3 +168,38 @@ def test_what_data_cannot_show_is_said_in_a_sentence(name: str, survey: Survey, 
     sentence = EFFECTS[name].invisible(HANGER_3, survey)
     assert why in sentence
     assert sentence.endswith(".")
+
+
+def with_prior(effect: str, parameter: str, lower: float, upper: float) -> Hanger:
+    return replace(HANGER_3, effect_priors=(EffectPrior(effect, parameter, lower, upper),))
+
+
+def test_the_owners_range_replaces_the_catalogues_and_nothing_else() -> None:
+    own = with_prior("point_mass", "mass_kg", 1, 50)
+    check_effect_priors(own)
+    mass, place = parameters_of("point_mass", own, Variant())
+    usual_mass, usual_place = parameters_of("point_mass", HANGER_3, Variant())
+    assert (mass.lower, mass.upper) == (1, 50)
+    assert replace(mass, lower=usual_mass.lower, upper=usual_mass.upper) == usual_mass
+    assert place == usual_place
+
+
+@pytest.mark.parametrize(
+    ("prior", "complaint"),
+    [
+        (("magic", "size", 1, 2), r"\[hanger.effects.magic\] is no effect"),
+        (("point_mass", "weight", 1, 2), r"\[hanger.effects.point_mass\] has no parameter weight"),
+        (("point_mass", "mass_kg", 50, 1), r"mass_kg = \[50, 1\] does not rise"),
+        (("point_mass", "mass_kg", 1, 1), "does not rise"),
+        (("point_mass", "mass_kg", 0, 1), r"mass_kg = \[0, 1\] is not above 0"),
+        (("timebase", "clock_error", -0.01, 0.01), "both signs"),
+        (("point_mass", "x_m", 3, 13), r"Stay within 0 and 12 m"),
+        (("section_loss", "loss", 0.1, 1), "Stay within 0 and 0.99 fraction"),
+        (("shear_and_rotary_inertia", "share", -1, 1), "beyond what can be"),
+    ],
+)
+def test_a_range_that_cannot_be_is_refused_with_what_to_do(prior: tuple, complaint: str) -> None:
+    with pytest.raises(BadInput, match=complaint) as refusal:
+        check_effect_priors(with_prior(*prior))
+    assert "hanger 3" in str(refusal.value)
+    assert refusal.value.remedy

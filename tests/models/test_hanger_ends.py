@@ -86,12 +86,8 @@ def test_sag_is_irvines(sag: float) -> None:
         half = w / 2
         return float(np.sin(half) - (half - 4 / sag * half**3) * np.cos(half))
 
-    symmetric = [
-        brentq(fault, (2 * n + 1) * np.pi * (1 - 1e-9), (2 * n + 2) * np.pi * (1 - 1e-9))
-        if n == 0
-        else brentq(fault, (2 * n + 1) * np.pi * (1 - 1e-9), (2 * n + 1.9) * np.pi)
-        for n in range(3)
-    ]
+    ends = ((2 * n + 1, 2 * n + (1.9 if n else 2 - 2e-9)) for n in range(3))
+    symmetric = [brentq(fault, low * np.pi * (1 - 1e-9), high * np.pi) for low, high in ends]
     waves = np.sort([*symmetric, *(2 * np.pi * np.arange(1, 4))]) / LENGTH
     sagging = replace(string(), sag_parameter=np.full((1, 2), sag))
     found = frequencies_hz(sagging, 6)[0, 0]
@@ -110,15 +106,8 @@ def skewed(angle: float, k: float, ends=(0, 1)) -> PhysicalHanger:
 @pytest.mark.parametrize("angle", [0.0, 0.2, np.pi / 4, 1.0, np.pi / 2, -0.7])
 def test_turned_springs_keep_the_frequencies_and_turn_the_motion(angle: float) -> None:
     k = 3e6
-    straight = tensioned_beam.frequencies_hz(
-        np.array([LENGTH]),
-        np.array([TENSION]),
-        np.array([EI]),
-        np.array([MASS]),
-        np.array([k]),
-        np.array([k]),
-        8,
-    )[0]
+    bar = (np.array([each]) for each in (LENGTH, TENSION, EI, MASS, k, k))
+    straight = tensioned_beam.frequencies_hz(*bar, 8)[0]
     rigid = frequencies_hz(clamped(), 8)[0, 0]
     found = solve(skewed(angle, k), 8, np.array([2.0, 5.1]))
     both = np.sort(found.frequency_hz[0].ravel())

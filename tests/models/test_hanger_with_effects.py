@@ -7,50 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.inference.described import DescribedCoordinates
-from shm.models import AsMade, build
+from shm.models import AsMade
 from shm.models.effects import Conditions, Variant
-from shm.values import AddedMass, FloatArray, Hanger, Turnbuckle
+from shm.values import AddedMass, FloatArray
+from tests.helpers.classes_as_made import as_made
+from tests.helpers.classes_as_made import drawn as own_drawn
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.slow import few_of
 
 PLACES = (1.2, 3.6, 6.0, 9.0)
 PLAIN = Conditions("t1")
 ROD = replace(HANGER_3, plate=None, fittings_m=(0.4, 0.3), ends="fork")
-LINED = replace(ROD, turnbuckles=(Turnbuckle(1.5, 0.6, 150.0, 1e7),))
 SETS = 4
-
-
-def as_made(name: str, hanger: Hanger) -> AsMade:
-    model = build(name, hanger)
-    assert isinstance(model, AsMade)
-    return model
 
 
 def drawn(model: AsMade, *effects: float) -> FloatArray:
     """Draw parameter sets of a class, with the same values of the effects behind."""
-    rng = np.random.default_rng(1)
-    coordinates = DescribedCoordinates(model, (), 1.0)
-    own = coordinates.finished(coordinates.draw_prior(SETS, rng), rng)
-    return np.column_stack([own, np.tile(effects, (SETS, 1))])
-
-
-@pytest.mark.parametrize("hanger", [ROD, LINED, HANGER_3], ids=["rod", "lined", "plates"])
-@pytest.mark.parametrize("name", ["beam1", "beam2", "beam3"])
-def test_modes_without_effects_are_the_class_own(name: str, hanger: Hanger) -> None:
-    model = as_made(name, hanger)
-    bare = model.with_effects([], PLACES)
-    theta = drawn(model)
-    assert bare.parameter_names == model.parameter_names
-    found = bare.modes(theta, PLAIN, 6)
-    np.testing.assert_allclose(found.frequency_hz, model.frequencies_hz(theta, 6), rtol=2e-4)
-    if not model.length_is_open:
-        shapes = model.shapes(theta, 3, np.array(PLACES))
-        for plane in (0, 1):
-            seen = found.shape[:, plane, :3, :, plane]
-            likeness = np.einsum("nmx,nmx->nm", seen, shapes[:, plane])
-            sizes = np.linalg.norm(seen, axis=2) * np.linalg.norm(shapes[:, plane], axis=2)
-            np.testing.assert_allclose(np.abs(likeness / sizes), 1, atol=1e-5)
+    return np.column_stack([own_drawn(model, SETS), np.tile(effects, (SETS, 1))])
 
 
 @pytest.mark.parametrize("name", few_of(["s1", "s2"], 1))

@@ -97,5 +97,5 @@ def test_an_unstated_radius_is_the_usual_one_in_a_prediction(
 
 
 def test_what_is_planted_without_a_radius_is_a_point() -> None:
-    found = planted(AddedMass(HEAVY, PLACE_M))
-    np.testing.assert_allclose(found, planted(AddedMass(HEAVY, PLACE_M, 0.0)), rtol=1e-12)
+    found, point = (planted(AddedMass(HEAVY, PLACE_M, *radius)) for radius in ((), (0.0,)))
+    np.testing.assert_allclose(found, point, rtol=1e-12)

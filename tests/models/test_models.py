@@ -9,7 +9,7 @@ import pytest
 
 from shm.errors import UsageError
 from shm.models import MODELS, PRIORS, THESIS, AsMade, Model, build
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.hangers import HANGER_3, ROD
 
 # Each makes a reduced basis of its own: s1 stands for what `AsMade` adds to a solid class.
 MADE_ALIKE = [(name, "description") for name in ("s2", "solid0", "solid1", "solid2")]
@@ -43,19 +43,15 @@ def sags(model: Model) -> bool:
     return isinstance(model, AsMade) and model.has_terms
 
 
-def test_frequencies_have_the_stated_shape_and_rise_with_the_order(model, theta) -> None:
-    frequencies = model.frequencies_hz(theta, 6)
-    assert frequencies.shape == (20, 2, 6)
-    assert np.all(np.diff(frequencies, axis=2) > 0)
-
-
-def test_more_tension_raises_every_frequency(model, theta) -> None:
+def test_frequencies_rise_with_the_order_and_the_tension(model, theta) -> None:
     more = theta.copy()
     more[:, model.parameter_names.index("theta_F")] *= 1.1
+    tighter, slacker = (model.frequencies_hz(each, 6) for each in (more, theta))
+    assert slacker.shape == (20, 2, 6)
+    assert np.all(np.diff(slacker, axis=2) > 0)
     # In the longitudinal plane of one with own weight, sag stiffens a slack bar.
     planes = slice(0, 1 if sags(model) else 2)
-    tighter, slacker = (model.frequencies_hz(each, 6)[:, planes] for each in (more, theta))
-    assert np.all(tighter > slacker)
+    assert np.all(tighter[:, planes] > slacker[:, planes])
 
 
 def test_a_swap_changes_no_frequency(model, theta, monkeypatch) -> None:
@@ -108,3 +104,12 @@ def test_beam_1_of_hanger_3_gives_the_exact_first_frequency() -> None:
     long, short = model.frequencies_hz(np.array([[1.0, 1.0], [1.0, 9.817 / 12]]), 1)[:, 0, 0]
     assert long == pytest.approx(5.58, abs=0.005)
     assert short == pytest.approx(7.67, abs=0.005)
+
+
+def test_an_end_spring_is_stiff_against_bending_stiffness_times_wave_number() -> None:
+    """sqrt(EI T + (EI n pi / L)^2): of a string EI and T alone, of a beam EI and n pi / L."""
+    ei, tension = ROD.bending_stiffness_n_m2, ROD.nominal_tension_n
+    for order in (1, 4):
+        expected = np.sqrt(ei * tension + (ei * order * np.pi / ROD.length_m) ** 2)
+        for one in (build("beam1", ROD), build("beam1", ROD, THESIS)):
+            assert one.wave_stiffness_n_m_rad(order) == pytest.approx(expected, rel=1e-12)

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.inference.described import DescribedCoordinates
-from shm.models import AsMade, build, described
+from shm.models import AsMade, described
 from shm.models.base import Conditions, radius_m
 from shm.models.hanger import PhysicalHanger, PointMass, physical, solve
 from shm.values import AddedMass, FloatArray, Hanger, Supports, Turnbuckle
+from tests.helpers.classes_as_made import as_made, drawn
 from tests.helpers.hangers import HANGER_3
 from tests.worlds.eight_kinds import Member, Zone, natural_frequencies_hz
 
@@ -37,19 +37,6 @@ REDUCED = 1.5e-4  # of a frequency, by the reduced basis
 NOWHERE = np.empty(0)
 
 
-def as_made(name: str, hanger: Hanger) -> AsMade:
-    model = build(name, hanger)
-    assert isinstance(model, AsMade)
-    return model
-
-
-def drawn(model: AsMade, seed: int = 1) -> FloatArray:
-    """Draw parameter sets from the prior of the description."""
-    rng = np.random.default_rng(seed)
-    coordinates = DescribedCoordinates(model, (), 1.0)
-    return coordinates.finished(coordinates.draw_prior(SETS, rng), rng)
-
-
 def stiff_zone(start_m: float, end_m: float) -> physical.Zone:
     one = np.ones(1)
     return physical.Zone(start_m * one, end_m * one, 6 * one, one)
@@ -62,10 +49,22 @@ def solved(bar: PhysicalHanger) -> FloatArray:
 @pytest.mark.parametrize("name", ["beam1", "beam2", "beam3"])
 @pytest.mark.parametrize("kind", HANGERS)
 def test_physical_frequencies_are_the_class_own(kind: str, name: str) -> None:
+    """Of the bar, of the class with no effects, and where it has shapes those as well."""
     model = as_made(name, HANGERS[kind])
-    theta = drawn(model)
-    bar = model.physical(theta)
-    np.testing.assert_allclose(solved(bar), model.frequencies_hz(theta, MODES), rtol=REDUCED)
+    theta, places = drawn(model, SETS), np.array([0.1, 0.3, 0.5, 0.75]) * HANGERS[kind].length_m
+    bar, bare = model.physical(theta), model.with_effects([], tuple(places))
+    own_hz = model.frequencies_hz(theta, MODES)
+    np.testing.assert_allclose(solved(bar), own_hz, rtol=REDUCED)
+    assert bare.parameter_names == model.parameter_names
+    found = bare.modes(theta, Conditions("t1"), MODES)
+    np.testing.assert_allclose(found.frequency_hz, own_hz, rtol=2e-4)
+    if not model.length_is_open and kind != "slack":
+        shapes = model.shapes(theta, 3, places)
+        for plane in (0, 1):
+            seen = found.shape[:, plane, :3, :, plane]
+            likeness = np.einsum("nmx,nmx->nm", seen, shapes[:, plane])
+            sizes = np.linalg.norm(seen, axis=2) * np.linalg.norm(shapes[:, plane], axis=2)
+            np.testing.assert_allclose(np.abs(likeness / sizes), 1, atol=1e-5)
     if kind == "slack":
         straight = replace(bar, sag_parameter=0 * bar.sag_parameter)
         assert np.abs(solved(straight) / solved(bar) - 1).max() > 0.02
@@ -76,7 +75,7 @@ def test_physical_with_known_mass(kind: str) -> None:
     hanger = HANGERS[kind]
     mass = AddedMass(x_m=2.2, mass_kg=9.0)
     model = as_made("beam2", hanger)
-    theta = drawn(model)
+    theta = drawn(model, SETS)
     # The class lets it keep its part of the length.
     length, one = model.stiffness_mass_length(theta)[2], np.ones(SETS)
     clamped_on = PointMass(2.2 * length, 9.0 * one, radius_m(hanger, mass) * length)
@@ -100,22 +99,9 @@ def test_physical_on_supports() -> None:
     np.testing.assert_allclose(found, unit * roots**2 / (2 * np.pi), rtol=1e-6)
 
 
-def test_physical_of_solid_has_plates_and_deviations() -> None:
-    model = as_made("s2", HANGER_3)
-    theta = drawn(model)
-    bar = model.with_effects((), (1.0, 2.0, 3.0)).physical(theta)
-    stiffness, mass, length = model.stiffness_mass_length(theta)
-    assert bar.sensor_turn_rad.shape == (SETS, 3)
-    np.testing.assert_allclose(bar.deck_end_m, 1.0915)
-    np.testing.assert_allclose(bar.length_m, length * (12.0 - 2 * 1.0915))
-    described_n_m2 = HANGER_3.bending_stiffness_n_m2
-    np.testing.assert_allclose(bar.bending_stiffness_n_m2[:, 1], stiffness * described_n_m2)
-    np.testing.assert_allclose(bar.mass_per_length_kg_m, mass * HANGER_3.mass_per_length_kg_m)
-
-
 def test_physical_with_open_length_is_centred() -> None:
     model = as_made("beam2", HANGER_3)
-    bar = model.physical(drawn(model))
+    bar = model.physical(drawn(model, SETS))
     np.testing.assert_allclose(bar.deck_end_m + bar.arch_end_m, 12.0)
     assert bar.length_m.min() < 11.0
 

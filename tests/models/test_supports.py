@@ -10,11 +10,12 @@ import pytest
 
 from shm.errors import UsageError
 from shm.inference.described import DescribedCoordinates
-from shm.models import MODELS, AsMade, applicable, build, check_baseline
+from shm.models import MODELS, AsMade, applicable, build, check_baseline, competing_names
+from shm.models.beam import Beam1
 from shm.models.effects import EFFECTS, Conditions, Survey, parameters_of
 from shm.models.hanger import PhysicalHanger, solve
 from shm.values import PLANES, FloatArray, Hanger, Supports
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.hangers import HANGER_3, ROD
 from tests.helpers.physical_hangers import EI, LENGTH, MASS, NOWHERE, TENSION
 
 UNIT_HZ = np.sqrt(EI / MASS) / LENGTH**2 / (2 * np.pi)
@@ -119,3 +120,28 @@ def test_a_diagnosis_takes_beam1_as_it_is_described_and_no_other_class() -> None
     admits = replace(hanger, models=("beam2",))
     with pytest.raises(UsageError, match="admits"):
         check_baseline("beam1", admits)
+
+
+class Plated(Beam1):
+    """A class that needs end plates."""
+
+    name = "plated"
+
+    @classmethod
+    def unfit(cls, hanger: Hanger) -> str:
+        return "" if hanger.plate else "it needs end plates."
+
+
+@pytest.fixture
+def plated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(MODELS, "plated", Plated)
+
+
+@pytest.mark.usefixtures("plated")
+def test_a_class_that_cannot_describe_the_hanger_says_why() -> None:
+    names = ["beam1", "plated", "beam2"]
+    assert applicable(HANGER_3, names) == (("beam1", "plated", "beam2"), {})
+    assert applicable(ROD, names) == (("beam1", "beam2"), {"plated": "it needs end plates."})
+    assert competing_names(ROD, ["beam1", "plated"]) == ("beam1",)
+    with pytest.raises(UsageError, match=r"hanger 3.*plated: it needs end plates"):
+        competing_names(ROD, ["plated"])

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.polynomial import legendre
-from scipy.linalg import block_diag, eigh
+from scipy.linalg import eigh
 
 from shm.models import described, tensioned_beam
 from shm.values import FloatArray
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import EI, LENGTH, MASS, TENSION
+from tests.helpers.timoshenko import legendre_hz
 
 NU = HANGER_3.poissons_ratio
 SHEAR = (
@@ -62,34 +61,8 @@ def pinned_hz(length_m: float, tension_n: float, modes: int) -> FloatArray:
 def test_a_short_bar_on_springs_is_that_of_another_discretisation(
     tension_n: float, deck: float, arch: float
 ) -> None:
-    expected = legendre_hz(2.0, tension_n, deck, arch, 6)
+    expected = legendre_hz(HANGER_3, 2.0, tension_n, 6, (deck, arch))
     np.testing.assert_allclose(found_hz(deck, arch, 6, 2.0, tension_n), expected, rtol=1e-8)
-
-
-def legendre_hz(
-    length_m: float, tension_n: float, deck: float, arch: float, modes: int
-) -> FloatArray:
-    """Deflections that vanish at the ends, rotations that the springs there resist."""
-    x, weights = legendre.leggauss(80)
-    weights = weights * length_m / 2
-    unit = np.eye(36)
-    bubbles = unit[2:] - unit[:-2]
-    slope = legendre.legval(x, legendre.legder(bubbles.T)) * 2 / length_m
-    turn, bend = (legendre.legval(x, each) for each in (unit, legendre.legder(unit)))
-    bend = bend * 2 / length_m
-    deflection, ends = legendre.legval(x, bubbles.T), legendre.legval(np.array([-1.0, 1.0]), unit)
-
-    def integral(left: Any, right: Any) -> FloatArray:
-        return np.asarray((left * weights) @ right.T)
-
-    corner = -SHEAR * integral(slope, turn)
-    whole = EI * integral(bend, bend) + SHEAR * integral(turn, turn)
-    whole += (ends * np.array([deck, arch])) @ ends.T
-    stiffness = np.block(
-        [[(SHEAR + tension_n) * integral(slope, slope), corner], [corner.T, whole]]
-    )
-    mass = MASS * block_diag(integral(deflection, deflection), GYRATION**2 * integral(turn, turn))
-    return np.asarray(np.sqrt(eigh(stiffness, mass, eigvals_only=True)[:modes]) / (2 * np.pi))
 
 
 @pytest.mark.parametrize("length_m", [2.0, 6.0])

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from shm.pipeline.bridge_reporting import hanger_summaries
 from shm.pipeline.diagnosing import choose_tests, latest_diagnosis
 from shm.store import Store
 from shm.values import WatchedTest
@@ -52,6 +53,9 @@ def test_choose_tests_since_the_change_in_force(
             assert found is not None
             is_old = since == "t2" and names[-1] == "t1"
             assert ("Diagnose again" in "".join(found.remarks)) == is_old
+            (now,) = hanger_summaries(workspace, store, NOW, [hanger])
+            line = f"Gap diagnosis of {NOW:%Y-%m-%d}: "
+            assert any(each.startswith(line) for each in now.message.reasons) != is_old
 
 
 def _watch(store: Store, watched: tuple[dict[str, object], ...], alerts: str) -> None:

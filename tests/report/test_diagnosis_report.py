@@ -102,9 +102,9 @@ def said(diagnosis: Diagnosis) -> str:
         (UNDECIDED, "Several causes fit alike, and these data cannot tell them apart: point mass "
                     "and sag, together probability 0.75."),
         (replace(LED, fit_p_value=0.002),
-         "Point mass explains a part of the gap, but more is left than the errors allow: "
+         "Point mass explains part of the gap, but more is left than the errors allow: "
          "measurements as far off would come by chance with probability below 0.01 only."),
-        (replace(ALIKE, fit_p_value=0.002), "first: one of rotational end flexibility (both ends)"),
+        (replace(ALIKE, fit_p_value=0.002), "first: rotational end flexibility (both ends)"),
         (SHARED, "rotational end flexibility (both ends), effective"),
         (FITS, FITS_TOO),
         # Beside "no gap" a rival that counts calls for a measurement.
@@ -298,5 +298,5 @@ def test_facts_have_intervals_and_no_endless_number() -> None:
     p_value = "posterior predictive p-value < 0.01"
     assert told["What is left"] == ("more than the errors", p_value)
     assert told["Tension"] == (
-        "702 ± 12 kN", "averaged over all explanations; baseline alone 731.4 ± 3.4 kN",
+        "702 ± 12 kN", "averaged over all explanations; beam1 alone 731.4 ± 3.4 kN",
     )  # fmt: skip

@@ -173,8 +173,9 @@ def test_summary_reads_so_from_beginning_to_end(season: HangerReport, bare: Hang
         "section loss, measure next: known mass of 25 kg at 3.6 m."
     )
     assert summary(bare) == (
-        "Hanger 3: tension 711 ± 14 kN, and no test after its baseline. Choose a warmer or colder "
-        "day at the next planned test, so that the baseline covers temperature. Its tension is "
+        "Hanger 3: tension 711 ± 14 kN, and no test after its baseline. No action is needed "
+        "before the next planned test: choose a warmer or colder day for it, so that the baseline "
+        "covers temperature. Its tension is "
         "711 ± 14 kN by test only. The model class is beam1. It predicts one measured frequency "
         "to 0.34 % (root mean square). Each lies within its 90 % interval: the model explains "
         "what was measured. Record the temperature with the next test: it moves the tension."

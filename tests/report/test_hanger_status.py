@@ -13,7 +13,8 @@ import pytest
 
 from shm.inference import UpdateOptions, update
 from shm.models import DESCRIPTION, THESIS, build
-from shm.report.contents import HangerReport
+from shm.report.bridge_report import tables
+from shm.report.contents import BridgeReport, HangerReport
 from shm.report.formatting import Interval
 from shm.report.hanger_report import facts
 from shm.report.hanger_status import (
@@ -46,6 +47,7 @@ from shm.values import (
 )
 from shm.values.hanger import Limits
 from shm.values.messages import Lead
+from shm.values.posterior import DIAGNOSE
 from shm.watch import Watched, WatchOptions, watch_hanger
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import NOW, a_change, a_drift, a_watched_test, an_alert, averaged, with_now
@@ -133,8 +135,8 @@ UNCOMPARED = "its latest test cannot be compared with the baseline."
     [
         ({}, "STEADY", "no change detected since the baseline (tension -0.40 ± 0.66 %).", NOTHING),
         ({"is_first": True}, "FIRST", "tension 702 ± 10 kN, and no test after its baseline.",
-         "Choose a warmer or colder day at the next planned test, so that the baseline covers "
-         "temperature."),
+         "No action is needed before the next planned test: choose a warmer or colder day for it, "
+         "so that the baseline covers temperature."),
         ({"latest": None}, None, "no test yet.", "Test it at the next planned test."),
         ({"latest": None, "tests": 5}, None, "5 tests, no result yet.",
          "No action is needed: the daemon is at work, or waits for more tests for a baseline."),
@@ -145,7 +147,7 @@ UNCOMPARED = "its latest test cannot be compared with the baseline."
         ({"drifts": [drift(shift=math.nan)]}, "UNCLEAR", UNCOMPARED, None),
         ({"drifts": [drift(sd=math.inf)]}, "UNCLEAR", UNCOMPARED, None),
         ({"drifts": [drift(sd=0.0305)]}, "UNCLEAR",
-         "no change detected, but its tests are too few or too rough to show one "
+         "no change detected, but its tests are too few or too imprecise to show one "
          "(tension -0.4 ± 5.0 %).",
          "Identify more modes at the next planned test, or test more often."),
         ({"drifts": [drift(sd=0.0303)]}, "STEADY", "no change detected since", NOTHING),
@@ -223,6 +225,32 @@ def test_an_alert_stays_as_sure_as_it_was_while_it_stands() -> None:
         assert said in with_tension(drifts=[now], standing=[standing]).message.lead.state
 
 
+def test_a_diagnosis_replaces_the_advice_to_make_one() -> None:
+    misses = f"beam1 misses the frequencies. Check the description{DIAGNOSE}."
+    line = "Gap diagnosis of 2026-05-25: partly explained; the tension is 830 ± 140 kN."
+    doubted = replace(tension(702e3), caveats=(misses,))
+    assert with_tension(tension=doubted).message.reasons == (misses,)
+    reasons = with_tension(tension=doubted, diagnosed=line).message.reasons
+    assert reasons == ("beam1 misses the frequencies. Check the description.", line)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"tension": tension(702e3)}, "100.3 ± 1.4 %"),
+        ({"tension": tension(702e3, 300e3)}, "not determined"),
+        ({"hanger": replace(HANGER, nominal_tension_n=0.0)}, "no nominal"),
+        ({"latest": None}, ""),
+    ],
+)
+def test_of_nominal_reads_alike_in_every_table(changes: dict[str, Any], words: str) -> None:
+    now = with_tension(**changes, is_first=True)
+    assert now.of_nominal_words == words
+    report = BridgeReport("Bridge", (now,), None, "", NOW, "1")
+    table = next(each for each in tables(report) if each.title == "Hangers")
+    assert table.rows[0][table.headings.index("of nominal")] == words
+
+
 def test_a_detected_change_is_over_when_the_latest_test_shows_it() -> None:
     change = a_change()
     level = HANGER.thresholds.end_probability
@@ -251,11 +279,12 @@ def test_a_bridge_leads_with_its_most_urgent_hanger() -> None:
     assert found.status is Status.ALERT
     assert found.notes == ("Ben looked.",)
     assert found.others == (
-        "Other hangers that need action within a week: 2. At the next planned test: 4."
+        "Other hangers that need action within a week: 2. At the next planned test: 4. "
+        "Not tested yet: 5."
     )
     assert found.words == (
         "It is so. Test it within a week. Ben looked. Other hangers that need action within a "
-        "week: 2. At the next planned test: 4."
+        "week: 2. At the next planned test: 4. Not tested yet: 5."
     )
     assert found.document == {
         "status": "alert",
@@ -276,11 +305,37 @@ def test_a_quiet_bridge_says_so_and_what_is_untested() -> None:
     assert bridge_message({}) == BridgeMessage(
         None, Lead("No hanger has been tested yet.", "Test all at the next planned test.")
     )
-    quiet = bridge_message({1: message(Status.FIRST), 2: message(Status.STEADY), 3: message(None)})
-    assert (quiet.status, quiet.others) == (Status.STEADY, "Not tested yet: 3.")
-    assert quiet.lead == Lead("No change detected on 2 hangers.", NOTHING)
-    assert quiet.document["status"] == "steady"
-    assert quiet.urgency == "none"
+    first, steady = message(Status.FIRST), message(Status.STEADY)
+    for known, state in (
+        ((first,), "1 hanger has a baseline only: no change can be judged yet."),
+        ((first, first), "2 hangers have a baseline only: no change can be judged yet."),
+        ((steady,), "No change detected on 1 hanger."),
+        (
+            (first, steady, steady),
+            "No change detected on 2 hangers. "
+            "1 hanger has a baseline only: no change can be judged yet.",
+        ),
+    ):
+        quiet = bridge_message({**dict(enumerate(known)), 9: message(None)})
+        assert quiet.lead == Lead(state, NOTHING)
+        assert quiet.others == "Not tested yet: 9."
+        assert quiet.document["status"] == ("steady" if steady in known else "first")
+        assert quiet.urgency == "none"
+
+
+def test_the_headline_names_every_hanger_whose_action_is_due() -> None:
+    """Whatever its state: the same urgency that the table of hangers shows decides."""
+    due = {
+        2: message(Status.FIRST, "Identify more modes at the next planned test."),
+        3: message(Status.UNCLEAR, "Identify more modes at the next planned test."),
+        7: message(Status.ALERT, "Repeat the hammer test today."),
+    }
+    quiet = {1: message(Status.FIRST), 4: message(Status.STEADY)}
+    found = bridge_message({**quiet, **due})
+    assert found.lead == due[7].lead
+    assert found.others == "Other hangers that need action at the next planned test: 2 and 3."
+    assert bridge_message({**quiet, 2: due[2]}).lead == due[2].lead
+    assert [id_ for id_, each in {**quiet, **due}.items() if each.needs_action] == [2, 3, 7]
 
 
 def test_a_message_says_what_its_warnings_add_to_the_lead() -> None:

@@ -24,7 +24,7 @@ from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_report import causes, diagnosis_json, diagnosis_paper, diagnosis_part
 from shm.report.diagnosis_summary import write_lead, write_summary
 from shm.report.figures import gap_causes, gap_map
-from shm.values import NAN, Cause, Diagnosis, Outcome, Outlier, Shrinkage
+from shm.values import NAN, Cause, Diagnosis, Outcome, Outlier, Shrinkage, effect_label
 from shm.values.verdict import Reason
 from tests.benchmarks.blind_scores import find_contradictions
 from tests.contracts import gap_calls as calls
@@ -136,7 +136,7 @@ def check_words(diagnosis: Diagnosis) -> None:
         verdict.outcome is Outcome.EXPLAINED
     )
     assert ("ot explained: " in lead) == (verdict.outcome is Outcome.UNEXPLAINED)
-    assert ("a part of the gap" in lead) == (verdict.outcome is Outcome.PARTLY)
+    assert ("part of the gap" in lead) == (verdict.outcome is Outcome.PARTLY)
     assert ("several causes fit alike" in lead.lower()) == (verdict.outcome is Outcome.ALIKE)
     no_gap = re.search(r"no gap|nothing visible", lead.lower())
     assert bool(no_gap) == (verdict.outcome is Outcome.NO_GAP)
@@ -153,7 +153,11 @@ def check_words(diagnosis: Diagnosis) -> None:
               if mark == "claimed"]  # fmt: skip
     if verdict.claim is not None:
         assert len(marked) == len(verdict.claim.causes)
-        assert marked[0].lower() in lead.lower()
+        first = verdict.claim.causes[0]
+        labels = (
+            [marked[0]] if len(marked) == 1 else [effect_label(each, "") for each in first.effects]
+        )
+        assert all(each.lower() in lead.lower() for each in labels)
     else:
         what = "no gap" if verdict.outcome is Outcome.NO_GAP else "something not in the catalogue"
         assert marked == [what]

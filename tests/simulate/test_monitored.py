@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy
 
-from shm.bridge.hanger import hanger_of
 from shm.simulate import HangerState
 from shm.simulate.ambient import Loss, MonitoringPlan, Weather, described_stream, streamed
 from shm.values import Hanger
@@ -17,15 +15,6 @@ from tests.worlds.simulated.elements import natural_frequencies
 
 START = datetime(2026, 6, 1, 12, tzinfo=UTC)
 QUIET = MonitoringPlan(trains_a_day=0.0, knocks_a_day=0.0, per_kelvin=0.0)
-
-
-@pytest.fixture(scope="module")
-def hanger() -> Hanger:
-    described = {
-        "id": 3, "length_m": 12.0, "diameter_m": 0.13, "elastic_modulus_pa": 200e9,
-        "density_kg_m3": 7800, "nominal_tension_n": 711e3,
-    }  # fmt: skip
-    return hanger_of(described, Path("bridge.toml"))
 
 
 def samples(hanger: Hanger, plan: MonitoringPlan, seconds: float, seed: int = 5) -> np.ndarray:

@@ -99,3 +99,19 @@ def test_every_command_of_the_proof_exists() -> None:
 def test_the_table_of_arguments_names_benchmarks_andmake_targets() -> None:
     assert set(every.WHOLE | every.SHORT) <= set(every.benchmarks())
     assert set(every.TESTS) <= make_targets(every.HERE)
+
+
+def test_every_mechanism_that_an_ablation_leaves_out_is_there() -> None:
+    """In a process of its own: its modules shut out threads and set the path."""
+    program = """
+import begin
+from tests.benchmarks import gap_ablation, identify_ablation, inference_ablation, watch_ablation
+from tests.benchmarks.left_out import without
+steps = {name: changes for name, (changes, _) in identify_ablation.STEPS.items()}
+for table in (gap_ablation.VARIANTS, identify_ablation.CONSTANTS, steps,
+              inference_ablation.VARIANTS, watch_ablation.MECHANISMS):
+    for changes in table.values():
+        with without(changes):
+            pass
+"""
+    subprocess.run([sys.executable, "-c", program], cwd=every.HERE, check=True)

@@ -74,12 +74,10 @@ def covered(of: str) -> set[str]:
 
 
 def test_nothing_that_the_thesis_numbers_is_missing() -> None:
+    """Every page exists."""
     listed = set().union(*(covered(item["of"]) for item in ITEMS))
     assert sorted(set(OF_THE_THESIS) - listed) == []
     assert not any("missing" in item["where"] for item in ITEMS)
-
-
-def test_every_page_of_it_exists() -> None:
     pages = [item["where"] for item in ITEMS if item["where"].startswith("docs/")]
     assert pages
     assert [page for page in pages if not (ROOT / page).is_file()] == []
@@ -139,14 +137,10 @@ def test_evidence_and_summary_stand_beside_the_thesis_s(
 
 
 def test_the_list_names_every_item(capsys: pytest.CaptureFixture[str]) -> None:
+    """And where the files of its commands lie."""
     assert validate.main(["--list", "--json"]) == 0
     output = capsys.readouterr().out
     assert all(item["of"] in output for item in ITEMS)
-
-
-def test_the_list_says_where_the_files_of_its_commands_lie(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
     assert validate.main(["--list"]) == 0
     assert f"H.toml: {HANGER_FILE}" in capsys.readouterr().out
 
@@ -167,9 +161,6 @@ def test_what_cannot_be_answered_is_refused_before_it_is_computed(
     output = capsys.readouterr()
     assert (refused.value.code, output.out) == (2, "")
     assert said in output.err
-
-
-def test_an_error_of_shm_ends_with_its_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
     assert validate.main(["--update", "--sigma", "planes"]) == 2
     assert "neither one of" in capsys.readouterr().err
 

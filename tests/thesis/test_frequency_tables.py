@@ -40,19 +40,14 @@ def test_every_table_keeps_its_mark() -> None:
 
 
 def test_a_table_beyond_its_mark_is_named(rows) -> None:
+    """A difference that is only stated is no miss; times stand next to the thesis's."""
     first = next(row for row in rows if row.table == "A.1")
     (miss,) = frequencies.misses([replace(first, difference_percent=0.31), rows[1]])
     assert miss == "table A.1, 711 kN: 0.31 % off, the mark is 0.3 %"
-
-
-def test_a_difference_that_is_only_stated_is_no_miss(rows) -> None:
     (stated,) = [row for row in rows if row.table == "A.2" and row.condition == "711 kN"]
     assert stated.difference_percent > 2
     assert not stated.missed
     assert frequencies.cells(stated)[-1] == "stated"
-
-
-def test_time_of_a_mesh_stands_next_to_the_thesis_s(rows) -> None:
     timed = replace(rows[0], seconds=1.23, thesis_time="4 to 125 s")
     assert frequencies.timed_cells(timed)[-2:] == ("1.2 s", "4 to 125 s")
     assert frequencies.timed_cells(rows[0])[-2:] == ("", "")

@@ -13,6 +13,7 @@ from shm.values import PLANES, ModalTest, Mode
 from tests.benchmarks.thesis.grouped_likelihood import GroupedLikelihood, update_grouped
 from tests.benchmarks.thesis.modal_groups import groups
 from tests.benchmarks.thesis.thesis_data import count_times
+from tests.helpers.given_modes import with_modes
 from tests.helpers.hangers import HANGER_3
 
 HZ = np.array([5.82, 13.85, 26.17, 6.09, 14.80, 27.00])
@@ -22,15 +23,30 @@ TEST = ModalTest(
 PREDICTED = HZ * (1 + np.array([[0.01] * 3 + [0.03] * 3, [0.02, -0.01, 0.0, 0.0, 0.04, 0.01]]))
 
 
-def test_of_planes_it_is_the_product_of_both_planes_alone() -> None:
+@pytest.mark.parametrize(
+    ("sigma", "rows", "names"),
+    [
+        ("plane", ([0, 1, 2], [3, 4, 5]), ["transverse", "longitudinal"]),
+        ("1-2,3", ([0, 1, 3, 4], [2, 5]), ["orders 1 to 2", "order 3"]),
+    ],
+)
+def test_of_groups_it_is_the_product_of_each_alone(
+    sigma: str, rows: tuple[list[int], ...], names: list[str]
+) -> None:
     """Problem: errors of 1 % in one plane and 3 % in the other; solution: two data sets apart."""
     alone = [
-        ThesisLikelihood([ModalTest("t", TEST.modes[own])]).marginal(PREDICTED[:, own])
-        for own in (slice(0, 3), slice(3, 6))
+        ThesisLikelihood([ModalTest("t", tuple(TEST.modes[n] for n in own))]).marginal(
+            PREDICTED[:, own]
+        )
+        for own in rows
     ]
-    grouped = GroupedLikelihood([TEST], "plane")
+    grouped = GroupedLikelihood([TEST], sigma)
     assert np.allclose(grouped.marginal(PREDICTED), sum(alone))
     assert np.array_equal(grouped.joint(PREDICTED, np.ones(2)), grouped.marginal(PREDICTED))
+    assert [own.tolist() for own in grouped.by_name.values()] == [*rows]
+    assert [*grouped.by_name] == names
+    assert [*groups(TEST.modes, "order")] == ["order 1", "order 2", "order 3"]
+    assert [*groups(TEST.modes, "mode")][3:] == [f"longitudinal {order}" for order in (1, 2, 3)]
 
 
 def test_of_modes_each_is_integrated_by_itself() -> None:
@@ -52,46 +68,22 @@ def test_sigma_stands_for_the_mean_square_of_the_groups() -> None:
     assert grouped.most_likely_sigma(predicted)[0] == pytest.approx(drawn.mean(), rel=0.1)
 
 
-def test_of_groups_of_orders_it_is_the_product_over_both_planes() -> None:
-    low, high = [0, 1, 3, 4], [2, 5]
-    alone = [
-        ThesisLikelihood([ModalTest("t", tuple(TEST.modes[n] for n in own))]).marginal(
-            PREDICTED[:, own]
-        )
-        for own in (low, high)
-    ]
-    grouped = GroupedLikelihood([TEST], "1-2,3")
-    assert np.allclose(grouped.marginal(PREDICTED), sum(alone))
-    assert {name: own.tolist() for name, own in grouped.by_name.items()} == {
-        "orders 1 to 2": low,
-        "order 3": high,
-    }
-    assert [*groups(TEST.modes, "order")] == ["order 1", "order 2", "order 3"]
-    assert [*groups(TEST.modes, "mode")][3:] == [f"longitudinal {order}" for order in (1, 2, 3)]
-
-
-@pytest.mark.parametrize("sigma", ["planes", "1-3,3-6", "3-1", ""])
-def test_groups_that_cannot_be_are_refused(sigma: str) -> None:
-    with pytest.raises(UsageError, match="--sigma"):
-        groups(TEST.modes, sigma)
-
-
-def test_an_order_in_no_group_is_refused() -> None:
-    with pytest.raises(UsageError, match="order 3 is in no group"):
-        GroupedLikelihood([TEST], "1-2")
+@pytest.mark.parametrize(
+    ("sigma", "said"),
+    [*((each, "--sigma") for each in ("planes", "1-3,3-6", "3-1", "")),
+     ("1-2", "order 3 is in no group")],
+)  # fmt: skip
+def test_groups_that_cannot_be_are_refused(sigma: str, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        GroupedLikelihood([TEST], sigma)
 
 
 def test_each_group_tells_its_own_error() -> None:
     """Problem: measured as beam1 says in one plane, 3 % off in the other, and N_D = 20."""
     model = build("beam1", HANGER_3, THESIS)
     exact = model.frequencies_hz(np.array([[1.0, 1.0]]), 3)[0]
-    off = 1 + 0.03 * np.array([1, -1, 1])
-    modes = tuple(
-        Mode(plane, order + 1, float(exact[place, order] * (off[order] if place else 1)))
-        for place, plane in enumerate(PLANES)
-        for order in range(3)
-    )
-    tests = count_times([ModalTest("t", modes)], 20)
+    off = 0.03 * np.array([[0, 0, 0], [1, -1, 1]])
+    tests = count_times([with_modes(exact, noise=off)], 20)
     _, found = update_grouped(tests, model, "plane", UpdateOptions(samples=300))
     assert found["transverse"].mean < 0.001
     assert found["longitudinal"].mean == pytest.approx(0.03, rel=0.1)

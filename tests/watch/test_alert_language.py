@@ -211,9 +211,10 @@ def test_no_word_is_one_to_avoid() -> None:
 
 def test_no_probability_is_told_twice() -> None:
     def rule(message: str, _: bool) -> bool:
-        before, _details, details = message.partition("probability ")
-        given = re.findall(r"(?:above |below )?\d\.\d\d(?= that)", details)
-        return "probability" not in before + details and len(given) == len(set(given))
+        before, _details, details = message.partition("Details: ")
+        given = re.findall(r" is ((?:above |below )?\d\.\d\d)(?=\.)", details)
+        told = details.count("The probability")
+        return "probability" not in before and told == len(given) == len(set(given))
 
     assert failing(rule) == []
 

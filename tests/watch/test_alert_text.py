@@ -79,7 +79,7 @@ def test_a_called_loss_that_is_clearly_beyond_its_threshold_asks_for_today_at_on
     """A call says that something changed: what is beyond then need not wait for a further test."""
     message = only(day(1), day(2, change(called=True), probability=0.7)).message
     assert "beyond its threshold. Repeat the hammer test today" in message
-    assert "probability 0.97 that tension is beyond its threshold" in message
+    assert "The probability that tension is beyond its threshold of 5 % is 0.97." in message
 
 
 @pytest.mark.parametrize(("sudden", "kind"), [(0.98, "sudden change"), (0.2, "slow drift")])
@@ -160,8 +160,8 @@ def test_a_sudden_loss_says_the_state_then_what_to_do_then_why() -> None:
         "Hanger 3: tension fell by 8.2 ± 1.1 %. Repeat the hammer test within a week; if the loss "
         "stays, inspect its anchorages and the rod, and compare the hangers beside it (`shm drift "
         "bridge`). It came suddenly, between 2026-04-30 and 2026-05-03. Details: ± is half "
-        "the 90 % interval; probability 0.90 that anything changed; mean time between false alarms "
-        "at least 200 years."
+        "the 90 % interval. The probability of any change, by the change detector, is 0.90. The "
+        "mean time between false alarms is at least 200 years."
     )
 
 
@@ -218,13 +218,24 @@ def test_beyond_the_threshold_after_a_call_speaks_of_the_called_change() -> None
     )
     assert call.change is not None
     assert beyond.change == replace(call.change, probability=0.99)
-    assert (
-        "0.97 that tension is beyond its threshold of 5 %, 0.99 that anything changed"
-        in beyond.message
+    assert beyond.message.endswith(
+        "The probability that tension is beyond its threshold of 5 % is 0.97. "
+        "The probability of any change, by the change detector, is 0.99."
     )
     assert "between 2026-04-30 and 2026-05-03" in beyond.message
     assert "k3" not in beyond.message
     assert "false alarms" not in beyond.message
+
+
+def test_a_message_gives_the_probabilities_of_its_document() -> None:
+    """Also where the shift, all tests taken at face value, is surer than the detector."""
+    alert = only(day(2, change(called=True, began=2, probability=0.94), 0.999))
+    assert alert.change is not None
+    assert (alert.change.probability, alert.drifts[0].probability) == (0.94, 0.999)
+    assert (
+        "The probability that tension is beyond its threshold of 5 % is above 0.99. "
+        "The probability of any change, by the change detector, is 0.94."
+    ) in alert.message
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,7 @@ class HangerGlance:
         if summary.tension_n:
             known = formatting.with_half(summary.tension_n, unit).removesuffix(f" {unit.name}")
             tension = known if is_known else "not determined"
-        nominal = formatting.mean(summary.of_nominal) if summary.of_nominal and is_known else ""
+        nominal = summary.of_nominal_words.removesuffix(" %")
         percent = rounded_percent(shift.mean, shift.width / 2, "+") if shift else ""
         return tension, nominal, percent.removesuffix(" %")
 

@@ -96,8 +96,8 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
     # A joint that slips lowers all frequencies, stretching raises all.
     expected = float(np.median(shifts)) if len(shifts) > 1 else 0.0
     modes = tuple(
-        _with_slope(mode, fit, bool(is_sure), expected, usual)
-        for mode, fit, is_sure in zip(found.modes, fits, sure, strict=True)
+        _unlike(_with_slope(mode, fit, bool(is_sure), expected, usual), index, courses, mode)
+        for index, (mode, fit, is_sure) in enumerate(zip(found.modes, fits, sure, strict=True))
     )
     return replace(found, modes=modes)
 
@@ -174,6 +174,30 @@ def _unlike_hz(rows: Sequence[Row]) -> float:
     """Return how far the decay of the amplitudes differs from the pole's, in Hz."""
     off = [math.log(size[-1] / size[0]) / (time_s[-1] - time_s[0]) for time_s, _, _, size in rows]
     return abs(float(np.median(off))) / (2 * math.pi)
+
+
+def _unlike(
+    mode: FoundMode, index: int, courses: Sequence[RingDownCourse], as_found: FoundMode
+) -> FoundMode:
+    """Widen the mode's intervals where its amplitudes decay otherwise than its pole does.
+
+    A clipped beginning causes that, for example.
+    """
+    decay = 2 * math.pi * as_found.frequency_hz * as_found.damping_ratio
+    late = [_from_largest(course, index, decay) for course in courses]
+    seen = [row for course in late if (row := phases_of(course, index, decay)) is not None]
+    off_hz = _unlike_hz(seen) if seen else 0.0
+    return replace(
+        mode,
+        damping_sd=math.hypot(mode.damping_sd, off_hz / mode.frequency_hz),
+        frequency_sd_hz=math.hypot(mode.frequency_sd_hz, _UNLIKE * off_hz),
+    )
+
+
+def _from_largest(course: RingDownCourse, index: int, decay: float) -> RingDownCourse:
+    now = np.abs(course.motion[:, index]) * np.exp(-decay * course.middle_s)
+    first = int(np.argmax(now[: max(1, len(now) // 2)]))
+    return RingDownCourse(course.middle_s[first:], course.motion[first:], course.sd[first:])
 
 
 def _averaged(laws: Sequence[_Fit]) -> _Fit | None:

@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta, gamma
+from scipy.stats import gamma
 
+from tests.benchmarks.shares import interval
 from tests.benchmarks.watch_trial.rivals import DAYS_A_YEAR
 
 Row = dict[str, Any]
@@ -117,9 +118,8 @@ def quantile(found: np.ndarray, share: float) -> float:
 
 
 def share(hits: int, count: int) -> str:
-    """A share with its 90 % interval (Clopper and Pearson)."""
-    low = beta.ppf(0.05, hits, count - hits + 1) if hits else 0.0
-    high = beta.ppf(0.95, hits + 1, count - hits) if hits < count else 1.0
+    """A share with its 90 % interval."""
+    low, high = interval(hits, count)
     return f"{hits} of {count}: {hits / max(count, 1):.2f} ({low:.2f} to {high:.2f})"
 
 

@@ -179,9 +179,7 @@ def seen_by_turned(
 def _of_plane(modes: BarModes, plane: int) -> PlaneModes:
     return PlaneModes(
         modes.angular_frequency_rad_s,
-        modes.nodes_m,
-        modes.deflection[plane],
-        modes.rotation[plane],
+        lambda x_m: modes.at(x_m)[:, plane],
         modes.added_damping_ratio,
     )
 

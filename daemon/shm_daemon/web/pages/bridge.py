@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from datetime import datetime
 from types import SimpleNamespace
 from typing import Any
@@ -14,8 +16,8 @@ from shm.pipeline.controls import control_charts
 from shm.report import formatting
 from shm.report.contents import hangers_unit
 from shm.report.formatting import Interval
-from shm.report.hanger_status import control_lead
-from shm.values.messages import TODAY, WEEK
+from shm.report.hanger_status import Status, control_lead
+from shm.values.messages import TODAY, URGENCIES, WEEK
 from shm.values.rounding import ForceUnit
 from shm_daemon.heartbeat import duration_words
 from shm_daemon.web.access import AtSite, Reader
@@ -50,6 +52,12 @@ router = APIRouter(tags=["state"])
 
 _WHEN = {"none": "", "next_test": "next test", "week": WEEK, "today": TODAY}
 """Of an action, in words."""
+_COLUMNS = (
+    "hanger", "name", "state", "when_to_act", "tension_kn", "tension_q05_kn", "tension_q95_kn",
+    "percent_of_nominal", "shift_percent", "shift_q05_percent", "shift_q95_percent", "open_alerts",
+    "last_test", "last_test_at", "tests",
+)  # fmt: skip
+"""Of the table of hangers as CSV: one number in each, days in ISO 8601."""
 _COMPARING = "The hangers are being compared …"
 
 
@@ -82,6 +90,44 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
         notes=site.store.notes.list_all(of_bridge=True),
         rows=[SimpleNamespace(**_row(each, unit, now)) for each in bridge.hangers],
     )
+
+
+@router.get("/hangers.csv", include_in_schema=False)
+def hangers_csv(site: AtSite, _: Reader) -> Response:
+    """Return the table of hangers as CSV, in the order of the description."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(_COLUMNS)
+    writer.writerows(_csv_row(each) for each in summarize_hangers(site, utc_now()).hangers)
+    headers = {"Content-Disposition": 'attachment; filename="hangers.csv"'}
+    content = text.getvalue().encode("utf-8-sig")
+    return Response(content, headers=headers, media_type="text/csv; charset=utf-8")
+
+
+def _csv_row(each: HangerGlance) -> tuple[str | int, ...]:
+    line = each.summary
+    latest, name = line.latest, each.hanger.name
+    return (
+        each.hanger.id,
+        f"'{name}" if name.startswith(("=", "@", "+", "-")) else name,  # no formula
+        line.status.value if line.status else "",
+        _WHEN[line.message.urgency],
+        *_numbers(line.tension_n and line.tension_n.scaled(1e-3), line.is_determined),
+        _numbers(line.of_nominal, line.is_determined)[0],
+        *_numbers(line.change and line.change.scaled(100)),
+        line.open_alerts,
+        latest.name if latest else "",
+        latest.time.isoformat() if latest else "",
+        each.tests,
+    )
+
+
+def _numbers(interval: Interval | None, is_determined: bool = True) -> tuple[str, str, str]:
+    """Return mean and 90 % interval, empty where unknown; no mean of what is not determined."""
+    if interval is None:
+        return "", "", ""
+    mean = f"{interval.mean:.6g}" if is_determined else ""
+    return mean, f"{interval.low:.6g}", f"{interval.high:.6g}"
 
 
 @router.get("/moved", include_in_schema=False)
@@ -153,6 +199,8 @@ def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
         "shift": shift or (shift_words(each) if latest else ""),
         "message": line.message,
         "when": _WHEN[line.message.urgency],
+        "severity": list(Status).index(line.status) if line.status else len(Status),
+        "urgency": -URGENCIES.index(line.message.urgency),  # the most urgent first
         "open_alerts": line.open_alerts,
         "day": f"{latest.time:%Y-%m-%d}" if latest else "",
         "age": f"{duration_words(now - latest.time)} ago" if latest else "",

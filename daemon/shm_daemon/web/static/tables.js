@@ -16,11 +16,14 @@
     ? parseFloat(text.replace(/^[<>]\s*/, "")) : NaN);
   const isDay = (text) => /^\d{4}-\d\d-\d\d/.test(text);
 
+  // What a cell is sorted by: its place in an order that its words do not give, or its words.
+  const sortedBy = (cell) => cell.dataset.sort ?? written(cell);
+
   function compare(one, other) {
     if (isDay(one) || isDay(other)) return one < other ? -1 : Number(one > other);
     const [a, b] = [number(one), number(other)];
     if (Number.isNaN(a) !== Number.isNaN(b)) return Number.isNaN(a) ? 1 : -1;
-    return Number.isNaN(a) ? one.localeCompare(other) : a - b;
+    return Number.isNaN(a) ? one.localeCompare(other, "en", { numeric: true }) : a - b;
   }
 
   function sort(table, column, heading) {
@@ -28,7 +31,7 @@
     table.querySelectorAll("thead th").forEach((each) => each.removeAttribute("aria-sort"));
     heading.setAttribute("aria-sort", falls ? "descending" : "ascending");
     const body = table.tBodies[0];
-    const rows = [...body.rows].map((row) => [written(row.cells[column]), row]);
+    const rows = [...body.rows].map((row) => [sortedBy(row.cells[column]), row]);
     rows.sort(([one], [other]) => (falls ? compare(other, one) : compare(one, other)));
     body.append(...rows.map(([, row]) => row));
   }
@@ -56,17 +59,31 @@
 
   function keep(table, title) {
     const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([`\ufeff${inCsv(table)}\r\n`], { type: "text/csv" }));
+    link.href = table.dataset.csv ?? URL.createObjectURL(new Blob([`\ufeff${inCsv(table)}\r\n`], { type: "text/csv" }));
     link.download = `${title.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "")}.csv`;
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 0);
   }
 
+  // A word is found by its beginning; a number, or a part of a day, only where it ends, too.
+  const wordsOf = (text) => plain(text).toLowerCase().split(/[^\p{L}\p{N}.+-]+/u)
+    .map((word) => word.replace(/\.+$/, "")).filter(Boolean);
+
+  function holds(text, wanted) {
+    const words = wordsOf(text);
+    const fits = (word, part) => word === part || word.startsWith(`${part}-`)
+      || (!/\d/.test(part) && word.startsWith(part));
+    return wanted.every((part) => words.some((word) => fits(word, part)));
+  }
+
+  // Rows whose name holds the words; if there is none, rows that hold them anywhere.
   function choose(table, words) {
-    const wanted = plain(words).toLowerCase();
-    for (const row of table.tBodies[0].rows) {
-      const text = [...row.cells].map(written).join(" ").toLowerCase();
-      row.hidden = !text.includes(wanted);
+    const wanted = wordsOf(words);
+    const rows = [...table.tBodies[0].rows];
+    const named = rows.filter((row) => holds(written(row.cells[0]), wanted));
+    for (const row of rows) {
+      const text = [...row.cells].map(written).join(" ");
+      row.hidden = named.length ? !named.includes(row) : !holds(text, wanted);
     }
   }
 
