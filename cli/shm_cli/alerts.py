@@ -193,7 +193,7 @@ def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
     is open while both are null.
     """
     noted, ended = stored.acknowledgement, stored.resolution
-    return {"acknowledged": noted and noted.said, "resolved": ended and ended.said}
+    return {"acknowledged": noted and noted.as_document, "resolved": ended and ended.as_document}
 
 
 def acknowledgement_words(stored: StoredAlert) -> str:

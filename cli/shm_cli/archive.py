@@ -50,8 +50,8 @@ def prune(ctx: click.Context, keep_days: int, dry_run: bool) -> None:
     files = [removal.recording.file.file_name for removal in found.removals]
     verb = "would be removed, which would free" if dry_run else "removed, which freed"
     lines = [f"archive: {len(files)} files {verb} {freed / 1e6:.1f} MB."]
-    lines += [f"  {count} old ones stay: {reason}." for reason, count in found.kept.items()]
-    pruned = {"files": files, "freed_bytes": freed, "kept": dict(found.kept)}
+    lines += [f"  {count} old ones stay: {reason}." for reason, count in found.retained.items()]
+    pruned = {"files": files, "freed_bytes": freed, "kept": dict(found.retained)}
     answer({"dry_run": dry_run, "archive": pruned}, "\n".join(lines))
 
 

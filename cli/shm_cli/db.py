@@ -225,11 +225,11 @@ def restore_command(ctx: click.Context, file: Path, replace: bool, copies: Path 
         restored = restore(workspace.location, file, keep_as, tell, replace=replace)
         copied = _fetch(workspace, copies)
     if flags.wants_json():
-        previous = str(restored.kept) if restored.kept else None
+        previous = str(restored.former) if restored.former else None
         show({"kept": previous, **_document(restored.tables, copied)})
     else:
         _show_tables(restored.tables)
-        previous_words = f" What it held before is in {restored.kept}." if restored.kept else ""
+        previous_words = f" What it held before is in {restored.former}." if restored.former else ""
         click.echo(f"The store holds what {file} holds.{previous_words}")
         with workspace.store() as store:
             _say_unknown(unknown_files(store, workspace.archive))

@@ -330,10 +330,10 @@ def check_clock(examined: DoctorContext) -> Iterator[Finding]:
             f"{duration_words(newest - now)} before the newest row",
             "Set it; tests without a time of their own are dated by it.",
         )
-    said = _synchronised()
-    if said is None:
+    is_synchronised = _synchronised()
+    if is_synchronised is None:
         yield unknown("clock", "cannot check whether the clock is synchronised (NTP)")
-    elif said:
+    elif is_synchronised:
         yield ok("clock", "synchronised")
     else:
         yield warning("clock", "not synchronised", "`timedatectl set-ntp true`.")
@@ -392,8 +392,10 @@ def _outdated_baselines(examined: DoctorContext) -> Iterator[Finding]:
         (gone, "baseline made from a test that was discarded"),
     ):
         if hangers:
-            anew = f"shm drift rebaseline --hanger {hangers[0]} --since DAY --why TEXT"
-            yield warning("hangers", f"{found}: {some(hangers)}", f"Set a new baseline: `{anew}`.")
+            command = f"shm drift rebaseline --hanger {hangers[0]} --since DAY --why TEXT"
+            yield warning(
+                "hangers", f"{found}: {some(hangers)}", f"Set a new baseline: `{command}`."
+            )
 
 
 def check_streams(examined: DoctorContext) -> Iterator[Finding]:
@@ -510,11 +512,11 @@ def check_deliveries(examined: DoctorContext) -> Iterator[Finding]:
     late = [each for each in waiting if each.attempts or _is_late(each, silences, bridge, now)]
     if late:
         worst = max(late, key=lambda each: each.attempts)
-        said = worst.last_error or "not tried yet: is a daemon active?"
+        reason = worst.last_error or "not tried yet: is a daemon active?"
         yield warning(
             "deliveries",
             f"{len(late)} alerts have not reached their hook; {worst.hook}, tried "
-            f"{worst.attempts} times: {said}",
+            f"{worst.attempts} times: {reason}",
             f"`shm alerts test --hook {worst.hook}`; they are tried again by themselves.",
         )
     ended = store.alerts.list_deliveries(DeliveryState.GIVEN_UP)

@@ -61,7 +61,7 @@ class Pulse:
         self._beaten_at = time.monotonic()
 
 
-def tell_systemd(*said: str) -> None:
+def tell_systemd(*lines: str) -> None:
     """Tells systemd how the service is, where it asked to be told (sd_notify(3)); else nothing.
 
     READY=1 may be said again and again.
@@ -74,7 +74,7 @@ def tell_systemd(*said: str) -> None:
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as line:
             line.settimeout(1.0)
-            line.sendto("\n".join(said).encode(), address)
+            line.sendto("\n".join(lines).encode(), address)
     except OSError as error:
         log.debug("systemd cannot be told: %s", error)
 

@@ -32,9 +32,11 @@ def begin_logging(settings: Settings, file: Path | None = None) -> None:
     """
     handler: logging.Handler = logging.StreamHandler(sys.stderr)
     if file is not None:
-        most, kept = settings.log_file_bytes, settings.log_files
+        most, n_files = settings.log_file_bytes, settings.log_files
         try:
-            handler = RotatingFileHandler(file, maxBytes=most, backupCount=kept, encoding="utf-8")
+            handler = RotatingFileHandler(
+                file, maxBytes=most, backupCount=n_files, encoding="utf-8"
+            )
         except OSError as error:
             raise UsageError(
                 f"the log file {file} cannot be written: {error.strerror}.",

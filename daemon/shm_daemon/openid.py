@@ -33,7 +33,7 @@ _ALGORITHMS = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "E
 _ENDPOINTS = ("authorization_endpoint", "token_endpoint", "jwks_uri")
 _TIMEOUT_S = 5.0  # judgement: a person waits, and holds a place of the pages meanwhile
 _LEEWAY_S = 60  # judgement: clocks that differ by more are to be set; `shm doctor` says as much
-_KEPT_S = 300.0  # judgement: a provider that has moved is followed within five minutes
+_CACHE_S = 300.0  # judgement: a provider that has moved is followed within five minutes
 _AT_ONCE = 4  # technical: a provider that hangs holds few of the 24 places of the pages
 _CLOCK = "Set this computer's clock, or have the provider's set."
 _OTHERWISE = "Sign in with a password meanwhile; `shm doctor` tells whether it is back."
@@ -62,7 +62,7 @@ class Provider:
     def discover(self) -> Mapping[str, Any]:
         """Return the provider's metadata (OpenID Connect Discovery 1.0, 4); raises ShmError."""
         now = time.monotonic()
-        if self._read is None or now - self._read[0] > _KEPT_S:
+        if self._read is None or now - self._read[0] > _CACHE_S:
             address = f"{self.described.issuer.rstrip('/')}/.well-known/openid-configuration"
             with self._asking(), _session(self.described) as session:
                 document = _document(session.get(address, withhold_token=True))
@@ -89,9 +89,9 @@ class Provider:
             keys = _document(session.get(document["jwks_uri"], withhold_token=True))
             claims = _claims(described, token, keys, begun.nonce)
             if described.user_claim not in claims and "userinfo_endpoint" in document:
-                told = _document(session.get(document["userinfo_endpoint"]))
+                userinfo = _document(session.get(document["userinfo_endpoint"]))
                 # OpenID Connect Core 1.0, 5.3.2: else it may be of somebody else.
-                claims = told if told.get("sub") == claims["sub"] else claims
+                claims = userinfo if userinfo.get("sub") == claims["sub"] else claims
         return _name_in(claims, described)
 
     def _refuse_foreign(self, document: Mapping[str, Any]) -> None:

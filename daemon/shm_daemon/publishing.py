@@ -77,9 +77,9 @@ def post(
 def _refusal(publication: Publication, status: int, words: bytes) -> ShmError:
     try:
         document = json.loads(words)
-        said = document.get("error") or document.get("message") or ""
+        answer = document.get("error") or document.get("message") or ""
     except (ValueError, AttributeError):
-        said = words.decode(errors="replace")
+        answer = words.decode(errors="replace")
     place = f"bucket {publication.bucket}" if publication.bucket else publication.database
     remedy = {
         401: "Correct the token in the file or variable that [[publish]] names.",
@@ -87,12 +87,12 @@ def _refusal(publication: Publication, status: int, words: bytes) -> ShmError:
         404: f"Create {place} there, or correct its name in [[publish]].",
     }.get(status, "See its log.")
     if 200 <= status < 300:
-        said = "not the 204 by which a database says that it has stored the points"
+        answer = "not the 204 by which a database says that it has stored the points"
         remedy = "See that url is the database itself, and not a login page or proxy."
     if 300 <= status < 400:
         remedy = "It is not followed: write the address that it sends to into [[publish]]."
     kind = PointsRefused if status in _POINTS_REFUSED else NotTaken
-    message = f"{publication.url} answered {status}: {one_line(str(said)) or 'no message'}."
+    message = f"{publication.url} answered {status}: {one_line(str(answer)) or 'no message'}."
     return kind(message, remedy=remedy)
 
 

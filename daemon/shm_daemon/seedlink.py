@@ -135,12 +135,12 @@ class StreamAsker:
 
     def _note_refused(self, error: Exception) -> None:
         """Note once an hour why the server sends nothing, or something that cannot be used."""
-        told = BadInput(
+        refusal = BadInput(
             f"{self._feed.host}:{self._feed.port}: {one_line(str(error))}.",
             remedy="See that the server runs and has these channels; it is asked again.",
         )
         assert self._store is not None
-        note_refused(self._store, self._stream.name, told, self._clock())
+        note_refused(self._store, self._stream.name, refusal, self._clock())
 
     async def _receive(self) -> None:
         """Take records until the connection ends; go on after the last one that is on disk."""

@@ -291,27 +291,27 @@ class Incoming:
 
     def _lies_there(self, target: Path, sidecar: Path | None) -> bool:
         """Return True if the same bytes wait already under that name, with the same sidecar."""
-        beside = sidecar_path(target)
+        existing = sidecar_path(target)
         try:
             if target.stat().st_size != self.size_bytes:
                 return False
-            told = beside.read_bytes() if beside.exists() else b""
+            content = existing.read_bytes() if existing.exists() else b""
             ours = sidecar.read_bytes() if sidecar is not None else b""
-            return told == ours and checksum(target) == self.sha256
+            return content == ours and checksum(target) == self.sha256
         except OSError:
             return False
 
     def _placed(self, target: Path, sidecar: Path | None) -> bool:
         """Return True if the place was free, of the file and of its sidecar, and is ours now."""
-        beside = sidecar_path(target)
-        if target.exists() or beside.exists():
+        target_sidecar = sidecar_path(target)
+        if target.exists() or target_sidecar.exists():
             return False
-        if sidecar is not None and not _named(sidecar, beside):
+        if sidecar is not None and not _named(sidecar, target_sidecar):
             return False
         if _named(self._path, target):
             return True
         if sidecar is not None:
-            beside.unlink(missing_ok=True)
+            target_sidecar.unlink(missing_ok=True)
         return False
 
 

@@ -123,9 +123,11 @@ class RollingFiles:
 
 
 def _chunks(workspace: Workspace, stream: Stream, path: Path) -> Iterator[Chunk]:
-    common, own = path.with_name("stream.toml"), sidecar_path(path)
-    if common.is_file() and not own.exists():  # what all files of a folder do not say stands there
-        shutil.copyfile(common, own)
+    common, sidecar = path.with_name("stream.toml"), sidecar_path(path)
+    if (
+        common.is_file() and not sidecar.exists()
+    ):  # what all files of a folder do not say stands there
+        shutil.copyfile(common, sidecar)
     recording, *others = read_test(path, read_limits(workspace.settings))
     if others or not isinstance(recording, Recording):
         raise _refusal("holds no samples, or those of several records", path)
@@ -146,8 +148,10 @@ def _channels(recording: Recording, stream: Stream, path: Path) -> list[Channel]
     if set(names) <= by_name.keys():
         return [by_name[name] for name in names]
     if len(found) != len(names):
-        told = ", ".join(by_name) or "none"
-        raise _refusal(f"has the channels {told}, where bridge.toml has {', '.join(names)}", path)
+        names_found = ", ".join(by_name) or "none"
+        raise _refusal(
+            f"has the channels {names_found}, where bridge.toml has {', '.join(names)}", path
+        )
     return list(found)
 
 

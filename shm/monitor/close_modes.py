@@ -86,9 +86,9 @@ class CloseModes:
     coherence: ComplexArray
     floor: FloatArray
 
-    def only(self, kept: Sequence[int]) -> CloseModes:
+    def only(self, indices: Sequence[int]) -> CloseModes:
         """Return some of them."""
-        rows = list(kept)
+        rows = list(indices)
         return CloseModes(
             self.radians_s[rows],
             self.decay_1_s[rows],
@@ -166,9 +166,9 @@ class Band:
         if not self.alone:
             self.across = self.along[:, ::-1] * np.array([-1.0, 1.0])[:, np.newaxis]
 
-    def only(self, kept: Sequence[int]) -> Band:
+    def only(self, indices: Sequence[int]) -> Band:
         """Of some of the modes, along the same directions."""
-        return Band(self.lines, self.directions, self.shapes[:, kept], self.known.only(kept))
+        return Band(self.lines, self.directions, self.shapes[:, indices], self.known.only(indices))
 
     def fitted(self, start: CloseModes, most: int = 25) -> BandFit:
         """Return the most likely modes from a start, by Fisher scoring in at most so many steps."""
@@ -299,6 +299,8 @@ def directions(shapes: FloatArray) -> FloatArray:
     return np.hstack((first, rest[:, [most]] / size[most]))
 
 
-def _components(first: FloatArray, second: FloatArray, beside: ComplexArray) -> FloatArray:
-    """x0 to x3 of Hermitian matrices with these diagonals, and `beside` them in the first row."""
-    return np.array([(first + second) / 2, beside.real, -beside.imag, (first - second) / 2])
+def _components(first: FloatArray, second: FloatArray, off_diagonal: ComplexArray) -> FloatArray:
+    """x0 to x3 of Hermitian matrices with these diagonals, and `off_diagonal` in the first row."""
+    return np.array(
+        [(first + second) / 2, off_diagonal.real, -off_diagonal.imag, (first - second) / 2]
+    )

@@ -70,7 +70,9 @@ class Limits:
     same_place_m: float = 0.01
     mixed: float = 0.4  # judgement: of the motion in its own plane; sensors turned by 22 degrees
     smoothed: int = 16  # technical: lines averaged, a quarter of which is their scatter
-    alike: float = 9.0  # judgement: a factor of three between the noise of sensors of one logger
+    noise_ratio: float = (
+        9.0  # judgement: a factor of three between the noise of sensors of one logger
+    )
 
     # ---- tracking
     # Of a peak, to either side of it in its band. What white force leaves out of the slope of the

@@ -56,7 +56,9 @@ def channel_noise(stretches: Sequence[Stretch], low_hz: float, high_hz: float) -
         [_quiet(each.values[:, each.between(low_hz, high_hz)]) for each in stretches], 0
     )
     usual = float(np.median(quiet))
-    noise: FloatArray = np.sqrt(np.clip(quiet, usual / LIMITS.alike, usual * LIMITS.alike))
+    noise: FloatArray = np.sqrt(
+        np.clip(quiet, usual / LIMITS.noise_ratio, usual * LIMITS.noise_ratio)
+    )
     return np.maximum(noise, np.finfo(float).tiny)
 
 

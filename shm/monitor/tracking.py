@@ -209,26 +209,26 @@ def tracked(found: Judged, known: Sequence[Mode], options: IdentifyOptions) -> t
         if lost and stays:
             moved = _move_plane(found, found.peaks, known, its)
             apart = _prove(found, moved, known, options)
-            if len(apart) > len(modes) and _are_moved_alike(
+            if len(apart) > len(modes) and _follow_changed_ends(
                 [(known[index], mode) for index in its for mode in apart if _is(mode, known[index])]
             ):
                 modes = apart
     return modes
 
 
-def _move_plane(found: Judged, peaks: Peaks, known: Sequence[Mode], own: Sequence[int]) -> Peaks:
+def _move_plane(found: Judged, peaks: Peaks, known: Sequence[Mode], rows: Sequence[int]) -> Peaks:
     """Return the peaks with those of one plane's modes where they suit these best."""
     alone = found_peaks(
-        found.stretches, found.channels, [known[index] for index in own], peaks.noise
+        found.stretches, found.channels, [known[index] for index in rows], peaks.noise
     )
     expected, hz = peaks.expected_hz.copy(), peaks.frequency_hz.copy()
     height, shapes = peaks.height_db.copy(), peaks.shapes.copy()
-    expected[own], hz[own] = alone.frequency_hz, alone.frequency_hz
-    height[own], shapes[:, own] = alone.height_db, alone.shapes
+    expected[rows], hz[rows] = alone.frequency_hz, alone.frequency_hz
+    height[rows], shapes[:, rows] = alone.height_db, alone.shapes
     return replace(peaks, expected_hz=expected, frequency_hz=hz, height_db=height, shapes=shapes)
 
 
-def _are_moved_alike(pairs: Sequence[tuple[Mode, Mode]], least: int = 3) -> bool:
+def _follow_changed_ends(pairs: Sequence[tuple[Mode, Mode]], least: int = 3) -> bool:
     """Return True if modes of one plane, before and after, have moved as ends move them.
 
     That is by fractions that change evenly with the order; peaks of the deck lie anywhere.

@@ -105,7 +105,7 @@ def adopt(
     workspace: Workspace,
     store: Store,
     hanger: Hanger,
-    wish: AdoptionRequest,
+    request: AdoptionRequest,
     at: datetime,
     progress: Progress = silent,
 ) -> StoredAdoption:
@@ -117,7 +117,7 @@ def adopt(
     before, baseline = _in_force(store, hanger)
     diagnosis = find_latest_diagnosis(store, hanger.id)
     tests = store.tests.list_all(hanger.id)
-    name = adopted_name(wish.effects, wish.at, wish.baseline, hanger, diagnosis, tests)
+    name = adopted_name(request.effects, request.at, request.baseline, hanger, diagnosis, tests)
     _refuse_second(store, hanger, str(name))
     chosen = [test for test in tests if test.test.id in baseline.posterior.tests]
     terms, lineage = update_terms(hanger, [str(name)], chosen, workspace.settings)
@@ -132,7 +132,7 @@ def adopt(
     )
     posterior = replace(posterior, baseline_check=baseline.posterior.baseline_check)
     gaps = gap_percent(baseline.posterior), gap_percent(posterior)
-    adoption = _adoption(name, hanger, wish, gaps, diagnosis.id if diagnosis else None)
+    adoption = _adoption(name, hanger, request, gaps, diagnosis.id if diagnosis else None)
     competing = [*before.selection.posteriors, posterior]
     models = [class_of(each, hanger) for each in competing]
     probabilities = class_probabilities(competing, models, measured)
@@ -160,7 +160,7 @@ def _refuse_second(store: Store, hanger: Hanger, model: str) -> None:
 def _adoption(
     name: AdoptedName,
     hanger: Hanger,
-    wish: AdoptionRequest,
+    request: AdoptionRequest,
     gaps: tuple[float, float],
     diagnosis_id: int | None,
 ) -> Adoption:
@@ -170,8 +170,8 @@ def _adoption(
         baseline_model=name.baseline,
         effect=joined(each.effect for each in name.effects),
         at=joined(variant_of(each, hanger).at for each in name.effects),
-        why=wish.why,
-        who=wish.who,
+        why=request.why,
+        who=request.who,
         gap_before_percent=gaps[0],
         gap_percent=gaps[1],
         diagnosis_id=diagnosis_id,
@@ -258,15 +258,15 @@ def _part(
     part = AdoptedEffect(effect, key, reference_c if follows else math.nan)
     if key not in keys:
         return part
-    told = cause is not None and Variant(_place_in(cause, effect)).key == key
+    is_diagnosed = cause is not None and Variant(_place_in(cause, effect)).key == key
     missed = missed_by_one_test(effect, hanger)
-    if missed and not told:
+    if missed and not is_diagnosed:
         raise BadInput(
             f"a single test cannot show {effect}, so that its size must come from a diagnosis of "
             f"many. {missed}",
             remedy=f"Diagnose first: `shm gap diagnose --hanger {hanger.id}`.",
         )
-    found = _estimates(effect, cause) if cause is not None and told else {}
+    found = _estimates(effect, cause) if cause is not None and is_diagnosed else {}
     ranges = {
         parameter_name(each): _range(each, found[each.name])
         for each in parameters_of(effect, hanger, variant_of(part, hanger))

@@ -77,10 +77,10 @@ def plan(
         ready_at = _ready_at(each, silences, now, policy)
         if ready_at is None:
             continue
-        alike = (each.hook, each.news, *_condition(each.alert)) if policy.window_s else (each.id,)
+        group = (each.hook, each.news, *_condition(each.alert)) if policy.window_s else (each.id,)
         # One alert a hanger: a second one is news of its own.
-        seen[alike, each.alert.hanger] += 1
-        gathered[alike, seen[alike, each.alert.hanger]].append((ready_at, each.id))
+        seen[group, each.alert.hanger] += 1
+        gathered[group, seen[group, each.alert.hanger]].append((ready_at, each.id))
     escalated = {each.id for each in unsent if each.hook in policy.escalation_s}
     messages = [
         tuple(sorted(id_ for at, id_ in found if at <= now))
@@ -158,14 +158,14 @@ def _ready_at(
         return now - _MOST_WINDOWS * timedelta(seconds=policy.window_s)
     ready_at = max(since, _held_back_until(delivery, silences, now) or since)
     if delivery.news is News.RAISED and delivery.hook in policy.escalation_s:
-        ready_at = _first_told(delivery.alert, policy.hooks, ready_at)
+        ready_at = _first_notification(delivery.alert, policy.hooks, ready_at)
         ready_at += timedelta(seconds=policy.escalation_s[delivery.hook])
     if (quiet := quiet_until(delivery, policy.hooks, ready_at)) is not None:
         ready_at = quiet.astimezone(UTC)
     return ready_at if ready_at <= now else None
 
 
-def _first_told(alert: Alert, hooks: Sequence[Hook], at: datetime) -> datetime:
+def _first_notification(alert: Alert, hooks: Sequence[Hook], at: datetime) -> datetime:
     """Return when the first hook that does not escalate is told; quiet hours may put it off."""
     first = (hook for hook in hooks if hook.escalation_after_seconds is None)
     ends = (hook.quiet_until(alert.message, at, is_raised=True) for hook in first)
@@ -202,16 +202,16 @@ def message_of(deliveries: Sequence[Delivery]) -> Alert:
     Its key is that of the only alert, else of the first with the number of the others: the same at
     each attempt, since a message keeps its deliveries.
     """
-    told = tuple(_told(each) for each in deliveries)
-    if len(told) == 1:
-        return told[0]
-    first, suffix = told[0], ":resolved" if deliveries[0].news is News.RESOLVED else ""
-    key = f"{first.key.removesuffix(suffix)}:and-{len(told) - 1}-more{suffix}"
+    messages = tuple(_message(each) for each in deliveries)
+    if len(messages) == 1:
+        return messages[0]
+    first, suffix = messages[0], ":resolved" if deliveries[0].news is News.RESOLVED else ""
+    key = f"{first.key.removesuffix(suffix)}:and-{len(messages) - 1}-more{suffix}"
     return replace(first, key=key, message=_of_several(deliveries), drifts=(), change=None,
-                   tension=None, alerts=told)  # fmt: skip
+                   tension=None, alerts=messages)  # fmt: skip
 
 
-def _told(delivery: Delivery) -> Alert:
+def _message(delivery: Delivery) -> Alert:
     alert, ended = delivery.alert, delivery.stored.resolution
     if delivery.news is News.RAISED or ended is None:
         return alert
@@ -278,10 +278,10 @@ def with_tension(alert: Alert, now: HangerSummary) -> Alert:
     if then_n is None or now_n is None or not now.is_found or now.basis != BASELINE_AND_CHANGE:
         return alert
     unit = force_unit(then_n.mean, now_n.mean)
-    said, mark, details = alert.message.partition(" Details: ")
-    said += f" The tension is now {formatting.with_half(now_n, unit)}."
-    said += f" At the baseline it was {formatting.with_half(then_n, unit)}."
-    return replace(alert, message=f"{said}{mark}{details}")
+    sentences, mark, details = alert.message.partition(" Details: ")
+    sentences += f" The tension is now {formatting.with_half(now_n, unit)}."
+    sentences += f" At the baseline it was {formatting.with_half(then_n, unit)}."
+    return replace(alert, message=f"{sentences}{mark}{details}")
 
 
 # ---------------------------------------------------------------- after planned works
@@ -308,8 +308,8 @@ def works_before(
     latest = max(ended, key=lambda each: each.until)
     if alert.change is not None and alert.change.began_after >= latest.until:
         return None
-    told = [each for each in earlier if each.kinds != ("repeat the test",)]
-    if any(each.time >= latest.until and each.key != alert.key for each in told):
+    announced = [each for each in earlier if each.kinds != ("repeat the test",)]
+    if any(each.time >= latest.until and each.key != alert.key for each in announced):
         return None
     return latest
 

@@ -54,21 +54,21 @@ def with_times(described: dict[str, Any], found: Survey) -> dict[str, Any]:
     return described
 
 
-def rate_told(found: Survey, described: Described) -> tuple[float, str]:
+def known_rate(found: Survey, described: Described) -> tuple[float, str]:
     """The sampling rate, in Hz: as said, else by the column in s; and why that has none.
 
     NaN where nothing tells it.
     """
-    said = float(described.get("sampling_rate_hz", found.sampling_rate_hz))
+    stated = float(described.get("sampling_rate_hz", found.sampling_rate_hz))
     tables = described.get("channel", {})
     for column in found.columns:
         table = tables.get(column.name, {})
-        if math.isnan(said) and table.get("unit") == "s" and column.values is not None:
+        if math.isnan(stated) and table.get("unit") == "s" and column.values is not None:
             try:
                 return rate_of(column.values, _uneven(found, column.name)), ""
             except BadInput as error:
                 return NAN, str(error)
-    return said, ""
+    return stated, ""
 
 
 def _uneven(found: Survey, channel: str) -> Callable[[int, str], BadInput]:
@@ -120,7 +120,7 @@ class Answers:
     unknown: frozenset[str] = frozenset()
 
     @property
-    def said(self) -> dict[str, Any]:
+    def stated(self) -> dict[str, Any]:
         """The same as the keys of a sidecar."""
         document: dict[str, Any] = {
             "hanger": self.hanger,
@@ -172,14 +172,14 @@ class Understood:
 
 @dataclass(frozen=True, eq=False)
 class Import:
-    """A file as it is understood. `described` is its sidecar, `kept` what its logger's profile is
-    to say; `problems` are what nobody can answer. `of_test` asks when it was and how warm, which is
-    asked once where anything is, and of one file alone. `caveat` doubts the hanger's description.
+    """A file as it is understood. `described` is its sidecar, `profiled` what its logger's profile
+    is to say; `problems` are what nobody can answer. `of_test` asks when it was and how warm, which
+    is asked once where anything is, and of one file alone. `caveat` doubts the hanger's description.
     """
 
     survey: Survey
     described: Described
-    kept: Described
+    profiled: Described
     profile: Profile | None
     columns: tuple[Understood, ...]
     sampling_rate_hz: float
@@ -210,8 +210,8 @@ def look_into(path: Path, workspace: Workspace, answers: Answers) -> Import:
 
     Raises BadInput where that is nothing.
     """
-    with ThreadPoolExecutor(1) as beside:
-        found = beside.submit(survey, path, read_limits(workspace.settings))
+    with ThreadPoolExecutor(1) as executor:
+        found = executor.submit(survey, path, read_limits(workspace.settings))
         import_module("shm.identify.measuring")  # a second, while another process reads
         return understand(found.result(), workspace, answers)
 
@@ -220,40 +220,40 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     """The same of a file that was looked into before."""
     path = Path(found.source)
     profile = profile_for(found.layout, workspace.folder)
-    own = _joined(sidecar_document(path), answers.said)
-    own, order = _with_chosen_time(own, found, workspace.bridge.time_zone)
-    _refuse_unknown(own, found, path)
+    sidecar = _joined(sidecar_document(path), answers.stated)
+    sidecar, order = _with_chosen_time(sidecar, found, workspace.bridge.time_zone)
+    _refuse_unknown(sidecar, found, path)
     known = profile.described if profile is not None else {}
     zone = workspace.bridge.time_zone
-    described = with_times(completed(known, found.layout, own, path.name, zone), found)
+    described = with_times(completed(known, found.layout, sidecar, path.name, zone), found)
     hanger = described.get("hanger", found.hanger)
-    rate, uneven = rate_told(found, described)
-    told = [_told(column, described) for column in found.columns]
-    questions = _questions(found, told, described, hanger, rate, workspace)
+    rate, uneven = known_rate(found, described)
+    surveyed = [_with_description(column, described) for column in found.columns]
+    questions = _questions(found, surveyed, described, hanger, rate, workspace)
     of_test = _of_test(found, described, answers)
     if found.layout.possible_times:  # two days in question are asked of each file
         questions += [each for each in of_test if each.about == "time"]
     problems = (
         *_hanger_problem(hanger, workspace),
-        *_place_problems(told, hanger, workspace),
+        *_place_problems(surveyed, hanger, workspace),
     )
-    record, fault = _recording(told, rate, path)
+    record, fault = _recording(surveyed, rate, path)
     fault = uneven or fault
     if found.lines or any(question.about in ("unit", "rate") for question in questions):
         fault = ""  # the answers may mend it
-    is_measured = any(each.quantity == "acceleration" for each in told)
+    is_measured = any(each.quantity == "acceleration" for each in surveyed)
     if not is_measured and all(question.about != "unit" for question in questions):
         # No answer can make it a recording.
         questions, fault = [], "; ".join(found.problems) or fault
-    kept = with_day_order(_to_keep(known, answers.said, found), order)
+    profiled = with_day_order(_to_keep(known, answers.stated, found), order)
     channels = {} if record is None else {c.name: c for c in record.channels}
     columns = tuple(
         _understood(raw, column, channels.get(column.name), rate)
-        for raw, column in zip(found.columns, told, strict=True)
+        for raw, column in zip(found.columns, surveyed, strict=True)
     )
     problems = (*problems, *((fault,) if fault else ()))
     return Import(
-        found, described, kept, profile, columns, rate, hanger, tuple(questions), problems,
+        found, described, profiled, profile, columns, rate, hanger, tuple(questions), problems,
         tuple(each for each in of_test if each not in questions), _caveat(hanger, workspace),
     )  # fmt: skip
 
@@ -262,25 +262,25 @@ def keep_profile(found: Import, workspace: Workspace, *, each_time: bool = False
     """Keeps what was said for the next file of this logger, but no hanger where that is asked
     `each_time`; None where nothing had to be."""
     before = found.profile.described if found.profile is not None else {}
-    if not each_time and (not found.kept or found.kept == before):
+    if not each_time and (not found.profiled or found.profiled == before):
         return found.profile
-    return save_profile(found.kept, found.survey.layout, workspace.folder, roams=each_time)
+    return save_profile(found.profiled, found.survey.layout, workspace.folder, roams=each_time)
 
 
 def _with_chosen_time(
-    own: dict[str, Any], found: Survey, zone: tzinfo
+    sidecar: dict[str, Any], found: Survey, zone: tzinfo
 ) -> tuple[dict[str, Any], DayOrder | None]:
     """Return the sidecar with the complete time, and the order of day and month that is known now.
 
     A person may name one of the possible times by its day alone.
     """
-    possible, time = found.layout.possible_times, own.get("time")
+    possible, time = found.layout.possible_times, sidecar.get("time")
     if not isinstance(time, datetime):
-        return own, found.layout.day_order
+        return sidecar, found.layout.day_order
     order = order_of_choice(time, possible) or found.layout.day_order
     same = [each.time for each in possible if each.time.date() == time.date()]
     is_day = bool(same) and time.time() == clock_time.min
-    return {**own, "time": in_zone(same[0], zone)} if is_day else own, order
+    return {**sidecar, "time": in_zone(same[0], zone)} if is_day else sidecar, order
 
 
 def _joined(first: Described, then: Described) -> dict[str, Any]:
@@ -292,9 +292,9 @@ def _joined(first: Described, then: Described) -> dict[str, Any]:
     return {**first, **then, "channel": tables} if tables else {**first, **then}
 
 
-def _refuse_unknown(own: Described, found: Survey, path: Path) -> None:
+def _refuse_unknown(sidecar: Described, found: Survey, path: Path) -> None:
     names = [column.name for column in found.columns]
-    for name in own.get("channel", {}):
+    for name in sidecar.get("channel", {}):
         if name not in names:
             raise BadInput(
                 "the file has no such column.",
@@ -308,12 +308,12 @@ OF_TEST = {"time": "time", "temperature": "temperature_c", "operator": "operator
 """What is asked of one test alone, and the key of a sidecar that says it."""
 
 
-def _to_keep(known: Described, said: Described, found: Survey) -> dict[str, Any]:
+def _to_keep(known: Described, stated: Described, found: Survey) -> dict[str, Any]:
     """Return what holds for every file of the logger: not the hanger that the file itself says."""
-    kept = _joined(known, {k: v for k, v in said.items() if k not in OF_TEST.values()})
+    profiled = _joined(known, {k: v for k, v in stated.items() if k not in OF_TEST.values()})
     if found.layout.hanger is not None:
-        kept.pop("hanger", None)
-    return kept
+        profiled.pop("hanger", None)
+    return profiled
 
 
 def _hanger_problem(hanger: object, workspace: Workspace) -> tuple[str, ...]:
@@ -398,7 +398,7 @@ def _of_time(found: Survey) -> Question:
     return Question("time", "", text, f"--time {'|'.join(days)}", False, days)
 
 
-def _told(column: SurveyedColumn, described: Described) -> SurveyedColumn:
+def _with_description(column: SurveyedColumn, described: Described) -> SurveyedColumn:
     """A column with what the sidecar says of it."""
     table = described.get("channel", {}).get(column.name, {})
     unit = str(table.get("unit", column.described_unit))
@@ -465,9 +465,9 @@ def _of_unit(column: SurveyedColumn) -> Question:
 
 def _of_sensor(column: SurveyedColumn, described: Described) -> list[Question]:
     name, quoted, asked = column.name, shlex.quote(column.name), []
-    said = {*described.get("channel", {}).get(name, {}), *described}
+    stated = {*described.get("channel", {}).get(name, {}), *described}
     moves = column.quantity == "acceleration"
-    if column.quantity and math.isnan(column.x_m) and "x_m" not in said:
+    if column.quantity and math.isnan(column.x_m) and "x_m" not in stated:
         what = f"Where is {name}" if moves else f"Where did the hammer hit (column {name})"
         text = f"{what}, in m from the deck end (or 'unknown')?"
         asked.append(Question("place", name, text, f"--place {quoted}=M", needed=moves))
@@ -482,14 +482,14 @@ def _of_sensor(column: SurveyedColumn, described: Described) -> list[Question]:
 
 
 def _recording(
-    told: Sequence[SurveyedColumn], rate: float, path: Path
+    surveyed: Sequence[SurveyedColumn], rate: float, path: Path
 ) -> tuple[Recording | None, str]:
     """The recording as it will be read, or why it will be refused."""
     try:
         columns = [
             Column(c.name, len(c.values), partial(np.asarray, c.values), role="channel",
                    stated=_entries(c, path))
-            for c in told
+            for c in surveyed
             if c.quantity is not None and c.values is not None
         ]  # fmt: skip
         rates = {} if math.isnan(rate) else {"sampling_rate_hz": Entry(rate, path)}
@@ -514,24 +514,24 @@ def _entries(column: SurveyedColumn, path: Path) -> dict[str, Entry]:
 
 
 def _understood(
-    raw: SurveyedColumn, told: SurveyedColumn, channel: Channel | None, rate: float
+    raw: SurveyedColumn, column: SurveyedColumn, channel: Channel | None, rate: float
 ) -> Understood:
     from shm.identify.measuring.hits import find_pulses
     from shm.identify.measuring.signal_faults import clipped
 
     values = raw.values if channel is None else channel.values
     good = np.zeros(0) if values is None else values[np.isfinite(values)]
-    measured = told.quantity is not None and channel is not None and len(good) > 0
+    measured = column.quantity is not None and channel is not None and len(good) > 0
     hits = None
-    if told.quantity == "force" and values is not None and rate > 0:
+    if column.quantity == "force" and values is not None and rate > 0:
         hits = len(find_pulses(values, rate))
     limit = NAN if channel is None else channel.full_scale
     return Understood(
         name=raw.name,
         unit=raw.unit or raw.described_unit,
-        quantity=told.quantity,
-        plane=told.plane,
-        x_m=told.x_m,
+        quantity=column.quantity,
+        plane=column.plane,
+        x_m=column.x_m,
         least=float(good.min()) if measured else NAN,
         largest=float(good.max()) if measured else NAN,
         overloads=raw.overloads,

@@ -62,11 +62,13 @@ def understand_modes(found: ForeignModes, workspace: Workspace, answers: Answers
     layout = _layout(found, axes)
     profile = profile_for(layout, workspace.folder)
     known = profile.described if profile else {}
-    said = completed(known, layout, answers.said, Path(found.source).name)
+    described = completed(known, layout, answers.stated, Path(found.source).name)
     planes: dict[str, Plane] = {
-        axis: table["plane"] for axis, table in said.get("channel", {}).items() if "plane" in table
+        axis: table["plane"]
+        for axis, table in described.get("channel", {}).items()
+        if "plane" in table
     }
-    hanger = said.get("hanger")
+    hanger = described.get("hanger")
     questions = _questions(axes, planes, hanger)
     if hanger is not None:
         workspace.bridge.tested(hanger)
@@ -89,11 +91,11 @@ def keep_modes_profile(
     found: ImportedModes, workspace: Workspace, answers: Answers
 ) -> Profile | None:
     """Keeps hanger and planes for the next file of this program."""
-    kept = {k: v for k, v in answers.said.items() if k in ("hanger", "channel")}
-    if not kept:
+    profiled = {k: v for k, v in answers.stated.items() if k in ("hanger", "channel")}
+    if not profiled:
         return profile_for(found.layout, workspace.folder)
     before = profile_for(found.layout, workspace.folder)
-    whole = completed(before.described if before else {}, found.layout, kept)
+    whole = completed(before.described if before else {}, found.layout, profiled)
     return save_profile(whole, found.layout, workspace.folder, roams=answers.each_time)
 
 

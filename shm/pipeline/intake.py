@@ -54,23 +54,23 @@ def receive(
     path = path.parent.resolve() / path.name
     sidecar, modified_at = sidecar_path(path), _modified(path)
     try:
-        kept_sidecar, kept = _keep(path, sidecar, workspace, not spooled, on_progress)
+        archived_sidecar, archived = _keep(path, sidecar, workspace, not spooled, on_progress)
     except TooLarge as error:
         if spooled:
-            _set_aside(path, safe_name(name), error, workspace, store, at)
+            _quarantine(path, safe_name(name), error, workspace, store, at)
         raise
     file = ReceivedFile(
-        kept.sha256,
+        archived.sha256,
         safe_name(name),
-        kept.size_bytes,
-        kept.entry if spooled else uuid.uuid4().hex,
-        kept.archived_as,
-        kept_sidecar.archived_as if kept_sidecar else None,
+        archived.size_bytes,
+        archived.entry if spooled else uuid.uuid4().hex,
+        archived.archived_as,
+        archived_sidecar.archived_as if archived_sidecar else None,
         modified_at,
     )
     receipt = store.recordings.receive(file, at)
     if spooled:
-        _remove(path, kept, kept_sidecar)
+        _remove(path, archived, archived_sidecar)
     return receipt
 
 
@@ -87,9 +87,9 @@ def _keep(
 ) -> tuple[ArchivedFile | None, ArchivedFile]:
     archive, most = workspace.archive, workspace.settings.max_file_bytes
     refuse_oversize(path.stat(follow_symlinks=follow).st_size, most, path)
-    kept_sidecar = None
+    archived_sidecar = None
     if _is_plain(sidecar):
-        kept_sidecar = archive.keep(sidecar, most_bytes=most, on_progress=on_progress)
+        archived_sidecar = archive.keep(sidecar, most_bytes=most, on_progress=on_progress)
     is_read = follow or not path.is_symlink()
     text = _sidecar_by_profile(path, workspace, learns=True) if is_read else None
     if text is not None:
@@ -97,8 +97,10 @@ def _keep(
             made_up = Path(folder) / sidecar.name
             made_up.write_text(text, encoding="utf-8")
             made = archive.keep(made_up, most_bytes=most, on_progress=on_progress)
-        kept_sidecar = replace(made, entry=kept_sidecar.entry) if kept_sidecar else made
-    return kept_sidecar, archive.keep(path, follow=follow, most_bytes=most, on_progress=on_progress)
+        archived_sidecar = replace(made, entry=archived_sidecar.entry) if archived_sidecar else made
+    return archived_sidecar, archive.keep(
+        path, follow=follow, most_bytes=most, on_progress=on_progress
+    )
 
 
 @contextmanager
@@ -127,7 +129,7 @@ def _sidecar_by_profile(path: Path, workspace: Workspace, *, learns: bool) -> st
     if not may_add or path.name.lower().endswith(MODES_SUFFIX):
         return None
     try:
-        layout, own = layout_of(path, read_limits(workspace.settings)), sidecar_document(path)
+        layout, sidecar = layout_of(path, read_limits(workspace.settings)), sidecar_document(path)
     except BadInput:
         return None  # it is refused with its reason where it is read
     if learns:
@@ -137,8 +139,8 @@ def _sidecar_by_profile(path: Path, workspace: Workspace, *, learns: bool) -> st
     if profile is None and zone is UTC:
         return None
     known = profile.described if profile is not None else {}
-    complete = completed(known, layout, own, path.name, zone)
-    return sidecar_text(complete) if complete != own else None
+    complete = completed(known, layout, sidecar, path.name, zone)
+    return sidecar_text(complete) if complete != sidecar else None
 
 
 def learn_from_answer(workspace: Workspace, store: Store, hold: Hold) -> None:
@@ -155,13 +157,13 @@ def learn_from_answer(workspace: Workspace, store: Store, hold: Hold) -> None:
     learn_day_order(layout, order, workspace.folder)
 
 
-def _set_aside(
+def _quarantine(
     path: Path, name: str, error: TooLarge, workspace: Workspace, store: Store, at: datetime
 ) -> None:
     """Lays what is too large in the quarantine, unread: nobody knows its checksum."""
     lies = move_to_quarantine(workspace, path, name, error, at, None)
-    said = {event.message for event in list_events(store, "refused", file_name=name)}
-    if lies != path or error.message not in said:  # what stays is met at each start
+    messages = {event.message for event in list_events(store, "refused", file_name=name)}
+    if lies != path or error.message not in messages:  # what stays is met at each start
         store.recordings.refuse_unread(name, error.message, at)
 
 
@@ -179,7 +181,7 @@ def _place(path: Path, spool: Path) -> tuple[Path, bool]:
     return Path(path.name), False
 
 
-def _remove(path: Path, kept: ArchivedFile, kept_sidecar: ArchivedFile | None) -> None:
+def _remove(path: Path, archived: ArchivedFile, archived_sidecar: ArchivedFile | None) -> None:
     """Empties the spool of a received file; its sidecar first, lest that be left alone.
 
     A sidecar that another file waits for, as NAME.uff beside NAME.csv, stays.
@@ -187,16 +189,16 @@ def _remove(path: Path, kept: ArchivedFile, kept_sidecar: ArchivedFile | None) -
     What has come under either name since it was read stays, to be taken in its turn.
     """
     sidecar = sidecar_path(path)
-    if kept_sidecar is not None:
+    if archived_sidecar is not None:
         others = {each for each in path.parent.iterdir() if sidecar_path(each) == sidecar}
         if not others - {path, sidecar}:
-            _remove_if_still(sidecar, kept_sidecar)
-    _remove_if_still(path, kept)
+            _remove_if_still(sidecar, archived_sidecar)
+    _remove_if_still(path, archived)
 
 
-def _remove_if_still(path: Path, kept: ArchivedFile) -> None:
+def _remove_if_still(path: Path, archived: ArchivedFile) -> None:
     try:
-        if inode_identity(path.lstat()) == kept.entry:
+        if inode_identity(path.lstat()) == archived.entry:
             path.unlink(missing_ok=True)
     except FileNotFoundError:
         return

@@ -45,10 +45,10 @@ IDENTIFY_SETTINGS = (
 
 @dataclass(frozen=True, eq=False)
 class Taught:
-    """The posterior of a test whose tension was read, too; `own`: of this hanger, not a sibling."""
+    """The posterior of a test whose tension was read, too, of the same hanger or of a sibling."""
 
     posterior: Posterior
-    own: bool
+    same_hanger: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,10 +258,10 @@ def _from_to(old: object, new: object) -> str:
     """Lists and tables would be long: of them it is said that they changed."""
     if any(isinstance(each, dict | list) for each in (old, new)):
         return ""
-    return f" from {_told(old)} to {_told(new)}"
+    return f" from {_as_text(old)} to {_as_text(new)}"
 
 
-def _told(value: object) -> str:
+def _as_text(value: object) -> str:
     if value is None:
         return "none"
     return f"{value:g}" if isinstance(value, float) else str(value)

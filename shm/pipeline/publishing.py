@@ -167,15 +167,15 @@ class _Look:
         for summary in hanger_summaries(self.workspace, self.store, self.now):
             fields = summary_fields(summary)
             point = Point(HANGER, self.tags_of(summary.hanger), fields, self.now)
-            said, sent_at = self.last_sent(point)
-            if said != point.line.rpartition(" ")[0] or self.now - sent_at >= _REPEATED:
+            content, sent_at = self.last_sent(point)
+            if content != point.line.rpartition(" ")[0] or self.now - sent_at >= _REPEATED:
                 yield point
 
     def last_sent(self, point: Point) -> tuple[str, datetime]:
         """Return what was queued last of a point's series, and its time; 1970 where nothing was."""
         line = self.outbox.latest(self.target, point.series)
-        said, _, at_ns = line.rpartition(" ")
-        return said, _EPOCH + timedelta(microseconds=int(at_ns or 0) / 1000)
+        content, _, at_ns = line.rpartition(" ")
+        return content, _EPOCH + timedelta(microseconds=int(at_ns or 0) / 1000)
 
     def tests(self, hanger: Hanger, looked_at: set[int]) -> Iterator[Point]:
         """Yield the tests that count, each with the tension by it alone; and their modes."""

@@ -72,20 +72,20 @@ class Outcome:
         unit = force_unit(float(tension_n.mean()))
         tension, count = unit.of(tension_n), len(made.posterior.tests)
         tests = "one test" if count == 1 else f"{count} tests"
-        said = [
+        lines = [
             f"Hanger {made.hanger} is compared with its {tests} since {made.since:%Y-%m-%d} from "
             f"now on: {tension.mean():.4g} {unit.name} (sd {tension.std(ddof=1):.2g} {unit.name})."
         ]
-        said += [
+        lines += [
             f"Its tests still show what alert {each.alert} told ({each.words}): from now on that "
             "is taken for its normal state."
             for each in self.accepted
         ]
-        said += [f"Alert {each} is explained by it and resolved." for each in self.explained]
+        lines += [f"Alert {each} is explained by it and resolved." for each in self.explained]
         if self.left:
             notes = ", ".join(f"`shm alerts ack {each}`" for each in self.left)
-            said.append(f"Alerts of it are still open. Take note of them: {notes}.")
-        return tuple(said)
+            lines.append(f"Alerts of it are still open. Take note of them: {notes}.")
+        return tuple(lines)
 
 
 def set_baseline(
@@ -159,15 +159,15 @@ def _still_shown(store: Store, hanger: Hanger, order: Order) -> tuple[Unrepaired
         before = store.watch.baseline(hanger.id, number=number)
         if before is None:
             continue
-        kept = kept_of(before.posterior, dated_tests(store, before)[0])
-        of_baseline = [test for test, _ in kept]
+        accepted = kept_of(before.posterior, dated_tests(store, before)[0])
+        of_baseline = [test for test, _ in accepted]
         reader = Reader(before.posterior, of_baseline, hanger)
-        told = [
+        announced = [
             (each.id, each.alert, tests.get(each.alert.test))
             for each in explained
             if each.baseline_id == number
         ]
-        found += unrepaired((reader, of_baseline), told, since, hanger, restores=restores)
+        found += unrepaired((reader, of_baseline), announced, since, hanger, restores=restores)
     return tuple(found)
 
 

@@ -63,16 +63,16 @@ def reconcile(open_alerts: Iterable[StoredAlert], conditions: Sequence[Condition
             left.append(each)
     to_open: list[Alert] = []
     for condition in conditions:
-        if condition.state == "holds" and not _is_told(condition, to_open, left):
+        if condition.state == "holds" and not _is_covered(condition, to_open, left):
             to_open.append(condition.alert)
     return Reconciled(tuple(to_open), to_close)
 
 
-def _is_told(condition: Condition, opened: Sequence[Alert], left: Sequence[StoredAlert]) -> bool:
-    alert, own = condition.alert, condition.baseline_id
-    same = [each.alert for each in left if each.baseline_id == own]
+def _is_covered(condition: Condition, opened: Sequence[Alert], left: Sequence[StoredAlert]) -> bool:
+    alert, baseline_id = condition.alert, condition.baseline_id
+    same = [each.alert for each in left if each.baseline_id == baseline_id]
     # Of tests and of sensors; what was raised against another baseline is another event.
-    other = (each.alert for each in left if (each.baseline_id is None) != (own is None))
+    other = (each.alert for each in left if (each.baseline_id is None) != (baseline_id is None))
     return tells([*opened, *same], alert) or any(is_same_event(each, alert) for each in other)
 
 
@@ -95,19 +95,19 @@ def tells(known: Sequence[Alert], alert: Alert) -> bool:
     if not kinds <= OF_CHANGES:
         return False
     if BEYOND in kinds:
-        told = {each for one in known if BEYOND in one.kinds for each in subjects_of(one)}
-        if not alert.drifts or not subjects_of(alert) <= told:
+        covered = {each for one in known if BEYOND in one.kinds for each in subjects_of(one)}
+        if not alert.drifts or not subjects_of(alert) <= covered:
             return False
     return kinds == {BEYOND} or any(covers_change(one, alert.change) for one in known)
 
 
-def covers_change(told: Alert, change: Change | None) -> bool:
+def covers_change(known: Alert, change: Change | None) -> bool:
     """Return True where an alert tells of a change: of the same way, begun before it was told."""
-    if change is None or not change.moved or not set(told.kinds) & OF_CHANGES:
+    if change is None or not change.moved or not set(known.kinds) & OF_CHANGES:
         return False
     first = change.moved[0]
-    moved: list[Drift | Moved] = [*told.drifts, *(told.change.moved[:1] if told.change else ())]
-    return change.began_by <= told.time and any(
+    moved: list[Drift | Moved] = [*known.drifts, *(known.change.moved[:1] if known.change else ())]
+    return change.began_by <= known.time and any(
         each.quantity == first.quantity and each.shift_mean * first.shift_mean > 0 for each in moved
     )
 
@@ -119,16 +119,16 @@ def is_same_event(first: Alert, alert: Alert) -> bool:
     """
     if not set(first.kinds) & OF_CHANGES:
         return False
-    told, own = _leading(first), _leading(alert)
-    if told is None or not set(alert.kinds) <= {*OF_CHANGES, *REPEAT}:
+    known, candidate = _leading(first), _leading(alert)
+    if known is None or not set(alert.kinds) <= {*OF_CHANGES, *REPEAT}:
         return False
     if alert.kinds == REPEAT:
         return True
-    if own is None or (alert.change and alert.change.began_after > first.time):
+    if candidate is None or (alert.change and alert.change.began_after > first.time):
         return False
-    is_same = own.quantity == told.quantity and own.shift_mean * told.shift_mean > 0
-    more = abs(own.shift_mean) - abs(told.shift_mean)
-    return is_same and more <= _SDS * math.hypot(own.shift_sd, told.shift_sd)
+    is_same = candidate.quantity == known.quantity and candidate.shift_mean * known.shift_mean > 0
+    more = abs(candidate.shift_mean) - abs(known.shift_mean)
+    return is_same and more <= _SDS * math.hypot(candidate.shift_sd, known.shift_sd)
 
 
 def _leading(alert: Alert) -> Drift | Moved | None:
@@ -154,7 +154,7 @@ _ODD = 0.5  # likelier than not: such a test agrees with nothing, and says nothi
 _REPEATS = (REPEAT, ("tests disagree",))
 JUDGED_AGAIN = "judged again with the thresholds in force"
 
-GapStands = Callable[[WatchedTest], bool]
+ShowsGap = Callable[[WatchedTest], bool]
 """Whether the gap of an adopted class is still larger at a test than when it was adopted."""
 
 
@@ -169,7 +169,7 @@ class Evidence:
     hanger: Hanger
     tests: Sequence[WatchedTest]
     newest: str
-    gap_stands: GapStands
+    shows_gap: ShowsGap
     called: Sequence[Alert]
     is_again: bool = False
 
@@ -199,8 +199,8 @@ def _conditions(known: Sequence[StoredAlert], found: Evidence) -> Iterator[Condi
                 yield Condition(with_free_key(replace(alert, message=text), ended), "holds")
         elif alert.test == found.newest and all(alert.key != each.alert.key for each in known):
             yield Condition(alert, "holds")
-    if (anew := _shown_again(resolved, is_open, found)) is not None:
-        yield Condition(anew, "holds")
+    if (renewed := _shown_again(resolved, is_open, found)) is not None:
+        yield Condition(renewed, "holds")
 
 
 def why_over(alert: Alert, found: Evidence) -> str:
@@ -283,15 +283,15 @@ def _shown_again(
     level = found.hanger.thresholds.alert_probability
     for stored in reversed(resolved):
         alert, end = stored.alert, stored.resolution
-        own = subjects_of(alert)
-        if end is None or own <= known:
+        subjects = subjects_of(alert)
+        if end is None or subjects <= known:
             continue
-        known |= own
+        known |= subjects
         since = alert.time if end.who == SHM else end.at
         later = [test for test in found.tests if test.time > since]
         shown = _agreeing(later, partial(_is_shown, alert, found, level))
         if len(shown) > 1:
-            return _anew(stored, shown, found.hanger)
+            return _renewed(stored, shown, found.hanger)
     return None
 
 
@@ -324,32 +324,32 @@ def _left(alert: Alert, test: WatchedTest, found: Evidence) -> float:
     is_odd = test.change.outlier_probability > _ODD
     if alert.kinds in _REPEATS:
         return float(is_odd or any(each.is_clearly_beyond for each in test.drifts))
-    if "gap" in alert.kinds and found.gap_stands(test):
+    if "gap" in alert.kinds and found.shows_gap(test):
         return 1.0
     if is_odd or not ("gap" in alert.kinds or alert.drifts):
         return math.nan
     now = {drift.quantity: drift for drift in test.drifts}
-    left = [_left_of(alert, told, now.get(told.quantity)) for told in alert.drifts]
+    left = [_left_of(alert, announced, now.get(announced.quantity)) for announced in alert.drifts]
     return math.nan if any(map(math.isnan, left)) else max(left, default=0.0)
 
 
-def _left_of(alert: Alert, told: Drift, later: Drift | None) -> float:
+def _left_of(alert: Alert, drift: Drift, later: Drift | None) -> float:
     """Return the probability that a shift is beyond its threshold as it was, or that half of it is
     left; NaN where that is not known."""
     if later is None or not later.shift_sd > 0 or math.isnan(later.probability):
         return math.nan
-    way = math.copysign(1, told.shift_mean)
-    off = way * later.shift_mean - _HALF * abs(told.shift_mean)
+    way = math.copysign(1, drift.shift_mean)
+    off = way * later.shift_mean - _HALF * abs(drift.shift_mean)
     half = 0.5 * math.erfc(-off / (math.sqrt(2) * later.shift_sd))
-    if abs(told.shift_mean) < told.threshold:
+    if abs(drift.shift_mean) < drift.threshold:
         return half
-    if alert.change is None and later.may_be_beyond(told.shift_mean):
+    if alert.change is None and later.may_be_beyond(drift.shift_mean):
         return 1.0
     is_same_way = way == math.copysign(1, later.shift_mean)
     return max(half, later.probability if is_same_way else 0.0)
 
 
-def _anew(stored: StoredAlert, shown: Sequence[WatchedTest], hanger: Hanger) -> Alert:
+def _renewed(stored: StoredAlert, shown: Sequence[WatchedTest], hanger: Hanger) -> Alert:
     alert, end, test = stored.alert, stored.resolution, shown[-1]
     now = {drift.quantity: drift for drift in test.drifts}
     drifts = tuple(now[each.quantity] for each in alert.drifts)
@@ -359,8 +359,8 @@ def _anew(stored: StoredAlert, shown: Sequence[WatchedTest], hanger: Hanger) -> 
         f"{test.test}, of two visits, show it again."
     )
     message = f"{_message_now(alert, drifts, test, hanger)} {again}"
-    anew = replace(alert, test=test.test, time=test.time, drifts=drifts, message=message)
-    return with_free_key(replace(anew, tension=None), [stored])
+    renewed = replace(alert, test=test.test, time=test.time, drifts=drifts, message=message)
+    return with_free_key(replace(renewed, tension=None), [stored])
 
 
 def _message_now(alert: Alert, drifts: Sequence[Drift], test: WatchedTest, hanger: Hanger) -> str:

@@ -55,7 +55,7 @@ def calibration(taught: Taught | None, hanger: Hanger) -> Calibration | None:
 
     None where there is nothing to learn from.
     """
-    return None if taught is None else learn(taught.posterior, hanger, taught.own)
+    return None if taught is None else learn(taught.posterior, hanger, taught.same_hanger)
 
 
 def identify_file(
@@ -177,25 +177,27 @@ def watch_test(
     current: Posterior,
     hanger: Hanger,
     limit_years: float,
-    kept: bytes | None = None,
-    beside: Beside | None = None,
+    state: bytes | None = None,
+    neighbours: Beside | None = None,
 ) -> WatchResult | None:
     """Return what the watch says after a test, the alert that it calls for, what to keep of it.
 
     `tests` are those of the baseline and those since, the last of which is the one in question; or
-    that one alone, with what was `kept` before it: None where nothing can go on from that. The
-    tests `beside` it are those that it may agree with, whatever the clocks say.
+    that one alone, with the `state` before it: None where nothing can go on from that. The
+    `neighbours` of it are those that it may agree with, whatever the clocks say.
     """
     since_baseline, later = tests
     options = WatchOptions.of(hanger.assumptions, limit_years=limit_years)
     try:
         found = (
-            watch_newest(baseline.posterior, since_baseline, later, hanger, options, kept, beside)
+            watch_newest(
+                baseline.posterior, since_baseline, later, hanger, options, state, neighbours
+            )
             if hanger.is_modelled
-            else watch_newest_frequencies(since_baseline, later, hanger, options, kept)
+            else watch_newest_frequencies(since_baseline, later, hanger, options, state)
         )
     except BadInput:
-        if kept is None:
+        if state is None:
             raise
         found = None  # what was kept may be damaged, and the watch can do without it
     if found is None:

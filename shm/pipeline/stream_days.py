@@ -18,7 +18,7 @@ from shm.store.tests import list_test_rows
 from shm.values import ModalTest, Posterior
 from shm.values.stream import PERIOD, PERIODS, Stream, period_start
 
-_OWN_DAYS = 7  # judgement: by then every class has been selected and the watch has learnt
+_LEARNING_DAYS = 7  # judgement: by then every class has been selected and the watch has learnt
 
 _MAY_LACK = timedelta(hours=1)  # judgement: of a day, whose mean that hardly moves
 _REST_COMES = timedelta(hours=6)
@@ -73,10 +73,10 @@ def baseline_of(store: Store, stream: Stream) -> Posterior | None:
     if pooled is None:
         return found.posterior
     first = period_start(pooled[0], PERIODS["day"])
-    days = (first + n * PERIODS["day"] for n in range(_OWN_DAYS))
-    own = tuple(f"{stream.name}-{day:%Y-%m-%d}" for day in days)
-    is_own = all(test.startswith(own) for test in found.posterior.tests)
-    return None if is_own else found.posterior
+    days = (first + n * PERIODS["day"] for n in range(_LEARNING_DAYS))
+    prefixes = tuple(f"{stream.name}-{day:%Y-%m-%d}" for day in days)
+    is_of_stream = all(test.startswith(prefixes) for test in found.posterior.tests)
+    return None if is_of_stream else found.posterior
 
 
 def hand_on_day(workspace: Workspace, store: Store, test: ModalTest, at: datetime) -> None:

@@ -44,8 +44,8 @@ _LATE, _SILENT = timedelta(minutes=5), timedelta(hours=1)
 """judgement: loggers send each minute; a router begins anew within five minutes."""
 _AHEAD = timedelta(minutes=2)  # judgement: clocks without GPS or NTP are seconds off
 _AT_FAULT = ("dead", "drifting", "swapped", "saturated", "lost modes", "thermometer")
-_FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends it
-_STANDS = {"thermometer": timedelta(hours=2)}  # derived: an hour is judged once it is over
+_FAULT_LASTS = timedelta(hours=1)  # six windows: one that shows nothing ends it
+_LASTS = {"thermometer": timedelta(hours=2)}  # derived: an hour is judged once it is over
 _NAMED = 5  # of many: the page of sensors lists them all
 
 
@@ -116,7 +116,7 @@ def classify_stream(
         return "silent"
     if now - last > _LATE:
         return "late"
-    standing = [e for e in events if last - e.end < _STANDS.get(e.kind, _FAULT_STANDS)]
+    standing = [e for e in events if last - e.end < _LASTS.get(e.kind, _FAULT_LASTS)]
     if any(each.kind == "lost modes" and not each.channel for each in standing):
         return "sees nothing"
     return "sensor at fault" if any(each.kind in _AT_FAULT for each in standing) else "live"

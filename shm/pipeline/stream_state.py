@@ -140,13 +140,13 @@ def against_hammer(store: Store, stream: Stream) -> AmbientBias:
     if hours is None:
         return ambient_bias(stream.hanger, (), ())
     last = hours[1]
-    own = [
+    ids = [
         row.id
         for row in list_test_rows(store, stream.hanger, _ROWS_SEEN)
         if row.time <= last + TOGETHER
         and not row.name.startswith(f"{stream.name}-{row.time:%Y-%m-%d}")  # a day of its own
     ][:_TESTS_COMPARED]
-    tests = [each.test for each in store.tests.list_all(ids=own)]
+    tests = [each.test for each in store.tests.list_all(ids=ids)]
     times = [test.time for test in tests if test.time is not None]
     return ambient_bias(stream.hanger, tests, list_hours_near(store, stream.name, times, TOGETHER))
 
@@ -189,12 +189,12 @@ def stream_course(
     if not hours and not windows:
         return None
     lines = len(windows[0][1]) if windows else 0
-    alike = [(at, spectrum) for at, spectrum in windows if len(spectrum) == lines]
+    same_grid = [(at, spectrum) for at, spectrum in windows if len(spectrum) == lines]
     return StreamHistory(
         stream=stream.name,
-        window_times=[at for at, _ in alike],
+        window_times=[at for at, _ in same_grid],
         line_hz=(np.arange(lines) + 0.5) * stream.sampling_rate_hz / 2 / max(1, lines),
-        spectrum_db=np.array([spectrum for _, spectrum in alike], dtype=float),
+        spectrum_db=np.array([spectrum for _, spectrum in same_grid], dtype=float),
         hours=[each.start + PERIODS[period] / 2 for each in hours],
         period=period,
         modes=_modes(hours),

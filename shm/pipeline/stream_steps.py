@@ -93,7 +93,7 @@ class Pooled:
     """A reading of a period, what the watch keeps, calls for and ends, a day as a modal test."""
 
     reading: PooledReading | None
-    kept: bytes | None = None
+    state: bytes | None = None
     alert: Alert | None = None
     events: tuple[StreamEvent, ...] = ()
     test: ModalTest | None = None
@@ -106,7 +106,7 @@ def pool_stream(
     start: datetime,
     hanger: Hanger,
     baseline: Posterior | None,
-    kept: bytes | None,
+    state: bytes | None,
     false_call_years: float,
     events: Sequence[StreamEvent] = (),
     *,
@@ -117,7 +117,7 @@ def pool_stream(
 
     An alert is led by that of `events` which was at the time of its change.
     """
-    kept, warm = with_believed(kept, readings)
+    state, warm = with_believed(state, readings)
     readings, noticed = warm.windows, warm.events if period == "hour" else ()
     reading = pooled(readings, period, start)
     if reading is None:
@@ -126,10 +126,10 @@ def pool_stream(
         return Pooled(reading, test=as_modal_test(reading))
     if period != "hour" or not is_watched or not hanger.is_modelled:
         return Pooled(reading, events=noticed)
-    own = hanger.thresholds.false_call_years
-    options = StreamOptions(limit_years=false_call_years if own is None else own)
-    found = watch_reading(baseline, reading, hanger, kept, options)
-    told = replace(
+    stated_years = hanger.thresholds.false_call_years
+    options = StreamOptions(limit_years=false_call_years if stated_years is None else stated_years)
+    found = watch_reading(baseline, reading, hanger, state, options)
+    watched = replace(
         reading,
         tension_shift=found.tension_shift,
         tension_shift_sd=found.tension_shift_sd,
@@ -139,4 +139,4 @@ def pool_stream(
     )
     noticed = (*noticed, *found.events)
     alert = found.alert and led_by(found.alert, (*events, *noticed))
-    return Pooled(told, found.kept, alert, noticed, ended=found.ended)
+    return Pooled(watched, found.kept, alert, noticed, ended=found.ended)

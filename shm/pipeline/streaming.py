@@ -61,12 +61,12 @@ if TYPE_CHECKING:
 
 WINDOW = PERIOD  # what is sealed as one is read as one
 """Long enough that a mode at 5 Hz of 0.1 % damping is known to 2e-4 (S. K. Au, 2014)."""
-_KEPT_BEFORE_ALERT = timedelta(hours=24)
+_RETAINED_BEFORE_ALERT = timedelta(hours=24)
 """Of raw samples, for good: what changed within a day is told within a day."""
 _AGAIN = timedelta(minutes=1)  # judgement: a machine without memory or disk is given a minute
 _WHOLE = 0.98  # judgement: of ten minutes; a chunk that lacks seconds is not waited for
 _PATIENCE = timedelta(minutes=20)  # judgement: a logger that sends each quarter of an hour
-_HEED = timedelta(minutes=10)  # technical: silences are told by the day
+_CHECK_EVERY = timedelta(minutes=10)  # technical: silences are told by the day
 _LOOKED_BACK = timedelta(days=10)
 """Judgement: for what was noticed as a change began; what is told later is a slow one."""
 
@@ -173,7 +173,7 @@ class Streaming:
                 self._retry_later(stream.name)
         self._first = (self._first + 1) % max(1, len(streams))
         if (now := self.clock()) >= self._look_at:
-            self._look_at = now + _HEED
+            self._look_at = now + _CHECK_EVERY
             evaluate_silent_streams(self.workspace, self.store, now)
         return bool(self._running)
 
@@ -379,13 +379,13 @@ class Streaming:
             hand_on_day(self.workspace, self.store, found.test, self.clock())
         if found.alert is not None:
             why = f"alert {found.alert.key}"
-            self.ring.keep(stream.name, end - _KEPT_BEFORE_ALERT, end, why)
+            self.ring.keep(stream.name, end - _RETAINED_BEFORE_ALERT, end, why)
         hooks = [hook.name for hook in self.workspace.bridge.hooks]
         is_again = end <= self._courses[stream.name].settled
         changes = self._reconciled(stream.hanger, found, is_again=is_again)
-        kept = found.kept or None
+        state = found.state or None
         for raised in self.store.streams.save_pooled(
-            found.reading, kept, changes, hooks, self.clock()
+            found.reading, state, changes, hooks, self.clock()
         ):
             log.warning("alert %s: %s", raised.alert.key, raised.alert.message)
 

@@ -49,20 +49,20 @@ if TYPE_CHECKING:
     from shm.watch import DatedTest
 
 
-_BESIDE = 2  # of which two that agree have been told before
+_N_NEIGHBOURS = 2  # of which two that agree have been told before
 
 
 @dataclass(frozen=True)
 class ToWatch:
     """Input of a watch: the tests of the baseline and those to go over, the newest last.
 
-    With something `kept` the newest goes alone. `key` tells what is kept after it from what was
-    kept after other tests, or by another shm.
+    With a `state` the newest goes alone. `key` tells the state stored after it from that
+    stored after other tests, or by another shm.
     """
 
     baseline_tests: Sequence[DatedTest]
     later: Sequence[DatedTest]
-    kept: bytes | None
+    state: bytes | None
     key: str
 
 
@@ -71,12 +71,12 @@ def to_watch(store: Store, baseline: Baseline, newest: StoredTest) -> ToWatch:
 
     How many tests there were before costs next to nothing.
     """
-    before, kept = list_watched_tests(store, baseline, newest), find_watch_state(store, baseline)
+    before, state = list_watched_tests(store, baseline, newest), find_watch_state(store, baseline)
     key = _key(before, newest)
-    if kept is None or kept.key != _key(before):
+    if state is None or state.key != _key(before):
         return ToWatch(*dated_tests(store, baseline, newest), None, key)
     return ToWatch(
-        _dated(list_baseline_tests(store, baseline)), _dated([newest]), kept.content, key
+        _dated(list_baseline_tests(store, baseline)), _dated([newest]), state.content, key
     )
 
 
@@ -89,7 +89,7 @@ def find_neighbouring_tests(store: Store, baseline: Baseline, newest: StoredTest
     by_clock = [
         hold.recording_id for hold in list_holds(store, newest.hanger) if hold.is_for_its_clock
     ]
-    of_test = store, baseline, newest, _BESIDE
+    of_test = store, baseline, newest, _N_NEIGHBOURS
     came = list_nearest_tests(*of_test, as_received=True, held=by_clock)
     dated = list_nearest_tests(*of_test)
     held = [each.test.id for each in (*came[0], *came[1]) if each.stage is Stage.HELD]
@@ -152,7 +152,7 @@ def judge_again(workspace: Workspace, store: Store, hanger: Hanger, at: datetime
 def differences(judged: StoredWatch, hanger: Hanger, settings: Settings) -> Iterator[str]:
     """Return which thresholds in force are others than those that a test was judged with."""
     limits, watched = hanger.thresholds, judged.watched
-    own = limits.false_call_years
+    stated_years = limits.false_call_years
     pairs = {
         **{
             each.quantity: (each.threshold, threshold_of(each.quantity, hanger))
@@ -161,7 +161,7 @@ def differences(judged: StoredWatch, hanger: Hanger, settings: Settings) -> Iter
         "alert probability": (judged.alert_probability, limits.alert_probability),
         "years between false alarms": (
             watched.change.limit_years,
-            settings.false_call_years if own is None else own,
+            settings.false_call_years if stated_years is None else stated_years,
         ),
     }
     for name, (then, now) in pairs.items():

@@ -166,8 +166,8 @@ class Queue:
         taught = self._find_taught(hanger, test.time)
         terms, lineage = update_terms(hanger, [model], [test], settings, known, taught)
         # A test of the baseline, done again, would be compared with what it has made itself.
-        own = store.watch.baseline(hanger.id, model, test.time)
-        of_baseline = own is not None and test.test.id in own.posterior.tests
+        current = store.watch.baseline(hanger.id, model, test.time)
+        of_baseline = current is not None and test.test.id in current.posterior.tests
         to_watch = not (of_baseline or hanger.is_control)
         plain = _to_infer(test.test, hanger)
         found = yield partial(run_step, steps.update_test, plain, hanger, model, known, terms)
@@ -195,14 +195,14 @@ class Queue:
         selection = store.posteriors.selection(hanger.id)
         compared = None if selection is None else selection.selection
         tension = averaged_now(current, compared, hanger.limits) if hanger.is_modelled else None
-        beside = find_neighbouring_tests(store, baseline, test)
+        neighbours = find_neighbouring_tests(store, baseline, test)
         years = settings.false_call_years
-        of_test = (baseline, tests, current, hanger, years, needed.kept, beside)
+        of_test = (baseline, tests, current, hanger, years, needed.state, neighbours)
         found: WatchResult | None = yield partial(run_step, steps.watch_test, *of_test)
         if found is None:  # the test still waits, to be watched from the baseline on
             store.watch.forget_state(baseline)
             return None
-        watched, alert, kept = found
+        watched, alert, state_bytes = found
         if alert is not None and tension is not None:
             called = list_detected_changes(store, [hanger]).get(hanger.id, ())
             now = HangerSummary(
@@ -222,7 +222,7 @@ class Queue:
             alert = self._add_doubts(alert, hanger, test.time)
         changes = reconciled(store, hanger, baseline, test, (watched, alert))
         stored = (test, baseline, watched, alert, hooks, self.clock())
-        state = WatchCheckpoint(needed.key, test.time, kept)
+        state = WatchCheckpoint(needed.key, test.time, state_bytes)
         level = hanger.thresholds.alert_probability
         return store.watch.save(*stored, state, changes, level)
 
@@ -248,15 +248,17 @@ class Queue:
             for each in self.workspace.bridge.hangers
             if hanger.family and each.family == hanger.family and each.id != hanger.id
         ]
-        own = find_latest_weighed(self.store, [hanger.id], before)
-        weighed = own or (find_latest_weighed(self.store, siblings, before) if siblings else None)
+        latest = find_latest_weighed(self.store, [hanger.id], before)
+        weighed = latest or (
+            find_latest_weighed(self.store, siblings, before) if siblings else None
+        )
         if weighed is None:
             return None
         try:
             posterior = self.store.posteriors.get(weighed.hanger, weighed.test.id)
         except NothingThere:  # not through updating yet
             return None
-        return Taught(posterior, own is not None)
+        return Taught(posterior, latest is not None)
 
 
 def _to_infer(test: ModalTest, hanger: Hanger) -> ModalTest:

@@ -136,14 +136,14 @@ class Evidence:
         shares, errors = np.array(self.errors).T
         shared = np.einsum("mi,ci,ni->cmn", way, np.array(sds) ** 2, way)
         covariance = shared[:, None] + np.diag(self.off.variance[mask])
-        covariance = covariance + errors[:, None, None] ** 2 * self._alike(mask)
+        covariance = covariance + errors[:, None, None] ** 2 * self._error_correlation(mask)
         covariance = covariance.reshape(-1, len(off), len(off))
         found = _log_normal(off, covariance) + np.log(np.outer(weights, shares)).ravel()
         if self.masses:
             found = np.append(found, self._with_mass(mask))
         return log_sum(found)
 
-    def _alike(self, mask: BoolArray) -> FloatArray:
+    def _error_correlation(self, mask: BoolArray) -> FloatArray:
         """Correlation (modes, modes) of the errors: what a bar model lacks is of no mode alone."""
         its = np.eye(int(mask.sum()))
         if self.errors is LIMITS.test_errors:

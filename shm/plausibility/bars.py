@@ -59,30 +59,30 @@ class OtherOrigin(Origin):
     text: str = ""
 
 
-OWN = Origin()
+FILED = Origin()
 
 
-def doubt_of(test: ModalTest, own: Known, others: Sequence[Known]) -> OtherOrigin | None:
-    """Say why `test`, filed under hanger `own`, is probably not of it; None where it well may be.
+def doubt_of(test: ModalTest, history: Known, others: Sequence[Known]) -> OtherOrigin | None:
+    """Say why `test` is probably not of its hanger, that of `history`; None where it may well be.
 
-    `own.tests` are its earlier accepted tests, `others` the other hangers of the bridge. None also
-    where nothing can be said: fewer than three modes, or a description that is no hanger's (free or
-    pinned ends, no tension).
+    `history.tests` are its earlier accepted tests, `others` the other hangers of the bridge. None
+    also where nothing can be said: fewer than three modes, or a description that is no hanger's
+    (free or pinned ends, no tension).
     """
-    found = _leading(test, own, others)
+    found = _leading(test, history, others)
     if found is None or found.kind != "unknown bar":
         return found
     # Its modes may have been numbered by the description of the named hanger, which it is not.
-    again = _leading(_by_rank(test), own, others)
+    again = _leading(_by_rank(test), history, others)
     return again if again is not None and again.kind == "hanger" else found
 
 
-def _leading(test: ModalTest, own: Known, others: Sequence[Known]) -> OtherOrigin | None:
-    odds = origins(test, own, others)
+def _leading(test: ModalTest, history: Known, others: Sequence[Known]) -> OtherOrigin | None:
+    odds = origins(test, history, others)
     if not odds:
         return None
     total = log_sum(np.array(list(odds.values())))
-    probability = -math.expm1(odds.pop(OWN) - total)
+    probability = -math.expm1(odds.pop(FILED) - total)
     if probability < LIMITS.doubted_from:
         return None
     leading = max(odds, key=lambda each: odds[each])
@@ -90,7 +90,7 @@ def _leading(test: ModalTest, own: Known, others: Sequence[Known]) -> OtherOrigi
         nearly = odds[leading] - LIMITS.clearly_nats
         described = [each for each in odds if each.kind == "hanger" and odds[each] > nearly]
         leading = max(described, key=lambda each: odds[each], default=leading)
-    return _said(leading, probability, own.hanger)
+    return _misattribution(leading, probability, history.hanger)
 
 
 def _by_rank(test: ModalTest) -> ModalTest:
@@ -104,17 +104,17 @@ def _by_rank(test: ModalTest) -> ModalTest:
     return replace(test, modes=tuple(numbered))
 
 
-def origins(test: ModalTest, own: Known, others: Sequence[Known]) -> dict[Origin, float]:
+def origins(test: ModalTest, history: Known, others: Sequence[Known]) -> dict[Origin, float]:
     """Log odds of where a test comes from, up to a constant; empty where nothing can be said."""
-    seen = seen_in([test], own.hanger)
-    if not own.hanger.as_hanger or seen.mask.sum() < LEAST_MODES:
+    seen = seen_in([test], history.hanger)
+    if not history.hanger.as_hanger or seen.mask.sum() < LEAST_MODES:
         return {}
     others = [each for each in others if each.hanger.as_hanger]
-    if not own.tests:
-        others = [each for each in others if not _twins(own.hanger, each.hanger)]
-    mine, rivals = _candidates(test, own, others)
+    if not history.tests:
+        others = [each for each in others if not _twins(history.hanger, each.hanger)]
+    mine, rivals = _candidates(test, history, others)
     odds = {
-        OWN: math.log(
+        FILED: math.log(
             1 - LIMITS.swap - LIMITS.unknown_bar - LIMITS.time_base - LIMITS.planes_exchanged
         )
     }
@@ -126,8 +126,8 @@ def origins(test: ModalTest, own: Known, others: Sequence[Known]) -> dict[Origin
     return odds
 
 
-def _said(origin: Origin, probability: float, own: Hanger) -> OtherOrigin:
-    name = f"hanger {own.id}"
+def _misattribution(origin: Origin, probability: float, hanger: Hanger) -> OtherOrigin:
+    name = f"hanger {hanger.id}"
     texts = {
         "hanger": f"The modes fit hanger {origin.hanger} rather than {name}: right hanger?",
         "unknown bar": f"No tension and no ends of {name} as described give these modes: right "
@@ -157,10 +157,10 @@ def _as_before(shift: Seen, sensitivity: FloatArray, *classes: tuple[float, ...]
 
 
 def _candidates(
-    test: ModalTest, own: Known, others: Sequence[Known]
+    test: ModalTest, history: Known, others: Sequence[Known]
 ) -> tuple[Evidence, dict[Origin, tuple[float, Evidence]]]:
     """Return the hanger of that number, and what else the test may come from with its prior."""
-    every = (own, *others)
+    every = (history, *others)
     now = {each.hanger.id: seen_in([test], each.hanger) for each in every}
     before = {
         each.hanger.id: seen_in(each.tests[-LATEST:], each.hanger) for each in every if each.tests
@@ -171,12 +171,12 @@ def _candidates(
         )
         for each in every
     }
-    id_ = own.hanger.id
+    id_ = history.hanger.id
     seen = now[id_]
-    bars[Origin("unknown bar")] = Bar.described(own.hanger, seen, any_bar=True)
-    for factor in COARSE_FACTORS if not own.tests else ():
+    bars[Origin("unknown bar")] = Bar.described(history.hanger, seen, any_bar=True)
+    for factor in COARSE_FACTORS if not history.tests else ():
         origin = Origin("time base", factor=factor)
-        bars[origin] = Bar.described(own.hanger, seen.times(1 / factor))
+        bars[origin] = Bar.described(history.hanger, seen.times(1 / factor))
     fits = dict(zip(bars, fit_bars(list(bars.values())), strict=True))
     mine = fits.pop(Origin("hanger", id_))
     rivals = {origin: fit.described() for origin, fit in fits.items()}

@@ -130,17 +130,19 @@ def notice_of(
     a loss. Nor must the likeness to another hanger: there it is said of the case that it is wrong.
     """
     loss = "" if any(map(_is_of_others, doubts)) else _loss(candidate, others, counted)
-    if_own = ""
+    if_correct = ""
     if not loss and not any(doubt.check == "copy" for doubt in doubts):
-        if_own = _if_own(candidate, is_of_other=any(d.check in _OTHER_BAR for d in doubts))
+        if_correct = _advice_if_correct(
+            candidate, is_of_other=any(d.check in _OTHER_BAR for d in doubts)
+        )
     states = "; ".join(doubt.state for doubt in doubts)
     end = "" if states.endswith("?") else "."
     held = f"test {candidate.test.id} (recording {recording_id}) is held: {states}{end}"
     lead = f"{loss} T{held[1:]}" if loss else f"Hanger {candidate.hanger.id}: {held}"
     why = " ".join(doubt.why for doubt in doubts)
     # Whose it is must be known as soon as it would have to be repeated.
-    to_do = _what_to_do(candidate, doubts, recording_id, TODAY if TODAY in if_own else WEEK)
-    return f"{lead} {to_do} {why} {if_own}Until then it counts in nothing."
+    to_do = _what_to_do(candidate, doubts, recording_id, TODAY if TODAY in if_correct else WEEK)
+    return f"{lead} {to_do} {why} {if_correct}Until then it counts in nothing."
 
 
 def _what_to_do(candidate: Candidate, doubts: Sequence[Doubt], recording_id: int, soon: str) -> str:
@@ -169,7 +171,7 @@ def _is_of_others(doubt: Doubt) -> bool:
     return doubt.check.startswith(("copy", "right"))
 
 
-def _if_own(candidate: Candidate, *, is_of_other: bool) -> str:
+def _advice_if_correct(candidate: Candidate, *, is_of_other: bool) -> str:
     """Return what the modes would mean if they are the hanger's own after all.
 
     A damaged hanger looks like another one: who discards the test unseen may discard the damage.

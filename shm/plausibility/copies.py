@@ -86,25 +86,25 @@ def copied(candidate: Candidate) -> Doubt | None:
     )
 
 
-def shared(own: Fingerprint, other: Fingerprint) -> bool:
+def shared(first: Fingerprint, other: Fingerprint) -> bool:
     """Return True if one recording holds the other's impacts.
 
     In at least half of the channels of the smaller one, lest a dead channel that always hums alike
     condemns a test.
     """
-    if own.digest == other.digest:
+    if first.digest == other.digest:
         return True
-    if not len(own.marks) or not len(other.marks):
+    if not len(first.marks) or not len(other.marks):
         return False
-    here, there = _alike(own, other)
-    shifts = own.marks[here, LIMITS.place] - other.marks[there, LIMITS.place]
+    here, there = _equal_shapes(first, other)
+    shifts = first.marks[here, LIMITS.place] - other.marks[there, LIMITS.place]
     pairs: set[tuple[int, int]] = set()
     for shift in np.unique(shifts):
         by = shifts == shift
         if by.sum() >= LIMITS.least:
-            pairs |= _channels(own.marks[here[by]], other.marks[there[by]], own, other)
+            pairs |= _channels(first.marks[here[by]], other.marks[there[by]], first, other)
     similar = min(len({pair[side] for pair in pairs}) for side in (0, 1))
-    return bool(pairs) and 2 * similar >= min(len(_lengths(each)) for each in (own, other))
+    return bool(pairs) and 2 * similar >= min(len(_lengths(each)) for each in (first, other))
 
 
 def _lengths(fingerprint: Fingerprint) -> dict[int, int]:
@@ -116,19 +116,19 @@ def _samples(fingerprint: Fingerprint) -> int:
     return sum(_lengths(fingerprint).values())
 
 
-def _alike(own: Fingerprint, other: Fingerprint) -> tuple[IntArray, IntArray]:
+def _equal_shapes(first: Fingerprint, other: Fingerprint) -> tuple[IntArray, IntArray]:
     """Return the shapes that are equal: roughly first, as hundreds are looked through."""
-    rough = [each.shapes.astype(np.float32) for each in (own, other)]
+    rough = [each.shapes.astype(np.float32) for each in (first, other)]
     mine, its = (each / np.linalg.norm(each, axis=1, keepdims=True) for each in rough)
     here, there = np.nonzero(np.abs(mine @ its.T) > 1 - LIMITS.roughly)
-    one, two = _unit(own.shapes[here]), _unit(other.shapes[there])
+    one, two = _unit(first.shapes[here]), _unit(other.shapes[there])
     same = 1 - np.abs(np.sum(one * two, axis=1)) < LIMITS.same
-    same &= own.marks[here, LIMITS.reach] == other.marks[there, LIMITS.reach]
+    same &= first.marks[here, LIMITS.reach] == other.marks[there, LIMITS.reach]
     return here[same], there[same]
 
 
 def _channels(
-    mine: IntArray, its: IntArray, own: Fingerprint, other: Fingerprint
+    mine: IntArray, its: IntArray, first: Fingerprint, other: Fingerprint
 ) -> set[tuple[int, int]]:
     """Return the pairs of channels that are copies if one is moved as these marks are.
 
@@ -138,7 +138,7 @@ def _channels(
     found = set()
     pairs = Counter(zip(mine[:, 0].tolist(), its[:, 0].tolist(), strict=True))
     for (one, two), count in pairs.items():
-        both = own.marks[own.marks[:, 0] == one], other.marks[other.marks[:, 0] == two].copy()
+        both = first.marks[first.marks[:, 0] == one], other.marks[other.marks[:, 0] == two].copy()
         both[1][:, LIMITS.place] += shift
         start, end = max(0, shift), min(both[0][0, 1], both[1][0, 1] + shift)
         within = [

@@ -67,14 +67,14 @@ def _refuse_other_times(columns: Sequence[Column], path: Path) -> None:
 
 def _of_all(key: str, listed: Sequence[Any], path: Path) -> object:
     """Return what the channels say of the test; raises BadInput where they differ."""
-    said = [value for each in listed for value in known_values({key: each.get(key)}).values()]
-    texts = sorted(set(map(str, said)))
+    values = [value for each in listed for value in known_values({key: each.get(key)}).values()]
+    texts = sorted(set(map(str, values)))
     if len(texts) > 1:
         what, remedy = f"say different {key}", "Give all channels of one test the same."
         if key == "start_timestamp":
             what, remedy = "begin at different times", "Cut them to one span."
         raise BadInput(f"the channels {what} ({', '.join(texts)}).", file=path, remedy=remedy)
-    return said[0] if said else None
+    return values[0] if values else None
 
 
 def is_json(head: bytes) -> bool:

@@ -192,8 +192,8 @@ def _tension(data: HangerReport) -> Fact:
     words = stated(data.averaged, data.tension_unit)
     doubt = "" if data.averaged.is_usable else "do not use it; "
     if not data.now.is_determined:
-        beside = f"{UNDETERMINED}; {doubt}90 % interval {words.interval}"
-        return ("Tension", "not determined", beside)
+        interval = f"{UNDETERMINED}; {doubt}90 % interval {words.interval}"
+        return ("Tension", "not determined", interval)
     value = formatting.with_half(data.tension_n, data.tension_unit)
     return ("Tension", value, f"{doubt}90 % interval; from {data.now.basis}")
 

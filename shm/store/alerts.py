@@ -80,8 +80,8 @@ def settle(
     for alert in changes.to_open:
         test_id = None
         if test is not None:
-            own = (tests.c.hanger == alert.hanger) & (tests.c.name == alert.test)
-            one = sa.select(tests.c.id).where(own, tests.c.superseded_at.is_(None))
+            of_alert = (tests.c.hanger == alert.hanger) & (tests.c.name == alert.test)
+            one = sa.select(tests.c.id).where(of_alert, tests.c.superseded_at.is_(None))
             test_id = connection.scalar(one) or test.id
         raised.append(raise_alert(connection, test_id, baseline_id, alert, hooks, at))
     return tuple(each for each in raised if each is not None)
@@ -94,12 +94,12 @@ def resolve(connection: Connection, alert_id: int, who: str, why: str, at: datet
     """
     if not _note_on(connection, alert_id, "ended", who, why, at):
         return False
-    told = sa.select(deliveries.c.hook).where(
+    notified = sa.select(deliveries.c.hook).where(
         deliveries.c.alert_id == alert_id,
         deliveries.c.news == News.RAISED,
         deliveries.c.state == DeliveryState.DELIVERED,
     )
-    for hook in connection.scalars(told.order_by(deliveries.c.id)).all():
+    for hook in connection.scalars(notified.order_by(deliveries.c.id)).all():
         insert(connection, deliveries, _owed(alert_id, hook, News.RESOLVED, at))
     return True
 
@@ -249,7 +249,7 @@ class Alerts(Repository):
                     f"alert {alert_id} is resolved already.", remedy="See `shm alerts`."
                 )
             acknowledge(connection, alert_id, who, why, at)
-            note(connection, at, "alert resolved", _said_of(found), why, who)
+            note(connection, at, "alert resolved", _describe(found), why, who)
             return alert_in(connection, alert_id)
 
     def settle(self, changes: Reconciled, hooks: Sequence[str], at: datetime) -> None:
@@ -273,7 +273,7 @@ class Alerts(Repository):
                     remedy="See `shm alerts`.",
                 )
             acknowledge(connection, alert_id, who, why, at)
-            note(connection, at, "alert acknowledged", _said_of(alert), why, who)
+            note(connection, at, "alert acknowledged", _describe(alert), why, who)
         return replace(alert, acknowledgement=AlertNote(alert_id, who, why, at))
 
     def list_deliveries(
@@ -341,8 +341,14 @@ class Alerts(Repository):
         at, tried = deliveries.c.next_attempt_at, deliveries.c.attempts
         is_counted = [tried == count for count in range(len(waits) - 1)] + [tried >= len(waits) - 1]
         too_far = [of & (at > now + wait) for of, wait in zip(is_counted, waits, strict=False)]
-        own = sa.func.coalesce(deliveries.c.message_id, deliveries.c.id) == deliveries.c.id
-        due = (deliveries.c.state == DeliveryState.WAITING) & own & sa.or_(at <= now, *too_far)
+        leads_message = (
+            sa.func.coalesce(deliveries.c.message_id, deliveries.c.id) == deliveries.c.id
+        )
+        due = (
+            (deliveries.c.state == DeliveryState.WAITING)
+            & leads_message
+            & sa.or_(at <= now, *too_far)
+        )
         if begun:
             due &= deliveries.c.message_id.is_not(None)
         query = _outbox.where(due, deliveries.c.id.not_in(excluding))
@@ -370,7 +376,9 @@ class Alerts(Repository):
         Raises NothingThere where there is none of that number, UsageError where none was given up.
         """
         given_up = deliveries.c.state == DeliveryState.GIVEN_UP
-        own = sa.select(deliveries.c.message_id).where(deliveries.c.alert_id == alert_id, given_up)
+        message_ids = sa.select(deliveries.c.message_id).where(
+            deliveries.c.alert_id == alert_id, given_up
+        )
         with self.writing() as connection:
             alert_in(connection, alert_id)
             of_alert = sa.select(deliveries.c.id).where(deliveries.c.alert_id == alert_id, given_up)
@@ -379,7 +387,7 @@ class Alerts(Repository):
                 raise UsageError(
                     f"alert {alert_id} was given up by no hook.", remedy="See `shm alerts`."
                 )
-            messages = [each for each in connection.scalars(own) if each is not None]
+            messages = [each for each in connection.scalars(message_ids) if each is not None]
             again = given_up & (deliveries.c.message_id.in_(messages) | deliveries.c.id.in_(ids))
             waits = {
                 "state": DeliveryState.WAITING,
@@ -403,7 +411,7 @@ class Alerts(Repository):
         return tuple(_delivery(row) for row in self.rows(query))
 
 
-def _said_of(stored: StoredAlert) -> str:
+def _describe(stored: StoredAlert) -> str:
     return f"alert {stored.id}, hanger {stored.alert.hanger}"
 
 
@@ -476,11 +484,11 @@ def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> 
 def describe_silence(silence: Silence) -> str:
     """A silence or a maintenance window in words: what it keeps from whom, until when, and why."""
     of = hangers_of(silence.hanger)
-    kept = f"hooks are told nothing of {of}"
+    effect = f"hooks are told nothing of {of}"
     if silence.is_maintenance:
-        kept = f"tests of {of} are compared with nothing, and hooks told nothing of it,"
+        effect = f"tests of {of} are compared with nothing, and hooks told nothing of it,"
     return (
-        f"{kind_of(silence)} {silence.id}: {kept} until {silence.until:%Y-%m-%d %H:%M} UTC "
+        f"{kind_of(silence)} {silence.id}: {effect} until {silence.until:%Y-%m-%d %H:%M} UTC "
         f"({silence.who}: {silence.why})"
     )
 

@@ -197,8 +197,8 @@ class CheckedStore:
         gone = "it refers to a row of {} that is not there."
         return (
             *(
-                Finding("fault of the file", "store", sentence(said), _RESTORE)
-                for said in self.faults
+                Finding("fault of the file", "store", sentence(fault), _RESTORE)
+                for fault in self.faults
             ),
             *(
                 Finding("broken reference", where, gone.format(table), _RESTORE)
@@ -358,8 +358,8 @@ def of_no_recording(names: Sequence[str]) -> tuple[str, str]:
 
 
 def _unreferenced(archive: Archive, names: Collection[str]) -> tuple[str, ...]:
-    kept = (path.relative_to(archive.folder).as_posix() for path in archive.folder.glob("??/*"))
-    return tuple(sorted(set(kept) - set(names)))
+    archived = (path.relative_to(archive.folder).as_posix() for path in archive.folder.glob("??/*"))
+    return tuple(sorted(set(archived) - set(names)))
 
 
 def _faults(connection: Connection, check: str) -> tuple[str, ...]:
@@ -370,7 +370,7 @@ def _faults(connection: Connection, check: str) -> tuple[str, ...]:
     if connection.dialect.name != "sqlite":
         return ()
     found = connection.exec_driver_sql(f"PRAGMA {check}").scalars()
-    return tuple(f"the file is damaged: {said}" for said in found if said != "ok")
+    return tuple(f"the file is damaged: {message}" for message in found if message != "ok")
 
 
 def _references(connection: Connection) -> tuple[tuple[str, str], ...]:
@@ -389,7 +389,7 @@ class Restored:
     """Content of a store after a restore, and the backup of the former content, if any."""
 
     tables: tuple[TableContent, ...]
-    kept: Path | None
+    former: Path | None
 
 
 def back_up(store: Database, file: Path, tell: Tell) -> CheckedStore:
@@ -436,8 +436,8 @@ def restore(
         with _opened(backup) as source:
             _made_present(source, file)
             _must_be_whole(source, file, tell)
-            kept = _cleared(target, keep_as, tell, replace)
-            return Restored(_copied(source, target, tell, replace=replace), kept)
+            former = _cleared(target, keep_as, tell, replace)
+            return Restored(_copied(source, target, tell, replace=replace), former)
 
 
 def _copied(
@@ -475,11 +475,11 @@ def _cleared(target: str | Path, keep_as: Path, tell: Tell, replace: bool) -> Pa
         mendable = error.retry_after_s is not None and not isinstance(error, StoreDamaged)
         if mendable or not replace or not isinstance(target, Path):
             raise
-    _move_aside(target, keep_as)
+    _move_away(target, keep_as)
     return keep_as
 
 
-def _move_aside(path: Path, keep_as: Path) -> None:
+def _move_away(path: Path, keep_as: Path) -> None:
     """A file that is no store any more, with what SQLite keeps beside it."""
     for ending in ("-wal", "-shm", ""):
         part = path.with_name(path.name + ending)

@@ -12,7 +12,7 @@ from shm.errors import UsageError
 from shm.store.columns import value_in
 from shm.store.database import Repository, insert
 from shm.store.journal import note
-from shm.store.rows import ChangedSetting, said
+from shm.store.rows import ChangedSetting, value_text
 from shm.store.tables import changed_settings
 
 
@@ -41,8 +41,8 @@ class ChangedSettings(Repository):
                 raise _overtaken(key, current, value, in_file)
             values = {"key": key, "document": value, "who": who, "at": at}
             insert(connection, changed_settings, values)
-            before = in_file if current is None else said(current.value)
-            after = f"{in_file}, back to bridge.toml" if value is None else said(value)
+            before = in_file if current is None else value_text(current.value)
+            after = f"{in_file}, back to bridge.toml" if value is None else value_text(value)
             detail = f"from {before} to {after}"
             note(connection, at, "setting changed", key.replace(".", " "), detail, who)
 
@@ -67,10 +67,12 @@ def _current(connection: Connection, *which: sa.ColumnElement[bool]) -> dict[str
 def _overtaken(
     key: str, current: ChangedSetting | None, wanted: float | str | None, in_file: str
 ) -> UsageError:
-    yours = "" if wanted is None else f", {said(wanted)},"
+    yours = "" if wanted is None else f", {value_text(wanted)},"
     found = f"back at {in_file}, as in bridge.toml"
     if current is not None:
-        found = f"{said(current.value)}, set by {current.who} at {current.at:%Y-%m-%d %H:%M} UTC"
+        found = (
+            f"{value_text(current.value)}, set by {current.who} at {current.at:%Y-%m-%d %H:%M} UTC"
+        )
     return UsageError(
         f"{key.replace('.', ' ')} was changed since you opened the page: it is {found}.",
         remedy=f"Your change{yours} was not saved: make it again if it should still hold.",

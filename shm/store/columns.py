@@ -256,11 +256,11 @@ def row_of(value: Any, table: sa.Table) -> dict[str, Any]:
     """Return a value by the columns of a table; its number is left to the table where it is 0."""
     found: dict[str, Any] = {}
     for name, nested in _fields(value.__class__):
-        own = getattr(value, name)
+        item = getattr(value, name)
         if name in table.c:
-            found[name] = own
-        elif nested is not None and own is not None:
-            found |= row_of(own, table)
+            found[name] = item
+        elif nested is not None and item is not None:
+            found |= row_of(item, table)
     if not found.get("id", True):
         del found["id"]
     return found
@@ -313,6 +313,6 @@ def _fields(kind: Any) -> tuple[tuple[str, Any], ...]:
 def _without_none(hint: Any) -> Any:
     """Return an annotation without `None`."""
     if get_origin(hint) in (Union, UnionType):
-        own = [each for each in get_args(hint) if each is not NoneType]
-        return own[0] if len(own) == 1 else hint
+        options = [each for each in get_args(hint) if each is not NoneType]
+        return options[0] if len(options) == 1 else hint
     return hint

@@ -94,8 +94,8 @@ def keep_judgement(
         test.name: _mark(connection, recording.id, test.position, Stage.HELD, at)
         for test in judged.held
     }
-    own = (recording.id, recording.file_name, recording.hanger, at)
-    hold = Hold(0, *own, judged.notice.message, judged.held, judged.sidecar_as)
+    context = (recording.id, recording.file_name, recording.hanger, at)
+    hold = Hold(0, *context, judged.notice.message, judged.held, judged.sidecar_as)
     hold_id = insert_hold(connection, hold)
     reason = _reason(recording, judged.notice.message, at)
     by_id = recordings.c.id == recording.id
@@ -139,8 +139,8 @@ def _mark(
     connection: Connection, recording_id: int, position: int, stage: Stage, at: datetime
 ) -> int:
     """Brings the test at a place of a file to a stage; its number."""
-    own = (tests.c.recording_id == recording_id) & is_current(tests)
-    here = own & (tests.c.position == position)
+    of_recording = (tests.c.recording_id == recording_id) & is_current(tests)
+    here = of_recording & (tests.c.position == position)
     number: int = connection.scalars(sa.select(tests.c.id).where(here)).one()
     connection.execute(sa.update(tests).where(here).values(stage=stage))
     write(connection, at, stage, recording_id, number)
@@ -324,8 +324,8 @@ def redescribe(connection: Connection, known: Row[Any], file: ReceivedFile, at: 
     `known` is its row as it was.
     """
     rows = _chosen(connection, known.id, sa.true())
-    own = of_baselines(connection, rows)
-    of_baseline = sorted(row.name for row in rows if row.id in own)
+    baseline_ids = of_baselines(connection, rows)
+    of_baseline = sorted(row.name for row in rows if row.id in baseline_ids)
     connection.execute(
         sa.update(recordings).where(recordings.c.id == known.id).values(**vars(file))
     )
@@ -358,11 +358,13 @@ def supersede_results(
     """
     updated = 0
     if stage is not Stage.WATCHED:
-        own = sa.select(posterior_tests.c.posterior_id).where(posterior_tests.c.test_id.in_(ids))
+        of_tests = sa.select(posterior_tests.c.posterior_id).where(
+            posterior_tests.c.test_id.in_(ids)
+        )
         lasting = sa.union(
             sa.select(baselines.c.posterior_id), sa.select(selection_entries.c.posterior_id)
         )
-        theirs = posteriors.c.id.in_(own) & posteriors.c.id.not_in(lasting)
+        theirs = posteriors.c.id.in_(of_tests) & posteriors.c.id.not_in(lasting)
         updated = _supersede(connection, posteriors, theirs, at)
     _supersede(connection, drifts, drifts.c.test_id.in_(ids), at)
     return updated, _supersede(connection, watches, watches.c.test_id.in_(ids), at)
@@ -429,16 +431,18 @@ class Dispositions(Repository):
         with self.writing() as connection:
             recording = by_id(connection, recording_id)
             hold, rows = _held(connection, recording_id, test)
-            own = sa.update(recordings).where(recordings.c.id == recording_id)
+            statement = sa.update(recordings).where(recordings.c.id == recording_id)
             if hold is None:
                 hold, rows = _excluded(connection, recording, time, test)
-                own = own.where(recordings.c.stage == Stage.REFUSED).values(stage=Stage.RECEIVED)
+                statement = statement.where(recordings.c.stage == Stage.REFUSED).values(
+                    stage=Stage.RECEIVED
+                )
             else:
                 hold = replace(hold, decision=Decision.CONFIRMED, time=time)
             refuse_time(hold, time, at)
             hold = _decide(connection, hold, who, why, at)
             _let_count(connection, rows, hold, who, at)
-            connection.execute(own.values(reason=None))
+            connection.execute(statement.values(reason=None))
             advance_recordings(connection, [recording_id], at)
             if hold.decision is Decision.REINSTATED:
                 _watch_again(connection, rows, at)
@@ -467,7 +471,7 @@ class Dispositions(Repository):
             if not rows or recording.stage == Stage.RECEIVED:
                 raise _not_counting(connection, recording)
             ids = [row.id for row in rows]
-            own = of_baselines(connection, rows)
+            baseline_ids = of_baselines(connection, rows)
             end_tests(connection, recording_id, ids, at)
             supersede_results(connection, ids, Stage.IDENTIFIED, at)
             text = f"test discarded by {who}" + (f": {why}" if why else "")
@@ -479,7 +483,7 @@ class Dispositions(Repository):
             hold = _unheld(recording, Decision.WITHDRAWN, named)
             hold = _decide(connection, hold, who, why, at)
             _end_or_advance(connection, recording, hold, at)
-            names = tuple(sorted(row.name for row in rows if row.id in own))
+            names = tuple(sorted(row.name for row in rows if row.id in baseline_ids))
             return Exclusion(hold, names, min(row.time for row in rows), again)
 
     def rerun(
@@ -497,7 +501,7 @@ class Dispositions(Repository):
                 text = f"{recording.file_name} was {discarded_reason(out)}"
                 raise UsageError(text, remedy=taking_back(out))
             chosen = _sent_back(connection, recording, from_stage, test)
-            own = of_baselines(connection, chosen)
+            baseline_ids = of_baselines(connection, chosen)
             if from_stage is not Stage.IDENTIFIED:
                 reopened = sa.update(recordings).where(recordings.c.id == recording_id)
                 connection.execute(reopened.values(stage=_BEFORE[from_stage], reason=None))
@@ -507,7 +511,7 @@ class Dispositions(Repository):
             text, name = f"sent back by request, to be {from_stage} again.", recording.file_name
             write(connection, at, AGAIN, recording_id, subject=name, detail=text, who="")
             stored = value_in(by_id(connection, recording_id), StoredRecording)
-            of_baseline = tuple(row.name for row in chosen if row.id in own)
+            of_baseline = tuple(row.name for row in chosen if row.id in baseline_ids)
             return Rerun(stored, tuple(row.name for row in chosen), *superseded, of_baseline)
 
 

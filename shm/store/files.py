@@ -48,8 +48,8 @@ def is_current(table: sa.Table) -> sa.ColumnElement[bool]:
 
 def begin_again(connection: Connection, recording_id: int, at: datetime) -> None:
     """A recording waits to be identified as if it had just come in."""
-    own = sa.update(recordings).where(recordings.c.id == recording_id)
-    connection.execute(own.values(stage=Stage.RECEIVED, reason=None))
+    statement = sa.update(recordings).where(recordings.c.id == recording_id)
+    connection.execute(statement.values(stage=Stage.RECEIVED, reason=None))
     write(connection, at, Stage.RECEIVED, recording_id)
 
 
@@ -61,8 +61,8 @@ def end_recording(
     subject: str = "",
 ) -> None:
     """A recording is refused, with a reason; of a file with a fault `subject` is its name."""
-    own = sa.update(recordings).where(recordings.c.id == recording_id)
-    connection.execute(own.values(stage=Stage.REFUSED, reason=dict(reason)))
+    statement = sa.update(recordings).where(recordings.c.id == recording_id)
+    connection.execute(statement.values(stage=Stage.REFUSED, reason=dict(reason)))
     detail = str(reason.get("message", "")) if subject else ""
     write(connection, at, Stage.REFUSED, recording_id, subject=subject, detail=detail)
 
@@ -110,8 +110,8 @@ def by_former_names(connection: Connection, which: str) -> list[int]:
         )
     )
     rows = files.subquery()
-    alike = sa.select(rows).where(rows.c.file_name.contains(which, autoescape=True))
-    found |= {id_ for id_, name in connection.execute(alike) if which in _called(name)}
+    query = sa.select(rows).where(rows.c.file_name.contains(which, autoescape=True))
+    found |= {id_ for id_, name in connection.execute(query) if which in _called(name)}
     return sorted(found)
 
 

@@ -173,8 +173,8 @@ def list_steps(store: Repository, recording_id: int) -> tuple[Entry, ...]:
 
 def list_former_tests(store: Repository, recording_id: int) -> tuple[FormerTest, ...]:
     """List every identification of a recording's tests with its posteriors, oldest first."""
-    own = (column for column in tests.c if column is not tests.c.frequency_response)
-    found = sa.select(*own).where(tests.c.recording_id == recording_id).order_by(tests.c.id)
+    selected = (column for column in tests.c if column is not tests.c.frequency_response)
+    found = sa.select(*selected).where(tests.c.recording_id == recording_id).order_by(tests.c.id)
     columns = [posteriors.c[name] for name in (*_WITHOUT_SAMPLES, *_LINEAGE)]
     made: sa.Select[Any] = (
         sa.select(posterior_tests.c.test_id, *columns)

@@ -49,10 +49,10 @@ class Notes(Repository):
         Raises UsageError for a text or time that cannot be, BadInput for a photo that is none.
         """
         text = _checked(text, at, now)
-        kept = _drawn_anew(photo) if photo else None
-        written = Note(0, hanger, at, kind, text, who, now, kept is not None)
+        encoded = _reencode(photo) if photo else None
+        written = Note(0, hanger, at, kind, text, who, now, encoded is not None)
         with self.writing() as connection:
-            made = insert_value(connection, notes, written, photo=kept)
+            made = insert_value(connection, notes, written, photo=encoded)
             note(connection, now, "note written", f"note {made.id}, {made.of}", text, who)
         return made
 
@@ -90,7 +90,7 @@ def _checked(text: str, at: datetime, now: datetime) -> str:
     return text
 
 
-def _drawn_anew(content: bytes) -> bytes:
+def _reencode(content: bytes) -> bytes:
     """The picture alone, as a JPEG that is no larger than a screen."""
     if len(content) > LARGEST_PHOTO_BYTES:
         raise _unfit(f"has {len(content) / 1e6:.1f} MB, at most 5 are taken")

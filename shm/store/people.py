@@ -45,7 +45,7 @@ class People(Repository):
         hashed = _NO_PASSWORD if password is None else _hashed(password)
         values = {"name": name, "role": role, "password_hash": hashed, "made_at": at}
         with self.writing() as connection:
-            for taken in _alike(connection, name):
+            for taken in _users_named(connection, name):
                 raise UsageError(
                     f"there is a user {taken.name} already.",
                     remedy=f"Take another name, or remove it: `shm user remove {taken.name}`.",
@@ -142,8 +142,8 @@ class People(Repository):
         with self.reading() as connection:
             row = _named(connection, name)
         try:
-            kept = _NO_PASSWORD if row is None else row.password_hash
-            argon2.PasswordHasher().verify(kept or _nobodys(), password[:_LONGEST])
+            password_hash = _NO_PASSWORD if row is None else row.password_hash
+            argon2.PasswordHasher().verify(password_hash or _nobodys(), password[:_LONGEST])
         except argon2.exceptions.VerificationError:
             return None
         return row
@@ -160,10 +160,10 @@ class People(Repository):
             if row.role == Role.ENGINEER and ends_engineer:
                 _refuse_last(connection, row.id)
             connection.execute(sa.update(users).where(users.c.id == row.id).values(**values))
-            own = sa.update(sessions).where(
+            statement = sa.update(sessions).where(
                 sessions.c.user_id == row.id, sessions.c.secret_sha256 != _checksum(but)
             )
-            connection.execute(own.where(sessions.c.ended_at.is_(None)).values(ended_at=at))
+            connection.execute(statement.where(sessions.c.ended_at.is_(None)).values(ended_at=at))
             detail = f"from {row.role} to {values['role']}" if "role" in values else ""
             note(connection, at, action, f"user {row.name}", detail)
 
@@ -180,7 +180,7 @@ def _in_one_form(name: str) -> str:
     return " ".join(unicodedata.normalize("NFKC", name).split())
 
 
-def _alike(connection: Connection, name: str) -> list[sa.Row[Any]]:
+def _users_named(connection: Connection, name: str) -> list[sa.Row[Any]]:
     rows = connection.execute(_in_force).all()
     return [row for row in rows if same_name(row.name) == same_name(name)]
 
@@ -189,8 +189,8 @@ def _named(connection: Connection, name: str) -> sa.Row[Any] | None:
     """The user in force who is meant: of names that differ only in form, as older releases took
     them, exactly the one that was written.
     """
-    alike = _alike(connection, name)
-    meant = [row for row in alike if row.name == name] or alike
+    candidates = _users_named(connection, name)
+    meant = [row for row in candidates if row.name == name] or candidates
     return meant[0] if len(meant) == 1 else None
 
 

@@ -136,8 +136,8 @@ class PointOutbox:
         with self._connected() as connection:
             waiting, oldest = connection.execute(count, (target, "waiting")).fetchone()
             refused, _ = connection.execute(count, (target, "refused")).fetchone()
-            said = connection.execute("SELECT why FROM targets WHERE target = ?", (target,))
-            (why,) = said.fetchone() or ("",)
+            rows = connection.execute("SELECT why FROM targets WHERE target = ?", (target,))
+            (why,) = rows.fetchone() or ("",)
         return OutboxState(
             waiting, refused, datetime.fromisoformat(oldest) if oldest else None, why
         )

@@ -147,15 +147,15 @@ def _numbers(
     """Of each row's posterior: as they are kept, or made from its samples."""
     selected = selection_numbers(connection)
     keys = {id_: key_of(hanger, selected.get(id_)) for id_, hanger in hangers.items()}
-    kept = {
+    numbers = {
         row.posterior_id: value_from(Numbers, row.summary)
         for row in rows
         if row.key == keys[row.hanger]
     }
-    missing = [row.posterior_id for row in rows if row.posterior_id not in kept]
+    missing = [row.posterior_id for row in rows if row.posterior_id not in numbers]
     for begin in range(0, len(missing), _AT_ONCE):
-        kept |= _made(connection, missing[begin : begin + _AT_ONCE], hangers)
-    return kept
+        numbers |= _made(connection, missing[begin : begin + _AT_ONCE], hangers)
+    return numbers
 
 
 def _made(
@@ -340,14 +340,14 @@ class Posteriors(Repository):
             ranked = sorted(ids, key=lambda name: (name != model, -probabilities[name]))
             probable = [(ids[name], probabilities[name]) for name in ranked]
             why = f"adopted {model}: {adoption.why}"
-            kept = {
+            references = {
                 "selection_id": insert_selection(connection, hanger, model, probable, at),
                 "baseline_id": insert_baseline(
                     connection, hanger, ids[model], adoption.who, why, at
                 ),
                 "adopted_at": at,
             }
-            id_ = insert(connection, adoptions, row_of(adoption, adoptions) | kept)
+            id_ = insert(connection, adoptions, row_of(adoption, adoptions) | references)
             subject, who = f"hanger {hanger}, {model}", adoption.who
             note(connection, at, "class adopted", subject, adoption.why, who)
         return StoredAdoption(id_, adoption, at)

@@ -83,7 +83,7 @@ class Recordings(Dispositions):
             row = by_id(connection, recording_id)
             if stage is not None and not waits_at(connection, row, stage, test_ids):
                 return
-            test_ids = _own(connection, recording_id, test_ids)
+            test_ids = _of_recording(connection, recording_id, test_ids)
             end_recording(connection, recording_id, reason, at, row.file_name)
             end_tests(connection, recording_id, test_ids, at)
 
@@ -147,15 +147,19 @@ def waits_at(
 ) -> bool:
     if not test_ids:
         return bool(recording.stage == stage)
-    own = _own(connection, recording.id, test_ids)
+    ids = _of_recording(connection, recording.id, test_ids)
     waiting = sa.select(tests.c.id).where(is_current(tests), tests.c.stage == stage)
-    return len(connection.scalars(waiting.where(tests.c.id.in_(own))).all()) == len(own)
+    return len(connection.scalars(waiting.where(tests.c.id.in_(ids))).all()) == len(ids)
 
 
-def _own(connection: Connection, recording_id: int, test_ids: Collection[int]) -> Collection[int]:
+def _of_recording(
+    connection: Connection, recording_id: int, test_ids: Collection[int]
+) -> Collection[int]:
     """Return those of the tests that are of one recording."""
-    own = sa.select(tests.c.id).where(tests.c.recording_id == recording_id)
-    return connection.scalars(own.where(tests.c.id.in_(test_ids)).order_by(tests.c.id)).all()
+    of_recording = sa.select(tests.c.id).where(tests.c.recording_id == recording_id)
+    return connection.scalars(
+        of_recording.where(tests.c.id.in_(test_ids)).order_by(tests.c.id)
+    ).all()
 
 
 def is_waiting(
@@ -268,14 +272,14 @@ def count_deaths(store: Repository) -> dict[int, Deaths]:
         .group_by(journal.c.recording_id)
         .subquery()
     )
-    own = journal.c.recording_id
+    recording_id = journal.c.recording_id
     query = (
-        sa.select(own, sa.func.count(), sa.func.max(journal.c.at))
-        .join(recordings, recordings.c.id == own)
-        .join(moved_at, moved_at.c.recording_id == own)
+        sa.select(recording_id, sa.func.count(), sa.func.max(journal.c.at))
+        .join(recordings, recordings.c.id == recording_id)
+        .join(moved_at, moved_at.c.recording_id == recording_id)
         .where(journal.c.kind == DIED, journal.c.at >= moved_at.c.at)
         .where(recordings.c.stage.not_in(ENDED))
-        .group_by(own)
+        .group_by(recording_id)
     )
     return {row[0]: Deaths(row[1], row[2]) for row in store.rows(query)}
 

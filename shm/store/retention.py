@@ -57,7 +57,7 @@ class Retention:
     """Files that may go, and of those old enough how many stay for which reason."""
 
     removals: tuple[Removal, ...]
-    kept: Mapping[str, int]
+    retained: Mapping[str, int]
 
     @property
     def size_bytes(self) -> int:
@@ -92,14 +92,14 @@ def removable(store: Store, archive: Archive, before: datetime, tell: Tell) -> R
     folders = _folders(store)
     everything = list_recordings(store)
     old = [each for each in everything if each.received_at < before and archive.holds(each.file)]
-    kept: Counter[str] = Counter()
+    retained: Counter[str] = Counter()
     found: dict[int, str] = {}
     for number, recording in enumerate(old, start=1):
         copy_folder = _copy(archive, recording, folders[recording.id])
         if recording.stage not in _ENDED:
-            kept[_UNDER_WAY] += 1
+            retained[_UNDER_WAY] += 1
         elif copy_folder is None:
-            kept[_COPY_LOST if folders[recording.id] else _NO_COPY] += 1
+            retained[_COPY_LOST if folders[recording.id] else _NO_COPY] += 1
         else:
             found[recording.id] = copy_folder
         tell("archive", number / len(old))
@@ -107,12 +107,12 @@ def removable(store: Store, archive: Archive, before: datetime, tell: Tell) -> R
     removals = []
     for recording in old:
         if recording.id in found and recording.file.archived_as in needed:
-            kept[_SHARED] += 1
+            retained[_SHARED] += 1
         elif recording.id in found:
             names = tuple(name for name in _names(recording) if name not in needed)
             size = sum(_size(archive.folder / name) for name in names)
             removals.append(Removal(recording, names, size, found[recording.id]))
-    return Retention(tuple(removals), dict(kept))
+    return Retention(tuple(removals), dict(retained))
 
 
 def remove(store: Store, archive: Archive, removals: Iterable[Removal], at: datetime) -> int:

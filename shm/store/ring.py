@@ -173,12 +173,12 @@ class Ring:
 
     def keep(self, stream: str, start: datetime, end: datetime, why: str) -> None:
         """Keep the samples of a time for good, for a reason."""
-        kept = self._days(stream).folder / "kept"
-        kept.mkdir(parents=True, exist_ok=True)
+        folder = self._days(stream).folder / "kept"
+        folder.mkdir(parents=True, exist_ok=True)
         document = {"stream": stream, "start": start, "end": end, "why": why}
-        path = kept / f"{microseconds(start):017d}-{microseconds(end):017d}.json"
+        path = folder / f"{microseconds(start):017d}-{microseconds(end):017d}.json"
         replace_text(path, dump(document) + "\n")
-        for each in (path, kept, kept.parent):
+        for each in (path, folder, folder.parent):
             sync(each)
 
     def sweep(
@@ -207,7 +207,7 @@ class Ring:
             if is_unread or is_recent or not (is_old or sum(sizes.values()) > ring_bytes):
                 continue
             before = sizes[path]
-            days.thin(path, _kept(days), may_go=start + _DAY < now - self._late)
+            days.thin(path, _retained(days), may_go=start + _DAY < now - self._late)
             sizes[path] = size_of(path)
             removed += sizes[path] < before
         for days in self._all_days():
@@ -389,7 +389,7 @@ def _day_of(path: Path) -> datetime:
     return datetime.strptime(path.stem, "%Y%m%d").replace(tzinfo=UTC)
 
 
-def _kept(days: StreamDays) -> list[tuple[int, int]]:
+def _retained(days: StreamDays) -> list[tuple[int, int]]:
     """Return from when to when samples are kept for good, in microseconds."""
     names = (path.stem.split("-") for path in (days.folder / "kept").glob("[0-9]*.json"))
     return [(int(start), int(end)) for start, end in names]

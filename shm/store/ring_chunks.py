@@ -40,7 +40,7 @@ def agree(one: Chunk, other: Chunk) -> bool:
     """Return True if two chunks have the same samples, as far as both have any."""
     samples = min(one.values.shape[1], other.values.shape[1])
     first, second = one.values[:, :samples], other.values[:, :samples]
-    return _is_alike(one, other) and np.array_equal(first, second, equal_nan=True)
+    return _have_same_channels(one, other) and np.array_equal(first, second, equal_nan=True)
 
 
 def find_taken(before: Chunk, chunk: Chunk) -> slice:
@@ -60,7 +60,7 @@ def repeats(before: Chunk, chunk: Chunk, taken: slice) -> bool:
     """Return True if the samples of the common time are the same, as of a logger that resends."""
     first = round((chunk.start - before.start).total_seconds() * chunk.sampling_rate_hz)
     there = before.values[:, first + taken.start : first + taken.stop]
-    return _is_alike(before, chunk) and np.array_equal(
+    return _have_same_channels(before, chunk) and np.array_equal(
         there, chunk.values[:, taken], equal_nan=True
     )
 
@@ -93,7 +93,7 @@ def join(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Piece
             chunk = replace(chunk, start=later, values=chunk.values[:, taken.stop :])
             if not chunk.values.shape[1]:
                 continue
-        if last is not None and _is_alike(last, chunk):
+        if last is not None and _have_same_channels(last, chunk):
             numbers = last.sequence, chunk.sequence
             slack = slack_s(*numbers, chunk.sampling_rate_hz, _seconds(last))
             if (chunk.start - last.end).total_seconds() <= slack:
@@ -106,7 +106,7 @@ def join(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Piece
 
 def _ends_as_begins(first: Chunk, second: Chunk, samples: int) -> bool:
     """Return True if so many samples at a seam are there twice, to the bit."""
-    if samples < 1 or not _is_alike(first, second):
+    if samples < 1 or not _have_same_channels(first, second):
         return False
     tail, head = first.values[:, -samples:], second.values[:, :samples]
     is_telling = len(np.unique(tail)) > tail.size / 2
@@ -117,7 +117,7 @@ def _seconds(chunk: Chunk) -> float:
     return (chunk.end - chunk.start).total_seconds()
 
 
-def _is_alike(one: Chunk, other: Chunk) -> bool:
+def _have_same_channels(one: Chunk, other: Chunk) -> bool:
     rates = one.sampling_rate_hz, other.sampling_rate_hz
     return one.channels == other.channels and rates[0] == rates[1]
 
@@ -206,8 +206,8 @@ def _stepped(stream: str, before: Row, row: Row) -> StreamEvent:
 
 
 def _note_late(stream: str, rows: Sequence[Row]) -> Iterator[StreamEvent]:
-    own = (row for row in rows if row.excluded != EARLY)
-    late = [row for row in own if time_of(row.arrived_us) > time_of(row.end_us) + _due(row)]
+    not_early = (row for row in rows if row.excluded != EARLY)
+    late = [row for row in not_early if time_of(row.arrived_us) > time_of(row.end_us) + _due(row)]
     if late:
         delay_h = max(row.arrived_us - row.end_us for row in late) / 3.6e9
         many = "1 chunk" if len(late) == 1 else f"{len(late)} chunks"
@@ -220,24 +220,25 @@ def _due(row: Row) -> timedelta:
 
 
 def _note_overlap(stream: str, rows: Sequence[Row]) -> Iterator[StreamEvent]:
-    own = [row for row in rows if row.covered]
-    if own:
-        first, last = own[0].sequence, own[-1].sequence
+    overlapping = [row for row in rows if row.covered]
+    if overlapping:
+        first, last = overlapping[0].sequence, overlapping[-1].sequence
         whose = numbered(first)
-        if len(own) > 1:
+        if len(overlapping) > 1:
             named = f", {first} to {last}," if last < BY_TIME else " of files"
-            whose = f"{len(own)} chunks{named}"
+            whose = f"{len(overlapping)} chunks{named}"
         text = (
-            f"{sum(row.covered for row in own)} samples of {whose} are of a time that was there "
-            "already: the first to come count, these are kept apart; see to the logger's clock"
+            f"{sum(row.covered for row in overlapping)} samples of {whose} are of a time that was "
+            "there already: the first to come count, these are kept apart; see to the logger's "
+            "clock"
         )
-        yield _event(stream, "overlap", own, text)
+        yield _event(stream, "overlap", overlapping, text)
 
 
 def _note_early(stream: str, rows: Sequence[Row]) -> Iterator[StreamEvent]:
-    own = [row for row in rows if row.excluded == EARLY]
-    if own:
-        yield _event(stream, "clock step", own, EARLY)
+    early = [row for row in rows if row.excluded == EARLY]
+    if early:
+        yield _event(stream, "clock step", early, EARLY)
 
 
 def _note_missing(stream: str, rows: Sequence[Row]) -> Iterator[StreamEvent]:
@@ -245,14 +246,14 @@ def _note_missing(stream: str, rows: Sequence[Row]) -> Iterator[StreamEvent]:
 
     Of a channel without any the watch over the sensors says that it is dead.
     """
-    own = [row for row in rows if not row.excluded]
-    counts = [[int(each) for each in row.missing.split()] for row in own if row.missing]
-    samples = sum(row.samples for row in own)
+    accepted = [row for row in rows if not row.excluded]
+    counts = [[int(each) for each in row.missing.split()] for row in accepted if row.missing]
+    samples = sum(row.samples for row in accepted)
     for number, missing in enumerate(map(sum, zip(*counts, strict=True))):
         if 0 < missing < samples:
             text = f"{missing} samples have no value (null or NaN)"
-            channel = own[0].channels.split()[number]
-            yield replace(_event(stream, "gap", own, text), channel=channel)
+            channel = accepted[0].channels.split()[number]
+            yield replace(_event(stream, "gap", accepted, text), channel=channel)
 
 
 def _note_loggers(stream: str, rows: Sequence[Row]) -> Iterator[StreamEvent]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from shm.errors import BadInput
 from shm.read.chunk_document import parse_chunk
-from shm.store.ring_days import set_aside
+from shm.store.ring_days import quarantine
 
 if TYPE_CHECKING:
     from shm.store.ring import Ring
@@ -31,7 +31,7 @@ def convert_former_files(ring: Ring, folder: Path, most_s: float = 1.0) -> None:
         try:
             _convert(ring, path)
         except BadInput as error:
-            set_aside(path, folder / "aside", error)
+            quarantine(path, folder / "aside", error)
     for leftover in folder.glob("incoming/.*.part"):
         leftover.unlink()
     (folder / "state.json").unlink(missing_ok=True)

@@ -189,18 +189,18 @@ class StreamDays:
         self._change(rows, "UPDATE chunks SET is_sealed = 1 WHERE id = ?")
 
     def _change(self, rows: Iterable[Row], sql: str, *values: object) -> None:
-        for path, own in groupby(sorted(rows, key=_day), _day):
+        for path, of_day in groupby(sorted(rows, key=_day), _day):
             with writing([path]) as (connection,):
-                connection.executemany(sql, [(*values, row.id) for row in own])
+                connection.executemany(sql, [(*values, row.id) for row in of_day])
                 _note_sealed(connection)
 
-    def thin(self, path: Path, kept_us: Sequence[tuple[int, int]], *, may_go: bool) -> None:
+    def thin(self, path: Path, retained_us: Sequence[tuple[int, int]], *, may_go: bool) -> None:
         """Remove what a day has outside of some times, and the day if that is all and it may go.
 
         A day that still takes chunks must stay: another process may have it open.
         """
-        inside = " OR ".join(["0", *("start_us < ? AND end_us > ?" for _ in kept_us)])
-        edges = [edge for start_us, end_us in kept_us for edge in (end_us, start_us)]
+        inside = " OR ".join(["0", *("start_us < ? AND end_us > ?" for _ in retained_us)])
+        edges = [edge for start_us, end_us in retained_us for edge in (end_us, start_us)]
         with writing([path]) as (connection,):
             sql = f"DELETE FROM chunks WHERE NOT ({inside})"  # noqa: S608 - question marks alone
             gone = connection.execute(sql, edges).rowcount
@@ -270,7 +270,7 @@ def query(path: Path, sql: str, *values: object) -> list[Any]:
         with translated(str(path), sqlite3.Error), _reading(path) as connection:
             return connection.execute(sql, values).fetchall() if connection else []
     except StoreDamaged as error:
-        set_aside(path, path.parent / "aside", error)
+        quarantine(path, path.parent / "aside", error)
         return []
 
 
@@ -301,21 +301,21 @@ def writing(paths: Iterable[Path]) -> Iterator[list[sqlite3.Connection]]:
     except StoreDamaged as error:
         for path in wanted:
             if path.exists() and query(path, "PRAGMA quick_check(1)") != [("ok",)]:
-                set_aside(path, path.parent / "aside", error)
+                quarantine(path, path.parent / "aside", error)
         raise
 
 
-def set_aside(path: Path, aside: Path, error: ShmError) -> None:
+def quarantine(path: Path, folder: Path, error: ShmError) -> None:
     """Move a damaged file into a folder that nobody reads, with the reason."""
     if not path.exists():
         return
-    aside.mkdir(exist_ok=True)
+    folder.mkdir(exist_ok=True)
     log.error("%s is set aside: %s", path, error.message)
-    replace_text(aside / f"{path.name}.reason.json", dump({"message": error.message}) + "\n")
+    replace_text(folder / f"{path.name}.reason.json", dump({"message": error.message}) + "\n")
     with _LOCK:
         _forget(path)
         for each in _files(path):
-            each.replace(aside / each.name)
+            each.replace(folder / each.name)
 
 
 # Closing the last connection to a file writes all that waits into it, which takes as long as two

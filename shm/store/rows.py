@@ -74,8 +74,8 @@ def sum_counts(known: type[StrEnum], rows: Iterable[Sequence[Any]]) -> dict[str,
     Each name of `known` is counted, 0 where there is none.
     """
     counted: dict[str, int] = {str(name): 0 for name in known}
-    for said, times in rows:
-        name = said if said in counted else OTHER
+    for value, times in rows:
+        name = value if value in counted else OTHER
         counted[name] = counted.get(name, 0) + int(times)
     return counted
 
@@ -283,7 +283,7 @@ class AlertNote:
     at: datetime
 
     @property
-    def said(self) -> dict[str, object]:
+    def as_document(self) -> dict[str, object]:
         """Return who, why and when, for documents."""
         return {"who": self.who, "why": self.why, "at": self.at}
 
@@ -725,14 +725,14 @@ class ChangedSetting:
 
     def __str__(self) -> str:
         setting, by = self.key.replace(".", " "), f"{self.who} on {self.at:%Y-%m-%d}"
-        return f"{setting} = {said(self.value)} instead of what bridge.toml says, by {by}"
+        return f"{setting} = {value_text(self.value)} instead of what bridge.toml says, by {by}"
 
     def is_of(self, hanger: int) -> bool:
         """Return True if it changes a hanger, or all of them."""
         return self.key.startswith(("settings.", f"hanger.{hanger}."))
 
 
-def said(value: float | str | None) -> str:
+def value_text(value: float | str | None) -> str:
     """A value as people read it."""
     if isinstance(value, str):
         return value or "none"

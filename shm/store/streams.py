@@ -36,7 +36,7 @@ from shm.values.stream import (
     period_start,
 )
 
-HOURS_KEPT = timedelta(days=800)
+HOURLY_RETENTION = timedelta(days=800)
 """Readings of an hour and of six: two summers and two winters, and a month to look at them."""
 
 _DAYS_BACK = 10
@@ -64,14 +64,14 @@ class Streams(Repository):
     def save_pooled(
         self,
         reading: PooledReading,
-        kept: bytes | None = None,
+        state: bytes | None = None,
         changes: Reconciled = _NO_CHANGE,
         hooks: Sequence[str] = (),
         at: datetime | None = None,
     ) -> tuple[StoredAlert, ...]:
         """Store a reading of an hour or a day, in the place of the one of then before.
 
-        `kept` is what the watch of the hanger goes on from, `changes` are alerts that it opens and
+        `state` is what the watch of the hanger goes on from, `changes` are alerts that it opens and
         closes; those that are new are owed to `hooks` from `at` on (the reading's end where nothing
         is said), and returned.
         """
@@ -80,10 +80,10 @@ class Streams(Repository):
         row["document"] = _document(reading)
         with self.writing() as connection:
             _replace(connection, pooled_readings, row, "stream", "period", "start")
-            if kept is not None:
-                state = {"hanger": reading.hanger, "reading_time": end, "content": kept}
-                _replace(connection, stream_watch, state, "hanger")
-                _keep_day(connection, state)
+            if state is not None:
+                entry = {"hanger": reading.hanger, "reading_time": end, "content": state}
+                _replace(connection, stream_watch, entry, "hanger")
+                _keep_day(connection, entry)
             return settle(connection, changes, hooks, at or end)
 
     def go_back(self, hanger: int, to: datetime, content: bytes) -> None:
@@ -104,7 +104,7 @@ class Streams(Repository):
                 insert(connection, stream_events, row)
 
     def sweep(self, now: datetime, window_days: float) -> None:
-        """Takes out windows and events of before so many days, and hours of before `HOURS_KEPT`.
+        """Remove windows and events before so many days, and hours before `HOURLY_RETENTION`.
 
         Readings of a day stay for good.
         """
@@ -113,9 +113,9 @@ class Streams(Repository):
         with self.writing() as connection:
             for chosen in (
                 sa.delete(stream_windows).where(stream_windows.c.start < oldest),
-                sa.delete(stream_events).where(stream_events.c.end < now - HOURS_KEPT),
+                sa.delete(stream_events).where(stream_events.c.end < now - HOURLY_RETENTION),
                 sa.delete(pooled_readings).where(
-                    of_hours, pooled_readings.c.start < now - HOURS_KEPT
+                    of_hours, pooled_readings.c.start < now - HOURLY_RETENTION
                 ),
             ):
                 connection.execute(chosen)
@@ -170,14 +170,14 @@ def _pooled_with(window: Window) -> sa.ColumnElement[bool]:
 def _keep_day(connection: Connection, state: dict[str, Any]) -> None:
     """A state of the watch as one to go back to, where the last such is a day old."""
     table = stream_watch_days
-    own, time = table.c.hanger == state["hanger"], state["reading_time"]
-    query = sa.select(table.c.reading_time).where(own).order_by(table.c.reading_time.desc())
+    of_hanger, time = table.c.hanger == state["hanger"], state["reading_time"]
+    query = sa.select(table.c.reading_time).where(of_hanger).order_by(table.c.reading_time.desc())
     known = connection.scalars(query).all()
     if known and time < known[0] + PERIODS["day"]:
         return
     connection.execute(sa.insert(table).values(state))
     for old in known[_DAYS_BACK - 1 :]:
-        connection.execute(sa.delete(table).where(own, table.c.reading_time == old))
+        connection.execute(sa.delete(table).where(of_hanger, table.c.reading_time == old))
 
 
 def _advance(connection: Connection, stream: str, until: datetime) -> None:
@@ -268,8 +268,8 @@ def find_first_unpooled(store: Repository, stream: str, since: datetime) -> date
     start: datetime
     for start in found:
         for period, length in PERIODS.items():
-            own = period_start(start, length)
-            if own not in starts[period] and own < max(starts[period], default=own):
+            begin = period_start(start, length)
+            if begin not in starts[period] and begin < max(starts[period], default=begin):
                 return start
     return None
 
@@ -314,10 +314,10 @@ def load_stream_watch(
     """Return what the watch of a hanger's sensors goes on from; with `until` as it was at the
     last kept time up to then."""
     table = stream_watch if until is None else stream_watch_days
-    own = sa.select(table.c.reading_time, table.c.content).where(table.c.hanger == hanger)
+    query = sa.select(table.c.reading_time, table.c.content).where(table.c.hanger == hanger)
     if until is not None:
-        own = own.where(table.c.reading_time <= until)
-    row = store.first(own.order_by(table.c.reading_time.desc()).limit(1))
+        query = query.where(table.c.reading_time <= until)
+    row = store.first(query.order_by(table.c.reading_time.desc()).limit(1))
     return None if row is None else StreamWatchCheckpoint(*row)
 
 

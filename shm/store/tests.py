@@ -76,8 +76,8 @@ class Tests(Repository):
                 return None
             if judged is not None and judged.sidecar_as != recording.sidecar_as:
                 return None
-            kept = _positions(connection, recording_id)
-            for item in (item for item in found if item.position not in kept):
+            stored = _positions(connection, recording_id)
+            for item in (item for item in found if item.position not in stored):
                 values = {**_test_values(connection, item, recording), **lineage.columns}
                 test_id = insert(connection, tests, {**values, "identified_at": at})
                 write(connection, at, Stage.IDENTIFIED, recording_id, test_id)
@@ -145,13 +145,13 @@ def _free_name(connection: Connection, item: IdentifiedTest, recording: Row[Any]
 
     A test identified again keeps the one of these that it had.
     """
-    own, plain = f"{item.test.id}-{recording.sha256[:8]}-{item.position}", item.test.id
+    unique, plain = f"{item.test.id}-{recording.sha256[:8]}-{item.position}", item.test.id
     query = sa.select(tests.c.name).where(tests.c.hanger == item.test.hanger)
     here = (tests.c.recording_id == recording.id) & (tests.c.position == item.position)
     former = connection.scalar(query.where(here).order_by(tests.c.id.desc()).limit(1))
     taken = query.where(tests.c.name == plain, is_current(tests))
-    free = former != own and connection.execute(taken).first() is None
-    return plain if free else own
+    free = former != unique and connection.execute(taken).first() is None
+    return plain if free else unique
 
 
 def shown_tests(hanger: int) -> sa.ColumnElement[bool]:
@@ -378,8 +378,8 @@ def list_weighed(store: Repository, ids: Collection[int]) -> frozenset[int]:
 
 def is_watched_again(store: Repository, test: StoredTest, baseline: Baseline) -> bool:
     """Return True where a test has been compared with a baseline before."""
-    own = (watches.c.test_id == test.id) & (watches.c.baseline_id == baseline.id)
-    return store.first(sa.select(watches.c.id).where(own)) is not None
+    of_test = (watches.c.test_id == test.id) & (watches.c.baseline_id == baseline.id)
+    return store.first(sa.select(watches.c.id).where(of_test)) is not None
 
 
 def is_caught_up(store: Repository, test: StoredTest, baseline: Baseline) -> bool:

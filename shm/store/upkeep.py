@@ -62,8 +62,8 @@ def list_copies(store: Repository) -> tuple[ArchiveCopy, ...]:
 
 def list_removed(store: Repository) -> dict[int, str]:
     """Return the folder with the copy of each recording taken out of the archive."""
-    own = journal.c.recording_id, journal.c.detail
-    query = sa.select(*own).where(journal.c.kind == REMOVED).order_by(journal.c.id)
+    columns = journal.c.recording_id, journal.c.detail
+    query = sa.select(*columns).where(journal.c.kind == REMOVED).order_by(journal.c.id)
     return {row[0]: row[1] for row in store.rows(query)}
 
 

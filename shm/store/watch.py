@@ -150,7 +150,7 @@ class Watch(Repository):
             _refuse_late(connection, before)
             number = insert_posterior(connection, hanger, posterior, chosen, lineage, at)
             id_ = insert_baseline(connection, hanger, number, who, why, at, since)
-            stands = sa.select(alerts.c.id).where(
+            open_alerts = sa.select(alerts.c.id).where(
                 alerts.c.hanger == hanger,
                 sa.or_(
                     alerts.c.baseline_id == before.id,
@@ -158,7 +158,7 @@ class Watch(Repository):
                 ),
                 alerts.c.ended_at.is_(None),
             )
-            for alert_id in connection.scalars(stands.order_by(alerts.c.id)).all():
+            for alert_id in connection.scalars(open_alerts.order_by(alerts.c.id)).all():
                 if explained is not None and alert_id not in explained:
                     continue
                 resolve(connection, alert_id, who, f"new baseline: {why}", at)
@@ -227,8 +227,8 @@ def _refuse_late(connection: Connection, before: Baseline) -> None:
 
 def _keep_state(connection: Connection, baseline: Baseline, state: WatchCheckpoint) -> None:
     _drop_state(connection, baseline)
-    own = {"hanger": baseline.hanger, "baseline_id": baseline.id}
-    insert(connection, watch_states, row_of(state, watch_states) | own)
+    keys = {"hanger": baseline.hanger, "baseline_id": baseline.id}
+    insert(connection, watch_states, row_of(state, watch_states) | keys)
 
 
 def _drop_state(connection: Connection, baseline: Baseline) -> None:

@@ -30,7 +30,7 @@ def test_a_backup_is_one_file_that_restores_into_either_kind(
     assert checked.troubles == ()
     assert [path.name for path in file.parent.iterdir()] == ["may.db"]
     restored = restore(empty, file, tmp_path / "kept.db", quiet)
-    assert (restored.tables, restored.kept) == (written, None)
+    assert (restored.tables, restored.former) == (written, None)
 
 
 def test_a_backup_is_consistent_while_others_write(
@@ -78,7 +78,7 @@ def test_a_restore_overwrites_nothing_unless_told_and_then_keeps_the_old(
         restore(location, file, kept, quiet)
     assert held(filled) == second
     restored = restore(location, file, kept, quiet, replace=True)
-    assert (restored.tables, restored.kept) == (first, kept)
+    assert (restored.tables, restored.former) == (first, kept)
     assert held(filled) == first  # an open store sees it too
     with Store.open(kept) as old:
         assert held(old) == second
@@ -107,7 +107,7 @@ def test_a_damaged_store_is_moved_aside_by_a_restore_that_may_replace(
     with pytest.raises(StoreError, match="not a database"):
         restore(sqlite, file, kept, quiet)
     restored = restore(sqlite, file, kept, quiet, replace=True)
-    assert (restored.tables, restored.kept) == (expected, kept)
+    assert (restored.tables, restored.former) == (expected, kept)
     assert kept.read_bytes().startswith(b"rubbish")
 
 

@@ -40,7 +40,7 @@ def watched(readings: Sequence[PooledReading], says: Says) -> list[Pooled]:
     for hour, each in enumerate(readings):
         windows = windows_of(each, says(hour, each.temperature_c))
         one = pool_stream(windows, "hour", each.start, HANGER, None, kept, 100.0, events[-9:])
-        kept, events = one.kept, [*events, *one.events]
+        kept, events = one.state, [*events, *one.events]
         found.append(one)
     return found
 

@@ -29,7 +29,7 @@ class AppriseDeliverer(Processes):
         # By standard input, as arguments are seen by everyone on the machine. -P: this folder
         # holds a module of the library's name.
         command = [sys.executable, "-P", str(_SENDER)]
-        self.run(command, _told(alert, addresses, self.surroundings.link(alert)), {})
+        self.run(command, _request(alert, addresses, self.surroundings.link(alert)), {})
         return f"taken by {', '.join(schemes)}"
 
     def ready(self, hook: AppriseHook) -> str:
@@ -62,7 +62,7 @@ def _allowed(address: str) -> str:
         raise HookFailed(f"{error}.", remedy="See docs/alerts.md for those that do.") from None
 
 
-def _told(alert: Alert, addresses: Sequence[str], link: str) -> bytes:
+def _request(alert: Alert, addresses: Sequence[str], link: str) -> bytes:
     test, resolved = "test" in alert.kinds, "resolved" in alert.kinds
     title = f"shm: {len(alert.alerts)} hangers" if alert.alerts else f"shm: hanger {alert.hanger}"
     message = without_code(alert.message)

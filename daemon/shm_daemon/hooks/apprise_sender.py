@@ -20,17 +20,17 @@ import apprise
 
 def main() -> int:
     """Sends to each address; the number of those that did not take it."""
-    told = json.load(sys.stdin)
+    request = json.load(sys.stdin)
     words = io.StringIO()
     library = logging.getLogger("apprise")
     library.addHandler(logging.StreamHandler(words))
     library.setLevel(logging.WARNING)
     library.propagate = False
-    failed = [address for address in told["addresses"] if not _sent(address, told)]
+    failed = [address for address in request["addresses"] if not _sent(address, request)]
     if failed:
         schemes = ", ".join(address.partition("://")[0] for address in failed)
-        said = without(" ".join(words.getvalue().split()), told["addresses"])
-        sys.stderr.write(f"{len(failed)} of {len(told['addresses'])} ({schemes}): {said}")
+        output = without(" ".join(words.getvalue().split()), request["addresses"])
+        sys.stderr.write(f"{len(failed)} of {len(request['addresses'])} ({schemes}): {output}")
     return min(len(failed), 100)
 
 
@@ -49,14 +49,16 @@ def without(text: str, addresses: Sequence[str]) -> str:
     return text
 
 
-def _sent(address: str, told: dict[str, Any]) -> bool:
+def _sent(address: str, request: dict[str, Any]) -> bool:
     try:
         # `Apprise.add` would take a text with commas for several addresses.
         service = apprise.Apprise.instantiate(address, asset=_careful())
         if service is None:
             return False
         sender = apprise.Apprise(service)
-        return bool(sender.notify(body=told["body"], title=told["title"], notify_type=told["type"]))
+        return bool(
+            sender.notify(body=request["body"], title=request["title"], notify_type=request["type"])
+        )
     except Exception as error:  # noqa: BLE001 - a service's own fault must not show its address
         logging.getLogger("apprise").warning("%s", type(error).__name__)
         return False

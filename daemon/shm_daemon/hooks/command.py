@@ -159,8 +159,8 @@ class CommandDeliverer(Processes):
     def ready(self, hook: CommandHook) -> str:
         """The program; raises HookFailed where it is not there or cannot be run."""
         program = hook.command[0]
-        beside = self.folder / program if "/" in program else program
-        found = shutil.which(beside, path=self._environment.get("PATH"))
+        candidate = self.folder / program if "/" in program else program
+        found = shutil.which(candidate, path=self._environment.get("PATH"))
         if found is None:
             raise HookFailed(
                 f"{program} is not there, or cannot be run.",

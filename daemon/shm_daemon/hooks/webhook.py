@@ -114,9 +114,9 @@ def _judged(answer: Answer) -> str:
     if 200 <= status < 300:
         return f"{status} {answer.reason}".strip()
     words = one_line(answer.body.decode(errors="replace"))
-    told = f"answered {status}: {words or answer.reason or 'no message'}"
+    message = f"answered {status}: {words or answer.reason or 'no message'}"
     if 300 <= status < 400:
-        raise HookFailed(told, remedy="Write the address that it sends to; it is not followed.")
+        raise HookFailed(message, remedy="Write the address that it sends to; it is not followed.")
     if 400 <= status < 500 and status not in _WORTH_ANOTHER_TRY:
-        raise DeliveryRefused(told, remedy="Correct its address or its secret.")
-    raise HookFailed(told, remedy=_LOOK)
+        raise DeliveryRefused(message, remedy="Correct its address or its secret.")
+    raise HookFailed(message, remedy=_LOOK)

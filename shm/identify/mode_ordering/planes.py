@@ -116,11 +116,11 @@ def shape_points(
     x_m = np.array([point.x_m for point in points])
 
     def at(place_m: float) -> ShapePoint:
-        own, cross = (x_m == place_m) & inside, (x_m == place_m) & ~inside
-        sd = np.fmax(_mean(mode.shape_sd[own]), _mean(mode.shape_sd[cross]))
+        along, cross = (x_m == place_m) & inside, (x_m == place_m) & ~inside
+        sd = np.fmax(_mean(mode.shape_sd[along]), _mean(mode.shape_sd[cross]))
         return ShapePoint(
             x_m=place_m,
-            value=_mean(mode.shape[own]) / largest,
+            value=_mean(mode.shape[along]) / largest,
             cross=_mean(mode.shape[cross]) / largest,
             sd=float(sd) / abs(largest),
         )

@@ -231,8 +231,8 @@ def _document(
         "message": alert.message,
         **asdict(lead),
         "urgency": lead.urgency,
-        "acknowledged": noted and noted.said,
-        "resolved": ended and ended.said,
+        "acknowledged": noted and noted.as_document,
+        "resolved": ended and ended.as_document,
         "silenced_until": None if ended else silenced_until(silences, alert.hanger, now),
         "deliveries": [_delivery(each, hooks.get(each.hook), alert.message, now) for each in owed],
     }

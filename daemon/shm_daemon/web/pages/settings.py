@@ -19,7 +19,7 @@ from shm.pipeline.watching import differences
 from shm.report import formatting
 from shm.settings import TABLE, Settings, load_settings
 from shm.store import Stage
-from shm.store.rows import ChangedSetting, said
+from shm.store.rows import ChangedSetting, value_text
 from shm.store.tests import list_waiting_tests
 from shm.store.watch import find_latest_watches
 from shm.values import Hanger
@@ -63,7 +63,7 @@ class _Row:
     @property
     def shown(self) -> str:
         """The number as its field shows it, empty where none is set."""
-        return "" if self.in_force == said(None) else self.in_force
+        return "" if self.in_force == value_text(None) else self.in_force
 
     @property
     def span(self) -> tuple[str, str] | None:
@@ -266,7 +266,7 @@ def _row(
     changed: Mapping[str, ChangedSetting],
     before: str = "",
 ) -> _Row:
-    in_file, in_force = (said(str(v) if isinstance(v, QuietHours) else v) for v in values)
+    in_file, in_force = (value_text(str(v) if isinstance(v, QuietHours) else v) for v in values)
     label = before + _MEANINGS[name]
     label = label if before else label[0].upper() + label[1:]
     return _Row(key, label, name.rpartition(".")[2], in_file, in_force, changed.get(key))
