@@ -174,8 +174,8 @@ class Understood:
 class Import:
     """A file as it is understood. `described` is its sidecar, `profiled` what its logger's profile
     is to say; `problems` are what nobody can answer. `of_test` asks when it was and how warm, which
-    is asked once where anything is, and of one file alone. `caveat` doubts what describes the
-    hanger.
+    is asked once where anything is, and of one file alone. `caveat` doubts the hanger's
+    description.
     """
 
     survey: Survey

@@ -24,7 +24,7 @@ from shm.values import Change, Hanger
 from shm.values.rounding import force_unit
 from shm.watch.readings import Reader
 from shm.watch.repair_check import EventKind, Unrepaired, is_explained, unrepaired
-from shm.watch.watching import kept_of
+from shm.watch.watching import accepted_baseline_tests
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def _still_shown(store: Store, hanger: Hanger, order: Order) -> tuple[Unrepaired
         before = store.watch.baseline(hanger.id, number=number)
         if before is None:
             continue
-        accepted = kept_of(before.posterior, dated_tests(store, before)[0])
+        accepted = accepted_baseline_tests(before.posterior, dated_tests(store, before)[0])
         of_baseline = [test for test, _ in accepted]
         reader = Reader(before.posterior, of_baseline, hanger)
         announced = [

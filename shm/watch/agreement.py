@@ -61,15 +61,15 @@ class Agreement:
 def agreement(
     reader: Reader,
     newest: tuple[ModalTest, datetime],
-    beside: Beside,
+    neighbours: Beside,
     hanger: Hanger,
     options: WatchOptions,
-    told: Collection[tuple[str, Way]],
+    announced: Collection[tuple[str, Way]],
 ) -> Agreement | None:
     """Return that a test is the second to show a tension beyond its threshold.
 
     None where it shows none, no test next to it agrees, the clocks say that it was a later visit,
-    a test of a visit before shows the same, or the shift is `told` already.
+    a test of a visit before shows the same, or the shift is `announced` already.
     """
     test, _ = newest
     tension = reader.quantities[0]
@@ -83,18 +83,18 @@ def agreement(
         return is_clear and abs(shift_of(tension, shown.mean)) >= threshold
 
     mine = show(test)
-    if not is_shown(mine) or (TENSION, way_of(mine.mean)) in told:
+    if not is_shown(mine) or (TENSION, way_of(mine.mean)) in announced:
         return None
-    unwatched = {*beside.held, *beside.of_works}
+    unwatched = {*neighbours.held, *neighbours.of_works}
     earlier = {
         each.id: each
-        for each in (*beside.came[0], *beside.dated[0])
+        for each in (*neighbours.came[0], *neighbours.dated[0])
         if _is_later(test, each) and each.id not in unwatched
     }
     if any(mine.agrees(show(each)) for each in earlier.values()):  # it is not new
         return None
     is_no_load = abs(shift_of(tension, mine.mean)) > BY_A_LOAD
-    near = {tests[0].id: tests[0] for tests in (*beside.came, *beside.dated) if tests}
+    near = {tests[0].id: tests[0] for tests in (*neighbours.came, *neighbours.dated) if tests}
     for other in near.values():
         of_one_visit = is_no_load and not _is_later(test, other)
         if not (other.id in unwatched or _is_later(other, test) or of_one_visit):
@@ -102,7 +102,7 @@ def agreement(
         shown = show(other)
         if is_shown(shown) and mine.agrees(shown):
             drift = _drift(tension, newest, (mine, shown), hanger)
-            return Agreement(drift, (other.id, test.id), other.id in beside.held)
+            return Agreement(drift, (other.id, test.id), other.id in neighbours.held)
     return None
 
 
@@ -156,11 +156,11 @@ def drifts_of(
 def _drift(
     quantity: WatchedQuantity,
     newest: tuple[ModalTest, datetime],
-    alike: Sequence[Shown],
+    similar: Sequence[Shown],
     hanger: Hanger,
 ) -> Drift:
     """Return what tests that agree show, as if their errors were all of each alone: the larger."""
-    weights = [1 / each.variance for each in alike]
-    mean = float(np.average([each.mean for each in alike], weights=weights))
-    sd = math.sqrt(max(each.variance for each in alike))
+    weights = [1 / each.variance for each in similar]
+    mean = float(np.average([each.mean for each in similar], weights=weights))
+    sd = math.sqrt(max(each.variance for each in similar))
     return drift_of_normal(quantity, hanger, (newest[0].id, newest[1]), mean, sd)

@@ -243,12 +243,12 @@ def weigh_pattern(
     )
     rows = tuple(map(_row, compared, gained.tolist(), lost.tolist()))
     suspects = _suspects(compared, groups)
-    alike = [each for each in groups if each.name == "common shift"]
+    common = [each for each in groups if each.name == "common shift"]
     fraction, sd = _mix(
-        np.concatenate([each.weight for each in alike]),
+        np.concatenate([each.weight for each in common]),
         *(
             np.concatenate([v / bridge.baseline_n for v in values]).mean(axis=1)
-            for values in ([each.mean_n for each in alike], [each.sd_n for each in alike])
+            for values in ([each.mean_n for each in common], [each.sd_n for each in common])
         ),
     )
     return BridgePattern(
@@ -256,7 +256,7 @@ def weigh_pattern(
         explanations=tuple(Explanation(*each) for each in ranked),
         suspects=suspects,
         rows=rows,
-        sum_kept=_sum_kept(bridge, rows, chances, suspects, ranked[0][0]),
+        sum_kept=_conserved_sum(bridge, rows, chances, suspects, ranked[0][0]),
         alike_fraction=float(fraction),
         alike_sd=float(sd),
         alike_cause=ALIKE_CAUSE,
@@ -349,7 +349,7 @@ def _weigh(shifts: Sequence[HangerShift], options: NeighbourOptions) -> list[_Gr
 
 def _at_one_scale(bridge: _Bridge, options: NeighbourOptions) -> list[_Group]:
     n, prior, sizes = len(bridge.shift_n), options.prior, options.sizes_fraction
-    nobody, each = np.empty((1, 0), np.int64), np.arange(n)[:, None]
+    none, each = np.empty((1, 0), np.int64), np.arange(n)[:, None]
 
     def normal(
         name: ExplanationName, prior: float, factors: FloatArray, members: IntArray, sign: int = 0
@@ -375,8 +375,8 @@ def _at_one_scale(bridge: _Bridge, options: NeighbourOptions) -> list[_Group]:
     both = np.concatenate([shed[pairs[:, 0]], shed[pairs[:, 1]]], axis=2)
     of_two *= 2 * len(pairs) / (n * (n - 1))
     return [
-        normal("no change", prior["no change"], np.zeros((1, n, 1)), nobody),
-        normal("common shift", prior["common shift"], bridge.baseline_n[None, :, None], nobody),
+        normal("no change", prior["no change"], np.zeros((1, n, 1)), none),
+        normal("common shift", prior["common shift"], bridge.baseline_n[None, :, None], none),
         one,
         normal("load gain", prior["load gain"], shed, each, sign=1),
         normal("load redistribution", loss * of_two, both, pairs, sign=-1),
@@ -444,8 +444,8 @@ def _independent_shifts(bridge: _Bridge, options: NeighbourOptions) -> _Group:
     log_weight = np.array([log_some - np.log(n / (n + 1))])
     log_weight += math.log(options.prior["independent shifts"])
     unknown = np.full((1, n), NAN)
-    nobody = np.empty((1, 0), np.int64)
-    return _Group("independent shifts", log_weight, nobody, gained, lost, unknown, unknown)
+    none = np.empty((1, 0), np.int64)
+    return _Group("independent shifts", log_weight, none, gained, lost, unknown, unknown)
 
 
 def _log_normal(y: FloatArray, variance: FloatArray) -> FloatArray:
@@ -498,7 +498,7 @@ def _mix(weight: FloatArray, mean: FloatArray, sd: FloatArray) -> tuple[FloatArr
     return middle, np.sqrt(np.maximum(weight @ (sd**2 + mean**2) - middle**2, 0))
 
 
-def _sum_kept(
+def _conserved_sum(
     bridge: _Bridge,
     rows: Sequence[HangerRow],
     chances: Mapping[ExplanationName, float],
@@ -513,11 +513,11 @@ def _sum_kept(
     wanted = {centre + step for centre in centres for step in range(-REACH, REACH + 1)}
     wanted = wanted or set(range(min(bridge.places), max(bridge.places) + 1))
     group = [index for index, row in enumerate(rows) if row.place in wanted]
-    kept = chances["no change"] + chances["load redistribution"] + chances["load gain"]
+    probability = chances["no change"] + chances["load redistribution"] + chances["load gain"]
     return SumKept(
         hangers=tuple(rows[index].hanger for index in group),
         sum_n=float(bridge.shift_n[group].sum()),
         sum_sd_n=float(np.sqrt(bridge.noise[np.ix_(group, group)].sum())),
-        probability=min(1.0, kept),
+        probability=min(1.0, probability),
         complete=len(wanted) == len(group),
     )

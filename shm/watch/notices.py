@@ -174,11 +174,11 @@ def news_of(
     A further mode of tests that do not fit is no further cause.
     """
     notable = [each for each in mistaken if each.is_notable]
-    is_told = any((each.plane, each.order) in noted for each in notable if each.is_misfit)
+    is_announced = any((each.plane, each.order) in noted for each in notable if each.is_misfit)
     return tuple(
         each
         for each in notable
-        if (each.plane, each.order) not in noted and not (is_told and each.is_misfit)
+        if (each.plane, each.order) not in noted and not (is_announced and each.is_misfit)
     )
 
 

@@ -163,7 +163,7 @@ def bound_by_recurrence(
     is_clear = evidence.log_evidence > math.log(limit_years)
     found, against = -math.inf, 0
     leading = float(evidence.log_mass.max(initial=-math.inf))
-    for n, index in enumerate(_likeliest(evidence)):
+    for n, index in enumerate(_most_probable(evidence)):
         mass = float(evidence.log_mass[index])
         if mass < leading - LIMITS.alike_nats:
             break
@@ -175,7 +175,7 @@ def bound_by_recurrence(
     return found, against
 
 
-def _likeliest(evidence: Evidence) -> list[tuple[int, ...]]:
+def _most_probable(evidence: Evidence) -> list[tuple[int, ...]]:
     """Return the likeliest changes of different beginning, kind and cause."""
     by_cause = evidence.log_mass.max(axis=(1, 4), initial=-math.inf)
     order = np.argsort(by_cause.ravel())[::-1][: LIMITS.persistence_leading]

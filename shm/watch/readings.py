@@ -342,7 +342,7 @@ class Reader:
         self._loosening = np.vstack(self.columns.loosening).T
         self._known: dict[int, tuple[ModalTest, Reading]] = {}
         self._residual = np.zeros(len(self.modes))
-        self._residual = self._own_residual([self._seen(test) for test in usable])
+        self._residual = self._mean_residual([self._seen(test) for test in usable])
 
     def reading(self, test: ModalTest, time: datetime) -> Reading:
         """Return what a test by itself states of the quantities; it was made at `time`.
@@ -427,7 +427,7 @@ class Reader:
     def _is_warmth_known(self, test: ModalTest) -> bool:
         return math.isfinite(test.temperature_c) and math.isfinite(self.reference_temperature_c)
 
-    def _own_residual(self, tests: Sequence[SeenModes]) -> FloatArray:
+    def _mean_residual(self, tests: Sequence[SeenModes]) -> FloatArray:
         """Measured less predicted log frequency (modes,), over the tests.
 
         The weighted mean; of three tests or more the median of what is left of each once its own

@@ -54,7 +54,7 @@ def unrepaired(
             in_force = [
                 now[each.quantity]
                 for each in drifts
-                if _stands(each, now[each.quantity], hanger, restores=restores)
+                if _persists(each, now[each.quantity], hanger, restores=restores)
             ]
             words = [f"{quantity_words(each.quantity)} {size_words(each)}" for each in in_force]
         elif alert.change is not None and test is not None:
@@ -68,20 +68,22 @@ def unrepaired(
     return tuple(found)
 
 
-def _stands(told: Drift, now: Drift, hanger: Hanger, *, restores: bool) -> bool:
+def _persists(drift: Drift, now: Drift, hanger: Hanger, *, restores: bool) -> bool:
     if not restores:
-        apart = abs(now.shift_mean - told.shift_mean)
-        return apart <= NINETY_PERCENT * math.hypot(told.shift_sd, now.shift_sd)
-    way = math.copysign(1, told.shift_mean)
-    off = way * now.shift_mean - LIMITS.half * abs(told.shift_mean)
+        apart = abs(now.shift_mean - drift.shift_mean)
+        return apart <= NINETY_PERCENT * math.hypot(drift.shift_sd, now.shift_sd)
+    way = math.copysign(1, drift.shift_mean)
+    off = way * now.shift_mean - LIMITS.half * abs(drift.shift_mean)
     left = 0.5 * math.erfc(-off / (math.sqrt(2) * now.shift_sd))
     return not left < hanger.thresholds.end_probability
 
 
-def share_left(baseline: Sequence[ModalTest], told: ModalTest, now: Sequence[ModalTest]) -> float:
-    """Of what the log frequencies of `told` are off the baseline's, the share that those of `now`
-    are off the same way, in least squares over the modes in all; NaN where there is none."""
-    then, at, after = (_log_frequencies(tests) for tests in (baseline, [told], now))
+def share_left(
+    baseline: Sequence[ModalTest], alerted: ModalTest, now: Sequence[ModalTest]
+) -> float:
+    """Of what the log frequencies of `alerted` are off the baseline's, the share that those of
+    `now` are off the same way, in least squares over the modes in all; NaN where there is none."""
+    then, at, after = (_log_frequencies(tests) for tests in (baseline, [alerted], now))
     keys = sorted(then.keys() & at.keys() & after.keys())
     moved = np.array([at[key] - then[key] for key in keys])
     left = np.array([after[key] - then[key] for key in keys])

@@ -123,7 +123,7 @@ class Bank:
     def _thinned(self) -> Bank:
         """Without the oldest, or that beginning which lies nearest to the next for its age."""
         if self.day - self.by_day[0] > LIMITS.oldest_days:
-            return self._kept(np.arange(1, len(self.by_day)))
+            return self._selected(np.arange(1, len(self.by_day)))
         if len(self.by_day) <= LIMITS.most:
             return self
         old = self.by_day[: len(self.by_day) - LIMITS.recent]
@@ -133,9 +133,9 @@ class Bank:
         after = self.after_day.copy()
         after[drop + 1] = after[drop]
         bank = replace(self, span_days=spans, after_day=after)
-        return bank._kept(np.delete(np.arange(len(spans)), drop))
+        return bank._selected(np.delete(np.arange(len(spans)), drop))
 
-    def _kept(self, chosen: IntArray) -> Bank:
+    def _selected(self, chosen: IntArray) -> Bank:
         return replace(
             self,
             effect=self.effect[:, chosen],

@@ -151,7 +151,7 @@ def watch_hanger(
     compared with the baseline. Raises BadInput where the baseline's tests hold no mode that its
     class describes.
     """
-    baseline_tests = kept_of(baseline, baseline_tests)
+    baseline_tests = accepted_baseline_tests(baseline, baseline_tests)
     reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
     since = max(time for _, time in baseline_tests)
     dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
@@ -170,7 +170,9 @@ def watch_hanger(
     return Watched(reader, readings, replace(watch, tests=tuple(tests)))
 
 
-def kept_of(baseline: Posterior, tests: Sequence[DatedTest]) -> tuple[DatedTest, ...]:
+def accepted_baseline_tests(
+    baseline: Posterior, tests: Sequence[DatedTest]
+) -> tuple[DatedTest, ...]:
     """Return the tests of a baseline without what was left out of it as mistaken."""
     check = baseline.baseline_check
     if check is None:
@@ -205,7 +207,7 @@ def watch_newest(
     then the watch must begin without it. Where the watch itself calls for no alert, the newest may
     yet agree with a test `beside` it.
     """
-    baseline_tests = kept_of(baseline, baseline_tests)
+    baseline_tests = accepted_baseline_tests(baseline, baseline_tests)
     reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
     options = options_of(hanger, len(baseline_tests), options)
     watcher = Watcher(reader.quantities, reader.columns, hanger, options)
@@ -243,10 +245,10 @@ def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> Wa
     return replace(options, baseline_tests=baseline_tests, limit_years=limit_years)
 
 
-def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertState, Alert | None]:
+def after(before: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertState, Alert | None]:
     """Return what is in force after one more test, and the alert that it calls for, if any."""
     level = hanger.thresholds.alert_probability
-    standing = told.still(test, hanger.thresholds.end_probability)
+    standing = before.still(test, hanger.thresholds.end_probability)
     is_call = test.change.called and not _is_known(standing, test.change)
     beyond = tuple(
         drift
@@ -256,7 +258,7 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     called = (*standing.called, test.change) if test.change.called else standing.called
     change = test.change if is_call else _explaining(beyond, called, test.change)
     alert = _alert(beyond, is_call, change, test, hanger, standing)
-    alone, since_baseline = told.alone, tuple[Drift, ...]()
+    alone, since_baseline = before.alone, tuple[Drift, ...]()
     if alert is None and test.change.is_baseline_alone and not (alone or standing.beyond):
         alert, alone = alert_of_baseline(test, hanger), True
         since_baseline = alert.drifts
@@ -266,7 +268,7 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
         words, key = message_of_odd(test, hanger, odd), kind.replace(" ", "-")
         alert = alert_of(hanger, (test.test, test.time), key, words, (kind,))
     wrong = frozenset((each.plane, each.order) for each in test.mistaken if each.is_notable)
-    noted = told.noted & wrong
+    noted = before.noted & wrong
     explained = any(each.moved and each.moved[0].quantity in CAUSES for each in called)
     if alert is None and not explained and (new := news_of(test.mistaken, noted)):
         # It waits while there is worse to report; a mass or lost section is why modes go astray.
