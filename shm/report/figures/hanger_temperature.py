@@ -55,8 +55,8 @@ def _caption(data: HangerReport) -> str:
         f" {formatting.counted(without, 'test')} without a temperature left out." if without else ""
     )
     return (
-        "Tension by each test over its temperature, with 90 % intervals. Points off the line are "
-        f"not explained by temperature.{left}"
+        "Tension by each test over its temperature, with 90 % intervals. A hanger that does "
+        f"not change lies on one line; what lies off it has another cause.{left}"
         f"{time_axes.thinned_words(known)}"
     )
 
