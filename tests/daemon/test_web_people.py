@@ -83,7 +83,7 @@ def test_new_password_ends_other_sessions(browser: httpx.Client, workspace: Work
     assert [sign_in(browser, "reader", each) for each in (PASSWORD, new)] == [401, 303]
     with workspace.store() as store:
         (row,) = list_changes(store, limit=1)
-    assert (row.who, row.via, row.action, row.subject) == (
+    assert (row.who, row.via, row.kind, row.subject) == (
         "reader", "page", "password changed", "user reader",
     )  # fmt: skip
     assert [change("wrong", new, new).status_code for _ in range(MOST_WRONG)][-1] == 429

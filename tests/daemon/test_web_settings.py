@@ -64,7 +64,7 @@ def test_a_threshold_holds_from_now_on_and_goes_back_to_the_file(
     assert told in " ".join(capsys.readouterr().out.split())
     with workspace.store() as store:
         (row,) = list_changes(store, limit=1)
-    assert (row.who, row.via, row.action, row.detail) == (
+    assert (row.who, row.via, row.kind, row.detail) == (
         "engineer", "page", "setting changed", f"from {in_file:g} to 0.9",
     )  # fmt: skip
     put(browser, LEVEL, "", back=True)
@@ -234,7 +234,7 @@ def test_engineer_manages_people(browser: httpx.Client, workspace: Workspace) ->
         found = {each.name: each.role for each in store.people.list_all() if not each.removed_at}
         rows = list_changes(store, limit=4)
     assert found == {"reader": "operator", "engineer": "engineer", "eva": "engineer"}
-    assert [row.action for row in rows] == [
+    assert [row.kind for row in rows] == [
         "user removed", "password set", "role changed", "user added",
     ]  # fmt: skip
     assert rows[2].detail == "from reader to operator"
