@@ -49,7 +49,7 @@ def measured(model: AsMade, theta: FloatArray, places_m: tuple[float, ...] = PLA
 
 
 def test_the_true_bar_fits_whatever_the_size_and_sign_of_its_shapes() -> None:
-    model = as_made(ROD)
+    model = as_made("beam2", ROD)
     theta = truth(model)
     test = measured(model, theta)
     turned = replace(
@@ -78,7 +78,7 @@ def log_likelihood(shapes: MeasuredShapes, misfits: FloatArray) -> FloatArray:
 
 
 def test_exchanged_sensors_count_for_nothing() -> None:
-    model = as_made(ROD)
+    model = as_made("beam2", ROD)
     theta, exchanged = truth(model), truth(model, log10_k1=7.0, log10_k3=4.0)
     right = MeasuredShapes([measured(model, theta)], ROD)
     wrong = MeasuredShapes([measured(model, theta, PLACES_M[::-1])], ROD)
@@ -94,7 +94,7 @@ def test_exchanged_sensors_count_for_nothing() -> None:
 
 
 def test_tests_of_one_mode_are_one_shape_whose_sensors_still_err() -> None:
-    model = as_made(ROD)
+    model = as_made("beam2", ROD)
     theta = truth(model)
     test = measured(model, theta)
     first = replace(test, modes=test.modes[:1])
@@ -106,7 +106,7 @@ def test_tests_of_one_mode_are_one_shape_whose_sensors_still_err() -> None:
 
 
 def test_ends_are_exchanged_only_where_nothing_tells_them_apart() -> None:
-    model = as_made(ROD)
+    model = as_made("beam2", ROD)
     shaped = measured(model, truth(model))
     bare = replace(shaped, modes=tuple(replace(m, shape=()) for m in shaped.modes))
     unknown = replace(
@@ -122,7 +122,7 @@ def test_ends_are_exchanged_only_where_nothing_tells_them_apart() -> None:
 
 
 def test_shapes_narrow_the_tension_and_exchanged_sensors_are_named() -> None:
-    model = as_made(ROD)
+    model = as_made("beam2", ROD)
     theta = truth(model)
     options = UpdateOptions(samples=500, seed=3)
     right, wrong = measured(model, theta), measured(model, theta, PLACES_M[::-1])
