@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Self
@@ -15,8 +16,8 @@ from shm.store import Store, Workspace
 log = logging.getLogger(__name__)
 
 
-class Background:
-    """Takes turns, with an open store of its own. For the holder of the workspace's lock.
+class Background(ABC):
+    """Take turns in a thread, with an open store. For the holder of the workspace's lock.
 
     `pause_s` lies between two turns, `retry_s` after one that failed.
     """
@@ -32,10 +33,11 @@ class Background:
         """Take a changed description over."""
         self._workspace = workspace
 
+    @abstractmethod
     def turn(self) -> object:
         """Do what there is to do."""
-        raise NotImplementedError
 
+    @abstractmethod
     def break_off(self) -> None:
         """End, from another thread, what a turn may wait for."""
 

@@ -223,6 +223,9 @@ class StreamKeeper(Background):
             self._store.streams.sweep(now, workspace.settings.window_days)
         return left
 
+    def break_off(self) -> None:
+        """Let the turn end by itself: it waits for nothing outside."""
+
     def drain(self) -> None:
         """Take turns until no file is left."""
         while self.turn():

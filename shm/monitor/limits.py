@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limits:
-    """Each with its unit and its reason; where no source is named it is a judgement."""
+    """Hold each limit with its unit and reason; where no source is named it is a judgement."""
 
     # ---- close modes
     # technical: lines are averaged over so much of a mode's half bandwidth, where T gives more.
@@ -70,9 +70,8 @@ class Limits:
     same_place_m: float = 0.01
     mixed: float = 0.4  # judgement: of the motion in its own plane; sensors turned by 22 degrees
     smoothed: int = 16  # technical: lines averaged, a quarter of which is their scatter
-    noise_ratio: float = (
-        9.0  # judgement: a factor of three between the noise of sensors of one logger
-    )
+    # judgement: a factor of three between the noise of sensors of one logger
+    noise_ratio: float = 9.0
 
     # ---- tracking
     # Of a peak, to either side of it in its band. What white force leaves out of the slope of the

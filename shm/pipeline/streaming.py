@@ -82,7 +82,7 @@ Work = Generator[Callable[[], Any], Any, None]
 
 @dataclass
 class _Course:
-    """How far a stream has come, as the store says: read again after whatever went wrong.
+    """Hold how far a stream has come by the store; read again after whatever went wrong.
 
     Ten minutes from `waiting` on are to be read, those before `done` came late; `pooled` is up to
     when each period is pooled, `changed` the first late window since. The watch has gone over

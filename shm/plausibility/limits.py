@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limits:
-    """Each with its unit and its reason; where no source is named it is a judgement."""
+    """Hold each limit with its unit and reason; where no source is named it is a judgement."""
 
     # ---- bar evidence
     # log10 k L/EI near a pin, in the middle and near a clamp, from where fits begin.

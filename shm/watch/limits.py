@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limits:
-    """Each with its unit and its reason; where no source is named it is a judgement."""
+    """Hold each limit with its unit and reason; where no source is named it is a judgement."""
 
     # ---- agreement
     # Standard deviations from the baseline, temperature and scatter included: one good test in 740
