@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.inference import UpdateOptions, update
-from shm.inference.thesis_noise import ThesisLikelihood
+from shm.inference.problem.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, Model, build
 from shm.models.base import Conditions
 from shm.values import NAN, AddedMass, ModalTest, Mode

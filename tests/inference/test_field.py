@@ -10,8 +10,8 @@ from scipy.special import logsumexp
 from scipy.stats import t
 
 from shm.assumptions import DEFAULTS
-from shm.inference.field import FieldLikelihood
-from shm.inference.systematic_errors import (
+from shm.inference.problem.field import FieldLikelihood
+from shm.inference.problem.systematic_errors import (
     errors_of_sensors,
     felt_by,
     loads_of_ends,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from shm.assumptions import DEFAULTS
-from shm.gap.repeated_errors import STRETCHES, section_loads
-from shm.inference.systematic_errors import (
+from shm.gap.hypotheses.repeated_errors import STRETCHES, section_loads
+from shm.inference.problem.systematic_errors import (
     errors_of_sensors,
     felt_by,
     loads_of_ends,

@@ -17,8 +17,8 @@ from scipy.optimize import brentq
 from shm.bridge import load_hanger
 from shm.errors import BadInput
 from shm.inference.options import silent
-from shm.inference.posterior import DIFFERENCE
-from shm.inference.problem import Problem
+from shm.inference.problem.hanger_problem import Problem
+from shm.inference.sampler.density import DIFFERENCE
 from shm.models import AsMade, described
 from shm.models.base import Conditions
 from shm.models.hanger import solve
