@@ -41,7 +41,7 @@ from shm.inference.answer.updating import check_class_priors
 from shm.inference.calibrating import calibrate
 from shm.inference.options import IMPORTANCE, SAMPLERS, silent
 from shm.models import DESCRIPTION, build, competing_names
-from shm.models.base import Conditions, Model
+from shm.models.classes.base import Conditions, Model
 from shm.read import read as read_file
 from shm.read import registry
 from shm.settings import Settings, load_settings

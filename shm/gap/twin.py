@@ -22,7 +22,7 @@ from shm.gap.hypotheses.data_checks import usable
 from shm.gap.hypotheses.problem import GapProblem
 from shm.models import AS_DESCRIBED
 from shm.models.effects import EFFECTS, Variant, check_effect_priors
-from shm.models.hanger_model import TENSION
+from shm.models.one_hanger.hanger_model import TENSION
 from shm.values import (
     NAN,
     PLANES,

@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from shm.models.tensioned_beam import frequencies_hz
+from shm.models.classes.tensioned_beam import frequencies_hz
 from shm.plausibility.limits import LIMITS
 from shm.values import NAN, PLANES, BoolArray, FloatArray, Hanger, ModalTest
 

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from shm.models import Model
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.values import (
     PLANES,
     BaselineCheck,

@@ -19,7 +19,7 @@ import numpy as np
 
 from shm.assumptions import DEFAULTS, Assumptions
 from shm.models import class_of
-from shm.models.tensioned_beam import frequencies_hz
+from shm.models.classes.tensioned_beam import frequencies_hz
 from shm.values import PLANES, BoolArray, FloatArray, Hanger, Mode, Posterior
 from shm.values.stream import PooledReading
 from shm.watch.limits import LIMITS

@@ -20,7 +20,7 @@ from shm.inference.sampler.density import find_peaks
 from shm.inference.sampler.linear import Linear
 from shm.models import MODELS, AsMade
 from shm.models.effects import Conditions, Variant
-from shm.models.hanger_model import DENSITY, LENGTH, MODULUS, SECTION, TENSION
+from shm.models.one_hanger.hanger_model import DENSITY, LENGTH, MODULUS, SECTION, TENSION
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import (
     ENOUGH_EFFECTIVE,

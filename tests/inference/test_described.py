@@ -14,7 +14,7 @@ from shm.inference.problem.described import DescribedCoordinates
 from shm.inference.problem.hanger_problem import Problem
 from shm.inference.problem.priors import TensionPrior, calibration_of
 from shm.models import build
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.values import (
     NAN,
     PLANES,

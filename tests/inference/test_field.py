@@ -19,7 +19,7 @@ from shm.inference.problem.systematic_errors import (
     mean_of_ends,
 )
 from shm.models import build
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Plane
 from tests.helpers.hangers import HANGER_3
 

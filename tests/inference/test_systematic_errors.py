@@ -17,7 +17,7 @@ from shm.inference.problem.systematic_errors import (
     loads_of_section,
     mean_of_ends,
 )
-from shm.models.end_effects import EndWaves
+from shm.models.classes.end_effects import EndWaves
 from shm.models.hanger import PhysicalHanger, PointMass
 from shm.values import FloatArray, Hanger, Scatter
 from tests.helpers.hangers import HANGER_3

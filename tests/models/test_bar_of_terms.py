@@ -20,10 +20,10 @@ from shm.inference.options import silent
 from shm.inference.problem.hanger_problem import Problem
 from shm.inference.sampler.density import DIFFERENCE
 from shm.models import AsMade, described
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.models.hanger import solve
-from shm.models.hanger_model import GRAVITY_M_S2
-from shm.models.terms import FITTING_STIFFNESS, Term, terms_of
+from shm.models.one_hanger.hanger_model import GRAVITY_M_S2
+from shm.models.one_hanger.terms import FITTING_STIFFNESS, Term, terms_of
 from shm.values import PLANES, AddedMass, FloatArray, Hanger, ModalTest, Mode, Turnbuckle
 from tests.helpers.classes_as_made import as_made
 from tests.worlds.eight_kinds import Member, Zone, natural_frequencies_hz

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from shm.models import tensioned_beam
+from shm.models.classes import tensioned_beam
 from shm.models.hanger import PhysicalHanger, Zone, solve
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import (

@@ -18,7 +18,7 @@ from shm.inference.answer.updating import log_class_prior
 from shm.inference.options import Progress, silent
 from shm.inference.sampler.mixture import normalised
 from shm.models import AS_DESCRIBED, MODELS, AsMade, applicable, check_baseline
-from shm.models.base import held_otherwise
+from shm.models.classes.base import held_otherwise
 from shm.values import Hanger, ModalTest
 
 BEAMS = ("beam1", "beam2", "beam3")

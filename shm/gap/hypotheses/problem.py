@@ -35,10 +35,10 @@ from shm.inference.problem.systematic_errors import (
 from shm.inference.sampler.density import Peak
 from shm.inference.sampler.likelihood import Likelihood
 from shm.models import AsMade
-from shm.models.beam import Beam3
+from shm.models.classes.beam import Beam3
 from shm.models.effects import EFFECTS, Conditions, Variant, parameters_of
 from shm.models.hanger import HangerModes
-from shm.models.hanger_model import BENDING
+from shm.models.one_hanger.hanger_model import BENDING
 from shm.values import NAN, BoolArray, FloatArray, IntArray, ModalTest
 
 Effects = tuple[tuple[str, Variant], ...]

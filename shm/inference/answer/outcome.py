@@ -18,7 +18,7 @@ from shm.inference.problem.field import FieldLikelihood
 from shm.inference.problem.hanger_problem import Problem
 from shm.inference.sampler.density import DIFFERENCE, climb
 from shm.inference.sampler.sampling import Sampled
-from shm.models.hanger_model import TENSION
+from shm.models.one_hanger.hanger_model import TENSION
 from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency
 
 SIGMA = "sigma"

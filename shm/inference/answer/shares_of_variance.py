@@ -9,7 +9,7 @@ import numpy as np
 
 from shm.inference.problem.described import DescribedCoordinates
 from shm.inference.problem.hanger_problem import Problem
-from shm.models.terms import FITTING_MASS, FITTING_STIFFNESS, INCLINATION
+from shm.models.one_hanger.terms import FITTING_MASS, FITTING_STIFFNESS, INCLINATION
 from shm.values import NAN, FloatArray, Posterior
 
 _OF_ENDS = (*FITTING_STIFFNESS, FITTING_MASS)

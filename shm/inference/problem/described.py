@@ -28,8 +28,8 @@ from shm.inference.problem.priors import (
 from shm.inference.problem.shapes import swaps_of
 from shm.inference.sampler.coordinates import Coordinates, log_normal
 from shm.models import AsMade
-from shm.models.beam import Beam, Beam3
-from shm.models.hanger_model import (
+from shm.models.classes.beam import Beam, Beam3
+from shm.models.one_hanger.hanger_model import (
     BENDING,
     DENSITY,
     LENGTH,

@@ -44,7 +44,7 @@ from shm.inference.problem.systematic_errors import (
 from shm.inference.sampler.likelihood import Covariance, Likelihood, NoiseNode
 from shm.models import AsMade, Model
 from shm.models.hanger.reduced import Modes
-from shm.models.hanger_model import TENSION
+from shm.models.one_hanger.hanger_model import TENSION
 from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
 
 

@@ -12,7 +12,7 @@ import scipy
 from shm.errors import BadInput
 from shm.inference.sampler.likelihood import Likelihood, NoiseNode
 from shm.models import Model
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.values import FloatArray, IntArray, ModalTest, Mode
 
 

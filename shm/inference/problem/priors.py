@@ -17,7 +17,7 @@ from shm.assumptions import DEFAULTS, Assumption, Assumptions
 from shm.inference.options import Calibration
 from shm.inference.sampler.coordinates import exchange, fold_pairs, log_folded, split_pairs
 from shm.models import AsMade
-from shm.models.hanger_model import BENDING, DENSITY, LENGTH, MODULUS, SECTION
+from shm.models.one_hanger.hanger_model import BENDING, DENSITY, LENGTH, MODULUS, SECTION
 from shm.values import FloatArray, Hanger, ModalTest
 
 DEVIATIONS = (SECTION, DENSITY, MODULUS)

@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 
 from shm.models import Model
-from shm.models.base import Swap
+from shm.models.classes.base import Swap
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode, ShapePoint
 
 

@@ -2,10 +2,10 @@
 
 The accelerometer's own mass lowers each mode by where it sits, both planes alike; the section
 wanders; supports give way sideways and lower high orders of stiff bars; fittings stiffen the ends
-(`shm.models.end_effects`); a known mass turns with the bar as much as it is long. All are small,
-known to first order and of uncertain size, so that their mean shifts a prediction and what is
-uncertain is a few normal errors ("loads": what one standard deviation of each does). The remaining
-errors of a mode are tau's (`shm.inference.problem.field`).
+(`shm.models.classes.end_effects`); a known mass turns with the bar as much as it is long. All are
+small, known to first order and of uncertain size, so that their mean shifts a prediction and what
+is uncertain is a few normal errors ("loads": what one standard deviation of each does). The
+remaining errors of a mode are tau's (`shm.inference.problem.field`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import TypeAlias
 import numpy as np
 
 from shm.assumptions import DEFAULTS, Assumptions
-from shm.models.end_effects import EndWaves
+from shm.models.classes.end_effects import EndWaves
 from shm.values import AddedMass, FloatArray, Hanger, IntArray
 
 Ends: TypeAlias = tuple[EndWaves, EndWaves]

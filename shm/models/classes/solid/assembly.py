@@ -30,8 +30,8 @@ from skfem import (
     MeshQuad2,
 )
 
-from shm.models.solid.geometry import AXIAL, LATERAL, Edge, Geometry, Material, Support
-from shm.models.solid.reduction import AffineSystem, factorised
+from shm.models.classes.solid.geometry import AXIAL, LATERAL, Edge, Geometry, Material, Support
+from shm.models.classes.solid.reduction import AffineSystem, factorised
 from shm.values import PLANES, BoolArray, FloatArray, IntArray, Plane
 
 # A cell's corners in the order of scikit-fem, as steps along the three axes of the grid.

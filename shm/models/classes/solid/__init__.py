@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from shm.models.solid.classes import S1, S2, Solid0, Solid1, Solid2
+from shm.models.classes.solid.classes import S1, S2, Solid0, Solid1, Solid2
 
 __all__ = ["S1", "S2", "Solid0", "Solid1", "Solid2"]

@@ -22,10 +22,10 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 
 from shm.errors import BadInput, UsageError, suggest
-from shm.models.base import DESCRIPTION, THESIS, Conditions, Model
+from shm.models.classes.base import DESCRIPTION, THESIS, Conditions, Model
+from shm.models.classes.registry import MODELS
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey, Variant
-from shm.models.hanger_model import BENDING, LENGTH, SHEAR, TENSION, HangerModel
-from shm.models.registry import MODELS
+from shm.models.one_hanger.hanger_model import BENDING, LENGTH, SHEAR, TENSION, HangerModel
 from shm.values import NAN, PLANES, FloatArray, Hanger, ModalTest
 
 _HALF_WIDTH_IN_SD = math.sqrt(3)  # of a uniform distribution

@@ -26,13 +26,13 @@ from typing import Any
 
 import numpy as np
 
-from shm.models.base import DESCRIPTION, Conditions, Model, point_mass, silent
-from shm.models.beam import Beam, Beam1, Beam2, Beam3
+from shm.models.classes.base import DESCRIPTION, Conditions, Model, point_mass, silent
+from shm.models.classes.beam import Beam, Beam1, Beam2, Beam3
+from shm.models.classes.solid import S2
 from shm.models.effects import EFFECTS, Case, Parameter, Variant, parameters_of
 from shm.models.hanger import HangerModes, Modes, PhysicalHanger, PointMass, ReducedBar, Zone, solve
 from shm.models.hanger.bar import stiffness_ratio
-from shm.models.solid import S2
-from shm.models.terms import (
+from shm.models.one_hanger.terms import (
     FITTING_MASS,
     FITTING_STIFFNESS,
     INCLINATION,
@@ -67,9 +67,9 @@ class HangerModel(Model):
     described length; where end plates leave the effective length open, effective over described),
     the class's springs in N m/rad, then `section`, `density` and `modulus` (logarithms of true over
     described area, density and elastic modulus) and of a strand its `bending_factor` and, in beam3,
-    its `shear_share`; of a beam its terms (`shm.models.terms`), unless it is `with_terms` false;
-    at last those of the effects. Where two have one name, the effect's name stands before its own:
-    `point_mass.x_m`. The effects act in their order.
+    its `shear_share`; of a beam its terms (`shm.models.one_hanger.terms`), unless it is
+    `with_terms` false; at last those of the effects. Where two have one name, the effect's name
+    stands before its own: `point_mass.x_m`. The effects act in their order.
     """
 
     priors = DESCRIPTION

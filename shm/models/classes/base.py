@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from shm.errors import BadInput, UsageError, suggest
-from shm.models.end_effects import EndWaves, coupled_bar
+from shm.models.classes.end_effects import EndWaves, coupled_bar
 from shm.models.hanger import PointMass, solve
 from shm.values import PLANES, AddedMass, FloatArray, Hanger, IntArray, ModalTest, Plane, Prior
 

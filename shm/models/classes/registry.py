@@ -6,10 +6,10 @@ Packages from outside add theirs by the entry points `shm.models` (`shm.models.p
 from __future__ import annotations
 
 from shm.errors import UsageError, suggest
-from shm.models.base import Model, held_otherwise
-from shm.models.beam import Beam1, Beam2, Beam3
+from shm.models.classes.base import Model, held_otherwise
+from shm.models.classes.beam import Beam1, Beam2, Beam3
+from shm.models.classes.solid import S1, S2, Solid0, Solid1, Solid2
 from shm.models.plug_ins import MODELS_GROUP, members_with_plug_ins
-from shm.models.solid import S1, S2, Solid0, Solid1, Solid2
 from shm.values import Hanger
 
 _BUILT_IN = (Beam1, Beam2, Beam3, S1, S2, Solid0, Solid1, Solid2)

@@ -10,9 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from shm.errors import BadInput
-from shm.models.base import RATIOS, Model, silent
-from shm.models.solid.basis import Description, transverse_basis
-from shm.models.solid.geometry import (
+from shm.models.classes.base import RATIOS, Model, silent
+from shm.models.classes.solid.basis import Description, transverse_basis
+from shm.models.classes.solid.geometry import (
     ALL_SPRINGS,
     AXIAL,
     AXIAL_SPRINGS,
@@ -95,7 +95,7 @@ class SolidModel(Model):
 
     def convergence_hz(self, rods: tuple[int, ...], modes: int) -> Iterator[tuple[int, FloatArray]]:
         """Unknowns and frequencies (modes,) of held ends at nominal tension, by cells along it."""
-        from shm.models.solid.reduction import natural_modes
+        from shm.models.classes.solid.reduction import natural_modes
 
         for rod in rods:
             system = self.description().meshed("transverse", rod)

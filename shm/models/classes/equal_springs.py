@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from shm.models.tensioned_beam import wave_numbers
+from shm.models.classes.tensioned_beam import wave_numbers
 from shm.values import FloatArray
 
 NAME = "equal springs"

@@ -24,12 +24,12 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from shm.models.solid.geometry import Geometry, Material, Support
-from shm.models.solid.reduction import TARGET_ERROR, Projected, Reduction
+from shm.models.classes.solid.geometry import Geometry, Material, Support
+from shm.models.classes.solid.reduction import TARGET_ERROR, Projected, Reduction
 from shm.values import FloatArray, Plane
 
 if TYPE_CHECKING:
-    from shm.models.solid.reduction import AffineSystem
+    from shm.models.classes.solid.reduction import AffineSystem
 
 # To be raised whenever the same description gives another basis than before.
 _VERSION = 3
@@ -53,14 +53,14 @@ class Description:
 
     def meshed(self, plane: Plane, rod: int) -> AffineSystem:
         """Return the full model's bending plane with that many cells along the rod."""
-        from shm.models.solid.assembly import assembled
+        from shm.models.classes.solid.assembly import assembled
 
         fine = replace(self.geometry.fineness, rod=rod)
         return assembled(replace(self.geometry, fineness=fine), self.material, self.support, plane)
 
     def full_frequencies_hz(self, points: FloatArray, modes: int) -> FloatArray:
         """Transverse frequencies (n, modes) of the full model at points of tension and log10 k."""
-        from shm.models.solid.reduction import natural_modes
+        from shm.models.classes.solid.reduction import natural_modes
 
         system = self.system("transverse", rounded_up(modes))
         return np.array(
@@ -98,7 +98,7 @@ def transverse_basis(
 def _make(
     description: Description, key: str, modes: int, progress: Callable[[float], None]
 ) -> Reduction:
-    from shm.models.solid.reduction import reduce
+    from shm.models.classes.solid.reduction import reduce
 
     box = np.array(description.lower), np.array(description.upper)
     reduction = reduce(description.system("transverse", modes), *box, modes, progress)

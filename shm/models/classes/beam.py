@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models import tensioned_beam
-from shm.models.base import RATIOS, Model
-from shm.models.end_effects import coupled_bar, has_symmetric_turnbuckles
+from shm.models.classes import tensioned_beam
+from shm.models.classes.base import RATIOS, Model
+from shm.models.classes.end_effects import coupled_bar, has_symmetric_turnbuckles
 from shm.models.hanger import PhysicalHanger, solve
 from shm.values import PLANES, FloatArray, Hanger
 
@@ -17,8 +17,8 @@ from shm.values import PLANES, FloatArray, Hanger
 class Beam(Model):
     """A tensioned Euler-Bernoulli beam; members say which rotational springs hold its ends, if any.
 
-    With turnbuckles it is a case of the general model (`shm.models.end_effects`), and its ends can
-    be exchanged only where the turnbuckles lie alike from both.
+    With turnbuckles it is a case of the general model (`shm.models.classes.end_effects`), and its
+    ends can be exchanged only where the turnbuckles lie alike from both.
     """
 
     def __init__(self, hanger: Hanger):
