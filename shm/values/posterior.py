@@ -12,8 +12,8 @@ import numpy as np
 from shm.values.hanger import Hanger, Limits
 from shm.values.kinds import NAN, FloatArray, Plane
 from shm.values.modes import ModalTest
-from shm.values.rounding import force_unit, two_digits
-from shm.values.showing import Displayable, front, line, tension_words
+from shm.values.rounding import force_unit, tension_words, two_digits
+from shm.values.showing import Displayable, front, line
 
 if TYPE_CHECKING:
     from pandas import DataFrame
