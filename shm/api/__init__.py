@@ -36,7 +36,8 @@ from shm.gap.check import check_gap as checked
 from shm.gap.simulator.any_simulator import diagnose_simulator
 from shm.identify import Identification, IdentifyOptions
 from shm.identify.identification import identify as identified
-from shm.inference import UpdateOptions, updating
+from shm.inference import UpdateOptions
+from shm.inference.answer import updating
 from shm.inference.answer.updating import check_class_priors
 from shm.inference.calibrating import calibrate
 from shm.inference.options import IMPORTANCE, SAMPLERS, silent

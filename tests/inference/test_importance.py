@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from shm.inference import UpdateOptions, sampling, update
+from shm.inference import UpdateOptions, update
 from shm.inference.options import EMCEE, silent
 from shm.inference.problem.hanger_problem import Problem
+from shm.inference.sampler import sampling
 from shm.inference.sampler.chain import run_chain
 from shm.inference.sampler.density import Points
 from shm.inference.sampler.mixture import Weighted
