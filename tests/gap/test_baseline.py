@@ -8,12 +8,17 @@ import numpy as np
 import pytest
 
 from shm.gap import GapOptions, diagnose
-from shm.gap.causes.baseline import AS_DESCRIBED, choose_baseline, find_richer
+from shm.gap.causes.baseline import AS_DESCRIBED, choose_baseline, find_richer, place_sensors
+from shm.gap.causes.search import find_starts
 from shm.gap.hypotheses.contract import Hypothesis
-from shm.models.effects import Variant
-from shm.values import PLANES, Hanger, ModalTest, Mode, Supports
+from shm.gap.hypotheses.problem import GapProblem
+from shm.gap.hypotheses.target import Target
+from shm.inference.sampler.density import find_peaks, laplace
+from shm.models import MODELS, AsMade
+from shm.models.effects import Conditions, Variant
+from shm.values import PLANES, Hanger, ModalTest, Mode, ShapePoint, Supports
 from tests.helpers.effects import all_but
-from tests.helpers.gap_campaigns import HANGER, campaign, problem_of
+from tests.helpers.gap_campaigns import HANGER, PLACES_M, campaign, problem_of
 from tests.helpers.timoshenko import legendre_hz
 
 FIRM = tuple(
@@ -93,3 +98,69 @@ def test_find_richer(baseline: str, effects: tuple[str, ...], richer: str | None
     problem = problem_of(SLENDER, baseline)
     found = find_richer(problem, Hypothesis(tuple((each, Variant("")) for each in effects)))
     assert (found.model.name if found else None) == richer
+
+
+@pytest.mark.parametrize("off_m", [0.0, 0.004, 0.025])
+def test_moved_sensors_leave_the_evidence_where_all_is_nearly_linear(off_m: float) -> None:
+    tests = [_at(test, PLACES_M[2], PLACES_M[2] - off_m) for test in campaign(shape_sd=0.002)]
+    problem = problem_of(tests)
+    placed = place_sensors(problem)
+    moved_m = np.array(placed.design.places_m) - np.array(problem.design.places_m)
+    # The first three also move as a bar of another length has them.
+    assert moved_m[2] - moved_m[1:2] == pytest.approx(off_m - 0.007, abs=0.003)
+    assert placed.design.survey == problem.design.survey  # what reports name stays
+    there = GapProblem(problem.model, tests, placed)
+    assert _log_evidence(there) == pytest.approx(_log_evidence(problem), abs=1.0)
+
+
+def test_sensor_thirty_millimetres_off_is_no_gap_of_a_stocky_bar() -> None:
+    """A stated place is about a twelfth of a half wave off in the seventh mode."""
+    hanger = replace(HANGER, length_m=4.7, nominal_tension_n=160e3)
+    test = shaped(hanger, (0.97, 2.16), 7)
+    there, stated = (problem_of([each], hanger=hanger) for each in (test, _at(test, 2.16, 2.19)))
+    moved = GapProblem(stated.model, stated.tests, place_sensors(stated))
+    true, first_order, found = (_log_evidence(each) for each in (there, stated, moved))
+    assert first_order < true - 7
+    assert found == pytest.approx(true - 3.0**2 / 2, abs=0.3)  # three standard deviations
+
+
+def _log_evidence(problem: GapProblem) -> float:
+    return laplace(find_peaks(Target(problem, Hypothesis()), find_starts(problem)))
+
+
+def _at(test: ModalTest, real_m: float, stated_m: float) -> ModalTest:
+    """State another place of the sensor that is at `real_m`."""
+    modes = [
+        replace(
+            mode,
+            shape=tuple(
+                replace(point, x_m=stated_m) if point.x_m == real_m else point
+                for point in mode.shape
+            ),
+        )
+        for mode in test.modes
+    ]
+    return replace(test, modes=tuple(modes))
+
+
+def shaped(hanger: Hanger, places_m: tuple[float, ...], modes: int) -> ModalTest:
+    """Make a test of a clamped bar as described, with exact shapes that are good to 0.5 %."""
+    model = AsMade(MODELS["beam1"](hanger))
+    usual = {"theta_F": 1.0, "theta_L": 1.0} | {name: model.usual(name) for name in model.terms}
+    theta = np.array([[usual.get(name, 0.0) for name in model.parameter_names]])
+    found = model.with_effects((), places_m).modes(theta, Conditions(), modes)
+    rows = [
+        Mode(
+            plane,
+            n + 1,
+            float(found.frequency_hz[0, p, n]),
+            SD * float(found.frequency_hz[0, p, n]),
+            shape=tuple(
+                ShapePoint(x_m, float(value[p]), float(value[1 - p]), 0.005)
+                for x_m, value in zip(places_m, found.shape[0, p, n], strict=True)
+            ),
+        )
+        for p, plane in enumerate(PLANES)
+        for n in range(modes)
+    ]
+    return ModalTest("t1", tuple(rows), hanger=3)

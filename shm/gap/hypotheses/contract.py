@@ -99,6 +99,7 @@ class Observations:
     does to a component of a shape; all of a mode turn together. `known_damping` (F, 2)
     holds the logarithm of each mode's damping ratio and its standard deviation; NaN where unknown.
     `rounding` (F,), None for none, is the standard deviation that rounding adds to frequencies.
+    `misplaced` (S,), None for none, is what the design's places hold of the sensors' errors.
     `assumed` is what the hanger's description assumes of errors.
     """
 
@@ -109,6 +110,7 @@ class Observations:
     known_damping: FloatArray | None = None
     rounding: FloatArray | None = None
     assumed: Assumptions = DEFAULTS
+    misplaced: FloatArray | None = None
 
     @property
     def damping(self) -> FloatArray:
@@ -132,8 +134,16 @@ class Observations:
         turned = None if self.turned is None else self.turned[data]
         rounding = None if self.rounding is None else self.rounding[frequencies]
         damping = self.damping[frequencies]
+        misplaced = None if self.misplaced is None else self.misplaced[shapes]
         return Observations(
-            part, self.value[data], self.sd[data], turned, damping, rounding, self.assumed
+            part,
+            self.value[data],
+            self.sd[data],
+            turned,
+            damping,
+            rounding,
+            self.assumed,
+            misplaced,
         )
 
 

@@ -249,6 +249,17 @@ class GapProblem:
         tensions, masses = self.tensions_of(design), self.masses_of(design)
         return Repeated(self.section_of(design), tensions, masses, shapes, errors)
 
+    @property
+    def place_loads(self) -> FloatArray:
+        """Return loads (S, places) of an error of each sensor's place; 0 where none is felt."""
+        found = np.zeros((len(self.design.shape_mode), len(self.design.places_m)))
+        for (kind, place, _), load in zip(
+            self.repeated.sensor_errors, self.repeated.sensors.T, strict=False
+        ):
+            if kind == "place":
+                found[:, place] = load
+        return found
+
     def tensions_of(self, design: Design) -> FloatArray:
         """Return loads (F, tests): what one standard deviation of each test's tension does.
 
@@ -310,7 +321,10 @@ class GapProblem:
 
     @cached_property
     def _usual(self) -> FloatArray:
-        return self.usual_of(self.design)
+        found = self.usual_of(self.design)
+        if self.observations.misplaced is not None:
+            found[self.design.frequencies :] -= self.observations.misplaced
+        return found
 
     def usual_of(self, design: Design) -> FloatArray:
         """Return what usual sensors and supports do to the data of a design (data,)."""
