@@ -26,7 +26,7 @@ from shm.values import Hanger, ModalTest
 
 BEAMS = ("beam1", "beam2", "beam3")
 _PLACED = 2  # numerical: steps of Gauss and Newton
-_MOST_MISPLACED = 3.0  # standard deviations: what is farther off is no error of a tape
+_MOST_MISPLACED = 3.0  # standard deviations
 _OF_NOTE = 0.02  # of the classes' probability: less moves no interval that is told
 
 
@@ -71,7 +71,8 @@ def place_sensors(problem: GapProblem) -> Observations:
 
     A place errs to first order, about where it is taken to be: three centimetres off bend a shape
     of high order by more than its errors. What moving the sensors takes of their error predictions
-    give back, so that the error's prior is still about the stated place.
+    give back, so that the error's prior is still about the stated place. Nothing is moved where one
+    would be farther off than a tape errs: there the hanger has a gap.
     """
     stated, count = problem.observations, problem.design.frequencies
     for _ in range(_PLACED if len(problem.design.shape_mode) else 0):
@@ -81,7 +82,8 @@ def place_sensors(problem: GapProblem) -> Observations:
         error = by.nodes[int(by.by_node(residual[None])[0].argmax())].covariance
         covariance = np.diag(error.shape) + error.shape_loads @ error.shape_loads.T
         size = problem.place_loads.T @ np.linalg.solve(covariance, residual[count:])
-        size = size.clip(-_MOST_MISPLACED, _MOST_MISPLACED)
+        if (np.abs(size) > _MOST_MISPLACED).any():
+            return stated
         places_m = np.array(stated.design.places_m) + size * problem.hanger.scatter.sensor_place_m
         design = replace(stated.design, places_m=tuple(places_m.tolist()))
         moved = GapProblem(problem.model, problem.tests, replace(stated, design=design))
