@@ -22,36 +22,36 @@ from shm_cli.installation import SETTING_HEADS, notices, setting_cells
 _ASSUMPTION_HEADS = ("assumption", "value", "unit", "from", "source", "reason")
 _EFFECTS = """# Catalogue of effects
 
-These are the physical effects that `shm gap diagnose` knows: what can make a hanger differ from
-the model of it, each a term of the general hanger model that vanishes at one value of its first
-parameter, its *size*.
+After this page you know the physical effects that `shm gap diagnose` knows: the reasons why a
+hanger can differ from its model. Each is a term of the general hanger model that vanishes at one
+value of its first parameter, its *size*.
 
-Priors are deliberately wide, because nobody knows the order of magnitude beforehand: most sizes are
-logarithmic, *either sign* means that the effect may raise or lower. Lengths, masses and stiffnesses
-are scaled by the hanger's own; the numbers below are those of
-[hanger 3](hangers.md#round-bar-with-end-plates). You know your bridge better: narrow any range in
-`bridge.toml`, see [hangers.md](hangers.md#ranges-of-effects).
+Priors are deliberately wide: most sizes are logarithmic, and *either sign* means that the effect
+may raise or lower. Lengths, masses and stiffnesses are scaled by those of the hanger; the numbers
+below are for [hanger 3](hangers.md#round-bar-with-end-plates). Narrow any range that you know
+better in `bridge.toml`, see [hangers.md](hangers.md#ranges-of-effects).
 
-An effect that your measurements cannot show is not tried, and the diagnosis says why. One that they
-show but cannot tell from another is reported as a group with it; *easily taken for* lists what to
-think of then. What imitates what:
+An effect that your measurements cannot show is not tried, and the diagnosis gives the reason. One
+that they show but cannot separate from another is reported as a group with it; *easily taken for*
+lists what to think of then. What imitates what:
 
-- More mass along the hanger, less bending stiffness and a slow clock give the same frequencies and
-  shapes once the tension is free. A known mass clamped on for one test tells the mass from the
-  other two; no hammer test tells stiffness from clock: hold the logger against another clock.
-  Effective length and stiff end zones come near to them in frequencies; shapes separate them.
+- More mass along the hanger, less bending stiffness and a clock by which frequencies read too low
+  give the same frequencies and shapes once the tension is free. A known mass clamped on for one
+  test separates the mass from the other two; no hammer test separates stiffness from clock:
+  compare the logger with another clock. Effective length and stiff end zones are similar in
+  frequencies; shapes separate them.
 - A stiff end spring k and a bar that is longer by EI/k are the same to first order, in frequencies
   and in shapes; so are a short stiff zone and a bar that is shorter by about its length.
-- Changes of mass, stiffness or length below 1 to 2 % lie within what a bar as made differs from its
-  description (`[hanger.scatter]`) and are no gap.
-- Turned sensors show in shapes only; effects of temperature and level only in tests that vary them,
-  and only apart where the warm tests are not the hard ones too.
-- Joints that soften or lie askew pass for plain end flexibility where the level is not varied, or
+- Changes of mass, stiffness or length below 1 to 2 % are within the tolerances of the description
+  (`[hanger.scatter]`) and are no gap.
+- Rotated sensors show in shapes only. Effects of temperature and level show only in tests that vary
+  them, and can be separated only if the warm tests are not the hard ones too.
+- Joints that soften or are skewed look like plain end flexibility if the level is not varied, or if
   the sensors see one plane only.
 - A small mass close to an end, an end that gives way sideways, and shear with rotary inertia all
-  lower the high orders alike.
-- Frequencies of a uniform hanger cannot tell its two ends apart: deck end and arch end, or a place
-  and its mirror image, need shapes or a known mass.
+  lower the high orders in a similar way.
+- Frequencies of a uniform hanger cannot distinguish its two ends: deck end and arch end, or a
+  position and its mirror image, need shapes or a known mass.
 """
 
 
@@ -72,7 +72,7 @@ def settings_page() -> str:
     head = (
         "# Settings\n\n"
         "A value comes from the flag, else the environment (`workers` from `SHM_WORKERS`), else "
-        "`[settings]` of `bridge.toml`, else the default. `shm settings` says the same.\n\n"
+        "`[settings]` of `bridge.toml`, else the default. `shm settings` prints the same.\n\n"
     )
     rows = [(f"`{row.name}`", *setting_cells(row)) for row in TABLE]
     return f"{head}{markdown(SETTING_HEADS, rows)}\n\n{_assumptions_section()}"
@@ -82,11 +82,11 @@ def _assumptions_section() -> str:
     """Return the section of the manual that lists the defaults, in Markdown."""
     head = (
         "## Assumptions\n\n"
-        "What is taken of hangers, sensors and measurements before any data. `[assumptions]` of "
-        "`bridge.toml` replaces rows for the bridge, `[hanger.assumptions]` for one hanger; what "
-        "`[hanger.scatter]` states goes before both. Every report says what was replaced, and "
-        "`shm settings --assumptions` lists what holds. Reasons for one table: [0007]"
-        "(decisions/0007-one-table-of-assumptions.md).\n\n"
+        "Values and priors of hangers, sensors and tests before any data. `[assumptions]` of "
+        "`bridge.toml` replaces rows for the bridge, `[hanger.assumptions]` for one hanger, and "
+        "`[hanger.scatter]` overrides both. Every report names what was replaced; `shm settings "
+        "--assumptions` lists what is in force ([why one table]"
+        "(decisions/0007-one-table-of-assumptions.md)).\n\n"
         "```toml\n"
         "[assumptions]\n"
         "accelerometer_mass_kg = 0.2\n"
@@ -111,8 +111,8 @@ def licences_page() -> str:
     head = (
         "# Licences\n\n"
         "`shm` itself is under the MIT licence. These are the packages that it requires, with the "
-        "licence that each declares; those of an extra are needed for that extra alone. `shm "
-        "notices` says so of your installation, where the texts of the licences lie, too.\n\n"
+        "licence that each declares; those of an extra are needed for that extra only. `shm "
+        "notices` lists those of your installation, with the files of the licence texts.\n\n"
     )
     rows = [(each.package, each.version, each.licence, each.extra) for each in notices()]
     return head + markdown(("package", "version", "licence", "extra"), rows) + "\n"

@@ -29,6 +29,7 @@ closed_form_hz = order / (2 * bar.length_m) * np.sqrt(711e3 / bar.mass_per_lengt
 parameters = np.array([[1.0, 1.0], [1.1, 1.0]])  # theta_F, theta_L
 as_string = build("beam1", string, priors="thesis").frequencies_hz(parameters, modes=4)
 as_bar = build("beam1", bar, priors="thesis").frequencies_hz(parameters, modes=4)
+# Shown in the manual until here.
 
 ratio = np.linspace(0.2, 1.5, 40)
 tensions = build("beam1", bar, priors="thesis").frequencies_hz(
@@ -39,7 +40,6 @@ axes = figure.subplots()
 axes.plot(711 * ratio, tensions[:, 0], label=[f"mode {n}" for n in order])
 axes.set(xlabel="tension (kN)", ylabel="frequency (Hz)")
 axes.legend()
-# Shown in the manual until here.
 print("model classes:", ", ".join(MODELS))
 print("string, closed form (Hz):", closed_form_hz.round(3))
 print("string, beam1       (Hz):", as_string[0, 0].round(3))

@@ -31,11 +31,11 @@ print(modes[["plane", "order", "frequency_hz", "frequency_sd_hz"]].to_string(ind
 table = posterior.to_dataframe()
 table["stress_mpa"] = table["tension_n"] / hanger.area_m2 / 1e6
 safety = 355 / table["stress_mpa"]
+# Shown in the manual until here.
 figure = Figure(layout="constrained")
 axes = figure.subplots()
 axes.hist(table["stress_mpa"], bins=30)
 axes.set(xlabel="stress (MPa)", ylabel="draws")
-# Shown in the manual until here.
 print(f"stress {table['stress_mpa'].mean():.2f} MPa, safety {safety.quantile(0.05):.2f} at least")
 
 with TemporaryDirectory() as folder:

@@ -25,11 +25,11 @@ tree = posterior.to_arviz([test.test], hanger)
 
 tension = tree["posterior"]["tension_n"]
 length = tree["posterior"]["theta_L"]
+# Shown in the manual until here.
 figure = Figure(layout="constrained")
 axes = figure.subplots()
 axes.scatter(length, tension / 1e3, s=4)
 axes.set(xlabel="effective over described length", ylabel="tension (kN)")
-# Shown in the manual until here.
 print(f"tension {float(tension.mean()):.0f} {tension.attrs['units']}")
 replicated = tree["posterior_predictive"]["frequency_hz"]
 observed = tree["observed_data"]["frequency_hz"]
