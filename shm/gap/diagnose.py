@@ -16,6 +16,7 @@ from shm.gap.damping import remark_on_damping
 from shm.gap.data_checks import usable
 from shm.gap.measurement_plan import ranked
 from shm.gap.misfit import doubt_orders, refuse_misfit
+from shm.gap.observations import observed
 from shm.gap.outliers import (
     Cleared,
     describe_doubtful,
@@ -138,8 +139,8 @@ def _search(
     check_effects(options.without)
     check_effect_priors(hanger)
     found = usable(tests, hanger)
+    check_hold_out(observed(found.tests, hanger).design, options.hold_out)
     whole = choose_baseline(found.tests, hanger, options, rng, progress)
-    check_hold_out(whole, options.hold_out)
     doubts = _of_another(found.tests, hanger)
 
     def report(label: str, done: float) -> None:
