@@ -106,7 +106,8 @@ def test_diagnose_takes_tests_since_the_last_change(shm: Shm, tmp_path: Path) ->
 def test_the_bar_has_the_sensors_of_all_tests(
     shm: Shm, hanger_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("shm_cli.gap.diagnosed", lambda *_: a_diagnosis())
+    for called in ("shm_cli.gap.diagnosed", "shm.gap.diagnose"):
+        monkeypatch.setattr(called, lambda *_: a_diagnosis())
     tests = []
     for name, x_m in (("t1", 2.5), ("t2", 4.4)):
         test = measured(name)
