@@ -26,6 +26,7 @@ from shm.gap.causes.search import Attribution, Explanation, answered, check_effe
 from shm.gap.hypotheses.contract import Fit, GapOptions, Hypothesis
 from shm.gap.hypotheses.coordinates import is_place
 from shm.gap.hypotheses.data_checks import usable
+from shm.gap.hypotheses.observations import observed
 from shm.gap.hypotheses.problem import GapProblem
 from shm.gap.next_measurement.measurement_plan import ranked
 from shm.inference.options import Progress, silent
@@ -138,8 +139,8 @@ def _search(
     check_effects(options.without)
     check_effect_priors(hanger)
     found = usable(tests, hanger)
+    check_hold_out(observed(found.tests, hanger).design, options.hold_out)
     whole = choose_baseline(found.tests, hanger, options, rng, progress)
-    check_hold_out(whole, options.hold_out)
     doubts = _of_another(found.tests, hanger)
 
     def report(label: str, done: float) -> None:

@@ -131,30 +131,43 @@ def test_help_shows_function(name: str) -> None:
     assert pickle.loads(pickle.dumps(step)) is step
 
 
-@pytest.mark.parametrize(
-    "imported",
-    [
-        "import shm.identify.options",
-        "import shm.identify.options as options",
-        "from shm.identify.options import IdentifyOptions",
-        "from shm.identify import options",
-        "from shm import identify",
-        "import shm",
-        "import shm.api",
-        "import shm; shm.identify; import shm.identify.estimation.courses as courses; courses.np",
-    ],
+IMPORTS = (
+    "import shm.identify.options",
+    "import shm.identify.options as options",
+    "from shm.identify.options import IdentifyOptions",
+    "from shm.identify import options",
+    "from shm import identify",
+    "import shm",
+    "import shm.api",
+    "import shm; shm.identify; import shm.identify.estimation.courses as courses; courses.np",
 )
-def test_step_after_any_import(imported: str) -> None:
-    code = (
-        f"{imported}\nimport shm, sys, types\n"
+# A process of its own for each, forked off one that has the libraries.
+AFTER_EACH = """
+import os, numpy, scipy.signal
+for number, code in enumerate(sys.argv[1:]):
+    if os.fork() == 0:
+        assert "shm" not in sys.modules
+        exec(code)
+        print(number, flush=True)
+        os._exit(0)
+    os.wait()
+"""
+
+
+def test_step_after_any_import() -> None:
+    checked = (
+        "import shm, sys, types\n"
         "assert isinstance(shm.identify, types.FunctionType)\n"
         "import shm.identify.options as again\n"
         "assert again is sys.modules['shm.identify.options'] is shm.identify.options\n"
         "assert shm.identify.IdentifyOptions is again.IdentifyOptions\n"
         "assert isinstance(sys.modules['shm.identify'], types.ModuleType)\n"
-        "try: shm.identify.nothing\nexcept AttributeError as e: print(e)"
+        "try: shm.identify.nothing\nexcept AttributeError as e: print(e, end=' ')"
     )
-    assert run_python(code) == "'function' object has no attribute 'nothing'\n"
+    codes = [f"{imported}\n{checked}" for imported in IMPORTS]
+    said = "'function' object has no attribute 'nothing'"
+    printed = run_python(f"import sys\nsys.argv = {['', *codes]!r}\n{AFTER_EACH}")
+    assert printed.splitlines() == [f"{said} {number}" for number in range(len(IMPORTS))]
 
 
 def test_import_is_cheap_and_steps_need_no_slow_library() -> None:

@@ -20,9 +20,8 @@ from tests.cli.conftest import Shm
 from tests.gap.test_shared_causes import bridge as bridge_of
 from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.effects import all_but
-from tests.helpers.flows import ingest
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.taken_in import with_a_loss
+from tests.helpers.taken_in import ingest_quickly, with_a_loss
 from tests.helpers.workspaces import make_workspace, modes_of
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
@@ -82,7 +81,7 @@ def test_a_diagnosis_of_a_workspace_is_kept_for_the_report(shm: Shm, tmp_path: P
     for day, name in enumerate(("t1", "t2", "t3")):  # alike but for the warmth: no copies
         test = replace(measured(name), temperature_c=12.0 + 0.1 * day)
         written(workspace.spool / f"{name}.modes.json", test)
-    ingest(workspace)
+    ingest_quickly(workspace)
     shm = shm.at(workspace)
     assert shm.json("report --hanger 3")["diagnosis"] is None
     document = shm.json("gap", "diagnose", "--hanger", 3, "--tests", 2, *SHORT)
@@ -107,7 +106,8 @@ def test_diagnose_takes_tests_since_the_last_change(shm: Shm, tmp_path: Path) ->
 def test_the_bar_has_the_sensors_of_all_tests(
     shm: Shm, hanger_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("shm_cli.gap.diagnosed", lambda *_: a_diagnosis())
+    for called in ("shm_cli.gap.diagnosed", "shm.gap.diagnose"):
+        monkeypatch.setattr(called, lambda *_: a_diagnosis())
     tests = []
     for name, x_m in (("t1", 2.5), ("t2", 4.4)):
         test = measured(name)
@@ -117,7 +117,7 @@ def test_the_bar_has_the_sensors_of_all_tests(
     workspace = make_workspace(tmp_path / "bridge")
     for test in tests:
         written(workspace.spool / f"{test.id}.modes.json", test)
-    ingest(workspace)
+    ingest_quickly(workspace)
     for ended in (
         shm.done("gap", "diagnose", path, "--hanger-file", hanger_file),
         shm.at(workspace).done("gap diagnose --hanger 3"),
@@ -192,7 +192,7 @@ def test_a_workspace_keeps_the_diagnosis_of_each_hanger(shm: Shm, tmp_path: Path
     workspace = make_workspace(tmp_path / "bridge", hangers=(3, 4))
     for number in (3, 4):
         written(workspace.spool / f"{number}.modes.json", sound(number))
-    ingest(workspace)
+    ingest_quickly(workspace)
     shm = shm.at(workspace)
     assert shm.told("gap", "diagnose", "--bridge", *SHORT).startswith("Gap diagnosis, 2 hangers")
     for number in (3, 4):

@@ -19,7 +19,6 @@ from shm.store import Stage, Workspace
 from shm.store.recordings import list_recordings
 from shm.values import Channel, Recording
 from tests.cli.conftest import Shm
-from tests.helpers.flows import ingest
 from tests.helpers.nouns import NOW
 from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.workspaces import QUICK, make_workspace, write_test
@@ -132,7 +131,7 @@ def test_later_files_are_read_by_profile(shm: Shm, workspace: Workspace, tmp_pat
             path.unlink()
     export(workspace.spool / "later.csv", 3)
     sidecar_path(workspace.spool / "later.csv").write_text("temperature_c = 4.5\n")
-    ingest(workspace)
+    ingest_quickly(workspace)
     with workspace.store() as store:
         (stored,) = list_recordings(store)
         with workspace.archive.opened(stored.file) as path:
@@ -145,7 +144,7 @@ def test_later_files_are_read_by_profile(shm: Shm, workspace: Workspace, tmp_pat
 
 def test_unknown_logger_is_refused(workspace: Workspace) -> None:
     export(workspace.spool / "first.csv")
-    ingest(workspace)
+    ingest_quickly(workspace)
     with workspace.store() as store:
         (stored,) = list_recordings(store)
     assert stored.stage is Stage.REFUSED
@@ -243,7 +242,7 @@ def test_modes_of_another_program(shm: Shm, workspace: Workspace, tmp_path: Path
     planes = "x=transverse,y=longitudinal"
     ended = shm("import", path, "--hanger", 3, "--plane", planes)
     assert ended.code == 0
-    ingest(workspace)
+    ingest_quickly(workspace)
     with workspace.store() as store:
         (test,) = (stored.test for stored in store.tests.list_all(3))
     found = [(mode.plane, mode.order, mode.frequency_hz) for mode in test.modes]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from tests.helpers.gap_campaigns import HANGER as PLAIN
 from tests.helpers.gap_campaigns import simulated
 from tests.helpers.gap_checks import frequencies_hz, names_from
 
-MASS = CheckOptions(("distributed_mass",), sound=2)
+MASS = CheckOptions(("distributed_mass",), "beam1", sound=2)
 
 
 @pytest.fixture(scope="module")
@@ -31,9 +32,17 @@ def tests() -> tuple[ModalTest, ...]:
     return simulated(seed=101, tension_spread=0.0)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def twins() -> Iterator[None]:
+    """Fit a twin once, whichever tests ask for it: it never changes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "Twin", cache(Twin))
+        yield
+
+
 @pytest.fixture(scope="module")
 def twin(tests: tuple[ModalTest, ...]) -> Twin:
-    found = Twin(tests, PLAIN, "beam1", 1)
+    found = module.Twin(tests, PLAIN, "beam1", 1)
     assert found.tension_n == pytest.approx(711e3, rel=0.03)
     assert found.misfit_percent < 0.1
     return found
@@ -103,11 +112,11 @@ def test_a_twin_keeps_shapes_and_conditions(twin: Twin, tests: tuple[ModalTest, 
             assert one.value == pytest.approx(other.value, abs=0.1)
 
 
-def test_a_twin_shows_hardening_within_a_test(tests: tuple[ModalTest, ...]) -> None:
+def test_a_twin_shows_hardening_within_a_test(tests: tuple[ModalTest, ...], twin: Twin) -> None:
+    assert "geometric_hardening" in twin.invisible()
     flat = {"amplitude_slope": 0.0, "amplitude_slope_sd": 1e-5}
     modes = tuple(replace(mode, **flat) for mode in tests[0].modes)
     twin = Twin([replace(tests[0], modes=modes)], PLAIN, "beam1", 1)
-    assert "geometric_hardening" in Twin(tests, PLAIN, "beam1", 1).invisible()
     assert "geometric_hardening" not in twin.invisible()
     (made,) = planted(twin, "geometric_hardening", 0.01)
     (sound,) = unplanted(twin)
@@ -120,8 +129,9 @@ def test_a_twin_shows_hardening_within_a_test(tests: tuple[ModalTest, ...]) -> N
 def test_the_smallest_size_is_found(checked: Callable[..., GapCheck]) -> None:
     """And a gap in a sound twin is counted."""
     assert checked("sag", least=0.0).false_gaps == 2
-    found = checked("distributed_mass")
+    found = checked("distributed_mass", options=replace(MASS, baseline=""))
     (effect,) = found.effects
+    assert found.baseline == "beam1"
     assert found.is_complete
     assert found.false_gaps == 0
     assert len(found.sound) == 2
@@ -176,7 +186,7 @@ def test_a_refused_twin_is_not_found(
 
 def test_half_of_the_seeds_decide(checked: Callable[..., GapCheck]) -> None:
     """A mass is found or not by where it sits; each seed has a place and noise of its own."""
-    options = CheckOptions(("point_mass",), seeds=3, sound=0, seed=7)
+    options = CheckOptions(("point_mass",), "beam1", seeds=3, sound=0, seed=7)
     found = checked("point_mass", least=0.005, options=options)
     (effect,) = found.effects
     from_each = sorted(
@@ -217,7 +227,7 @@ def test_without_tests_a_usual_test_is_made() -> None:
 
 
 def test_a_check_is_read_back(checked: Callable[..., GapCheck]) -> None:
-    options = CheckOptions(("distributed_mass", "sensor_mass", "load_scale"), sound=1)
+    options = replace(MASS, effects=("distributed_mass", "sensor_mass", "load_scale"), sound=1)
     found = checked("timebase", "distributed_mass", options=options)
     document = json.loads(dump(gap_check_document(found)))
     assert document["schema"] == "shm.gap_check/1"

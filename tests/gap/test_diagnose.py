@@ -25,10 +25,10 @@ from tests.helpers.gap_campaigns import PLANTED_CLAMP as CLAMP
 from tests.helpers.gap_campaigns import campaign as own_campaign
 from tests.helpers.gap_campaigns import simulated
 
-FEW_EFFECTS = GapOptions(without=all_but("timebase", "bending_stiffness"))
-CLAMPS_ALONE = GapOptions(without=all_but("point_mass"))
+FEW_EFFECTS = GapOptions("beam1", without=all_but("timebase", "bending_stiffness"))
+CLAMPS_ALONE = GapOptions("beam1", without=all_but("point_mass"))
 GREMLINS = EffectPrior("gremlins", "mass_kg", 1.0, 2.0)
-SOME = GapOptions(without=all_but("point_mass", "section_loss", "bending_stiffness", "timebase"))
+SOME = all_but("point_mass", "section_loss", "bending_stiffness", "timebase")
 
 
 def planted(*effects: PlantedEffect, **plan: Any) -> tuple[ModalTest, ...]:
@@ -38,7 +38,7 @@ def planted(*effects: PlantedEffect, **plan: Any) -> tuple[ModalTest, ...]:
 @pytest.fixture(scope="module")
 def untouched() -> Diagnosis:
     """Of a hanger that nothing was planted on."""
-    return diagnose(planted(), PLAIN, SOME)
+    return diagnose(planted(), PLAIN, GapOptions("beam1", without=SOME))
 
 
 def test_a_planted_clamp_is_named_with_its_size_and_place() -> None:
@@ -70,7 +70,7 @@ def test_the_mirror_image_of_a_place_is_named_and_the_size_is_of_one_side() -> N
     """Without shapes frequencies tell a place from its mirror image hardly or not at all."""
     clamp = (("point_mass", Variant()),)
     unloaded = own_campaign(clamp, (12.0, 3.4), sd=5e-5)[0]
-    found = diagnose([unloaded], PLAIN, replace(CLAMPS_ALONE, baseline="beam1"))
+    found = diagnose([unloaded], PLAIN, CLAMPS_ALONE)
     leading = found.leading
     assert leading is not None
     (place,) = (each for each in leading.parameters if each.name == "x_m")

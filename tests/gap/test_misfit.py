@@ -14,7 +14,7 @@ from shm.values import ModalTest, Mode
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 
-OPTIONS = GapOptions(without=all_but("point_mass", "timebase"), seed=1)
+OPTIONS = GapOptions("beam1", without=all_but("point_mass", "timebase"), seed=1)
 AREA_M2 = np.pi * 0.0004**2 / 4
 STRING = replace(
     HANGER_3,

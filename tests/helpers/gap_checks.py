@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -30,9 +31,7 @@ def names_from(twin: Twin, least: float, *effects: str) -> Diagnose:
 
     Several are of one group, the first the likeliest; none is something unknown.
     """
-    rng = np.random.default_rng(0)
-    sound = [frequencies_hz(twin.measure("", Variant(), np.empty(0), rng)) for _ in range(50)]
-    sound_hz = np.mean(sound, axis=0)
+    sound_hz = sound_frequencies_hz(twin)
 
     def diagnose(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) -> Diagnosis:
         away = abs(np.log(frequencies_hz(tests) / sound_hz)[0])  # that which errs least
@@ -46,6 +45,14 @@ def names_from(twin: Twin, least: float, *effects: str) -> Diagnose:
         return a_diagnosis(causes=causes)
 
     return diagnose
+
+
+@cache
+def sound_frequencies_hz(twin: Twin) -> FloatArray:
+    """Return the mean frequencies of a twin without any effect."""
+    rng = np.random.default_rng(0)
+    sound = [frequencies_hz(twin.measure("", Variant(), np.empty(0), rng)) for _ in range(50)]
+    return np.mean(sound, axis=0)
 
 
 def frequencies_hz(tests: Sequence[ModalTest]) -> FloatArray:

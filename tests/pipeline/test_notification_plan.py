@@ -55,10 +55,14 @@ def inbox() -> Inbox:
 
 @pytest.fixture
 def bridge(tmp_path: Path) -> Workspace:
-    """Fifty hangers alike, a hook `mail`, and a hook `boss` that hears after an hour."""
+    return make_bridge(tmp_path, range(1, 9))
+
+
+def make_bridge(tmp_path: Path, hangers: Sequence[int]) -> Workspace:
+    """Hangers alike, a hook `mail`, and a hook `boss` that hears after an hour."""
     settings = {"alert_grouping_seconds": 60.0, "hook_backoff_seconds": 5.0}
     hooks = {"mail": ["true"], "boss": ["true"]}
-    made = make_workspace(tmp_path / "bridge", hangers=HANGERS, settings=settings, hooks=hooks)
+    made = make_workspace(tmp_path / "bridge", hangers=hangers, settings=settings, hooks=hooks)
     described = Path(made.bridge.source)
     text = described.read_text().replace(
         'name = "boss"', 'name = "boss"\nescalation_after_seconds = 3600'
@@ -102,8 +106,9 @@ def states(workspace: Workspace, hook: str) -> set[str]:
 
 @pytest.mark.slow
 def test_fifty_hangers_that_move_alike_are_one_message_that_lists_all(
-    bridge: Workspace, clock: Clock, inbox: Inbox
+    tmp_path: Path, clock: Clock, inbox: Inbox
 ) -> None:
+    bridge = make_bridge(tmp_path, HANGERS)
     for hanger in HANGERS:
         raise_on(bridge, clock, [hanger])
         clock.pass_by(2.0)

@@ -7,9 +7,11 @@ part of the mean rests on rare large values: hardly any run of this size shows i
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from _pytest.mark import ParameterSet
 
 from shm.values import FloatArray, Reading
 from shm.watch.options import WatchOptions
@@ -18,6 +20,18 @@ from tests.helpers.synthetic_readings import START, History, tension, watch_of
 WEAK_STEP = 0.001
 """A change much below the scatter: then the statistic's mean is not that of a few large values."""
 LIMIT_YEARS = 2.0
+
+
+def few_and_many(values: Sequence[float], few: int, many: int) -> list[ParameterSet]:
+    """Return a quick case of the first value, slow ones of the others, and a trial of each."""
+    quick = [pytest.param(value, few, id=f"{value}-few") for value in values[:1]]
+    slow = [
+        pytest.param(value, few, id=f"{value}-few", marks=pytest.mark.slow) for value in values[1:]
+    ]
+    trials = [
+        pytest.param(value, many, id=f"{value}-many", marks=pytest.mark.trial) for value in values
+    ]
+    return quick + slow + trials
 
 
 def years(readings: list[Reading], index: int) -> float:
@@ -62,10 +76,7 @@ def count_calls(scatter: float, hangers: int, step: float = 0.0) -> tuple[int, f
     return called, watched_years / LIMIT_YEARS
 
 
-@pytest.mark.parametrize(
-    "hangers", [pytest.param(8, id="few"), pytest.param(100, id="many", marks=pytest.mark.trial)]
-)
-@pytest.mark.parametrize("beginnings", [40, 8])
+@pytest.mark.parametrize(("beginnings", "hangers"), few_and_many((40, 8), 8, 100))
 def test_evidence_years_without_change(beginnings: int, hangers: int) -> None:
     """It grows by 0.75 of the time watched: by the prior of tension and ends, 0.68, and a little
     of the others'."""
@@ -75,10 +86,7 @@ def test_evidence_years_without_change(beginnings: int, hangers: int) -> None:
     assert 0.68 - 3 * error < statistic.mean() / time.mean() < 0.85 + 3 * error
 
 
-@pytest.mark.parametrize(
-    "hangers", [pytest.param(6, id="few"), pytest.param(50, id="many", marks=pytest.mark.trial)]
-)
-@pytest.mark.parametrize("scatter", [0.003, 0.0055])
+@pytest.mark.parametrize(("scatter", "hangers"), few_and_many((0.0055, 0.003), 6, 50))
 def test_false_calls_below_limit(scatter: float, hangers: int) -> None:
     """Far fewer than the limit allows are called, and nearly all that lost a twelfth."""
     called, allowed = count_calls(scatter, hangers)

@@ -256,10 +256,10 @@ def held_out(
     )
 
 
-def check_hold_out(problem: GapProblem, hold_out: tuple[str, ...]) -> None:
+def check_hold_out(design: Design, hold_out: tuple[str, ...]) -> None:
     """Raise what `held_out` would, before anything is fitted."""
     if hold_out:
-        _named(problem.observations.design, hold_out)
+        _named(design, hold_out)
 
 
 def shrinkage(problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut) -> Shrinkage:
