@@ -18,7 +18,6 @@ from shm.errors import NothingThere
 from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.lineage import discarded_of_baselines, redescribed, settings_words, software
 from shm.pipeline.stream_health import blind_hangers, heard
-from shm.report.contents import BridgeReport
 from shm.report.formatting import Interval
 from shm.report.hanger_status import findings, still_detected
 from shm.report.hanger_summary import HangerSummary, LatestTest, PeriodSummary
@@ -30,7 +29,6 @@ from shm.report.open_warnings import (
     redescription_words,
     standing_out,
 )
-from shm.report.states import Period, called_words
 from shm.store import (
     BaselineGlance,
     Silence,
@@ -51,9 +49,11 @@ from shm.store.watch import (
 from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
-from shm.watch.alert_text import look_again
+from shm.watch.alert_text import called_words, look_again
 
 if TYPE_CHECKING:
+    from shm.report.contents import BridgeReport
+    from shm.report.states import Period
     from shm.watch.neighbours import BridgePattern, HangerShift
 
 
@@ -64,6 +64,8 @@ def bridge_report(
 
     Raises NothingThere before any test is through, and where none lies in the period.
     """
+    from shm.report.contents import BridgeReport  # `shm status` does without the engine it brings
+
     hangers = workspace.bridge.hangers
     lines = hanger_summaries(workspace, store, generated_at)
     if all(line.tension_n is None for line in lines):

@@ -213,23 +213,17 @@ class Alerts(Repository):
     """Alerts and the outbox: messages owed to hooks."""
 
     def list_all(
-        self,
-        hanger: int | None = None,
-        baseline_id: int | None = None,
-        *,
-        standing: bool | None = None,
+        self, hanger: int | None = None, *, standing: bool | None = None
     ) -> tuple[StoredAlert, ...]:
-        """Alerts as they were raised and acknowledged, the oldest first; of a hanger, against a
-        baseline where these are named, and only those whose condition stands, or has ended, where
-        `standing` tells.
+        """List alerts, the oldest first; of one hanger where named.
+
+        Only those whose condition stands, or has ended, where `standing` tells.
         """
         query = stored_alerts.order_by(alerts.c.id)
         if standing is not None:
             query = query.where(alerts.c.ended_at.is_(None) == standing)
         if hanger is not None:
             query = query.where(alerts.c.hanger == hanger)
-        if baseline_id is not None:
-            query = query.where(alerts.c.baseline_id == baseline_id)
         return tuple(stored_alert(row) for row in self.rows(query))
 
     def get(self, alert_id: int) -> StoredAlert:
