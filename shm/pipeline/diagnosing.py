@@ -7,11 +7,11 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from shm.errors import NothingThere
-from shm.inference.options import Progress, silent
 from shm.pipeline.lineage import diagnosis_lineage
 from shm.report.diagnosis_summary import write_line
 from shm.report.hanger_status import still_detected
 from shm.store import Store, StoredTest
+from shm.store.posteriors import list_baselines_in_force
 from shm.store.tests import list_test_rows
 from shm.store.watch import (
     find_latest_diagnosis,
@@ -22,6 +22,7 @@ from shm.values import Diagnosis, Hanger, ModalTest
 
 if TYPE_CHECKING:
     from shm.gap import GapOptions
+    from shm.inference.options import Progress
 
 LATEST_TESTS = 20
 """So many of the latest tests are diagnosed together."""
@@ -79,7 +80,8 @@ def find_last_change(store: Store, hanger: Hanger) -> datetime | None:
     None where neither is known. A change is in force while the watch detects it, or while an alert
     of it has not ended; what two tests agree on began with the first of them.
     """
-    baseline, latest = store.watch.baseline(hanger.id), find_latest_watches(store, [hanger])
+    baseline = list_baselines_in_force(store, [hanger]).get(hanger.id)
+    latest = find_latest_watches(store, [hanger])
     detected = list_detected_changes(store, [hanger]).get(hanger.id, ())
     watched = latest[hanger.id].watched if hanger.id in latest else None
     times = [change.began_by for change in still_detected(detected, watched, hanger)]
@@ -136,15 +138,16 @@ def diagnose_stored(
     hanger: Hanger,
     options: GapOptions,
     now: datetime,
-    progress: Progress = silent,
+    progress: Progress | None = None,
 ) -> Diagnosis:
     """Diagnose stored tests of a hanger, keep the diagnosis and return it.
 
     Raises as `shm.gap.diagnose` does.
     """
     from shm.gap import diagnose  # only who diagnoses needs it
+    from shm.inference.options import silent
 
-    found = diagnose(chosen.tests, hanger, options, progress)
+    found = diagnose(chosen.tests, hanger, options, progress or silent)
     return keep_diagnosis(store, chosen, hanger, found, options, now)
 
 
