@@ -216,8 +216,9 @@ def _without_a_test(
     store: Store, hangers: Sequence[Hanger], compared: Collection[int]
 ) -> list[BaselineGlance]:
     """Return baselines set by a person with which no test has been compared yet."""
-    baselines = list_baselines_in_force(store, hangers)
-    return [each for id_, each in baselines.items() if each.since and id_ not in compared]
+    others = [each for each in hangers if each.id not in compared]
+    baselines = list_baselines_in_force(store, others) if others else {}
+    return [each for each in baselines.values() if each.since]
 
 
 def _show(drifts: Sequence[Drift]) -> None:
