@@ -170,7 +170,8 @@ class HangersNow:
         silences = store.silences.list_all()
         self.works = [each for each in silences if each.is_maintenance]
         self.silences = tuple(each for each in silences if not each.is_over(now))
-        self.blind = blind_hangers(heard(workspace, store, now))
+        self.streams = heard(workspace, store, now)
+        self.blind = blind_hangers(self.streams)
         self.undated = list_undated_names(store)
         self.charts = control_charts(workspace, store)
         self._discarded = discarded_of_baselines(store)

@@ -531,6 +531,11 @@ def list_alert_page(
     return tuple(stored_alert(row) for row in store.rows(query.limit(limit)))
 
 
+def count_raised(store: Repository) -> int:
+    """Count all alerts that were ever raised."""
+    return int(store.scalar(sa.select(sa.func.count(alerts.c.id))))
+
+
 def count_alerts(store: Repository) -> tuple[int, int]:
     """Count the open and the acknowledged alerts."""
     noted = store.scalar(sa.select(sa.func.count(alerts.c.noted_at)))
