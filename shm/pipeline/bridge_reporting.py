@@ -46,7 +46,7 @@ from shm.store.watch import (
     list_detected_changes,
     list_diagnosed_hangers,
 )
-from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest
+from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint, Summary, WatchedTest
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
 from shm.watch.alert_text import called_words, look_again
@@ -203,18 +203,26 @@ class HangersNow:
             if point
             else blind,
             undated=self.undated.get(hanger.id, ()),
-            diagnosed=self._diagnosed(hanger),
+            diagnosed=self._diagnosed(hanger, watched, called, standing),
             control=control,
             tests=self.tests[hanger.id].tests if hanger.id in self.tests else 0,
         )
 
-    def _diagnosed(self, hanger: Hanger) -> str:
+    def _diagnosed(
+        self,
+        hanger: Hanger,
+        watched: WatchedTest | None,
+        called: Sequence[Change],
+        standing: Sequence[StoredAlert],
+    ) -> str:
         if hanger.id not in self._have_diagnosis:
             return ""
         # Few hangers are diagnosed, and the words of a diagnosis take long to import.
-        from shm.pipeline.diagnosing import describe_diagnosis
+        from shm.pipeline.diagnosing import describe_diagnosis, last_change
 
-        return describe_diagnosis(self._store, hanger)
+        baseline = self.baselines.get(hanger.id)
+        began_by = last_change(self._store, hanger, baseline, watched, called, standing)
+        return describe_diagnosis(self._store, hanger, began_by)
 
     def _warnings(
         self, hanger: Hanger, baseline: BaselineGlance | None, watched: WatchedTest | None
