@@ -18,9 +18,7 @@ import rich_click as click
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import stored_pattern
-from shm.report.hanger_tables import temperature_documents, temperature_table
 from shm.report.shifts import pattern_json, pattern_tables, shift_cells
-from shm.report.states import NOTHING_WATCHED
 from shm.store import Baseline, BaselineGlance
 from shm.store.posteriors import list_baselines_in_force
 from shm.store.watch import find_latest_watches
@@ -48,7 +46,8 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
     """
     if ctx.invoked_subcommand is not None:
         return
-    states, rebaselined = NOTHING_WATCHED, list[BaselineGlance]()
+    states: StatesOverTime | None = None
+    rebaselined: list[BaselineGlance] = []
     with opened_store(ctx) as (workspace, store):
         hangers: Sequence[Hanger] = workspace.bridge.hangers
         if hanger_id is not None:
@@ -70,7 +69,9 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
         )
     if flags.wants_json():
         document: dict[str, object] = {"drifts": [asdict(drift) for drift in shown]}
-        if hanger_id is not None:
+        if states is not None:
+            from shm.report.hanger_tables import temperature_documents
+
             document["temperature_coefficients"] = temperature_documents(states)
         show(document)
         return
@@ -82,7 +83,9 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
             "in after that baseline was set."
         )
         click.echo(paragraph(sentence))
-    if states.temperature_coefficients:
+    if states is not None and states.temperature_coefficients:
+        from shm.report.hanger_tables import temperature_table
+
         click.echo()
         show_texts(temperature_table(states))
 
@@ -205,6 +208,7 @@ def _document(made: Baseline) -> dict[str, object]:
 
 
 if TYPE_CHECKING:
+    from shm.report.states import StatesOverTime
     from shm.store import Store
 
 
@@ -212,8 +216,9 @@ def _without_a_test(
     store: Store, hangers: Sequence[Hanger], compared: Collection[int]
 ) -> list[BaselineGlance]:
     """Return baselines set by a person with which no test has been compared yet."""
-    baselines = list_baselines_in_force(store, hangers)
-    return [each for id_, each in baselines.items() if each.since and id_ not in compared]
+    others = [each for each in hangers if each.id not in compared]
+    baselines = list_baselines_in_force(store, others) if others else {}
+    return [each for each in baselines.values() if each.since]
 
 
 def _show(drifts: Sequence[Drift]) -> None:

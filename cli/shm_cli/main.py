@@ -118,6 +118,7 @@ class Verbs(click.RichGroup):
             return click.RichCommand(name=cmd_name, help=VERBS[cmd_name].summary)
         verb = VERBS[cmd_name]
         command: click.Command = getattr(import_module(verb.module), verb.name)
+        gc.freeze()  # or the first collection would look through all modules after all
         gc.enable()
         _take_workspace(command)
         _clean_output(command)

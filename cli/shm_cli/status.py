@@ -26,7 +26,7 @@ from shm.report.hanger_status import Status, bridge_message
 from shm.report.hanger_summary import HangerSummary
 from shm.report.open_warnings import dated_by_receipt
 from shm.store import ENDED, Decision, DeliveryState, Store, Workspace
-from shm.store.alerts import count_deliveries, describe_silence
+from shm.store.alerts import count_deliveries, count_raised, describe_silence
 from shm.store.journal import list_events, list_former_tests, list_steps
 from shm.store.point_outbox import PointOutbox
 from shm.store.recordings import (
@@ -220,8 +220,7 @@ def _actions(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
-    alerts, deliveries = store.alerts.list_all(), count_deliveries(store)
-    counts = count_stages(store)
+    counts, deliveries = count_stages(store), count_deliveries(store)
     ended = sum(counts[stage] for stage in ENDED)
     held, now = list_holds(store), utc_now()
     state = HangersNow(workspace, store, workspace.bridge.hangers, now)
@@ -241,7 +240,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
             for path, what in sorted(unsupported_entries(workspace.spool).items())
         ],
         "quarantine": sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json")),
-        "alerts": len(alerts),
+        "alerts": count_raised(store),
         "open_alerts": open_at.total(),
         "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
@@ -249,7 +248,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "silences": [
             describe_silence(each) for each in store.silences.list_all() if each.is_in_force(now)
         ],
-        "streams": [each.words for each in stream_leads(workspace, store, now)],
+        "streams": [each.words for each in stream_leads(state.streams)],
         "publications": [
             f"publish {each.name}: {words}"
             for each in workspace.bridge.publications

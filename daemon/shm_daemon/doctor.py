@@ -27,7 +27,7 @@ from shm.errors import NothingThere, ShmError
 from shm.models import competing_names
 from shm.pipeline.courier import quiet_until
 from shm.pipeline.lineage import discarded_of_baselines, redescribed
-from shm.pipeline.stream_health import stream_leads
+from shm.pipeline.stream_health import heard, stream_leads
 from shm.read import sandbox
 from shm.report.formatting import counted
 from shm.report.paper import read_logo
@@ -400,7 +400,7 @@ def _outdated_baselines(examined: DoctorContext) -> Iterator[Finding]:
 
 def check_streams(examined: DoctorContext) -> Iterator[Finding]:
     """Find streams that say nothing or are not read; nothing where none is described."""
-    leads = stream_leads(examined.workspace, examined.store, examined.now)
+    leads = stream_leads(heard(examined.workspace, examined.store, examined.now))
     yield from (warning("streams", lead.state.rstrip("."), lead.action) for lead in leads)
     if (streams := examined.workspace.bridge.streams) and not leads:
         yield ok("streams", f"{counted(len(streams), 'stream')}, heard within the hour")

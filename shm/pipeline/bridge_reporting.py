@@ -18,7 +18,6 @@ from shm.errors import NothingThere
 from shm.pipeline.controls import campaign_warnings, control_charts
 from shm.pipeline.lineage import discarded_of_baselines, redescribed, settings_words, software
 from shm.pipeline.stream_health import blind_hangers, heard
-from shm.report.contents import BridgeReport
 from shm.report.formatting import Interval
 from shm.report.hanger_status import findings, still_detected
 from shm.report.hanger_summary import HangerSummary, LatestTest, PeriodSummary
@@ -30,7 +29,6 @@ from shm.report.open_warnings import (
     redescription_words,
     standing_out,
 )
-from shm.report.states import Period, called_words
 from shm.store import (
     BaselineGlance,
     Silence,
@@ -48,12 +46,14 @@ from shm.store.watch import (
     list_detected_changes,
     list_diagnosed_hangers,
 )
-from shm.values import TENSION, Drift, Hanger, ResponsePoint, Summary, WatchedTest
+from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint, Summary, WatchedTest
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
-from shm.watch.alert_text import look_again
+from shm.watch.alert_text import called_words, look_again
 
 if TYPE_CHECKING:
+    from shm.report.contents import BridgeReport
+    from shm.report.states import Period
     from shm.watch.neighbours import BridgePattern, HangerShift
 
 
@@ -64,6 +64,8 @@ def bridge_report(
 
     Raises NothingThere before any test is through, and where none lies in the period.
     """
+    from shm.report.contents import BridgeReport  # `shm status` does without the engine it brings
+
     hangers = workspace.bridge.hangers
     lines = hanger_summaries(workspace, store, generated_at)
     if all(line.tension_n is None for line in lines):
@@ -168,7 +170,8 @@ class HangersNow:
         silences = store.silences.list_all()
         self.works = [each for each in silences if each.is_maintenance]
         self.silences = tuple(each for each in silences if not each.is_over(now))
-        self.blind = blind_hangers(heard(workspace, store, now))
+        self.streams = heard(workspace, store, now)
+        self.blind = blind_hangers(self.streams)
         self.undated = list_undated_names(store)
         self.charts = control_charts(workspace, store)
         self._discarded = discarded_of_baselines(store)
@@ -200,18 +203,26 @@ class HangersNow:
             if point
             else blind,
             undated=self.undated.get(hanger.id, ()),
-            diagnosed=self._diagnosed(hanger),
+            diagnosed=self._diagnosed(hanger, watched, called, standing),
             control=control,
             tests=self.tests[hanger.id].tests if hanger.id in self.tests else 0,
         )
 
-    def _diagnosed(self, hanger: Hanger) -> str:
+    def _diagnosed(
+        self,
+        hanger: Hanger,
+        watched: WatchedTest | None,
+        called: Sequence[Change],
+        standing: Sequence[StoredAlert],
+    ) -> str:
         if hanger.id not in self._have_diagnosis:
             return ""
         # Few hangers are diagnosed, and the words of a diagnosis take long to import.
-        from shm.pipeline.diagnosing import describe_diagnosis
+        from shm.pipeline.diagnosing import describe_diagnosis, last_change
 
-        return describe_diagnosis(self._store, hanger)
+        baseline = self.baselines.get(hanger.id)
+        began_by = last_change(self._store, hanger, baseline, watched, called, standing)
+        return describe_diagnosis(self._store, hanger, began_by)
 
     def _warnings(
         self, hanger: Hanger, baseline: BaselineGlance | None, watched: WatchedTest | None

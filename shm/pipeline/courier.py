@@ -411,7 +411,7 @@ class Courier:
         excluded = [each.delivery.id for each in self._sending]
         excluded += self._list_quiet(workspace, now)
         room = 2 * _THREADS
-        due = alerts.list_due_deliveries(now, room, excluded, _LONGEST_WAITS, begun=True)
+        due = alerts.list_due_deliveries(now, room, excluded, _LONGEST_WAITS)
         parts: defaultdict[int | None, list[Delivery]] = defaultdict(list)
         for part in alerts.list_deliveries(messages=[each.id for each in due]) if due else ():
             parts[part.message_id].append(part)

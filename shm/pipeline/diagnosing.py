@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
 from shm.errors import NothingThere
-from shm.inference.options import Progress, silent
 from shm.pipeline.lineage import diagnosis_lineage
 from shm.report.diagnosis_summary import write_line
 from shm.report.hanger_status import still_detected
-from shm.store import Store, StoredTest
+from shm.store import BaselineGlance, Store, StoredAlert, StoredTest
+from shm.store.posteriors import list_baselines_in_force
 from shm.store.tests import list_test_rows
 from shm.store.watch import (
     find_latest_diagnosis,
     find_latest_watches,
     list_detected_changes,
 )
-from shm.values import Diagnosis, Hanger, ModalTest
+from shm.values import Change, Diagnosis, Hanger, ModalTest, WatchedTest
 
 if TYPE_CHECKING:
     from shm.gap import GapOptions
+    from shm.inference.options import Progress
 
 LATEST_TESTS = 20
 """So many of the latest tests are diagnosed together."""
@@ -74,16 +76,33 @@ def choose_tests(
 
 
 def find_last_change(store: Store, hanger: Hanger) -> datetime | None:
+    """Return by when the last change in force of a hanger began; see `last_change`."""
+    latest = find_latest_watches(store, [hanger]).get(hanger.id)
+    return last_change(
+        store,
+        hanger,
+        list_baselines_in_force(store, [hanger]).get(hanger.id),
+        latest.watched if latest else None,
+        list_detected_changes(store, [hanger]).get(hanger.id, ()),
+        store.alerts.list_all(hanger.id, standing=True),
+    )
+
+
+def last_change(
+    store: Store,
+    hanger: Hanger,
+    baseline: BaselineGlance | None,
+    latest: WatchedTest | None,
+    detected: Sequence[Change],
+    standing: Sequence[StoredAlert],
+) -> datetime | None:
     """Return by when the last change that is in force began, or the baseline was set anew.
 
     None where neither is known. A change is in force while the watch detects it, or while an alert
     of it has not ended; what two tests agree on began with the first of them.
     """
-    baseline, latest = store.watch.baseline(hanger.id), find_latest_watches(store, [hanger])
-    detected = list_detected_changes(store, [hanger]).get(hanger.id, ())
-    watched = latest[hanger.id].watched if hanger.id in latest else None
-    times = [change.began_by for change in still_detected(detected, watched, hanger)]
-    for each in store.alerts.list_all(hanger.id, standing=True):
+    times = [change.began_by for change in still_detected(detected, latest, hanger)]
+    for each in standing:
         if each.alert.change is not None:
             times.append(each.alert.change.began_by)
         elif "beyond threshold" in each.alert.kinds:
@@ -103,7 +122,8 @@ def latest_diagnosis(store: Store, hanger: Hanger) -> Diagnosis | None:
     if stored is None:
         return None
     found = stored.diagnosis
-    if (began_by := _outdated_by(store, hanger, found)) is None:
+    began_by = find_last_change(store, hanger)
+    if began_by is None or not _is_outdated(store, hanger, found, began_by):
         return found
     remark = (
         f"These tests are from before {began_by:%Y-%m-%d}, when the watch reports a change. "
@@ -112,20 +132,22 @@ def latest_diagnosis(store: Store, hanger: Hanger) -> Diagnosis | None:
     return replace(found, remarks=(remark, *found.remarks))
 
 
-def _outdated_by(store: Store, hanger: Hanger, diagnosis: Diagnosis) -> datetime | None:
-    """Return by when a change began after all tests of a diagnosis; None without one."""
-    began_by = find_last_change(store, hanger)
-    if began_by is None:
-        return None
+def _is_outdated(store: Store, hanger: Hanger, diagnosis: Diagnosis, began_by: datetime) -> bool:
+    """Return True if all tests of a diagnosis are from before a change."""
     rows = list_test_rows(store, hanger.id)
     times = [row.time for row in rows if row.name in diagnosis.tests]
-    return None if not times or max(times) >= began_by else began_by
+    return bool(times) and max(times) < began_by
 
 
-def describe_diagnosis(store: Store, hanger: Hanger) -> str:
-    """Return verdict, tension and date of the latest diagnosis; empty if a change outdates it."""
+def describe_diagnosis(store: Store, hanger: Hanger, began_by: datetime | None) -> str:
+    """Return verdict, tension and date of the latest diagnosis.
+
+    Empty if it is from before the last change, which began by a time.
+    """
     stored = find_latest_diagnosis(store, hanger.id)
-    if stored is None or _outdated_by(store, hanger, stored.diagnosis) is not None:
+    if stored is None:
+        return ""
+    if began_by is not None and _is_outdated(store, hanger, stored.diagnosis, began_by):
         return ""
     return write_line(stored.diagnosis, stored.diagnosed_at)
 
@@ -136,15 +158,16 @@ def diagnose_stored(
     hanger: Hanger,
     options: GapOptions,
     now: datetime,
-    progress: Progress = silent,
+    progress: Progress | None = None,
 ) -> Diagnosis:
     """Diagnose stored tests of a hanger, keep the diagnosis and return it.
 
     Raises as `shm.gap.diagnose` does.
     """
     from shm.gap import diagnose  # only who diagnoses needs it
+    from shm.inference.options import silent
 
-    found = diagnose(chosen.tests, hanger, options, progress)
+    found = diagnose(chosen.tests, hanger, options, progress or silent)
     return keep_diagnosis(store, chosen, hanger, found, options, now)
 
 

@@ -16,11 +16,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass, replace
 from functools import cache
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from shm.assumptions import DEFAULTS, number_text
 from shm.documents import compact
-from shm.models import Model, build, competing_names
 from shm.pipeline.reconcile import SHM
 from shm.read import Limits
 from shm.settings import TABLE, Settings
@@ -36,6 +35,9 @@ from shm.store import (
 from shm.store.recordings import find_discard
 from shm.store.tests import list_refused_of_baselines
 from shm.values import Hanger, Posterior
+
+if TYPE_CHECKING:
+    from shm.models import Model
 
 IDENTIFY_SETTINGS = (
     "band_low_hz", "band_high_hz", "identifier", "cross_check", "estimator", "reference_force_n",
@@ -66,6 +68,8 @@ def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -
 
     Raises UsageError where the selected class does not apply to the hanger, or none does.
     """
+    from shm.models import build, competing_names  # not before they are needed
+
     if hanger.id in selected:
         return (build(selected[hanger.id], hanger, settings.priors),)
     names = competing_names(hanger, settings.model_names)
@@ -181,7 +185,10 @@ def redescribed(hanger: Hanger, baseline: Baseline | BaselineGlance | None) -> t
     """Return what has changed since the baseline was made, as `length_m from 12 to 12.4`."""
     if baseline is None or baseline.described is None:
         return ()
-    before, now = _comparable(baseline.described), _comparable(_described(hanger))
+    described = json.loads(compact(_described(hanger)))
+    if described == baseline.described:  # as a rule, and what follows takes five times as long
+        return ()
+    before, now = _comparable(baseline.described), _comparable(described)
     return tuple(_changes(before, now))
 
 

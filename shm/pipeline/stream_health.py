@@ -122,9 +122,8 @@ def classify_stream(
     return "sensor at fault" if any(each.kind in _AT_FAULT for each in standing) else "live"
 
 
-def stream_leads(workspace: Workspace, store: Store, now: datetime) -> tuple[Lead, ...]:
+def stream_leads(found: Sequence[StreamHealth]) -> tuple[Lead, ...]:
     """Return what somebody should know of the streams."""
-    found = heard(workspace, store, now)
     return (*leads_of(found), *backlog_leads(found))
 
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from shm.errors import BadInput, ShmError, StoreError
 from shm.pipeline import Clock, utc_now
-from shm.pipeline.reconcile import Condition, is_same_event, reconcile
+from shm.pipeline.reconcile import Condition, is_reported, reconcile
 from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day
 from shm.pipeline.stream_health import (
     evaluate_silent_streams,
@@ -398,11 +398,8 @@ class Streaming:
         is_open = [each for each in alerts if each.resolution is None]
         over = [each.alert for each in is_open if each.alert.key in found.ended]
         conditions = [Condition(each, "over", _OVER) for each in over]
-        known = [each.alert for each in alerts if is_again and each.baseline_id is None]
-        if found.alert and not any(
-            set(found.alert.kinds) <= set(each.kinds) and is_same_event(each, found.alert)
-            for each in known
-        ):
+        past = [each.alert for each in alerts if is_again and each.baseline_id is None]
+        if found.alert and not is_reported(found.alert, past):
             conditions.append(Condition(found.alert, "holds"))
         return reconcile(is_open, conditions)
 

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING
 
 import shm
 from shm.errors import NothingThere
-from shm.pipeline.reconcile import Evidence, conditions_of, is_gap_larger, reconcile
+from shm.pipeline.conditions import Evidence, conditions_of, is_gap_larger
+from shm.pipeline.reconcile import reconcile
 from shm.settings import Settings
 from shm.store import (
     Baseline,

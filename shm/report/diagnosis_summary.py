@@ -6,9 +6,9 @@ import math
 import statistics
 from collections.abc import Mapping
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 from shm.report import formatting
-from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_wording import (
     AFTER,
     is_of_the_measurement,
@@ -27,6 +27,9 @@ from shm.values import (
     effect_label,
 )
 from shm.values.verdict import Reason
+
+if TYPE_CHECKING:
+    from shm.report.contents import DiagnosisSheet
 
 _SURE = 0.9
 _WORTH_MEASURING = 1.0

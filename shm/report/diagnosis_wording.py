@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from shm.models.effects import EFFECTS
 from shm.report import formatting
 from shm.report.formatting import Interval
 from shm.report.sizes import Sizes
@@ -31,6 +30,8 @@ _PLACE_STARTS = {"sensor": "of the", "test": "in"}
 def is_of_the_measurement(claim: Claim) -> bool:
     """Return whether all that is named are faults of sensors, clock or what was clamped on."""
     names = {effect for cause in claim.causes for effect in cause.effects}
+    from shm.models.effects import EFFECTS  # the models take long to import, and few need it
+
     known = [EFFECTS.get(name) for name in names if name != "timebase"]
     return all(effect is not None and not effect.of_the_hanger for effect in known)
 
@@ -65,6 +66,8 @@ def effect_phrase(effect: str, at: str, estimates: Sequence[EffectEstimate]) -> 
     """Return what the effect is, how large, where; its name where the size is not known."""
     where = _place(at)
     try:
+        from shm.models.effects import EFFECTS
+
         wording = EFFECTS[effect].phrase.format_map(Sizes(estimates))
     except KeyError:
         wording = formatting.quantity(effect)

@@ -17,13 +17,12 @@ from shm.values import (
     NAN,
     TENSION,
     BoolArray,
-    Change,
     FloatArray,
     Hanger,
     TemperatureCoefficient,
     WatchedQuantity,
 )
-from shm.watch.alert_text import group_words, is_stiffness, probable_groups, quantity_words
+from shm.watch.alert_text import called_words, quantity_words
 from shm.watch.notices import off_the_baseline
 from shm.watch.state import Band, StateHistory, StateOptions, set_free, states
 
@@ -197,23 +196,3 @@ def _over_time(quantity: WatchedQuantity, history: StateHistory) -> QuantityOver
         quantity.baseline,
         quantity.unit,
     )
-
-
-def called_words(change: Change) -> str:
-    """Describe a change: `sudden: tension -6.3 %`.
-
-    Of a stiffness it is the ratio to before, of another cause the mean effect on the
-    frequencies.
-    """
-    kind = "sudden" if change.sudden > 0.5 else "slow"
-    groups = probable_groups(change)
-    if not groups:
-        return f"{kind}: not known what"
-    first = groups[0][0]
-    size = f"{100 * first.shift_mean:+z.1f} %"
-    if is_stiffness(first.quantity):
-        size = f"{10**first.shift_mean:.2f} times"
-    elif first.quantity != TENSION:
-        size = f"(frequencies {size})"
-    doubt = " (or another cause)" if len(groups) > 1 else ""
-    return f"{kind}: {group_words(groups[0])} {size}{doubt}"

@@ -213,23 +213,17 @@ class Alerts(Repository):
     """Alerts and the outbox: messages owed to hooks."""
 
     def list_all(
-        self,
-        hanger: int | None = None,
-        baseline_id: int | None = None,
-        *,
-        standing: bool | None = None,
+        self, hanger: int | None = None, *, standing: bool | None = None
     ) -> tuple[StoredAlert, ...]:
-        """Alerts as they were raised and acknowledged, the oldest first; of a hanger, against a
-        baseline where these are named, and only those whose condition stands, or has ended, where
-        `standing` tells.
+        """List alerts, the oldest first; of one hanger where named.
+
+        Only those whose condition stands, or has ended, where `standing` tells.
         """
         query = stored_alerts.order_by(alerts.c.id)
         if standing is not None:
             query = query.where(alerts.c.ended_at.is_(None) == standing)
         if hanger is not None:
             query = query.where(alerts.c.hanger == hanger)
-        if baseline_id is not None:
-            query = query.where(alerts.c.baseline_id == baseline_id)
         return tuple(stored_alert(row) for row in self.rows(query))
 
     def get(self, alert_id: int) -> StoredAlert:
@@ -325,12 +319,8 @@ class Alerts(Repository):
         limit: int,
         excluding: Collection[int] = (),
         waits: Sequence[timedelta] = (),
-        *,
-        begun: bool = False,
     ) -> tuple[Delivery, ...]:
-        """Deliveries whose time has come, the longest due first; of each message the first alone.
-
-        With `begun` only of messages: others, which may wait for months, must not fill the limit.
+        """List the first delivery of each message whose time has come, the longest due first.
 
         Also those that would wait longer than `waits` says for so many attempts, its last for more:
         the clock was ahead when they were put off.
@@ -341,17 +331,9 @@ class Alerts(Repository):
         at, tried = deliveries.c.next_attempt_at, deliveries.c.attempts
         is_counted = [tried == count for count in range(len(waits) - 1)] + [tried >= len(waits) - 1]
         too_far = [of & (at > now + wait) for of, wait in zip(is_counted, waits, strict=False)]
-        leads_message = (
-            sa.func.coalesce(deliveries.c.message_id, deliveries.c.id) == deliveries.c.id
-        )
-        due = (
-            (deliveries.c.state == DeliveryState.WAITING)
-            & leads_message
-            & sa.or_(at <= now, *too_far)
-        )
-        if begun:
-            due &= deliveries.c.message_id.is_not(None)
-        query = _outbox.where(due, deliveries.c.id.not_in(excluding))
+        is_first = deliveries.c.message_id == deliveries.c.id
+        waits_now = (deliveries.c.state == DeliveryState.WAITING) & sa.or_(at <= now, *too_far)
+        query = _outbox.where(is_first, waits_now, deliveries.c.id.not_in(excluding))
         return self._deliveries(query.order_by(deliveries.c.next_attempt_at).limit(limit))
 
     def save_delivery(self, delivery: Delivery, at: datetime) -> None:
@@ -535,6 +517,11 @@ def list_alert_page(
     if before is not None:
         query = query.where(_is_after(before, is_open=is_open))
     return tuple(stored_alert(row) for row in store.rows(query.limit(limit)))
+
+
+def count_raised(store: Repository) -> int:
+    """Count all alerts that were ever raised."""
+    return int(store.scalar(sa.select(sa.func.count(alerts.c.id))))
 
 
 def count_alerts(store: Repository) -> tuple[int, int]:

@@ -179,37 +179,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class CheckedStore:
-    """Hold the content of every table, and the faults of file, references and schema."""
+    """Hold the content of every table, and what is wrong with file, references, rows and schema."""
 
     tables: tuple[TableContent, ...]
-    faults: tuple[str, ...] = ()
-    """What SQLite finds wrong with its file."""
-    references: tuple[tuple[str, str], ...] = ()
-    """Rows that refer to a row that is not there, each with the table of that one."""
-    changed: tuple[str, ...] = ()
-    """Tables and indexes that are not as the migrations make them."""
-    unreadable: tuple[tuple[str, str], ...] = ()
-    """Rows of which a document or packed arrays cannot be read, each with the columns."""
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """A finding for each fault, broken reference and changed part of the schema."""
-        gone = "it refers to a row of {} that is not there."
-        return (
-            *(
-                Finding("fault of the file", "store", sentence(fault), _RESTORE)
-                for fault in self.faults
-            ),
-            *(
-                Finding("broken reference", where, gone.format(table), _RESTORE)
-                for where, table in self.references
-            ),
-            *(Finding("changed schema", name, _CHANGED, _COPY) for name in self.changed),
-            *(
-                Finding("unreadable row", where, f"its {what} cannot be read.", _RESTORE)
-                for where, what in self.unreadable
-            ),
-        )
+    findings: tuple[Finding, ...] = ()
 
     @property
     def troubles(self) -> tuple[str, ...]:
@@ -282,25 +255,32 @@ def check_store(store: Database, tell: Tell) -> CheckedStore:
     """Read everything that the store holds; raises StoreError where it cannot be read."""
     with store.reading() as connection:
         try:
-            faults, references = _faults(connection, "integrity_check"), _references(connection)
-            changed, unreadable = changed_objects(connection), list[tuple[str, str]]()
-            tables = contents(connection, tell, partial(_note_unreadable, unreadable))
-            return CheckedStore(tables, faults, references, changed, tuple(unreadable))
+            found = [_fault(each) for each in _faults(connection, "integrity_check")]
+            found += _broken_references(connection)
+            found += [
+                Finding("changed schema", name, _CHANGED, _COPY)
+                for name in changed_objects(connection)
+            ]
+            tables = contents(connection, tell, partial(_note_unreadable, found))
+            return CheckedStore(tables, tuple(found))
         except (sa.exc.DatabaseError, ValueError) as error:
             if connection.dialect.name != "sqlite":
                 raise
             cause = getattr(error, "orig", None) or error
-            return CheckedStore((), (f"the file is damaged: {cause}",))
+            return CheckedStore((), (_fault(f"the file is damaged: {cause}"),))
 
 
-def _note_unreadable(
-    found: list[tuple[str, str]], table: sa.Table, rows: Sequence[RowMapping]
-) -> None:
+def _fault(message: str) -> Finding:
+    return Finding("fault of the file", "store", sentence(message), _RESTORE)
+
+
+def _note_unreadable(found: list[Finding], table: sa.Table, rows: Sequence[RowMapping]) -> None:
     for row in rows:
         columns = [c.name for c in table.c if not _is_readable(c, row[c.name])]
         if columns:
             key = ",".join(str(row[column.name]) for column in table.primary_key)
-            found.append((f"{table.name}/{key}", " and ".join(columns)))
+            what = f"its {' and '.join(columns)} cannot be read."
+            found.append(Finding("unreadable row", f"{table.name}/{key}", what, _RESTORE))
 
 
 def _is_readable(column: sa.Column[Any], value: Any) -> bool:
@@ -373,12 +353,15 @@ def _faults(connection: Connection, check: str) -> tuple[str, ...]:
     return tuple(f"the file is damaged: {message}" for message in found if message != "ok")
 
 
-def _references(connection: Connection) -> tuple[tuple[str, str], ...]:
+def _broken_references(connection: Connection) -> list[Finding]:
     """Rows that refer to one that is not there; a PostgreSQL server allows none."""
     if connection.dialect.name != "sqlite":
-        return ()
-    broken = connection.exec_driver_sql("PRAGMA foreign_key_check")
-    return tuple((f"{row[0]}/{row[1]}", str(row[2])) for row in broken)
+        return []
+    gone = "it refers to a row of {} that is not there."
+    return [
+        Finding("broken reference", f"{row[0]}/{row[1]}", gone.format(row[2]), _RESTORE)
+        for row in connection.exec_driver_sql("PRAGMA foreign_key_check")
+    ]
 
 
 _PAGES_AT_ONCE = 1000  # technical: 4 MB, between which the daemon may write

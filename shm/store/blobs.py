@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from shm.documents import value_of
-from shm.models import class_units
 from shm.modes_document import MODES_SCHEMA, parse_modes
 from shm.store.columns import value_from
 from shm.values import (
@@ -103,6 +102,8 @@ def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
 
     What documents of former versions lack was then as it is where nothing is said.
     """
+    from shm.models import class_units  # who reads no posterior needs no models
+
     predicted = [
         {**entry, "mean_hz": entry["frequency_hz"]["mean"], "sd_hz": entry["frequency_hz"]["sd"]}
         for entry in document["predicted"]

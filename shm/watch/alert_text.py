@@ -10,9 +10,9 @@ import hashlib
 import math
 from collections.abc import Sequence
 from datetime import datetime
+from functools import cache
+from typing import TYPE_CHECKING
 
-from shm.models.effects import EFFECTS
-from shm.models.effects.base import OverTime
 from shm.values import (
     TENSION,
     Alert,
@@ -30,20 +30,33 @@ from shm.values.messages import NEXT_TEST, TODAY, WEEK, Lead, Urgency
 from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
 from shm.watch.limits import LIMITS
 
-CAUSES = {
-    **{name: each.over_time for name, each in EFFECTS.items() if each.over_time},
-    "unexplained": OverTime(
-        fell="no known cause explains it",
-        rose="no known cause explains it",
-        check="check hanger, sensors, axes and orders of modes in the test's files",
-    ),
-}
-"""Possible causes of moved frequencies, next to tension and end stiffness."""
+if TYPE_CHECKING:
+    from shm.models.effects.base import OverTime
 
 _WHICH_END, _FORMER = "which end is not known", " of its former value"
 
 
 # ---------------------------------------------------------------- what may have changed
+
+
+def cause_of(quantity: str) -> OverTime | None:
+    """Return a possible cause of moved frequencies; None for a tension or an end stiffness."""
+    is_own = is_ratio(quantity) or quantity.startswith("log10_k") or "end_stiffness" in quantity
+    return None if is_own else _causes().get(quantity)
+
+
+@cache
+def _causes() -> dict[str, OverTime]:
+    from shm.models.effects import EFFECTS  # the models take long to import, and most do without
+    from shm.models.effects.base import OverTime
+
+    unexplained = OverTime(
+        fell="no known cause explains it",
+        rose="no known cause explains it",
+        check="check hanger, sensors, axes and orders of modes in the test's files",
+    )
+    known = {name: each.over_time for name, each in EFFECTS.items() if each.over_time}
+    return {**known, "unexplained": unexplained}
 
 
 def suspected_groups(change: Change) -> list[tuple[Moved, ...]]:
@@ -84,8 +97,7 @@ def quantity_words(name: str, end: End | None = None, plane: Plane | None = None
 def group_words(group: Sequence[Moved]) -> str:
     """Return `end stiffness in both planes at the deck end`, a cause, or the quantities' names."""
     first = group[0]
-    if first.quantity in CAUSES:
-        cause = CAUSES[first.quantity]
+    if cause := cause_of(first.quantity):
         return cause.fell if first.shift_mean < 0 else cause.rose
     ends, planes = {each.end for each in group}, {each.plane for each in group}
     if len(group) == 1 or None in planes:
@@ -97,7 +109,7 @@ def group_words(group: Sequence[Moved]) -> str:
 
 
 def is_stiffness(quantity: str) -> bool:
-    return not is_ratio(quantity) and quantity not in CAUSES
+    return not is_ratio(quantity) and cause_of(quantity) is None
 
 
 def shift_words(quantity: str, mean: float, sd: float) -> str:
@@ -205,7 +217,7 @@ def _changed(change: Change) -> str:
 def _moved(group: Sequence[Moved]) -> str:
     """Return what moved together, where, and how far."""
     first = group[0]
-    if first.quantity in CAUSES:
+    if cause_of(first.quantity):
         return f"{group_words(group)} (frequencies {size_words(first)} on average)"
     if len(group) > 1 and any(each.quantity == TENSION for each in group):
         return _kind(group, sized=True)
@@ -218,7 +230,7 @@ def _moved(group: Sequence[Moved]) -> str:
 def _kind(group: Sequence[Moved], *, sized: bool = False) -> str:
     """Return a group in the fewest words, such as `end stiffness fell`, or with its size."""
     first = group[0]
-    if first.quantity in CAUSES:
+    if cause_of(first.quantity):
         size = f" (frequencies {_signed(first.shift_mean, first.shift_sd)})" if sized else ""
         return f"{group_words(group)}{size}"
     tension = next((each for each in group if each.quantity == TENSION), None)
@@ -250,13 +262,33 @@ def _state_of_frequencies(
     if change is None or not groups:
         return f"The frequencies of {name} changed{again}; the tests do not show which."
     first, since = groups[0][0], f"since {change.began_by:%Y-%m-%d}"
-    if first.quantity in CAUSES:
+    if cause_of(first.quantity):
         size = _signed(first.shift_mean, first.shift_sd)
         text = f"have{again} moved by different amounts {since}, on average by {size}"
         return f"The frequencies of {name} {text}."
     if first.together:
         return f"The frequencies of {name} {have(f'have{again}', first)} {since}."
     return f"The {first.quantity} of {name} {have(f'has{again}', first)} {since}."
+
+
+def called_words(change: Change) -> str:
+    """Describe a change: `sudden: tension -6.3 %`.
+
+    Of a stiffness it is the ratio to before, of another cause the mean effect on the
+    frequencies.
+    """
+    kind = "sudden" if change.sudden > 0.5 else "slow"
+    groups = probable_groups(change)
+    if not groups:
+        return f"{kind}: not known what"
+    first = groups[0][0]
+    size = f"{100 * first.shift_mean:+z.1f} %"
+    if is_stiffness(first.quantity):
+        size = f"{10**first.shift_mean:.2f} times"
+    elif first.quantity != TENSION:
+        size = f"(frequencies {size})"
+    doubt = " (or another cause)" if len(groups) > 1 else ""
+    return f"{kind}: {group_words(groups[0])} {size}{doubt}"
 
 
 # ---------------------------------------------------------------- what to do
@@ -296,7 +328,7 @@ def _action(
     again = f"{look_again(hanger)} {WEEK}" if urgency == "week" else f"Compare again {NEXT_TEST}"
     groups = probable_groups(change)
     if len(groups) > 1 and not beyond:
-        causes = [CAUSES[each[0].quantity] for each in groups if each[0].quantity in CAUSES]
+        causes = [cause for each in groups if (cause := cause_of(each[0].quantity))]
         if causes:
             check, by = causes[0].check, causes[0].apart_by
             return _as_sentence(f"{when}, {check}; then test with {by}, to tell them apart")
@@ -307,8 +339,8 @@ def _action(
     lead = _gravest(beyond) if beyond else groups[0][0] if groups else None
     if lead is None:
         return f"{again}{'' if hanger.has_sensors else ', with more modes'}."
-    if lead.quantity in CAUSES:
-        return _as_sentence(f"{when}, {CAUSES[lead.quantity].check}, then test again")
+    if cause := cause_of(lead.quantity):
+        return _as_sentence(f"{when}, {cause.check}, then test again")
     return f"{again}; {_look(lead, change)}."
 
 

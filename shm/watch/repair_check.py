@@ -10,16 +10,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shm.values import TENSION, Alert, Drift, Hanger, ModalTest
 from shm.values.rounding import NINETY_PERCENT
-from shm.watch.agreement import drifts_of
 from shm.watch.alert_text import is_stiffness, probable_groups, quantity_words, size_words
-from shm.watch.baseline_check import known_modes
 from shm.watch.limits import LIMITS
-from shm.watch.readings import Reader
+
+if TYPE_CHECKING:
+    from shm.watch.readings import Reader
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ def unrepaired(
     ends an alert; else it must be other than told, beyond the 90 % interval of both. Of an alert
     that names no quantity the frequencies must have come back half of the way.
     """
+    from shm.watch.agreement import drifts_of  # who lists the kinds of events needs no engine
+
     reader, of_baseline = before
     now = {each.quantity: each for each in drifts_of(reader, since, hanger)}
     found = []
@@ -92,6 +95,8 @@ def share_left(
 
 
 def _log_frequencies(tests: Sequence[ModalTest]) -> dict[tuple[str, int], float]:
+    from shm.watch.baseline_check import known_modes  # it computes: not before it is needed
+
     found: dict[tuple[str, int], list[float]] = {}
     for test in tests:
         for mode in known_modes(test):

@@ -31,7 +31,7 @@ from shm.values import (
 )
 from shm.values.drift import OF_ONE_VISIT
 from shm.watch.agreement import Way, agreement, way_of
-from shm.watch.alert_text import CAUSES, alert_of, message_of, suspects
+from shm.watch.alert_text import alert_of, cause_of, message_of, suspects
 from shm.watch.kept_state import from_bytes, to_bytes
 from shm.watch.limits import LIMITS
 from shm.watch.notices import (
@@ -269,7 +269,7 @@ def after(before: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertS
         alert = alert_of(hanger, (test.test, test.time), key, words, (kind,))
     wrong = frozenset((each.plane, each.order) for each in test.mistaken if each.is_notable)
     noted = before.noted & wrong
-    explained = any(each.moved and each.moved[0].quantity in CAUSES for each in called)
+    explained = any(each.moved and cause_of(each.moved[0].quantity) for each in called)
     if alert is None and not explained and (new := news_of(test.mistaken, noted)):
         # It waits while there is worse to report; a mass or lost section is why modes go astray.
         alert, noted = notice_of(test, hanger, new), wrong

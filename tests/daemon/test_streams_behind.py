@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline import utc_now
-from shm.pipeline.stream_health import stream_leads
+from shm.pipeline.stream_health import heard, stream_leads
 from shm.read.chunk_document import chunk_document
 from shm.store import Workspace
 from shm.store.ring import ring_of
@@ -84,4 +84,4 @@ def test_faces_name_unread_hours(
     save_windows(bridge, start, 15)
     ring_of(bridge).seal(utc_now() + PERIOD)
     with bridge.store() as store:
-        assert stream_leads(bridge, store, utc_now()) == ()
+        assert stream_leads(heard(bridge, store, utc_now())) == ()

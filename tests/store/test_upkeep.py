@@ -8,11 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from shm.store import Store
+from shm.store import Store, backups
 from shm.store.archive import Archive, Quarantine
 from shm.store.backups import (
     CheckedArchive,
-    CheckedStore,
     check_archive,
     check_store,
     quick_troubles,
@@ -93,7 +92,7 @@ def test_a_refused_file_is_moved_with_its_reason_and_its_sidecar(tmp_path: Path)
     assert len({path.name for path in quarantine.folder.glob("a*.csv")}) == 2
 
 
-def test_check_store_findings(filled_copy: Store) -> None:
+def test_check_store_findings(filled_copy: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each has its kind, its place and its remedy; a changed schema keeps no backup out."""
     whole = check_store(filled_copy, quiet)
     assert whole.findings == whole.unfit == quick_troubles(filled_copy) == ()
@@ -110,7 +109,8 @@ def test_check_store_findings(filled_copy: Store) -> None:
     assert (schema.kind, schema.where) == ("changed schema", "index ix_posterior_tests_test_id")
     assert "shm db backup FILE" in schema.remedy
     assert found.unfit == found.troubles[:-1]
-    file = CheckedStore((), ("the file is damaged: page 3",)).findings[0]
+    monkeypatch.setattr(backups, "_faults", lambda *_: ("the file is damaged: page 3",))
+    file = check_store(filled_copy, quiet).findings[0]
     assert (file.kind, file.where, file.what) == (
         "fault of the file", "store", "the file is damaged: page 3.",
     )  # fmt: skip

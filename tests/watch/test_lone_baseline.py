@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shm.models import build
-from shm.pipeline.reconcile import Evidence, why_over
+from shm.pipeline.conditions import Evidence, why_over
 from shm.values import Alert, Beside, Drift, ModalTest, WatchedTest
 from shm.watch import WatchOptions, watch_newest
 from shm.watch.baseline_check import check_baseline

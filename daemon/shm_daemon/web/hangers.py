@@ -17,7 +17,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import HangersNow
 from shm.report import formatting
 from shm.report.formatting import Interval
-from shm.report.states import StatesOverTime, called_words
+from shm.report.states import StatesOverTime
 from shm.store import DeliveryState, StoredWatch, TestRow
 from shm.store import TrendPoint as StoredPoint
 from shm.store.alerts import count_alerts, count_deliveries, list_hanger_events
@@ -26,6 +26,7 @@ from shm.store.recordings import count_stages
 from shm.store.tests import count_tests, list_test_rows
 from shm.values import Hanger
 from shm.values.rounding import ForceUnit, force_unit
+from shm.watch.alert_text import called_words
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader

@@ -139,7 +139,7 @@ def _silences(site: Site) -> list[Lead]:
 
 
 def _stream_leads(site: Site) -> Sequence[Lead]:
-    return stream_leads(site.workspace, site.store, utc_now())
+    return stream_leads(heard(site.workspace, site.store, utc_now()))
 
 
 def _streams(site: Site) -> Sequence[Lead]:
