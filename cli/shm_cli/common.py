@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import getpass
 import shutil
+import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -62,6 +63,11 @@ def answer(document: Mapping[str, object], words: str, kind: str = "") -> None:
         show(document, kind)
     else:
         click.echo(words)
+
+
+def can_ask() -> bool:
+    """Return True if a person at a terminal can be asked; with --json nothing is."""
+    return not wants_json() and sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def show_rows(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

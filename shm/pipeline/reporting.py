@@ -28,12 +28,27 @@ from shm.pipeline.lineage import (
 from shm.pipeline.steps import identify_options
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import peek_test, read_test
-from shm.report.contents import HangerReport, ModalTestReport, TensionAtLevel, TrendRow
+from shm.report.contents import (
+    Deed,
+    HangerReport,
+    ModalTestReport,
+    TensionAtLevel,
+    TrendRow,
+)
 from shm.report.formatting import Interval
 from shm.report.hanger_report import StructureReport
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
-from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
-from shm.store.alerts import count_open_alerts
+from shm.store import (
+    Baseline,
+    EventKind,
+    HangerEvent,
+    Store,
+    StoredAlert,
+    StoredTest,
+    TrendPoint,
+    Workspace,
+)
+from shm.store.alerts import count_open_alerts, list_hanger_events
 from shm.store.posteriors import find_latest_trends, list_trend
 from shm.store.tests import (
     count_tests,
@@ -69,6 +84,7 @@ def hanger_report(
         report,
         alerts=tuple(each for each in report.alerts if period is None or period.holds(each.time)),
         inspections=tuple(e for e in report.inspections if period is None or period.holds(e.at)),
+        deeds=tuple(each for each in report.deeds if period is None or period.holds(each.at)),
         frequency_response=load_frequency_response(store, latest),
         hits=_hit_places(workspace, store, latest),
         states=hanger_states(
@@ -182,6 +198,32 @@ def hanger_now(
         redescribed=redescribed(hanger, in_force),
         discarded=discarded_of_baselines(store).get(hanger.id, ()),
         inspections=store.notes.list_all(hanger.id),
+        deeds=_deeds(store, hanger, trend),
+    )
+
+
+DEED_WORDS = {
+    EventKind.BASELINE: "baseline set",
+    EventKind.ADOPTED: "effect adopted",
+    EventKind.UNDONE: "adoption undone",
+}
+
+
+def _deeds(store: Store, hanger: Hanger, trend: Sequence[TrendPoint]) -> tuple[Deed, ...]:
+    """Return what people set and adopted, each where the trend shows it."""
+
+    def shown_at(event: HangerEvent) -> datetime:
+        """Return the event's time; of a baseline, that of its last test."""
+        if event.kind is not EventKind.BASELINE:
+            return event.at
+        baseline = store.watch.baseline(hanger.id, number=event.id)
+        names = baseline.posterior.tests if baseline else ()
+        return max((each.time for each in trend if each.test in names), default=event.at)
+
+    return tuple(
+        Deed(DEED_WORDS[event.kind], shown_at(event), f"by {event.who}: {event.why}")
+        for event in list_hanger_events(store, hanger.id)
+        if event.kind in DEED_WORDS
     )
 
 

@@ -38,12 +38,12 @@ def bridge_paper(data: BridgeReport) -> Paper:
                 lead=data.message.words,
                 summary=details(data),
                 facts=facts(data),
-                tables=filled(bars_table([line.bar for line in data.hangers])),
-                brief=filled(replace(_hangers(data), title="", note="")),
+                tables=filled(_hangers(data), bars_table([line.bar for line in data.hangers])),
+                brief=filled(replace(_hangers(data), title="", note="").with_units_in_headings()),
             ),
             Section("Along the bridge", figures=lambda: _figures(data)),
             *(_control_part(each) for each in data.controls),
-            Section("Numbers", tables=tables(data)),
+            Section("Numbers", tables=_other_tables(data)),
             *appendices(Section("Settings", tables=filled(settings(data.settings)))),
         ),
         generated_at=data.generated_at,
@@ -159,8 +159,12 @@ _NEXT_TO = {"repeatability": "repeatability", "above": "above limit", "slack": "
 
 def tables(data: BridgeReport) -> tuple[Table, ...]:
     """Return all tables that this report can fill."""
+    return (*filled(_hangers(data)), *_other_tables(data))
+
+
+def _other_tables(data: BridgeReport) -> tuple[Table, ...]:
+    """Return what stands behind the table of the hangers."""
     return filled(
-        _hangers(data),
         _courses(data),
         *(pattern_tables(data.pattern) if data.pattern else ()),
         _origin(data),
