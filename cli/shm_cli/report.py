@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,12 +38,12 @@ class _Report:
     document: Callable[[Any], dict[str, Any]]
 
 
-def _written(report: _Report, form: str, revision: str, *, is_full: bool) -> str | bytes:
+def _written(report: _Report, form: str, revision: str, *, is_brief: bool) -> str | bytes:
     if form == "json":
         return dump(report.document(report.content))
     if form == "text":
         paper = report.paper(report.content)
-        return (as_text if is_full else as_brief_text)(paper, readable_width())
+        return (as_brief_text if is_brief else as_text)(paper, readable_width())
     # What draws and sets is loaded where a page is asked for.
     with drawing():
         if form == "html":
@@ -103,8 +104,9 @@ def command(
     _refuse_pdf_on_a_terminal(form, out)
     now = utc_now()
     period = period_since(since, now) if since else None
-    report = _gathered(ctx, hanger_id, test_id, now, period)
-    _write(_written(report, form, revision, is_full=is_full or out is not None), out)
+    is_brief = form == "text" and not is_full and out is None
+    report = _gathered(ctx, hanger_id, test_id, now, period, is_brief=is_brief)
+    _write(_written(report, form, revision, is_brief=is_brief), out)
 
 
 def _gathered(
@@ -113,6 +115,8 @@ def _gathered(
     test_id: str | None,
     now: datetime,
     period: Period | None,
+    *,
+    is_brief: bool,
 ) -> _Report:
     with opened_store(ctx) as (workspace, store), waiting("gathering the numbers"):
         if hanger_id is None:
@@ -123,8 +127,8 @@ def _gathered(
             of_structure = structure_report(workspace, store, hanger_id, now)
             return _Report(of_structure, structure_paper, structure_json)
         if test_id is None:
-            of_hanger = hanger_report(workspace, store, hanger_id, now, period)
-            return _Report(of_hanger, hanger_paper, hanger_json)
+            of_hanger = hanger_report(workspace, store, hanger_id, now, period, is_brief=is_brief)
+            return _Report(of_hanger, partial(hanger_paper, is_brief=is_brief), hanger_json)
         sheet = modal_test_report(workspace, store, hanger_id, test_id)
         return _Report(replace(sheet, generated_at=now), modal_test_paper, modal_test_json)
 

@@ -71,14 +71,20 @@ def hanger_report(
     hanger_id: int,
     generated_at: datetime,
     period: Period | None = None,
+    *,
+    is_brief: bool = False,
 ) -> HangerReport:
     """All that the store knows of a hanger, for its report; its states over time take a second.
 
-    Of a `period`, tests, trend and alerts are those that lie in it. Raises BadInput for an unknown
-    hanger, NothingThere before its first test is through and where none lies in the period.
+    Of a `period`, tests, trend and alerts are those that lie in it. One that `is_brief` lacks what
+    only figures and tables show. Raises BadInput for an unknown hanger, NothingThere before its
+    first test is through and where none lies in the period.
     """
     hanger = workspace.bridge.hanger(hanger_id)
     report = hanger_now(workspace, store, hanger, _trend(store, hanger, period), generated_at)
+    report = replace(report, period=period, at_level=_at_level(workspace, report))
+    if is_brief:
+        return report
     latest = store.tests.named(hanger_id, report.latest.id)
     return replace(
         report,
@@ -91,8 +97,6 @@ def hanger_report(
             workspace, store, hanger, store.watch.baseline(hanger_id, report.posterior.model)
         ),
         neighbours=pattern_or_why(workspace, store)[0] if report.now.called else None,
-        period=period,
-        at_level=_at_level(workspace, report),
     )
 
 
