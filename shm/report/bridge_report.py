@@ -27,6 +27,7 @@ from shm.watch.control_chart import ControlChart
 
 def bridge_paper(data: BridgeReport) -> Paper:
     """Return the report of a bridge: summary, figures along the bridge, numbers."""
+    hangers = _hangers(data).with_units_in_headings()
     return Paper(
         title=data.bridge,
         period=str(data.period) if data.period else "",
@@ -38,8 +39,8 @@ def bridge_paper(data: BridgeReport) -> Paper:
                 lead=data.message.words,
                 summary=details(data),
                 facts=facts(data),
-                tables=filled(_hangers(data), bars_table([line.bar for line in data.hangers])),
-                brief=filled(replace(_hangers(data), title="", note="").with_units_in_headings()),
+                tables=filled(hangers, bars_table([line.bar for line in data.hangers])),
+                brief=filled(replace(hangers, title="", note="")),
             ),
             Section("Along the bridge", figures=lambda: _figures(data)),
             *(_control_part(each) for each in data.controls),
@@ -187,6 +188,7 @@ def _hangers(data: BridgeReport) -> Table:
         "equal temperature. Repeatability: the standard deviation between tests of one state. "
         "Alert: beyond a threshold. Watch: a change was detected, or a shift beyond a threshold "
         "is more probable than not. More: shm report --hanger N.",
+        may_break=True,
     )  # fmt: skip
 
 
