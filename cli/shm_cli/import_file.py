@@ -164,8 +164,7 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
 @click.option("--operator", default="", metavar="NAME", help="Who measured.")
 @click.option("--dry-run", is_flag=True, help="Only show what is understood; keep nothing.")
 @flags.json
-@click.pass_context
-def command(ctx: click.Context, /, file: Path, dry_run: bool, **options: Any) -> int:
+def command(file: Path, dry_run: bool, **options: Any) -> int:
     """Take in the first file of a logger; asks what it does not say.
 
     Later files of that logger need no answers: use `shm ingest FILE`, or copy them into the spool.
@@ -180,7 +179,7 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, **options: Any) ->
     Example: shm import export.csv
     Example: shm import export.csv --hanger 3 --place 4.2,4.2 --plane transverse,longitudinal
     """
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     asks = can_ask()
     if options["hanger"] is not None:
         workspace.bridge.tested(options["hanger"])

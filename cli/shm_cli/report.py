@@ -74,9 +74,7 @@ def _written(report: _Report, form: str, revision: str, *, is_brief: bool) -> st
 @click.option("--revision", metavar="TEXT", default="", help="The revision that a page names.")
 @click.option("--json", "as_json", is_flag=True, help="The same as --format json.")
 @click.option("--out", type=flags.NewFile(), metavar="FILE", help="Write here instead of stdout.")
-@click.pass_context
 def command(
-    ctx: click.Context,
     hanger_id: int | None,
     of_bridge: bool,
     form: str | None,
@@ -105,12 +103,11 @@ def command(
     now = utc_now()
     period = period_since(since, now) if since else None
     is_brief = form == "text" and not is_full and out is None
-    report = _gathered(ctx, hanger_id, test_id, now, period, is_brief=is_brief)
+    report = _gathered(hanger_id, test_id, now, period, is_brief=is_brief)
     _write(_written(report, form, revision, is_brief=is_brief), out)
 
 
 def _gathered(
-    ctx: click.Context,
     hanger_id: int | None,
     test_id: str | None,
     now: datetime,
@@ -118,7 +115,7 @@ def _gathered(
     *,
     is_brief: bool,
 ) -> _Report:
-    with opened_store(ctx) as (workspace, store), waiting("gathering the numbers"):
+    with opened_store() as (workspace, store), waiting("gathering the numbers"):
         if hanger_id is None:
             content = bridge_report(workspace, store, now, period)
             return _Report(content, bridge_paper, bridge_json)
