@@ -28,8 +28,7 @@ def token() -> None:
     help="`write` may upload and acknowledge, and read.",
 )
 @flags.json
-@click.pass_context
-def create(ctx: click.Context, name: str, scope: str) -> None:
+def create(name: str, scope: str) -> None:
     """Make a token and print it, once.
 
     It goes into the header `Authorization: Bearer TOKEN`. Only its checksum is kept: where it is
@@ -41,7 +40,7 @@ def create(ctx: click.Context, name: str, scope: str) -> None:
     from shm.pipeline import utc_now
     from shm.store import Scope
 
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         secret = store.upkeep.create_token(name, Scope(scope), utc_now())
     if flags.wants_json():
         show({"name": name, "scope": scope, "token": secret})
@@ -52,14 +51,13 @@ def create(ctx: click.Context, name: str, scope: str) -> None:
 
 @token.command("list")
 @flags.json
-@click.pass_context
-def list_tokens(ctx: click.Context) -> None:
+def list_tokens() -> None:
     """List tokens, their last use, and revoked ones.
 
     \b
     Example: shm token list --json
     """
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         tokens = store.upkeep.list_tokens()
     if flags.wants_json() or not tokens:
         document = [{**vars(each), "scopes": sorted(each.scopes)} for each in tokens]
@@ -76,8 +74,7 @@ def list_tokens(ctx: click.Context) -> None:
 @token.command()
 @click.argument("name")
 @flags.json
-@click.pass_context
-def revoke(ctx: click.Context, name: str) -> None:
+def revoke(name: str) -> None:
     """Revoke a token at once.
 
     \b
@@ -85,7 +82,7 @@ def revoke(ctx: click.Context, name: str) -> None:
     """
     from shm.pipeline import utc_now
 
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         store.upkeep.revoke_token(name, utc_now())
     answer({"name": name, "revoked": True}, f"Token {name} is revoked.")
 
@@ -109,8 +106,7 @@ def user() -> None:
 )
 @click.option("--single-sign-on", "vouched", is_flag=True, help="No password: by that alone.")
 @flags.json
-@click.pass_context
-def add(ctx: click.Context, name: str, role: str, vouched: bool) -> None:
+def add(name: str, role: str, vouched: bool) -> None:
     """Add a user; the password is asked for, or read from stdin.
 
     A password has at least 15 characters: four or five words will do.
@@ -121,21 +117,20 @@ def add(ctx: click.Context, name: str, role: str, vouched: bool) -> None:
     from shm.pipeline import utc_now
     from shm.store.rows import Role
 
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         store.people.add(name, Role(role), None if vouched else _asked(), utc_now())
     answer({"name": name, "role": role}, f"{name} may sign in as {role}.")
 
 
 @user.command("list")
 @flags.json
-@click.pass_context
-def list_users(ctx: click.Context) -> None:
+def list_users() -> None:
     """List users, their roles, and removed users.
 
     \b
     Example: shm user list --json
     """
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         users = store.people.list_all()
     if flags.wants_json() or not users:
         answer({"users": [vars(each) for each in users]}, "No user has been made.")
@@ -151,8 +146,7 @@ def list_users(ctx: click.Context) -> None:
 @user.command()
 @click.argument("name")
 @flags.json
-@click.pass_context
-def remove(ctx: click.Context, name: str) -> None:
+def remove(name: str) -> None:
     """Remove a user and sign them out everywhere; the last engineer needs a successor first.
 
     \b
@@ -160,7 +154,7 @@ def remove(ctx: click.Context, name: str) -> None:
     """
     from shm.pipeline import utc_now
 
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         store.people.remove(name, utc_now())
     answer({"name": name, "removed": True}, f"{name} may not sign in any more.")
 
@@ -168,8 +162,7 @@ def remove(ctx: click.Context, name: str) -> None:
 @user.command()
 @click.argument("name")
 @flags.json
-@click.pass_context
-def password(ctx: click.Context, name: str) -> None:
+def password(name: str) -> None:
     """Set a new password, asked for or read from stdin; signs the user out everywhere.
 
     It has at least 15 characters.
@@ -179,7 +172,7 @@ def password(ctx: click.Context, name: str) -> None:
     """
     from shm.pipeline import utc_now
 
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         store.people.set_password(name, _asked(), utc_now())
     answer({"name": name, "changed": True}, f"{name} has a new password.")
 
@@ -187,8 +180,7 @@ def password(ctx: click.Context, name: str) -> None:
 @user.command("single-sign-on")
 @click.argument("name")
 @flags.json
-@click.pass_context
-def use_single_sign_on(ctx: click.Context, name: str) -> None:
+def use_single_sign_on(name: str) -> None:
     """Switch a user from password to single sign-on; signs the user out everywhere.
 
     \b
@@ -196,7 +188,7 @@ def use_single_sign_on(ctx: click.Context, name: str) -> None:
     """
     from shm.pipeline import utc_now
 
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         store.people.set_single_sign_on(name, utc_now())
     answer({"name": name, "changed": True}, f"{name} signs in by single sign-on alone.")
 

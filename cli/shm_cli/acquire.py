@@ -78,10 +78,7 @@ def _channel_of(text: str, name: str, option: str) -> Channel:
 @flags.hanger_file
 @flags.seed
 @flags.json
-@click.pass_context
 def command(
-    ctx: click.Context,
-    /,
     device: str,
     hammer: str,
     sensors: tuple[str, ...],
@@ -104,7 +101,7 @@ def command(
 
     if out.suffix.lower() != ".zip":
         raise UsageError(f"{out.name} is no .zip.", remedy="Write --out TEST.zip.")
-    hanger = one_hanger(ctx, hanger_file, hanger_id)
+    hanger = one_hanger(hanger_file, hanger_id)
     named = ((text, f"acc_{n}", "--sensor") for n, text in enumerate(sensors, start=1))
     channels = tuple(_channel_of(*each) for each in ((hammer, "force", "--hammer"), *named))
     if device == _SIMULATED:

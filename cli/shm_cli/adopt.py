@@ -38,9 +38,7 @@ from shm_cli.common import answer, opened_store, progress_bar, show, show_rows
 @flags.why
 @flags.who
 @flags.json
-@click.pass_context
 def adopt(
-    ctx: click.Context,
     hanger_id: int,
     effects: tuple[str, ...],
     at: tuple[str, ...],
@@ -58,7 +56,7 @@ def adopt(
     Example: shm gap adopt --hanger 3 --effect point_mass --why "clamp of the lamp at 3.4 m"
     """
     request = AdoptionRequest(effects, at, baseline, why, who)
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         with progress_bar() as progress:
             made = adopt_in_store(workspace, store, hanger, request, utc_now(), progress)
@@ -71,14 +69,13 @@ def adopt(
 @flags.hanger()
 @click.option("--all", "undone", is_flag=True, help="Those that were dropped too.")
 @flags.json
-@click.pass_context
-def adopted(ctx: click.Context, hanger_id: int | None, undone: bool) -> None:
+def adopted(hanger_id: int | None, undone: bool) -> None:
     """List adopted effects and the gap since then.
 
     \b
     Example: shm gap adopted --hanger 3
     """
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.hanger(hanger_id)
         found = list_adoptions(store, hanger_id, undone=undone)
@@ -103,9 +100,7 @@ def adopted(ctx: click.Context, hanger_id: int | None, undone: bool) -> None:
 @flags.why
 @flags.who
 @flags.json
-@click.pass_context
 def drop(
-    ctx: click.Context,
     hanger_id: int,
     number: int | None,
     why: str,
@@ -118,7 +113,7 @@ def drop(
     \b
     Example: shm gap drop --hanger 3 --why "the clamp was taken off"
     """
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         workspace.bridge.hanger(hanger_id)
         chosen = _chosen(store, hanger_id, number)
         made = store.posteriors.drop_adoption(chosen.id, why, who, utc_now())

@@ -33,7 +33,7 @@ def command(ctx: click.Context, hanger_id: int | None) -> None:
     Example: shm alerts --hanger 7 --json
     """
     if ctx.invoked_subcommand is None:
-        _list(ctx, hanger_id)
+        _list(hanger_id)
 
 
 @command.command()
@@ -45,9 +45,7 @@ def command(ctx: click.Context, hanger_id: int | None) -> None:
 @click.option("--why", type=flags.Words(), required=True, help="For the record.")
 @flags.who
 @flags.json
-@click.pass_context
 def silence(
-    ctx: click.Context,
     hanger_id: int | None,
     whole: bool,
     since: datetime | None,
@@ -69,7 +67,7 @@ def silence(
     if whole == (hanger_id is not None):
         raise UsageError("name one hanger, or all.", remedy="Give --hanger N or --bridge.")
     now = utc_now()
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.tested(hanger_id)
         made = store.silences.make(
@@ -91,15 +89,14 @@ def silence(
 
 @command.command()
 @flags.json
-@click.pass_context
-def silences(ctx: click.Context) -> None:
+def silences() -> None:
     """List silences and maintenance windows, with author and reason.
 
     \b
     Example: shm alerts silences --json
     """
     now = utc_now()
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         found = store.silences.list_all()
     if flags.wants_json() or not found:
         document = {"silences": [silence_row(each, now) for each in found]}
@@ -125,15 +122,14 @@ def _silence_cells(each: Silence, now: datetime) -> tuple[str, ...]:
 @click.argument("silence_id", type=int, metavar="ID")
 @flags.who
 @flags.json
-@click.pass_context
-def unsilence(ctx: click.Context, silence_id: int, who: str) -> None:
+def unsilence(silence_id: int, who: str) -> None:
     """End a silence now.
 
     \b
     Example: shm alerts unsilence 3
     """
     now = utc_now()
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         ended = store.silences.end(silence_id, who, now)
     answer(
         silence_row(ended, now),
@@ -164,8 +160,7 @@ def _at(time: datetime) -> str:
 @click.option("--resolved", is_flag=True, help="Its cause is gone or explained: hooks hear of it.")
 @flags.who
 @flags.json
-@click.pass_context
-def acknowledge(ctx: click.Context, alert_id: int, why: str, resolved: bool, who: str) -> None:
+def acknowledge(alert_id: int, why: str, resolved: bool, who: str) -> None:
     """Acknowledge an alert.
 
     ID is the number that `shm alerts` shows. The alert is open no more; the watch goes on as it
@@ -176,7 +171,7 @@ def acknowledge(ctx: click.Context, alert_id: int, why: str, resolved: bool, who
     Example: shm alerts ack 4 --why "crew is on its way"
     Example: shm alerts ack 4 --resolved --why "crew was there on 3 May: pin replaced"
     """
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         note = store.alerts.resolve if resolved else store.alerts.acknowledge
         noted = note(alert_id, who, why, utc_now())
     done = "resolved" if resolved else "acknowledged"
@@ -208,8 +203,7 @@ def acknowledgement_words(stored: StoredAlert) -> str:
 @command.command()
 @click.argument("alert_id", type=int, metavar="ID")
 @flags.json
-@click.pass_context
-def resend(ctx: click.Context, alert_id: int) -> None:
+def resend(alert_id: int) -> None:
     """Send an alert again to the hooks that gave it up.
 
     A hook that keeps failing is given up after `hook_attempts` tries. Mend it, see that it works
@@ -218,7 +212,7 @@ def resend(ctx: click.Context, alert_id: int) -> None:
     \b
     Example: shm alerts resend 4
     """
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         owed = store.alerts.resend(alert_id, utc_now())
     hooks = list(dict.fromkeys(each.hook for each in owed))
     answer(
@@ -237,8 +231,7 @@ def resend(ctx: click.Context, alert_id: int) -> None:
     help="A hook of bridge.toml.",
 )
 @flags.json
-@click.pass_context
-def test(ctx: click.Context, name: str) -> None:
+def test(name: str) -> None:
     """Send a test alert to a hook.
 
     It goes the way of every alert, once, whether the daemon runs or not. Only the audit log keeps
@@ -249,7 +242,7 @@ def test(ctx: click.Context, name: str) -> None:
     """
     from shm_daemon.hooks.trial import send_test_alert
 
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     hook = _described(workspace.bridge, name)
     found = send_test_alert(workspace, hook, os.environ, utc_now())
     document = {"hook": name, "kind": hook.kind, "key": found.alert.key, "answer": found.answer}
@@ -268,8 +261,8 @@ def _described(bridge: Bridge, name: str) -> Hook:
     )
 
 
-def _list(ctx: click.Context, hanger_id: int | None) -> None:
-    with opened_store(ctx) as (workspace, store):
+def _list(hanger_id: int | None) -> None:
+    with opened_store() as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.tested(hanger_id)
         alerts = store.alerts.list_all(hanger_id)

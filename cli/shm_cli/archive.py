@@ -30,8 +30,7 @@ def command() -> None:
 )
 @click.option("--dry-run", is_flag=True, help="Only say what would go.")
 @flags.json
-@click.pass_context
-def prune(ctx: click.Context, keep_days: int, dry_run: bool) -> None:
+def prune(keep_days: int, dry_run: bool) -> None:
     """Remove old raw files that have a copy elsewhere; all results stay.
 
     A raw file is removed only if its recording is done and a copy recorded by
@@ -40,7 +39,7 @@ def prune(ctx: click.Context, keep_days: int, dry_run: bool) -> None:
     \b
     Example: shm archive prune --keep-days 400 --dry-run
     """
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         with progress_bar() as tell:
             before = utc_now() - timedelta(days=keep_days)
             found = removable(store, workspace.archive, before, tell)
@@ -58,14 +57,13 @@ def prune(ctx: click.Context, keep_days: int, dry_run: bool) -> None:
 @command.command("fetch")
 @click.argument("which", metavar="ID")
 @flags.json
-@click.pass_context
-def fetch_command(ctx: click.Context, which: str) -> None:
+def fetch_command(which: str) -> None:
     """Fetch the raw file of a recording (by number) or test (by name) from its copy.
 
     \b
     Example: shm archive fetch t7
     """
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         recording = store.recordings.get(find_recording(store, which)[0])
         held = workspace.archive.holds_whole(recording.file)
         folder = None if held else fetch(store, workspace.archive, recording)

@@ -13,11 +13,9 @@ from shm_cli.common import is_workspace, one_hanger, open_workspace, readable_wi
 ASSUMPTIONS_SCHEMA = "shm.assumptions/1"
 
 
-def show_assumptions(
-    ctx: click.Context, hanger_file: Path | None, hanger_id: int | None, as_json: bool
-) -> None:
+def show_assumptions(hanger_file: Path | None, hanger_id: int | None, as_json: bool) -> None:
     """Print the table of a hanger, of the bridge, or of the defaults outside of a workspace."""
-    assumed = _in_force(ctx, hanger_file, hanger_id)
+    assumed = _in_force(hanger_file, hanger_id)
     if as_json:
         rows = {name: row_document(row) for name, row in assumed.items()}
         show({"schema": ASSUMPTIONS_SCHEMA, "assumptions": rows})
@@ -25,10 +23,10 @@ def show_assumptions(
         click.echo("\n".join(_paragraph(row) for row in assumed.values()))
 
 
-def _in_force(ctx: click.Context, hanger_file: Path | None, hanger_id: int | None) -> Assumptions:
+def _in_force(hanger_file: Path | None, hanger_id: int | None) -> Assumptions:
     if hanger_file is not None or hanger_id is not None:
-        return one_hanger(ctx, hanger_file, hanger_id).assumptions
-    return open_workspace(ctx).bridge.assumptions if is_workspace(ctx) else DEFAULTS
+        return one_hanger(hanger_file, hanger_id).assumptions
+    return open_workspace().bridge.assumptions if is_workspace() else DEFAULTS
 
 
 def _paragraph(row: Assumption) -> str:

@@ -15,7 +15,7 @@ from shm.errors import StoreError
 from shm.pipeline import utc_now
 from shm.values import printable
 from shm_cli import flags
-from shm_cli.common import open_workspace, paragraph, show
+from shm_cli.common import open_workspace, paragraph, show, workspace_folder
 from shm_cli.terminal import Terminal
 from shm_daemon.doctor import Finding, Level, examine
 
@@ -30,8 +30,7 @@ _FAULT = 1
 
 @click.command()
 @flags.json
-@click.pass_context
-def doctor(ctx: click.Context) -> int:
+def doctor() -> int:
     """Check the installation and the workspace.
 
     Looks at folders, disks, store, daemon, spool, recordings, backups, clock, hooks, hangers,
@@ -41,7 +40,7 @@ def doctor(ctx: click.Context) -> int:
     \b
     Example: shm --workspace arch doctor
     """
-    findings = examine(Path(ctx.obj), utc_now())
+    findings = examine(Path(workspace_folder()), utc_now())
     if flags.wants_json():
         worst = max((each.level for each in findings), key=list(Level).index)
         show({"worst": worst, "findings": [asdict(each) for each in findings]})
@@ -65,8 +64,7 @@ def _show_findings(findings: Sequence[Finding]) -> None:
 
 @click.command()
 @flags.json
-@click.pass_context
-def bridges(ctx: click.Context) -> None:
+def bridges() -> None:
     """Show the state of this bridge and of the others of bridge.toml.
 
     The dashboard of each [[other_bridge]] is asked; one that does not answer is named, with what
@@ -80,7 +78,7 @@ def bridges(ctx: click.Context) -> None:
     from shm_daemon.web.other_bridges import ask_all
     from shm_daemon.web.site import Description, Site
 
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     site = Site(Description(workspace), Address())
     try:
         others = ask_all(workspace.bridge.other_bridges, workspace.folder)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import getpass
 import shutil
+import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -64,6 +65,11 @@ def answer(document: Mapping[str, object], words: str, kind: str = "") -> None:
         click.echo(words)
 
 
+def can_ask() -> bool:
+    """Return True if a person at a terminal can be asked; with --json nothing is."""
+    return not wants_json() and sys.stdin.isatty() and sys.stdout.isatty()
+
+
 def show_rows(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print rows of texts as a table that fits the terminal; in a file no column is narrow."""
     from shm.report.as_text import laid_out
@@ -104,51 +110,58 @@ def paragraph(text: str) -> str:
     return textwrap.fill(text, readable_width())
 
 
-def open_workspace(ctx: click.Context, **flags: object) -> Workspace:
+def workspace_folder() -> str:
+    """Return the folder of the running command."""
+    context = click.get_current_context()
+    assert context is not None
+    return str(context.obj)
+
+
+def open_workspace(**flags: object) -> Workspace:
     """Return the workspace of the command; `flags` are settings given on the command line."""
     from shm.store import Workspace
     from shm.store.journal import COMMAND_LINE, Actor
 
-    opened = Workspace.open(ctx.obj, flags)
+    opened = Workspace.open(workspace_folder(), flags)
     return replace(opened, actor=Actor(getpass.getuser(), COMMAND_LINE))
 
 
-def is_workspace(ctx: click.Context) -> bool:
+def is_workspace() -> bool:
     """Return True if the folder of the command is a workspace."""
-    return (Path(ctx.obj) / "bridge.toml").is_file()
+    return (Path(workspace_folder()) / "bridge.toml").is_file()
 
 
 @contextmanager
-def opened_store(ctx: click.Context) -> Iterator[tuple[Workspace, Store]]:
+def opened_store() -> Iterator[tuple[Workspace, Store]]:
     """Return the workspace of the command and its store, open."""
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     with workspace.store() as store:
         yield workspace, store
 
 
-def one_hanger(ctx: click.Context, hanger_file: Path | None, hanger_id: int | None) -> Hanger:
+def one_hanger(hanger_file: Path | None, hanger_id: int | None) -> Hanger:
     """Return the hanger that the options name; raises UsageError where they name none."""
     if hanger_file is not None:
         return load_hanger(hanger_file, hanger_id)
     if hanger_id is None:
         raise UsageError("which hanger?", remedy="Give --hanger N, or --hanger-file H.toml.")
-    return open_workspace(ctx).bridge.hanger(hanger_id)
+    return open_workspace().bridge.hanger(hanger_id)
 
 
 def tests_and_hanger(
-    ctx: click.Context, modes_file: Path | None, hanger_file: Path | None, hanger_id: int | None
+    modes_file: Path | None, hanger_file: Path | None, hanger_id: int | None
 ) -> tuple[tuple[ModalTest, ...], Hanger]:
     """Return tests of a MODES.json with their hanger, or the latest of the workspace."""
     if modes_file is not None:
         tests = load_modes(modes_file)
         if hanger_id is None and hanger_file is None:
             hanger_id = tests[0].hanger
-        hanger = one_hanger(ctx, hanger_file, hanger_id)
+        hanger = one_hanger(hanger_file, hanger_id)
         return tests, hanger
     from shm.pipeline.diagnosing import latest_tests
 
-    hanger = one_hanger(ctx, hanger_file, hanger_id)
-    with opened_store(ctx) as (_, store):
+    hanger = one_hanger(hanger_file, hanger_id)
+    with opened_store() as (_, store):
         return (latest_tests(store, hanger, 1)[0].test,), hanger
 
 

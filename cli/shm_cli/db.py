@@ -62,8 +62,7 @@ def command() -> None:
 
 @command.command()
 @flags.json
-@click.pass_context
-def upgrade(ctx: click.Context) -> None:
+def upgrade() -> None:
     """Upgrade the store to the schema of this version; make its tables on a new server.
 
     Then what the reports show of older tests is summed up once more, hanger by hanger. That may be
@@ -72,7 +71,7 @@ def upgrade(ctx: click.Context) -> None:
     \b
     Example: shm --workspace arch db upgrade
     """
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     with workspace.lock():
         with waiting("upgrading the store"):
             Store.upgrade(workspace.location)
@@ -89,8 +88,7 @@ def upgrade(ctx: click.Context) -> None:
 @command.command()
 @click.option("--archive", "with_archive", is_flag=True, help="Read the raw files too.")
 @flags.json
-@click.pass_context
-def check(ctx: click.Context, with_archive: bool) -> None:
+def check(with_archive: bool) -> None:
     """Check the complete store; exit code 5 on any fault.
 
     With --archive, each raw file must be there with the SHA-256 that it is named by. Two stores
@@ -99,7 +97,7 @@ def check(ctx: click.Context, with_archive: bool) -> None:
     \b
     Example: shm db check --archive
     """
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     with workspace.store() as store, progress_bar() as tell:
         checked, location = check_store(store, tell), store.location
         archive = check_archive(store, workspace.archive, tell) if with_archive else None
@@ -137,9 +135,7 @@ def check(ctx: click.Context, with_archive: bool) -> None:
     "--print-timer", "as_timer", is_flag=True, help="Only print a timer that begins it each night."
 )
 @flags.json
-@click.pass_context
 def backup(
-    ctx: click.Context,
     target: Path,
     copies: Path | None,
     as_unit: bool,
@@ -155,7 +151,7 @@ def backup(
     \b
     Example: shm db backup /backup/arch-2026-05-01.db --archive /backup/archive
     """
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     if as_unit or as_timer:
         _print_backup_unit(workspace.folder, target, copies, as_timer)
         return
@@ -208,8 +204,7 @@ def _print_backup_unit(workspace: Path, target: Path, copies: Path | None, timer
 )
 @_copies_option
 @flags.json
-@click.pass_context
-def restore_command(ctx: click.Context, file: Path, replace: bool, copies: Path | None) -> None:
+def restore_command(file: Path, replace: bool, copies: Path | None) -> None:
     """Restore a backup into an empty store; --replace keeps the former contents as a file.
 
     No daemon may be active. A backup of an older schema is brought to the present one. With
@@ -219,7 +214,7 @@ def restore_command(ctx: click.Context, file: Path, replace: bool, copies: Path 
     Example: shm db restore /backup/arch-2026-05-01.db --replace
     """
     _refuse_no_backup(file)
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     keep_as = workspace.folder / f"shm-before-restore-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.db"
     with workspace.lock(), progress_bar() as tell:
         restored = restore(workspace.location, file, keep_as, tell, replace=replace)
@@ -240,8 +235,7 @@ def restore_command(ctx: click.Context, file: Path, replace: bool, copies: Path 
 @command.command()
 @click.option("--to", "target", required=True, metavar="URL", help="A PostgreSQL URL, or a file.")
 @flags.json
-@click.pass_context
-def copy(ctx: click.Context, target: str) -> None:
+def copy(target: str) -> None:
     """Copy the store into an empty one of either kind, and compare rows and checksums.
 
     Then name that one in SHM_STORE and put shm.db away. A password is better given by PGPASSWORD or
@@ -250,7 +244,7 @@ def copy(ctx: click.Context, target: str) -> None:
     \b
     Example: shm db copy --to postgresql://shm@db.example.org/arch
     """
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     place = target if "://" in target else Path(target).resolve()
     with workspace.lock(), workspace.store() as store, progress_bar() as tell:
         tables = copy_store(store, place, tell)

@@ -48,7 +48,7 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
         return
     states: StatesOverTime | None = None
     rebaselined: list[BaselineGlance] = []
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         hangers: Sequence[Hanger] = workspace.bridge.hangers
         if hanger_id is not None:
             from shm.pipeline.reporting import hanger_states  # it loads the engine
@@ -98,8 +98,7 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
     metavar="FILE.png",
     help="Write the elevation of the bridge, hangers coloured by their shift, as a picture.",
 )
-@click.pass_context
-def bridge(ctx: click.Context, figure: Path | None) -> None:
+def bridge(figure: Path | None) -> None:
     """Show which hangers gained and lost tension, and if the complete bridge moved.
 
     Compares the latest tension shift of each hanger with its neighbours': one hanger whose
@@ -111,7 +110,7 @@ def bridge(ctx: click.Context, figure: Path | None) -> None:
     \b
     Example: shm drift bridge
     """
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         pattern = stored_pattern(store, [hanger.id for hanger in workspace.bridge.hangers])
     if figure is not None:
         from shm.report.figures.along_the_bridge import bridge_illustration
@@ -144,9 +143,7 @@ def bridge(ctx: click.Context, figure: Path | None) -> None:
 @flags.why
 @flags.who
 @flags.json
-@click.pass_context
 def rebaseline(
-    ctx: click.Context,
     hanger_id: int,
     since: datetime,
     kind: str | None,
@@ -171,7 +168,7 @@ def rebaseline(
 
     event = EVENT_KINDS[kind] if kind else None
     order = Order(since, why, who, event)
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         with progress_bar() as progress:
             found = set_baseline(workspace, store, hanger, order, utc_now(), progress)

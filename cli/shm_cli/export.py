@@ -32,9 +32,7 @@ from shm_cli.common import opened_store, show, waiting
     help="Where to write.",
 )
 @flags.json
-@click.pass_context
 def command(
-    ctx: click.Context,
     hanger_id: int,
     test: str | None,
     form: str | None,
@@ -50,7 +48,7 @@ def command(
     Example: shm export --hanger 3 --out hanger3.csv
     """
     export.check_format(out, form)
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         posterior = store.posteriors.get(hanger_id, test)
         tests = [store.tests.named(hanger_id, name).test for name in posterior.tests]

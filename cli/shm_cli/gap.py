@@ -99,9 +99,7 @@ def command() -> None:
 @_all_tests
 @flags.seed
 @flags.json
-@click.pass_context
 def plan(
-    ctx: click.Context,
     file: Path | None,
     hanger_id: int | None,
     hanger_file: Path | None,
@@ -120,8 +118,8 @@ def plan(
     \b
     Example: shm gap plan hanger3.modes.json --hanger-file H.toml --budget 8
     """
-    tests, hanger, remark = _measured(ctx, file, hanger_file, hanger_id, every=all_tests)
-    bridge = load_bridge(hanger_file) if hanger_file is not None else open_workspace(ctx).bridge
+    tests, hanger, remark = _measured(file, hanger_file, hanger_id, every=all_tests)
+    bridge = load_bridge(hanger_file) if hanger_file is not None else open_workspace().bridge
     options = GapOptions(baseline, without, seed=seed)
     with progress_bar() as progress:
         diagnosis, attribution = examined(tests, hanger, options, progress)
@@ -158,7 +156,6 @@ def plan(
 
 
 def _measured(
-    ctx: click.Context,
     file: Path | None,
     hanger_file: Path | None,
     hanger_id: int | None,
@@ -167,9 +164,9 @@ def _measured(
 ) -> tuple[Sequence[ModalTest], Hanger, str]:
     """Return the tests, their hanger and a remark on those left out, as `shm gap diagnose` does."""
     if file is not None:
-        return *tests_and_hanger(ctx, file, hanger_file, hanger_id), ""
-    hanger = one_hanger(ctx, hanger_file, hanger_id)
-    with opened_store(ctx) as (_, store):
+        return *tests_and_hanger(file, hanger_file, hanger_id), ""
+    hanger = one_hanger(hanger_file, hanger_id)
+    with opened_store() as (_, store):
         chosen = choose_tests(store, hanger, every=every)
         return chosen.tests, hanger, chosen.remark
 
@@ -205,9 +202,7 @@ def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
 )
 @flags.figures
 @flags.json
-@click.pass_context
 def diagnose(
-    ctx: click.Context,
     files: tuple[Path, ...],
     hanger_id: int | None,
     hanger_file: Path | None,
@@ -238,16 +233,14 @@ def diagnose(
     """
     options = GapOptions(baseline, without, hold_out, seed=seed)
     if bridge or len(files) > 1:
-        joint = _jointly(ctx, files, bridge, (hanger_id, hanger_file), (count, all_tests), options)
+        joint = _jointly(files, bridge, (hanger_id, hanger_file), (count, all_tests), options)
         draw = partial(drawn, (SHARED,), joint.diagnosis)
         _show(bridge_diagnosis_paper(joint), bridge_diagnosis_json(joint), draw, html, figures)
         return
     if not files:
-        sheet = _of_workspace(
-            ctx, one_hanger(ctx, hanger_file, hanger_id), (count, all_tests), options
-        )
+        sheet = _of_workspace(one_hanger(hanger_file, hanger_id), (count, all_tests), options)
     else:
-        tests, hanger = tests_and_hanger(ctx, files[0], hanger_file, hanger_id)
+        tests, hanger = tests_and_hanger(files[0], hanger_file, hanger_id)
         found = _diagnosis(tests, hanger, options)
         sheet = DiagnosisSheet(found, hanger, sensors=_sensors(tests))
     draw = partial(drawn, OF_DIAGNOSIS, sheet)
@@ -258,14 +251,12 @@ for _verb in (adopt, adopted, check, drop, effects):
     command.add_command(_verb)
 
 
-def _of_workspace(
-    ctx: click.Context, hanger: Hanger, latest: tuple[int, bool], options: GapOptions
-) -> DiagnosisSheet:
+def _of_workspace(hanger: Hanger, latest: tuple[int, bool], options: GapOptions) -> DiagnosisSheet:
     """Return the diagnosis of the latest tests, which the store keeps.
 
     `latest` says how many at most, and if from before the last change, too.
     """
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         chosen = choose_tests(store, hanger, latest[0], every=latest[1])
         with progress_bar() as progress:
             found = diagnose_stored(store, chosen, hanger, options, utc_now(), progress)
@@ -290,7 +281,6 @@ def _diagnosis(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) 
 
 
 def _jointly(
-    ctx: click.Context,
     files: tuple[Path, ...],
     bridge: bool,
     one: tuple[int | None, Path | None],
@@ -304,8 +294,8 @@ def _jointly(
             remedy="Give MODES.json H.toml pairs alone, or --bridge alone.",
         )
     if bridge:
-        return _of_bridge(ctx, latest, options)
-    found = [tests_and_hanger(ctx, modes, of, None) for modes, of in _pairs(files)]
+        return _of_bridge(latest, options)
+    found = [tests_and_hanger(modes, of, None) for modes, of in _pairs(files)]
     for tests, hanger in found:
         show_doubts(tests, hanger)
     with progress_bar() as progress:
@@ -324,11 +314,9 @@ def _pairs(files: tuple[Path, ...]) -> list[tuple[Path, Path]]:
     return pairs
 
 
-def _of_bridge(
-    ctx: click.Context, latest: tuple[int, bool], options: GapOptions
-) -> BridgeDiagnosisSheet:
+def _of_bridge(latest: tuple[int, bool], options: GapOptions) -> BridgeDiagnosisSheet:
     """Return all hangers of the workspace that have tests and that the baseline can describe."""
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         stored = {
             hanger: choose_tests(store, hanger, latest[0], every=latest[1])
             for hanger in workspace.bridge.hangers

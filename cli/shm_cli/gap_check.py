@@ -102,7 +102,7 @@ def check(
         raise BadInput(
             f"{figure} is no name of a picture.", remedy="Let it end in .svg or in .png."
         )
-    tests, hanger = _measured(ctx, file, hanger_file, hanger_id, count)
+    tests, hanger = _measured(file, hanger_file, hanger_id, count)
     chosen = () if effects is None else tuple(name.strip() for name in effects.split(","))
     if not all(chosen):
         raise UsageError(
@@ -125,7 +125,6 @@ def check(
 
 
 def _measured(
-    ctx: click.Context,
     file: Path | None,
     hanger_file: Path | None,
     hanger_id: int | None,
@@ -133,11 +132,11 @@ def _measured(
 ) -> tuple[Sequence[ModalTest], Hanger]:
     """Return the tests and their hanger; no test where none is given or stored."""
     if file is not None:
-        return tests_and_hanger(ctx, file, hanger_file, hanger_id)
-    hanger = one_hanger(ctx, hanger_file, hanger_id)
+        return tests_and_hanger(file, hanger_file, hanger_id)
+    hanger = one_hanger(hanger_file, hanger_id)
     if hanger_file is not None:
         return (), hanger
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         return [each.test for each in store.tests.list_all(hanger.id)[-count:]], hanger
 
 

@@ -20,7 +20,7 @@ from shm.store.disposition import discarded_reason, taking_back
 from shm.store.journal import list_former_tests
 from shm.store.recordings import find_latest_hold, find_recording, list_holds
 from shm_cli import flags
-from shm_cli.common import paragraph, show
+from shm_cli.common import can_ask, paragraph, show
 
 
 def show_held(workspace: Workspace) -> int:
@@ -63,13 +63,14 @@ def decide(
     from shm_cli.working import finish_now
 
     refuse_impossible(time, workspace.bridge.built)
-    who, why = record[0] or getpass.getuser(), record[1] or ""
+    who = record[0] or getpass.getuser()
     with workspace.store() as store:
         known = {stored.id for stored in store.alerts.list_all()}
         recording_id, test = find_recording(store, which)
         held = _is_held(store, recording_id, test)
         if held and test is not None:
             _refuse_part(find_latest_hold(store, recording_id), test, decision)
+        why = record[1] or _ask_reason(decision)
         if not held:
             _refuse_without_reason(store, recording_id, decision, why)
         exclusion = None
@@ -86,6 +87,13 @@ def decide(
             finish_now(workspace, recording_id)
         raised = [stored for stored in store.alerts.list_all() if stored.id not in known]
         return Decided(hold, raised, exclusion)
+
+
+def _ask_reason(decision: Decision) -> str:
+    """Ask at a terminal why something is discarded; return an empty text elsewhere."""
+    if decision is not Decision.DISCARDED or not can_ask():
+        return ""
+    return str(click.prompt("Why is it discarded? For the record", type=flags.Words()))
 
 
 def _is_held(store: Store, recording_id: int, test: str | None) -> bool:

@@ -123,10 +123,7 @@ _DEFAULT = Settings()
 @flags.hanger()
 @flags.hanger_file
 @flags.json
-@click.pass_context
 def command(
-    ctx: click.Context,
-    /,
     files: tuple[Path, ...],
     together: bool,
     band: tuple[float, float],
@@ -149,7 +146,7 @@ def command(
     Example: shm identify hanger3.csv --hanger-file H.toml --html hanger3.html
     """
     known = hanger_file is not None or hanger_id is not None
-    hanger = one_hanger(ctx, hanger_file, hanger_id) if known else None
+    hanger = one_hanger(hanger_file, hanger_id) if known else None
     groups = [files] if together else [(path,) for path in files]
     if (html is not None or hits is not None) and len(groups) > 1:
         raise UsageError(
@@ -158,8 +155,8 @@ def command(
         )
     options = IdentifyOptions(band_low_hz=band[0], band_high_hz=band[1], **chosen)
     workspace = None
-    if hanger_file is None and (hanger_id is not None or is_workspace(ctx)):
-        workspace = open_workspace(ctx)
+    if hanger_file is None and (hanger_id is not None or is_workspace()):
+        workspace = open_workspace()
     with counting_bar() as bar:
         sheets = [
             _identified(group, hanger, options, workspace)

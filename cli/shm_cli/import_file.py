@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import shlex
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -40,9 +39,10 @@ from shm.read.logger_words import unit_of
 from shm.read.modal_sets import ForeignModes, axes_of
 from shm.read.profiles import Profile
 from shm.read.sandbox import foreign_modes
+from shm.report.formatting import plain
 from shm.store import Workspace
 from shm_cli import flags
-from shm_cli.common import open_workspace, show, show_rows
+from shm_cli.common import can_ask, open_workspace, show, show_rows
 from shm_cli.import_prompts import asked, asked_if_it_stays
 from shm_daemon.spool import Landed, incoming
 
@@ -164,8 +164,7 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
 @click.option("--operator", default="", metavar="NAME", help="Who measured.")
 @click.option("--dry-run", is_flag=True, help="Only show what is understood; keep nothing.")
 @flags.json
-@click.pass_context
-def command(ctx: click.Context, /, file: Path, dry_run: bool, **options: Any) -> int:
+def command(file: Path, dry_run: bool, **options: Any) -> int:
     """Take in the first file of a logger; asks what it does not say.
 
     Later files of that logger need no answers: use `shm ingest FILE`, or copy them into the spool.
@@ -180,8 +179,8 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, **options: Any) ->
     Example: shm import export.csv
     Example: shm import export.csv --hanger 3 --place 4.2,4.2 --plane transverse,longitudinal
     """
-    workspace = open_workspace(ctx)
-    asks = not flags.wants_json() and sys.stdin.isatty() and sys.stdout.isatty()
+    workspace = open_workspace()
+    asks = can_ask()
     if options["hanger"] is not None:
         workspace.bridge.tested(options["hanger"])
     first = look_into(file, workspace, _whole_file(options))
@@ -340,7 +339,7 @@ def _range(column: Understood) -> str:
     if not math.isfinite(column.largest):
         return ""
     unit = "N" if column.quantity == "force" else "m/s²"
-    return f"{column.least:.3g} to {column.largest:.3g} {unit}"
+    return f"{plain(column.least)} to {plain(column.largest)} {unit}"
 
 
 def _seen(column: Understood) -> str:

@@ -98,9 +98,9 @@ def command(
     """
     _refuse_mixture(files, about, together or look)
     if look:
-        return show_peeks(files, open_workspace(ctx) if is_workspace(ctx) else None)
+        return show_peeks(files, open_workspace() if is_workspace() else None)
     logging.getLogger("shm").addHandler(logging.NullHandler())  # all is said in the table
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     if about["held"]:
         return show_held(workspace)
     if about["confirm"] or about["discard"]:

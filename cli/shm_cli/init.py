@@ -10,7 +10,7 @@ import rich_click as click
 
 from shm.store import Workspace
 from shm_cli import flags
-from shm_cli.common import answer
+from shm_cli.common import answer, workspace_folder
 
 
 @click.command()
@@ -24,8 +24,7 @@ from shm_cli.common import answer
 )
 @click.option("--bridge", "name", metavar="NAME", help="Name of the bridge.")
 @flags.json
-@click.pass_context
-def command(ctx: click.Context, folder: Path | None, config: Path | None, name: str | None) -> None:
+def command(folder: Path | None, config: Path | None, name: str | None) -> None:
     """Make a workspace for a bridge.
 
     It is a folder: bridge.toml (describe your hangers there), shm.db, spool/ (drop recordings
@@ -34,7 +33,7 @@ def command(ctx: click.Context, folder: Path | None, config: Path | None, name: 
     \b
     Example: shm init arch --bridge "Arch bridge"
     """
-    workspace = Workspace.initialise(folder or Path(ctx.obj), config)
+    workspace = Workspace.initialise(folder or Path(workspace_folder()), config)
     if name is not None:
         _rename(Path(workspace.bridge.source), name)
     description = workspace.folder / "bridge.toml"

@@ -29,10 +29,7 @@ SETTING_HEADS = ("setting", "default", "unit", "range", "meaning")
 @flags.hanger()
 @flags.hanger_file
 @flags.json
-@click.pass_context
-def settings_command(
-    ctx: click.Context, assumptions: bool, hanger_id: int | None, hanger_file: Path | None
-) -> None:
+def settings_command(assumptions: bool, hanger_id: int | None, hanger_file: Path | None) -> None:
     """List every setting with default and range.
 
     A value comes from the flag, else the environment (`workers` from SHM_WORKERS), else
@@ -45,7 +42,7 @@ def settings_command(
     Example: shm settings --assumptions
     """
     if assumptions:
-        show_assumptions(ctx, hanger_file, hanger_id, flags.wants_json())
+        show_assumptions(hanger_file, hanger_id, flags.wants_json())
     elif hanger_file is not None or hanger_id is not None:
         raise UsageError(
             "settings are those of the bridge, not of one hanger.",

@@ -25,9 +25,7 @@ _MOST_POINTS = 10_000  # technical: a table that a person can still open, in sec
 @flags.hanger()
 @flags.hanger_file
 @flags.json
-@click.pass_context
 def command(
-    ctx: click.Context,
     model: str,
     settings: tuple[str, ...],
     sweep: str | None,
@@ -48,7 +46,7 @@ def command(
     Example: shm predict beam1 --hanger-file H.toml --sweep theta_F=0.5:2:50
     """
     # The thesis's for its parameters alone: nobody asked for its reading of the description.
-    chosen = build(model, one_hanger(ctx, hanger_file, hanger_id), THESIS).as_it_hangs()
+    chosen = build(model, one_hanger(hanger_file, hanger_id), THESIS).as_it_hangs()
     nominal = {name: 1.0 for name in chosen.parameter_names if name.startswith("theta_")}
     values = nominal | dict(_pair(setting) for setting in settings)
     if sweep is None:

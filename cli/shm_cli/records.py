@@ -43,9 +43,7 @@ def note() -> None:
 )
 @flags.who
 @flags.json
-@click.pass_context
 def add(
-    ctx: click.Context,
     text: str,
     hanger_id: int | None,
     whole: bool,
@@ -62,7 +60,7 @@ def add(
     if whole == (hanger_id is not None):
         raise UsageError("a note of what?", remedy="Give --hanger N or --bridge.")
     now = utc_now()
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.tested(hanger_id)
         image = photo.read_bytes() if photo else b""
@@ -73,14 +71,13 @@ def add(
 @note.command("list")
 @flags.hanger()
 @flags.json
-@click.pass_context
-def list_notes(ctx: click.Context, hanger_id: int | None) -> None:
+def list_notes(hanger_id: int | None) -> None:
     """List notes on a hanger and on the bridge, or all notes, the latest first.
 
     \b
     Example: shm note list --hanger 3 --json
     """
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.tested(hanger_id)
         found = store.notes.list_all(hanger_id)
@@ -100,8 +97,7 @@ def list_notes(ctx: click.Context, hanger_id: int | None) -> None:
 @click.command()
 @click.option("--limit", type=click.IntRange(min=1), help="So many of the newest.")
 @flags.json
-@click.pass_context
-def audit(ctx: click.Context, limit: int | None) -> None:
+def audit(limit: int | None) -> None:
     """Show who changed what, and when.
 
     What shm does by itself is not listed, nor what is edited in bridge.toml.
@@ -109,7 +105,7 @@ def audit(ctx: click.Context, limit: int | None) -> None:
     \b
     Example: shm audit --limit 20
     """
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         rows = [change_document(each) for each in list_changes(store, limit)]
     if flags.wants_json() or not rows:
         answer({"changes": rows}, "Nothing was changed.")

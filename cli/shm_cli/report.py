@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,12 +38,12 @@ class _Report:
     document: Callable[[Any], dict[str, Any]]
 
 
-def _written(report: _Report, form: str, revision: str, *, is_full: bool) -> str | bytes:
+def _written(report: _Report, form: str, revision: str, *, is_brief: bool) -> str | bytes:
     if form == "json":
         return dump(report.document(report.content))
     if form == "text":
         paper = report.paper(report.content)
-        return (as_text if is_full else as_brief_text)(paper, readable_width())
+        return (as_brief_text if is_brief else as_text)(paper, readable_width())
     # What draws and sets is loaded where a page is asked for.
     with drawing():
         if form == "html":
@@ -73,9 +74,7 @@ def _written(report: _Report, form: str, revision: str, *, is_full: bool) -> str
 @click.option("--revision", metavar="TEXT", default="", help="The revision that a page names.")
 @click.option("--json", "as_json", is_flag=True, help="The same as --format json.")
 @click.option("--out", type=flags.NewFile(), metavar="FILE", help="Write here instead of stdout.")
-@click.pass_context
 def command(
-    ctx: click.Context,
     hanger_id: int | None,
     of_bridge: bool,
     form: str | None,
@@ -103,18 +102,20 @@ def command(
     _refuse_pdf_on_a_terminal(form, out)
     now = utc_now()
     period = period_since(since, now) if since else None
-    report = _gathered(ctx, hanger_id, test_id, now, period)
-    _write(_written(report, form, revision, is_full=is_full or out is not None), out)
+    is_brief = form == "text" and not is_full and out is None
+    report = _gathered(hanger_id, test_id, now, period, is_brief=is_brief)
+    _write(_written(report, form, revision, is_brief=is_brief), out)
 
 
 def _gathered(
-    ctx: click.Context,
     hanger_id: int | None,
     test_id: str | None,
     now: datetime,
     period: Period | None,
+    *,
+    is_brief: bool,
 ) -> _Report:
-    with opened_store(ctx) as (workspace, store), waiting("gathering the numbers"):
+    with opened_store() as (workspace, store), waiting("gathering the numbers"):
         if hanger_id is None:
             content = bridge_report(workspace, store, now, period)
             return _Report(content, bridge_paper, bridge_json)
@@ -123,8 +124,8 @@ def _gathered(
             of_structure = structure_report(workspace, store, hanger_id, now)
             return _Report(of_structure, structure_paper, structure_json)
         if test_id is None:
-            of_hanger = hanger_report(workspace, store, hanger_id, now, period)
-            return _Report(of_hanger, hanger_paper, hanger_json)
+            of_hanger = hanger_report(workspace, store, hanger_id, now, period, is_brief=is_brief)
+            return _Report(of_hanger, partial(hanger_paper, is_brief=is_brief), hanger_json)
         sheet = modal_test_report(workspace, store, hanger_id, test_id)
         return _Report(replace(sheet, generated_at=now), modal_test_paper, modal_test_json)
 

@@ -34,9 +34,7 @@ print_unit_option = click.option(
 @click.option("--workers", type=click.IntRange(1, 64), help="Processes that identify and update.")
 @flags.log_file
 @print_unit_option
-@click.pass_context
 def daemon(
-    ctx: click.Context,
     once: bool,
     standby: bool,
     with_web: bool,
@@ -58,7 +56,7 @@ def daemon(
     from shm_daemon.web.address import Address
     from shm_daemon.web.serving import web_with_daemon
 
-    workspace = replace(open_workspace(ctx, workers=workers), actor=None)
+    workspace = replace(open_workspace(workers=workers), actor=None)
     if as_unit:
         words = [
             "daemon",
@@ -81,9 +79,7 @@ def daemon(
 @click.option("--port", type=click.IntRange(1, 65535), default=8400, help="The port.")
 @flags.log_file
 @print_unit_option
-@click.pass_context
 def web(
-    ctx: click.Context,
     host: str,
     port: int,
     log_file: Path | None,
@@ -103,7 +99,7 @@ def web(
     from shm_daemon.web.address import Address
     from shm_daemon.web.serving import leaving, serve
 
-    workspace, address = replace(open_workspace(ctx), actor=None), Address(host, port)
+    workspace, address = replace(open_workspace(), actor=None), Address(host, port)
     if as_unit:
         print_unit("shm-web.service", workspace.folder, ["web", *serving_words(host, port)])
         return

@@ -135,9 +135,7 @@ def _springs(function: flags.F) -> flags.F:
 @click.option("--out", type=flags.FOLDER, metavar="DIR", required=True, help="Where the files go.")
 @flags.seed
 @flags.json
-@click.pass_context
 def command(
-    ctx: click.Context,
     hanger_id: int | None,
     hanger_file: Path | None,
     tests: int,
@@ -155,7 +153,7 @@ def command(
     \b
     Example: shm simulate --hanger-file H.toml --k1 1e7 --k3 1e7 --out tests
     """
-    hanger = one_hanger(ctx, hanger_file, hanger_id)
+    hanger = one_hanger(hanger_file, hanger_id)
     _refuse_other_supports(hanger)
     start = first or _FIRST
     out.mkdir(parents=True, exist_ok=True)

@@ -62,8 +62,7 @@ _HELD_SHOWN = 5  # layout: the rest by `shm ingest --held`
     "--of", "which", metavar="ID", help="The stages of one recording (by number) or test (by name)."
 )
 @flags.json
-@click.pass_context
-def command(ctx: click.Context, which: str | None) -> None:
+def command(which: str | None) -> None:
     """Show the state of every hanger and of the workspace.
 
     \b
@@ -71,9 +70,9 @@ def command(ctx: click.Context, which: str | None) -> None:
     Example: shm --workspace arch status --of t7
     """
     if which is not None:
-        show_stages(ctx, which)
+        show_stages(which)
         return
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         document = _status(workspace, store)
     if flags.wants_json():
         show(document)
@@ -353,9 +352,9 @@ _OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
 _OF_STEP = ("at", "version", "test_id", "test")
 
 
-def show_stages(ctx: click.Context, which: str) -> None:
+def show_stages(which: str) -> None:
     """Print the stages of a recording or test; raises NothingThere where there is none."""
-    with opened_store(ctx) as (_, store):
+    with opened_store() as (_, store):
         recording_id, _ = find_recording(store, which)
         recording = store.recordings.get(recording_id)
         steps, tests = (

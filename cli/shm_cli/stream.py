@@ -62,7 +62,7 @@ def command(ctx: click.Context, events: bool, days: float) -> None:
     """
     if ctx.invoked_subcommand is not None:
         return
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         if not workspace.bridge.streams:
             raise NothingThere(
                 "bridge.toml describes no stream.",
@@ -80,8 +80,7 @@ def command(ctx: click.Context, events: bool, days: float) -> None:
 @_to
 @flags.why
 @flags.json
-@click.pass_context
-def keep(ctx: click.Context, name: str, start: datetime, end: datetime, why: str) -> None:
+def keep(name: str, start: datetime, end: datetime, why: str) -> None:
     """Keep the samples of a period permanently.
 
     The ring takes out what is older than the setting `ring_days`, but for what is kept.
@@ -89,7 +88,7 @@ def keep(ctx: click.Context, name: str, start: datetime, end: datetime, why: str
     \b
     Example: shm stream keep h3 2026-05-01T10:00Z 2026-05-01T10:20Z --why "heavy transport"
     """
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     stream, ring = workspace.bridge.stream(name), ring_of(workspace)
     recording_of(ring, stream, start, end, workspace.settings.max_samples)
     ring.keep(name, start, end, why)
@@ -105,8 +104,7 @@ def keep(ctx: click.Context, name: str, start: datetime, end: datetime, why: str
 @_to
 @click.argument("file", type=flags.NewFile(), metavar="FILE")
 @flags.json
-@click.pass_context
-def export(ctx: click.Context, name: str, start: datetime, end: datetime, file: Path) -> None:
+def export(name: str, start: datetime, end: datetime, file: Path) -> None:
     """Write the samples of a period as a recording for `shm identify`.
 
     FILE ends with .h5, .csv, .npz or .uff. What is missing is an empty value.
@@ -114,7 +112,7 @@ def export(ctx: click.Context, name: str, start: datetime, end: datetime, file: 
     \b
     Example: shm stream export h3 2026-05-01T10:00Z 2026-05-01T10:10Z h3.csv
     """
-    workspace = open_workspace(ctx)
+    workspace = open_workspace()
     stream = workspace.bridge.stream(name)
     found = recording_of(ring_of(workspace), stream, start, end, workspace.settings.max_samples)
     write(found, file)

@@ -109,9 +109,7 @@ modes_argument = click.argument(
     help="The model class.",
 )
 @_updating
-@click.pass_context
 def command(
-    ctx: click.Context,
     modes_file: Path | None,
     model: str,
     hanger_id: int | None,
@@ -131,7 +129,7 @@ def command(
     Example: shm update hanger3.modes.json --hanger-file H.toml --model beam2
     """
     options = UpdateOptions(samples, seed, sampler=sampler)
-    tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
+    tests, hanger = tests_and_hanger(modes_file, hanger_file, hanger_id)
     tests = tests_at(tests, level)
     doubts = show_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
@@ -197,9 +195,7 @@ def show_posterior(posterior: Posterior, limits: Limits | None = None) -> None:
     help="How probable each class is beforehand, such as beam1=0.25,beam2=0.75.",
 )
 @_updating
-@click.pass_context
 def select_command(
-    ctx: click.Context,
     modes_file: Path | None,
     models: str | None,
     class_priors: str | None,
@@ -225,8 +221,8 @@ def select_command(
     """
     options = UpdateOptions(samples, seed, sampler=sampler)
     stated = None if class_priors is None else _stated_priors(class_priors)
-    tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
-    names = _names(ctx, models, None if hanger_file else hanger.id)
+    tests, hanger = tests_and_hanger(modes_file, hanger_file, hanger_id)
+    names = _names(models, None if hanger_file else hanger.id)
     _, not_applicable = applicable(hanger, names)
     chosen = [build(name, hanger, priors) for name in competing_names(hanger, names)]
     if stated is not None:
@@ -250,13 +246,13 @@ def select_command(
         click.echo(f"{name} does not apply: {reason}")
 
 
-def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tuple[str, ...]:
+def _names(models: str | None, hanger_id: int | None) -> tuple[str, ...]:
     """Return the requested classes, or those of the setting and the hanger's adopted ones."""
     if models is not None:
         return load_settings({"models": models}, environment={}).model_names
     if hanger_id is None:
         return load_settings().model_names
-    with opened_store(ctx) as (workspace, store):
+    with opened_store() as (workspace, store):
         adopted = [each.adoption.model for each in list_adoptions(store, hanger_id)]
     return tuple(dict.fromkeys([*workspace.settings.model_names, *adopted]))
 

@@ -28,12 +28,27 @@ from shm.pipeline.lineage import (
 from shm.pipeline.steps import identify_options
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import peek_test, read_test
-from shm.report.contents import HangerReport, ModalTestReport, TensionAtLevel, TrendRow
+from shm.report.contents import (
+    Deed,
+    HangerReport,
+    ModalTestReport,
+    TensionAtLevel,
+    TrendRow,
+)
 from shm.report.formatting import Interval
 from shm.report.hanger_report import StructureReport
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
-from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
-from shm.store.alerts import count_open_alerts
+from shm.store import (
+    Baseline,
+    EventKind,
+    HangerEvent,
+    Store,
+    StoredAlert,
+    StoredTest,
+    TrendPoint,
+    Workspace,
+)
+from shm.store.alerts import count_open_alerts, list_hanger_events
 from shm.store.posteriors import find_latest_trends, list_trend
 from shm.store.tests import (
     count_tests,
@@ -56,27 +71,32 @@ def hanger_report(
     hanger_id: int,
     generated_at: datetime,
     period: Period | None = None,
+    *,
+    is_brief: bool = False,
 ) -> HangerReport:
     """All that the store knows of a hanger, for its report; its states over time take a second.
 
-    Of a `period`, tests, trend and alerts are those that lie in it. Raises BadInput for an unknown
-    hanger, NothingThere before its first test is through and where none lies in the period.
+    Of a `period`, tests, trend and alerts are those that lie in it. One that `is_brief` lacks what
+    only figures and tables show. Raises BadInput for an unknown hanger, NothingThere before its
+    first test is through and where none lies in the period.
     """
     hanger = workspace.bridge.hanger(hanger_id)
     report = hanger_now(workspace, store, hanger, _trend(store, hanger, period), generated_at)
+    report = replace(report, period=period, at_level=_at_level(workspace, report))
+    if is_brief:
+        return report
     latest = store.tests.named(hanger_id, report.latest.id)
     return replace(
         report,
         alerts=tuple(each for each in report.alerts if period is None or period.holds(each.time)),
         inspections=tuple(e for e in report.inspections if period is None or period.holds(e.at)),
+        deeds=tuple(each for each in report.deeds if period is None or period.holds(each.at)),
         frequency_response=load_frequency_response(store, latest),
         hits=_hit_places(workspace, store, latest),
         states=hanger_states(
             workspace, store, hanger, store.watch.baseline(hanger_id, report.posterior.model)
         ),
         neighbours=pattern_or_why(workspace, store)[0] if report.now.called else None,
-        period=period,
-        at_level=_at_level(workspace, report),
     )
 
 
@@ -182,6 +202,32 @@ def hanger_now(
         redescribed=redescribed(hanger, in_force),
         discarded=discarded_of_baselines(store).get(hanger.id, ()),
         inspections=store.notes.list_all(hanger.id),
+        deeds=_deeds(store, hanger, trend),
+    )
+
+
+DEED_WORDS = {
+    EventKind.BASELINE: "baseline set",
+    EventKind.ADOPTED: "effect adopted",
+    EventKind.UNDONE: "adoption undone",
+}
+
+
+def _deeds(store: Store, hanger: Hanger, trend: Sequence[TrendPoint]) -> tuple[Deed, ...]:
+    """Return what people set and adopted, each where the trend shows it."""
+
+    def shown_at(event: HangerEvent) -> datetime:
+        """Return the event's time; of a baseline, that of its last test."""
+        if event.kind is not EventKind.BASELINE:
+            return event.at
+        baseline = store.watch.baseline(hanger.id, number=event.id)
+        names = baseline.posterior.tests if baseline else ()
+        return max((each.time for each in trend if each.test in names), default=event.at)
+
+    return tuple(
+        Deed(DEED_WORDS[event.kind], shown_at(event), f"by {event.who}: {event.why}")
+        for event in list_hanger_events(store, hanger.id)
+        if event.kind in DEED_WORDS
     )
 
 

@@ -44,7 +44,7 @@ def _part(part: Section, width: int) -> Iterator[str]:
     if part.remarks:
         yield "\n".join(_folded(each, width, "! ") for each in part.remarks) + "\n"
     if part.facts:
-        yield laid_out(Table("", ("", "", ""), tuple(part.facts)), width).lstrip()
+        yield laid_out(Table("", ("", "", ""), tuple(part.facts)), width)
     for table in part.tables:
         shown = in_terminal(table)
         if shown.rows or shown.note:
@@ -78,13 +78,13 @@ def laid_out(table: Table, width: int = WIDTH) -> str:
 
     No word is cut. Where there is no room for that, each row becomes a list.
     """
-    title = textwrap.fill(table.title.upper(), width)
+    title = [textwrap.fill(table.title.upper(), width)] if table.title else []
     note = [textwrap.fill(table.note, width)] if table.note else []
     lines: list[str] = []
     if table.rows:
         widths = _widths(table, width)
         lines = _columns(table, widths) if widths else _lists(table, width)
-    return "\n".join((title, *lines, *note, ""))
+    return "\n".join((*title, *lines, *note, ""))
 
 
 def _columns(table: Table, widths: list[int]) -> list[str]:

@@ -27,6 +27,7 @@ from shm.watch.control_chart import ControlChart
 
 def bridge_paper(data: BridgeReport) -> Paper:
     """Return the report of a bridge: summary, figures along the bridge, numbers."""
+    hangers = _hangers(data).with_units_in_headings()
     return Paper(
         title=data.bridge,
         period=str(data.period) if data.period else "",
@@ -38,12 +39,12 @@ def bridge_paper(data: BridgeReport) -> Paper:
                 lead=data.message.words,
                 summary=details(data),
                 facts=facts(data),
-                tables=filled(bars_table([line.bar for line in data.hangers])),
-                brief=filled(replace(_hangers(data), title="", note="")),
+                tables=filled(hangers, bars_table([line.bar for line in data.hangers])),
+                brief=filled(replace(hangers, title="", note="")),
             ),
             Section("Along the bridge", figures=lambda: _figures(data)),
             *(_control_part(each) for each in data.controls),
-            Section("Numbers", tables=tables(data)),
+            Section("Numbers", tables=_other_tables(data)),
             *appendices(Section("Settings", tables=filled(settings(data.settings)))),
         ),
         generated_at=data.generated_at,
@@ -159,8 +160,12 @@ _NEXT_TO = {"repeatability": "repeatability", "above": "above limit", "slack": "
 
 def tables(data: BridgeReport) -> tuple[Table, ...]:
     """Return all tables that this report can fill."""
+    return (*filled(_hangers(data)), *_other_tables(data))
+
+
+def _other_tables(data: BridgeReport) -> tuple[Table, ...]:
+    """Return what stands behind the table of the hangers."""
     return filled(
-        _hangers(data),
         _courses(data),
         *(pattern_tables(data.pattern) if data.pattern else ()),
         _origin(data),
@@ -183,6 +188,7 @@ def _hangers(data: BridgeReport) -> Table:
         "equal temperature. Repeatability: the standard deviation between tests of one state. "
         "Alert: beyond a threshold. Watch: a change was detected, or a shift beyond a threshold "
         "is more probable than not. More: shm report --hanger N.",
+        may_break=True,
     )  # fmt: skip
 
 

@@ -49,7 +49,7 @@ from shm.values import (
     group_causes,
     is_excluded,
 )
-from shm.values.rounding import ForceUnit
+from shm.values.rounding import ForceUnit, two_digits
 
 FIGURES = (CAUSES, GAP_MAP)
 
@@ -255,18 +255,17 @@ def tension(sheet: DiagnosisSheet) -> Table:
 
 
 def _tension_cells(estimate: TensionEstimate, nominal_n: float, unit: ForceUnit) -> tuple[str, ...]:
-    interval, form = tension_of(estimate).in_unit(unit), f".{unit.decimals(estimate.mean)}f"
+    interval = tension_of(estimate).in_unit(unit)
+    known = (formatting.plain(interval.mean), "not known", "not known")
+    if math.isfinite(interval.width):
+        sd = two_digits(unit.of(estimate.sd))
+        known = (formatting.mean(interval), sd, formatting.span(interval))
     of_nominal = "no nominal"
     if nominal_n > 0:
         share = tension_of(estimate).scaled(100 / nominal_n)
         is_known = math.isfinite(share.width)
         of_nominal = formatting.with_span(share) if is_known else f"{share.mean:.1f}"
-    return (
-        format(interval.mean, form),
-        formatting.number(unit.of(estimate.sd), form),
-        _range(interval.low, interval.high, form),
-        of_nominal,
-    )
+    return (*known, of_nominal)
 
 
 def _range(low: float, high: float, form: str) -> str:

@@ -230,8 +230,8 @@ def spoken_probability(value: float) -> str:
     return probability(value).replace("> ", "above ").replace("< ", "below ")
 
 
-def temperature(celsius: float) -> str:
-    return number(celsius, ".1f") + " °C" if math.isfinite(celsius) else "temperature not recorded"
+def temperature(celsius: float, absent: str = "temperature not recorded") -> str:
+    return f"{celsius:.1f} °C" if math.isfinite(celsius) else absent
 
 
 def moment(time: datetime | None) -> str:

@@ -38,38 +38,25 @@ from shm.values.stated_tension import StatedTension, stated
 from shm.watch.alert_text import structure_words
 
 
-def hanger_paper(data: HangerReport) -> Paper:
-    """Return page 1 with all that is acted on; then why; appendices are for a screen."""
+def hanger_paper(data: HangerReport, *, is_brief: bool = False) -> Paper:
+    """Return page 1 with all that is acted on; then why; appendices are for a screen.
+
+    One that `is_brief` has its first part alone.
+    """
+    first = Section(
+        "In short",
+        lead=data.now.message.words,
+        summary=why(data),
+        facts=facts(data),
+        tables=[bar_table(data.bar)],
+    )
     return Paper(
         title=formatting.hanger_name(data.hanger.id, data.hanger.name),
         bridge=data.bridge,
         period=str(data.period) if data.period else "",
         status=data.status.value,
         style=data.status.name.lower(),
-        parts=(
-            Section(
-                "In short",
-                lead=data.now.message.words,
-                summary=why(data),
-                facts=facts(data),
-                tables=[bar_table(data.bar)],
-            ),
-            Section(
-                "Sensors and formulas of practice",
-                figures=lambda: drawn((SKETCH,), data.bar),
-                tables=filled(tables.practice(data)),
-            ),
-            _trend_part(data),
-            Section(
-                "Fit of the model",
-                paragraphs=[fit(data)],
-                figures=lambda: drawn((FREQUENCIES,), data),
-                tables=[tables.frequencies(data)],
-            ),
-            short_gap_part(data),
-            _events_part(data),
-            *_appendices(data),
-        ),
+        parts=(first,) if is_brief else (first, *_parts(data)),
         is_signed=True,
         letterhead=data.letterhead,
         generated_at=data.generated_at,
@@ -77,6 +64,27 @@ def hanger_paper(data: HangerReport) -> Paper:
         closing=f"{CREDIBLE}; times are UTC.",
         more=f"All of it: `shm report --hanger {data.hanger.id} --full`, or "
         f"`--out hanger{data.hanger.id}.pdf`.",
+    )
+
+
+def _parts(data: HangerReport) -> tuple[Section, ...]:
+    """Return what follows page 1."""
+    return (
+        Section(
+            "Sensors and formulas of practice",
+            figures=lambda: drawn((SKETCH,), data.bar),
+            tables=filled(tables.practice(data)),
+        ),
+        _trend_part(data),
+        Section(
+            "Fit of the model",
+            paragraphs=[fit(data)],
+            figures=lambda: drawn((FREQUENCIES,), data),
+            tables=[tables.frequencies(data)],
+        ),
+        short_gap_part(data),
+        _events_part(data),
+        *_appendices(data),
     )
 
 

@@ -55,7 +55,13 @@ def details(data: HangerReport) -> str:
     """Return why, and how sure: everything after state, action and tension."""
     neighbours = data.neighbours.sentence if data.neighbours else ""
     undated = open_warnings.dated_by_receipt(data.now.undated)
-    return _joined(*_doubts(data), over_time(data), neighbours, fit(data), undated)
+    # A doubt that says by how much the model misses is not said twice, nor what to do about it.
+    is_stated = data.averaged.states_misfit
+    model = f"{_chosen(data)}." if is_stated else _model(data)
+    further = _further_advice(data, is_misfit_stated=is_stated)
+    return _joined(
+        *_doubts(data), over_time(data), neighbours, model, _outside(data), *further, undated
+    )
 
 
 def over_time(data: HangerReport) -> str:
@@ -84,9 +90,10 @@ def advice(data: HangerReport) -> tuple[str, ...]:
     return further if further and first.urgency == "none" else (first.action, *further)
 
 
-def _further_advice(data: HangerReport) -> tuple[str, ...]:
-    made = (_quality, _sampling, _width, _diagnose, _thermometer)
-    return tuple(each for make in made if (each := make(data)))
+def _further_advice(data: HangerReport, *, is_misfit_stated: bool = False) -> tuple[str, ...]:
+    diagnose = "" if is_misfit_stated and data.diagnosis is None else _diagnose(data)
+    made = (_quality(data), _sampling(data), _width(data), diagnose, _thermometer(data))
+    return tuple(each for each in made if each)
 
 
 def _tension(data: HangerReport) -> str:
@@ -217,7 +224,7 @@ def _width(data: HangerReport) -> str:
         return "Identify more modes, or state the ends and the length more exactly."
     return (
         f"The tension is known to ± {100 * half:.1f} %, no better than the threshold of "
-        f"{100 * threshold_fraction:.3g} %: identify more modes, or repeat the test, "
+        f"{100 * threshold_fraction:.3g} %. Identify more modes, or repeat the test, "
         f"to see smaller shifts."
     )
 

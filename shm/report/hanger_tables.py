@@ -222,8 +222,7 @@ def _history_row(row: TrendRow, unit: ForceUnit) -> tuple[str, ...]:
     return (
         formatting.moment(row.time),
         row.test,
-        formatting.number(row.temperature_c, ".1f", "not recorded")
-        + (" °C" if math.isfinite(row.temperature_c) else ""),
+        formatting.temperature(row.temperature_c, "not recorded"),
         formatting.model_class(row.model),
         formatting.mean(tension),
         formatting.span(tension),

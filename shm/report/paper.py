@@ -105,6 +105,18 @@ class Table:
         rows = tuple((*left, *right) for left, right in pairs)
         return replace(self, headings=self.headings * 2, rows=rows, is_folded=False)
 
+    def with_units_in_headings(self) -> Table:
+        """Return the table with a unit that all numbers of a column share in its heading."""
+        headings, columns = [], []
+        for heading, cells in zip(self.headings, zip(*self.rows, strict=True), strict=True):
+            numbers = [cell for cell in cells if any(map(str.isdecimal, cell))]
+            units = {cell.rpartition(" ")[2] for cell in numbers}
+            unit = units.pop() if len(units) == 1 else ""
+            is_shared = bool(unit) and not any(map(str.isdecimal, unit))
+            headings.append(f"{heading}, {unit}" if is_shared else heading)
+            columns.append([c.removesuffix(f" {unit}") for c in cells] if is_shared else cells)
+        return replace(self, headings=tuple(headings), rows=tuple(zip(*columns, strict=True)))
+
     def not_in_terminal(self) -> Table:
         """Return the table, left out in a terminal."""
         return replace(self, terminal_rows=(), hidden_note="")

@@ -99,7 +99,7 @@ def lineage(known: Mapping[str, str]) -> dict[str, str]:
 def conditions(test: ModalTest) -> dict[str, str]:
     """Return the conditions of a test in words, as every report of it gives them."""
     return {
-        "temperature": formatting.temperature(test.temperature_c),
+        "temperature": formatting.temperature(test.temperature_c, "not recorded"),
         "hit level over reference level": formatting.plain(test.amplitude, absent="not recorded"),
         "added mass": added_mass(test),
         "measured by": test.operator or "not recorded",

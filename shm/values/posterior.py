@@ -442,6 +442,11 @@ class Averaged:
         """Return False if a caveat says that the sampler failed."""
         return not any(_SAMPLER_FAILED in each for each in self.caveats)
 
+    @property
+    def states_misfit(self) -> bool:
+        """Return True if a caveat says by how much the model misses the frequencies."""
+        return any(_MISSES in each for each in self.caveats)
+
 
 @dataclass(frozen=True, eq=False)
 class Selection(Displayable):

@@ -105,9 +105,9 @@ class Terminal:
 
 
 @contextmanager
-def terminal(workspace: Workspace, *arguments: object) -> Iterator[Terminal]:
+def terminal(workspace: Workspace, *arguments: object, verb: str = "import") -> Iterator[Terminal]:
     """In a process forked off this one, which has everything imported."""
-    words = ["--workspace", str(workspace.folder), "import", *map(str, arguments)]
+    words = ["--workspace", str(workspace.folder), verb, *map(str, arguments)]
     with warnings.catch_warnings():  # the threads of pytest-xdist hold nothing that a command needs
         warnings.simplefilter("ignore", DeprecationWarning)
         process, keys = pty.fork()

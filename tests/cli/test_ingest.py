@@ -23,12 +23,13 @@ from shm.identify import Identification, identify
 from shm.modes_document import modes_document
 from shm.pipeline import reporting
 from shm.pipeline.lineage import discarded_of_baselines
-from shm.store import Stage, Workspace
+from shm.store import Decision, Stage, Workspace
 from shm.store.posteriors import list_history
-from shm.store.recordings import count_stages, list_holds, list_recordings
+from shm.store.recordings import count_stages, find_latest_hold, list_holds, list_recordings
 from shm_cli import working
 from shm_cli.main import run
 from tests.cli.conftest import Shm
+from tests.cli.test_import_prompts import terminal
 from tests.helpers.flows import threads
 from tests.helpers.logger_exports import write_described_export, write_export
 from tests.helpers.painting import unpaint
@@ -212,6 +213,16 @@ def test_what_is_discarded_says_that_its_raw_file_stays(on_held: Shm) -> None:
     assert "`shm ingest --confirm 2 --why TEXT`" in again.said
     back = on_held.told("ingest --confirm lost --why 'it was right' --time 2026-06-01T10:00Z")
     assert "counts again from now on; it is done. Its time is 2026-06-01 10:00." in back
+
+
+def test_discard_asks_why_at_a_terminal(held: Workspace) -> None:
+    with terminal(held, "--discard", 2, verb="ingest") as person:
+        person.answer("Why is it discarded?", "  ", "wrong hanger")
+        assert person.end() == 0
+    with held.store() as store:
+        hold = find_latest_hold(store, 2)
+    assert hold is not None
+    assert (hold.decision, hold.why) == (Decision.DISCARDED, "wrong hanger")
 
 
 @pytest.mark.parametrize("verb", ["--confirm", "--discard"])

@@ -15,6 +15,11 @@ import pytest
 import xarray
 from PIL import Image
 
+from shm.pipeline import utc_now
+from shm.pipeline.reporting import hanger_report
+from shm.report.as_text import as_brief_text
+from shm.report.hanger_report import hanger_paper
+from shm.report.states import period_since
 from shm.store import Workspace
 from tests.cli.conftest import Ended, Shm
 from tests.helpers.pdf_words import Pdf
@@ -181,6 +186,17 @@ def test_note_is_written_and_listed(note: Callable[..., Ended], tmp_path: Path) 
     listed = note("list", "--hanger", 3, "--json").document["notes"]
     assert [each["text"] for each in listed] == ["storm", "new pin"]
     assert "new pin" in note("list").out
+
+
+def test_brief_report_is_page_one_of_the_full(on_bridge: Shm, bridge: Workspace) -> None:
+    for since, period in (
+        ("", None),
+        (" --since 2000-01-01", period_since("2000-01-01", utc_now())),
+    ):
+        with bridge.store() as store:
+            paper = hanger_paper(hanger_report(bridge, store, 3, utc_now(), period))
+        told = " ".join(as_brief_text(paper).split())
+        assert on_bridge.told(f"report --hanger 3{since}") == told
 
 
 def test_full_report_letters_its_appendices(shm: Shm, bridge: Workspace) -> None:

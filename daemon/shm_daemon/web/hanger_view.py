@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
-from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,12 +14,11 @@ from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm.pipeline.diagnosing import latest_diagnosis
 from shm.pipeline.reporting import hanger_now, hanger_states
-from shm.report.contents import Deed, DiagnosisSheet, HangerReport
+from shm.report.contents import DiagnosisSheet, HangerReport
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.store import (
     Baseline,
     BaselineGlance,
-    EventKind,
     HangerEvent,
     Store,
     StoredWatch,
@@ -41,12 +39,6 @@ from shm_daemon.web.models import HangerNumber
 from shm_daemon.web.site import described
 
 log = logging.getLogger(__name__)
-
-_DEEDS = {
-    EventKind.BASELINE: "baseline set",
-    EventKind.ADOPTED: "effect adopted",
-    EventKind.UNDONE: "adoption undone",
-}
 
 
 @dataclass(frozen=True)
@@ -122,20 +114,7 @@ class HangerView:
             # A test without a time stands at its receipt.
             trend=tuple(replace(row, time=point.time) for row, point in rows),
             states=self.states or NOTHING_WATCHED,
-            deeds=tuple(
-                Deed(_DEEDS[event.kind], self._shown_at(event), f"by {event.who}: {event.why}")
-                for event in self.events
-                if event.kind in _DEEDS
-            ),
         )
-
-    def _shown_at(self, event: HangerEvent) -> datetime:
-        """Return where the trend shows an event: of a baseline, the time of its last test."""
-        if event.kind is not EventKind.BASELINE:
-            return event.at
-        baseline = self.store.watch.baseline(self.hanger.id, number=event.id)
-        names = baseline.posterior.tests if baseline else ()
-        return max((each.time for each in self.trend if each.test in names), default=event.at)
 
     @cached_property
     def sheet(self) -> DiagnosisSheet | None:

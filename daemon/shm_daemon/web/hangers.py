@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
@@ -83,9 +82,8 @@ class ModalTestRow:
         if self.point is None:
             return ("", f"on its way: {self.row.stage.value}", "", "")
         tension = Interval.of_averaged(self.point.averaged).in_unit(self.unit)
-        known = math.isfinite(self.point.temperature_c)
         return (
-            formatting.temperature(self.point.temperature_c) if known else "not recorded",
+            formatting.temperature(self.point.temperature_c, "not recorded"),
             formatting.model_class(self.point.model),
             formatting.mean(tension),
             formatting.span(tension),

@@ -175,7 +175,7 @@ def _signs(deeds: Sequence[Deed]) -> list[spec.Mark]:
 
 
 def _view(data: HangerReport, scale: float) -> tuple[float, float]:
-    """Return the range of tests, state, baseline, thresholds and a nominal tension close by.
+    """Return the range of tests, headline, state, baseline, thresholds and a nominal close by.
 
     No axis reaches to an excluded test for its sake; single wide intervals may exceed it.
     """
@@ -183,6 +183,8 @@ def _view(data: HangerReport, scale: float) -> tuple[float, float]:
     counted = np.ones(len(bounds.middle), bool)
     counted[excluded] = len(excluded) == len(counted)
     seen: list[FloatArray] = [bounds.middle[counted]]
+    if data.now.is_determined:
+        seen.append(np.array([data.tension_n.low, data.tension_n.high]))
     if (baseline := data.now.baseline_n) is not None:
         seen.append(baseline.mean * np.array([1 - _reach(data), 1 + _reach(data)]))
     if (state := _state(data)) is not None:

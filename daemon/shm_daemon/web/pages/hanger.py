@@ -16,7 +16,7 @@ from fastapi.responses import HTMLResponse
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_summaries
-from shm.pipeline.reporting import hanger_report
+from shm.pipeline.reporting import DEED_WORDS, hanger_report
 from shm.report import formatting, hanger_tables
 from shm.report.bar_table import bar_table
 from shm.report.contents import DiagnosisSheet, HangerReport
@@ -46,12 +46,7 @@ router = APIRouter(include_in_schema=False)
 _LATEST_TESTS = 10
 _TESTS_A_PAGE = 100
 _LATEST_EVENTS = 20
-_EVENTS = {
-    EventKind.BASELINE: "baseline set",
-    EventKind.ADOPTED: "effect adopted",
-    EventKind.UNDONE: "adoption undone",
-    EventKind.ACKNOWLEDGED: "alert acknowledged",
-}
+_EVENTS = {**DEED_WORDS, EventKind.ACKNOWLEDGED: "alert acknowledged"}
 _TABLES = {
     "numbers": (hanger_tables.changes, hanger_tables.frequencies),
     "model": (hanger_tables.models, hanger_tables.parameters),

@@ -116,7 +116,7 @@ def _facts(view: ModalTestView) -> tuple[tuple[str, str, str], ...]:
     return (
         ("Modes", str(len(sheet.modes)), f"in {formatting.counted(len(planes), 'plane')}"),
         _tension(view),
-        ("Temperature", _temperature(test.temperature_c), "of the test"),
+        ("Temperature", formatting.temperature(test.temperature_c, "not recorded"), "of the test"),
         (
             "Tested",
             formatting.moment(test.time),
@@ -124,10 +124,6 @@ def _facts(view: ModalTestView) -> tuple[tuple[str, str, str], ...]:
         ),
         ("Excluded", str(n_foreign), "resonances without an order"),
     )
-
-
-def _temperature(celsius: float) -> str:
-    return formatting.number(celsius, ".1f") + " °C" if celsius == celsius else "not recorded"
 
 
 def _tension(view: ModalTestView) -> tuple[str, str, str]:

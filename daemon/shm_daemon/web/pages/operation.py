@@ -52,7 +52,7 @@ _STAGES = {
     "updated": "updated, wait for the watch",
     "watched": "watched, wait for their alerts to be sent",
     "done": "finished",
-    "refused": "refused",
+    "refused": "not usable as they are, or discarded",
     "held": "implausible: counts in nothing until a person decides",
 }
 _OTHER_STAGE = "at a stage that this version of shm does not know"

@@ -62,7 +62,7 @@
         try {
           show(form, await send(form));
         } catch (error) {
-          problem.textContent = `Not noted: ${error.message}`;
+          problem.textContent = `Not noted: ${error.message}`.replaceAll("`", "");
           button.disabled = false;
         }
       });

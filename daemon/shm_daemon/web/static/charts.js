@@ -157,6 +157,7 @@
     await library.react(plot, inTheme(figure.data, turned),
       layoutOf(inTheme(figure.layout ?? {}, turned), light, narrow, parseFloat(plot.style.height)),
       { responsive: true, displaylogo: false, scrollZoom: false,
+        displayModeBar: narrow ? false : "hover", // on a phone it would cover the legend
         modeBarButtonsToRemove: ["lasso2d", "select2d"] });
     if (plot.dataset.follows) return;
     plot.dataset.follows = "yes";

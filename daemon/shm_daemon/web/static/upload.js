@@ -15,6 +15,7 @@
   const said = (fault) => [fault.message, fault.remedy].filter(Boolean).join(" ").replaceAll("`", "");
   const size = (bytes) => bytes < 1e6
     ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+  const rounded = (value) => Number(value.toPrecision(3)); // never 1.86e+3
   const made = (name, values = {}) => Object.assign(document.createElement(name), values);
   const rest = (seconds) => new Promise((resolve) => { setTimeout(resolve, 1000 * seconds); });
   let queue = Promise.resolve();
@@ -91,7 +92,7 @@
   function cells(column) {
     const unit = column.quantity === "force" ? "N" : "m/s²";
     const range = column.largest === null ? ""
-      : `${column.least.toPrecision(3)} to ${column.largest.toPrecision(3)} ${unit}`;
+      : `${rounded(column.least)} to ${rounded(column.largest)} ${unit}`;
     const seen = [column.hits === null ? "" : `${column.hits} hits`,
       column.is_clipped ? "clipped" : ""].filter(Boolean).join(", ");
     const picture = column.outline.map((share) => BARS[Math.round(8 * share)]).join("");
