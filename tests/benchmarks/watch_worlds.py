@@ -146,7 +146,7 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
             continue  # the baseline would hold the event
         hanger = hanger_of(described.description, number)
         first = tests[:baseline_tests]
-        check = check_baseline(first, build("beam2", hanger))
+        check = check_baseline(first, hanger)
         posterior = baseline_of(check.accepted_tests(first), hanger)
         posterior = replace(posterior, baseline_check=check)
         dated = [(test, test.time) for test in tests]
