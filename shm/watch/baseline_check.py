@@ -18,7 +18,6 @@ import numpy as np
 
 from shm.models.bar_fit import PARAMETERS, SPRINGS, Bar, Fit, Seen, fit_bars, seen_in
 from shm.values import (
-    NAN,
     PLANES,
     BaselineCheck,
     BoolArray,
@@ -151,7 +150,7 @@ def _fit_tests(
             expected[n, seen] = table[n, seen] - left
             is_far = np.abs(left) > LIMITS.least_mistake
             off[n, seen] = ~found.sound & is_far
-            good[n, seen] = np.where(found.sound, table[n, seen], NAN)
+            good[n, seen] = np.where(found.sound, table[n, seen], expected[n, seen])
             is_unfit = found.is_misfit and is_far.sum() > MOST_MISTAKEN * len(rest)
             why[n] = "its modes fit none of the other tests'" if is_unfit else ""
     for n, fit in enumerate(fits if len(table) >= LIMITS.enough_for_clocks else ()):

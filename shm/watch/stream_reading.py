@@ -35,11 +35,8 @@ def baseline_of(
     if baseline is not None:
         return baseline, hanger
     (fit,) = fit_bars([Bar.described(hanger, Seen.of(keys, log_hz))])
-    nominal, factor = (
-        nominal_n(hanger),
-        hanger.bending_stiffness_factor * math.exp(2 * fit.theta[1]),
-    )
-    bar = replace(hanger, bending_stiffness_factor=factor, nominal_tension_n=nominal)
+    factor = hanger.bending_stiffness_factor * math.exp(2 * fit.theta[1])
+    bar = replace(hanger, bending_stiffness_factor=factor, nominal_tension_n=nominal_n(hanger))
     springs = fit.theta[SPRINGS] + math.log10(bar.bending_stiffness_n_m2 / hanger.length_m)
     names = ("theta_F", "theta_L", "log10_k1", "log10_k2", "log10_k3", "log10_k4")
     theta = (math.exp(fit.theta[0]), 1.0, *springs.tolist())
