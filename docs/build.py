@@ -33,7 +33,7 @@ from docs.filling import fill_in
 from docs.gap_page import hanger_3_table
 from docs.house import house
 from shm import api
-from shm.models.registry import MODELS
+from shm.models.classes.registry import MODELS
 from shm_cli.common import markdown
 from shm_cli.main import VERBS, cli
 from tests.benchmarks.thesis import frequencies, selection, thesis_data

@@ -58,10 +58,10 @@ if TYPE_CHECKING:
     from shm.api import simulate as simulate
     from shm.api import update as update
     from shm.errors import ShmError as ShmError
-    from shm.gap.simulator_problem import Prior as Prior
-    from shm.gap.simulator_problem import Reading as Reading
-    from shm.gap.simulator_problem import Simulator as Simulator
-    from shm.gap.simulator_problem import SimulatorEffect as SimulatorEffect
+    from shm.gap.simulator.simulator_problem import Prior as Prior
+    from shm.gap.simulator.simulator_problem import Reading as Reading
+    from shm.gap.simulator.simulator_problem import Simulator as Simulator
+    from shm.gap.simulator.simulator_problem import SimulatorEffect as SimulatorEffect
     from shm.identify import Identification as Identification
     from shm.simulate import PlantedEffect as PlantedEffect
     from shm.values import AddedMass as AddedMass
@@ -84,7 +84,7 @@ _HOMES = {
         "load_modes", "round_bar", "select", "update",
     ),
     "shm.errors": ("ShmError",),
-    "shm.gap.simulator_problem": ("Prior", "Reading", "Simulator", "SimulatorEffect"),
+    "shm.gap.simulator.simulator_problem": ("Prior", "Reading", "Simulator", "SimulatorEffect"),
     "shm.identify": ("Identification",),
     "shm.simulate": ("PlantedEffect",),
     "shm.values": (

@@ -71,7 +71,7 @@ def hooks(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> li
 
 def models(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Return names of model classes; after a comma the next one."""
-    from shm.models.registry import MODELS
+    from shm.models.classes.registry import MODELS
 
     *chosen, last = incomplete.split(",")
     before = "".join(f"{name}," for name in chosen)

@@ -16,9 +16,14 @@ from shm.bridge import load_bridge
 from shm.errors import NothingThere, UsageError
 from shm.gap import GapOptions, diagnose_bridge
 from shm.gap import diagnose as diagnosed
+from shm.gap.bridge.shared_causes import LEAST
 from shm.gap.diagnose import examined
-from shm.gap.measurement_plan import PlannedMeasurement, Race, nothing_planned, planned
-from shm.gap.shared_causes import LEAST
+from shm.gap.next_measurement.measurement_plan import (
+    PlannedMeasurement,
+    Race,
+    nothing_planned,
+    planned,
+)
 from shm.pipeline import utc_now
 from shm.pipeline.diagnosing import ChosenTests, choose_tests, diagnose_stored, keep_diagnosis
 from shm.report.as_html import as_html

@@ -12,7 +12,7 @@ import numpy as np
 import rich_click as click
 
 from shm.errors import UsageError
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.read import FORMATS, write
 from shm.simulate import (
     AmbientPlan,

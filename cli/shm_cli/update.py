@@ -230,7 +230,7 @@ def select_command(
     _, not_applicable = applicable(hanger, names)
     chosen = [build(name, hanger, priors) for name in competing_names(hanger, names)]
     if stated is not None:
-        from shm.inference.updating import check_class_priors
+        from shm.inference.answer.updating import check_class_priors
 
         check_class_priors(stated, [model.name for model in chosen])
     tests = tests_at(tests, level)

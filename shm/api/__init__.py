@@ -31,17 +31,18 @@ from shm.bridge.hanger import hanger_of
 from shm.errors import BadInput, UsageError
 from shm.gap import GapOptions, Progress
 from shm.gap import diagnose as diagnosed
-from shm.gap.any_simulator import diagnose_simulator
 from shm.gap.check import CheckOptions
 from shm.gap.check import check_gap as checked
+from shm.gap.simulator.any_simulator import diagnose_simulator
 from shm.identify import Identification, IdentifyOptions
 from shm.identify.identification import identify as identified
-from shm.inference import UpdateOptions, updating
+from shm.inference import UpdateOptions
+from shm.inference.answer import updating
+from shm.inference.answer.updating import check_class_priors
 from shm.inference.calibrating import calibrate
 from shm.inference.options import IMPORTANCE, SAMPLERS, silent
-from shm.inference.updating import check_class_priors
 from shm.models import DESCRIPTION, build, competing_names
-from shm.models.base import Conditions, Model
+from shm.models.classes.base import Conditions, Model
 from shm.read import read as read_file
 from shm.read import registry
 from shm.settings import Settings, load_settings

@@ -19,10 +19,10 @@ import numpy as np
 
 from shm import __version__
 from shm.errors import BadInput, UsageError, needing
-from shm.inference.data_checks import check_for_update
 from shm.inference.options import silent
-from shm.inference.problem import Problem
-from shm.inference.thesis_noise import ThesisLikelihood
+from shm.inference.problem.data_checks import check_for_update
+from shm.inference.problem.hanger_problem import Problem
+from shm.inference.problem.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, class_of, parameter_sets
 from shm.values import FloatArray, Hanger, ModalTest, Posterior
 from shm.values.parameter_names import is_logarithm
@@ -248,7 +248,7 @@ def predictive(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hanger)
 
 
 def _of_the_field(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hanger) -> Predictive:
-    """Return the same where the likelihood is that of `shm.inference.field`."""
+    """Return the same where the likelihood is that of `shm.inference.problem.field`."""
     model = class_of(posterior, hanger)
     used = check_for_update(tests, model)[0] if posterior.remarks else tests
     problem = Problem.of(used, model, silent)

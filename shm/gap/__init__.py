@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from shm.gap.bridge_diagnosis import diagnose_bridge
-from shm.gap.contract import GapOptions
+from shm.gap.bridge.bridge_diagnosis import diagnose_bridge
 from shm.gap.diagnose import diagnose
+from shm.gap.hypotheses.contract import GapOptions
 from shm.inference.options import Progress
 
 __all__ = ["GapOptions", "Progress", "diagnose", "diagnose_bridge"]

@@ -11,8 +11,8 @@ from typing import TypeAlias
 import numpy as np
 
 from shm.errors import ShmError, UsageError
-from shm.gap.contract import GapOptions
 from shm.gap.diagnose import diagnose
+from shm.gap.hypotheses.contract import GapOptions
 from shm.gap.twin import Twin
 from shm.inference.options import Progress, silent
 from shm.models.effects import EFFECTS, Parameter, Variant, parameters_of

@@ -9,14 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.gap.baseline import choose_baseline, find_richer
-from shm.gap.contract import Fit, GapOptions, Hypothesis
-from shm.gap.coordinates import is_place
-from shm.gap.damping import remark_on_damping
-from shm.gap.data_checks import usable
-from shm.gap.measurement_plan import ranked
-from shm.gap.misfit import doubt_orders, refuse_misfit
-from shm.gap.outliers import (
+from shm.gap.causes.baseline import choose_baseline, find_richer
+from shm.gap.causes.damping import remark_on_damping
+from shm.gap.causes.misfit import doubt_orders, refuse_misfit
+from shm.gap.causes.outliers import (
     Cleared,
     describe_doubtful,
     describe_excluded,
@@ -24,13 +20,17 @@ from shm.gap.outliers import (
     exclude_gross_errors,
     residuals_with_outliers,
 )
-from shm.gap.places import AS_LIKELY, list_other_places, places, split_place
-from shm.gap.problem import GapProblem
-from shm.gap.residuals import check_hold_out, held_out, residuals, shrinkage, trends
-from shm.gap.search import Attribution, Explanation, answered, check_effects, possible
-from shm.inference.data_checks import CheckedData
-from shm.inference.mixture import systematic
+from shm.gap.causes.places import AS_LIKELY, list_other_places, places, split_place
+from shm.gap.causes.residuals import check_hold_out, held_out, residuals, shrinkage, trends
+from shm.gap.causes.search import Attribution, Explanation, answered, check_effects, possible
+from shm.gap.hypotheses.contract import Fit, GapOptions, Hypothesis
+from shm.gap.hypotheses.coordinates import is_place
+from shm.gap.hypotheses.data_checks import usable
+from shm.gap.hypotheses.problem import GapProblem
+from shm.gap.next_measurement.measurement_plan import ranked
 from shm.inference.options import Progress, silent
+from shm.inference.problem.data_checks import CheckedData
+from shm.inference.sampler.mixture import systematic
 from shm.models.effects import check_effect_priors
 from shm.plausibility.bars import Known, doubt_of
 from shm.values import (

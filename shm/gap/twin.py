@@ -15,14 +15,14 @@ from itertools import count
 import numpy as np
 import scipy
 
-from shm.gap.baseline import choose_baseline
-from shm.gap.contract import GapOptions, Hypothesis
-from shm.gap.data_checks import usable
-from shm.gap.problem import GapProblem
-from shm.gap.search import fit_alone, invisible
+from shm.gap.causes.baseline import choose_baseline
+from shm.gap.causes.search import fit_alone, invisible
+from shm.gap.hypotheses.contract import GapOptions, Hypothesis
+from shm.gap.hypotheses.data_checks import usable
+from shm.gap.hypotheses.problem import GapProblem
 from shm.models import AS_DESCRIBED
 from shm.models.effects import EFFECTS, Variant, check_effect_priors
-from shm.models.hanger_model import TENSION
+from shm.models.one_hanger.hanger_model import TENSION
 from shm.values import (
     NAN,
     PLANES,

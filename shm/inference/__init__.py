@@ -8,7 +8,7 @@ from shm.inference.options import Progress, UpdateOptions
 from shm.resources import when_asked
 
 if TYPE_CHECKING:
-    from shm.inference.updating import class_probabilities, refresh, select, update
+    from shm.inference.answer.updating import class_probabilities, refresh, select, update
 
 __all__ = ["Progress", "UpdateOptions", "class_probabilities", "refresh", "select", "update"]
 
@@ -17,6 +17,6 @@ if not TYPE_CHECKING:
     __getattr__ = when_asked(
         __name__,
         dict.fromkeys(
-            ("class_probabilities", "refresh", "select", "update"), "shm.inference.updating"
+            ("class_probabilities", "refresh", "select", "update"), "shm.inference.answer.updating"
         ),
     )

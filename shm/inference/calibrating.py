@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from shm.errors import BadInput, UsageError
-from shm.inference.data_checks import check_data
-from shm.inference.options import Progress, UpdateOptions
-from shm.inference.priors import Calibration, calibration_of
-from shm.inference.updating import select
+from shm.inference.answer.updating import select
+from shm.inference.options import Calibration, Progress, UpdateOptions
+from shm.inference.problem.data_checks import check_data
+from shm.inference.problem.priors import calibration_of
 from shm.models import DESCRIPTION, Model
-from shm.models.hanger_model import BENDING, DENSITY, LENGTH, MODULUS, SECTION
+from shm.models.one_hanger.hanger_model import BENDING, DENSITY, LENGTH, MODULUS, SECTION
 from shm.values import Hanger, ModalTest, Posterior
 
 _SHARE_WITHIN_A_FAMILY = 1 / 3  # judgement: one bar of a delivery from another, to one delivery

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from shm.inference.priors import Calibration
+from shm.values import FloatArray
 
 Progress = Callable[[str, float], None]
 
@@ -16,6 +16,19 @@ def silent(label: str, fraction: float) -> None:
 
 IMPORTANCE, EMCEE = "importance", "emcee"
 SAMPLERS = (IMPORTANCE, EMCEE)
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Hold what measured tensions have taught of the deviations of a bar as made.
+
+    `names` are among `section`, `density`, `modulus`, `theta_L` and `bending_factor` (as logarithms
+    of true over described); `mean` (k,) and `covariance` (k, k).
+    """
+
+    names: tuple[str, ...]
+    mean: FloatArray
+    covariance: FloatArray
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Compute frequencies and shapes of a hanger from parameters, by each model class.
 
 A new class is one file and one line in `MODELS`; a baseline with effects that a hanger's owner
-adopted is made from its name (see `shm.models.adopted`).
+adopted is made from its name (see `shm.models.one_hanger.adopted`).
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from shlex import quote
 import numpy as np
 
 from shm.errors import UsageError, suggest
-from shm.models.adopted import (
+from shm.models.classes.base import DESCRIPTION, PRIORS, THESIS, Model, held_otherwise
+from shm.models.classes.registry import MODELS
+from shm.models.one_hanger.adopted import (
     Adopted,
     AdoptedName,
     AdoptedOfThesis,
     is_adopted,
     with_parameters,
 )
-from shm.models.adopted import unfit as adopted_unfit
-from shm.models.base import DESCRIPTION, PRIORS, THESIS, Model, held_otherwise
-from shm.models.hanger_model import HangerModel
-from shm.models.registry import MODELS
+from shm.models.one_hanger.adopted import unfit as adopted_unfit
+from shm.models.one_hanger.hanger_model import HangerModel
 from shm.values import PLANES, FloatArray, Hanger, Posterior
 
 AsMade = HangerModel

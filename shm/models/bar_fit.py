@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.models.tensioned_beam import frequencies_hz
+from shm.models.classes.tensioned_beam import frequencies_hz
 from shm.values import NAN, PLANES, BoolArray, FloatArray, Hanger, ModalTest, Plane
 
 

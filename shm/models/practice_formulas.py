@@ -8,7 +8,7 @@ not at hand; their coefficients were held against the exact clamped beam (tests/
 test_practice_formulas.py): without tension they give 0 within 2 EI/L^2, over their range the errors
 that `worst_error` states. Fang and Wang (2012) is not among them: its coefficients could be checked
 neither against the paper nor by a limit. Ceballos and Prato (2008) take several frequencies:
-`shm.models.equal_springs`.
+`shm.models.classes.equal_springs`.
 """
 
 from __future__ import annotations

@@ -17,7 +17,8 @@ from shm.errors import BadInput, NothingThere, UsageError
 from shm.inference import class_probabilities, update
 from shm.inference.options import Progress, silent
 from shm.models import build, class_of
-from shm.models.adopted import (
+from shm.models.effects import EFFECTS, Parameter, Variant, parameters_of
+from shm.models.one_hanger.adopted import (
     AdoptedEffect,
     AdoptedName,
     bounds_of,
@@ -27,7 +28,6 @@ from shm.models.adopted import (
     places_of,
     variant_of,
 )
-from shm.models.effects import EFFECTS, Parameter, Variant, parameters_of
 from shm.pipeline.lineage import update_terms
 from shm.pipeline.steps import options_of
 from shm.store import (

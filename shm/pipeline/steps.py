@@ -14,7 +14,7 @@ from shm.identify import IdentifyOptions, identify
 from shm.identify.plausibility import signal_doubts
 from shm.inference import UpdateOptions, refresh, select, update
 from shm.inference.calibrating import learn
-from shm.inference.priors import Calibration
+from shm.inference.options import Calibration
 from shm.models import build
 from shm.pipeline.lineage import Taught, Terms, competing, identify_settings, read_limits
 from shm.pipeline.remote_file import Opens, WatchResult

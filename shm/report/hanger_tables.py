@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shm.models import equal_springs
+from shm.models.classes import equal_springs
 from shm.models.practice_formulas import FORMULAS
 from shm.report import formatting, shared_tables
 from shm.report.bar_table import NOT_STATED

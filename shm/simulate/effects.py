@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.errors import UsageError
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.models.effects import EFFECTS, Case, Effect, Survey, Variant
 from shm.models.hanger import PhysicalHanger, PointMass
 from shm.values import PLANES, AddedMass, FloatArray, Hanger

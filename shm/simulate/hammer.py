@@ -9,7 +9,7 @@ from datetime import datetime
 import numpy as np
 
 from shm.errors import UsageError
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.models.hanger import PhysicalHanger
 from shm.simulate.effects import PlantedEffect, plant_effects
 from shm.simulate.modes import make_bar, plane_modes

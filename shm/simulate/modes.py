@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.errors import UsageError
-from shm.models.end_effects import coupled_bar
+from shm.models.classes.end_effects import coupled_bar
 from shm.models.hanger import NormalModes, PhysicalHanger, normal_modes
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, Plane
 from shm.values.leading import MIN_NO_GAP_PROBABILITY, find_leading_cause, sum_group_probability
-from shm.values.showing import Displayable, front, line, tension_words
+from shm.values.rounding import tension_words
+from shm.values.showing import Displayable, front, line
 from shm.values.verdict import GapVerdict, judge
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, Plane, Verdict
 from shm.values.recording import AddedMass
-from shm.values.rounding import NINETY_PERCENT
-from shm.values.showing import Displayable, front, line, tension_words
+from shm.values.rounding import NINETY_PERCENT, tension_words
+from shm.values.showing import Displayable, front, line
 
 if TYPE_CHECKING:
     from pandas import DataFrame

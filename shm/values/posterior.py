@@ -12,8 +12,8 @@ import numpy as np
 from shm.values.hanger import Hanger, Limits
 from shm.values.kinds import NAN, FloatArray, Plane
 from shm.values.modes import ModalTest
-from shm.values.rounding import force_unit, two_digits
-from shm.values.showing import Displayable, front, line, tension_words
+from shm.values.rounding import force_unit, tension_words, two_digits
+from shm.values.showing import Displayable, front, line
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -189,7 +189,7 @@ class Posterior(Displayable):
     `tension_of_other_ends_n` is that of other ends in posteriors of version 1.0, NaN in others.
     `description_off_sd` is by how many of its standard deviations the description would be off,
     `reading_off_sd` by how many a tension that was read is off what the frequencies say.
-    `remarks` say in words what `shm.inference.data_checks` changed in the tests, or doubts.
+    `remarks` say in words what `shm.inference.problem.data_checks` changed in the tests, or doubts.
     `taut_string_tension_n` is what a string without bending stiffness with these frequencies would
     carry, `stated_error_percent` the root mean square of the errors stated of frequencies; NaN
     where unknown.

@@ -59,6 +59,32 @@ def force_unit(*forces_n: float) -> ForceUnit:
     return _NEWTON if max(known) < _KILONEWTON_FROM_N else _MEGANEWTON
 
 
+def tension_and_interval(
+    mean_n: float, low_n: float, high_n: float, unit: ForceUnit | None = None
+) -> tuple[str, str]:
+    """Return `654 kN` and `640 to 671 kN`: two digits of the interval's half width."""
+    unit = unit or force_unit(mean_n)
+    low, mean, high = (unit.of(n) for n in (low_n, mean_n, high_n))
+    low_text, text, high_text = (
+        to_two_digits(each, (high - low) / 2) for each in (low, mean, high)
+    )
+    return f"{text} {unit.name}", f"{low_text} to {high_text} {unit.name}"
+
+
+def tension_words(mean_n: float, low_n: float, high_n: float) -> str:
+    """Return `654 kN (90 % credible interval 640 to 671 kN)`; the mean without an interval."""
+    if not math.isfinite(mean_n):
+        return "tension not known"
+    if not math.isfinite(high_n - low_n):
+        return force_unit(mean_n).with_unit(mean_n)
+    return with_interval(*tension_and_interval(mean_n, low_n, high_n))
+
+
+def with_interval(tension: str, interval: str) -> str:
+    """Return `654 kN (90 % credible interval 640 to 671 kN)`."""
+    return f"{tension} (90 % credible interval {interval})"
+
+
 NINETY_PERCENT = 1.645  # sds on either side that hold 90 % of a normal law
 
 

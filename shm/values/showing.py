@@ -7,7 +7,6 @@ what is asked for then.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 
@@ -44,16 +43,3 @@ def line(what: str, hanger: int | None, text: str) -> str:
     """Return `<Posterior of hanger 3: 654 kN (90 % credible interval 640 to 671 kN)>`."""
     whose = "" if hanger is None else f" of hanger {hanger}"
     return f"<{what}{whose}: {text}>"
-
-
-def tension_words(mean_n: float, low_n: float, high_n: float) -> str:
-    """Return `654 kN (90 % credible interval 640 to 671 kN)`; the mean without an interval."""
-    from shm.values.posterior import Averaged, Summary
-    from shm.values.rounding import force_unit
-    from shm.values.stated_tension import stated
-
-    if not math.isfinite(mean_n):
-        return "tension not known"
-    if not math.isfinite(high_n - low_n):
-        return force_unit(mean_n).with_unit(mean_n)
-    return stated(Averaged(Summary(mean_n, math.nan, low_n, math.nan, high_n), math.nan)).headline

@@ -7,7 +7,13 @@ from dataclasses import dataclass, replace
 
 from shm.values.hanger import Limits
 from shm.values.posterior import Averaged, Posterior, Selection
-from shm.values.rounding import MOST_DECIMALS, ForceUnit, force_unit, to_two_digits
+from shm.values.rounding import (
+    MOST_DECIMALS,
+    ForceUnit,
+    force_unit,
+    tension_and_interval,
+    with_interval,
+)
 
 _MIN_STATED = 0.01  # ten of a thousand draws: they tell a smaller probability to no digit
 
@@ -59,8 +65,8 @@ class StatedTension:
 
     @property
     def headline(self) -> str:
-        """`654 kN (90 % credible interval 640 to 671 kN)`."""
-        return f"{self.tension} (90 % credible interval {self.interval})"
+        """Return `654 kN (90 % credible interval 640 to 671 kN)`."""
+        return with_interval(self.tension, self.interval)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -82,14 +88,9 @@ def stated(averaged: Averaged, unit: ForceUnit | None = None) -> StatedTension:
     """Return a tension in words, rounded to two digits of its interval's half width."""
     tension_n, sd_n = averaged.tension_n, averaged.repeatability_sd_n
     unit = unit or force_unit(tension_n.mean)
-    low, mean, high = (unit.of(n) for n in (tension_n.q05, tension_n.mean, tension_n.q95))
-    low_text, text, high_text = (
-        to_two_digits(each, (high - low) / 2) for each in (low, mean, high)
-    )
     repeats = unit.of(sd_n)
     return StatedTension(
-        f"{text} {unit.name}",
-        f"{low_text} to {high_text} {unit.name}",
+        *tension_and_interval(tension_n.mean, tension_n.q05, tension_n.q95, unit),
         f"{repeats:.{decimals(repeats)}f} {unit.name}" if math.isfinite(repeats) else "",
         _probability(averaged.probability_above_limit),
         _probability(averaged.probability_slack),

@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from shm.models import Model
-from shm.models.end_effects import coupled_bar
+from shm.models.classes.end_effects import coupled_bar
 from shm.models.hanger import PointMass, solve
 from shm.models.hanger.physical import Zone
 from shm.values import PLANES, TENSION, End, FloatArray, Hanger, IntArray, WatchedQuantity

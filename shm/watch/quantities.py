@@ -16,8 +16,8 @@ import scipy
 
 from shm.errors import UsageError
 from shm.models import MODELS, AdoptedName, Model, class_of, is_adopted
-from shm.models.base import Conditions
-from shm.models.beam import Beam
+from shm.models.classes.base import Conditions
+from shm.models.classes.beam import Beam
 from shm.values import (
     NAN,
     PLANES,

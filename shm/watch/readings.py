@@ -23,7 +23,7 @@ import scipy
 
 from shm.errors import BadInput
 from shm.models import Model, class_of, described
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.values import (
     PLANES,
     TENSION,

@@ -15,8 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.gap.any_simulator import SimulatorDiagnosis, diagnose_simulator
-from shm.gap.simulator_problem import Reading, Simulator
+from shm.gap.simulator.any_simulator import SimulatorDiagnosis, diagnose_simulator
+from shm.gap.simulator.simulator_problem import Reading, Simulator
 from tests.helpers.textbook_simulators import CANTILEVER, FRAME, OSCILLATOR
 from tests.worlds.textbook_systems import Read, cantilever, frame, oscillator
 

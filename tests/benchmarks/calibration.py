@@ -51,7 +51,7 @@ from rich.progress import track
 from scipy.stats import chisquare, cramervonmises
 
 from shm.inference import UpdateOptions, update
-from shm.inference.thesis_noise import ThesisLikelihood
+from shm.inference.problem.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, Model, build
 from shm.values import NAN, PLANES, FloatArray, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3

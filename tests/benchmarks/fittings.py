@@ -3,8 +3,8 @@
 python tests/benchmarks/fittings.py
 
 Each row is a bar with fittings at both ends: the worst of its first six modes, in per cent of the
-frequency, by which the product's prediction (`shm.models.end_effects`) differs from a bar whose
-ends are zones of that stiffness and length. A per cent of a frequency is two of the tension.
+frequency, by which the product's prediction (`shm.models.classes.end_effects`) differs from a bar
+whose ends are zones of that stiffness and length. A per cent of a frequency is two of the tension.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models import tensioned_beam
-from shm.models.end_effects import EndWaves
+from shm.models.classes import tensioned_beam
+from shm.models.classes.end_effects import EndWaves
 from shm.models.hanger import PhysicalHanger, Zone, solve
 from shm.values import Hanger
 

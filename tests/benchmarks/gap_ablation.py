@@ -23,8 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from shm.gap import baseline, noise, outliers, problem, sampling, search
-from shm.gap.probabilities import ByLaws
+from shm.gap.causes import baseline, outliers, search
+from shm.gap.causes.probabilities import ByLaws
+from shm.gap.hypotheses import noise, problem, sampling
 from shm.values import Outcome
 from shm.values.posterior import ENOUGH_EFFECTIVE
 from tests.benchmarks.blind_scores import SURE, Row

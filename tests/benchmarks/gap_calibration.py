@@ -1,4 +1,4 @@
-"""What simulated hangers teach the gap diagnosis: writes `shm/gap/calibration.toml` anew.
+"""What simulated hangers teach the gap diagnosis: writes `shm/gap/causes/calibration.toml` anew.
 
     python tests/benchmarks/gap_calibration.py --cases 480 --seed 131 --jobs 2 --keep lessons.jsonl
         --write
@@ -32,11 +32,9 @@ from scipy.special import logsumexp
 
 from shm.bridge import load_hanger
 from shm.errors import ShmError
-from shm.gap.baseline import choose_baseline
-from shm.gap.contract import Fit, GapOptions
-from shm.gap.data_checks import usable
-from shm.gap.outliers import Cleared, exclude_gross_errors
-from shm.gap.probabilities import (
+from shm.gap.causes.baseline import choose_baseline
+from shm.gap.causes.outliers import Cleared, exclude_gross_errors
+from shm.gap.causes.probabilities import (
     CALIBRATION,
     FILE,
     Calibration,
@@ -44,8 +42,10 @@ from shm.gap.probabilities import (
     _allowances,
     _linear,
 )
-from shm.gap.problem import GapProblem
-from shm.gap.search import Attribution
+from shm.gap.causes.search import Attribution
+from shm.gap.hypotheses.contract import Fit, GapOptions
+from shm.gap.hypotheses.data_checks import usable
+from shm.gap.hypotheses.problem import GapProblem
 from shm.modes_document import load_modes
 from tests.benchmarks.blind_trial import Truth, make_hanger, plan_hangers
 

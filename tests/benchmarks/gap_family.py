@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from shm.gap import GapOptions
-from shm.gap.bridge_diagnosis import diagnose_jointly, examine_hanger
-from shm.gap.shared_evidence import HangerEvidence
+from shm.gap.bridge.bridge_diagnosis import diagnose_jointly, examine_hanger
+from shm.gap.bridge.shared_evidence import HangerEvidence
 from shm.values import PLANES, BridgeDiagnosis, Diagnosis, Hanger, ModalTest, Mode
 from tests.benchmarks.shares import share
 from tests.worlds import finite_elements as world

@@ -18,7 +18,9 @@ from typing import Any
 import begin
 import numpy as np
 
-from shm.inference import UpdateOptions, sampling, starts, update, valley
+from shm.inference import UpdateOptions, update
+from shm.inference.problem import starts
+from shm.inference.sampler import sampling, valley
 from shm.models import build
 from tests.benchmarks.left_out import Change, without
 from tests.benchmarks.worlds import hanger_and_tests

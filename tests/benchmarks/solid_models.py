@@ -19,11 +19,11 @@ from rich.progress import track
 
 from shm.bridge import load_hanger
 from shm.models import THESIS, build
-from shm.models.base import silent
-from shm.models.solid.assembly import assembled
-from shm.models.solid.basis import transverse_basis
-from shm.models.solid.geometry import Fineness
-from shm.models.solid.reduction import natural_modes
+from shm.models.classes.base import silent
+from shm.models.classes.solid.assembly import assembled
+from shm.models.classes.solid.basis import transverse_basis
+from shm.models.classes.solid.geometry import Fineness
+from shm.models.classes.solid.reduction import natural_modes
 from shm.values import FloatArray, Hanger
 
 HANGER_FILE = Path(__file__).parents[2] / "cli/shm_cli/example/hanger3.toml"

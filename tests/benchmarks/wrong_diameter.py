@@ -15,7 +15,7 @@ import numpy as np
 import shm
 from shm.inference import UpdateOptions, select
 from shm.models import build
-from shm.models.tensioned_beam import frequencies_hz
+from shm.models.classes.tensioned_beam import frequencies_hz
 from shm.values import PLANES, Hanger, ModalTest, Mode
 
 MODULUS_PA, DENSITY_KG_M3, ERROR = 205e9, 7850.0, 2e-4

@@ -12,8 +12,8 @@ import pytest
 from click.shell_completion import ShellComplete
 from rich.console import Console
 
+from shm.models.classes.registry import MODELS
 from shm.models.effects import EFFECTS
-from shm.models.registry import MODELS
 from shm.store import Workspace
 from shm_cli.main import GROUPS, VERBS, cli
 from tests.cli.conftest import Shm

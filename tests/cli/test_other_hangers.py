@@ -9,7 +9,7 @@ import pytest
 
 from shm.bridge import load_hanger
 from shm.models import MODELS
-from shm.models.beam import Beam1
+from shm.models.classes.beam import Beam1
 from shm.store import Workspace
 from shm.values import Hanger
 from tests.cli.conftest import Shm

@@ -37,7 +37,7 @@ from shm.models import (  # noqa: E402
     described,
     end_stiffness,
 )
-from shm.models.base import Model  # noqa: E402
+from shm.models.classes.base import Model  # noqa: E402
 from shm.modes_document import load_modes, modes_document  # noqa: E402
 from shm.store.blobs import pack_samples  # noqa: E402
 from shm.values import PLANES, ModalTest, Mode  # noqa: E402

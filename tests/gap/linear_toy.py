@@ -6,8 +6,8 @@ import numpy as np
 from scipy import stats
 from scipy.special import logsumexp
 
-from shm.gap.contract import Design, Fit, Hypothesis, Observations
-from shm.inference.likelihood import Covariance, NoiseNode
+from shm.gap.hypotheses.contract import Design, Fit, Hypothesis, Observations
+from shm.inference.sampler.likelihood import Covariance, NoiseNode
 from shm.models.effects import Conditions
 from shm.values import FloatArray
 from tests.helpers.toy_gap import design_of

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shm.gap.contract import Fit, Hypothesis
-from shm.gap.probabilities import ScoredHypothesis
-from shm.gap.search import Attribution, Explanation, answered, hardly_behind, possible
+from shm.gap.causes.probabilities import ScoredHypothesis
+from shm.gap.causes.search import Attribution, Explanation, answered, hardly_behind, possible
+from shm.gap.hypotheses.contract import Fit, Hypothesis
 from shm.models.effects import Variant
 from tests.gap import linear_toy as toy
 from tests.helpers.diagnoses import MASS, a_diagnosis

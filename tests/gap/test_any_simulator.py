@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput, UsageError
-from shm.gap.any_simulator import diagnose_simulator
-from shm.gap.contract import Hypothesis
-from shm.gap.simulator_fit import fit_hypothesis as fitted
-from shm.gap.simulator_problem import (
+from shm.gap.hypotheses.contract import Hypothesis
+from shm.gap.simulator.any_simulator import diagnose_simulator
+from shm.gap.simulator.simulator_fit import fit_hypothesis as fitted
+from shm.gap.simulator.simulator_problem import (
     Condition,
     Predict,
     Prior,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from shm.gap import GapOptions, diagnose
-from shm.gap.baseline import AS_DESCRIBED, choose_baseline, find_richer
-from shm.gap.contract import Hypothesis
+from shm.gap.causes.baseline import AS_DESCRIBED, choose_baseline, find_richer
+from shm.gap.hypotheses.contract import Hypothesis
 from shm.models.effects import Variant
 from shm.values import PLANES, Hanger, ModalTest, Mode, Supports
 from tests.helpers.effects import all_but

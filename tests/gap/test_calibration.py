@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shm.gap.contract import Hypothesis
-from shm.gap.probabilities import CALIBRATION, FILE, Calibration, read_calibration
-from shm.gap.search import fit_alone
+from shm.gap.causes.probabilities import CALIBRATION, FILE, Calibration, read_calibration
+from shm.gap.causes.search import fit_alone
+from shm.gap.hypotheses.contract import Hypothesis
 from shm.models.effects import Variant
 from tests.benchmarks.blind_trial import GAPPED, Plan, make_hanger
 from tests.benchmarks.gap_calibration import Lesson, calibrated, lesson, shares, text, ways_of

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from shm.errors import UsageError
-from shm.gap.contract import Hypothesis, Observations
-from shm.gap.residuals import held_out, shrinkage
+from shm.gap.causes.residuals import held_out, shrinkage
+from shm.gap.hypotheses.contract import Hypothesis, Observations
 from shm.models.effects import Conditions, Variant
 from shm.values import AddedMass
 from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension

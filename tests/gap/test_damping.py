@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.gap.damping import log_rising, remark_on_damping
-from shm.gap.observations import observed
+from shm.gap.causes.damping import log_rising, remark_on_damping
+from shm.gap.hypotheses.observations import observed
 from shm.values import NAN, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 

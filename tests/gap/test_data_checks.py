@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from shm.errors import BadInput
-from shm.gap.data_checks import usable
+from shm.gap.hypotheses.data_checks import usable
 from shm.values import NAN, AddedMass, Hanger, ModalTest, Mode, Scatter, ShapePoint
 
 HANGER = Hanger(3, 12.0, 200e9, 0.01327, 1.402e-5, 103.5, 711e3)

@@ -12,7 +12,7 @@ from shm.diagnosis_document import diagnosis_document
 from shm.documents import dump
 from shm.errors import BadInput, UsageError
 from shm.gap import GapOptions, diagnose
-from shm.gap.baseline import BEAMS
+from shm.gap.causes.baseline import BEAMS
 from shm.inference import select
 from shm.models import build
 from shm.models.effects import Variant

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.contract import Hypothesis, Observations
-from shm.gap.residuals import (
+from shm.gap.causes.residuals import (
     HeldOut,
     predictions,
     predictive_p_value,
     residuals,
     trends,
 )
-from shm.gap.search import fit_alone
+from shm.gap.causes.search import fit_alone
+from shm.gap.hypotheses.contract import Hypothesis, Observations
 from shm.models.effects import Conditions
 from shm.values import AddedMass
 from tests.gap import linear_toy as plain

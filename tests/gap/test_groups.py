@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.contract import Fit, Hypothesis
-from shm.gap.groups import expected_log_bayes_factor, group, views_from_peaks
-from shm.inference.likelihood import Covariance, Likelihood
-from shm.inference.posterior import Peak
+from shm.gap.causes.groups import expected_log_bayes_factor, group, views_from_peaks
+from shm.gap.hypotheses.contract import Fit, Hypothesis
+from shm.inference.sampler.density import Peak
+from shm.inference.sampler.likelihood import Covariance, Likelihood
 from shm.values import FloatArray, IntArray
 from tests.gap import linear_toy as toy
 

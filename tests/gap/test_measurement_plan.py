@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.contract import GapOptions
-from shm.gap.experiment_design import lift_off
-from shm.gap.measurement_plan import (
+from shm.gap.causes.search import Attribution, attribute
+from shm.gap.hypotheses.contract import GapOptions
+from shm.gap.next_measurement.experiment_design import lift_off
+from shm.gap.next_measurement.measurement_plan import (
     NO_GAP,
     UNKNOWN,
     Race,
@@ -18,7 +19,6 @@ from shm.gap.measurement_plan import (
     nothing_planned,
     planned,
 )
-from shm.gap.search import Attribution, attribute
 from shm.simulate import PlantedEffect
 from shm.values import MEASUREMENT_HOURS
 from tests.helpers.effects import all_but

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.contract import Hypothesis, Observations
-from shm.gap.experiment_design import like_the_present, measured_already, proposals
-from shm.gap.foresight import Errors, Foresight, NewTests, divergence
-from shm.gap.measurement_plan import NO_GAP, ranked
+from shm.gap.hypotheses.contract import Hypothesis, Observations
+from shm.gap.next_measurement.experiment_design import like_the_present, measured_already, proposals
+from shm.gap.next_measurement.foresight import Errors, Foresight, NewTests, divergence
+from shm.gap.next_measurement.measurement_plan import NO_GAP, ranked
 from shm.models.effects import Conditions, Variant
 from shm.simulate import PlantedEffect
 from shm.values import AddedMass

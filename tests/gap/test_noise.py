@@ -10,14 +10,14 @@ from scipy import integrate, stats
 from scipy.special import logsumexp
 
 from shm.assumptions import DEFAULTS
-from shm.gap.contract import Observations
-from shm.gap.noise import (
+from shm.gap.hypotheses.contract import Observations
+from shm.gap.hypotheses.noise import (
     drawn_together,
     flexible_nodes,
     nodes,
 )
-from shm.gap.repeated_errors import Repeated
-from shm.inference.likelihood import Covariance, Likelihood
+from shm.gap.hypotheses.repeated_errors import Repeated
+from shm.inference.sampler.likelihood import Covariance, Likelihood
 from shm.values import FloatArray
 from tests.gap import linear_toy as toy
 

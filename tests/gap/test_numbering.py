@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput
-from shm.gap.contract import GapOptions
+from shm.gap.causes.misfit import doubt_orders
+from shm.gap.causes.search import attribute
 from shm.gap.diagnose import diagnose
-from shm.gap.misfit import doubt_orders
-from shm.gap.search import attribute
+from shm.gap.hypotheses.contract import GapOptions
 from shm.simulate import PlantedEffect
 from shm.values import ModalTest
 from tests.helpers.effects import all_but

@@ -9,11 +9,11 @@ import pytest
 
 from shm.errors import BadInput
 from shm.gap import GapOptions, diagnose
-from shm.gap.noise import nodes
-from shm.gap.observations import observed, remark_on_rounding, rounding_covariance
-from shm.gap.problem import GapProblem
-from shm.gap.search import fit_alone, hypotheses
-from shm.inference.data_checks import step_hz
+from shm.gap.causes.search import fit_alone, hypotheses
+from shm.gap.hypotheses.noise import nodes
+from shm.gap.hypotheses.observations import observed, remark_on_rounding, rounding_covariance
+from shm.gap.hypotheses.problem import GapProblem
+from shm.inference.problem.data_checks import step_hz
 from shm.simulate import PlantedEffect
 from shm.values import NAN, AddedMass, ModalTest, Mode, ShapePoint
 from tests.helpers.effects import all_but

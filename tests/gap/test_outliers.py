@@ -12,8 +12,7 @@ from scipy import stats
 
 from shm.assumptions import DEFAULTS
 from shm.gap import GapOptions, diagnose
-from shm.gap.observations import observed
-from shm.gap.outliers import (
+from shm.gap.causes.outliers import (
     FREEDOM,
     SURE,
     acts_alone,
@@ -21,7 +20,8 @@ from shm.gap.outliers import (
     log_gross,
     log_ordinary,
 )
-from shm.gap.search import fit_alone
+from shm.gap.causes.search import fit_alone
+from shm.gap.hypotheses.observations import observed
 from shm.simulate import PlantedEffect
 from shm.values import ModalTest, Outcome
 from tests.helpers.effects import all_but

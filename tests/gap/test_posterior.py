@@ -10,11 +10,11 @@ import pytest
 from scipy import stats
 from scipy.special import logsumexp, ndtr
 
-from shm.gap.contract import Hypothesis
-from shm.gap.posterior import Target
-from shm.gap.sampling import Sampling, approximate, sample
-from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
-from shm.inference.posterior import find_peaks, laplace
+from shm.gap.hypotheses.contract import Hypothesis
+from shm.gap.hypotheses.sampling import Sampling, approximate, sample
+from shm.gap.hypotheses.target import Target
+from shm.inference.sampler.density import find_peaks, laplace
+from shm.inference.sampler.likelihood import Covariance, Likelihood, NoiseNode
 from shm.models.effects import Parameter
 from shm.values import ENOUGH_EFFECTIVE, FloatArray, IntArray
 

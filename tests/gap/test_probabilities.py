@@ -8,8 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shm.gap.contract import Fit, Hypothesis
-from shm.gap.probabilities import (
+from shm.gap.causes.probabilities import (
     CALIBRATION,
     NO_GAP,
     PAIR,
@@ -22,8 +21,9 @@ from shm.gap.probabilities import (
     log_prior,
     probabilities,
 )
-from shm.gap.problem import GapProblem
-from shm.gap.search import fit_alone
+from shm.gap.causes.search import fit_alone
+from shm.gap.hypotheses.contract import Fit, Hypothesis
+from shm.gap.hypotheses.problem import GapProblem
 from shm.models.effects import EFFECTS, Variant
 from shm.simulate import PlantedEffect
 from tests.gap import linear_toy as toy

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from shm.gap.contract import Hypothesis
-from shm.gap.coordinates import Coordinates, cut
-from shm.models.base import point_mass
+from shm.gap.hypotheses.contract import Hypothesis
+from shm.gap.hypotheses.coordinates import Coordinates, cut
+from shm.models.classes.base import point_mass
 from shm.models.effects import Parameter, Variant
 from shm.models.hanger import solve
 from tests.helpers.gap_campaigns import HANGER, campaign, problem_of

@@ -9,9 +9,9 @@ import pytest
 
 from shm.assumptions import DEFAULTS
 from shm.gap import GapOptions, diagnose
-from shm.gap.contract import Hypothesis
-from shm.gap.data_checks import usable
-from shm.gap.observations import observed
+from shm.gap.hypotheses.contract import Hypothesis
+from shm.gap.hypotheses.data_checks import usable
+from shm.gap.hypotheses.observations import observed
 from shm.models.effects import EFFECTS
 from shm.models.hanger import PhysicalHanger, solve
 from shm.report.diagnosis_wording import is_of_the_measurement

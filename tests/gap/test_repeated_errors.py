@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from shm.assumptions import DEFAULTS
-from shm.gap.contract import Hypothesis
-from shm.gap.problem import GapProblem
-from shm.gap.repeated_errors import (
+from shm.gap.hypotheses.contract import Hypothesis
+from shm.gap.hypotheses.problem import GapProblem
+from shm.gap.hypotheses.repeated_errors import (
     STRETCHES,
     ShapeScaling,
     section_loads,
     section_ways,
 )
-from shm.inference.systematic_errors import errors_of_sensors, felt_by, loads_of_ends
+from shm.inference.problem.systematic_errors import errors_of_sensors, felt_by, loads_of_ends
 from shm.models.hanger import Zone, solve
 from shm.values import AddedMass, FloatArray
 from tests.helpers.gap_campaigns import HANGER, problem_of, simulated

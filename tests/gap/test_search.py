@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from shm.errors import UsageError
-from shm.gap.contract import GapOptions, Hypothesis
-from shm.gap.probabilities import ScoredHypothesis
-from shm.gap.scan import VISIBLE, Scan, scan, scan_pair
-from shm.gap.search import ALONE, DROWNED, Search, fit_alone, hypotheses, invisible
-from shm.inference.linear import Linear
+from shm.gap.causes.probabilities import ScoredHypothesis
+from shm.gap.causes.scan import VISIBLE, Scan, scan, scan_pair
+from shm.gap.causes.search import ALONE, DROWNED, Search, fit_alone, hypotheses, invisible
+from shm.gap.hypotheses.contract import GapOptions, Hypothesis
+from shm.inference.sampler.linear import Linear
 from shm.models.effects import EFFECTS, Variant
 from shm.values import ENOUGH_EFFECTIVE
 from tests.helpers.effects import all_but

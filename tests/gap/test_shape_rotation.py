@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shm.gap.noise import nodes
-from shm.gap.observations import observed, separate_turn
-from shm.gap.repeated_errors import turn_loads
+from shm.gap.hypotheses.noise import nodes
+from shm.gap.hypotheses.observations import observed, separate_turn
+from shm.gap.hypotheses.repeated_errors import turn_loads
 from shm.values import FloatArray, ModalTest, Mode
 from tests.helpers.gap_campaigns import problem_of, simulated
 from tests.helpers.hangers import HANGER_3

@@ -11,12 +11,9 @@ import pytest
 
 from shm.errors import UsageError
 from shm.gap import GapOptions, diagnose_bridge
-from shm.gap.bridge_diagnosis import diagnose_jointly
-from shm.gap.probabilities import NO_GAP, SINGLE, UNKNOWN
-from shm.gap.scan import VISIBLE
-from shm.gap.search import Attribution, attribute
-from shm.gap.shared_causes import find_groups, sum_two_or_more
-from shm.gap.shared_evidence import (
+from shm.gap.bridge.bridge_diagnosis import diagnose_jointly
+from shm.gap.bridge.shared_causes import find_groups, sum_two_or_more
+from shm.gap.bridge.shared_evidence import (
     SHARING,
     EffectEvidence,
     HangerEvidence,
@@ -24,6 +21,9 @@ from shm.gap.shared_evidence import (
     Sizes,
     weigh_hanger,
 )
+from shm.gap.causes.probabilities import NO_GAP, SINGLE, UNKNOWN
+from shm.gap.causes.scan import VISIBLE
+from shm.gap.causes.search import Attribution, attribute
 from shm.models.effects import EFFECTS, Variant
 from shm.report.as_text import as_text
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_paper

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.models.tensioned_beam import shapes, waves
+from shm.models.classes.tensioned_beam import shapes, waves
 from shm.values import FloatArray
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.inference.described import DescribedCoordinates
+from shm.inference.problem.described import DescribedCoordinates
 from shm.models import AsMade, build
 from shm.values import FloatArray, Hanger
 

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 from shm.assumptions import DEFAULTS
-from shm.gap.contract import Fit, Hypothesis
-from shm.gap.observations import observed
-from shm.gap.posterior import Target
-from shm.gap.problem import GapProblem
-from shm.gap.sampling import MOST_ROUNDS, Sampling
-from shm.gap.scan import Scan, scan
-from shm.gap.search import fit_alone
-from shm.inference.linear import Linear
-from shm.inference.posterior import find_peaks
+from shm.gap.causes.scan import Scan, scan
+from shm.gap.causes.search import fit_alone
+from shm.gap.hypotheses.contract import Fit, Hypothesis
+from shm.gap.hypotheses.observations import observed
+from shm.gap.hypotheses.problem import GapProblem
+from shm.gap.hypotheses.sampling import MOST_ROUNDS, Sampling
+from shm.gap.hypotheses.target import Target
+from shm.inference.sampler.density import find_peaks
+from shm.inference.sampler.linear import Linear
 from shm.models import MODELS, AsMade
 from shm.models.effects import Conditions, Variant
-from shm.models.hanger_model import DENSITY, LENGTH, MODULUS, SECTION, TENSION
+from shm.models.one_hanger.hanger_model import DENSITY, LENGTH, MODULUS, SECTION, TENSION
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import (
     ENOUGH_EFFECTIVE,

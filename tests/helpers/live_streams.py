@@ -11,7 +11,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from shm.models.tensioned_beam import frequencies_hz
+from shm.models.classes.tensioned_beam import frequencies_hz
 from shm.pipeline.stream_steps import WindowFound
 from shm.pipeline.streaming import Streaming
 from shm.read.chunk_document import chunk_document

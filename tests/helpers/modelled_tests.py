@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from shm.models import described
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode, Plane, Posterior
 from shm.watch.quantities import common_stiffness
 from tests.helpers.hangers import HANGER_3

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from shm.gap.simulator_problem import Condition, Prior, Simulator, SimulatorEffect
+from shm.gap.simulator.simulator_problem import Condition, Prior, Simulator, SimulatorEffect
 
 Values = dict[str, Any]
 GAIN = {"gain": Prior("normal", 1.0, 0.01)}

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.gap.contract import Design, Fit, Hypothesis, Observations
-from shm.gap.repeated_errors import Repeated
-from shm.inference.likelihood import Covariance
+from shm.gap.hypotheses.contract import Design, Fit, Hypothesis, Observations
+from shm.gap.hypotheses.repeated_errors import Repeated
+from shm.inference.sampler.likelihood import Covariance
 from shm.models.effects import Conditions, Parameter, Survey
 from shm.values import NAN, PLANES, AddedMass, FloatArray, Hanger
 from tests.helpers.hangers import HANGER_3

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from shm.inference import UpdateOptions, update
-from shm.inference.thesis_noise import ThesisLikelihood
+from shm.inference.problem.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, Model, build
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.values import NAN, AddedMass, ModalTest, Mode
 from tests.helpers.given_modes import with_modes
 from tests.helpers.hangers import HANGER_3

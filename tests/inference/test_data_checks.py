@@ -10,9 +10,9 @@ import pytest
 import shm
 from shm.errors import BadInput
 from shm.gap import GapOptions, diagnose
-from shm.gap.data_checks import usable
+from shm.gap.hypotheses.data_checks import usable
 from shm.inference import UpdateOptions, update
-from shm.inference.data_checks import check_data, check_for_update, find_line_hz
+from shm.inference.problem.data_checks import check_data, check_for_update, find_line_hz
 from shm.models import DESCRIPTION, THESIS, build
 from shm.report.diagnosis_summary import write_lead
 from shm.values import NAN, Hanger, ModalTest, Mode, Scatter, Selection

@@ -9,12 +9,12 @@ import pytest
 
 from shm.assumptions import DEFAULTS
 from shm.inference import UpdateOptions, select, update
-from shm.inference.described import DescribedCoordinates
-from shm.inference.options import silent
-from shm.inference.priors import Calibration, TensionPrior, calibration_of
-from shm.inference.problem import Problem
+from shm.inference.options import Calibration, silent
+from shm.inference.problem.described import DescribedCoordinates
+from shm.inference.problem.hanger_problem import Problem
+from shm.inference.problem.priors import TensionPrior, calibration_of
 from shm.models import build
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.values import (
     NAN,
     PLANES,

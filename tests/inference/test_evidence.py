@@ -11,10 +11,10 @@ from scipy.special import ndtri
 from scipy.stats import multivariate_normal
 
 from shm.inference import UpdateOptions, update
-from shm.inference.likelihood import Covariance, NoiseNode
-from shm.inference.problem import Problem
-from shm.inference.thesis_noise import ThesisLikelihood
-from shm.inference.updating import infer
+from shm.inference.answer.updating import infer
+from shm.inference.problem.hanger_problem import Problem
+from shm.inference.problem.thesis_noise import ThesisLikelihood
+from shm.inference.sampler.likelihood import Covariance, NoiseNode
 from shm.models import THESIS, Model, build
 from shm.values import FloatArray, Posterior
 from tests.helpers.evidence_oracle import (

@@ -10,8 +10,8 @@ from scipy.special import logsumexp
 from scipy.stats import t
 
 from shm.assumptions import DEFAULTS
-from shm.inference.field import FieldLikelihood
-from shm.inference.systematic_errors import (
+from shm.inference.problem.field import FieldLikelihood
+from shm.inference.problem.systematic_errors import (
     errors_of_sensors,
     felt_by,
     loads_of_ends,
@@ -19,7 +19,7 @@ from shm.inference.systematic_errors import (
     mean_of_ends,
 )
 from shm.models import build
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Plane
 from tests.helpers.hangers import HANGER_3
 

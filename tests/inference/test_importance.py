@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from shm.inference import UpdateOptions, sampling, update
-from shm.inference.chain import run_chain
-from shm.inference.mixture import Weighted
+from shm.inference import UpdateOptions, update
 from shm.inference.options import EMCEE, silent
-from shm.inference.posterior import Points
-from shm.inference.problem import Problem
-from shm.inference.valley import Draws
+from shm.inference.problem.hanger_problem import Problem
+from shm.inference.sampler import sampling
+from shm.inference.sampler.chain import run_chain
+from shm.inference.sampler.density import Points
+from shm.inference.sampler.mixture import Weighted
+from shm.inference.sampler.valley import Draws
 from shm.models import THESIS, build
 from shm.values import FloatArray, Posterior
 from tests.helpers.evidence_oracle import TABLES, modal_test

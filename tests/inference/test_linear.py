@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 from scipy.special import logsumexp
 
-from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
-from shm.inference.linear import Linear
+from shm.inference.sampler.likelihood import Covariance, Likelihood, NoiseNode
+from shm.inference.sampler.linear import Linear
 
 F, S, L = 6, 4, 3
 RNG = np.random.default_rng(2)

@@ -7,7 +7,7 @@ import pytest
 
 import shm
 from shm.inference import UpdateOptions, update
-from shm.inference.other_answers import _description_off_sd
+from shm.inference.answer.other_answers import _description_off_sd
 from shm.models import THESIS, build
 from shm.values import Hanger, ModalTest, Posterior
 from tests.helpers.given_modes import with_modes

@@ -10,8 +10,8 @@ import pytest
 from scipy import stats
 
 from shm.assumptions import DEFAULTS
-from shm.inference.priors import SPRINGS, Ends, TensionPrior, clamped_probability, fixity_of
-from shm.inference.updating import class_probabilities
+from shm.inference.answer.updating import class_probabilities
+from shm.inference.problem.priors import SPRINGS, Ends, TensionPrior, clamped_probability, fixity_of
 from shm.models import build
 from shm.values import Hanger
 from tests.helpers.hangers import ROD

@@ -10,7 +10,7 @@ import pytest
 from shm.errors import UsageError
 from shm.inference import UpdateOptions, refresh, select, update
 from shm.models import THESIS, Model, build, parameter_sets
-from shm.models.beam import Beam2
+from shm.models.classes.beam import Beam2
 from shm.values import FloatArray, ModalTest, Posterior
 from tests.helpers.evidence_oracle import ORACLE, TABLES, modal_test
 from tests.helpers.given_modes import with_modes

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
+from shm.inference.answer.updating import update
 from shm.inference.options import UpdateOptions
-from shm.inference.shapes import MeasuredShapes, swaps_of
-from shm.inference.updating import update
+from shm.inference.problem.shapes import MeasuredShapes, swaps_of
+from shm.inference.sampler.likelihood import Covariance, Likelihood, NoiseNode
 from shm.models import AsMade
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, ShapePoint
 from tests.helpers.classes_as_made import as_made

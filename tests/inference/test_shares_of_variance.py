@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.inference import UpdateOptions, update
-from shm.inference.shares_of_variance import explained_share
+from shm.inference.answer.shares_of_variance import explained_share
 from shm.models import described
 from shm.values import Hanger, ModalTest, Posterior, Selection
 from tests.helpers.given_modes import with_modes

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from shm.assumptions import DEFAULTS
-from shm.gap.repeated_errors import STRETCHES, section_loads
-from shm.inference.systematic_errors import (
+from shm.gap.hypotheses.repeated_errors import STRETCHES, section_loads
+from shm.inference.problem.systematic_errors import (
     errors_of_sensors,
     felt_by,
     loads_of_ends,
     loads_of_section,
     mean_of_ends,
 )
-from shm.models.end_effects import EndWaves
+from shm.models.classes.end_effects import EndWaves
 from shm.models.hanger import PhysicalHanger, PointMass
 from shm.values import FloatArray, Hanger, Scatter
 from tests.helpers.hangers import HANGER_3

@@ -10,8 +10,8 @@ import pytest
 
 from shm.errors import BadInput, UsageError
 from shm.inference import UpdateOptions, select, update
-from shm.inference.outcome import _at_bounds
-from shm.inference.thesis_noise import ThesisLikelihood
+from shm.inference.answer.outcome import _at_bounds
+from shm.inference.problem.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, build
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode
 from tests.helpers.evidence_oracle import TABLES, log_marginal, modal_test

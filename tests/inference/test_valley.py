@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from shm.inference.valley import Proposal, valleys_through
+from shm.inference.sampler.valley import Proposal, valleys_through
 from shm.values import FloatArray
 
 SD = 0.01

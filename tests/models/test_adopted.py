@@ -10,8 +10,8 @@ import pytest
 from shm.errors import BadInput, UsageError
 from shm.inference import UpdateOptions
 from shm.models import PRIORS, THESIS, AsMade, Model, applicable, build, class_of, described
-from shm.models.adopted import AdoptedEffect, AdoptedName, places_of
 from shm.models.effects import EFFECTS, Variant
+from shm.models.one_hanger.adopted import AdoptedEffect, AdoptedName, places_of
 from shm.values import AddedMass, ModalTest
 from tests.helpers import quick_update
 from tests.helpers.hangers import HANGER_3

@@ -9,7 +9,7 @@ import pytest
 
 from shm.assumptions import DEFAULTS
 from shm.models import THESIS, AsMade, build, described
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.values import AddedMass, FloatArray, Hanger
 from tests.helpers.classes_as_made import as_made
 from tests.helpers.hangers import HANGER_3, ROD
@@ -23,7 +23,7 @@ DEVIATIONS = {"theta_L": 1.004, "section": 0.02, "density": -0.006, "modulus": 0
 @pytest.fixture(autouse=True)
 def _weightless(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the bar's own weight out: the classes of the thesis have none."""
-    monkeypatch.setattr("shm.models.hanger_model.GRAVITY_M_S2", 0.0)
+    monkeypatch.setattr("shm.models.one_hanger.hanger_model.GRAVITY_M_S2", 0.0)
 
 
 def packed(model: AsMade, **values: float) -> FloatArray:

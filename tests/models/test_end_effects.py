@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.models.end_effects import EndWaves
+from shm.models.classes.end_effects import EndWaves
 from shm.models.hanger import PhysicalHanger, PointMass, Zone
 from shm.values import FloatArray
 from tests.helpers.physical_hangers import EI, LENGTH, MASS, TENSION, clamped, frequencies_hz

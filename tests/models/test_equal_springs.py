@@ -7,8 +7,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from shm.models.equal_springs import VALID_FROM_XI, WORST_ERROR, tension_n
-from shm.models.tensioned_beam import frequencies_hz
+from shm.models.classes.equal_springs import VALID_FROM_XI, WORST_ERROR, tension_n
+from shm.models.classes.tensioned_beam import frequencies_hz
 
 LENGTH_M, MASS_KG_M, STIFFNESS_N_M2 = 9.0, 80.0, 2e5
 BAR = (LENGTH_M, MASS_KG_M, STIFFNESS_N_M2)

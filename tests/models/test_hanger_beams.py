@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from shm.models import tensioned_beam
+from shm.models.classes import tensioned_beam
 from shm.models.hanger import PhysicalHanger, Zone, solve
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import (
@@ -81,7 +81,7 @@ ZONES = [
 def test_a_zone_agrees_with_fine_elements(start, end, stiffness, mass) -> None:
     inside = ElementZone(max(start, 0.0), min(end, LENGTH), stiffness, mass)
     member = Member(LENGTH, TENSION, EI, MASS, zones=(inside,), rotation_n_m_rad=CLAMPED)
-    expected = natural_frequencies_hz(member, 8, 600)
+    expected = natural_frequencies_hz(member, 8, 24)
     zone = Zone(*(np.array([value]) for value in (start, end, stiffness, mass)))
     found = frequencies_hz(replace(clamped(), zones=(zone,)), 8)[0, 0]
     np.testing.assert_allclose(found, expected, rtol=5e-5)
@@ -108,7 +108,7 @@ def test_solve_compressed_zone(stiffness: float, mass: float) -> None:
     force_n = 0.3 * EULER_N
     weak = (ElementZone(START, END, stiffness, mass),)
     held = Member(LENGTH, -force_n, EI, MASS, zones=weak, rotation_n_m_rad=(np.inf, np.inf))
-    expected = natural_frequencies_hz(held, 5, 600)
+    expected = natural_frequencies_hz(held, 5, 24)
     bar = PhysicalHanger.clamped(HANGER_3, np.array([-force_n]))
     bar = replace(bar, zones=zone(1, START, END, stiffness, mass))
     np.testing.assert_allclose(frequencies_hz(bar, 5)[0, 0], expected, rtol=3e-4)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from shm.models import tensioned_beam
+from shm.models.classes import tensioned_beam
 from shm.models.hanger import PhysicalHanger, solve
 from tests.helpers.physical_hangers import (
     EI,

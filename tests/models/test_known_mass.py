@@ -10,7 +10,7 @@ import scipy
 
 from shm.assumptions import DEFAULTS
 from shm.models import MODELS, THESIS, AsMade, build
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.models.hanger import PhysicalHanger, solve
 from shm.simulate.effects import plant_effects
 from shm.values import AddedMass, FloatArray, Hanger

@@ -55,7 +55,7 @@ def test_frequencies_rise_with_the_order_and_the_tension(model, theta) -> None:
 
 
 def test_a_swap_changes_no_frequency(model, theta, monkeypatch) -> None:
-    monkeypatch.setattr("shm.models.hanger_model.GRAVITY_M_S2", 0.0)
+    monkeypatch.setattr("shm.models.one_hanger.hanger_model.GRAVITY_M_S2", 0.0)
     for one, other in model.swaps:
         swapped = theta.copy()
         columns = [model.parameter_names.index(name) for name in (one, other)]

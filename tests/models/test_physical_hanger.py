@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shm.models import AsMade, described
-from shm.models.base import Conditions, radius_m
+from shm.models.classes.base import Conditions, radius_m
 from shm.models.hanger import PhysicalHanger, PointMass, physical, solve
 from shm.values import AddedMass, FloatArray, Hanger, Supports, Turnbuckle
 from tests.helpers.classes_as_made import as_made, drawn

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from shm.errors import UsageError
-from shm.models.base import Model
-from shm.models.beam import Beam1
+from shm.models.classes.base import Model
+from shm.models.classes.beam import Beam1
 from shm.models.effects import EFFECTS
 from shm.models.effects.base import Effect
 from shm.models.plug_ins import (
@@ -19,7 +19,7 @@ from shm.models.plug_ins import (
 )
 
 MODULE = """
-from shm.models.beam import Beam1
+from shm.models.classes.beam import Beam1
 from shm.models.effects.of_mass import UnknownPointMass
 
 class Lamp(UnknownPointMass):

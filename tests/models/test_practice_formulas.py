@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shm.models.classes.tensioned_beam import frequencies_hz
 from shm.models.practice_formulas import FORMULAS, PracticeFormula
-from shm.models.tensioned_beam import frequencies_hz
 
 LENGTH_M, MASS_KG_M, STIFFNESS_N_M2 = 9.0, 80.0, 2e5
 BAR = (LENGTH_M, MASS_KG_M, STIFFNESS_N_M2)

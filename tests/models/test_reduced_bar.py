@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from shm.models import tensioned_beam
+from shm.models.classes import tensioned_beam
 from shm.models.hanger import PhysicalHanger, PointMass, ReducedBar, Zone, solve
 from shm.values import FloatArray, Hanger
 

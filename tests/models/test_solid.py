@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from shm.models import DESCRIPTION, THESIS, AsMade, build
-from shm.models.base import silent
-from shm.models.beam import Beam1
-from shm.models.solid import S1, Solid0, Solid1, Solid2
-from shm.models.solid.assembly import assembled
-from shm.models.solid.basis import transverse_basis
-from shm.models.solid.classes import SolidModel
-from shm.models.solid.reduction import Projected, natural_modes
+from shm.models.classes.base import silent
+from shm.models.classes.beam import Beam1
+from shm.models.classes.solid import S1, Solid0, Solid1, Solid2
+from shm.models.classes.solid.assembly import assembled
+from shm.models.classes.solid.basis import transverse_basis
+from shm.models.classes.solid.classes import SolidModel
+from shm.models.classes.solid.reduction import Projected, natural_modes
 from shm.values import Hanger
 from tests.benchmarks.thesis import thesis_data
 from tests.helpers.hangers import HANGER_3

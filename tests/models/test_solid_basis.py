@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.models.base import silent
-from shm.models.solid import S1, Solid2, basis, reduction
+from shm.models.classes.base import silent
+from shm.models.classes.solid import S1, Solid2, basis, reduction
 from tests.helpers.hangers import HANGER_3
 
 SHORT = replace(HANGER_3, length_m=3.0, plate=None)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from shm.errors import UsageError
-from shm.inference.described import DescribedCoordinates
+from shm.inference.problem.described import DescribedCoordinates
 from shm.models import MODELS, AsMade, applicable, build, check_baseline, competing_names
-from shm.models.beam import Beam1
+from shm.models.classes.beam import Beam1
 from shm.models.effects import EFFECTS, Conditions, Survey, parameters_of
 from shm.models.hanger import PhysicalHanger, solve
 from shm.values import PLANES, FloatArray, Hanger, Supports

@@ -8,7 +8,7 @@ from numpy.polynomial import Legendre
 from scipy.linalg import eigh, null_space
 from scipy.optimize import brentq
 
-from shm.models.tensioned_beam import wave_numbers
+from shm.models.classes.tensioned_beam import wave_numbers
 from tests.helpers.beam_count import modes_below
 from tests.helpers.beam_shapes import mode_shape
 

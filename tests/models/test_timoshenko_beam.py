@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from shm.models import described, tensioned_beam
+from shm.models import described
+from shm.models.classes import tensioned_beam
 from shm.values import FloatArray
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import EI, LENGTH, MASS, TENSION

@@ -8,7 +8,7 @@ import pytest
 
 from shm.errors import UsageError
 from shm.models import MODELS
-from shm.models.beam import Beam1
+from shm.models.classes.beam import Beam1
 from shm.store import Stage, Workspace
 from shm.store.recordings import count_stages
 from shm.values import Hanger

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shm.models import build
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.plausibility.bars import Known, OtherOrigin, doubt_of
 from shm.values import PLANES, AddedMass, Hanger, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3

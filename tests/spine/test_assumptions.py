@@ -17,11 +17,11 @@ from shm.assumptions import DEFAULTS, Assumption, Assumptions, number_text
 from shm.bridge import Bridge, load_bridge
 from shm.documents import dump
 from shm.errors import BadInput
-from shm.gap.noise import nodes
-from shm.gap.observations import observed
-from shm.inference.field import FieldLikelihood
-from shm.inference.priors import SPRINGS, Ends, TensionPrior, reading_of
-from shm.inference.systematic_errors import errors_of_sensors
+from shm.gap.hypotheses.noise import nodes
+from shm.gap.hypotheses.observations import observed
+from shm.inference.problem.field import FieldLikelihood
+from shm.inference.problem.priors import SPRINGS, Ends, TensionPrior, reading_of
+from shm.inference.problem.systematic_errors import errors_of_sensors
 from shm.models import described
 from shm.models.bar_fit import seen_in
 from shm.models.effects import EFFECTS, Variant

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.models.tensioned_beam import wave_numbers
+from shm.models.classes.tensioned_beam import wave_numbers
 from shm.values import FloatArray
 
 MODES = 7  # as many as the thesis draws

@@ -7,7 +7,7 @@ import pytest
 
 from shm.errors import UsageError
 from shm.inference import UpdateOptions, update
-from shm.inference.thesis_noise import ThesisLikelihood
+from shm.inference.problem.thesis_noise import ThesisLikelihood
 from shm.models import DESCRIPTION, THESIS, build
 from shm.values import PLANES, ModalTest, Mode
 from tests.benchmarks.thesis.grouped_likelihood import GroupedLikelihood, update_grouped

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput
-from shm.models.tensioned_beam import frequencies_hz
+from shm.models.classes.tensioned_beam import frequencies_hz
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, StreamEvent

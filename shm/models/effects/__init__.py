@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from shm.errors import BadInput
-from shm.models.base import Conditions
+from shm.models.classes.base import Conditions
 from shm.models.effects.base import Case, Effect, Parameter, Survey, Variant
 from shm.models.effects.of_ends import (
     EffectiveLength,

@@ -13,7 +13,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from shm.models.base import Conditions, Model
+from shm.models.classes.base import Conditions, Model
 from shm.models.hanger.physical import PhysicalHanger, Zone
 from shm.values import NAN, PLANES, AddedMass, FloatArray, Hanger, Plane
 

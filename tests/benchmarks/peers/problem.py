@@ -3,7 +3,7 @@
 Beam 2 on hanger 3 of the thesis with its table 1.1 ("thesis") or with frequencies of an exact beam
 that are known to 3e-5 ("sharp"): six parameters with uniform priors and the model error sigma,
 uniform on [0, 1], as a seventh ("sampled") or integrated out ("integrated"). The frequencies and
-the likelihood are the package's, `shm.models` and `shm.inference.likelihood`.
+the likelihood are the package's, `shm.models` and `shm.inference.sampler.likelihood`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from importlib.metadata import version
 import numpy as np
 
 import shm
-from shm.inference.thesis_noise import ThesisLikelihood
+from shm.inference.problem.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, build
 from shm.values import FloatArray
 from tests.helpers.evidence_oracle import TABLES, modal_test

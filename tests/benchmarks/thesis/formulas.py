@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.inference import UpdateOptions, update
-from shm.models import build, equal_springs
+from shm.models import build
+from shm.models.classes import equal_springs
+from shm.models.classes.tensioned_beam import frequencies_hz
 from shm.models.practice_formulas import FORMULAS
-from shm.models.tensioned_beam import frequencies_hz
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode, Selection
 
 _ORDERS = 6  # as many as the thesis measured

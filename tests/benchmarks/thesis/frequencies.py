@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from shm.models import THESIS, build
-from shm.models.solid.classes import SolidModel
+from shm.models.classes.solid.classes import SolidModel
 from shm.values import PLANES, FloatArray, Hanger, Plane
 from tests.benchmarks.thesis import thesis_data
 

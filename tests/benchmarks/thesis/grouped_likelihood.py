@@ -9,11 +9,11 @@ import numpy as np
 
 from shm.errors import UsageError
 from shm.inference import Progress, UpdateOptions
+from shm.inference.answer.outcome import posterior_of
+from shm.inference.answer.updating import infer
 from shm.inference.options import silent
-from shm.inference.outcome import posterior_of
-from shm.inference.problem import Problem
-from shm.inference.thesis_noise import ThesisLikelihood
-from shm.inference.updating import infer
+from shm.inference.problem.hanger_problem import Problem
+from shm.inference.problem.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, Model
 from shm.values import FloatArray, ModalTest, Posterior, Summary
 from tests.benchmarks.thesis.modal_groups import groups

@@ -18,12 +18,12 @@ import numpy as np
 
 from shm.errors import UsageError
 from shm.inference import Progress, UpdateOptions
-from shm.inference.mixture import Normal, Rows, Weighted, normalised
+from shm.inference.answer.other_answers import Outcome
+from shm.inference.answer.outcome import assembled
 from shm.inference.options import silent
-from shm.inference.other_answers import Outcome
-from shm.inference.outcome import assembled
-from shm.inference.posterior import Points
-from shm.inference.problem import Problem
+from shm.inference.problem.hanger_problem import Problem
+from shm.inference.sampler.density import Points
+from shm.inference.sampler.mixture import Normal, Rows, Weighted, normalised
 from shm.models import THESIS, Model
 from shm.values import BoolArray, FloatArray, ModalTest, Posterior
 

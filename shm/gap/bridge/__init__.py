@@ -1,0 +1,1 @@
+"""Diagnose a bridge as one patient: causes that its hangers share."""

@@ -1,0 +1,84 @@
+"""The model class that a diagnosis starts from: the one that `select` would prefer.
+
+Where the cause that is found would be part of another class, the diagnosis goes on with that one:
+that a bar shears or that its ends turn is no gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.gap.causes.search import fit_alone, sample_alone
+from shm.gap.hypotheses.contract import GapOptions, Hypothesis, Observations
+from shm.gap.hypotheses.observations import observed
+from shm.gap.hypotheses.problem import GapProblem
+from shm.inference.answer.updating import log_class_prior
+from shm.inference.options import Progress, silent
+from shm.inference.sampler.mixture import normalised
+from shm.models import AS_DESCRIBED, MODELS, AsMade, applicable, check_baseline
+from shm.models.classes.base import held_otherwise
+from shm.values import Hanger, ModalTest
+
+BEAMS = ("beam1", "beam2", "beam3")
+_OF_NOTE = 0.02  # of the classes' probability: less moves no interval that is told
+
+
+def choose_baseline(
+    tests: Sequence[ModalTest],
+    hanger: Hanger,
+    options: GapOptions,
+    rng: np.random.Generator,
+    progress: Progress = silent,
+) -> GapProblem:
+    """Return the problem of the baseline in `options`, else of the likeliest beam.
+
+    Raises UsageError for a class that is no baseline of this hanger.
+    """
+    observations = observed(tests, hanger)
+    if options.baseline:
+        check_baseline(options.baseline, hanger)
+        return _problem(options.baseline, tests, hanger, observations)
+    names = applicable(hanger, BEAMS)[0]
+    if not names:
+        if not held_otherwise(hanger):
+            check_baseline(AS_DESCRIBED, hanger)
+        names = (AS_DESCRIBED,)
+    problems = [_problem(name, tests, hanger, observations) for name in names]
+    if len(problems) == 1:
+        return problems[0]
+    log = []
+    for each in problems:
+        progress(f"baseline {each.model.name}", 0.0)
+        log.append(sample_alone(each, rng).log_evidence[0] + log_class_prior(each.model))
+    share = normalised(np.array(log))
+    chosen = problems[int(share.argmax())]
+    for of, each in zip(share.tolist(), problems, strict=True):
+        if of > _OF_NOTE:
+            fit_alone(each, rng, options.draws)
+            chosen.rivals.append((of, each))
+    return chosen
+
+
+def find_richer(problem: GapProblem, hypothesis: Hypothesis) -> GapProblem | None:
+    """Return the problem of the beam that has most effects of a hypothesis as its own parameters.
+
+    It has those of the beam of `problem`, too. None where no beam has any effect more.
+    """
+    effects, included = {name for name, _ in hypothesis.effects}, set(problem.has_itself)
+    best, most = None, 0
+    for name in applicable(problem.hanger, BEAMS)[0]:
+        other = _problem(name, problem.tests, problem.hanger, problem.observations)
+        shared = len(effects & set(other.has_itself) - included)
+        if included <= set(other.has_itself) and shared > most:
+            best, most = other, shared
+    if best is not None:
+        best.rivals = problem.rivals
+    return best
+
+
+def _problem(
+    name: str, tests: Sequence[ModalTest], hanger: Hanger, observations: Observations
+) -> GapProblem:
+    return GapProblem(AsMade(MODELS[name](hanger)), tests, observations)

@@ -1,0 +1,1 @@
+"""Predict a hanger's tests by each hypothesis: parameters, errors, likelihood and posterior."""

@@ -1,0 +1,1 @@
+"""Choose the measurement that would tell the leading causes apart best."""

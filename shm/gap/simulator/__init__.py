@@ -1,0 +1,1 @@
+"""Diagnose the gap of any simulator on the same engine."""

@@ -1,0 +1,1 @@
+"""Put a hanger and its tests into a prior and a likelihood."""

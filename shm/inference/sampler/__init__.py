@@ -1,0 +1,1 @@
+"""Draw from a posterior and integrate it: peaks, valleys, importance sampling, emcee."""

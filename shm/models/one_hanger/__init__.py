@@ -1,0 +1,1 @@
+"""Describe one hanger by its class, its uncertain terms, effects and adopted causes."""
