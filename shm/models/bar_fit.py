@@ -1,8 +1,8 @@
 """Fit a Timoshenko beam on end springs to measured modes, as its description allows.
 
 Whoever asks what bar a test shows asks here: is it this hanger's, which of a baseline's modes are
-mistaken, by what a sensor's modes go with the tension. Gauss-Newton steps from three kinds of ends,
-with Student's weights (Lange et al. 1989): a mode of a wrong order counts for little.
+mistaken, what tension does a held test imply. Gauss-Newton steps from three kinds of ends, with
+Student's weights (Lange et al. 1989): a mode of a wrong order counts for little.
 """
 
 from __future__ import annotations

@@ -287,6 +287,11 @@ class Limits:
     clip: float = 4.0  # sds: what a mode may add to its spread at once
     # technical: of the tension, for a slope by central differences
     stream_reading_step: float = 0.01
+    n_springs: int = 10
+    n_shares: int = 4
+    # Of a sum of misfits: modes fit a beam to 0.3 % each, nominal tensions are good to 15 %.
+    # Judgement.
+    nominal: float = 0.003 * 3 / 0.15
 
     # ---- stream thermometer
     # Derived: of a rod of 20 mm, the thinnest hanger, that loses nothing of the 900 W/m2 of a high

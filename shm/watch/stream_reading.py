@@ -19,28 +19,53 @@ import numpy as np
 
 from shm.assumptions import DEFAULTS, Assumptions
 from shm.models import class_of
-from shm.models.bar_fit import SPRINGS, Bar, Seen, fit_bars, nominal_n
+from shm.models.classes.tensioned_beam import frequencies_hz
 from shm.values import PLANES, BoolArray, FloatArray, Hanger, Mode, Posterior
 from shm.values.stream import PooledReading
 from shm.watch.limits import LIMITS
 from shm.watch.quantities import MeasuredMode, base_point, log_frequencies, posterior_at
 
 _HALVES = np.array([0.5, -0.5])  # by definition: of a contrast, in each of PLANES
+# What is tried where there is no baseline: xi = L sqrt(T/EI) from slack to a slender cable, springs
+# k L/EI from pinned to clamped, and the share of the solid stiffness that a strand may have.
+_XI = np.geomspace(0.5, 300.0, 240)
 
 
 def baseline_of(
     baseline: Posterior | None, hanger: Hanger, keys: Sequence[MeasuredMode], log_hz: FloatArray
 ) -> tuple[Posterior, Hanger]:
-    """Return the baseline with its hanger; without one the described bar that fits best."""
+    """Return the baseline with its hanger; without one the beam on springs that fits best.
+
+    That has the least sum of absolute misfits, springs by plane: a mode with a wrong order counts
+    for little. The nominal tension tells a slack bar on stiff springs from a taut one on soft ones.
+    """
     if baseline is not None:
         return baseline, hanger
-    (fit,) = fit_bars([Bar.described(hanger, Seen.of(keys, log_hz))])
-    factor = hanger.bending_stiffness_factor * math.exp(2 * fit.theta[1])
-    bar = replace(hanger, bending_stiffness_factor=factor, nominal_tension_n=nominal_n(hanger))
-    springs = fit.theta[SPRINGS] + math.log10(bar.bending_stiffness_n_m2 / hanger.length_m)
+    order = np.array([each for _, each in keys]) - 1
+    assumed = hanger.assumptions
+    stiffness = np.geomspace(*assumed.end_restraint.bounds, LIMITS.n_springs)
+    factors = np.geomspace(*assumed.strand_bending_factor.bounds, LIMITS.n_shares)
+    shares = factors if hanger.kind == "strand" else np.ones(1)
+    length_m, mass = np.asarray(hanger.length_m), np.asarray(hanger.mass_per_length_kg_m)
+    xi, k, share = np.meshgrid(_XI, stiffness, shares, indexing="ij")
+    bending = hanger.bending_stiffness_n_m2 * share
+    tension_n, spring = bending * (xi / length_m) ** 2, k * bending / length_m
+    modes = frequencies_hz(length_m, tension_n, bending, mass, spring, spring, order.max() + 1)
+    misfit = np.abs(np.log(modes[..., order]) - log_hz)
+    by_plane = {plane: misfit[..., its].sum(axis=-1) for plane, its in planes_of(keys).items()}
+    total = sum(each.min(axis=1) for each in by_plane.values())
+    if hanger.nominal_tension_n > 0:
+        total = total + LIMITS.nominal * np.abs(np.log(tension_n[:, 0] / hanger.nominal_tension_n))
+    at, of = np.unravel_index(int(np.argmin(total)), total.shape)
+    found = {plane: each[at, :, of].argmin() for plane, each in by_plane.items()}
+    across, along = (found.get(each, next(iter(found.values()))) for each in PLANES)
+    ends = np.log10(spring[at, [across, along, across, along], of])
+    nominal_n = hanger.nominal_tension_n if hanger.nominal_tension_n > 0 else 1.0
+    theta = np.array([tension_n[at, 0, of] / nominal_n, 1.0, *ends])
+    factor = hanger.bending_stiffness_factor * float(shares[of])
+    bar = replace(hanger, bending_stiffness_factor=factor, nominal_tension_n=nominal_n)
     names = ("theta_F", "theta_L", "log10_k1", "log10_k2", "log10_k3", "log10_k4")
-    theta = (math.exp(fit.theta[0]), 1.0, *springs.tolist())
-    return posterior_at("beam2", bar, dict(zip(names, theta, strict=True))), bar
+    return posterior_at("beam2", bar, dict(zip(names, theta.tolist(), strict=True))), bar
 
 
 @dataclass(frozen=True, eq=False)
