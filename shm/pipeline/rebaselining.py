@@ -16,12 +16,13 @@ from shm.inference import update
 from shm.inference.options import Progress, silent
 from shm.models import build
 from shm.pipeline.lineage import update_terms
-from shm.pipeline.steps import checked, options_of
+from shm.pipeline.steps import options_of
 from shm.pipeline.watching import dated_tests
 from shm.store import Baseline, Stage, Store, StoredAlert, StoredTest, Workspace
 from shm.store.watch import list_detected_changes
 from shm.values import Change, Hanger
 from shm.values.rounding import force_unit
+from shm.watch.baseline_check import check_baseline
 from shm.watch.readings import Reader
 from shm.watch.repair_check import EventKind, Unrepaired, is_explained, unrepaired
 from shm.watch.watching import accepted_baseline_tests
@@ -120,7 +121,7 @@ def set_baseline(
     model = before.posterior.model
     terms, lineage = update_terms(hanger, [model], chosen, workspace.settings)
     measured = [test.test for test in chosen]
-    check = checked(measured, hanger, terms)
+    check = check_baseline(measured, hanger)
     posterior = update(
         check.accepted_tests(measured),
         build(model, hanger, terms.priors),

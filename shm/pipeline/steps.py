@@ -15,7 +15,7 @@ from shm.identify.plausibility import signal_doubts
 from shm.inference import UpdateOptions, refresh, select, update
 from shm.inference.calibrating import learn
 from shm.inference.options import Calibration
-from shm.models import build, described
+from shm.models import build
 from shm.pipeline.lineage import Taught, Terms, competing, identify_settings, read_limits
 from shm.pipeline.remote_file import Opens, WatchResult
 from shm.plausibility import fingerprint_of
@@ -24,7 +24,6 @@ from shm.settings import Settings
 from shm.store import Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
 from shm.values import (
-    BaselineCheck,
     Beside,
     Hanger,
     ModalTest,
@@ -36,18 +35,11 @@ from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_newest
 from shm.watch.baseline_check import check_baseline
 from shm.watch.frequency_watch import measured_levels, watch_newest_frequencies
 
-_CHECKED_BY = "beam2"  # fast, and any bar is such a beam as far as a mistaken mode goes
-
 
 def options_of(terms: Terms, hanger: Hanger) -> UpdateOptions:
     """The terms of an update as its options."""
     learnt = calibration(terms.taught, hanger)
     return UpdateOptions(samples=terms.samples, seed=terms.seed, calibration=learnt)
-
-
-def checked(tests: Sequence[ModalTest], hanger: Hanger, terms: Terms) -> BaselineCheck:
-    """Find mistakes among the tests of a baseline, by a beam on springs whatever competes."""
-    return check_baseline(tests, described(_CHECKED_BY, hanger, terms.priors))
 
 
 def calibration(taught: Taught | None, hanger: Hanger) -> Calibration | None:
@@ -152,7 +144,7 @@ def select_model(
     if not hanger.is_modelled:
         return Selection((measured_levels(tests, terms.seed),), (1.0,))
     models = [build(name, hanger, terms.priors) for name in names]
-    check = checked(tests, hanger, terms)
+    check = check_baseline(tests, hanger)
     found = select(check.accepted_tests(tests), models, options_of(terms, hanger))
     posteriors = tuple(replace(each, baseline_check=check) for each in found.posteriors)
     return replace(found, posteriors=posteriors)

@@ -16,20 +16,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shm.models.bar_fit import Bar, Seen, fit_bars, seen_in
 from shm.plausibility.bar_evidence import (
     LATEST,
     LEAST_MODES,
     ORDINARY,
     OTHER_CLOCK,
     TIGHTER,
-    Bar,
     Evidence,
     Origin,
-    Seen,
     changes_of,
-    fit_bars,
     log_sum,
-    seen_in,
+    weigh_change,
+    weigh_description,
 )
 from shm.plausibility.candidate import Candidate
 from shm.plausibility.limits import LIMITS
@@ -179,12 +178,12 @@ def _candidates(
         bars[origin] = Bar.described(history.hanger, seen.times(1 / factor))
     fits = dict(zip(bars, fit_bars(list(bars.values())), strict=True))
     mine = fits.pop(Origin("hanger", id_))
-    rivals = {origin: fit.described() for origin, fit in fits.items()}
+    rivals = {origin: weigh_description(fit) for origin, fit in fits.items()}
     for origin, fit in fits.items():
         if origin.kind == "hanger" and (at := origin.hanger) in before:
             rivals[origin] = _as_before(now[at].over(before[at]), fit.way)
     if id_ not in before:
-        return replace(mine.described(), masses=True), _with_priors(rivals, len(others))
+        return replace(weigh_description(mine), masses=True), _with_priors(rivals, len(others))
     shift, way = seen.over(before[id_]), mine.way
     for factor in LIMITS.factors:
         rivals[Origin("time base", factor=factor)] = _as_before(shift.times(1 / factor), way)
@@ -193,7 +192,7 @@ def _candidates(
         rivals[Origin("time base", factor=factor)] = _as_before(shift, way, OTHER_CLOCK)
     crossed = seen.over(before[id_].exchanged())
     rivals[Origin("planes")] = _as_before(crossed, way[::-1])
-    return mine.changed(shift), _with_priors(rivals, len(others))
+    return weigh_change(mine, shift), _with_priors(rivals, len(others))
 
 
 def _with_priors(

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, timedelta
 
-import numpy as np
-
 from shm.documents import format_time
-from shm.models.classes.tensioned_beam import frequencies_hz
-from shm.plausibility.limits import LIMITS
+from shm.models.bar_fit import PARAMETERS, Bar, fit_bars, refit, seen_in
+from shm.plausibility.bar_evidence import OTHER_BAR, changes_of
 from shm.values import (
     NAN,
     Doubt,
     Fingerprint,
-    FloatArray,
     Hanger,
     KnownSamples,
     ModalTest,
@@ -66,50 +64,20 @@ Check = Callable[[Candidate], Doubt | None]
 
 
 def implied_shift(test: ModalTest, reference: Sequence[ModalTest], hanger: Hanger) -> float:
-    """By which fraction the tension differs from the reference's, going by the modes.
+    """Return by which fraction the tension differs from the reference's, going by the modes.
 
-    Least squares over the modes that both have, each with d ln f / d ln T of the described bar at
-    its nominal tension, ends clamped, or pinned where they are described so. From three orders on
-    the bending stiffness may differ, too: stiffer ends lift the high modes alone, and a tension by
+    Bending stiffness and ends may differ, too: stiffer ends lift the high modes, and a tension by
     itself would have to rise for that, though it has fallen. A rough figure is all that is wanted
     of a test that may be of another bar. NaN where they share no mode, or where the bar carries no
     tension.
     """
-    change = _shared(test, reference)
-    if not change or not hanger.nominal_tension_n > 0:
+    before = seen_in(reference, hanger)
+    shift = seen_in([test], hanger).over(before)
+    if not shift.mask.any() or not hanger.nominal_tension_n > 0:
         return NAN
-    slopes = _slopes(hanger, max(order for _, order in change))
-    gain = np.array([slopes[order - 1] for _, order in change])
-    shift = np.array(list(change.values()))
-    if len({order for _, order in change}) < LIMITS.orders_of_two:
-        return float(np.expm1(gain @ shift / (gain @ gain)))
-    # f^2 goes with a T + b EI, so both logarithmic slopes add up to a half.
-    both = np.column_stack([gain, 0.5 - gain])
-    return float(np.expm1(np.linalg.lstsq(both, shift, rcond=None)[0][0]))
-
-
-def _slopes(hanger: Hanger, modes: int) -> FloatArray:
-    """d ln f / d ln T of the first modes."""
-    end = np.full(2, 0.0 if hanger.supports.ends("pinned") else np.inf)
-    tension_n = hanger.nominal_tension_n * np.exp([-LIMITS.step / 2, LIMITS.step / 2])
-    length_m = np.full(2, hanger.length_m)
-    stiffness = np.asarray(hanger.bending_stiffness_n_m2)
-    mass = np.asarray(hanger.mass_per_length_kg_m)
-    below, above = frequencies_hz(length_m, tension_n, stiffness, mass, end, end, modes)
-    return np.asarray(np.log(above / below) / LIMITS.step)
-
-
-def _shared(test: ModalTest, reference: Sequence[ModalTest]) -> dict[tuple[str, int], float]:
-    """The change of the log frequency of each mode that both have, from the reference's mean."""
-    before: dict[tuple[str, int], list[float]] = {}
-    for each in reference:
-        for mode in each.modes:
-            before.setdefault((mode.plane, mode.order), []).append(mode.frequency_hz)
-    return {
-        key: float(np.log(mode.frequency_hz / np.mean(before[key])))
-        for mode in test.regular_modes
-        if mode.order <= LIMITS.most_orders and (key := (mode.plane, mode.order)) in before
-    }
+    (fit,) = fit_bars([Bar.described(hanger, before)])
+    ((_, sd),) = changes_of(OTHER_BAR)
+    return math.expm1(refit(fit, shift, sd[:PARAMETERS]).theta[0] - fit.theta[0])
 
 
 _OTHER_BAR = ("right hanger", "right planes", "right time base")

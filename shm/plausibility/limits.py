@@ -10,20 +10,6 @@ class Limits:
     """Hold each limit with its unit and reason; where no source is named it is a judgement."""
 
     # ---- bar evidence
-    # log10 k L/EI near a pin, in the middle and near a clamp, from where fits begin.
-    starts: tuple[float, ...] = (-1.0, 0.75, 2.5)
-    # Of fits: misfits of 10 % count at first, those of 0.2 % in the end.
-    steps: int = 14
-    wide: float = 0.1
-    narrows: float = 0.5
-    fit_sd: float = 2e-3
-    # Of ln c: what end zones and sensors do to a bar that is taken as uniform.
-    model_c: float = 0.005
-    # Of the share of shear of a rod: that of theory.
-    rod_shear: tuple[float, ...] = (1.0, 0.02)
-    # Standard deviations of ln tension and ln c of a bar that nobody described: c from a quarter to
-    # four times as large, as that of a bar of half or twice the length is.
-    any_bar: tuple[float, ...] = (2.0, 0.7)
     looser: tuple[float, ...] = 0.02, 0.05, 3e-4, 0.5, 0.0
     altered: tuple[float, ...] = 0.01, 0.40, 1e-2, 0.7, 0.0
     test_errors: tuple[tuple[float, float], ...] = (
@@ -50,9 +36,8 @@ class Limits:
     mistaken: float = 0.02
     mistaken_density: float = 2.5
     most_mistaken: int = 2
-    # Probability that something was hung on the bar; share by which Rayleigh's quotient errs, and
-    # the error of each mode besides.
-    masses: tuple[float, ...] = (0.01, 0.15)
+    # Probability that something was hung on the bar, and the error of each mode besides.
+    mass: float = 0.01
     mass_error: float = 2e-3
 
     # ---- bars
@@ -70,11 +55,6 @@ class Limits:
     # 20 to 1 (judgement): where a described hanger is that near to a bar that nobody described, the
     # person who looks is better served with its number.
     clearly_nats: float = 3.0
-
-    # ---- candidate
-    most_orders: int = 20  # higher ones say next to nothing of the tension
-    step: float = 0.02  # of ln T: small against its curvature, large against the solver's error
-    orders_of_two: int = 3  # two unknowns, and one mode that may speak against them
 
     # ---- copies
     # Of each shape, from its reach before its place up to its reach after it.

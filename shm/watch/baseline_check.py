@@ -3,41 +3,40 @@
 A baseline that holds a mistake is wrong for years: its posterior follows it, and later tests fit it
 no better than it fits itself. One or two tests are compared with what the description allows; of
 three or more each is compared with the median of all. These may differ in what a hanger does: its
-tension, the stiffness of its ends, and what all frequencies have in common, by the slopes of a
-model class. What no such difference explains is mistaken. Another hanger's test is held as it comes
-in (`shm.plausibility`).
+tension, the stiffness of its ends, and what all frequencies have in common, as those of a bar on
+springs do (`shm.models.bar_fit`). What no such difference explains is mistaken. Another hanger's
+test is held as it comes in (`shm.plausibility`).
 """
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
-from shm.models import Model
-from shm.models.classes.base import Conditions
+from shm.models.bar_fit import PARAMETERS, SPRINGS, Bar, Fit, Seen, fit_bars, seen_in
 from shm.values import (
     PLANES,
     BaselineCheck,
     BoolArray,
     FloatArray,
-    IntArray,
+    Hanger,
     MistakenMode,
     MistakenTest,
     ModalTest,
     Mode,
 )
 from shm.watch.limits import LIMITS
-from shm.watch.mistaken_modes import MOST_MISTAKEN, log_mixture, sound_modes
+from shm.watch.mistaken_modes import MOST_MISTAKEN, sound_modes
 from shm.watch.quantities import MeasuredMode
 
 _FIT_NO_STATE = "fit no tension and no end stiffness that the description allows"
 
-_SPRING, _FELT = "log10_k", 3.0  # of the stiffness of a wave: a spring that bends with the bar
+
+_Linear = tuple[FloatArray, FloatArray, FloatArray]
+"""What modes are off, how they go with a state, and their variances."""
 
 
 def known_modes(test: ModalTest) -> list[Mode]:
@@ -45,16 +44,13 @@ def known_modes(test: ModalTest) -> list[Mode]:
     return [mode for mode in test.regular_modes if mode.frequency_hz > 0]
 
 
-def check_baseline(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
-    """Return what is mistaken among the tests of a baseline, and whether they fit.
-
-    `model` is any class of the hanger that is fast.
-    """
+def check_baseline(tests: Sequence[ModalTest], hanger: Hanger) -> BaselineCheck:
+    """Return what is mistaken among the tests of a baseline, and whether they fit."""
     if not any(known_modes(test) for test in tests):
         return BaselineCheck(unchecked="no test has a mode that a tension is inferred from")
     if len(tests) >= LIMITS.enough:
-        return _check_together(tests, model)
-    checks = [_check_alone(test, model) for test in tests]
+        return _check_together(tests, hanger)
+    checks = [_check_alone(test, hanger) for test in tests]
     return BaselineCheck(
         modes=tuple(mode for each in checks for mode in each.modes),
         misfit=next((each.misfit for each in checks if each.misfit), ""),
@@ -62,114 +58,104 @@ def check_baseline(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
     )
 
 
-def _check_alone(test: ModalTest, model: Model) -> BaselineCheck:
+def _check_alone(test: ModalTest, hanger: Hanger) -> BaselineCheck:
     """Compare a test with what the description allows."""
-    modes = known_modes(test)
-    if len(modes) < LIMITS.baseline_check_fewest:
+    seen = seen_in([test], hanger)
+    keys, log_hz = _list_modes(seen.mask), seen.log_f[seen.mask]
+    if len(keys) < LIMITS.baseline_check_fewest:
         return BaselineCheck(
-            unchecked=f"test {test.id} has {len(modes)} modes, and at least "
+            unchecked=f"test {test.id} has {len(keys)} modes, and at least "
             f"{LIMITS.baseline_check_fewest} are needed"
         )
-    measured = np.log([mode.frequency_hz for mode in modes])
-    bar = _Bar.of([(mode.plane, mode.order) for mode in modes], model, measured)
-    off = bar.off_description(model.conditions(test))
+    (fit,) = fit_bars([Bar.described(hanger, seen)])
+    off = log_hz - fit.log_f[seen.mask]
     odd: BoolArray = np.abs(off) > LIMITS.baseline_check_off
-    if odd.sum() > MOST_MISTAKEN * len(modes):
+    if odd.sum() > MOST_MISTAKEN * len(keys):
         return BaselineCheck(
-            misfit=f"{odd.sum()} of the {len(modes)} modes of test {test.id} {_FIT_NO_STATE}"
+            misfit=f"{odd.sum()} of the {len(keys)} modes of test {test.id} {_FIT_NO_STATE}"
         )
-    expected_hz = np.exp(measured - off)
     return BaselineCheck(
         tuple(
-            MistakenMode(test.id, mode.plane, mode.order, mode.frequency_hz, float(hz))
-            for mode, hz, is_odd in zip(modes, expected_hz, odd, strict=True)
-            if is_odd
+            MistakenMode(test.id, *keys[n], math.exp(log_hz[n]), math.exp(log_hz[n] - off[n]))
+            for n in np.flatnonzero(odd)
         )
     )
 
 
-def _check_together(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
+def _check_together(tests: Sequence[ModalTest], hanger: Hanger) -> BaselineCheck:
     """Compare each test with the median of all."""
-    every = [(mode.plane, mode.order) for test in tests for mode in known_modes(test)]
-    keys = sorted(key for key in set(every) if every.count(key) >= LIMITS.enough)
+    each = [seen_in([test], hanger) for test in tests]
+    mask = np.sum([seen.mask for seen in each], axis=0) >= LIMITS.enough
+    keys = _list_modes(mask)
     if not keys:
         return BaselineCheck(unchecked="no mode is measured in three of its tests")
-    table, variance = _tabulate(tests, keys, model)
-    bar = _Bar.of(keys, model, np.nanmedian(table, axis=0))
-    off, expected, why = _fit_tests(tests, table, variance, bar)
+    table = np.array([seen.log_f[mask] for seen in each])
+    variance = np.array([seen.variance[mask] for seen in each]) + LIMITS.mode_scatter**2
+    (fit,) = fit_bars([Bar.described(hanger, Seen.of(keys, np.nanmedian(table, axis=0)))])
+    off, expected, why = _fit_tests(table, variance, fit, keys)
     wrong = [MistakenTest(test.id, each) for test, each in zip(tests, why, strict=True) if each]
     sound = np.array([not each for each in why])
     modes = [
-        MistakenMode(tests[n].id, plane, order, math.exp(table[n, at]), math.exp(expected[n, at]))
+        MistakenMode(tests[n].id, *keys[at], math.exp(table[n, at]), math.exp(expected[n, at]))
         for n, at in np.argwhere(off & sound[:, None]).tolist()
-        for plane, order in [keys[at]]
     ]
     count, misfit = int(np.isfinite(table[sound]).sum()), ""
     if len(wrong) > MOST_MISTAKEN * len(tests):
         misfit = f"{len(wrong)} of its {len(tests)} tests do not agree with the others"
     elif len(modes) > MOST_MISTAKEN * count:
         misfit = f"{len(modes)} of its {count} modes do not agree from test to test"
-    return BaselineCheck(tuple(modes), tuple(wrong), misfit or _misfit_of_all(bar, keys))
+    left = (fit.bar.seen.log_f - fit.log_f)[mask]
+    return BaselineCheck(tuple(modes), tuple(wrong), misfit or _misfit_of_all(left, keys))
 
 
-def _tabulate(
-    tests: Sequence[ModalTest], keys: Sequence[MeasuredMode], model: Model
-) -> tuple[FloatArray, FloatArray]:
-    """Return log frequencies (tests, keys), NaN where not measured, and their variances."""
-    table, variance = np.full((2, len(tests), len(keys)), np.nan)
-    unstated = model.hanger.assumptions.unstated_frequency_sd.value
-    for row, test in enumerate(tests):
-        for mode in known_modes(test):
-            if (mode.plane, mode.order) in keys:
-                at = keys.index((mode.plane, mode.order))
-                sd = mode.frequency_sd_hz / mode.frequency_hz
-                is_stated = sd > 0 and math.isfinite(sd)
-                table[row, at] = math.log(mode.frequency_hz)
-                variance[row, at] = (sd if is_stated else unstated) ** 2 + LIMITS.mode_scatter**2
-    return table, variance
+def _list_modes(mask: BoolArray) -> list[MeasuredMode]:
+    """Return the modes of a `mask` (2, orders), plane by plane."""
+    return [(PLANES[plane], order + 1) for plane, order in np.argwhere(mask).tolist()]
 
 
 def _fit_tests(
-    tests: Sequence[ModalTest], table: FloatArray, variance: FloatArray, bar: _Bar
+    table: FloatArray, variance: FloatArray, median: Fit, keys: Sequence[MeasuredMode]
 ) -> tuple[BoolArray, FloatArray, list[str]]:
     """Return which modes are mistaken (tests, keys), what was expected, and why a test is wrong.
 
     Each test's state is fitted to its modes about their levels; these are the medians of what is
-    left of all tests.
+    left of all tests. A state (6,) is by what tests may differ: what all frequencies have in
+    common, ln of the tension, decades of each spring.
     """
     # A median of n is off by 1.25 standard deviations over the root of n.
     variance = variance * (1 + 1.57 / np.isfinite(table).sum(axis=0))
-    sds = np.array([LIMITS.common_sd, LIMITS.tension_sd, *[LIMITS.decades_sd] * (bar.count - 2)])
-    states = np.zeros((len(tests), bar.count))
-    off, expected, why = np.zeros(table.shape, bool), table.copy(), [""] * len(tests)
-    conditions = [bar.model.conditions(test) for test in tests]
+    mask, columns = median.bar.seen.mask, [0, *range(SPRINGS.start, SPRINGS.stop)]
+    sds = np.array([LIMITS.common_sd, LIMITS.tension_sd, *[LIMITS.decades_sd] * 4])
+    fit_sds = np.full(PARAMETERS, LIMITS.common_sd)
+    fit_sds[columns] = sds[1:]
+    level = (median.bar.seen.log_f - median.log_f)[mask]
+    states, why = np.zeros((len(table), len(sds))), [""] * len(table)
+    off, expected, good = np.zeros(table.shape, bool), table.copy(), table.copy()
+
+    def about(n: int, fit: Fit) -> _Linear:
+        """Return what a test's modes are off the median's state, by the slopes of a fit."""
+        slopes, seen = fit.way[mask][:, [-1, *columns]], np.isfinite(table[n])
+        moved = slopes[:, 1:] @ (fit.theta - median.theta)[columns]
+        rest = table[n] - level - fit.log_f[mask] + moved
+        return rest[seen], slopes[seen], variance[n, seen]
+
     for _ in range(LIMITS.rounds):
-        predicted = np.array(
-            [bar.predict(x[None], its)[0] for x, its in zip(states, conditions, strict=True)]
-        )
-        level = np.nanmedian(table - predicted, axis=0)
-        for n, its in enumerate(conditions):
-            seen = np.flatnonzero(np.isfinite(table[n]))
-            slopes = bar.slopes(states[n], its)[seen]
-            rest = (table[n] - predicted[n] - level)[seen] + slopes @ states[n]
-            found = sound_modes(rest, slopes, variance[n, seen], 1 / sds**2)
-            left = rest - slopes @ found.x
-            states[n] = found.x
+        bars = [replace(median.bar, seen=Seen.of(keys, each)) for each in good - level]
+        fits = fit_bars([replace(b, mean=median.theta, sd=fit_sds) for b in bars], median.theta)
+        level = np.nanmedian(table - [each.log_f[mask] for each in fits], axis=0)
+        for n, fit in enumerate(fits):
+            rest, slopes, its = about(n, fit)
+            seen, found = np.isfinite(table[n]), sound_modes(rest, slopes, its, 1 / sds**2)
+            left, states[n] = rest - slopes @ found.x, found.x
             expected[n, seen] = table[n, seen] - left
             is_far = np.abs(left) > LIMITS.least_mistake
             off[n, seen] = ~found.sound & is_far
-            is_unfit = found.is_misfit and is_far.sum() > MOST_MISTAKEN * len(seen)
+            good[n, seen] = np.where(found.sound, table[n, seen], expected[n, seen])
+            is_unfit = found.is_misfit and is_far.sum() > MOST_MISTAKEN * len(rest)
             why[n] = "its modes fit none of the other tests'" if is_unfit else ""
-    for n, its in enumerate(conditions if len(tests) >= LIMITS.enough_for_clocks else ()):
-        seen = np.flatnonzero(np.isfinite(table[n]))
+    for n, fit in enumerate(fits if len(table) >= LIMITS.enough_for_clocks else ()):
         spread = _measure_spread(np.delete(states, n, axis=0), sds)
-        by_state = []
-        for x in (states[n], np.zeros(bar.count)):
-            slopes = bar.slopes(x, its)[seen]
-            rest = (table[n] - level)[seen] - bar.predict(x[None], its)[0][seen] + slopes @ x
-            by_state.append((rest, slopes, variance[n, seen]))
-        about_state, about_median = by_state
-        if clock := _find_clock_error(about_state, about_median, spread):
+        if clock := _find_clock_error(about(n, fit), about(n, median), spread):
             why[n] = (
                 "all its frequencies are off the other tests' alike, by "
                 f"{100 * math.expm1(clock):+.1f} %: another hanger, or a wrong clock"
@@ -185,9 +171,6 @@ def _measure_spread(states: FloatArray, sds: FloatArray) -> FloatArray:
     found = 1.4826 * np.median(np.abs(states - np.median(states, axis=0)), axis=0)
     # Of four tests the spread is hardly known: in one of ten it seems a third of what it is.
     return np.asarray(np.clip(3 * found, least, sds))
-
-
-_Linear = tuple[FloatArray, FloatArray, FloatArray]
 
 
 def _find_clock_error(about_state: _Linear, about_median: _Linear, spread: FloatArray) -> float:
@@ -207,12 +190,11 @@ def _find_clock_error(about_state: _Linear, about_median: _Linear, spread: Float
     return common if is_clock else 0.0
 
 
-def _misfit_of_all(bar: _Bar, keys: Sequence[MeasuredMode]) -> str:
+def _misfit_of_all(off: FloatArray, keys: Sequence[MeasuredMode]) -> str:
     """State which modes no description allows, though the tests agree on them."""
-    off = bar.off_description(Conditions()).tolist()
     odd = [
         (key, each)
-        for key, each in zip(keys, off, strict=True)
+        for key, each in zip(keys, off.tolist(), strict=True)
         if abs(each) > LIMITS.baseline_check_off
     ]
     if len(odd) > MOST_MISTAKEN * len(keys):
@@ -224,97 +206,3 @@ def _misfit_of_all(bar: _Bar, keys: Sequence[MeasuredMode]) -> str:
         f"{plane} {order} of all its tests is {100 * math.expm1(worst):+.0f} % off what the "
         "other modes and the description allow"
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Bar:
-    """Modes (n,) of a hanger, and their `measured` log frequencies.
-
-    The state (q,) by which tests may differ is what all have in common, ln of the tension, and
-    decades of each spring.
-    """
-
-    model: Model
-    planes: IntArray
-    orders: IntArray
-    measured: FloatArray
-
-    @classmethod
-    def of(cls, keys: Sequence[MeasuredMode], model: Model, measured: FloatArray) -> _Bar:
-        planes = np.array([PLANES.index(plane) for plane, _ in keys], dtype=int)
-        orders = np.array([order - 1 for _, order in keys], dtype=int)
-        return cls(model, planes, orders, measured)
-
-    def _log_frequencies(self, theta: FloatArray, conditions: Conditions) -> FloatArray:
-        found = self.model.frequencies_at(theta, int(self.orders.max()) + 1, conditions)
-        return np.asarray(np.log(found[:, self.planes, self.orders]))
-
-    def _best(self, theta: FloatArray, its: Conditions) -> tuple[FloatArray, FloatArray]:
-        """Return the most probable of parameter sets and its misfit; a few modes are mistaken."""
-        off = self.measured - self._log_frequencies(theta, its)
-        at = int(np.nanargmax(log_mixture(off, LIMITS.model_sd**2).sum(axis=1)))
-        return theta[at], off[at]
-
-    def off_description(self, conditions: Conditions) -> FloatArray:
-        """Return what modes (n,) are off from the description's most probable parameter set."""
-        rng = np.random.default_rng(0)
-        lower, upper = self.model.prior.lower, self.model.prior.upper
-        theta = lower + (upper - lower) * rng.random((LIMITS.draws, len(lower)))
-        best, off = self._best(theta, conditions)
-        for width in LIMITS.narrower:
-            near = best + width * (upper - lower) * rng.uniform(
-                -1, 1, (LIMITS.draws // 4, len(lower))
-            )
-            best, off = self._best(np.vstack([best, np.clip(near, lower, upper)]), conditions)
-        return off
-
-    @cached_property
-    def base(self) -> FloatArray:
-        """Return the described bar with ends that are felt, at the tension which suits best.
-
-        Slopes are taken there: what differs from test to test is the same anywhere near.
-        """
-        model, names, prior = self.model, self.model.parameter_names, self.model.prior
-        theta = (prior.lower + prior.upper) / 2
-        for column, name in enumerate(names):
-            with contextlib.suppress(KeyError):
-                theta[column] = model.usual(name)
-            if name == "theta_L":
-                theta[column] = 1.0
-            elif name.startswith(_SPRING):
-                theta[column] = math.log10(_FELT * model.wave_stiffness_n_m_rad(1))
-        every = np.tile(theta, (LIMITS.tensions, 1))
-        every[:, names.index("theta_F")] = np.geomspace(*LIMITS.tension_range, LIMITS.tensions)
-        return self._best(np.clip(every, prior.lower, prior.upper), Conditions())[0]
-
-    @cached_property
-    def _springs(self) -> list[int]:
-        names = self.model.parameter_names
-        return [n for n, name in enumerate(names) if name.startswith(_SPRING)]
-
-    @property
-    def count(self) -> int:
-        """Return q."""
-        return 2 + len(self._springs)
-
-    def predict(self, x: FloatArray, conditions: Conditions) -> FloatArray:
-        """Return log frequencies (sets, n) of states (sets, q)."""
-        theta, prior, springs = np.tile(self.base, (len(x), 1)), self.model.prior, self._springs
-        tension = self.model.parameter_names.index("theta_F")
-        theta[:, tension] *= np.exp(
-            np.clip(x[:, 1], -LIMITS.farthest_tension, LIMITS.farthest_tension)
-        )
-        decades = np.clip(x[:, 2:], -LIMITS.farthest_decades, LIMITS.farthest_decades)
-        theta[:, springs] = np.clip(
-            theta[:, springs] + decades, prior.lower[springs], prior.upper[springs]
-        )
-        return self._log_frequencies(theta, conditions) + x[:, :1]
-
-    def slopes(self, x: FloatArray, conditions: Conditions) -> FloatArray:
-        """Return how log frequencies go with the state (n, q), by central differences."""
-        steps = np.array(
-            [1.0, LIMITS.baseline_check_tension_step, *[LIMITS.decades_step] * len(self._springs)]
-        )
-        both = np.vstack([x + np.diag(steps), x - np.diag(steps)])
-        up, down = np.split(self.predict(both, conditions), 2)
-        return np.asarray(((up - down) / (2 * steps[:, None])).T)

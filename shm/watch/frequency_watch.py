@@ -21,7 +21,7 @@ from shm.watch.options import WatchOptions
 from shm.watch.quantities import posterior_at
 from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watcher
-from shm.watch.watching import AlertState, DatedTest, Newest, after, options_of
+from shm.watch.watching import AlertState, DatedTest, Newest, after, options_of, replay
 
 _POOL = timedelta(days=POOLED_DAYS)
 
@@ -68,9 +68,7 @@ class FrequencyWatch:
     def begin(self) -> _Watching:
         """After the baseline."""
         state, watch = self._watcher.begin([self._reading(each) for each in self._pools])
-        reported = AlertState()
-        for found in watch.tests:
-            reported, _ = after(reported, found, self._hanger)
+        reported, _ = replay(watch.tests, self._hanger)
         return _Watching(state, reported, _Pool(), watch.tests[-1])
 
     def after(self, now: _Watching, dated: DatedTest) -> tuple[_Watching, Alert | None]:

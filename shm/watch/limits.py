@@ -38,7 +38,6 @@ class Limits:
     # Of a log frequency. Judgement: by which no bar as made is off its class in one mode alone; a
     # class compared with a bar as made.
     baseline_check_off: float = 0.04
-    model_sd: float = 0.01
     # Judgement, standard deviations of what tests of one baseline differ by: in common, as clocks
     # and sensors do; in tension, as seasons and traffic do; in decades of a spring.
     common_sd: float = 1e-3
@@ -52,15 +51,6 @@ class Limits:
     least_clock: float = 0.007
     least_spread: tuple[float, ...] = (0.01, 0.03)
     enough_for_clocks: int = 4  # of three tests, two alike may be chance
-    baseline_check_tension_step: float = 0.02  # technical: of finite differences
-    decades_step: float = 0.1
-    farthest_tension: float = 0.4  # technical: beyond it nothing is linearised
-    farthest_decades: float = 1.0
-    draws: int = 4000  # of the description: technical, refined below
-    # technical: of the prior's range, about the best draw
-    narrower: tuple[float, ...] = (0.3, 0.1, 0.03)
-    tension_range: tuple[float, float] = (0.3, 2.5)  # of the nominal one; technical
-    tensions: int = 60
 
     # ---- causes
     # Places along the hanger, a share of the length: a uniform bar is the same from either end.

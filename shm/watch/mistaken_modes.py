@@ -20,15 +20,6 @@ from shm.watch.limits import LIMITS
 MOST_MISTAKEN = 1 / 3  # judgement: where more modes fit no state, it is the test that does not
 
 
-def log_mixture(off: FloatArray, variance: FloatArray | float) -> FloatArray:
-    """Return the log density of modes `off` by so much, of which a few are mistaken; NaN stays."""
-    with np.errstate(invalid="ignore"):
-        mixed = np.logaddexp(
-            _log_good(off, variance), math.log(LIMITS.mistaken / LIMITS.mistaken_range)
-        )
-    return np.asarray(mixed)
-
-
 def _log_good(off: FloatArray, variance: FloatArray | float) -> FloatArray:
     return np.asarray(
         math.log(1 - LIMITS.mistaken) - off**2 / variance / 2 - np.log(2 * np.pi * variance) / 2

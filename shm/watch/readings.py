@@ -428,26 +428,13 @@ class Reader:
         return math.isfinite(test.temperature_c) and math.isfinite(self.reference_temperature_c)
 
     def _mean_residual(self, tests: Sequence[SeenModes]) -> FloatArray:
-        """Measured less predicted log frequency (modes,), over the tests.
-
-        The weighted mean; of three tests or more the median of what is left of each once its own
-        state is taken off, so that a mistaken mode of one of them moves nothing.
-        """
-        its = np.concatenate([seen.own for seen in tests])
-        base = np.zeros((1, len(self.quantities)))
+        """Return measured less predicted log frequency (modes,), the mean over the tests."""
+        base, n = np.zeros((1, len(self.quantities))), len(self.modes)
         off = [seen.log_frequency - self._likelihood.predicted(base, seen)[0] for seen in tests]
-        if len(tests) < LIMITS.rounds:
-            weight = 1 / np.concatenate([seen.variance for seen in tests])
-            total = np.bincount(its, weight * np.concatenate(off), len(self.modes))
-            return np.asarray(total / np.bincount(its, weight, len(self.modes)))
-        table = np.full((len(tests), len(self.modes)), np.nan)
-        for row, seen, each in zip(table, tests, off, strict=True):
-            row[seen.own] = each
-        residual = np.nanmedian(table, axis=0)
-        for _ in range(LIMITS.rounds):
-            common = np.nanmedian(table - residual, axis=1)
-            residual = np.nanmedian(table - common[:, None], axis=0)
-        return np.asarray(residual)
+        its = np.concatenate([seen.own for seen in tests])
+        weight = 1 / np.concatenate([seen.variance for seen in tests])
+        total = np.bincount(its, weight * np.concatenate(off), n)
+        return np.asarray(total / np.bincount(its, weight, n))
 
     def _seen(self, test: ModalTest) -> SeenModes:
         read = (mode for mode in test.regular_modes if _is_measured(mode))

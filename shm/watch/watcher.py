@@ -302,26 +302,6 @@ class Watcher:
         return CreepRate(mean, math.sqrt(variance), self.options.creep_per_year_sd)
 
 
-def watched(
-    readings: Sequence[Reading],
-    quantities: tuple[WatchedQuantity, ...],
-    columns: Columns,
-    hanger: Hanger,
-    options: WatchOptions | None = None,
-) -> Watch:
-    """One result a reading, each of which rests on the readings up to it alone.
-
-    The same as a Watcher finds test by test. Raises BadInput where readings are not in the order of
-    time or not of these quantities.
-    """
-    watcher = Watcher(quantities, columns, hanger, options or WatchOptions.of(hanger.assumptions))
-    if not readings:
-        return Watch(())
-    count = watcher.options.baseline_tests
-    state, begun = watcher.begin(readings[:count])
-    return Watch((*begun.tests, *watcher.watch(state, readings[count:])[1].tests))
-
-
 def _counting(state: WatchState) -> IntArray:
     """Return the tests that count; as long as none does, the newest, which then says nothing."""
     rows = np.flatnonzero(state.counted)

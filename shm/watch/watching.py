@@ -45,7 +45,7 @@ from shm.watch.notices import (
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.state_sums import WatchState
-from shm.watch.watcher import Watch, Watcher, watched
+from shm.watch.watcher import Watch, Watcher
 
 Condition = tuple[str, Way]
 """A quantity, and the way that it went."""
@@ -151,23 +151,32 @@ def watch_hanger(
     compared with the baseline. Raises BadInput where the baseline's tests hold no mode that its
     class describes.
     """
-    baseline_tests = accepted_baseline_tests(baseline, baseline_tests)
-    reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
-    since = max(time for _, time in baseline_tests)
-    dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
-    readings = tuple(reader.reading(test, time) for test, time in dated)
-    options = options_of(hanger, len(baseline_tests), options)
-    words = [known[test.id] for test, _ in later if test.id in known]
-    begin = readings if len(words) < len(later) else readings[: len(baseline_tests)]
-    watch = watched(begin, reader.quantities, reader.columns, hanger, options)
-    if begin is not readings:
-        watch = Watch((*watch.tests, *words))
-    tests = list(watch.tests)
+    accepted, reader, watcher, since = _begun(baseline, baseline_tests, hanger, options)
+    first = [reader.reading(*each) for each in accepted]
+    state, watch = watcher.begin(first)
+    readings = [reader.reading(test, max(time, since)) for test, time in later]
+    tests = [known[test.id] for test, _ in later if test.id in known]
+    if len(tests) < len(later):
+        tests = list(watcher.watch(state, readings)[1].tests)
     mistaken: tuple[RepeatedMistake, ...] = ()
-    for n in range(len(baseline_tests), len(tests)):
-        mistaken = repeated_mistakes(mistaken, readings[n], reader.modes)
+    for n, reading in enumerate(readings):
+        mistaken = repeated_mistakes(mistaken, reading, reader.modes)
         tests[n] = replace(tests[n], mistaken=mistaken)
-    return Watched(reader, readings, replace(watch, tests=tuple(tests)))
+    return Watched(reader, (*first, *readings), Watch((*watch.tests, *tests)))
+
+
+def _begun(
+    baseline: Posterior,
+    baseline_tests: Sequence[DatedTest],
+    hanger: Hanger,
+    options: WatchOptions,
+) -> tuple[tuple[DatedTest, ...], Reader, Watcher, datetime]:
+    """Return a baseline's accepted tests, its reader and watcher, and when it ends."""
+    tests = accepted_baseline_tests(baseline, baseline_tests)
+    reader = Reader(baseline, [test for test, _ in tests], hanger)
+    options = options_of(hanger, len(tests), options)
+    watcher = Watcher(reader.quantities, reader.columns, hanger, options)
+    return tests, reader, watcher, max(time for _, time in tests)
 
 
 def accepted_baseline_tests(
@@ -207,21 +216,16 @@ def watch_newest(
     then the watch must begin without it. Where the watch itself calls for no alert, the newest may
     yet agree with a test `beside` it.
     """
-    baseline_tests = accepted_baseline_tests(baseline, baseline_tests)
-    reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
-    options = options_of(hanger, len(baseline_tests), options)
-    watcher = Watcher(reader.quantities, reader.columns, hanger, options)
+    accepted, reader, watcher, since = _begun(baseline, baseline_tests, hanger, options)
+    alert: Alert | None = None
     if kept is None:
-        readings = [reader.reading(test, time) for test, time in baseline_tests]
-        state, watch = watcher.begin(readings)
-        reported, alert = AlertState(), None
-        for found in watch.tests:
-            reported, alert = after(reported, found, hanger)
+        state, watch = watcher.begin([reader.reading(*each) for each in accepted])
+        reported, _ = replay(watch.tests, hanger)
+        found = watch.tests[-1]
     else:
         state, reported = from_bytes(tuple[WatchState, AlertState], kept)
         if state.key != watcher.key:
             return None
-    since = max(time for _, time in baseline_tests)
     for test, time in later:
         reading = reader.reading(test, max(time, since))
         state, found = watcher.after(state, reading)
@@ -229,7 +233,7 @@ def watch_newest(
         reported, alert = after(reported, found, hanger)
     # A second test that agrees answers the notice that asks for one.
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
-        agreed = agreement(reader, later[-1], beside, hanger, options, reported.beyond)
+        agreed = agreement(reader, later[-1], beside, hanger, watcher.options, reported.beyond)
         if agreed is not None:
             alert = alert_of_agreement(agreed, hanger)
             reported = reported.with_beyond(alert.drifts, alert.time)
@@ -287,8 +291,8 @@ def after(before: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertS
     return in_force, alert
 
 
-def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
-    """Return all alerts of a history, the oldest test first.
+def replay(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[AlertState, tuple[Alert, ...]]:
+    """Return what is in force after a history, the oldest test first, and all alerts on the way.
 
     An alert's key names hanger, rules, quantity, way and test: the same whenever it is asked for.
     """
@@ -296,7 +300,7 @@ def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ..
     for test in watched:
         reported, alert = after(reported, test, hanger)
         alerts += [alert] if alert else []
-    return tuple(alerts)
+    return reported, tuple(alerts)
 
 
 def _is_known(standing: AlertState, change: Change) -> bool:

@@ -44,7 +44,7 @@ from shm.watch import DatedTest, Watched, WatchOptions, watch_hanger  # noqa: E4
 from shm.watch.agreement import agreement  # noqa: E402
 from shm.watch.baseline_check import check_baseline  # noqa: E402
 from shm.watch.notices import alert_of_agreement  # noqa: E402
-from shm.watch.watching import alerts_of  # noqa: E402
+from shm.watch.watching import replay  # noqa: E402
 from tests.benchmarks.watch_trial.outcomes import BEGINS  # noqa: E402
 from tests.benchmarks.watch_trial.report import HEADS, events, save_figure, tables  # noqa: E402
 from tests.benchmarks.watch_trial.rivals import rivals  # noqa: E402
@@ -146,7 +146,7 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
             continue  # the baseline would hold the event
         hanger = hanger_of(described.description, number)
         first = tests[:baseline_tests]
-        check = check_baseline(first, build("beam2", hanger))
+        check = check_baseline(first, hanger)
         posterior = baseline_of(check.accepted_tests(first), hanger)
         posterior = replace(posterior, baseline_check=check)
         dated = [(test, test.time) for test in tests]
@@ -157,7 +157,7 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
         )  # fmt: skip
         seconds = time.process_time() - started
         alerts = [
-            *alerts_of(watched.watch.tests, hanger),
+            *replay(watched.watch.tests, hanger)[1],
             *agreeing(watched, dated, baseline_tests, hanger),
         ]
         alerts.sort(key=lambda alert: alert.time)

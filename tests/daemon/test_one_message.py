@@ -32,7 +32,7 @@ from shm.store import Store, StoredTest, Workspace
 from shm.values import Alert, Change, Drift, Moved, RepeatedMistake, WatchedTest
 from shm.values.messages import Lead, Urgency
 from shm.watch.alert_text import message_of
-from shm.watch.watching import alerts_of
+from shm.watch.watching import replay
 from shm_cli.main import cli
 from shm_daemon.web.commands import set_reader, without_commands
 from tests.helpers.entering import LINEAGE, identified, selected
@@ -78,7 +78,7 @@ class Hangers:
         own = tuple(replace(d, hanger=hanger, test=name, time=time) for d in drifts)
         found = WatchedTest(name, time, 11.5, own, change, None, **more)  # type: ignore[arg-type]
         before = [each.watched for each in self.store.watch.list_all(hanger, baseline.id)]
-        every = alerts_of([*before, found], replace(HANGER_3, id=hanger))
+        every = replay([*before, found], replace(HANGER_3, id=hanger))[1]
         alert = next((each for each in every if each.test == found.test), None)
         self.store.watch.save(test, baseline, found, alert, ["mail"], time)
 

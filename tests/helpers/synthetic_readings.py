@@ -13,7 +13,7 @@ from shm.models import described
 from shm.values import PLANES, End, FloatArray, ModeReading, Plane, Reading, WatchedQuantity
 from shm.watch.causes import Columns, columns_of
 from shm.watch.options import WatchOptions
-from shm.watch.watcher import Watch, Watcher, watched
+from shm.watch.watcher import Watch, Watcher
 from tests.helpers.hangers import HANGER_3
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -88,7 +88,13 @@ def watch_of(
     quantities: tuple[WatchedQuantity, ...],
     options: WatchOptions | None = None,
 ) -> Watch:
-    return watched(readings, quantities, columns(), HANGER_3, options)
+    chosen = options or WatchOptions.of(HANGER_3.assumptions)
+    watcher = Watcher(quantities, columns(), HANGER_3, chosen)
+    if not readings:
+        return Watch(())
+    state, begun = watcher.begin(readings[: chosen.baseline_tests])
+    later = watcher.watch(state, readings[chosen.baseline_tests :])[1]
+    return Watch((*begun.tests, *later.tests))
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,9 +23,9 @@ from shm.inference.problem.field import FieldLikelihood
 from shm.inference.problem.priors import SPRINGS, Ends, TensionPrior, reading_of
 from shm.inference.problem.systematic_errors import errors_of_sensors
 from shm.models import described
+from shm.models.bar_fit import seen_in
 from shm.models.effects import EFFECTS, Variant
 from shm.pipeline.lineage import redescribed
-from shm.plausibility.bar_evidence import seen_in
 from shm.report.assumed import assumptions_line, assumptions_table, with_assumptions
 from shm.store import BaselineGlance
 from shm.values import NAN, FloatArray, Hanger, ModalTest, Mode, Scatter

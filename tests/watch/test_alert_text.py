@@ -19,7 +19,7 @@ from shm.values import (
 from shm.values.messages import Lead
 from shm.watch.alert_text import shift_words
 from shm.watch.notices import message_of_odd
-from shm.watch.watching import alerts_of
+from shm.watch.watching import replay
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_drift, a_watched_test
 
@@ -64,11 +64,11 @@ def day(
 
 
 def told(*watched: WatchedTest) -> list[tuple[str, tuple[str, ...]]]:
-    return [(alert.test, alert.kinds) for alert in alerts_of(watched, HANGER_3)]
+    return [(alert.test, alert.kinds) for alert in replay(watched, HANGER_3)[1]]
 
 
 def only(*watched: WatchedTest) -> Alert:
-    (alert,) = alerts_of(watched, HANGER_3)
+    (alert,) = replay(watched, HANGER_3)[1]
     return alert
 
 
@@ -123,7 +123,7 @@ def test_the_level_and_its_half_are_those_of_the_hanger() -> None:
     careful = replace(HANGER_3, thresholds=Thresholds(alert_probability=0.6))
     chances = enumerate((0.6, 0.31, 0.31, 0.7, 0.29, 0.29, 0.7))
     watched = [day(2 * n, probability=p) for n, p in chances]
-    assert [alert.test for alert in alerts_of(watched, careful)] == ["t0", "t12"]
+    assert [alert.test for alert in replay(watched, careful)[1]] == ["t0", "t12"]
 
 
 def test_a_called_change_that_passes_the_threshold_is_told_again() -> None:
@@ -201,7 +201,7 @@ def test_another_cause_says_what_to_check_before_the_next_test(
 def test_of_a_hanger_whose_sensors_stay_nobody_asks_for_a_hammer_test(
     said: tuple[Change, float], action: str
 ) -> None:
-    (alert,) = alerts_of([day(2, *said)], MonitoredHanger.of(HANGER_3))
+    (alert,) = replay([day(2, *said)], MonitoredHanger.of(HANGER_3))[1]
     assert f". {action}" in alert.message
     for in_a_row in (1, 3):
         odd = message_of_odd(day(2), MonitoredHanger.of(HANGER_3), in_a_row)
@@ -213,9 +213,9 @@ def test_of_a_hanger_whose_sensors_stay_nobody_asks_for_a_hammer_test(
 def test_beyond_the_threshold_after_a_call_speaks_of_the_called_change() -> None:
     """After a call the watch looks for a further change: what it makes of that is no cause."""
     further = change(began=9, probability=0.99, sudden=0.5, moved=(ARCH,))
-    call, beyond = alerts_of(
-        [day(2, change(called=True, began=2)), day(9, further, 0.97)], HANGER_3
-    )
+    call, beyond = replay([day(2, change(called=True, began=2)), day(9, further, 0.97)], HANGER_3)[
+        1
+    ]
     assert call.change is not None
     assert beyond.change == replace(call.change, probability=0.99)
     assert beyond.message.endswith(

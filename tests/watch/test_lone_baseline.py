@@ -9,7 +9,6 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
-from shm.models import build
 from shm.pipeline.conditions import Evidence, why_over
 from shm.values import Alert, Beside, Drift, ModalTest, WatchedTest
 from shm.watch import WatchOptions, watch_newest
@@ -92,7 +91,7 @@ def test_what_the_season_may_have_done_is_not_told() -> None:
 def test_a_mistaken_mode_of_the_only_baseline_test_is_no_loss() -> None:
     tests = weekly(*[1.0] * 8)
     tests[0] = misnamed(tests[0], "transverse", 2)
-    check = check_baseline(tests[:1], build("beam2", HANGER))
+    check = check_baseline(tests[:1], HANGER)
     assert [(each.plane, each.order) for each in check.modes] == [("transverse", 2)]
     assert rung([check.without_mistakes(tests[0]), *tests[1:]]) == []
 

@@ -18,7 +18,7 @@ from shm.watch import (
     watch_hanger,
     watch_newest,
 )
-from shm.watch.watching import alerts_of
+from shm.watch.watching import replay
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import posterior
 
@@ -116,5 +116,5 @@ def test_going_on_test_by_test_from_what_was_kept_finds_the_same() -> None:
     at_once = _newest(later)
     assert at_once is not None
     assert at_once.test.change == whole.latest.change
-    assert tuple(alerts) == alerts_of(whole.watch.tests, HANGER_3)
+    assert tuple(alerts) == replay(whole.watch.tests, HANGER_3)[1]
     assert len(alerts) == 1
