@@ -94,9 +94,9 @@ def command(
     A double hit or an overload is reported at once. It stops when the modes are good enough, and
     writes one recording for each hit into a .zip, which `shm ingest` takes as one test.
 
-    \b Example: shm acquire --device 0 --hanger 3 --hammer 2:transverse:5e3 --sensor
-    3:transverse:981 --out t.zip
-    """
+    \b
+    Example: shm acquire --device 0 --hanger 3 --hammer 2:transverse:5e3 --sensor 3:transverse:981 --out t.zip
+    """  # noqa: E501
     from shm.acquire import AcquireOptions, SimulatedDevice, SoundCard, acquire
 
     if out.suffix.lower() != ".zip":

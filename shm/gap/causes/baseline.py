@@ -14,7 +14,7 @@ import numpy as np
 from shm.gap.causes.search import find_starts, fit_alone, sample_alone
 from shm.gap.hypotheses.contract import GapOptions, Hypothesis, Observations
 from shm.gap.hypotheses.observations import observed
-from shm.gap.hypotheses.problem import GapProblem
+from shm.gap.hypotheses.problem import MOST_REPEATED, GapProblem
 from shm.gap.hypotheses.target import Target
 from shm.inference.answer.updating import log_class_prior
 from shm.inference.options import Progress, silent
@@ -25,8 +25,6 @@ from shm.models.classes.base import held_otherwise
 from shm.values import Hanger, ModalTest
 
 BEAMS = ("beam1", "beam2", "beam3")
-_PLACED = 2  # numerical: steps of Gauss and Newton
-_MOST_MISPLACED = 3.0  # standard deviations
 _OF_NOTE = 0.02  # of the classes' probability: less moves no interval that is told
 
 
@@ -75,14 +73,14 @@ def place_sensors(problem: GapProblem) -> Observations:
     would be farther off than a tape errs: there the hanger has a gap.
     """
     stated, count = problem.observations, problem.design.frequencies
-    for _ in range(_PLACED if len(problem.design.shape_mode) else 0):
+    for _ in range(2 if len(problem.design.shape_mode) else 0):  # steps of Gauss and Newton
         z = find_peaks(Target(problem, Hypothesis()), find_starts(problem))[0].z[None]
         residual = (problem.value - problem.predict(Hypothesis(), z))[0]
         by = problem.likelihood(Hypothesis())
         error = by.nodes[int(by.by_node(residual[None])[0].argmax())].covariance
         covariance = np.diag(error.shape) + error.shape_loads @ error.shape_loads.T
         size = problem.place_loads.T @ np.linalg.solve(covariance, residual[count:])
-        if (np.abs(size) > _MOST_MISPLACED).any():
+        if (np.abs(size) > MOST_REPEATED).any():
             return stated
         places_m = np.array(stated.design.places_m) + size * problem.hanger.scatter.sensor_place_m
         design = replace(stated.design, places_m=tuple(places_m.tolist()))

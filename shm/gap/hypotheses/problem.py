@@ -47,7 +47,8 @@ Effects = tuple[tuple[str, Variant], ...]
 _TENSIONS = np.linspace(-2.5, 2.5, 41)
 _STEP_SD = 0.01  # numerical: of a reading's standard deviation; frequencies are linear over it
 _AT_REST = Conditions(amplitude=0.0)
-_MOST_REPEATED = 3.0  # standard deviations
+MOST_REPEATED = 3.0
+"""Standard deviations: what is larger is no error that repeats."""
 _STRAIGHT = 0.1
 """Numerical: standard deviations of a datum by which a prediction may be off its slope where a
 parameter still counts as linear."""
@@ -365,7 +366,7 @@ class GapProblem:
         residual = (self.value - fit.predicted)[: self.design.frequencies]
         loads = self.repeated_with(fit.hypothesis.effects).of_frequencies
         size = loads.T @ np.linalg.solve(fit.noise.frequency, residual)
-        return np.asarray(residual - loads @ size.clip(-_MOST_REPEATED, _MOST_REPEATED))
+        return np.asarray(residual - loads @ size.clip(-MOST_REPEATED, MOST_REPEATED))
 
     def misfit_percent(self, fit: Fit) -> float:
         """Return by how much a fit misses the frequencies, root mean square."""
