@@ -43,7 +43,7 @@ from shm.store.watch import (
 )
 from shm.values import Hanger, Summary
 from shm.values.rounding import ForceUnit, force_unit, rounded_percent
-from shm.watch.alert_text import watch_words
+from shm.watch.words.alert_text import watch_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document

@@ -44,7 +44,7 @@ from shm.store.watch import find_latest_diagnosis, list_adoptions
 from shm.values import BaselineCheck, Cause, EffectEstimate, Hanger
 from shm.values.diagnosis import joined
 from shm.watch import gap_percent, has_grown
-from shm.watch.options import reference_of
+from shm.watch.engine.options import reference_of
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ from shm.store.watch import (
 from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint, Summary, WatchedTest
 from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
-from shm.watch.alert_text import called_words, look_again
+from shm.watch.words.alert_text import called_words, look_again
 
 if TYPE_CHECKING:
     from shm.report.contents import BridgeReport
@@ -297,7 +297,7 @@ def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
     Raises NothingThere where fewer than three of them can be compared.
     """
     # It is loaded where it is sought: who lists the hangers does without.
-    from shm.watch.neighbours_words import bridge_pattern
+    from shm.watch.words.neighbours_words import bridge_pattern
 
     return bridge_pattern(hanger_shifts(store, order), order)
 

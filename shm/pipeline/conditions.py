@@ -192,7 +192,7 @@ def _renewed(stored: StoredAlert, shown: Sequence[WatchedTest], hanger: Hanger) 
     now = {drift.quantity: drift for drift in test.drifts}
     drifts, message = tuple(now[each.quantity] for each in alert.drifts), alert.message
     if drifts:
-        from shm.watch.alert_text import message_of  # it computes: not before it is needed
+        from shm.watch.words.alert_text import message_of  # it computes: not before it is needed
 
         level = hanger.thresholds.alert_probability
         beyond = [drift for drift in drifts if drift.probability >= level]

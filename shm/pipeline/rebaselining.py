@@ -23,7 +23,7 @@ from shm.store.watch import list_detected_changes
 from shm.values import Change, Hanger
 from shm.values.rounding import force_unit
 from shm.watch.baseline_check import check_baseline
-from shm.watch.readings import Reader
+from shm.watch.engine.readings import Reader
 from shm.watch.repair_check import EventKind, Unrepaired, is_explained, unrepaired
 from shm.watch.watching import accepted_baseline_tests
 

@@ -60,7 +60,7 @@ from shm.store.watch import list_detections
 from shm.values import Hanger, ResponsePoint, WatchedTest
 from shm.values.stated_tension import averaged_now
 from shm.watch import WatchOptions, watch_hanger
-from shm.watch.alert_text import watch_words
+from shm.watch.words.alert_text import watch_words
 
 log = logging.getLogger(__name__)
 

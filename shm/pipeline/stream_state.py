@@ -35,7 +35,7 @@ from shm.values.stream import (
     period_start,
 )
 from shm.watch.ambient_hammer import TOGETHER, AmbientBias, ambient_bias
-from shm.watch.state import Band
+from shm.watch.engine.state import Band
 
 _TESTS_COMPARED = 12
 """Judgement: of so many the mean is known to a tenth of what is taken for likely before any."""

@@ -15,8 +15,8 @@ from shm.identify.options import PASSED
 from shm.monitor import as_modal_test, pooled, read_window, sensor_faults
 from shm.values import PLANES, Alert, Hanger, ModalTest, Mode, Plane, Posterior
 from shm.values.stream import Period, Piece, PooledReading, Stream, StreamEvent, WindowReading
-from shm.watch.notices import led_by
-from shm.watch.stream_watch import StreamOptions, watch_reading, with_believed
+from shm.watch.sensors.stream_watch import StreamOptions, watch_reading, with_believed
+from shm.watch.words.notices import led_by
 
 _LINES = 200  # technical: of a spectrogram, as many as a panel has pixels
 _LINES_S = 20.0  # technical: stretches that part modes 0.1 Hz apart

@@ -54,7 +54,7 @@ from shm.values.stream import (
     WindowReading,
     period_start,
 )
-from shm.watch.stream_watch import gone_back
+from shm.watch.sensors.stream_watch import gone_back
 
 if TYPE_CHECKING:
     from shm.pipeline.stream_steps import Pooled, WindowFound

@@ -35,7 +35,7 @@ from shm.report.states import period_json
 from shm.values import Alert, ControlHanger, Drift, FrequencyResponse, Hanger
 from shm.values.rounding import NINETY_PERCENT, force_unit, rounded_percent
 from shm.values.stated_tension import StatedTension, stated
-from shm.watch.alert_text import structure_words
+from shm.watch.words.alert_text import structure_words
 
 
 def hanger_paper(data: HangerReport, *, is_brief: bool = False) -> Paper:

@@ -19,7 +19,7 @@ from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedT
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
 from shm.values.posterior import DIAGNOSE
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
-from shm.watch.alert_text import lead_of, look_again, quantity_words, size_words
+from shm.watch.words.alert_text import lead_of, look_again, quantity_words, size_words
 
 if TYPE_CHECKING:
     from shm.report.hanger_summary import HangerSummary

@@ -16,7 +16,7 @@ from shm.report.formatting import counted, listed
 from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
 from shm.values.messages import WEEK
 from shm.values.rounding import rounded_percent
-from shm.watch.alert_text import against_baseline_words, look_again
+from shm.watch.words.alert_text import against_baseline_words, look_again
 
 # Judgement: hangers of sound bridges are within a quarter of their nominal tension, or all are off.
 _OFF_NOMINAL = 0.25
@@ -58,7 +58,9 @@ def open_warnings(
         found.append(against_baseline_words(latest.change, hanger))
     notable = [each for each in latest.mistaken if each.is_notable] if latest else []
     if notable:
-        from shm.watch.notices import warning_words  # which brings the engine, and few need it
+        from shm.watch.words.notices import (
+            warning_words,  # which brings the engine, and few need it
+        )
 
         found.append(warning_words(notable, hanger))
     elif latest is not None and latest.is_unexplained:

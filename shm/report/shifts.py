@@ -11,8 +11,8 @@ from shm.report.formatting import Interval
 from shm.report.paper import Table, fold_improbable
 from shm.values import NAN, Drift, is_ratio, kind_of
 from shm.values.rounding import ForceUnit, force_unit
-from shm.watch.alert_text import factor
 from shm.watch.neighbours import BridgePattern, HangerRow
+from shm.watch.words.alert_text import factor
 
 _UNMOVED = 0.01  # of the threshold: no test tells so little
 

@@ -22,9 +22,9 @@ from shm.values import (
     TemperatureCoefficient,
     WatchedQuantity,
 )
-from shm.watch.alert_text import called_words, quantity_words
-from shm.watch.notices import off_the_baseline
-from shm.watch.state import Band, StateHistory, StateOptions, set_free, states
+from shm.watch.engine.state import Band, StateHistory, StateOptions, set_free, states
+from shm.watch.words.alert_text import called_words, quantity_words
+from shm.watch.words.notices import off_the_baseline
 
 if TYPE_CHECKING:
     from shm.watch import Watched

@@ -11,9 +11,9 @@ from shm.resources import when_asked
 
 if TYPE_CHECKING:
     from shm.models import end_stiffness
+    from shm.watch.engine.options import WatchOptions
     from shm.watch.frequency_watch import WatchedFrequencies, watch_frequencies
     from shm.watch.gap import gap_percent, has_grown, joined, watch_gap
-    from shm.watch.options import WatchOptions
     from shm.watch.watching import DatedTest, Newest, Watched, watch_hanger, watch_newest
 
 __all__ = [
@@ -32,7 +32,7 @@ if not TYPE_CHECKING:
                 ("WatchedFrequencies", "watch_frequencies"), "shm.watch.frequency_watch"
             ),
             **dict.fromkeys(("gap_percent", "has_grown", "joined", "watch_gap"), "shm.watch.gap"),
-            "WatchOptions": "shm.watch.options",
+            "WatchOptions": "shm.watch.engine.options",
             **dict.fromkeys(
                 ("DatedTest", "Newest", "Watched", "watch_hanger", "watch_newest"),
                 "shm.watch.watching",

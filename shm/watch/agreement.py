@@ -19,11 +19,11 @@ import numpy as np
 
 from shm.values import TENSION, Beside, Drift, Hanger, ModalTest, WatchedQuantity
 from shm.values.drift import threshold_of
-from shm.watch.limits import LIMITS
-from shm.watch.options import WatchOptions
-from shm.watch.posterior_summary import drift_of_normal
-from shm.watch.quantities import shift_of
-from shm.watch.readings import Reader
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.options import WatchOptions
+from shm.watch.engine.posterior_summary import drift_of_normal
+from shm.watch.engine.quantities import shift_of
+from shm.watch.engine.readings import Reader
 
 BY_A_LOAD = 0.1
 """Of the tension (judgement): a lift or a lorry that stands beside the hanger."""

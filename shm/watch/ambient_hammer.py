@@ -18,8 +18,8 @@ from shm.assumptions import DEFAULTS
 from shm.values import NAN, ModalTest, Mode
 from shm.values.rounding import NINETY_PERCENT, rounded_percent
 from shm.values.stream import PooledReading
-from shm.watch.limits import LIMITS
-from shm.watch.quantities import MeasuredMode
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.quantities import MeasuredMode
 
 TOGETHER = timedelta(hours=3)
 """Judgement: so long temperature and traffic are alike, and a stream that ran has shown a mode."""

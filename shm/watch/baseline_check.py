@@ -28,9 +28,9 @@ from shm.values import (
     ModalTest,
     Mode,
 )
-from shm.watch.limits import LIMITS
-from shm.watch.mistaken_modes import MOST_MISTAKEN, sound_modes
-from shm.watch.quantities import MeasuredMode
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.mistaken_modes import MOST_MISTAKEN, sound_modes
+from shm.watch.engine.quantities import MeasuredMode
 
 _FIT_NO_STATE = "fit no tension and no end stiffness that the description allows"
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.values import WITHOUT_MODEL, Alert, Hanger, ModalTest, Posterior, Reading, WatchedTest
-from shm.watch.frequencies import POOLED_DAYS, FrequencyReader
-from shm.watch.kept_state import from_bytes, to_bytes
-from shm.watch.options import WatchOptions
-from shm.watch.quantities import posterior_at
+from shm.watch.engine.frequencies import POOLED_DAYS, FrequencyReader
+from shm.watch.engine.kept_state import from_bytes, to_bytes
+from shm.watch.engine.options import WatchOptions
+from shm.watch.engine.quantities import posterior_at
 from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watcher
 from shm.watch.watching import AlertState, DatedTest, Newest, after, options_of, replay

@@ -15,7 +15,7 @@ import numpy as np
 
 from shm.models import is_adopted
 from shm.values import Alert, Hanger, Posterior
-from shm.watch.limits import LIMITS
+from shm.watch.engine.limits import LIMITS
 
 
 def gap_percent(posterior: Posterior) -> float:

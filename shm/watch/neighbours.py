@@ -22,7 +22,7 @@ import scipy
 from shm.errors import NothingThere
 from shm.values import NAN, TENSION, Drift, FloatArray, IntArray
 from shm.values.rounding import NINETY_PERCENT
-from shm.watch.limits import LIMITS
+from shm.watch.engine.limits import LIMITS
 
 ExplanationName = Literal[
     "no change", "load redistribution", "load gain", "common shift", "independent shifts"

@@ -16,11 +16,11 @@ import numpy as np
 
 from shm.values import TENSION, Alert, Drift, Hanger, ModalTest
 from shm.values.rounding import NINETY_PERCENT
-from shm.watch.alert_text import is_stiffness, probable_groups, quantity_words, size_words
-from shm.watch.limits import LIMITS
+from shm.watch.engine.limits import LIMITS
+from shm.watch.words.alert_text import is_stiffness, probable_groups, quantity_words, size_words
 
 if TYPE_CHECKING:
-    from shm.watch.readings import Reader
+    from shm.watch.engine.readings import Reader
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,10 @@ from shm.values import (
     WatchedQuantity,
     is_ratio,
 )
-from shm.watch.causes import DetectedChange, Structure
-from shm.watch.change_point import SIZES, Evidence, Sums, select_null, sums_of
-from shm.watch.limits import LIMITS
-from shm.watch.options import (
+from shm.watch.engine.causes import DetectedChange, Structure
+from shm.watch.engine.change_point import SIZES, Evidence, Sums, select_null, sums_of
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.options import (
     OF_ONE_VISIT_YEARS,
     Warmth,
     WatchOptions,
@@ -34,8 +34,8 @@ from shm.watch.options import (
     temperature_offsets,
     years_between,
 )
-from shm.watch.persistence import Course, Seen
-from shm.watch.quantities import MeasuredMode
+from shm.watch.engine.persistence import Course, Seen
+from shm.watch.engine.quantities import MeasuredMode
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,14 +26,18 @@ from shm.values import (
     WatchedTest,
 )
 from shm.values.drift import ENOUGH_AGAINST
-from shm.watch.causes import Columns, DetectedChange, Structure, structure_of
-from shm.watch.change_point import Evidence, evidence_of
-from shm.watch.frequencies import structure_of_frequencies
-from shm.watch.kept_state import to_bytes
-from shm.watch.limits import LIMITS
-from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of
-from shm.watch.persistence import bound_by_recurrence, outlier_probability, select_consistent_tests
-from shm.watch.posterior_summary import (
+from shm.watch.engine.causes import Columns, DetectedChange, Structure, structure_of
+from shm.watch.engine.change_point import Evidence, evidence_of
+from shm.watch.engine.frequencies import structure_of_frequencies
+from shm.watch.engine.kept_state import to_bytes
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of
+from shm.watch.engine.persistence import (
+    bound_by_recurrence,
+    outlier_probability,
+    select_consistent_tests,
+)
+from shm.watch.engine.posterior_summary import (
     SummaryContext,
     probability_of_change,
     summarize_change,

@@ -31,10 +31,14 @@ from shm.values import (
 )
 from shm.values.drift import OF_ONE_VISIT
 from shm.watch.agreement import Way, agreement, way_of
-from shm.watch.alert_text import alert_of, cause_of, message_of, suspects
-from shm.watch.kept_state import from_bytes, to_bytes
-from shm.watch.limits import LIMITS
-from shm.watch.notices import (
+from shm.watch.engine.kept_state import from_bytes, to_bytes
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.options import WatchOptions
+from shm.watch.engine.readings import Reader
+from shm.watch.state_sums import WatchState
+from shm.watch.watcher import Watch, Watcher
+from shm.watch.words.alert_text import alert_of, cause_of, message_of, suspects
+from shm.watch.words.notices import (
     alert_of_agreement,
     alert_of_baseline,
     message_of_odd,
@@ -42,10 +46,6 @@ from shm.watch.notices import (
     notice_of,
     repeated_mistakes,
 )
-from shm.watch.options import WatchOptions
-from shm.watch.readings import Reader
-from shm.watch.state_sums import WatchState
-from shm.watch.watcher import Watch, Watcher
 
 Condition = tuple[str, Way]
 """A quantity, and the way that it went."""

@@ -33,7 +33,7 @@ from shm.store.streams import find_progress, list_pooled, list_stream_events
 from shm.store.tests import list_test_rows
 from shm.values import Hanger
 from shm.values.stream import Chunk, PooledReading, Stream
-from shm.watch.stream_watch import StreamOptions, StreamWatch
+from shm.watch.sensors.stream_watch import StreamOptions, StreamWatch
 from shm_daemon.loop import run
 from tests.benchmarks.stream_load import processor_s
 from tests.benchmarks.stream_trial import as_reading, daily_shift

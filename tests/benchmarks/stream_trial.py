@@ -47,9 +47,9 @@ from shm.values.stream import (  # noqa: E402
     Window,
     WindowReading,
 )
-from shm.watch.kept_state import to_bytes  # noqa: E402
-from shm.watch.stream_reading import usable  # noqa: E402
-from shm.watch.stream_watch import (  # noqa: E402
+from shm.watch.engine.kept_state import to_bytes  # noqa: E402
+from shm.watch.sensors.stream_reading import usable  # noqa: E402
+from shm.watch.sensors.stream_watch import (  # noqa: E402
     HOURS_A_DAY,
     TOGETHER,
     StreamOptions,

@@ -33,9 +33,9 @@ from shm.watch import (
     watcher,
     watching,
 )
-from shm.watch.change_point import Evidence
-from shm.watch.limits import LIMITS
-from shm.watch.readings import Likelihood
+from shm.watch.engine.change_point import Evidence
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.readings import Likelihood
 from shm.watch.state_sums import StateSums, WatchState
 from shm.watch.watcher import Watcher
 from tests.benchmarks import watch_worlds

@@ -43,8 +43,8 @@ from shm.values import TENSION, Alert, Beside, Hanger, ModalTest, Posterior  # n
 from shm.watch import DatedTest, Watched, WatchOptions, watch_hanger  # noqa: E402
 from shm.watch.agreement import agreement  # noqa: E402
 from shm.watch.baseline_check import check_baseline  # noqa: E402
-from shm.watch.notices import alert_of_agreement  # noqa: E402
 from shm.watch.watching import replay  # noqa: E402
+from shm.watch.words.notices import alert_of_agreement  # noqa: E402
 from tests.benchmarks.watch_trial.outcomes import BEGINS  # noqa: E402
 from tests.benchmarks.watch_trial.report import HEADS, events, save_figure, tables  # noqa: E402
 from tests.benchmarks.watch_trial.rivals import rivals  # noqa: E402

@@ -32,7 +32,7 @@ from shm.values import (
 )
 from shm.watch import Newest, WatchOptions, watch_frequencies, watch_newest
 from shm.watch.neighbours import HangerShift
-from shm.watch.neighbours_words import bridge_pattern
+from shm.watch.words.neighbours_words import bridge_pattern
 from tests.contracts.inference_calls import GOLDEN
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import EVERYTHING, frequencies, posterior

@@ -29,10 +29,10 @@ from shm.inference.problem.data_checks import CheckLimits  # noqa: E402
 from shm.inference.problem.shapes import ShapeOptions  # noqa: E402
 from shm.settings import TABLE  # noqa: E402
 from shm.values.hanger import Thresholds  # noqa: E402
+from shm.watch.engine.options import WatchOptions  # noqa: E402
+from shm.watch.engine.state import StateOptions  # noqa: E402
 from shm.watch.neighbours import NeighbourOptions  # noqa: E402
-from shm.watch.options import WatchOptions  # noqa: E402
-from shm.watch.state import StateOptions  # noqa: E402
-from shm.watch.stream_watch import StreamOptions  # noqa: E402
+from shm.watch.sensors.stream_watch import StreamOptions  # noqa: E402
 
 GOLDEN = Path(__file__).parent / "golden" / "defaults.json"
 OPTIONS = (

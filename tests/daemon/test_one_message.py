@@ -31,8 +31,8 @@ from shm.report.hanger_status import Status
 from shm.store import Store, StoredTest, Workspace
 from shm.values import Alert, Change, Drift, Moved, RepeatedMistake, WatchedTest
 from shm.values.messages import Lead, Urgency
-from shm.watch.alert_text import message_of
 from shm.watch.watching import replay
+from shm.watch.words.alert_text import message_of
 from shm_cli.main import cli
 from shm_daemon.web.commands import set_reader, without_commands
 from tests.helpers.entering import LINEAGE, identified, selected

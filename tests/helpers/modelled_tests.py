@@ -11,7 +11,7 @@ import numpy as np
 from shm.models import described
 from shm.models.classes.base import Conditions
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode, Plane, Posterior
-from shm.watch.quantities import common_stiffness
+from shm.watch.engine.quantities import common_stiffness
 from tests.helpers.hangers import HANGER_3
 
 WHEN = datetime(2026, 5, 1, tzinfo=UTC)

@@ -11,8 +11,8 @@ import numpy as np
 
 from shm.models import described
 from shm.values import PLANES, End, FloatArray, ModeReading, Plane, Reading, WatchedQuantity
-from shm.watch.causes import Columns, columns_of
-from shm.watch.options import WatchOptions
+from shm.watch.engine.causes import Columns, columns_of
+from shm.watch.engine.options import WatchOptions
 from shm.watch.watcher import Watch, Watcher
 from tests.helpers.hangers import HANGER_3
 

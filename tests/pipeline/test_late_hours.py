@@ -20,9 +20,9 @@ from shm.store.streams import list_pooled, load_stream_watch
 from shm.store.tests import list_baseline_tests
 from shm.values import Mode
 from shm.values.stream import PooledReading
-from shm.watch.kept_state import from_bytes, to_bytes
-from shm.watch.stream_thermometer import Thermometer
-from shm.watch.stream_watch import StreamState, watch_reading
+from shm.watch.engine.kept_state import from_bytes, to_bytes
+from shm.watch.sensors.stream_thermometer import Thermometer
+from shm.watch.sensors.stream_watch import StreamState, watch_reading
 from tests.helpers.flows import Clock, ingest
 from tests.helpers.live_streams import drain, found_in, with_live_streams
 from tests.helpers.workspaces import make_workspace

@@ -23,9 +23,9 @@ from shm.store import Store, Workspace
 from shm.store.ring import ring_of
 from shm.store.streams import Streams, list_pooled, list_windows, load_stream_watch
 from shm.values.stream import PooledReading
-from shm.watch.kept_state import to_bytes
-from shm.watch.stream_reading import ModeTable
-from shm.watch.stream_watch import StreamState, StreamWatched
+from shm.watch.engine.kept_state import to_bytes
+from shm.watch.sensors.stream_reading import ModeTable
+from shm.watch.sensors.stream_watch import StreamState, StreamWatched
 from tests.helpers.flows import Clock
 from tests.helpers.live_streams import (
     CALM,

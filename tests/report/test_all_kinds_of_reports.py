@@ -26,7 +26,7 @@ from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.paper import Paper
 from shm.report.states import CalledChange, Period, QuantityOverTime, StatesOverTime
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
-from shm.watch.state import Band
+from shm.watch.engine.state import Band
 from tests.helpers.nouns import a_change, a_summary, with_now
 from tests.report.conftest import START
 from tests.report.diagnoses import CASES

@@ -23,7 +23,7 @@ from shm.report.hanger_status import Status
 from shm.report.hanger_tables import neighbours
 from shm.values import Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift
-from shm.watch.neighbours_words import bridge_pattern
+from shm.watch.words.neighbours_words import bridge_pattern
 from tests.helpers.nouns import a_change, a_summary, with_now
 from tests.report.outline import Outline, flat, text_words
 

@@ -27,7 +27,7 @@ from shm.report.modal_test_report import FIGURES as OF_MODAL_TEST
 from shm.report.modal_test_report import modal_test_figures
 from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
 from shm.values import FloatArray
-from shm.watch.state import Band
+from shm.watch.engine.state import Band
 from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, sheet
 from tests.report.sheets import make_sheet, warned
 

@@ -27,7 +27,7 @@ from shm.report.shifts import shift_unit
 from shm.values import Hanger, Posterior, Selection, TensionEstimate
 from shm.values.rounding import force_unit
 from shm.watch.neighbours import HangerShift
-from shm.watch.neighbours_words import bridge_pattern
+from shm.watch.words.neighbours_words import bridge_pattern
 from tests.helpers.nouns import a_summary
 from tests.helpers.slow import few_of
 from tests.report.diagnoses import HANGER, sheet

@@ -20,7 +20,7 @@ from shm.report.hanger_status import Status
 from shm.report.modal_test_report import modal_test_paper
 from shm.report.paper import Paper, Section, Table
 from shm.watch.neighbours import HangerShift
-from shm.watch.neighbours_words import bridge_pattern
+from shm.watch.words.neighbours_words import bridge_pattern
 from tests.helpers.nouns import a_summary
 from tests.report.conftest import START
 from tests.report.diagnoses import CASES, sheet

@@ -30,8 +30,8 @@ from shm.report.assumed import assumptions_line, assumptions_table, with_assumpt
 from shm.store import BaselineGlance
 from shm.values import NAN, FloatArray, Hanger, ModalTest, Mode, Scatter
 from shm.watch import WatchOptions
-from shm.watch.causes import mounted_kg
-from shm.watch.stream_watch import condition_sd
+from shm.watch.engine.causes import mounted_kg
+from shm.watch.sensors.stream_watch import condition_sd
 from tests.helpers.hangers import HANGER_3
 
 ROOT = Path(__file__).resolve().parents[2]

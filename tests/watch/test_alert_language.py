@@ -17,8 +17,7 @@ import pytest
 
 from shm.values import Change, Drift, End, Moved, Plane, WatchedTest
 from shm.values.messages import Lead
-from shm.watch.alert_text import message_of, message_of_agreeing, watch_words
-from shm.watch.causes import (
+from shm.watch.engine.causes import (
     BENDING_STIFFNESS,
     POINT_MASS,
     SECTION_LOSS,
@@ -26,7 +25,8 @@ from shm.watch.causes import (
     TIMEBASE,
     UNEXPLAINED,
 )
-from shm.watch.notices import message_of_odd
+from shm.watch.words.alert_text import message_of, message_of_agreeing, watch_words
+from shm.watch.words.notices import message_of_odd
 from tests.helpers.hangers import HANGER_3
 
 START = datetime(2026, 5, 1, tzinfo=UTC)

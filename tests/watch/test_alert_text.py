@@ -17,9 +17,9 @@ from shm.values import (
     WatchedTest,
 )
 from shm.values.messages import Lead
-from shm.watch.alert_text import shift_words
-from shm.watch.notices import message_of_odd
 from shm.watch.watching import replay
+from shm.watch.words.alert_text import shift_words
+from shm.watch.words.notices import message_of_odd
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_drift, a_watched_test
 

@@ -13,8 +13,8 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
 from shm.values import FloatArray
-from shm.watch.causes import DetectedChange, Direction, Layout
-from shm.watch.change_point import (
+from shm.watch.engine.causes import DetectedChange, Direction, Layout
+from shm.watch.engine.change_point import (
     LOG_SHARES,
     RAMP,
     SIZES,

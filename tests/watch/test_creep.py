@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from shm.values import CreepRate
-from shm.watch.alert_text import watch_words
+from shm.watch.words.alert_text import watch_words
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.synthetic_readings import History, watch_of
 

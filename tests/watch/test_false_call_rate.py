@@ -14,7 +14,7 @@ import pytest
 from _pytest.mark import ParameterSet
 
 from shm.values import FloatArray, Reading
-from shm.watch.options import WatchOptions
+from shm.watch.engine.options import WatchOptions
 from tests.helpers.synthetic_readings import START, History, tension, watch_of
 
 WEAK_STEP = 0.001

@@ -13,7 +13,7 @@ import pytest
 from shm.errors import BadInput
 from shm.values import Hanger, ModalTest, Mode
 from shm.watch import WatchedFrequencies, WatchOptions, watch_frequencies
-from shm.watch.frequencies import FrequencyReader
+from shm.watch.engine.frequencies import FrequencyReader
 from shm.watch.frequency_watch import watch_newest_frequencies
 
 START = datetime(2026, 5, 1, 12, tzinfo=UTC)

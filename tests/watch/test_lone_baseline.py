@@ -13,8 +13,8 @@ from shm.pipeline.conditions import Evidence, why_over
 from shm.values import Alert, Beside, Drift, ModalTest, WatchedTest
 from shm.watch import WatchOptions, watch_newest
 from shm.watch.baseline_check import check_baseline
-from shm.watch.notices import alert_of_baseline
 from shm.watch.watching import DatedTest
+from shm.watch.words.notices import alert_of_baseline
 from tests.helpers.modelled_tests import misnamed
 from tests.helpers.nouns import a_change
 from tests.watch.test_agreement import BEGIN, HANGER, a_test, baseline_of

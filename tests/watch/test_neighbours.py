@@ -12,7 +12,7 @@ import pytest
 from shm.errors import NothingThere
 from shm.values import Drift, FloatArray
 from shm.watch.neighbours import BridgePattern, HangerShift, NeighbourOptions, shifts_of
-from shm.watch.neighbours_words import bridge_pattern
+from shm.watch.words.neighbours_words import bridge_pattern
 
 NOW = datetime(2026, 5, 1, tzinfo=UTC)
 NOISE = 0.003

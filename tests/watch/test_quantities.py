@@ -9,7 +9,7 @@ import numpy as np
 
 from shm.models import described
 from shm.values import TENSION, Hanger, Posterior, Turnbuckle
-from shm.watch.quantities import (
+from shm.watch.engine.quantities import (
     MeasuredMode,
     watched_quantities,
 )

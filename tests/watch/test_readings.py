@@ -17,7 +17,7 @@ from shm.values import (
     ModalTest,
     Reading,
 )
-from shm.watch.readings import Reader
+from shm.watch.engine.readings import Reader
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import (
     EVERYTHING,

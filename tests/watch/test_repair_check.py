@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import pytest
 
 from shm.values import Alert, Change, ModalTest
-from shm.watch.readings import Reader
+from shm.watch.engine.readings import Reader
 from shm.watch.repair_check import share_left, unrepaired
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import frequencies, measured, posterior

@@ -8,10 +8,10 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from shm.values import ModeReading, Reading, RepeatedMistake, WatchedTest
-from shm.watch.kept_state import from_bytes, to_bytes
-from shm.watch.notices import repeated_mistakes
-from shm.watch.quantities import MeasuredMode
+from shm.watch.engine.kept_state import from_bytes, to_bytes
+from shm.watch.engine.quantities import MeasuredMode
 from shm.watch.watching import AlertState, after
+from shm.watch.words.notices import repeated_mistakes
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_change
 

@@ -12,7 +12,7 @@ import pytest
 from shm.errors import NothingThere, UsageError
 from shm.values import FloatArray
 from shm.values.drift import Change, Reading, WatchedQuantity
-from shm.watch.state import StateHistory, StateOptions, set_free, states
+from shm.watch.engine.state import StateHistory, StateOptions, set_free, states
 
 START = datetime(2024, 1, 1, tzinfo=UTC)
 BASELINE_N = 711e3

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.watch.stream_filter import FEATURES, LEVEL, Bank
+from shm.watch.sensors.stream_filter import FEATURES, LEVEL, Bank
 
 COEFFICIENT_SD = np.array([0.001])
 

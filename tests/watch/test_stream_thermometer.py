@@ -12,7 +12,7 @@ import pytest
 from shm.pipeline.stream_steps import Pooled, pool_stream
 from shm.values import outdoor_c
 from shm.values.stream import PooledReading, Window, WindowReading
-from shm.watch.stream_thermometer import Believed, Thermometer, believed
+from shm.watch.sensors.stream_thermometer import Believed, Thermometer, believed
 from tests.watch.test_stream_watch import HANGER, START, from_hour, hours
 from tests.watch.test_stream_watch import watched as watch_readings
 

@@ -16,11 +16,10 @@ from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, StreamEvent
 from shm.watch.ambient_hammer import ambient_bias
-from shm.watch.kept_state import from_bytes
-from shm.watch.notices import led_by
-from shm.watch.stream_causes import find_cause
-from shm.watch.stream_reading import ModeTable
-from shm.watch.stream_watch import (
+from shm.watch.engine.kept_state import from_bytes
+from shm.watch.sensors.stream_causes import find_cause
+from shm.watch.sensors.stream_reading import ModeTable
+from shm.watch.sensors.stream_watch import (
     StreamOptions,
     StreamState,
     StreamWatch,
@@ -28,6 +27,7 @@ from shm.watch.stream_watch import (
     watch_reading,
     with_believed,
 )
+from shm.watch.words.notices import led_by
 
 AREA = math.pi * 0.07**2 / 4
 HANGER = Hanger(

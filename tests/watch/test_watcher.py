@@ -11,8 +11,8 @@ import pytest
 
 from shm.errors import BadInput
 from shm.values import WatchedTest
-from shm.watch.causes import TIMEBASE
-from shm.watch.options import WatchOptions
+from shm.watch.engine.causes import TIMEBASE
+from shm.watch.engine.options import WatchOptions
 from shm.watch.watcher import Watch
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.synthetic_readings import (

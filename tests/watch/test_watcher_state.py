@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from shm.errors import BadInput
-from shm.watch.kept_state import from_bytes, to_bytes
-from shm.watch.options import WatchOptions
+from shm.watch.engine.kept_state import from_bytes, to_bytes
+from shm.watch.engine.options import WatchOptions
 from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watcher
 from tests.helpers.hangers import HANGER_3

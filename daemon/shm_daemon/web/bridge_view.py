@@ -21,7 +21,7 @@ from shm.report.hanger_summary import HangerSummary
 from shm.values import Hanger
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm.watch.neighbours import BridgePattern, HangerShift
-from shm.watch.neighbours_words import bridge_pattern
+from shm.watch.words.neighbours_words import bridge_pattern
 from shm_daemon.web.background_work import background_worker_of
 from shm_daemon.web.site import Site
 

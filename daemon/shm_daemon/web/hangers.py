@@ -25,7 +25,7 @@ from shm.store.recordings import count_stages
 from shm.store.tests import count_tests, list_test_rows
 from shm.values import Hanger
 from shm.values.rounding import ForceUnit, force_unit
-from shm.watch.alert_text import called_words
+from shm.watch.words.alert_text import called_words
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader

@@ -16,7 +16,7 @@ from shm.report.figures import specification as spec
 from shm.report.figures import time_axes
 from shm.report.formatting import Interval
 from shm.report.sizes import size_of
-from shm.watch.state import Band as Bounds
+from shm.watch.engine.state import Band as Bounds
 
 _UNIT = "N m/rad"  # of what `shm.models.end_stiffness` returns
 _PANEL_INCHES = 1.5  # layout

@@ -17,7 +17,7 @@ from shm.report.figures import time_axes
 from shm.report.states import QuantityOverTime
 from shm.values import FloatArray
 from shm.values.notes import Note, NoteKind
-from shm.watch.state import Band as Bounds
+from shm.watch.engine.state import Band as Bounds
 
 _LONGEST_WORDS = 200  # layout: characters of a note in a hover; the page has all
 _AT_FOOT = 0.03  # layout: of the height, where signs of what people did stand

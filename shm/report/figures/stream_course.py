@@ -13,7 +13,7 @@ from shm.report.figures import specification as spec
 from shm.values import FloatArray
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PERIODS, Period, StreamEvent
-from shm.watch.state import Band as Bounds
+from shm.watch.engine.state import Band as Bounds
 
 _HUES = ("blue", "orange", "green", "purple")
 _SHOWN_MODES = len(_HUES)

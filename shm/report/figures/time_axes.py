@@ -11,7 +11,7 @@ from shm.report.figures import specification as spec
 from shm.report.formatting import Interval
 from shm.report.states import CalledChange
 from shm.values import FloatArray, IntArray
-from shm.watch.state import Band as Bounds
+from shm.watch.engine.state import Band as Bounds
 
 TIME = "time of the test (UTC)"
 MOST_POINTS = 1_000

@@ -29,7 +29,7 @@ from shm.store import EventKind, Store, TrendPoint, Workspace
 from shm.store.posteriors import find_latest_trends, list_trend
 from shm.values import Hanger
 from shm.values.bar_description import describe_bar
-from shm.watch.alert_text import called_words
+from shm.watch.words.alert_text import called_words
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.background_work import RETRY_AFTER, BackgroundWorker, background_worker_of
 from shm_daemon.web.faults import Refused

@@ -28,10 +28,10 @@ from shm.values import (
     is_ratio,
 )
 from shm.values.drift import threshold_of
-from shm.watch.change_point import LOG_SHARES, SAMPLES, SIZES, STEP, Evidence
-from shm.watch.limits import LIMITS
-from shm.watch.options import DAYS_PER_YEAR, WatchOptions
-from shm.watch.quantities import shift_of, value_at
+from shm.watch.engine.change_point import LOG_SHARES, SAMPLES, SIZES, STEP, Evidence
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.options import DAYS_PER_YEAR, WatchOptions
+from shm.watch.engine.quantities import shift_of, value_at
 
 
 @cache

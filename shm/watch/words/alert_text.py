@@ -28,7 +28,7 @@ from shm.values import (
 )
 from shm.values.messages import NEXT_TEST, TODAY, WEEK, Lead, Urgency
 from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
-from shm.watch.limits import LIMITS
+from shm.watch.engine.limits import LIMITS
 
 if TYPE_CHECKING:
     from shm.models.effects.base import OverTime

@@ -24,8 +24,8 @@ import numpy as np
 import scipy
 
 from shm.values import FloatArray, IntArray
-from shm.watch.limits import LIMITS
-from shm.watch.options import DAYS_PER_YEAR
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.options import DAYS_PER_YEAR
 
 CLIP = 3.5
 """Sds: a reading then adds 4.5 to a log likelihood ratio, of the 13.7 that 100 years take."""

@@ -30,7 +30,7 @@ from shm.values import (
     WatchedQuantity,
     is_ratio,
 )
-from shm.watch.limits import LIMITS
+from shm.watch.engine.limits import LIMITS
 
 MeasuredMode = tuple[Plane, int]
 """Plane and order, which counts from 1."""

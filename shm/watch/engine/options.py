@@ -15,7 +15,7 @@ from shm.assumptions import DEFAULTS, Assumptions
 from shm.errors import UsageError
 from shm.values import NAN, FloatArray
 from shm.values.drift import OF_ONE_VISIT
-from shm.watch.limits import LIMITS
+from shm.watch.engine.limits import LIMITS
 
 
 @dataclass(frozen=True)

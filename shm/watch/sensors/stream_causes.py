@@ -13,14 +13,14 @@ from datetime import UTC, datetime
 import numpy as np
 
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode, Moved, Plane, Posterior
-from shm.watch.causes import SENSOR_MASS, TIMEBASE, UNEXPLAINED, structure_of
-from shm.watch.change_point import evidence_of, sums_of
-from shm.watch.limits import LIMITS
-from shm.watch.options import WatchOptions
-from shm.watch.posterior_summary import SummaryContext, rank_causes
-from shm.watch.readings import Reader
+from shm.watch.engine.causes import SENSOR_MASS, TIMEBASE, UNEXPLAINED, structure_of
+from shm.watch.engine.change_point import evidence_of, sums_of
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.options import WatchOptions
+from shm.watch.engine.posterior_summary import SummaryContext, rank_causes
+from shm.watch.engine.readings import Reader
+from shm.watch.sensors.stream_reading import ModeTable, baseline_of
 from shm.watch.state_sums import effects_of
-from shm.watch.stream_reading import ModeTable, baseline_of
 
 EXCHANGED = "exchanged planes"
 """A cause that no hammer test has: the cables of the sensors are exchanged. Record 0002."""

@@ -32,7 +32,10 @@ from shm.values.messages import WEEK
 from shm.values.rounding import listed
 from shm.values.stream import StreamEvent
 from shm.watch.agreement import BY_A_LOAD, Agreement, way_of
-from shm.watch.alert_text import (
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.mistaken_modes import MOST_MISTAKEN
+from shm.watch.engine.quantities import MeasuredMode
+from shm.watch.words.alert_text import (
     against_baseline_words,
     alert_of,
     is_stiffness,
@@ -42,9 +45,6 @@ from shm.watch.alert_text import (
     size_words,
     structure_words,
 )
-from shm.watch.limits import LIMITS
-from shm.watch.mistaken_modes import MOST_MISTAKEN
-from shm.watch.quantities import MeasuredMode
 
 _CHECK: AlertKind = "check the baseline"
 

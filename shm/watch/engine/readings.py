@@ -38,10 +38,10 @@ from shm.values import (
     Reading,
     WatchedQuantity,
 )
-from shm.watch.causes import columns_of, mounted_kg
-from shm.watch.limits import LIMITS
-from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
-from shm.watch.quantities import (
+from shm.watch.engine.causes import columns_of, mounted_kg
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
+from shm.watch.engine.quantities import (
     MeasuredMode,
     base_point,
     log_frequencies,

@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from shm.values import BoolArray, FloatArray
-from shm.watch.limits import LIMITS
+from shm.watch.engine.limits import LIMITS
 
 MOST_MISTAKEN = 1 / 3  # judgement: where more modes fit no state, it is the test that does not
 

@@ -19,9 +19,9 @@ from shm.models.classes.end_effects import coupled_bar
 from shm.models.hanger import PointMass, solve
 from shm.models.hanger.physical import Zone
 from shm.values import PLANES, TENSION, End, FloatArray, Hanger, IntArray, WatchedQuantity
-from shm.watch.limits import LIMITS
-from shm.watch.options import WatchOptions
-from shm.watch.quantities import MeasuredMode
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.options import WatchOptions
+from shm.watch.engine.quantities import MeasuredMode
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,8 @@ from shm.models import class_of
 from shm.models.classes.tensioned_beam import frequencies_hz
 from shm.values import PLANES, BoolArray, FloatArray, Hanger, Mode, Posterior
 from shm.values.stream import PooledReading
-from shm.watch.limits import LIMITS
-from shm.watch.quantities import MeasuredMode, base_point, log_frequencies, posterior_at
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.quantities import MeasuredMode, base_point, log_frequencies, posterior_at
 
 _HALVES = np.array([0.5, -0.5])  # by definition: of a contrast, in each of PLANES
 # What is tried where there is no baseline: xi = L sqrt(T/EI) from slack to a slender cable, springs

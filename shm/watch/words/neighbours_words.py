@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded, rounded_percent
-from shm.watch.limits import LIMITS
+from shm.watch.engine.limits import LIMITS
 from shm.watch.neighbours import (
     REACH,
     BridgePattern,

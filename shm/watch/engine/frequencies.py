@@ -18,10 +18,10 @@ import scipy
 from shm.assumptions import DEFAULTS
 from shm.errors import BadInput
 from shm.values import FREQUENCY, ModalTest, ModeReading, Reading, WatchedQuantity
-from shm.watch.causes import UNEXPLAINED, Columns, Direction, Layout, Structure
-from shm.watch.limits import LIMITS
-from shm.watch.options import DAYS_PER_YEAR, WatchOptions, reference_of
-from shm.watch.quantities import MeasuredMode
+from shm.watch.engine.causes import UNEXPLAINED, Columns, Direction, Layout, Structure
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.options import DAYS_PER_YEAR, WatchOptions, reference_of
+from shm.watch.engine.quantities import MeasuredMode
 
 POOLED_DAYS = 3.0  # judgement: short beside three weeks in which an owner wants to know, and cheap
 

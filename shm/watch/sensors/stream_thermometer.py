@@ -13,7 +13,7 @@ from datetime import datetime, timedelta
 
 from shm.values import COLDEST_C, NAN, WARMEST_C, outdoor_c
 from shm.values.stream import StreamEvent, Window, WindowReading
-from shm.watch.limits import LIMITS
+from shm.watch.engine.limits import LIMITS
 
 _WINDOW = timedelta(minutes=10)  # the least time over which two values are compared
 

@@ -23,9 +23,9 @@ from shm.values import FloatArray
 from shm.values.drift import TENSION, Change, Reading, TemperatureCoefficient, WatchedQuantity
 from shm.values.kinds import NAN
 from shm.values.rounding import NINETY_PERCENT
-from shm.watch.limits import LIMITS
-from shm.watch.options import Assumed, reference_of
-from shm.watch.quantities import value_at
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.options import Assumed, reference_of
+from shm.watch.engine.quantities import value_at
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,9 +22,9 @@ import numpy as np
 import scipy
 
 from shm.values import BoolArray, FloatArray, IntArray
-from shm.watch.causes import DetectedChange, Direction, Layout
-from shm.watch.limits import LIMITS
-from shm.watch.options import OF_ONE_VISIT_YEARS
+from shm.watch.engine.causes import DetectedChange, Direction, Layout
+from shm.watch.engine.limits import LIMITS
+from shm.watch.engine.options import OF_ONE_VISIT_YEARS
 
 STEP, RAMP = 0, 1
 SIZES = np.array([1.0, 6.0])

@@ -20,9 +20,9 @@ import numpy as np
 import scipy
 
 from shm.values import BoolArray, FloatArray
-from shm.watch.causes import BENDING_STIFFNESS, SPRINGS
-from shm.watch.change_point import RAMP, Evidence
-from shm.watch.limits import LIMITS
+from shm.watch.engine.causes import BENDING_STIFFNESS, SPRINGS
+from shm.watch.engine.change_point import RAMP, Evidence
+from shm.watch.engine.limits import LIMITS
 
 
 @dataclass(frozen=True, eq=False)

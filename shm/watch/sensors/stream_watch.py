@@ -41,13 +41,22 @@ from shm.values.stream import (
     StreamEventKind,
     WindowReading,
 )
-from shm.watch.causes import TIMEBASE
-from shm.watch.kept_state import from_bytes, to_bytes
-from shm.watch.limits import LIMITS
-from shm.watch.stream_causes import EXCHANGED, StreamCause, find_cause, find_exchange
-from shm.watch.stream_filter import CLIP, FAST, FEATURES, LEVEL, NOTHING, SLOW, Bank, Evidence
-from shm.watch.stream_reading import ModeTable, SeenReading, planes_of, usable
-from shm.watch.stream_thermometer import Believed, Thermometer, believed
+from shm.watch.engine.causes import TIMEBASE
+from shm.watch.engine.kept_state import from_bytes, to_bytes
+from shm.watch.engine.limits import LIMITS
+from shm.watch.sensors.stream_causes import EXCHANGED, StreamCause, find_cause, find_exchange
+from shm.watch.sensors.stream_filter import (
+    CLIP,
+    FAST,
+    FEATURES,
+    LEVEL,
+    NOTHING,
+    SLOW,
+    Bank,
+    Evidence,
+)
+from shm.watch.sensors.stream_reading import ModeTable, SeenReading, planes_of, usable
+from shm.watch.sensors.stream_thermometer import Believed, Thermometer, believed
 from shm.watch.watching import AlertState, after
 
 HOURS_A_DAY = 24.0  # by definition
